@@ -1,4 +1,4 @@
-"""Writes the drawings in docs/images (`make docs`); with --check only tells whether they are up to date.
+"""Writes the drawings in docs/images (`make docs`); with --check only says whether they are up to date.
 
 Each is drawn by a module of docs/drawings: the rooms from the code's imports, the spectra from a simulated drive.
 """
@@ -13,7 +13,7 @@ from drawings.rooms import rooms
 from drawings.service import service
 from drawings.spectra import spectra
 
-TOLERANCE_PX: Final = 1.0  # of the spectra, which machines round differently
+TOLERANCE_PX: Final = 1.0  # chosen: of the spectra, which machines round differently
 IMAGES: Final = Path(__file__).with_name("images")
 DRAWINGS: Final[Mapping[str, Callable[[], str]]] = {
     "half-car.svg": half_car,

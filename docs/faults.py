@@ -1,6 +1,6 @@
-"""Writes docs/faults.md from tests/faults.toml and from what `make test-vm` and `make soak` measured.
+"""Writes docs/faults.md from tests/faults.toml and from the measurements of `make test-vm` and `make soak`.
 
-python docs/make.py --record takes the measurements of the last runs from build/ into docs/*.json first.
+`python docs/make.py --record` first copies the measurements of the last runs from build/ into docs/*.json.
 """
 
 import json
@@ -159,7 +159,7 @@ def _line(row: dict[str, str], tests: dict[str, Any]) -> str:
 
 
 def record() -> None:
-    """Keep the measurements of the last runs, where there are any, and of earlier ones what these did not measure."""
+    """Store the measurements of the last runs, keeping earlier ones for what these did not measure."""
     for found, kept in RECORDED:
         if found.exists():
             measured = json.loads(kept.read_text()) if kept.exists() else {}

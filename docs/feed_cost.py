@@ -1,7 +1,7 @@
-"""What the feeders cost (docs/feed.md, kuksa.md, traccar.md), from what was measured.
+"""The cost of the feeders (docs/feed.md, kuksa.md, traccar.md), from measurements.
 
 `python -m benchmarks.speed.feed --output docs/feed_cost.json` and `python -m benchmarks.speed.feeders --output
-docs/feeders_cost.json`.
+docs/feeders_cost.json` make them.
 """
 
 import json
@@ -12,7 +12,7 @@ DOCS: Final = Path(__file__).parent
 
 
 def cost() -> str:
-    """What the feed takes of one core."""
+    """The feed's share of one core."""
     told = json.loads((DOCS / "feed_cost.json").read_text(encoding="utf-8"))
     return (
         f"{told['cpu_pct']:.1f} % of one core and {told['rss_mb']:.0f} MB at {told['rate_hz']:.0f} samples a second, "
@@ -23,18 +23,18 @@ def cost() -> str:
 
 
 def told() -> str:
-    """What the feed printed when that was measured."""
+    """The output of the feed in that measurement."""
     found = json.loads((DOCS / "feed_cost.json").read_text(encoding="utf-8"))
     return f"```json\n{json.dumps(found['told'], separators=(',', ':'))}\n```\n"
 
 
 def kuksa() -> str:
-    """What KUKSA's feeder takes of one core."""
+    """The KUKSA feeder's share of one core."""
     return _beside("kuksa", "publishing what is new")
 
 
 def traccar() -> str:
-    """What Traccar's feeder takes of one core."""
+    """The Traccar feeder's share of one core."""
     return _beside("traccar", "sending what is new")
 
 

@@ -1,4 +1,4 @@
-"""What `make fleet-test` counted (docs/fleet.md): docs/fleet_test.json, the last run with each number of vehicles."""
+"""The counts of `make fleet-test` (docs/fleet.md): docs/fleet_test.json, the last run with each number of vehicles."""
 
 import json
 from pathlib import Path
@@ -9,12 +9,12 @@ COUNTS: Final = DOCS / "fleet_test.json"
 
 
 def counted() -> str:
-    """What was done and what came of it, of the last run with each number of vehicles."""
+    """The faults injected and their effect, for the last run with each number of vehicles."""
     return table(json.loads(COUNTS.read_text(encoding="utf-8")))
 
 
 def table(runs: list[dict[str, Any]]) -> str:
-    """What was done and what came of it, a column for each number of vehicles."""
+    """The faults injected and their effect, a column for each number of vehicles."""
     times = {1: "once", 2: "twice", 3: "three times"}
     first = runs[0]
     blows = ", ".join(f"{blow} {times[n]}" for blow, n in first["blows"].items())
@@ -30,7 +30,7 @@ def table(runs: list[dict[str, Any]]) -> str:
 
 
 def rows(counts: dict[str, Any]) -> dict[str, Any]:
-    """One run's figures by what they are."""
+    """One run's figures by name."""
     return {
         "Seconds": counts["seconds"],
         "Estimates written by the vehicles, rows of them": f"{counts['estimates']}, {counts['estimate_rows']}",
@@ -46,7 +46,7 @@ def rows(counts: dict[str, Any]) -> dict[str, Any]:
 
 
 def take(counts: dict[str, Any]) -> None:
-    """Keep them in place of the last run with as many vehicles."""
+    """Store these counts in place of the last run with as many vehicles."""
     others = [run for run in json.loads(COUNTS.read_text(encoding="utf-8")) if run["vehicles"] != counts["vehicles"]]
     runs = sorted([*others, counts], key=lambda run: int(run["vehicles"]))
     COUNTS.write_text(json.dumps(runs, indent=1) + "\n", encoding="utf-8")

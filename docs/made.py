@@ -1,4 +1,4 @@
-"""What every made page has in common: marks that are filled, tables, and how it is compared."""
+"""Common parts of the page generators: filled marks, tables, and comparison."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -15,13 +15,13 @@ NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e-?\d+)?")
 
 
 class StaleError(Exception):
-    """A page that does not say what its source does."""
+    """A page that is not up to date."""
 
 
 def keep_up_to_date(page: Path, text: str, *, is_check: bool, tolerance: float = 0.0) -> None:
-    """Write ``page``, or where ``is_check`` raise StaleError where it says something else.
+    """Write ``page``, or with ``is_check`` raise StaleError if it differs.
 
-    What is computed from a simulation may differ by ``tolerance`` in each number: machines round differently.
+    Numbers computed by simulation may differ by ``tolerance``, as machines round differently.
     """
     if not is_check:
         page.write_text(text, encoding="utf-8")
@@ -30,7 +30,7 @@ def keep_up_to_date(page: Path, text: str, *, is_check: bool, tolerance: float =
 
 
 def filled(text: str, parts: Mapping[str, Callable[[], str]]) -> str:
-    """``text`` with what stands between <!-- made: NAME --> and <!-- end: NAME --> made anew.
+    """``text`` with the parts between <!-- made: NAME --> and <!-- end: NAME --> replaced.
 
     Raises ValueError for a part without its marks, or marks without their part.
     """
@@ -51,7 +51,7 @@ def table(heading: str, rows: Iterable[Sequence[str]]) -> str:
 
 
 def agrees(one: str, other: str, tolerance: Callable[[str], float]) -> bool:
-    """True where only numbers differ, each by no more than what ``tolerance`` gives for the number as printed."""
+    """True if only numbers differ, each by at most ``tolerance`` of the number as printed."""
     if NUMBER.sub("#", one) != NUMBER.sub("#", other):
         return False
     pairs = zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
@@ -59,9 +59,9 @@ def agrees(one: str, other: str, tolerance: Callable[[str], float]) -> bool:
 
 
 def key_table(model: type, *without: str) -> str:
-    """A table of TOML's keys: default, limits and description of every field of ``model`` but those named.
+    """A table of TOML keys: default, limits and description of every field of ``model`` except those named.
 
-    ``model`` is a pydantic model or an annotated dataclass; what is required comes first.
+    ``model`` is a pydantic model or an annotated dataclass; required keys come first.
     """
     schema = TypeAdapter(model).json_schema()
     required = schema.get("required", ())
@@ -79,12 +79,12 @@ def key_table(model: type, *without: str) -> str:
 
 
 def _none_of(key: dict[str, Any]) -> dict[str, Any] | None:
-    """A schema leaves the default out where a factory makes it: an empty table."""
+    """The default that a schema omits because a factory makes it: an empty table."""
     return {} if key.get("type") == "object" else None
 
 
 def default_of(default: Any) -> str:
-    """What holds when the key is absent, as TOML would write it."""
+    """The value of an absent key, as TOML writes it."""
     if default is None:
         return "absent"
     if isinstance(default, bool):
@@ -95,7 +95,7 @@ def default_of(default: Any) -> str:
 
 
 def limits_of(schema: dict[str, Any], named: Mapping[str, Any] = MappingProxyType({})) -> str:
-    """What the JSON schema of a key allows, in words; empty where it allows all of its kind."""
+    """The limits of a key by its JSON schema, in words; empty without any."""
     if "$ref" in schema:
         return limits_of(named.get(schema["$ref"].rsplit("/", 1)[-1], {}), named)
     if "anyOf" in schema:

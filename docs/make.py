@@ -1,8 +1,8 @@
-"""Makes what is computed in the documents: python docs/make.py [--check] [PAGE...]
+"""Makes the computed parts of the documents: python docs/make.py [--check] [PAGE...]
 
-Without a page all of them. With --check nothing is written, and it ends with 1 where a page is not up to date. Words
-stand in the pages themselves; between <!-- made: NAME --> and <!-- end: NAME --> stands what the code, a measurement
-or a command says.
+Without a page it makes all. With --check it writes nothing and exits with 1 if a page is not up to date. Prose is in
+the pages themselves; the text between <!-- made: NAME --> and <!-- end: NAME --> comes from the code, a measurement or
+a command.
 """
 
 import argparse
@@ -18,9 +18,8 @@ import errors_table
 import faults
 import feed_cost
 import fleet_counts
-import packed
 import performance
-import phone_import
+import printed
 import reference
 import scale
 import studies
@@ -29,12 +28,12 @@ from made import ROOT, StaleError, filled, keep_up_to_date
 DOCS: Final = ROOT / "docs"
 PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
     **{f"docs/{page}": parts for page, parts in reference.PARTS.items()},
-    "docs/contribute.md": {"packed": packed.printed},
+    "docs/contribute.md": {"packed": printed.campaign_pack},
     "docs/feed.md": {"cost": feed_cost.cost, "told": feed_cost.told},
     "docs/fleet.md": {"fleet test": fleet_counts.counted},
     "docs/hardware.md": {"noise": studies.noise_that_works},
     "docs/kuksa.md": {"cost": feed_cost.kuksa},
-    "docs/phone.md": {"output": phone_import.printed, "accuracy": studies.phone_beside_can},
+    "docs/phone.md": {"output": printed.phone_import, "accuracy": studies.phone_beside_can},
     "docs/traccar.md": {"cost": feed_cost.traccar},
 }
 """Pages with words of their own, by their place; each part between its marks."""
@@ -68,19 +67,19 @@ WHOLE: Final[Mapping[str, Callable[[], str]]] = {
 
 
 def pages() -> list[str]:
-    """Every page that is made, by its place in the repository."""
+    """Every page with computed parts, by its path in the repository."""
     return [*PARTS, *WHOLE]
 
 
 def text_of(page: str) -> str:
-    """What the page should say."""
+    """The up-to-date text of a page."""
     if page in WHOLE:
         return WHOLE[page]()
     return filled((ROOT / page).read_text(encoding="utf-8"), PARTS[page])
 
 
 def tolerance_of(page: str) -> float:
-    """By how much a number may differ from machine to machine."""
+    """Permitted difference of a number between machines."""
     return drawn.TOLERANCE_PX if page.endswith(".svg") else TOLERANCES.get(page, 0.0)
 
 

@@ -25,11 +25,11 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 IMAGES: Final = Path(__file__).with_name("images")
 SPRINGSCALE: Final = (sys.executable, "-m", "gateway")
-N_FIRST_DRIVE: Final = 5
+N_FIRST_DRIVE: Final = 5  # batches of the demonstration's first drive
 N_WEIGHED: Final = 9  # the first drive's five batches, the second's three empty ones and its first loaded one
-PATIENCE_S: Final = 300.0
-MOST_BYTES: Final = 300_000
-GAP_PX: Final = 24
+PATIENCE_S: Final = 300.0  # chosen: timeout
+MOST_BYTES: Final = 300_000  # chosen: of a picture
+GAP_PX: Final = 24  # chosen
 LAPTOP: Final[dict[str, Any]] = {"viewport": {"width": 1600, "height": 1000}, "color_scheme": "light"}
 REPORT: Final[dict[str, Any]] = {"viewport": {"width": 1240, "height": 1075}, "color_scheme": "light"}
 PHONE: Final[dict[str, Any]] = {
@@ -43,7 +43,7 @@ PHONE: Final[dict[str, Any]] = {
 
 @contextmanager
 def demonstration(speed: str, *more: str) -> Iterator[str]:
-    """Where the page of a running demonstration is."""
+    """The address of a running demonstration's page."""
     command = [*SPRINGSCALE, "demo", "--port", "0", "--speed", speed, *more]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
         try:
@@ -54,7 +54,7 @@ def demonstration(speed: str, *more: str) -> Iterator[str]:
 
 
 def wait_for_batches(url: str, are_there: Callable[[list[dict[str, Any]]], bool]) -> None:
-    """Until the batches in the history are those one waits for."""
+    """Wait until the history has the expected batches."""
     end_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < end_s:
         with urllib.request.urlopen(f"{url}/api/v1/estimates?spectra=false") as answer:
@@ -71,7 +71,7 @@ def weighed(n: int) -> Callable[[list[dict[str, Any]]], bool]:
 
 
 def opened(browser: Browser, url: str, options: dict[str, Any]) -> Page:
-    """A page with every chart drawn that it unfolds: on a phone the first ones."""
+    """A page with all its charts drawn; on a phone the first ones."""
     page = browser.new_page(locale="en-GB", timezone_id="UTC", **options)
     page.goto(url)
     for chart in ("#payload-chart", *(() if options is PHONE else ("#spectra-phase_rad",))):
@@ -86,7 +86,7 @@ def down_to(page: Page, last: str) -> Any:
 
 
 def save(picture: bytes, name: str) -> None:
-    """As a PNG of 256 colours: charts and words need no more."""
+    """Save a PNG of 256 colours, which suffices for charts and text."""
     with Image.open(BytesIO(picture)) as whole:
         whole.convert("RGB").quantize(256).save(IMAGES / name, optimize=True)
     if (IMAGES / name).stat().st_size > MOST_BYTES:

@@ -1,7 +1,7 @@
-"""The documents as a site, `make site`: every page of docs/ and those of the top folder, built strictly by mkdocs.
+"""Builds the documents as a site, `make site`: every page of docs/ and those of the top folder, strictly by mkdocs.
 
-A link in a document is relative to its place in the repository. In the site it becomes relative to the page; where it
-leads to something that is no page, such as a test, its words stay and the link goes.
+A link in a document is relative to its place in the repository. In the site it becomes relative to the page; a link to
+something that is not a page, such as a test, becomes plain text.
 """
 
 import os
@@ -40,7 +40,7 @@ def main() -> None:
 
 
 def gather() -> None:
-    """Every page where the site has it, with links that fit there."""
+    """Copy every page to its place in the site, with adapted links."""
     shutil.rmtree(PAGES, ignore_errors=True)
     places = {file: file.relative_to(DOCS) for pattern in STATIC for file in DOCS.rglob(pattern)}
     places |= {ROOT / name: Path(name) for name in TOP_PAGES}
@@ -73,7 +73,7 @@ def fitted(source: Path, places: dict[Path, Path]) -> str:
 
 
 def with_formulas(text: str) -> str:
-    """Markdown with what stands between dollar signs as MathML, but not in code."""
+    """Markdown with formulas between dollar signs as MathML, except in code."""
     parts: list[str] = []
     end = 0
     for code in VERBATIM.finditer(text):
@@ -89,7 +89,7 @@ def _as_mathml(formula: re.Match[str]) -> str:
 
 
 def list_of(decisions: Path) -> str:
-    """A page that names every decision by its first line."""
+    """A page that lists every decision by its first line."""
     titles = {page.name: page.read_text(encoding="utf-8").splitlines()[0] for page in sorted(decisions.glob("*.md"))}
     return "# Decisions\n\n" + "".join(f"- [{title.removeprefix('# ')}]({name})\n" for name, title in titles.items())
 

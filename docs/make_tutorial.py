@@ -1,11 +1,11 @@
-"""Runs the commands of tutorial.md and writes what they print below them; with --check only compares.
+"""Runs the commands of tutorial.md and writes their output below them; with --check only compares.
 
-Commands stand in fences of kind sh, what they print in a fence of kind text below. All run in one shell in an empty
-folder. Where something must differ from run to run, a comment above the output says what, as a regular expression:
+Commands are in fences of kind sh, their output in a fence of kind text below. All run in one shell in an empty folder.
+A comment above an output gives what may differ from run to run, as a regular expression:
 
     <!-- may differ: "age_s":[0-9.]+ -->
 
-Numbers may differ by one in their last printed digit, for machines round differently. The port is a free one.
+Numbers may differ by one in their last printed digit, as machines round differently. The port is a free one.
 """
 
 import os
@@ -23,7 +23,7 @@ from made import ROOT, agrees
 PAGE: Final = Path(__file__).with_name("tutorial.md")
 PORT: Final = "8000"
 MARK: Final = "@@ block"
-PATIENCE_S: Final = 600.0
+PATIENCE_S: Final = 600.0  # chosen: timeout
 STEP: Final = re.compile(
     r"```sh\n(?P<commands>.*?)```\n"
     r"(?:\n(?:<!-- may differ: (?P<rule>[^\n]+) -->\n\n)?```text\n(?P<output>.*?)```\n)?",

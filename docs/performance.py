@@ -1,4 +1,4 @@
-"""Writes docs/performance.md from docs/performance.json, which `make bench` measured; --check compares."""
+"""Writes docs/performance.md from docs/performance.json, the figures of `make bench`; --check compares."""
 
 import sys
 from collections.abc import Mapping

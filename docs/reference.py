@@ -1,6 +1,6 @@
-"""The parts of the reference pages that are made from the code: tables of keys, fields, reasons and findings.
+"""The parts of the reference pages made from the code: tables of keys, fields, reasons and findings.
 
-``PARTS`` names them by page and mark; the words around them stand in the pages (docs/make.py fills the marks).
+``PARTS`` names them by page and mark; the prose is in the pages (docs/make.py fills the marks).
 """
 
 import json
@@ -29,7 +29,7 @@ from gateway.calibration.axle_weights import (
 from gateway.calibration.campaign import CampaignTable, RunTable
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.inspection.explained import EXPLAINED, Topic
-from gateway.cli.text.axle_weights import vehicle_block
+from gateway.cli.calibration import vehicle_block
 from gateway.config import Settings
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Lack
@@ -67,13 +67,13 @@ SI_UNITS: Final = {
 
 
 def signals_table() -> str:
-    """Every signal: what it measures, and what it is for."""
+    """Every signal: its quantity and its use."""
     rows = ((f"`{signal}`", QUANTITIES[signal].replace("_", " "), meaning) for signal, meaning in MEANINGS.items())
     return table("NAME | quantity | meaning", rows)
 
 
 def units_table() -> str:
-    """Every quantity: its SI unit, and the names that are accepted."""
+    """Every quantity: its SI unit, and the accepted unit names."""
     rows = (
         (
             quantity.replace("_", " "),
@@ -102,7 +102,7 @@ GOLDEN_CAR: float = 0.15  # unsprung over sprung mass of a quarter-car, both axl
 
 
 def sprung_section() -> str:
-    """How axle weights become sprung mass and front share, with the example's numbers."""
+    """The calculation of sprung mass and front share from axle weights, with the example's numbers."""
     body = sprung_of(WEIGHED)
     estimated_pct, given_pct = 100.0 * ESTIMATED_UNSPRUNG_STD, 100.0 * WEIGHED_STD
     shares = {car: 100.0 * (front + rear) / 2.0 / sprung for car, (sprung, front, rear) in MEASURED.items()}
@@ -275,7 +275,7 @@ def part_of(one: EstimateField) -> str:
 
 
 def unit_of(one: EstimateField) -> str:
-    """The unit in which the field's number is; empty for words and pure numbers."""
+    """The unit of the field's number; empty for words and pure numbers."""
     if one.name in SHARES:
         return "0 to 1"
     if one.kind in (INSTANT, REASONS, SPECTRA, NUMBERS_BY_NAME, WEIGHTS):
@@ -320,7 +320,7 @@ def columns_table() -> str:
 
 
 def _meaning(column: str) -> str:
-    """In the words of the estimate's own page."""
+    """The words of the estimate's own page."""
     others = {**PROVENANCE, **DIAGNOSTICS, **{name: words for name, (_, words) in OWN_STD.items()}}
     if column in others:
         return others[column]
@@ -423,7 +423,7 @@ class _WithoutFieldTitles(GenerateJsonSchema):
 
 
 def calibration_schema() -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of a file as `springscale calibrate` writes it: no key missing, none besides."""
+    """JSON Schema (draft 2020-12) of a file written by `springscale calibrate`: all keys, and no others."""
     model = CalibrationFile.model_json_schema(mode="serialization", schema_generator=_WithoutFieldTitles)
     return {
         "$schema": DIALECT,

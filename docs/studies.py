@@ -1,6 +1,7 @@
-"""What hardware.md and phone.md say of studies: sensor-grades.json and phone_accuracy.json.
+"""Sentences of hardware.md and phone.md about studies, from sensor-grades.json and phone_accuracy.json.
 
-`python -m benchmarks.accuracy sensor-grades --output docs` and `python -m benchmarks.accuracy phones --output docs`.
+`python -m benchmarks.accuracy sensor-grades --output docs` and `python -m benchmarks.accuracy phones --output docs`
+make them.
 """
 
 import json
@@ -21,11 +22,11 @@ def noise_that_works() -> str:
 
 
 def phone_beside_can() -> str:
-    """How a phone's errors and intervals compare with a CAN IMU's."""
+    """A phone's errors and intervals beside a CAN IMU's."""
     rows = {row["sensor"]: row["payload"] for row in _numbers("phone_accuracy")["rows"]}
     phone, can = rows[BY_PHONE], rows[CAN]
     return (
-        f"On the same simulated drives [a phone](phone_accuracy.md) errs by {phone['mean_abs_kg']:.1f} kg in the mean, "
+        f"On the same simulated drives [a phone](phone_accuracy.md) errs by {phone['mean_abs_kg']:.1f} kg on average, "
         f"a CAN IMU by {can['mean_abs_kg']:.1f} kg; half its 95 % interval is {phone['half_width_kg']:.0f} kg, the CAN "
         f"IMU's {can['half_width_kg']:.0f} kg.\n"
     )

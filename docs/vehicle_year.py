@@ -1,16 +1,17 @@
-"""What a vehicle needs in a year, by what was measured and what is assumed, and how many vehicles anything bears."""
+"""A vehicle's needs in a year, from measurements and assumptions, and the fleet size at which each limit is reached."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-GB: Final = 1e9
+GB: Final = 1e9  # SI
+# SI prefixes
 _UNITS: Final = ((1e15, "PB"), (1e12, "TB"), (GB, "GB"), (1e6, "MB"), (1e3, "kB"))
 
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What one vehicle needs in a year of driving, by what was measured and what is assumed."""
+    """The needs of one vehicle in a year of driving, from measurements and assumptions."""
 
     measured: Mapping[str, Any]
     assumed: Mapping[str, Mapping[str, Any]]
@@ -35,7 +36,7 @@ class Scale:
 
     @property
     def receipt_bytes(self) -> float:
-        """With a log a day."""
+        """With one log a day."""
         of = self.measured["records"]["receipt_bytes"]
         return float(self.assumed["driving"]["days_per_year"] * of["per_log"]) + self._jobs * float(of["per_file"])
 
@@ -54,13 +55,13 @@ class Scale:
 
     @property
     def weighing_core_hours(self) -> float:
-        """Of logs that hold only the mapped frames; reading them is in it."""
+        """For logs of the mapped frames only, reading included."""
         weighing = self.measured["weighing"]
         return self.hours * float(weighing["cpu_s"] / weighing["hours"]) / 3600.0
 
     @property
     def bus_core_hours(self) -> float:
-        """Of logs of the whole bus: weighing, and reading all the frames that are not ours."""
+        """For logs of the whole bus: weighing, and reading all other frames."""
         bus = self.measured["whole_bus"]
         mframes = self.hours * 3600.0 * float(bus["frames_per_s"]) / 1e6
         return self.weighing_core_hours + mframes / float(bus["gz_mframes_per_cpu_s"]) / 3600.0
@@ -76,7 +77,7 @@ class Scale:
 
     @property
     def report_cpu_s(self) -> float:
-        """Of a vehicle more in the report of a fleet."""
+        """Per additional vehicle in a fleet report."""
         return self._of_report("cpu_s")
 
     @property
@@ -88,7 +89,7 @@ class Scale:
         return 1e3 * self._of_report("page_kb")
 
     def _of_report(self, what: str) -> float:
-        """What the vehicles beyond the first tenth added, each."""
+        """The increase per vehicle beyond the first tenth."""
         told = self.measured["report"]
         n_more = int(told["vehicles"]) - max(1, int(told["vehicles"]) // 10)
         return float(told["whole"][what] - told["tenth"][what]) / n_more
@@ -105,13 +106,13 @@ class Scale:
         return float(self.assumed["prices"][name])
 
     def stored_cost(self, n_bytes: float) -> float:
-        """Of keeping so much for a year."""
+        """The cost of storing this for a year."""
         return n_bytes / GB * 12.0 * self.price("storage_per_gb_month")
 
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """What breaks: at how many vehicles, by which sum, and what one would do then."""
+    """A limit: the number of vehicles that reach it, the calculation, and the remedy."""
 
     what: str
     n_vehicles: float
@@ -120,7 +121,7 @@ class Limit:
 
 
 def limits_of(scale: Scale) -> list[Limit]:
-    """What breaks, the first first."""
+    """All limits, the first to be reached first."""
     machine, archive = scale.assumed["machine"], scale.assumed["archive"]
     broker, people = scale.assumed["broker"], scale.assumed["people"]
     connection, per_message_us = scale.measured["uplink"]["connections"], scale.measured["uplink"]["cpu_us_per_message"]
@@ -131,26 +132,26 @@ def limits_of(scale: Scale) -> list[Limit]:
                 "One person calibrates",
                 people["hours_per_year"] / people["hours_per_calibration"],
                 f"{figure(people['hours_per_calibration'])} h a vehicle, {figure(people['hours_per_year'])} h a year",
-                "calibrate a line of like vehicles once and let each find its own zero; more people last",
+                "calibrate a line of like vehicles once and commission each vehicle empty; only then more people",
             ),
             Limit(
                 "One machine weighs the whole year in a night, logs of the whole bus",
                 machine["cores"] * machine["night_hours"] / scale.bus_core_hours,
                 f"{figure(scale.bus_core_hours)} core hours a vehicle",
-                "record the mapped frames only; more machines by `--scheduler`, for jobs share nothing",
+                "record only the mapped frames; add machines by `--scheduler`: jobs share nothing",
             ),
             Limit(
                 "One machine weighs the whole year in a night, logs of the mapped frames",
                 machine["cores"] * machine["night_hours"] / scale.weighing_core_hours,
                 f"{figure(scale.weighing_core_hours)} core hours a vehicle",
-                "more machines by `--scheduler`; weigh anew only what a change touches, which the receipts tell",
+                "add machines by `--scheduler`; reprocess only the logs that a change affects: the receipts show them",
             ),
             Limit(
                 "The fleet's report on one page",
                 1e6 * scale.assumed["report"]["most_page_mb"] / scale.report_page_bytes,
                 f"{in_bytes(scale.report_page_bytes)} a vehicle, a browser opens "
                 f"{figure(scale.assumed['report']['most_page_mb'])} MB",
-                "a report for each depot; report.json and the data set itself for more",
+                "a report for each depot; use report.json or the data set for more",
             ),
             Limit(
                 "The fleet's report in the memory of one machine",
@@ -162,46 +163,46 @@ def limits_of(scale: Scale) -> list[Limit]:
                 "The fleet's report in a night, one process",
                 3600.0 * machine["night_hours"] / scale.report_cpu_s,
                 f"{figure(scale.report_cpu_s)} core seconds a vehicle",
-                "a report for each depot, side by side",
+                "a report for each depot, in parallel",
             ),
             Limit(
                 "The broker's open files, at a system's usual limit",
                 broker["most_handles"],
                 f"a connection is a handle, and {figure(broker['most_handles'])} are allowed",
-                "raise the limit (LimitNOFILE); a line in a unit file",
+                "raise the limit (LimitNOFILE in the unit file)",
             ),
             Limit(
                 "One core of the broker while a whole fleet comes back",
                 broker["back_off_max_s"] / (connection["cpu_ms_each"] / 1e3),
                 f"{figure(connection['cpu_ms_each'])} ms a TLS connection, all within "
                 f"{figure(broker['back_off_max_s'])} s",
-                "several brokers by vehicle id; a larger `back_off_max_s`; TLS ended before the broker",
+                "several brokers by vehicle id; a larger `back_off_max_s`; a TLS proxy before the broker",
             ),
             Limit(
                 "Listing one year's receipts before anything begins",
                 listed / (scale.objects / 2.0),
                 f"{figure(scale.objects / 2.0)} receipts a vehicle, {figure(archive['requests_per_s'])} requests/s of "
                 f"{figure(archive['objects_listed_per_request'])}, at most {figure(archive['most_listing_s'])} s",
-                "list vehicles side by side, for a vehicle is a prefix; an index of receipts, made by what writes them",
+                "list vehicles in parallel: each has its own prefix; or let the writers keep an index of receipts",
             ),
             Limit(
                 "One core of the broker at the busiest moment",
                 1e6 / per_message_us / scale.messages_per_s_at_peak,
-                f"{figure(per_message_us)} µs a message, taken and passed on",
+                f"{figure(per_message_us)} µs a message, received and forwarded",
                 "several brokers by vehicle id",
             ),
             Limit(
                 "Storing logs of the whole bus costs much",
                 scale.price("logs_are_much_at") / scale.stored_cost(scale.bus_log_bytes),
                 f"{figure(scale.stored_cost(scale.bus_log_bytes))} a vehicle-year by the example prices, and "
-                f"{figure(scale.price('logs_are_much_at'))} a year is called much",
-                "keep the mapped frames; keep the bus only around what was refused; a colder class of storage",
+                f"{figure(scale.price('logs_are_much_at'))} a year counts as much",
+                "keep only the mapped frames, and the whole bus only around refusals; use cheaper storage",
             ),
             Limit(
                 "Storing logs of the mapped frames costs much",
                 scale.price("logs_are_much_at") / scale.stored_cost(scale.mapped_log_bytes),
-                f"{figure(scale.stored_cost(scale.mapped_log_bytes))} a vehicle-year, likewise",
-                "keep logs for as long as a method may change, records for ever; a colder class of storage",
+                f"{figure(scale.stored_cost(scale.mapped_log_bytes))} a vehicle-year, as above",
+                "keep logs while the method may still change, records for ever; use cheaper storage",
             ),
         ],
         key=lambda limit: limit.n_vehicles,
@@ -209,7 +210,7 @@ def limits_of(scale: Scale) -> list[Limit]:
 
 
 def figure(number: float) -> str:
-    """Two digits that count, the whole number from a hundred on; thousands apart."""
+    """Two significant digits, the whole number from a hundred on; thousands separated."""
     if number == 0.0:
         return "0"
     if number < 100.0:

@@ -1,8 +1,8 @@
-"""Memory that arrays give back stays with the process, to be used again.
+"""Keeps freed memory in the process for reuse.
 
-The C library returns freed memory above a small mark to the system, and every array that follows pays for fresh pages:
-an estimator that makes and drops arrays of a megabyte a thousand times a second spends a third of its time on that. The
-marks are glibc's (mallopt(3)); other C libraries have none and need none.
+glibc returns freed memory above a small threshold to the system, so every new array pays for fresh pages. An estimator
+that creates and drops arrays of a megabyte a thousand times a second spends a third of its time on that. The thresholds
+are glibc's (mallopt(3)); other C libraries have none and need none.
 """
 
 import ctypes
@@ -10,12 +10,12 @@ from typing import Final
 
 M_TRIM_THRESHOLD: Final = -1
 M_MMAP_THRESHOLD: Final = -3
-KEPT_BYTES: Final = 32 << 20  # freed at the top of the heap: some batch's arrays together; chosen
-MAPPED_BYTES: Final = 16 << 20  # an array from this size on has pages of its own and gives them back
+KEPT_BYTES: Final = 32 << 20  # kept at the top of the heap: about the arrays of one batch; chosen
+MAPPED_BYTES: Final = 16 << 20  # an array of at least this size is mapped, and unmapped when it is freed
 
 
 def keep_freed_memory() -> None:
-    """For this process, from now on."""
+    """Set the thresholds for this process."""
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
         mallopt(M_TRIM_THRESHOLD, KEPT_BYTES)

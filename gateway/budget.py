@@ -1,4 +1,4 @@
-"""The budget of an error: what each source adds to it, largest first, and what would narrow it.
+"""The error budget: the contribution of each source, largest first, and what would narrow it.
 
 Nothing here is canned: a remedy is offered where it applies, with the width that the same posterior would have after
 it.
@@ -32,7 +32,7 @@ class Remedy(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class BudgetLine:
-    """One source: standard deviations that it adds, NaN where the quantity is unknown. ``payload_with_remedy_kg`` is
+    """One source: standard deviations that it adds, NaN if the quantity is unknown. ``payload_with_remedy_kg`` is
     the standard deviation of the payload, all sources together, once the remedy is taken.
     """
 
@@ -54,7 +54,7 @@ def budget_of(posterior: Posterior, *, is_shape_said: bool, is_empty_weighed: bo
 
 
 def typical_budget(budgets: Sequence[tuple[BudgetLine, ...]]) -> tuple[BudgetLine, ...]:
-    """Of several batches together: root mean squares by source, with the remedy that the most batches have."""
+    """Mean budget of several batches: root mean square by source, with the most frequent remedy."""
     rows: dict[str, list[BudgetLine]] = {}
     for line in (line for budget in budgets for line in budget):
         rows.setdefault(line.source, []).append(line)

@@ -1,8 +1,8 @@
-"""The errors a person may meet. Each message says what is wrong, where, and how to mend it."""
+"""The errors shown to people. Each message says what is wrong, where, and how to mend it."""
 
 
 class SpringscaleError(Exception):
-    """The work failed; the command line prints the message alone and exits with 1."""
+    """The work failed; the command line prints only the message and exits with 1."""
 
     exit_code = 1
 
@@ -18,7 +18,7 @@ class NothingWeighedError(SpringscaleError):
 
 
 class UntrustedFileError(ConfigurationError):
-    """A file that must be signed is not, or by nobody who is trusted, or was changed afterwards."""
+    """A required signature is missing, made by an untrusted key, or does not match the file."""
 
 
 class SignalMapError(ConfigurationError):
@@ -34,7 +34,7 @@ class CalibrationFileError(ConfigurationError):
 
 
 class LineError(ConfigurationError):
-    """Calibrations that make no line, or a vehicle that is none of theirs."""
+    """Calibrations do not form a line, or a vehicle does not belong to a line."""
 
 
 class WeightRefusedError(SpringscaleError):
@@ -62,11 +62,11 @@ class AlarmRefusedError(SpringscaleError):
 
 
 class CalibrationImpossibleError(SpringscaleError):
-    """The known-load drives do not carry enough to calibrate from."""
+    """The known-load drives are not sufficient for a calibration."""
 
 
 class KeptBatchError(SpringscaleError):
-    """A kept batch is damaged, or written by nobody we know."""
+    """A kept batch is damaged, or was written by another program."""
 
 
 class LogUnreadableError(SpringscaleError):
@@ -74,7 +74,7 @@ class LogUnreadableError(SpringscaleError):
 
 
 class ReaderMissingError(LogUnreadableError):
-    """A log may be whole, but what reads its kind is not installed here."""
+    """The reader for this kind of log is not installed."""
 
 
 class ArraysError(SpringscaleError):
@@ -86,10 +86,10 @@ class BusError(SpringscaleError):
 
 
 class StoreError(SpringscaleError):
-    """The database cannot be used now (another Springscale is at work on it)."""
+    """The database cannot be used now, for example because another Springscale uses it."""
 
 
 class StoreRefusedError(StoreError):
-    """The file is not for this version or not ours: a person must decide, trying again helps nobody; exits with 2."""
+    """The database is of another version or program, so retrying does not help; exits with 2."""
 
     exit_code = 2

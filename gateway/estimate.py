@@ -58,7 +58,7 @@ class Weight:
 
     @property
     def is_over_limit(self) -> bool:
-        """By this number alone; warnings have hysteresis (core.weights)."""
+        """Whether this number exceeds the limit, without the hysteresis of warnings (core.weights)."""
         return self.limit_kg is not None and self.kg > self.limit_kg
 
 
@@ -105,7 +105,7 @@ class Watched:
     ignition_off: bool | None = None
 
     def joined(self, other: "Watched") -> "Watched":
-        """Over both times."""
+        """Door and ignition during both times together."""
         return Watched(_either(self.door_opened, other.door_opened), _either(self.ignition_off, other.ignition_off))
 
 

@@ -1,6 +1,6 @@
-"""The history as rooms hand it to each other: the kinds of its records, and pieces of it.
+"""The types of the history that store, web and uplink exchange: kinds of records, records, pages.
 
-The store keeps one journal. The web sends it, the uplink and the webhook deliver it, and all follow it the same way.
+The store keeps one journal. The web, the uplink and the webhook follow it in the same way.
 """
 
 from dataclasses import dataclass
@@ -8,16 +8,17 @@ from typing import Final
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class RecordKind:
     """One kind of record: a row of the table below.
 
-    ``name`` is its name in the journal and on the event stream, ``letter`` that in the webhook, ``branch`` its MQTT
-    topic below the vehicle's. A later revision of a revised record takes the place of the one before it; records that
-    are not revised form a chain, each with the number of the one before it. What is retained stays with the broker.
+    ``name`` is its name in the journal and on the event stream, ``webhook_type`` its type in the webhook, ``branch``
+    its MQTT topic below that of the vehicle. If ``is_revised``, a later revision replaces the earlier one; the other
+    records form a chain, each with the number of the one before it. The broker retains the last message of a kind with
+    ``is_retained``.
     """
 
     name: str
-    letter: str
+    webhook_type: str
     branch: str
     is_revised: bool
     is_retained: bool = False
@@ -26,17 +27,17 @@ class Kind:
 ESTIMATE: Final = "estimate"
 REJECTION: Final = "rejection"
 ALARM: Final = "alarm"
-REMAINDER: Final = "remainder"  # too short to be a batch: kept for the trips, never sent
-SERVICE: Final = "service"  # what happened to the service itself: kept and asked for, never sent
+REMAINDER: Final = "remainder"  # too short to be a batch: stored for the trips, never sent
+SERVICE: Final = "service"  # events of the service itself: stored, never sent
 
 KINDS: Final = {
     kind.name: kind
     for kind in (
-        Kind(ESTIMATE, ESTIMATE, "estimates", is_revised=False),
-        Kind(REJECTION, ESTIMATE, "estimates", is_revised=False),
-        Kind("event", "event", "events", is_revised=True),
-        Kind("trip", "trip", "trips", is_revised=True),
-        Kind(ALARM, "alarm", "alarms", is_revised=True, is_retained=True),
+        RecordKind(ESTIMATE, ESTIMATE, "estimates", is_revised=False),
+        RecordKind(REJECTION, ESTIMATE, "estimates", is_revised=False),
+        RecordKind("event", "event", "events", is_revised=True),
+        RecordKind("trip", "trip", "trips", is_revised=True),
+        RecordKind(ALARM, "alarm", "alarms", is_revised=True, is_retained=True),
     )
 }
 BATCHES: Final = tuple(kind.name for kind in KINDS.values() if not kind.is_revised)
@@ -44,10 +45,10 @@ ENTRIES: Final = tuple(kind.name for kind in KINDS.values() if kind.is_revised)
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
-    """One record of the journal: its place, what it is, and its JSON.
+class JournalRecord:
+    """One record of the journal: its cursor, kind, id and JSON.
 
-    ``previous`` is the number of the record before it in the chain of batches, 0 where there is none.
+    ``previous`` is the number of the record before it in the chain of batches, 0 if there is none.
     """
 
     cursor: str
@@ -63,11 +64,11 @@ class Record:
 
 
 @dataclass(frozen=True, slots=True)
-class Page:
-    """A piece of the history: JSON texts in order, the cursor of each beside it, and the number of the one before it.
+class HistoryPage:
+    """A page of the history: JSON texts in order, with the cursor of each and the number of the one before it.
 
-    ``next_cursor`` asks for more, None where there is no more now; ``last_cursor`` is the newest row
-    of this page: the place to go on from when more arrives (None while there is nothing at all).
+    ``next_cursor`` requests the next page; None if there are no more records now. ``last_cursor`` is the cursor of the
+    newest record of this page, from which to follow new records; None if there is no record at all.
     """
 
     items: tuple[str, ...]
@@ -81,7 +82,7 @@ class Page:
 class Delivery:
     """How far an uplink has delivered. ``n_pruned`` estimates were removed by retention before it could.
 
-    ``oldest_ns`` is when the oldest that waits was received; None where none waits.
+    ``oldest_ns`` is when the oldest that waits was received; None if none waits.
     ``n_pruned_entries`` is of load events, trips and alarms.
     """
 

@@ -41,7 +41,7 @@ class Count:
 
     @property
     def kg(self) -> float | None:
-        """None where the count is no weight."""
+        """None if the count is no weight."""
         return None if self.raw > LARGEST else self.raw * self.parameter.kg_per_bit
 
 

@@ -1,6 +1,6 @@
-"""The log: every event under one logger, at one level, written one way; one JSON line each, plain at a terminal.
+"""The log: all events go through one logger, as JSON lines, or as plain text at a terminal.
 
-Standard error is the service's log; systemd keeps it in the journal. docs/deployment.md tells of every event.
+Standard error is the service's log; systemd stores it in the journal. docs/deployment.md describes every event.
 """
 
 import json
@@ -27,7 +27,7 @@ _SYSLOG_PRIORITY: Final = {
 
 
 class Event(StrEnum):
-    """All that the service writes of itself; what it was about stands in the fields beside it."""
+    """Every event that the service logs; the fields beside it give the details."""
 
     STARTED = "started"
     READY = "ready"
@@ -99,20 +99,21 @@ class Event(StrEnum):
 
 
 def log_event(event: Event, *, level: int = logging.INFO, **fields: object) -> None:
-    """Write one event; fields keep their names, so that programs can ask for them."""
+    """Write one event with its fields, which programs can query by name."""
     LOGGER.log(level, event.value, extra={"fields": fields})
 
 
-def tell_event(
-    event: Event, fields: Mapping[str, Any], keep: Callable[[str, Mapping[str, Any]], object], level: int = logging.INFO
-) -> None:
-    """To the log, and by ``keep`` to whoever remembers what happened."""
+OnEvent = Callable[[str, Mapping[str, Any]], object]  # a listener that stores events: name and fields
+
+
+def tell_event(event: Event, fields: Mapping[str, Any], keep: OnEvent, level: int = logging.INFO) -> None:
+    """Write an event to the log, and hand it to ``keep``, which stores it."""
     log_event(event, level=level, **fields)
     keep(event.value.replace(" ", "_"), fields)
 
 
 class FloodGate(logging.Filter):
-    """Lets each event of ours through so often in a minute; the next line that passes tells how many were left out."""
+    """Limits the lines of each event per minute; the next line that passes says how many were left out."""
 
     def __init__(self, most: int = MOST_IN_A_MINUTE, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
@@ -122,7 +123,7 @@ class FloodGate(logging.Filter):
         self._left_out: Counter[str] = Counter()
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """False where this event was written too often; other libraries' records always pass."""
+        """False if this event was written too often; records of other libraries always pass."""
         if record.name != LOGGER.name:
             return True
         event, now_s = record.getMessage(), self._clock()

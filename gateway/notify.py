@@ -6,7 +6,7 @@ import time
 
 
 class Notifier:
-    """Tells systemd how the service is. Silent where NOTIFY_SOCKET is not set."""
+    """Reports the state of the service to systemd. Does nothing if NOTIFY_SOCKET is not set."""
 
     def __init__(self, environment: os._Environ[str] | dict[str, str] = os.environ) -> None:
         address = environment.get("NOTIFY_SOCKET", "")
@@ -16,7 +16,7 @@ class Notifier:
         self._status = ""
 
     def send_status(self, sentence: str) -> None:
-        """What `systemctl status` shows, where it is another than before."""
+        """Set the line that `systemctl status` shows, if it has changed."""
         if sentence != self._status:
             self._status = sentence
             self.send(STATUS=sentence)
@@ -36,7 +36,7 @@ class Notifier:
         self.send(RELOADING="1", MONOTONIC_USEC=str(time.monotonic_ns() // 1000))
 
     def close(self) -> None:
-        """Give the socket back."""
+        """Close the socket."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None

@@ -1,4 +1,4 @@
-"""One error, by its sources: what an estimate believes of the load and where each part of its error comes from.
+"""The posterior of a load with its error by source: own covariance of a batch, and columns shared by batches.
 
 The quantities are, in this order, the payload (kg), the front share of the sprung mass (%) and, where a roll rate was
 read, the lateral place of the centre of gravity (m left of the centre line). A source is a cause that several batches
@@ -26,7 +26,7 @@ PAYLOAD, FRONT_SHARE, CG_LEFT = range(3)  # the order of the quantities
 
 
 class Source(StrEnum):
-    """Causes of error that batches share; each has a lifetime, and that decides what cancels."""
+    """Sources of error that batches share; the lifetime of each decides which errors cancel in a difference."""
 
     CALIBRATION = "calibration"  # what known loads left open of the vehicle; for ever
     GOODS = "goods"  # how long and high the loads of this vehicle usually are; for ever
@@ -58,7 +58,7 @@ class Posterior:
     tails: tuple[float, float] = NORMAL_TAILS
 
     def __eq__(self, other: object) -> bool:
-        """The same numbers, to the last bit."""
+        """Whether all numbers are bit-identical."""
         if not isinstance(other, Posterior) or self.sources.keys() != other.sources.keys():
             return False
         return (
@@ -73,31 +73,31 @@ class Posterior:
 
     @property
     def size(self) -> int:
-        """How many quantities are known."""
+        """Number of known quantities."""
         return len(self.mean)
 
     @property
     def covariance(self) -> F64:
-        """(d, d) of all errors together."""
+        """Covariance (d, d) of all errors together."""
         return self.own + self.shared
 
     @property
     def shared(self) -> F64:
-        """(d, d) of what other batches share."""
+        """Covariance (d, d) of the errors shared with other batches."""
         return sum((columns.T @ columns for columns in self.sources.values()), np.zeros((self.size, self.size)))
 
     def std(self, quantity: int) -> float:
-        """Standard deviation of one quantity; NaN where it is unknown."""
+        """Standard deviation of one quantity; NaN if it is unknown."""
         return math.sqrt(float(self.covariance[quantity, quantity])) if quantity < self.size else math.nan
 
     def correlation(self, one: int, other: int) -> float:
-        """Of two errors, -1 to 1; NaN where either is unknown or has none."""
+        """Correlation of two errors, -1 to 1; NaN if either is unknown or zero."""
         if max(one, other) >= self.size or not (scale := self.std(one) * self.std(other)):
             return math.nan
         return float(self.covariance[one, other]) / scale
 
     def quantity(self, quantity: int) -> Quantity:
-        """One quantity with its 95 % interval; unknown where it is."""
+        """One quantity with its 95 % interval; UNKNOWN if it is not known."""
         if quantity >= self.size:
             return UNKNOWN
         slopes = np.zeros(self.size)
@@ -122,7 +122,7 @@ class Posterior:
         return Quantity(number, math.sqrt(max(variance, 0.0)), (low, high))
 
     def _tails_along(self, slopes: F64) -> tuple[float, float]:
-        """A quantity that falls as the payload rises has the tails the other way round."""
+        """Skewed interval; the tails are swapped for a quantity that falls as the payload rises."""
         rises = sum(
             float((self.sources[name] @ slopes) @ self.sources[name][:, PAYLOAD])
             for name in SHAPE
@@ -137,17 +137,17 @@ class Posterior:
         return float(one @ self.covariance @ other)
 
     def with_source(self, name: Source, columns: F64) -> "Posterior":
-        """With more columns (k, d) of one source."""
+        """The posterior with more columns (k, d) of one source."""
         before = self.sources.get(name)
         together = columns if before is None else np.concatenate([before, columns])
         return replace(self, sources={**self.sources, name: together})
 
     def without(self, *names: Source) -> "Posterior":
-        """Without the errors of these sources."""
+        """The posterior without the errors of these sources."""
         return replace(self, sources={name: one for name, one in self.sources.items() if name not in names})
 
     def first(self, n: int) -> "Posterior":
-        """The first ``n`` quantities alone."""
+        """The posterior of the first ``n`` quantities only."""
         if n >= self.size:
             return self
         sources = {name: columns[:, :n] for name, columns in self.sources.items()}
@@ -160,23 +160,23 @@ class Posterior:
 
 
 def exactly(*numbers: float) -> Posterior:
-    """A load that is known without any error: payload (kg), front share (%) and lateral place (m), as many as known."""
+    """The posterior of a load known without error: payload (kg), front share (%) and lateral position (m)."""
     return Posterior(np.array(numbers, float), np.zeros((len(numbers), len(numbers))))
 
 
 def fused(parts: Sequence[Posterior]) -> Posterior:
-    """Several batches of one load together (Fusible). Raises ValueError for no part."""
+    """Fuse several batches of one load (see Fusible). Raises ValueError without parts."""
     return Fusible(parts).fused(0, len(parts))
 
 
 class Fusible:
-    """Batches in their order, of which any that follow one another can be fused. One alone is taken as it is."""
+    """Batches in order, of which any consecutive ones can be fused. A single batch stays unchanged."""
 
     def __init__(self, parts: Sequence[Posterior]) -> None:
         self._parts = parts
 
     def fused(self, first: int, stop: int) -> Posterior:
-        """Parts ``first`` to before ``stop`` together. Raises ValueError where there is none."""
+        """Fuse the parts ``first`` to ``stop`` (exclusive). Raises ValueError if there is none."""
         if stop <= first:
             raise ValueError("there is no batch to fuse")
         return self._parts[first] if stop - first == 1 else self._sums.fused(first, stop)
@@ -216,7 +216,7 @@ class _Sums:
         self._tails = np.array([part.tails for part in parts])
 
     def _weighted(self, rows: Sequence[F64]) -> F64:
-        """(n, c, size) rows (c, d) of each part times its precision; 0 where a part has fewer."""
+        """(n, c, size) rows (c, d) of each part times its precision; 0 if a part has fewer."""
         size = self._precisions.shape[-1]
         whole = np.zeros((len(rows), max(len(each) for each in rows), size))
         for i, each in enumerate(rows):
@@ -225,7 +225,7 @@ class _Sums:
         return weighted
 
     def fused(self, first: int, stop: int) -> Posterior:
-        """Parts ``first`` to before ``stop`` together."""
+        """Fuse the parts ``first`` to ``stop`` (exclusive)."""
         some = slice(first, stop)
         size = int(self._sizes[some].max())
         precisions = self._precisions[some, :size, :size]
@@ -262,7 +262,7 @@ def difference(before: Posterior, after: Posterior, *, is_one_load: bool) -> tup
 
 
 def _paired(one: F64 | None, other: F64 | None, size: int) -> tuple[F64, F64]:
-    """Both with as many columns; absent ones are zero."""
+    """Pad the columns of both with zeros to the same number."""
     if one is not None and other is not None and len(one) == len(other):
         return one, other
     n = max(0 if each is None else len(each) for each in (one, other))

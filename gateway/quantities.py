@@ -1,4 +1,4 @@
-"""Every quantity that leaves the house, with the name that each outlet has for it: one row a quantity.
+"""Every quantity in the outputs, with its name in each of them: one row per quantity.
 
 JSON, CSV and Parquet take a name from ``json_name``, VSS from ``vss``, Prometheus from ``metric``, Home Assistant from
 ``label``, SAE J1939 from ``spns``. A new quantity is a row here, a new outlet a column.

@@ -10,7 +10,7 @@ UNKNOWN_INTERVAL: Final = (math.nan, math.nan)
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A number, its standard deviation and its 95 % interval (low, high), all in one unit. NaN where unknown.
+    """A number, its standard deviation and its 95 % interval (low, high), all in one unit. NaN if unknown.
 
     A payload is in kg, the lateral place of a centre of gravity in m. A share of the sprung mass, on the front axle
     or on the left wheels, is in percent, its standard deviation in percentage points.

@@ -1,4 +1,4 @@
-"""All that crosses rooms: frames, motion, batches and the reasons why not; gateway.estimate has the answer.
+"""The types that the rooms exchange: frames, motion, batches and reasons; gateway.estimate has the estimate.
 
 Plain immutable values. Arrays are numpy, SI throughout, unknown is NaN. Time is the frame's own,
 integer nanoseconds since 1970-01-01 UTC.
@@ -155,7 +155,7 @@ class Motion:
         return counter.astype(np.int64) if np.isfinite(counter).all() else None
 
     def rows(self, chosen: Bool | slice) -> "Motion":
-        """The chosen rows, in the order they have."""
+        """The chosen rows, in their order."""
         counters = {signal: counter[chosen] for signal, counter in self.counters.items()}
         aside = None if self.aside is None else self.aside[chosen]
         return Motion(self.signals, self.t_ns[chosen], self.columns[chosen], counters, aside)
@@ -173,12 +173,12 @@ class Motion:
         return self.rows(kept)
 
     def part(self, begin: int, end: int) -> "Motion":
-        """Rows begin to end (exclusive)."""
+        """The rows ``begin`` to ``end`` (exclusive)."""
         return self.rows(slice(begin, end))
 
 
 def joined(parts: Sequence[Motion]) -> Motion:
-    """Rows of one signal map (at least one part), one part after the other."""
+    """Concatenate motions of one signal map; at least one part."""
     first = parts[0]
     return Motion(
         first.signals,

@@ -1,7 +1,7 @@
-"""How a record describes itself to whoever makes a file, a form or a page of it: words, bounds and arrays in JSON.
+"""Metadata of dataclass fields for files, forms and pages: descriptions, bounds, and arrays in JSON.
 
-A record is a plain dataclass. What stands here is read by pydantic, which the pure rooms do not import: constraints by
-pydantic's names in a field's metadata, and for arrays the two methods that pydantic looks for.
+A record is a plain dataclass. pydantic reads the metadata defined here, although the pure rooms do not import it:
+constraints have pydantic's names, and arrays have the two methods that pydantic looks for.
 """
 
 from typing import Any, Final
@@ -18,7 +18,7 @@ def described(words: str, **constraints: Any) -> dict[str, Any]:
 
 
 class AsLists:
-    """Metadata of an array's type: lists of finite numbers in JSON, a float64 array here."""
+    """Metadata of an array type: lists of finite numbers in JSON, a float64 array in Python."""
 
     @staticmethod
     def __get_pydantic_core_schema__(source: Any, handler: Any) -> dict[str, Any]:
@@ -36,7 +36,7 @@ class AsLists:
 
 
 def array_of(numbers: Any) -> Any:
-    """A float64 array. Raises ValueError for what is none or holds a number that is not finite."""
+    """Convert to a float64 array. Raises ValueError if that fails or a number is not finite."""
     try:
         array = np.asarray(numbers, dtype=float)
     except (OverflowError, TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""What turns frames into estimates: signal map, calibration, estimator and known weights, loaded and checked."""
+"""The setup that turns frames into estimates: signal map, calibration, estimator and known weights, all checked."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,7 +23,7 @@ NOBODY = Identity()  # a log without a configuration belongs to no named vehicle
 class Setup:
     """Everything that turns frames into estimates, loaded and checked.
 
-    ``limits`` are those in force; where there is none the calibration's stands.
+    ``limits`` override those of the calibration.
     """
 
     signal_map: SignalMap
@@ -45,9 +45,9 @@ class Setup:
         return Flow(settings, self.signal_map.traits, self.calibrated, self.estimator, self.identity, self.knowledge)
 
     def with_known_weights_of(self, path: Path) -> "Setup":
-        """With what the known weights in ``path`` teach of this calibration and estimator.
+        """The setup with the known weights in ``path`` for this calibration and estimator.
 
-        Raises ConfigurationError for a file that cannot be believed.
+        Raises ConfigurationError for an invalid file.
         """
         calibration_id = self.calibration.id if self.calibration else None
         return replace(self, knowledge=load_known_weights(path).knowledge(calibration_id, self.estimator))
@@ -61,12 +61,11 @@ def load_setup(
     read: Read = Path.read_bytes,
     limits: Limits = NO_OTHER,
 ) -> Setup:
-    """Loads the signal map and the calibration file; the best estimator of the file where none is named.
+    """Load the signal map and the calibration file. Without ``estimator``, the best one of the file is used.
 
-    ``limits`` stand before those that the calibration was made with. ``read`` sees to the files' signatures where
-    they are required (files.signed).
+    ``limits`` override those of the calibration. ``read`` checks signatures if they are required (files.signed).
 
-    Raises SignalMapError, CalibrationFileError, or ConfigurationError where the file lacks the estimator.
+    Raises SignalMapError, CalibrationFileError, or ConfigurationError if the file lacks the estimator.
     """
     held = load_calibration(calibration, read) if calibration else None
     chosen = estimator or (held.estimators[0] if held else "cross_spectrum")
@@ -81,7 +80,7 @@ def load_setup(
 def setup_of(settings: Settings, estimator: str | None = None, read: Read | None = None) -> Setup:
     """The setup that a springscale.toml describes. Raises as :func:`load_setup`, and for another vehicle's file.
 
-    ``read`` stands in for reading with the trust that the settings describe.
+    ``read`` replaces reading with the trust of the settings.
     """
     identity = Identity(settings.vehicle.id, settings.vehicle.vin)
     read = read or settings.trust.for_reading().read

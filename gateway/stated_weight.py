@@ -1,4 +1,4 @@
-"""A weight that somebody states of a vehicle at a time: a weighbridge's ticket, or a load that is known."""
+"""A weight stated by a person for a time: from a weighbridge ticket, or a known load."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -15,10 +15,10 @@ class Drive(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class StatedWeight:
-    """Of one load: the gross weight, or both axles' weights, or the payload and, unless it is zero, its place.
+    """The gross weight, or both axle weights, or the payload and, unless it is zero, its position.
 
-    ``at`` is RFC 3339. ``position_m`` is behind the front axle. ``drive`` None: whichever it must be. ``std_kg`` is the
-    standard deviation of each number on the scale or on the paper, None: as usual for its kind.
+    ``at`` is RFC 3339. ``position_m`` is behind the front axle. ``drive`` None: the drive follows from the time.
+    ``std_kg`` is the standard deviation of each number; None: the usual one of its kind.
     """
 
     at: str

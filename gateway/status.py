@@ -1,4 +1,4 @@
-"""The service's status, as types and in words: its parts fill it in, the web sends it unchanged."""
+"""The service's status as types and as a sentence: the service fills it in, the web sends it unchanged."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -80,7 +80,7 @@ class SignalHealth(_Told):
 
     @property
     def is_silent(self) -> bool:
-        """Never received, or not for longer than any signal pauses."""
+        """Whether the signal was never received, or not for longer than any signal pauses."""
         return self.last_age_s is None or self.last_age_s > SILENT_AFTER_S
 
 

@@ -1,4 +1,4 @@
-"""TOML files that people write: read, checked against a model, every fault named with its file and key."""
+"""Reads TOML files written by people and checks them against a model; every fault names its file and key."""
 
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -107,7 +107,7 @@ def _what(fault: dict[str, Any], model: type) -> str:
 
 
 def _keys_of(model: type, table: Sequence[int | str]) -> list[str]:
-    """The keys that the table at this place may have; where there is a choice of models, those of all of them."""
+    """The keys that a table may have; for a union of models, the keys of all of them."""
     models = [model]
     for part in table:
         types = [hints[part] for one in models if isinstance(part, str) and part in (hints := _fields_of(one))]
@@ -142,7 +142,7 @@ def _beyond(fault: dict[str, Any]) -> str:
 
 
 def _taken_for(key: str, number: float, bound: float) -> str | None:
-    """The unit in which ``number`` would keep the bound, and not be a speck beside it."""
+    """The unit in which ``number`` would be within the bound and of a plausible size."""
     speck = min(1.0, abs(bound) / 20.0)
     for end, factor, unit in _TAKEN_FOR:
         meant = factor * number

@@ -1,4 +1,4 @@
-"""How numbers are told to people, wherever they are."""
+"""Numbers with their nouns, for people."""
 
 
 def counted(n: int, noun: str) -> str:

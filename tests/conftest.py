@@ -11,9 +11,55 @@ from gateway.allocator import keep_freed_memory
 # The last lie beside the checkout
 PROMISED = ("chromium", "playwright", "mosquitto", "postgresql", "ssh-keygen", "a test machine", "recorded drives")
 
+# Files of more than about ten seconds, the longest first: two workers that take whole files then end together.
+LONGEST_FIRST = (
+    "golden/test_recorded_roll.py",
+    "golden/test_tutorial.py",
+    "golden/test_recorded_drives.py",
+    "scenarios/test_web_memory.py",
+    "golden/test_wrong_labels.py",
+    "e2e/test_reproduce.py",
+    "e2e/test_vehicle_packages.py",
+    "e2e/test_calibration_report.py",
+    "unit/test_phone_import.py",
+    "e2e/test_archive_cluster.py",
+    "e2e/test_dist.py",
+    "e2e/test_cli_demo.py",
+    "contracts/test_web_description.py",
+    "unit/test_cross_spectrum.py",
+    "scenarios/test_fleet_view.py",
+    "scenarios/test_bad_campaigns.py",
+    "golden/test_recorded_sensor_faults.py",
+    "unit/test_inspection_campaign.py",
+    "unit/test_campaign_pack.py",
+    "unit/test_line_commands.py",
+)
+
 keep_freed_memory()  # as the command does
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Files go out in the order of pytest_collection_modifyitems: by itself, xdist begins with the most tests."""
+    config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest files first, the others as they come."""
+    places = {name: place for place, name in enumerate(LONGEST_FIRST)}
+    items.sort(key=lambda item: places.get("/".join(item.path.parts[-2:]), len(places)))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """One folder for all processes of a run: see support.kept."""
+    from support.kept import PLACE
+
+    folder = tmp_path_factory.getbasetemp()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(PLACE, str((folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "kept"))
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)

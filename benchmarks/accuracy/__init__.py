@@ -1,5 +1,6 @@
-"""How well the estimators weigh: studies that take minutes, on simulated vans and on a campaign's own runs.
+"""The accuracy of the estimators: studies that take minutes, on simulated vans and on a campaign's own runs.
 
-Campaign files and seeds come in; numbers (NAME.json) and the page made of them (NAME.md) go out, which docs/ shows.
-Run by ``python -m benchmarks.accuracy coverage|advice|learning-curve|bounds``; nothing of it is in the wheel.
+Campaign files and seeds go in; numbers (NAME.json) and their page (NAME.md), which docs/ shows, come out. ``runner``
+runs the cases of a study, ``markdown`` writes its page. Run a study by ``python -m benchmarks.accuracy NAME``; the
+wheel has none of it.
 """

@@ -1,21 +1,22 @@
-"""python -m benchmarks.accuracy: what a calibration is worth, found out by experiment. Each study takes minutes.
+"""python -m benchmarks.accuracy: studies of calibration and estimation by experiment. Each takes minutes.
 
     python -m benchmarks.accuracy coverage --vans 12 --seed 20265 --workers 2 --output docs
 
-prints its page; ``--output`` also writes the numbers (NAME.json) and the page made of them (NAME.md).
+prints its page; ``--output`` also writes the numbers (NAME.json) and the page (NAME.md).
 """
 
 import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import click
 
 from benchmarks.accuracy import advice as on_advice
 from benchmarks.accuracy import alarm_days as on_alarm_days
 from benchmarks.accuracy import alarms as on_alarms
+from benchmarks.accuracy import availability as on_availability
 from benchmarks.accuracy import budget as on_budget
 from benchmarks.accuracy import coverage as on_coverage
 from benchmarks.accuracy import delivery as on_delivery
@@ -41,7 +42,7 @@ from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection import SplitRun
 from gateway.calibration.judgement import learning_curve as on_learning
 from gateway.cli.options import FILE, batch_settings, window
-from gateway.cli.text.progress import counted
+from gateway.cli.progress import counted
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.vehicle import Vehicle
@@ -49,18 +50,21 @@ from gateway.errors import SpringscaleError
 from gateway.offline import inspect
 
 Study = Callable[..., None]
-WORKERS: Final = "processes that drive"
 
 
-def _vans(seed: int, n_vans: int = Scope().n_vans) -> Callable[[Study], Study]:
-    """Options of a study that drives fresh vans."""
-    vans = click.option("--vans", "n_vans", type=click.IntRange(min=2), default=n_vans, show_default=True)
-    seeds = click.option("--seed", type=click.IntRange(min=0), default=seed, show_default=True)
-    workers = click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help=WORKERS)
-    return lambda study: vans(seeds(workers(study)))
+def _seed(seed: int) -> Callable[[Study], Study]:
+    return click.option("--seed", type=click.IntRange(min=0), default=seed, show_default=True)
 
 
+_workers = click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes")
+_kept = click.option("--kept", type=FILE, default=None, help="directory of cases to resume from: read and stored there")
 _output = click.option("--output", type=FILE, default=None, help="directory to write the numbers and their page to")
+
+
+def _vans(seed: int, n_vans: int = Scope().n_vans, least: int = 2) -> Callable[[Study], Study]:
+    """Options of a study that drives fresh vans."""
+    vans = click.option("--vans", "n_vans", type=click.IntRange(min=least), default=n_vans, show_default=True)
+    return lambda study: vans(_seed(seed)(_workers(study)))
 
 
 @click.group()
@@ -79,7 +83,7 @@ def studies() -> None:
     show_default=True,
     help="choices of runs to try for each number of runs",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=on_learning.SEED, show_default=True)
+@_seed(on_learning.SEED)
 @_output
 @window
 def learning_curve(
@@ -90,7 +94,7 @@ def learning_curve(
     output: Path | None,
     window_s: float | None,
 ) -> None:
-    """How accurate would CAMPAIGN be with 2, 3, 4, 6, 10 of its runs? Found by leaving runs out."""
+    """How accurate would CAMPAIGN be with 2, 3, 4, 6, 10 of its runs? Leaves runs out."""
     runs, vehicle = _read(campaign, window_s)
     with counted("calibrating and judging") as on_trial:
         found = on_learning.curve_of(
@@ -110,7 +114,7 @@ def learning_curve(
 @_output
 @window
 def advice(campaign: Path, output: Path | None, window_s: float | None) -> None:
-    """Does it help to drive what --plan advises? Tried with CAMPAIGN's own runs as the next ones."""
+    """Does driving the loads that --plan advises help? Uses CAMPAIGN's own runs as the next ones."""
     runs, vehicle = _read(campaign, window_s)
     with counted("calibrating and judging") as on_fit:
         found = on_advice.advice_of(runs, vehicle, name=vehicle.name, on_fit=on_fit).to_json()
@@ -121,7 +125,7 @@ def advice(campaign: Path, output: Path | None, window_s: float | None) -> None:
 @_vans(on_coverage.SEED)
 @_output
 def coverage(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
-    """Do 95 % intervals hold the truth? Simulated vans, each calibrated and then driven elsewhere; ~40 s a van."""
+    """Do 95 % intervals contain the truth? Simulated vans, each calibrated and then driven elsewhere; ~40 s a van."""
     with counted("calibrating and driving vans") as on_van:
         found = on_coverage.coverage(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
     _hand_out("coverage", found, coverage_page(found), output)
@@ -131,7 +135,7 @@ def coverage(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
 @_vans(on_budget.SEED)
 @_output
 def budget(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
-    """Is the error made up as its budget says? Each source alone, then all at once; ~3 min a van."""
+    """Does the error agree with its budget? Each source alone, then all at once; ~3 min a van."""
     with counted("driving vans with each source alone") as on_van:
         alone = on_budget.alone(n_vans, seed, workers=workers, on_van=on_van)
     with counted("driving vans with all sources at once") as on_van:
@@ -144,7 +148,7 @@ def budget(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
 @_vans(on_disturbances.SEED)
 @_output
 def disturbances(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
-    """What jitter, losses, lags and sensors that moved do to calibrated vans; ~2 min a van."""
+    """The effect of jitter, losses, lags and moved sensors on calibrated vans; ~2 min a van."""
     with counted("calibrating, driving and disturbing vans") as on_van:
         found = on_disturbances.disturbances(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
     _hand_out("disturbances", found, disturbances_page(found), output)
@@ -154,7 +158,9 @@ def disturbances(n_vans: int, seed: int, workers: int, output: Path | None) -> N
 @_vans(on_grades.SEED, on_grades.N_VANS)
 @_output
 def sensor_grades(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
-    """What sensors of other noise, resolution and rate weigh on the same drives of the same vans; ~6 minutes a van."""
+    """The accuracy with sensors of other noise, resolution and rate, on the same drives of the same vans; ~6 minutes a
+    van.
+    """
     with counted("calibrating and driving vans with every sensor") as on_van:
         found = on_grades.grades(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van)
     _hand_out("sensor-grades", found, grades_page(found), output)
@@ -164,9 +170,9 @@ def sensor_grades(n_vans: int, seed: int, workers: int, output: Path | None) -> 
 @click.argument("campaign", type=FILE)
 @click.option("--calibration", type=FILE, required=True, help="calibration file of that vehicle")
 @click.option("--runs", type=click.IntRange(min=1), multiple=True, help="numbers of the drives [default: all]")
-@click.option("--seed", type=click.IntRange(min=0), default=on_faults.SEED, show_default=True)
-@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help=WORKERS)
-@click.option("--kept", type=FILE, default=None, help="directory of cases weighed before: read from there, left there")
+@_seed(on_faults.SEED)
+@_workers
+@_kept
 @_output
 def faults(
     campaign: Path,
@@ -177,7 +183,7 @@ def faults(
     kept: Path | None,
     output: Path | None,
 ) -> None:
-    """What do faulty sensors do to CAMPAIGN's drives? Each log rewritten with each fault; ~2 minutes a drive."""
+    """The effect of faulty sensors on CAMPAIGN's drives: each log rewritten with each fault; ~2 minutes a drive."""
     study = on_faults.Study(campaign, calibration, runs or None, kept=kept, seed=seed)
     with counted("weighing drives with faulty sensors") as on_case:
         found = on_faults.faults(study, workers=workers, on_case=on_case)
@@ -186,12 +192,12 @@ def faults(
 
 @studies.command("delivery")
 @click.option("--seeds", "n_days", type=click.IntRange(min=1), default=on_delivery.N_DAYS, show_default=True)
-@click.option("--seed", type=click.IntRange(min=0), default=on_delivery.SEED, show_default=True)
-@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help=WORKERS)
-@click.option("--kept", type=FILE, default=None, help="directory of days driven before: read from there, left there")
+@_seed(on_delivery.SEED)
+@_workers
+@_kept
 @_output
 def delivery(n_days: int, seed: int, workers: int, kept: Path | None, output: Path | None) -> None:
-    """Are load events found, and none invented? Simulated delivery days of calibrated vans; ~25 s a day."""
+    """Are load events found, and are any reported without a change? Simulated delivery days of vans; ~25 s a day."""
     with counted("driving delivery days") as on_day:
         found = on_delivery.delivery(n_days, seed, workers=workers, kept=kept, on_day=on_day)
     _hand_out("events", found, delivery_page(found), output)
@@ -199,13 +205,13 @@ def delivery(n_days: int, seed: int, workers: int, kept: Path | None, output: Pa
 
 @studies.command("alarms")
 @click.option("--loads", "n_loads", type=click.IntRange(min=1), default=on_alarms.N_LOADS, show_default=True)
-@click.option("--seed", type=click.IntRange(min=0), default=on_alarms.SEED, show_default=True)
+@_seed(on_alarms.SEED)
 @click.option("--days", "n_days", type=click.IntRange(min=1), default=on_delivery.N_DAYS, show_default=True)
-@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help=WORKERS)
-@click.option("--kept", type=FILE, default=None, help="directory of days driven before: read from there, left there")
+@_workers
+@_kept
 @_output
 def alarms(n_loads: int, seed: int, n_days: int, workers: int, kept: Path | None, output: Path | None) -> None:
-    """Are the rules of the alarms right, and do alarms come and go? Made-up loads, then delivery days; ~25 s a day."""
+    """Are alarms right, and are they steady? Made-up loads, then delivery days; ~25 s a day."""
     with counted("weighing loads about a limit") as on_line:
         found = on_alarms.alarms(n_loads, seed, on_line)
     with counted("driving delivery days") as on_day:
@@ -217,7 +223,7 @@ def alarms(n_loads: int, seed: int, n_days: int, workers: int, kept: Path | None
 @_vans(on_sensitivity.SEED)
 @_output
 def sensitivity(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
-    """What hangs on each constant that was chosen: halved and doubled in turn; ~4 minutes a van."""
+    """The effect of each chosen constant: halved and doubled in turn; ~4 minutes a van."""
     with counted("driving vans, calibrating and weighing them over and over") as on_van:
         found = on_sensitivity.sensitivity(Scope(n_vans=n_vans), seed, workers=workers, on_van=on_van).to_json()
     _hand_out("sensitivity", found, sensitivity_page(found), output)
@@ -227,7 +233,7 @@ def sensitivity(n_vans: int, seed: int, workers: int, output: Path | None) -> No
 @_vans(on_siblings.SEED)
 @_output
 def siblings(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
-    """What does a line tell of its next van? Simulated siblings calibrated in six ways; ~1 min a van."""
+    """How much does a line help its next van? Simulated siblings calibrated in six ways; ~1 min a van."""
     with counted("calibrating lines and driving their siblings") as on_line:
         found = on_siblings.siblings(n_vans, seed, workers=workers, on_van=on_line).to_json()
     _hand_out("siblings", found, siblings_page(found), output)
@@ -236,11 +242,11 @@ def siblings(n_vans: int, seed: int, workers: int, output: Path | None) -> None:
 @studies.command("false-facts")
 @click.option("--lines", "n_lines", type=click.IntRange(min=1), default=on_false_facts.N_LINES, show_default=True)
 @click.option("--right", "n_right", type=click.IntRange(min=1), default=on_false_facts.N_RIGHT, show_default=True)
-@click.option("--seed", type=click.IntRange(min=0), default=on_false_facts.SEED, show_default=True)
-@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help=WORKERS)
+@_seed(on_false_facts.SEED)
+@_workers
 @_output
 def false_facts(n_lines: int, n_right: int, seed: int, workers: int, output: Path | None) -> None:
-    """Which false facts does commissioning catch, and does it let true ones pass? ~3 minutes a line."""
+    """Which false facts does commissioning catch, and does it accept true ones? ~3 minutes a line."""
     with counted("commissioning simulated vans") as on_line:
         tried = on_false_facts.false_facts(n_lines, n_right, seed, workers=workers, on_van=on_line)
     for line in on_false_facts.each_line(tried):
@@ -251,32 +257,43 @@ def false_facts(n_lines: int, n_right: int, seed: int, workers: int, output: Pat
 
 @studies.command("phones")
 @click.option("--rounds", "n_rounds", type=click.IntRange(min=1), default=2, show_default=True, help="times each van")
-@click.option("--seed", type=click.IntRange(min=0), default=on_phones.SEED, show_default=True)
+@_seed(on_phones.SEED)
 @_output
 def phones(n_rounds: int, seed: int, output: Path | None) -> None:
-    """What does a phone weigh beside a CAN IMU on the same drives? ~2 minutes a round."""
+    """The accuracy of a phone beside a CAN IMU on the same drives; ~2 minutes a round."""
     with counted("driving vans with a phone on the floor") as on_drive:
         found = on_phones.phones(n_rounds, seed, on_drive)
     _hand_out("phone_accuracy", found, on_phones.phones_page(found), output)
+
+
+@studies.command("availability")
+@_vans(on_availability.SEED, 2, least=1)
+def availability(n_vans: int, seed: int, workers: int) -> None:
+    """How much of the time on the road do estimates cover in slow or broken driving? ~1 minute a van."""
+    with counted("driving vans through slow and broken worlds") as on_van:
+        lines = on_availability.table_of(n_vans, seed, workers=workers, on_van=on_van)
+    click.echo("\n".join(lines))
 
 
 @studies.command("bounds")
 @click.option("--duration-s", type=click.FloatRange(min=20.0), default=300.0, show_default=True, help="driving seen")
 @click.option("--speed-kmh", type=click.FloatRange(10.0, 200.0), default=50.0, show_default=True, help="steady speed")
 def bounds(duration_s: float, speed_kmh: float) -> None:
-    """Cramer-Rao bounds of payload and front share for the paper's van on its road, by what is seen and known."""
+    """Cramer-Rao bounds of payload and front share for the paper's van on its road, by observation and prior
+    knowledge.
+    """
     click.echo(limits_table(limits(Drive(duration_s, speed_kmh / 3.6))), nl=False)
 
 
 def _read(path: Path, window_s: float | None) -> tuple[Sequence[SplitRun], Vehicle]:
-    """The runs of a campaign without those that have a fault."""
+    """The runs of a campaign, without those with a fault."""
     campaign = load_campaign(path)
     with counted("reading drives") as on_run:
         return inspect(campaign, batch_settings(window_s), on_run=on_run).usable, campaign.vehicle
 
 
 def _hand_out(name: str, found: Mapping[str, Any], page: str, output: Path | None) -> None:
-    """The page, printed; with the numbers as files where a directory was named."""
+    """Print the page; with ``output`` also write it and the numbers as files."""
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
         (output / f"{name}.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,8 +1,8 @@
-"""Does it help to drive what the plan advises? Tried on a campaign whose next runs were driven already.
+"""Does the plan's advice help? Tested on a campaign whose next runs were already driven.
 
-From every triple of the empty run and two loads at different positions, each remaining run in turn is
-taken as the fourth; the plan chooses among them knowing the triple alone. Judged on the validation part
-of all runs, the same batches for every choice.
+From every triple of the empty run and two loads at different positions, each remaining run in turn is taken as the
+fourth; the plan chooses among them knowing the triple alone. All choices are judged on the same batches, the validation
+part of all runs.
 """
 
 import math
@@ -26,8 +26,8 @@ from gateway.errors import CalibrationImpossibleError
 
 Errors = tuple[float, float]  # mean |error| of payload and front share, percent (12)
 ESTIMATOR: Final = "cross_spectrum"
-LEAST_RUNS: Final = 5
-BATCH_S: Final = 300.0
+LEAST_RUNS: Final = 5  # three, and two to choose from
+BATCH_S: Final = 300.0  # BatchSettings.window_s
 OnFit = Callable[[int, int], None]  # (calibrations done, calibrations in all)
 Scored = tuple[Errors, Errors]  # with misses, and of what was answered
 
@@ -36,9 +36,9 @@ Scored = tuple[Errors, Errors]  # with misses, and of what was answered
 class Choice:
     """One set of runs driven so far and every run that could follow it.
 
-    ``before`` and ``after`` (by the run's number) are errors over one and the same set of batches;
-    ``advised`` and ``least`` are the runs that the plan expects most and least of. ``expected`` is what it
-    expects of the loads the vehicle carries before any of them.
+    ``before`` and ``after`` (by the run's number) are errors over the same batches; ``advised`` and ``least`` are the
+    runs with the largest and the smallest expected benefit. ``expected`` is the error that the plan predicts over the
+    vehicle's loads before any of them.
     """
 
     numbers: tuple[int, ...]
@@ -53,9 +53,9 @@ class Choice:
 class Comparison:
     """Means over all choices, payload and front share.
 
-    ``others`` is the mean of the runs not advised, what a fitter without advice may expect; ``best``
-    and ``worst`` are found by hindsight, by the sum of both errors. better_share (0..1): how often
-    the advised run did better than the mean of the others.
+    ``others`` is the mean of the runs not advised, the expectation without advice; ``best`` and ``worst`` are known in
+    hindsight, by the sum of both errors. better_share (0..1): how often the advised run was better than the mean of the
+    others.
     """
 
     n_choices: int
@@ -71,15 +71,16 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class AdviceStudy:
-    """``with_misses`` counts a rejected batch as a mid-range answer; ``answered`` leaves it out, so that a
-    calibration that refuses much looks better than it is."""
+    """``with_misses`` counts a rejected batch as a mid-range answer; ``answered`` leaves it out, which favours a
+    calibration that refuses many.
+    """
 
     campaign: str
     with_misses: Comparison
     answered: Comparison
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers for a file or a report; null where nothing was answered."""
+        """The figures for a file or a report; null without an answer."""
         return {"campaign": self.campaign, "with_misses": _plain(self.with_misses), "answered": _plain(self.answered)}
 
 
@@ -88,7 +89,7 @@ def advice_of(
 ) -> AdviceStudy:
     """Errors with and without the advice, over runs without a fault.
 
-    Raises CalibrationImpossibleError where no such triple has runs to choose from.
+    Raises CalibrationImpossibleError if there is no such triple with runs to choose from.
     """
     runs = [one.identification for one in split]
     triples = triples_at_different_positions(runs, vehicle)
@@ -103,13 +104,13 @@ def advice_of(
 
 
 def _n_calibrations(triples: Sequence[tuple[int, ...]], numbers: Sequence[int]) -> int:
-    """Triples, and the different quadruples that follow from them."""
+    """The number of triples and of different quadruples made of them."""
     fours = {frozenset((*triple, number)) for triple in triples for number in numbers if number not in triple}
     return len(triples) + len(fours)
 
 
 class _Tried:
-    """Calibrations made so far, each once."""
+    """The calibrations made so far, each computed once."""
 
     def __init__(self, split: Sequence[SplitRun], vehicle: Vehicle, on_fit: OnFit, n_fits: int) -> None:
         self._split = {one.identification.number: one for one in split}
@@ -118,7 +119,7 @@ class _Tried:
         self._made: dict[frozenset[int], tuple[CalibratedVehicle, Scored]] = {}
 
     def choice(self, numbers: tuple[int, ...]) -> tuple[Choice, Choice]:
-        """What could follow these runs, once with misses and once of what was answered."""
+        """The runs that could follow these, once with misses and once over answered batches."""
         calibrated, before = self._calibrated(numbers)
         advised, least, expected = self._advice(numbers, calibrated)
         after = {number: self._calibrated((*numbers, number))[1] for number in self._split if number not in numbers}
@@ -136,7 +137,7 @@ class _Tried:
         return both[0], both[1]
 
     def _advice(self, numbers: tuple[int, ...], calibrated: CalibratedVehicle) -> tuple[int, int, Errors]:
-        """The runs not driven yet that the plan expects most and least of, and the errors it expects so far."""
+        """The remaining runs with the largest and the smallest expected benefit, and the error predicted so far."""
         found = calibrated.cross_spectrum
         if found is None:
             raise ValueError("a study of the advice needs the cross-spectral calibration")
@@ -189,7 +190,7 @@ def _or_nan(x: float | None) -> float:
 
 
 def compared(choices: Sequence[Choice]) -> Comparison:
-    """Sums up. Raises ValueError without any choice."""
+    """The means over all choices. Raises ValueError without any choice."""
     if not choices:
         raise ValueError("nothing to compare: no runs could follow")
     advised = _rows([choice.after[choice.advised] for choice in choices])
@@ -220,7 +221,7 @@ def _mean_of_others(choice: Choice) -> Errors:
 
 
 def _both(errors: Errors) -> float:
-    """Their sum, to order by; where nothing was answered, the last."""
+    """Sum of both errors, for sorting; infinite without an answer."""
     return sum(errors) if np.isfinite(errors).all() else float("inf")
 
 
@@ -229,7 +230,7 @@ def _rows(errors: Any) -> np.ndarray:
 
 
 def _mean(errors: Any) -> Errors:
-    """Column by column over what was answered; NaN where nothing was."""
+    """Mean of each column over answered batches; NaN without any."""
     payload, share = (_mean_known(column[np.isfinite(column)]) for column in _rows(errors).T)
     return payload, share
 

@@ -1,7 +1,7 @@
-"""What the alarms say on simulated delivery days (delivery_days): of vans that are not quite as they were calibrated.
+"""Alarms on simulated delivery days (delivery_days) of vans that differ slightly from their calibration.
 
-A day's payloads are held against several limits in turn, parts of the rated payload. What counts is how the alarm of
-the gross weight stands at the end of each leg that was weighed.
+A day's payloads are compared with several limits in turn, parts of the rated payload. Each weighed leg counts by the
+state of the gross weight's alarm at its end.
 """
 
 from collections import Counter
@@ -14,22 +14,25 @@ from typing import Any, Final
 from benchmarks.accuracy.coverage_drives import stated
 from benchmarks.accuracy.delivery import leg_of
 from benchmarks.accuracy.delivery_days import Day, Said, kept_day
-from benchmarks.accuracy.vans import OnVan, of_each_van, van_of
+from benchmarks.accuracy.runner import OnDone, run_each
+from benchmarks.accuracy.vans import van_of
 from gateway.core.alarms import AlarmRules, AlarmState, AlarmWatch
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json
 
-LIMITS: Final = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)  # of the rated payload
-NEAR: Final = 0.1  # likewise
+LIMITS: Final = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)  # chosen: of the rated payload
+NEAR: Final = 0.1  # chosen, likewise
 CLASSES: Final = ("far_over", "over", "under", "far_under")
 
-End = tuple[str, str | None]  # how the truth lies to the limit, and what the alarm says at a leg's end
+End = tuple[str, str | None]  # the truth relative to the limit, and the alarm's state at the end of a leg
 
 
-def days(n_days: int, seed: int, *, workers: int = 1, kept: Path | None = None, on_day: OnVan) -> dict[str, Any]:
-    """Of all days and limits: legs by where the truth lies, and how many ended with an alarm, early or confirmed."""
-    legs = [leg for day in of_each_van(partial(legs_of, kept, seed), n_days, workers, on_day) for leg in day]
+def days(n_days: int, seed: int, *, workers: int = 1, kept: Path | None = None, on_day: OnDone) -> dict[str, Any]:
+    """Legs over all days and limits, by the truth relative to the limit, and how many ended with an early or final
+    alarm.
+    """
+    legs = [leg for day in run_each(partial(legs_of, kept, seed), n_days, workers, on_day) for leg in day]
     counts = Counter(legs)
     return {
         "n_days": n_days,
@@ -50,7 +53,7 @@ def days(n_days: int, seed: int, *, workers: int = 1, kept: Path | None = None, 
 
 
 def legs_of(kept: Path | None, seed: int, number: int) -> list[tuple[Said, str, str | None]]:
-    """One day against each limit."""
+    """The legs of one day for each limit."""
     driven = kept_day(kept, seed, number)
     vehicle = replace(stated(van_of(seed, number)), unsprung_front_kg=0.0, unsprung_rear_kg=0.0)
     return [
@@ -75,7 +78,7 @@ def _legs(driven: Day, estimates: tuple[Estimate, ...], vehicle: Vehicle, part: 
 
 
 def _truth(over: float) -> str:
-    """``over`` the limit, in parts of the rated payload."""
+    """The class of a payload that is ``over`` the limit, in parts of the rated payload."""
     if over > 0.0:
         return "far_over" if over > NEAR else "over"
     return "far_under" if over < -NEAR else "under"

@@ -1,20 +1,22 @@
-"""How much of the time on the road is covered by estimates, where driving is slow, short or broken by stops.
+"""The share of the time on the road that estimates cover, in driving that is slow, short or broken by stops.
 
-    python -m benchmarks.accuracy.availability --vans 2        a line a world, as Markdown
+    table_of(n_vans, seed) -> a line per world, as Markdown
 
 Every van is calibrated by known loads at 50 km/h and then driven through each world with one load, or with one that
-changes at a stop. A second on the road counts as covered where it lies within an estimate, early looks left out.
+changes at a stop. A second on the road counts as covered if it is within an estimate that is not provisional.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
-import click
 import numpy as np
 
 from benchmarks.accuracy.coverage_drives import MAP_NAME, Scope, unseen_load
 from benchmarks.accuracy.delivery_days import ROAD
+from benchmarks.accuracy.markdown import table
+from benchmarks.accuracy.runner import OnDone, run_each
 from benchmarks.accuracy.vans import FreshVan, fresh_van
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
 from gateway.calibration.judgement.learning_curve import calibrated_on
@@ -29,19 +31,19 @@ from gateway.sim.vehicle import Load, payload_kg
 from gateway.units import NS_PER_S
 from gateway.workbench.wiring import Wiring
 
-SEED: Final = 20_300
+SEED: Final = 20_300  # arbitrary, of this study alone
 ESTIMATOR: Final = "cross_spectrum"
-STANDSTILL_MPS: Final = 0.5
-START_NS: Final = 1_790_000_000_000_000_000
-HOUR_S: Final = 3600.0
-HOP_S: Final = (100.0, 280.0)
+STANDSTILL_MPS: Final = 0.5  # BatchSettings.standstill_speed_mps
+START_NS: Final = 1_790_000_000_000_000_000  # arbitrary, in 2026
+HOUR_S: Final = 3600.0  # seconds
+HOP_S: Final = (100.0, 280.0)  # chosen: shorter than a window
 
-Hop = tuple[Drive, float]  # how it is driven, and how many seconds the vehicle then stands
+Hop = tuple[Drive, float]  # the drive, and the seconds of standstill after it
 
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """``hops`` draws what is driven; ``is_changed``: at the middle stop another load is put on."""
+    """``hops`` draws the drives; ``is_changed``: another load from the middle stop on."""
 
     name: str
     hops: Callable[[np.random.Generator], list[Hop]]
@@ -62,7 +64,7 @@ def _slow(
 
 
 def _delivery(rng: np.random.Generator) -> list[Hop]:
-    """Twenty short hops in town with a minute or two at each door: none is long enough for a batch."""
+    """Twenty short hops in town with a minute or two at each door; none is long enough for a batch."""
     return [
         (_slow(rng, (20.0, 45.0), (8.0, 40.0), 0.4, float(rng.uniform(*HOP_S))), float(rng.uniform(75.0, 150.0)))
         for _ in range(20)
@@ -84,7 +86,9 @@ WORLDS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Of one drive: seconds on the road, those within estimates, and each estimate as (error, half-width) in kg."""
+    """One drive: seconds on the road, seconds within estimates, and each estimate's (error, half-width, is covered) in
+    kg.
+    """
 
     moving_s: float
     covered_s: float
@@ -134,7 +138,7 @@ def _within(t_ns: I64, estimates: list[Estimate]) -> Bool:
 
 
 def _true_kg(one: Estimate, t_ns: I64, moving_s: F64, carried: list[tuple[int, tuple[Load, ...]]]) -> float:
-    """The load aboard for most of the time on the road."""
+    """The load on board for most of the time on the road."""
     inside = (t_ns >= one.t_start_ns) & (t_ns < one.t_end_ns)
     bounds = [start_ns for start_ns, _ in carried[1:]]
     of_hop = np.searchsorted(bounds, t_ns[inside], side="right")
@@ -150,36 +154,37 @@ def _error_of(one: Estimate, true_kg: float) -> tuple[float, float, bool]:
     return one.payload.number - true_kg, 0.5 * (high - low), low <= true_kg <= high
 
 
-def table(n_vans: int, seed: int = SEED) -> Iterator[str]:
-    """Lines of Markdown."""
-    yield "| world | on the road [min] | covered | estimates | refused | mean error [kg] | half-width [kg] | held |"
-    yield "|---|---|---|---|---|---|---|---|"
-    scope = Scope()
-    of_world: dict[str, list[Found]] = {world.name: [] for world in WORLDS}
-    for number in range(n_vans):
-        fresh = fresh_van(scope, seed, number)
-        calibrated = calibrated_on(fresh.runs, fresh.vehicle, ESTIMATOR)
-        for world, one in zip(WORLDS, fresh.test_seed.spawn(len(WORLDS)), strict=True):
-            of_world[world.name].append(driven(fresh, calibrated, world, one))
-    for name, found in of_world.items():
-        errors = [error for one in found for error in one.errors_kg]
-        moving_s, covered_s = (sum(getattr(one, which) for one in found) for which in ("moving_s", "covered_s"))
-        figures = [f"{np.mean([abs(e[0]) for e in errors]):.1f}", f"{np.mean([e[1] for e in errors]):.0f}"]
-        held = f"{sum(e[2] for e in errors)} of {len(errors)}"
-        yield (
-            f"| {name} | {moving_s / 60.0:.0f} | {100.0 * covered_s / moving_s:.0f} % | {len(errors)} | "
-            f"{sum(one.n_refused for one in found)} | {' | '.join(figures if errors else ['-', '-'])} | {held} |"
-        )
+COLUMNS: Final = (
+    "world", "on the road [min]", "covered", "estimates", "refused", "mean error [kg]", "half-width [kg]", "held",
+)  # fmt: skip
 
 
-@click.command()
-@click.option("--vans", default=2, show_default=True, help="how many vans are driven through each world")
-@click.option("--seed", default=SEED, show_default=True)
-def main(vans: int, seed: int) -> None:
-    """Print the table."""
-    for line in table(vans, seed):
-        click.echo(line)
+def table_of(n_vans: int, seed: int = SEED, *, workers: int = 1, on_van: OnDone = lambda done, of: None) -> list[str]:
+    """The table in Markdown."""
+    vans = list(run_each(partial(of_one_van, seed), n_vans, workers, on_van))
+    return table(
+        COLUMNS, [_cells(world.name, found) for world, found in zip(WORLDS, zip(*vans, strict=True), strict=True)]
+    )
 
 
-if __name__ == "__main__":
-    main()
+def of_one_van(seed: int, number: int) -> list[Found]:
+    """One van through every world."""
+    fresh = fresh_van(Scope(), seed, number)
+    calibrated = calibrated_on(fresh.runs, fresh.vehicle, ESTIMATOR)
+    seeds = fresh.test_seed.spawn(len(WORLDS))
+    return [driven(fresh, calibrated, world, one) for world, one in zip(WORLDS, seeds, strict=True)]
+
+
+def _cells(name: str, found: Sequence[Found]) -> list[str]:
+    errors = [error for one in found for error in one.errors_kg]
+    moving_s, covered_s = (sum(getattr(one, which) for one in found) for which in ("moving_s", "covered_s"))
+    figures = [f"{np.mean([abs(e[0]) for e in errors]):.1f}", f"{np.mean([e[1] for e in errors]):.0f}"]
+    return [
+        name,
+        f"{moving_s / 60.0:.0f}",
+        f"{100.0 * covered_s / moving_s:.0f} %",
+        str(len(errors)),
+        str(sum(one.n_refused for one in found)),
+        *(figures if errors else ["-", "-"]),
+        f"{sum(e[2] for e in errors)} of {len(errors)}",
+    ]

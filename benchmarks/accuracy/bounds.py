@@ -1,4 +1,4 @@
-"""The limits of weighing, as a table: the paper's van on the paper's road, by what is seen and what is known."""
+"""Theoretical limits of the accuracy: the paper's van on the paper's road, by observation and prior knowledge."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ PAPER_VAN: Final = Vehicle(
     empty_front_share_pct=50.0,
     sensor_position_m=3.1,
 )
-MODEL_SLACK: Final = 0.02
+MODEL_SLACK: Final = 0.02  # chosen: share of unmodelled power
 SENSOR_NOISE: Final = (
     (150e-6 * STANDARD_GRAVITY_MPS2) ** 2,
     radians(0.01) ** 2,
 )  # per hertz, usual for automotive MEMS
-SHARE_RANGE_PCT: Final = 20.0
+SHARE_RANGE_PCT: Final = 20.0  # the paper's range of front shares
 MILD: Final[Mapping[str, float]] = MappingProxyType(
     {
         "spring_front_npm": 0.1,
@@ -45,7 +45,7 @@ MILD: Final[Mapping[str, float]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """One row: what is seen, what is known of the vehicle, what disturbs, and the bound."""
+    """One row: the observation, whether the vehicle is known, the disturbance, and the bound."""
 
     seen: Seen
     is_vehicle_known: bool
@@ -54,12 +54,12 @@ class Limit:
 
     @property
     def payload_pct(self) -> float:
-        """Of the paper's range, 450 kg."""
+        """In percent of the paper's range, 450 kg."""
         return 100.0 * self.bound.payload_std_kg / PAPER_PAYLOAD_KG
 
     @property
     def front_share_pct(self) -> float:
-        """Of the paper's range, 20 points."""
+        """In percent of the paper's range, 20 points."""
         return 100.0 * self.bound.front_share_std_pct / SHARE_RANGE_PCT
 
 
@@ -82,7 +82,7 @@ def limits(drive: Drive | None = None) -> list[Limit]:
 
 
 def limits_table(found: list[Limit]) -> str:
-    """The rows as Markdown."""
+    """The table in Markdown."""
     lines = ["| seen | vehicle | beside the road | payload | front share |", "|---|---|---|---|---|"]
     for one in found:
         known = "known" if one.is_vehicle_known else "mild priors"

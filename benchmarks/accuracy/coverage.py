@@ -1,10 +1,10 @@
-"""Coverage over many simulated vans, roads and drives: each van calibrated on known loads, then put to the test.
+"""Coverage over many simulated vans, roads and drives: each van is calibrated on known loads, then tested.
 
     coverage(Scope(), seed) -> CoverageTable
 
-The vans, loads, roads and seeds serve this study alone: no setting of the estimators was chosen with them. Sensors sit
-up to 0.4 m beside the centre line. Every van is calibrated and judged twice on the same drives: with its roll rate
-mapped, and without.
+Vans, loads, roads and seeds serve this study alone: no setting of the estimators was chosen with them. Sensors are up
+to 0.4 m off the centre line. Every van is calibrated and judged twice on the same drives: with its roll rate mapped,
+and without.
 """
 
 from dataclasses import replace
@@ -20,31 +20,32 @@ from benchmarks.accuracy.coverage_table import (
     judged_batches,
     roll_in_words,
 )
-from benchmarks.accuracy.vans import OnVan, fresh_van, of_each_van
+from benchmarks.accuracy.runner import OnDone, run_each
+from benchmarks.accuracy.vans import fresh_van
 from gateway.calibration.judgement import judge
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import CalibrationImpossibleError
 
-SEED: Final = 20261
-UNNOTED_EVERY: Final = 2  # of every so many vans nobody noted where the known loads stood sideways
+SEED: Final = 20261  # arbitrary, of this study alone
+UNNOTED_EVERY: Final = 2  # chosen: every second van lacks the lateral places of its known loads
 Found = tuple[list[JudgedBatch], list[str]]
 
 
 def coverage(
-    scope: Scope, seed: int = SEED, *, workers: int = 1, on_van: OnVan = lambda done, of: None
+    scope: Scope, seed: int = SEED, *, workers: int = 1, on_van: OnDone = lambda done, of: None
 ) -> CoverageTable:
-    """Drive, calibrate and judge every van. ``refused`` of the result names calibrations that were impossible."""
+    """Drive, calibrate and judge every van. ``refused`` of the result lists impossible calibrations."""
     batches: list[JudgedBatch] = []
     refused: list[str] = []
-    for of_van, refused_of_van in of_each_van(partial(of_one_van, scope, seed), scope.n_vans, workers, on_van):
+    for of_van, refused_of_van in run_each(partial(of_one_van, scope, seed), scope.n_vans, workers, on_van):
         batches += of_van
         refused += refused_of_van
     return coverage_table(batches, seed, refused)
 
 
 def of_one_van(scope: Scope, seed: int, number: int) -> Found:
-    """One van's batches by every estimator, and why an estimator could not be calibrated."""
+    """One van's batches by every estimator, and the reasons of impossible calibrations."""
     fresh = fresh_van(scope, seed, number)
     van, vehicle, runs = fresh.van, fresh.vehicle, fresh.runs
     asked = [trip for trip in TRIPS.values() for _ in range(scope.n_tests)]

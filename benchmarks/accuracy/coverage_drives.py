@@ -1,4 +1,4 @@
-"""Vans that no calibration was tried on, and the drives on which their intervals are put to the test."""
+"""The vans of the studies, which no setting was chosen with, and their test drives."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -28,18 +28,18 @@ from gateway.workbench.campaigns import ON_PALLETS, PAPER_SPEED_MPS, share_range
 from gateway.workbench.wiring import Wiring
 
 MAP_NAME: Final = "reference"
-CALIBRATED_PARTS: Final = (0.25, 0.6, 0.95)  # of the rated payload
-CALIBRATED_PLACES: Final = (0.2, 0.5, 1.0)  # of the wheelbase
-EMPTY_SHARE: Final = 0.15  # of the drives put to the test
-OTHER_SPEEDS_KMH: Final = (30.0, 110.0)
-SENSOR_OFF_M: Final = 0.4  # at most, to either side of the centre line
-NEAR_M: Final = (0.0, 0.1)  # from the centre line: where a load stands that nobody put beside it
-SIDEWAYS_M: Final = (0.15, 0.35)
+CALIBRATED_PARTS: Final = (0.25, 0.6, 0.95)  # chosen: of the rated payload
+CALIBRATED_PLACES: Final = (0.2, 0.5, 1.0)  # chosen: of the wheelbase
+EMPTY_SHARE: Final = 0.15  # chosen: of the test drives
+OTHER_SPEEDS_KMH: Final = (30.0, 110.0)  # chosen: town to motorway
+SENSOR_OFF_M: Final = 0.4  # chosen: at most, on either side of the centre line
+NEAR_M: Final = (0.0, 0.1)  # chosen: from the centre line, of a load placed in the middle
+SIDEWAYS_M: Final = (0.15, 0.35)  # chosen: from the centre line, of a load placed off it
 
 
 @dataclass(frozen=True, slots=True)
 class Scope:
-    """How much is driven: per van so many known loads and, of each kind, so many drives put to the test."""
+    """The amount of driving: vans, known loads per van, and test drives of each kind."""
 
     n_vans: int = 12
     n_known_loads: int = 6
@@ -50,9 +50,9 @@ class Scope:
 
 @dataclass(frozen=True, slots=True)
 class Trip:
-    """A kind of drive: its name, how it is driven and where, and what has changed since the calibration.
+    """A kind of drive: its name, how and where it is driven, and changes since calibration.
 
-    Loads stand off_m (least, most) from the centre line, to either side.
+    Loads are off_m (least, most) from the centre line, on either side.
     """
 
     kind: str
@@ -64,20 +64,20 @@ class Trip:
 
 
 def draw_van(number: int, rng: np.random.Generator) -> Vehicle:
-    """The ``number``-th van: of the types in turn, its masses, springs, dampers, tyres and places scattered."""
+    """The ``number``-th van: of the types in turn, with scattered masses, springs, dampers, tyres and places."""
     kinds = list(VANS.values())
     van = scattered(kinds[number % len(kinds)], OF_TYPES, rng)
     return replace(van, name=f"{van.name}_{number}")
 
 
 def draw_sensors(rng: np.random.Generator) -> Sensors:
-    """The reference unit, somewhere beside the centre line."""
+    """The reference unit at a random distance from the centre line."""
     left_m = float(rng.uniform(-SENSOR_OFF_M, SENSOR_OFF_M))
     return replace(REFERENCE, mount=replace(REFERENCE.mount, left_m=left_m))
 
 
 def stated(van: Vehicle, sensors: Sensors = REFERENCE) -> StatedVehicle:
-    """What a fitter would write into the campaign file: weights and places, nothing of springs."""
+    """The vehicle as a fitter states it in the campaign file: weights and places, but no springs."""
     return StatedVehicle(
         name=van.name,
         empty_mass_kg=van.sprung_kg,
@@ -100,7 +100,7 @@ def known_loads(van: Vehicle, n_loads: int, rng: np.random.Generator) -> list[tu
 
 
 def unseen_load(van: Vehicle, rng: np.random.Generator) -> tuple[Load, ...]:
-    """Any load of any shape at any place from the driver's back to the rear axle; sometimes none."""
+    """A load of any shape at any place from the driver's back to the rear axle; sometimes none."""
     if rng.random() < EMPTY_SHARE:
         return ()
     mass_kg, position_m = float(rng.uniform(0.05, 1.0)) * van.rated_payload_kg, float(rng.uniform(0.15, 1.0))
@@ -129,9 +129,9 @@ def rows_of(
     seeds: np.random.SeedSequence,
     sensors: Sensors = REFERENCE,
 ) -> tuple[Motion, Vehicle, tuple[Load, ...]]:
-    """One drive through sensors, frames and decoder; with the vehicle as it is that day, and what it carries.
+    """One drive through sensors, frames and decoder; with the vehicle of that day and its loads.
 
-    The same seeds give the same road and drive whatever the sensors.
+    The same seeds give the same road and drive with any sensors.
     """
     plan_seed, day_seed, side_seed = np.random.SeedSequence(seeds.entropy, spawn_key=seeds.spawn_key).spawn(3)
     plan_rng, day_rng = np.random.default_rng(plan_seed), np.random.default_rng(day_seed)
@@ -144,13 +144,13 @@ def rows_of(
 
 
 def beside(loads: tuple[Load, ...], off_m: tuple[float, float], rng: np.random.Generator) -> tuple[Load, ...]:
-    """The same loads, all of them to one side of the centre line, off_m (least, most) from it."""
+    """The same loads, all on one side of the centre line, off_m (least, most) from it."""
     left_m = float(rng.uniform(*off_m)) * float(rng.choice([-1.0, 1.0]))
     return tuple(replace(load, left_m=left_m) for load in loads)
 
 
 def without_roll_rate(run: KnownRun) -> KnownRun:
-    """The same run by a signal map without a roll rate: no other number of a batch changes."""
+    """The same run through a signal map without a roll rate: no other number of a batch changes."""
     return replace(run, batches=tuple(replace(batch, roll_rate_radps=None) for batch in run.batches))
 
 

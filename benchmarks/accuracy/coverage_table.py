@@ -1,4 +1,4 @@
-"""Many batches of many vehicles in one table: errors (12), refusals and coverage, a line for each kind of drive."""
+"""Batches of many vehicles in one table: errors (12), refusals and coverage, a line per kind of drive."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -14,15 +14,15 @@ from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.records import Why
 
 ALL_KINDS: Final = "all"
-HALF_AN_ANSWER: Final = "no_front_share"  # where an estimator is calibrated for the payload alone
+HALF_AN_ANSWER: Final = "no_front_share"  # of an estimator calibrated for the payload alone
 
 
 @dataclass(frozen=True, slots=True)
 class JudgedBatch:
-    """One batch: errors in percent of its vehicle's ranges, and whether the 95 % intervals held the truth.
+    """One batch: errors in percent of its vehicle's ranges, and whether the 95 % intervals contain the truth.
 
-    Where the batch was rejected the errors are those of a mid-range answer, no interval covers, and half-widths and
-    interval scores are NaN. cg_left_error_m is NaN where the lateral place is unknown.
+    For a rejected batch the errors are those of a mid-range answer, no interval covers, and half-widths and interval
+    scores are NaN. cg_left_error_m is NaN if the lateral place is unknown.
     """
 
     van: str
@@ -46,15 +46,15 @@ class JudgedBatch:
 
     @property
     def is_rejected(self) -> bool:
-        """Whether it gave no answer."""
+        """Whether the batch has no answer."""
         return bool(self.rejected)
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One estimator over one kind of drive. Means are of |error| in percent; None where nothing was answered.
+    """One estimator over one kind of drive. Means are of |error| in percent; None without an answer.
 
-    Coverage is clustered by run, and by van where ``_by_van``: one calibration serves all runs of a van.
+    Coverage is clustered by run, and by van for ``_by_van``: one calibration serves all runs of a van.
     """
 
     kind: str
@@ -85,9 +85,9 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class CoverageTable:
-    """What a study of coverage found, line by line; the lines of all kinds together come last.
+    """The result of a study of coverage, line by line; the lines of all kinds together come last.
 
-    With and without a roll rate are never counted together.
+    Batches with and without a roll rate are never pooled.
     """
 
     seed: int
@@ -96,7 +96,7 @@ class CoverageTable:
     refused: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers for a file or a page."""
+        """The figures for a file or a page."""
         return asdict(self)
 
 
@@ -113,7 +113,7 @@ def judged_batches(
 
 
 def roll_in_words(has_roll_rate: bool) -> str:
-    """As pages say it."""
+    """The words of the pages."""
     return "with roll rate" if has_roll_rate else "without roll rate"
 
 
@@ -174,7 +174,7 @@ def _judged(one: Judged, vehicle: Vehicle, kind: str, estimator: str, cg_m: floa
 def _interval(
     interval: tuple[float, float], true: float, full_range: tuple[float, float], is_rejected: bool
 ) -> tuple[float, float]:
-    """Half-width and score in percent of the range; NaN of what was rejected."""
+    """Half-width and score in percent of the range; NaN for a rejected batch."""
     if is_rejected:
         return math.nan, math.nan
     percent = 100.0 / (full_range[1] - full_range[0])
@@ -233,13 +233,13 @@ def _mean_abs(errors_pct: Sequence[float]) -> float | None:
 
 
 def _mean_known(numbers: Sequence[float]) -> float | None:
-    """Of those that are known: an answer without an interval has no width."""
+    """Mean over the known numbers; an answer without an interval has no width."""
     return _mean_abs([x for x in numbers if math.isfinite(x)])
 
 
 def _coverage(
     answered: Sequence[JudgedBatch], is_covered: Callable[[JudgedBatch], bool], cluster: Callable[[JudgedBatch], str]
 ) -> Coverage | None:
-    """None where fewer than two clusters answered."""
+    """None if fewer than two clusters were answered."""
     clusters = [cluster(batch) for batch in answered]
     return coverage_of([is_covered(batch) for batch in answered], clusters) if len({*clusters}) > 1 else None

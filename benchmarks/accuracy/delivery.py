@@ -1,6 +1,7 @@
-"""Are load events found, and none invented? Simulated delivery days, told batch by batch as the service would.
+"""Are load events found, and are any reported without a change? Delivery days, processed batch by batch like the
+service.
 
-delivery(seed, n_days) -> numbers for events.json
+    delivery(n_days, seed) -> numbers for events.json
 """
 
 import math
@@ -16,7 +17,8 @@ import numpy as np
 from benchmarks.accuracy.coverage_drives import stated
 from benchmarks.accuracy.delivery_days import Day as DrivenDay
 from benchmarks.accuracy.delivery_days import Said, kept_day
-from benchmarks.accuracy.vans import OnVan, of_each_van, van_of
+from benchmarks.accuracy.runner import OnDone, run_each
+from benchmarks.accuracy.vans import van_of
 from gateway.calibration.judgement.coverage import interval_scores
 from gateway.core.change import Rules
 from gateway.core.events import Entry, EntryKind, Ledger
@@ -24,14 +26,14 @@ from gateway.core.events.day import Day
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json
 
-SEED: Final = 20_280
-N_DAYS: Final = 20
-PLAIN: Final = 3.0  # standard deviations
+SEED: Final = 20_280  # arbitrary, of this study alone
+N_DAYS: Final = 20  # chosen: some 150 changes
+PLAIN: Final = 3.0  # standard deviations, as core.events.ledger.PLAIN_STDS
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What lies between two weighings: the truth, what was found, and whether it was told in the end."""
+    """A pair of consecutive weighings: the true and the estimated change, and whether it was reported in the end."""
 
     day: int
     true_kg: float
@@ -60,7 +62,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """A trip's tonne-kilometres: the truth, and what was told."""
+    """A trip's tonne-kilometres: true and reported."""
 
     day: int
     true_tkm: float
@@ -72,7 +74,7 @@ class Carried:
 
 @dataclass(frozen=True, slots=True)
 class Weighed:
-    """A batch that counted, in percent of the rated payload: its error, half its 95 % interval, and its score."""
+    """A counted batch, in percent of the rated payload: its error, half its 95 % interval, and its score."""
 
     error_pct: float
     half_width_pct: float
@@ -82,7 +84,7 @@ class Weighed:
 
 @dataclass(frozen=True, slots=True)
 class JudgedDay:
-    """One day, judged."""
+    """One simulated day with its judged events."""
 
     van: str
     changes: list[Change]
@@ -92,10 +94,10 @@ class JudgedDay:
 
 
 def delivery(
-    n_days: int, seed: int = SEED, *, workers: int = 1, kept: Path | None = None, on_day: OnVan = lambda done, of: None
+    n_days: int, seed: int = SEED, *, workers: int = 1, kept: Path | None = None, on_day: OnDone = lambda done, of: None
 ) -> dict[str, Any]:
-    """Drive the days, tell them, judge them."""
-    days = list(of_each_van(partial(judged_day, kept, seed), n_days, workers, on_day))
+    """Simulate and judge the days."""
+    days = list(run_each(partial(judged_day, kept, seed), n_days, workers, on_day))
     return {
         "seed": seed,
         "vans": [day[Said.NOTHING].van for day in days],
@@ -117,7 +119,7 @@ def _told_of(days: Sequence[JudgedDay]) -> dict[str, Any]:
 
 
 def judged_day(kept: Path | None, seed: int, number: int) -> dict[Said, JudgedDay]:
-    """One day's truth beside what was told of it, by what was said beforehand."""
+    """One day's truth and reports, for each statement of the campaign."""
     driven = kept_day(kept, seed, number)
     rules = Rules.of(stated(van_of(seed, number)))
     return {said: _judged(number, driven, tuple(map(estimate_from_json, driven.records[said])), rules) for said in Said}

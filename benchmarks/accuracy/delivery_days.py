@@ -1,13 +1,12 @@
-"""Delivery days of simulated vans: what is loaded and unloaded at each of eight stops, and what the gateway told.
+"""Delivery days of simulated vans: the loads at each of eight stops, and the estimates of the gateway.
 
-A van of the coverage study is calibrated on six known loads, and is a little another one on its delivery day (worn,
-warm, other tyres). It leaves empty, is loaded at the first stop, then parcels go off, once one comes aboard, and at
-two stops nothing happens. Legs last a little over one window, some over two; the bus sleeps while the van stands.
+A van of the coverage study is calibrated on six known loads, and differs a little on its delivery day (worn, warm,
+other tyres). It leaves empty and is loaded at the first stop; then parcels are delivered, one is picked up, and at two
+stops nothing happens. Legs last a little over one window, some over two; the bus sleeps while the van stands.
 """
 
-import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
@@ -16,6 +15,7 @@ import numpy as np
 
 from benchmarks.accuracy.coverage_drives import MAP_NAME, Scope
 from benchmarks.accuracy.loads import box
+from benchmarks.accuracy.runner import kept
 from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, scattered
 from benchmarks.accuracy.vans import fresh_van
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
@@ -34,24 +34,24 @@ from gateway.units import NS_PER_S
 from gateway.workbench.wiring import Wiring
 
 ESTIMATOR: Final = "cross_spectrum"
-N_STOPS: Final = 8
-IDLE_STOPS: Final = (3, 6)  # numbers from 0: a break, and nobody at home
-PICK_UP_STOP: Final = 5
-LONG_LEGS: Final = (1, 4, 7)
-LEG_S: Final = (345.0, 655.0)  # short and long
-URBAN_LONGER: Final = 1.35  # stop and go: a window wants that much
-STOP_S: Final = 600.0
+N_STOPS: Final = 8  # chosen
+IDLE_STOPS: Final = (3, 6)  # chosen, from 0: a break, and nobody at home
+PICK_UP_STOP: Final = 5  # chosen, from 0
+LONG_LEGS: Final = (1, 4, 7)  # chosen, from 0
+LEG_S: Final = (345.0, 655.0)  # chosen: short and long, one window and two
+URBAN_LONGER: Final = 1.35  # chosen: stop and go has less usable driving
+STOP_S: Final = 600.0  # chosen
 ROAD: Final = ObstacleRoad(UnevenRoad(iso_road("B"), stretch_m=400.0, spread=0.4), potholes_per_km=1.0)
-PARCEL_PARTS: Final = (0.08, 0.22)  # of the rated payload
-N_PARCELS: Final = 6
+PARCEL_PARTS: Final = (0.08, 0.22)  # chosen: of the rated payload
+N_PARCELS: Final = 6  # chosen
 
 
-FLOOR_PARTS: Final = (0.25, 1.0)  # of the wheelbase, where parcels lie
-PARCEL_EXTENT_M: Final = ((0.3, 1.1), (0.2, 0.9))  # lengths and heights of single ones
+FLOOR_PARTS: Final = (0.25, 1.0)  # chosen: of the wheelbase, places of parcels
+PARCEL_EXTENT_M: Final = ((0.3, 1.1), (0.2, 0.9))  # chosen: lengths and heights of single parcels
 
 
 class Said(StrEnum):
-    """What the campaign says of the loads' shape."""
+    """The campaign's statement of the loads' shape."""
 
     NOTHING = "nothing"
     CARRIES = "carries"  # parcels
@@ -59,8 +59,8 @@ class Said(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Day:
-    """What was aboard on each leg, kg, the share it made, %, and the JSON objects of all estimates of that day, by what
-    was said of the loads' length.
+    """The payload (kg) and front share (%) of each leg, and the JSON objects of all estimates of that day, by the
+    campaign's statement.
     """
 
     van: str
@@ -73,7 +73,7 @@ class Day:
 
 
 def day_of(seed: int, number: int) -> Day:
-    """The ``number``-th day of a study with this seed; it does not depend on the others."""
+    """The ``number``-th day of a study with this seed, independent of the others."""
     fresh = fresh_van(Scope(), seed, number)
     calibrated = calibrated_on(fresh.runs, fresh.vehicle, ESTIMATOR)
     plan_seed, day_seed, *leg_seeds = np.random.SeedSequence([seed, number, 1]).spawn(3 + N_STOPS)
@@ -110,14 +110,14 @@ def day_of(seed: int, number: int) -> Day:
 
 
 def _with(said: Said, calibrated: CalibratedVehicle) -> CalibratedVehicle:
-    """As the calibration would be, had the campaign said so: known loads are weighed by their own shape either way."""
+    """The calibration with this statement; known loads are weighed with their own shape either way."""
     if said is Said.NOTHING:
         return calibrated
     return replace(calibrated, vehicle=replace(calibrated.vehicle, carries=Carries.PARCELS))
 
 
 def loads_of_legs(van: Vehicle, rng: np.random.Generator) -> list[tuple[Load, ...]]:
-    """What is aboard on each of the nine legs."""
+    """The loads on board on each of the nine legs."""
     parcels = [_parcel(van, rng) for _ in range(N_PARCELS)]
     aboard: list[Load] = []
     legs: list[tuple[Load, ...]] = [()]
@@ -133,19 +133,12 @@ def loads_of_legs(van: Vehicle, rng: np.random.Generator) -> list[tuple[Load, ..
 
 
 def kept_day(folder: Path | None, seed: int, number: int) -> Day:
-    """The day as an earlier call left it in ``folder``; else driven, and left there."""
-    path = None if folder is None else folder / f"day-{seed}-{number}.json"
-    if path is not None and path.exists():
-        told: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        return Day(**{name: as_told(told[name]) for name, as_told in _AS_TOLD.items()})
-    day = day_of(seed, number)
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps({name: getattr(day, name) for name in _AS_TOLD}), encoding="utf-8")
-    return day
+    """The day, read from ``folder`` if an earlier run stored it there, else simulated and stored."""
+    stored = kept(folder, f"day-{seed}-{number}", lambda: asdict(day_of(seed, number)))
+    return Day(**{name: from_json(stored[name]) for name, from_json in _FROM_JSON.items()})
 
 
-_AS_TOLD: Final[dict[str, Callable[[Any], Any]]] = {
+_FROM_JSON: Final[dict[str, Callable[[Any], Any]]] = {
     "van": str,
     "rated_kg": float,
     "payload_kg": tuple,
@@ -154,7 +147,7 @@ _AS_TOLD: Final[dict[str, Callable[[Any], Any]]] = {
     "leg_start_ns": tuple,
     "records": dict,
 }
-"""How each field of a day comes out of JSON."""
+"""The type of each field of a day, from JSON."""
 
 
 def _parcel(van: Vehicle, rng: np.random.Generator) -> Load:

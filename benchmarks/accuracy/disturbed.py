@@ -1,7 +1,7 @@
-"""What may go wrong with a calibrated vehicle's sensors and stamps: each disturbance by name.
+"""What may go wrong with a calibrated vehicle, its sensors, stamps and loads: each disturbance by name.
 
-Some disturb the rows of a drive that was recorded well; the others are driven again with sensors that sit
-elsewhere or are others, or with a load that calibration never saw the like of.
+Some disturb the rows of a drive that was recorded well. The others drive again: with sensors that sit elsewhere or are
+others, with a vehicle that has worn, or with a load of a kind that calibration never saw.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,21 +13,34 @@ import numpy as np
 
 from gateway.records import F64, I64, Motion, Signal, Why
 from gateway.sim.sensors import Sensors
+from gateway.sim.vehicle import Axle, Damper, Load, Vehicle
 from gateway.units import NS_PER_S
 
+WORN_BY: Final = 0.35  # chosen: of the dampers' rates
+MORE_FRICTION: Final = 2.5  # chosen: times the dampers' friction
+SOFTER_TYRES_BY: Final = 0.15  # chosen: of the tyres' rate
+ON_TOW_BAR_KG: Final = 60.0  # chosen: a full bicycle carrier
+TOW_BAR_BEHIND_AXLE_M: Final = 0.9  # as core.cargo has it
+PARCELS_M: Final = (1.2, 2.4)  # chosen: high, long
+
 Rows = Callable[[Motion, np.random.Generator], Motion]
+Loads = tuple[Load, ...]
+World = Callable[[Vehicle, Loads], tuple[Vehicle, Loads]]
 
 
 @dataclass(frozen=True, slots=True)
 class Disturbance:
-    """One line of the table. ``rows`` disturbs what was decoded, other ``sensors`` drive again.
+    """One line of the table. ``rows`` disturbs what was decoded; other ``sensors``, or another ``world`` of vehicle and
+    loads, drive again.
 
-    ``is_mended``: errors should stay within a quarter of the undisturbed; ``reasons`` are the right ones to refuse.
+    ``is_mended``: errors should stay within 1.25 times the undisturbed ones; ``reasons`` are the right reasons to
+    refuse.
     """
 
     name: str
     rows: Rows = lambda motion, rng: motion
     sensors: Callable[[Sensors], Sensors] = lambda sensors: sensors
+    world: World = lambda van, loads: (van, loads)
     is_overloaded: bool = False
     is_sideways: bool = False
     has_roll_rate: bool = True
@@ -36,7 +49,7 @@ class Disturbance:
 
 
 def _stamped(stamp: Callable[[I64, np.random.Generator], I64]) -> Rows:
-    """Rows with other stamps, in the order in which they then come."""
+    """Rows with other stamps, in their new order."""
 
     def disturb(motion: Motion, rng: np.random.Generator) -> Motion:
         t_ns = stamp(motion.t_ns, rng)
@@ -47,7 +60,7 @@ def _stamped(stamp: Callable[[I64, np.random.Generator], I64]) -> Rows:
 
 
 def jittered(mean_s: float) -> Rows:
-    """Every stamp late by an exponential delay, never before an earlier one."""
+    """Every stamp delayed exponentially, but never before an earlier one."""
     return _stamped(
         lambda t_ns, rng: np.maximum.accumulate(
             t_ns + np.rint(rng.exponential(mean_s, len(t_ns)) * NS_PER_S).astype(int)
@@ -56,13 +69,13 @@ def jittered(mean_s: float) -> Rows:
 
 
 def heaped(every_s: float) -> Rows:
-    """Frames handed over together every so often, stamped then, as USB adapters do."""
+    """Frames delivered together at intervals and stamped then, as USB adapters do."""
     every_ns = round(every_s * NS_PER_S)
     return _stamped(lambda t_ns, rng: t_ns[0] - (t_ns[0] - t_ns) // every_ns * every_ns)
 
 
 def stalled(length_s: float, every_s: float) -> Rows:
-    """A reader that stands still for a moment, again and again."""
+    """A reader that stalls for a moment at intervals."""
     length_ns, every_ns = round(length_s * NS_PER_S), round(every_s * NS_PER_S)
 
     def stamp(t_ns: I64, rng: np.random.Generator) -> I64:
@@ -93,7 +106,7 @@ def lagging(by_s: float) -> Rows:
 
 
 def amplified(by: float, *of: Signal) -> Rows:
-    """Sensors whose gain has changed; the accelerometer's changes gravity too."""
+    """Sensors with changed gains; that of the accelerometer changes gravity too."""
 
     def disturb(motion: Motion, rng: np.random.Generator) -> Motion:
         columns = motion.columns.copy()
@@ -104,13 +117,13 @@ def amplified(by: float, *of: Signal) -> Rows:
 
 
 def drawing_a_trailer(motion: Motion, rng: np.random.Generator) -> Motion:
-    """Every frame says that a trailer is drawn; nothing else changes."""
+    """Every frame reports a trailer; nothing else changes."""
     drawn = np.ones((len(motion), 1))
     return replace(motion, signals=(*motion.signals, Signal.TRAILER), columns=np.hstack([motion.columns, drawn]))
 
 
 def half_of_the_time(signal: Signal, to: Callable[[F64], F64]) -> Rows:
-    """What one signal says in every other minute is replaced by ``to`` of its samples."""
+    """One signal replaced by ``to`` of its samples in every second minute."""
 
     def disturb(motion: Motion, rng: np.random.Generator) -> Motion:
         columns = motion.columns.copy()
@@ -126,12 +139,12 @@ def half_of_the_time(signal: Signal, to: Callable[[F64], F64]) -> Rows:
 
 
 def stuck(samples: F64) -> F64:
-    """All of them the first."""
+    """All samples equal to the first."""
     return np.full_like(samples, samples[0])
 
 
 def missing(samples: F64) -> F64:
-    """None of them."""
+    """NaN in place of every sample."""
     return np.full_like(samples, np.nan)
 
 
@@ -152,7 +165,7 @@ def _moved(back_m: float = 0.0, left_m: float = 0.0, yaw_deg: float = 0.0) -> Ca
 
 
 def noisier(accel: float = 1.0, gyro: float = 1.0) -> Callable[[Sensors], Sensors]:
-    """White noise of so many times the density."""
+    """White noise with its density multiplied."""
 
     def noisy(sensors: Sensors) -> Sensors:
         imu = sensors.imu
@@ -168,8 +181,49 @@ def _sampled_at(rate_hz: float) -> Callable[[Sensors], Sensors]:
     return lambda sensors: replace(sensors, imu=replace(sensors.imu, rate_hz=rate_hz))
 
 
+def _with_axles(axle: Callable[[Axle], Axle]) -> World:
+    return lambda van, loads: (replace(van, front=axle(van.front), rear=axle(van.rear)), loads)
+
+
+def _with_dampers(damper: Callable[[Damper], Damper]) -> World:
+    return _with_axles(lambda axle: replace(axle, damper=damper(axle.damper)))
+
+
+def _worn(damper: Damper) -> Damper:
+    left = 1.0 - WORN_BY
+    return replace(damper, compression_nspm=left * damper.compression_nspm, rebound_nspm=left * damper.rebound_nspm)
+
+
+def _with_more_friction(damper: Damper) -> Damper:
+    return replace(damper, friction_n=MORE_FRICTION * damper.friction_n)
+
+
+def _with_softer_tyres(axle: Axle) -> Axle:
+    return replace(axle, wheel=replace(axle.wheel, tyre_npm=(1.0 - SOFTER_TYRES_BY) * axle.wheel.tyre_npm))
+
+
+def _on_tow_bar(**base: float) -> World:
+    """A mass on the tow bar in addition to the load; ``base`` are its resonance and damping as a Load has them."""
+
+    def carrying(van: Vehicle, loads: Loads) -> tuple[Vehicle, Loads]:
+        behind_m = van.wheelbase_m + TOW_BAR_BEHIND_AXLE_M
+        ball = Load(ON_TOW_BAR_KG, behind_m, height_m=0.45, length_m=0.1, width_m=0.1, tall_m=0.1, **base)
+        return van, (*loads, ball)
+
+    return carrying
+
+
+def _long_and_high(van: Vehicle, loads: Loads) -> tuple[Vehicle, Loads]:
+    """The same loads as parcels: their floor stays where it is."""
+    tall_m, length_m = PARCELS_M
+    return van, tuple(
+        replace(load, height_m=load.height_m + 0.5 * (tall_m - load.tall_m), tall_m=tall_m, length_m=length_m)
+        for load in loads
+    )
+
+
 _SENSOR_MOVED: Final = (Why.SENSOR_CHANGED, Why.MODEL_MISFIT)
-_UNSEEN: Final = (Why.TOO_UNCERTAIN, Why.MODEL_MISFIT)  # no half-car rolls, and no interval of use is wide enough
+_UNSEEN: Final = (Why.TOO_UNCERTAIN, Why.MODEL_MISFIT)  # a half-car has no roll, and a wide enough interval is useless
 _BEYOND: Final = (Why.OUT_OF_RANGE, Why.MODEL_MISFIT, Why.TOO_UNCERTAIN)
 
 UNDISTURBED: Final = Disturbance("as recorded", is_mended=True)
@@ -216,6 +270,16 @@ DISTURBANCES: Final[Mapping[str, Disturbance]] = MappingProxyType(
                 half_of_the_time(Signal.ROLL_RATE, missing),
                 is_sideways=True,
                 reasons=_UNSEEN,
+            ),
+            Disturbance("dampers - 35 %", world=_with_dampers(_worn), reasons=(Why.MODEL_MISFIT,)),
+            Disturbance("friction x 2.5", world=_with_dampers(_with_more_friction), reasons=(Why.MODEL_MISFIT,)),
+            Disturbance("tyres - 15 %", world=_with_axles(_with_softer_tyres), reasons=(Why.MODEL_MISFIT,)),
+            Disturbance("load 2.4 m long and 1.2 m high", world=_long_and_high),
+            Disturbance("60 kg more on a tow bar", world=_on_tow_bar(), reasons=_BEYOND),
+            Disturbance(
+                "60 kg more on a soft tow bar",
+                world=_on_tow_bar(resonance_hz=3.0, damping_ratio=0.1),
+                reasons=_BEYOND,
             ),
             Disturbance("load beyond the calibrated", is_overloaded=True, reasons=_BEYOND),
         )

@@ -2,9 +2,9 @@
 
     false_facts(n_lines, n_right, seed) -> FalseFacts
 
-Each goes the way that the service goes: what was typed is asked about (``doubts_of``), made a vehicle and held against
-its line, then its empty drive is fitted and held against both (``contradictions``). A fact is caught where any of these
-stops it or asks. No setting was chosen with these vans: the seed serves this study alone.
+Each passes the service's steps: the typed answers are checked (``doubts_of``), made a vehicle and compared with its
+line; then its empty drive is fitted and compared with both (``contradictions``). A fact is caught if any step refuses
+it or asks about it. No setting was chosen with these vans: the seed serves this study alone.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -16,9 +16,10 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from benchmarks.accuracy.coverage_drives import AS_CALIBRATED, driven
+from benchmarks.accuracy.markdown import page
+from benchmarks.accuracy.runner import OnDone, run_each
 from benchmarks.accuracy.siblings.drives import MIXED, SCOPE, Drawn, draw_line, drawn_van, sister
 from benchmarks.accuracy.siblings.drives import Line as DrawnLine
-from benchmarks.accuracy.vans import OnVan, of_each_van
 from gateway.calibration.commissioning import NO_LINE, LineFacts, doubts_of, vehicle_table
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.half_car import fit_cross_spectrum
@@ -29,11 +30,11 @@ from gateway.sim.vans import VANS
 from gateway.sim.vehicle import Load
 from gateway.stated import DIVISION_KG, VehicleAnswers
 
-SEED: Final = 20304
-N_LINES: Final = 3
-N_RIGHT: Final = 20
-POUNDS_PER_KG: Final = 1.0 / 0.45359237
-ABOARD_AT: Final = 0.7  # wheelbases behind the front axle
+SEED: Final = 20304  # arbitrary, of this study alone
+N_LINES: Final = 3  # chosen: one of each type
+N_RIGHT: Final = 20  # chosen: true vehicles
+POUNDS_PER_KG: Final = 1.0 / 0.45359237  # international pound
+ABOARD_AT: Final = 0.7  # chosen: wheelbases behind the front axle
 PASSED: Final = "passed"
 
 Said = dict[str, Any]
@@ -42,7 +43,7 @@ Falsified = Callable[[Said], Said]
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """One false fact: in words, what it makes of true answers, what is aboard, and which line is chosen."""
+    """One false fact: its words, how it changes true answers, the load on board, and the chosen line."""
 
     words: str
     falsify: Falsified = dict
@@ -101,7 +102,7 @@ FALSE: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """One commissioning: what was said, with a line or without, and what stopped it or asked."""
+    """One commissioning: the fact, with a line or without, and the check that caught it."""
 
     words: str
     has_line: bool
@@ -118,7 +119,7 @@ class FalseFacts:
     right: tuple[Tried, ...]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers for a file or a page."""
+        """The figures for a file or a page."""
         return {
             "seed": self.seed,
             "n_lines": self.n_lines,
@@ -133,11 +134,11 @@ def false_facts(
     seed: int = SEED,
     *,
     workers: int = 1,
-    on_van: OnVan = lambda done, of: None,
+    on_van: OnDone = lambda done, of: None,
 ) -> FalseFacts:
-    """Every false fact once in each of ``n_lines`` lines, and ``n_right`` vans of these lines stated as they are."""
+    """Every false fact once in each of ``n_lines`` lines, and ``n_right`` vans of these lines with true answers."""
     of_line = partial(_of_line, seed, n_lines, n_right)
-    found = list(of_each_van(of_line, n_lines, workers, on_van))
+    found = list(run_each(of_line, n_lines, workers, on_van))
     return FalseFacts(
         seed,
         n_lines,
@@ -198,7 +199,7 @@ def _known(drawn: DrawnLine, seeds: np.random.SeedSequence) -> _Known:
 
 
 def _answers(van: Drawn) -> Said:
-    """What a careful fitter types, scales of 20 kg."""
+    """The answers of a careful fitter, with scales of 20 kg."""
     share = van.van.empty_front_share_pct / 100.0
     front_kg = share * van.van.sprung_kg + 2.0 * van.van.front.wheel.unsprung_kg
     rear_kg = (1.0 - share) * van.van.sprung_kg + 2.0 * van.van.rear.wheel.unsprung_kg
@@ -219,7 +220,7 @@ def _empty_drive(van: Drawn, aboard_kg: float, *, is_mixed: bool) -> KnownRun:
 
 
 def _commissioned(said: Mapping[str, Any], run: KnownRun, known: _Known | None) -> str:
-    """What stops it or asks; ``PASSED`` where nothing does."""
+    """The check that refuses it or asks; ``PASSED`` if none does."""
     try:
         answers = TypeAdapter(VehicleAnswers).validate_python(dict(said))
         doubts = doubts_of(answers, known.facts if known else NO_LINE)
@@ -258,31 +259,27 @@ def false_facts_page(found: Mapping[str, Any]) -> str:
     n_with, n_without = (sum(row[way]["n_caught"] for row in rows) for way in ("with_line", "without"))
     of_with, of_without = (sum(row[way]["n"] for row in rows) for way in ("with_line", "without"))
     right_with, right_without = found["right"]["True"], found["right"]["False"]
-    return "\n".join(
-        [
-            "# False facts at commissioning",
-            "",
-            "Generated by `python -m benchmarks.accuracy false-facts --output DIR`; do not edit by hand.",
-            "",
-            f"{len(rows)} false facts, each in a simulated van of each of {found['n_lines']} lines, stated as a fitter "
-            "would type it; all else is true, axle weights read from scales of 20 kg. Each van is driven empty for ten "
-            "minutes (two with a load aboard), its line is one sister calibrated with six known loads. Caught: typed "
-            "answers are refused or asked about, or the drive contradicts them "
-            "([commissioning](commissioning.md#doubts) lists what is asked).",
-            "",
-            "| false fact | caught with its line | without a line | by |",
-            "|---|---|---|---|",
-            *(f"| {row['words']} | {_cell(row['with_line'])} | {_cell(row['without'])} | {_by(row)} |" for row in rows),
-            f"| **all** | **{n_with} of {of_with}** | **{n_without} of {of_without}** | |",
-            "",
-            f"True facts, {right_with['n']} other vans of the same lines, half of them driven mixed: "
-            f"{right_with['n_caught']} asked about with their line, {right_without['n_caught']} without.",
-            "",
-            "Without a line nobody knows how stiff the springs are, so that a load aboard looks like softer springs: "
-            "only weighing can show it. `bounds` is a number that no vehicle reaches, `line` a vehicle that its line "
-            "refuses; the other names are those of the doubts.",
-            "",
-        ]
+    return page(
+        "False facts at commissioning",
+        "false-facts --output DIR",
+        f"{len(rows)} false facts, each in a simulated van of each of {found['n_lines']} lines, stated as a fitter "
+        "would type it; all else is true, axle weights read from scales of 20 kg. Each van is driven empty for ten "
+        "minutes (two with a load aboard), its line is one sister calibrated with six known loads. Caught: typed "
+        "answers are refused or asked about, or the drive contradicts them "
+        "([commissioning](commissioning.md#doubts) lists what is asked).",
+        "",
+        "| false fact | caught with its line | without a line | by |",
+        "|---|---|---|---|",
+        *(f"| {row['words']} | {_cell(row['with_line'])} | {_cell(row['without'])} | {_by(row)} |" for row in rows),
+        f"| **all** | **{n_with} of {of_with}** | **{n_without} of {of_without}** | |",
+        "",
+        f"True facts, {right_with['n']} other vans of the same lines, half of them driven mixed: "
+        f"{right_with['n_caught']} asked about with their line, {right_without['n_caught']} without.",
+        "",
+        "Without a line the stiffness of the springs is unknown, and a load aboard looks like softer springs: "
+        "only scales can show it. `bounds` is a number that no vehicle reaches, `line` a vehicle that its line "
+        "refuses; the other names are those of the doubts.",
+        "",
     )
 
 
@@ -295,6 +292,6 @@ def _by(row: Mapping[str, Any]) -> str:
 
 
 def each_line(found: FalseFacts) -> Iterator[str]:
-    """What passed though it was false, and what was asked about though it was true, for a terminal."""
+    """False facts that passed, and true ones that were questioned, for a terminal."""
     yield from (f"passed: {one.words}, line {one.has_line}" for one in found.false if one.caught_by == PASSED)
     yield from (f"asked: {one.caught_by}, line {one.has_line}" for one in found.right if one.caught_by != PASSED)

@@ -1,11 +1,10 @@
-"""What ordinary faults of sensors do to the weighing of recorded drives: refused, held, or answered wrongly.
+"""The effect of ordinary sensor faults on estimates of recorded drives: refused, covered, or wrong.
 
     faults(Study(Path("campaign.toml"), Path("vehicle.json"))) -> numbers for faults_page
 
-Every log is rewritten with every fault (faulty_logs) and weighed as `springscale estimate` weighs it.
+Every log is rewritten with every fault (faulty_logs) and weighed as `springscale estimate` does.
 """
 
-import json
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -18,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.accuracy.faulty_logs import Fault, Log, faults_of
-from benchmarks.accuracy.vans import OnVan, of_each_van
+from benchmarks.accuracy.runner import OnDone, kept, run_each
 from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
 from gateway.calibration.campaign import Campaign, RunTable, chosen_runs, load_campaign
@@ -27,12 +26,12 @@ from gateway.offline import estimates_of_logs
 from gateway.records import Frames, Why
 from gateway.setup import Setup, load_setup
 
-SEED: Final = 20_271
+SEED: Final = 20_271  # arbitrary, of this study alone
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """The drives by their numbers (None: all), what weighs them, and where cases are kept that were weighed before."""
+    """The drives by their numbers (None: all), their calibration, and the directory of stored cases."""
 
     campaign: Path
     calibration: Path
@@ -44,9 +43,10 @@ class Study:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A whole batch of a rewritten drive: why it was refused, or how far the truth lies outside the 95 % intervals.
+    """A whole batch of a rewritten drive: the reasons of its refusal, or the truth's distance outside the 95 %
+    intervals.
 
-    In half-widths beyond the interval's end; 0 where it holds.
+    In half-widths beyond the interval's end; 0 if it is inside.
     """
 
     rejected: tuple[str, ...]
@@ -55,22 +55,22 @@ class Judged:
 
     @property
     def is_held(self) -> bool:
-        """Answered, and both intervals hold."""
+        """Answered, with the truth in both intervals."""
         return not self.rejected and self.payload_outside == self.front_share_outside == 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One drive under one fault, and the processor time that it took."""
+    """One drive with one fault, and its processor time."""
 
     cpu_s: float
     batches: tuple[Judged, ...]
 
 
-def faults(study: Study, *, workers: int = 1, on_case: OnVan = lambda done, of: None) -> dict[str, Any]:
-    """Weigh every drive under every fault; a line for every fault and strength, over all drives."""
+def faults(study: Study, *, workers: int = 1, on_case: OnDone = lambda done, of: None) -> dict[str, Any]:
+    """Weigh every drive with every fault; a line for every fault and strength, over all drives."""
     _, setup, runs, known = _loaded(study)
-    cases = list(of_each_van(partial(_case, study), len(runs) * len(known), workers, on_case))
+    cases = list(run_each(partial(_case, study), len(runs) * len(known), workers, on_case))
     return {
         "campaign": f"{study.campaign.parent.name}/{study.campaign.name}",
         "calibration": setup.calibration.id if setup.calibration else None,
@@ -116,18 +116,15 @@ def _log_of(study: Study, run: RunTable) -> Log:
 
 
 def _case(study: Study, number: int) -> Case:
-    """As it was kept; else weighed, and kept. The faults of one drive follow one another."""
+    """The case, from ``study.kept`` if it was stored there. The faults of one drive are consecutive."""
     _, _, runs, known = _loaded(study)
     (run_number, run), fault = runs[number // len(known)], known[number % len(known)]
-    path = None if study.kept is None else study.kept / f"{study.seed}-{run_number}-{fault.id}.json"
-    if path is not None and path.exists():
-        kept = json.loads(path.read_text(encoding="utf-8"))
-        return Case(kept["cpu_s"], tuple(Judged(tuple(one.pop("rejected")), **one) for one in kept["batches"]))
-    case = _weighed(study, run, fault, np.random.default_rng([study.seed, run_number, *fault.id.encode()]))
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(asdict(case)), encoding="utf-8")
-    return case
+
+    def weighed() -> dict[str, Any]:
+        return asdict(_weighed(study, run, fault, np.random.default_rng([study.seed, run_number, *fault.id.encode()])))
+
+    stored = kept(study.kept, f"{study.seed}-{run_number}-{fault.id}", weighed)
+    return Case(stored["cpu_s"], tuple(Judged(tuple(one.pop("rejected")), **one) for one in stored["batches"]))
 
 
 def _weighed(study: Study, run: RunTable, fault: Fault, rng: np.random.Generator) -> Case:

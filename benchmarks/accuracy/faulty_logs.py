@@ -1,7 +1,7 @@
-"""What ordinary faults of sensors make of a recorded drive: each rewrites the frames of its log.
+"""Ordinary sensor faults: each rewrites the frames of a recorded drive's log.
 
-A fault works on what the signal map reads, in SI and vehicle axes (ISO 8855), and puts it back into the bits that the
-device sends, so that it meets everything from the log's reader on.
+A fault works on mapped signals, in SI and vehicle axes (ISO 8855), and encodes them back into the device's bits, so
+that it passes through the log's reader and everything after it.
 """
 
 import math
@@ -25,20 +25,20 @@ ACCELERATION, PITCH_RATE, ROLL_RATE, SPEED = (
     Signal.SPEED,
 )
 NAMES: Final = {ACCELERATION: "acceleration", PITCH_RATE: "pitch rate", ROLL_RATE: "roll rate", SPEED: "speed"}
-LEVER_CUT_HZ: Final = 20.0  # a gyro's noise is no angular acceleration
-BRACKET_DAMPING: Final = 0.1
-PERIOD_S: Final = 60.0  # of what comes and goes
+LEVER_CUT_HZ: Final = 20.0  # chosen: the derivative of a gyro's noise is not angular acceleration
+BRACKET_DAMPING: Final = 0.1  # chosen: of critical
+PERIOD_S: Final = 60.0  # chosen: period of intermittent faults
 
 
 @dataclass(frozen=True, slots=True)
 class Log:
-    """The frames (n,) of a drive in order of time, and what reads them."""
+    """The frames (n,) of a drive in order of time, and their signal map."""
 
     frames: Frames
     signal_map: SignalMap
 
     def mapped(self, signal: Signal) -> tuple[MappedSignal, I64]:
-        """How a signal is read, and the rows (k,) of its frames. Raises KeyError where the map has none."""
+        """The mapping of a signal, and the rows (k,) of its frames. Raises KeyError if the map has none."""
         for message in self.signal_map.messages:
             for mapped in message.signals:
                 if mapped.signal is signal:
@@ -52,7 +52,7 @@ class Log:
         return t_s, mapped.field.physical(mapped.field.bits(self.frames.payload[rows])) * mapped.to_si
 
     def showing(self, signal: Signal, samples: F64) -> "Log":
-        """The same drive with these samples (k,); what the bits cannot carry is held to their range."""
+        """The same drive with these samples (k,), clipped to the range of the bits."""
         mapped, _ = self.mapped(signal)
         return self.sending(signal, physical_bits(mapped.field, samples / mapped.to_si))
 
@@ -66,7 +66,7 @@ class Log:
         return replace(self, frames=replace(self.frames, payload=payload))
 
     def rows(self, chosen: I64, t_ns: I64 | None = None) -> "Log":
-        """These frames, some perhaps more than once, at other times (k,) where they are given; in order of time."""
+        """These frames, possibly repeated, at other times (k,) if given; in order of time."""
         one = self.frames
         t_ns = one.t_ns[chosen] if t_ns is None else t_ns
         chosen, t_ns = chosen[order := np.argsort(t_ns, kind="stable")], t_ns[order]
@@ -79,7 +79,7 @@ Change = Callable[[F64, F64, np.random.Generator], F64]  # of times and samples
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One row of the matrix: what is wrong, how much, which signals it touches, what it does to a log."""
+    """One fault: its name, its strength, the signals it needs, and its rewriting of a log."""
 
     name: str
     strength: str
@@ -88,12 +88,12 @@ class Fault:
 
     @property
     def id(self) -> str:
-        """Fit for a file's name."""
+        """The fault in a file name."""
         return "".join(c if c.isalnum() else "-" for c in f"{self.name} {self.strength}")
 
 
 def faults_of(signal_map: SignalMap) -> list[Fault]:
-    """Those whose signals the map reads; the first is none."""
+    """The faults whose signals the map has; the first is none."""
     return [fault for fault in FAULTS if {*fault.signals} <= {*signal_map.signals}]
 
 
@@ -126,7 +126,7 @@ def _biased(by: float) -> Change:
 
 
 def _clipped(at: float) -> Change:
-    """At so much either side of the mean."""
+    """Clipped at this distance on either side of the mean."""
     return lambda t_s, x, rng: np.clip(x, x.mean() - at, x.mean() + at)
 
 
@@ -143,7 +143,7 @@ def _low_pass(cut_hz: float) -> Change:
 
 
 def _resonance(at_hz: float) -> Change:
-    """A mass on a bracket: what it feels is its base's motion through a spring."""
+    """A mass on a bracket, which follows its base through a spring."""
     w = 2.0 * math.pi * at_hz
     bracket = ([2.0 * BRACKET_DAMPING * w, w**2], [1.0, 2.0 * BRACKET_DAMPING * w, w**2])
     return lambda t_s, x, rng: _filtered(filters.bilinear(*bracket, fs=_rate_hz(t_s)), x)
@@ -159,12 +159,12 @@ def _rate_hz(t_s: F64) -> float:
 
 
 def _held(every_s: float) -> Change:
-    """A device that measures more seldom than it sends."""
+    """A device that measures at a lower rate than it sends."""
     return lambda t_s, x, rng: x[np.searchsorted(t_s, np.floor(t_s / every_s) * every_s)]
 
 
 def _stuck(part_s: float) -> Change:
-    """So many seconds of every minute it repeats what it said last."""
+    """For this many seconds of every minute the last sample is repeated."""
 
     def change(t_s: F64, x: F64, rng: np.random.Generator) -> F64:
         begin_s = np.floor(t_s / PERIOD_S) * PERIOD_S + (PERIOD_S - part_s)
@@ -178,7 +178,7 @@ def _wrapped(span: float) -> Change:
 
 
 def _late(by_s: float, *signals: Signal) -> Rewrite:
-    """What they say is older than it should be; each frame stays in its place."""
+    """Samples that are older than their frames; each frame keeps its time."""
     return _of_samples(lambda t_s, x, rng: np.interp(t_s - by_s, t_s, x), *signals)
 
 
@@ -207,7 +207,7 @@ def _moved(back_m: float = 0.0, left_m: float = 0.0) -> Rewrite:
 
 
 def _turned(deg: float) -> Rewrite:
-    """About the vertical: pitch and roll rate mix."""
+    """Turned about the vertical, so that pitch and roll rate mix."""
     c, s = math.cos(math.radians(deg)), math.sin(math.radians(deg))
 
     def rewrite(log: Log, rng: np.random.Generator) -> Log:
@@ -223,7 +223,7 @@ def _dropped(share: float) -> Rewrite:
 
 
 def _doubled(share: float) -> Rewrite:
-    """Sent once more, half a millisecond later."""
+    """Sent again half a millisecond later."""
 
     def rewrite(log: Log, rng: np.random.Generator) -> Log:
         return _joined(log, log, np.flatnonzero(rng.random(len(log.frames)) < share), round(0.0005 * NS_PER_S))
@@ -242,7 +242,7 @@ def _two_devices(other: Rewrite, late_s: float) -> Rewrite:
 
 
 def _joined(log: Log, other: Log, rows: I64, late_ns: int) -> Log:
-    """With these rows of another, of as many frames, so much later."""
+    """With these rows of another log with as many frames, delayed."""
     one, more = log.frames, other.rows(rows).frames
     t_ns = np.r_[one.t_ns, more.t_ns + late_ns]
     both = Frames(
@@ -283,7 +283,7 @@ def _amounts() -> Iterator[Fault]:
 
 
 def _dynamics() -> Iterator[Fault]:
-    """What a sample says is not what happens now."""
+    """Samples that do not represent the present."""
     yield from _each("rings at", _resonance, " Hz", (ACCELERATION, (4.0, 8.0, 15.0, 30.0)), (PITCH_RATE, (8.0,)))
     yield from _each("low pass of", _low_pass, " Hz", *((one, (1.0, 3.0, 8.0)) for one in BOTH))
     yield Fault("both low pass of", "3 Hz", BOTH, _of_samples(_low_pass(3.0), *BOTH))
@@ -301,7 +301,7 @@ def _dynamics() -> Iterator[Fault]:
 
 
 def _frames() -> Iterator[Fault]:
-    """Frames that are too many, or too few."""
+    """Too many frames, or too few."""
     for share in (0.1, 1.0):
         yield Fault("frames doubled", f"{share:.0%}", (), _doubled(share))
     for share in (0.01, 0.05, 0.2, 0.5):
@@ -315,7 +315,7 @@ def _frames() -> Iterator[Fault]:
 
 
 def _mounts() -> Iterator[Fault]:
-    """A sensor that is not where it was calibrated."""
+    """A sensor that was moved since calibration."""
     for back_m in (-1.0, -0.3, 0.1, 0.3, 1.0):
         yield Fault("sensor moved back", f"{back_m:g} m", BOTH, _moved(back_m=back_m))
     for left_m in (-0.3, 0.1, 0.3, 1.0):
@@ -325,7 +325,7 @@ def _mounts() -> Iterator[Fault]:
 
 
 def _digits() -> Iterator[Fault]:
-    """What becomes of a number between the sensor and the bus."""
+    """Errors of a number between the sensor and the bus."""
     for name, change, of_acceleration, of_pitch_rate in (
         ("clipped beyond", _clipped, (0.5, 1.0, 2.0, 4.0), (0.03, 0.1)),
         ("wraps around at", _wrapped, (11.0, 13.0), (0.05, 0.15)),

@@ -1,9 +1,10 @@
-"""How good a sensor must be: the same fresh vans on the same drives, with sensors of other noise, resolution and rate.
+"""The required quality of a sensor: the same fresh vans on the same drives, with sensors of other noise, resolution and
+rate.
 
     grades(Scope(n_vans=3), seed) -> {"grades": [...], "lines": [...], ...}
 
-Each van is calibrated and driven with each sensor: who buys a noisy sensor calibrates with it too. A drive as
-calibrated and a mixed one carry loads within what was calibrated, near the centre line, as for the disturbances.
+Each van is calibrated and driven with each sensor, because a noisy sensor is used for calibration too. A drive as
+calibrated and a mixed one carry loads within the calibrated range, near the centre line, as for the disturbances.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,16 +17,17 @@ from benchmarks.accuracy.coverage_drives import AS_CALIBRATED, TRIPS, Scope, dri
 from benchmarks.accuracy.coverage_table import JudgedBatch, coverage_table, judged_batches
 from benchmarks.accuracy.disturbances import ESTIMATOR, WITHIN_PARTS, WITHIN_PLACES
 from benchmarks.accuracy.disturbed import noisier
-from benchmarks.accuracy.vans import OnVan, fresh_van, of_each_van
+from benchmarks.accuracy.runner import OnDone, run_each
+from benchmarks.accuracy.vans import fresh_van
 from gateway.calibration.judgement import judge
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.errors import CalibrationImpossibleError
 from gateway.sim.sensors import CANMOD, REFERENCE, Sensors
 from gateway.sim.vehicle import Load
 
-SEED: Final = 20_285
-N_VANS: Final = 3  # one of each type
-TIMES: Final = (2.0, 5.0, 10.0, 20.0)  # the reference unit's noise
+SEED: Final = 20_285  # arbitrary, of this study alone
+N_VANS: Final = 3  # chosen: one of each type
+TIMES: Final = (2.0, 5.0, 10.0, 20.0)  # chosen: factors of the reference unit's noise
 
 
 def _as_coarse_as_canmod(sensors: Sensors) -> Sensors:
@@ -37,14 +39,14 @@ def _as_coarse_as_canmod(sensors: Sensors) -> Sensors:
 
 
 def _sampled(rate_hz: float) -> Callable[[Sensors], Sensors]:
-    """The unit's own low-pass goes down with the rate, as far below half of it."""
+    """The unit's low-pass scales with the rate."""
     corner_hz = REFERENCE.imu.corner_hz * rate_hz / REFERENCE.imu.rate_hz
     return lambda sensors: replace(sensors, imu=replace(sensors.imu, rate_hz=rate_hz, corner_hz=corner_hz))
 
 
 @dataclass(frozen=True, slots=True)
 class Grade:
-    """One sensor: what it is called, and what it makes of the reference unit."""
+    """One sensor: its name, and its difference from the reference unit."""
 
     name: str
     sensors_of: Callable[[Sensors], Sensors] = lambda mounted: mounted
@@ -68,15 +70,15 @@ GRADES: Final[Mapping[str, Grade]] = MappingProxyType(
 
 
 def grades(
-    scope: Scope, seed: int = SEED, *, workers: int = 1, on_van: OnVan = lambda done, of: None
+    scope: Scope, seed: int = SEED, *, workers: int = 1, on_van: OnDone = lambda done, of: None
 ) -> dict[str, Any]:
     """Calibrate, drive and judge every van with every sensor: the table, and each sensor's noise and resolution.
 
-    ``refused`` names calibrations that were impossible.
+    ``refused`` lists impossible calibrations.
     """
     batches: list[JudgedBatch] = []
     refused: list[str] = []
-    for of_van, refused_of_van in of_each_van(partial(_of_one_van, scope, seed), scope.n_vans, workers, on_van):
+    for of_van, refused_of_van in run_each(partial(_of_one_van, scope, seed), scope.n_vans, workers, on_van):
         batches += of_van
         refused += refused_of_van
     sensors = [{"name": name, **_facts(grade.sensors_of(REFERENCE))} for name, grade in GRADES.items()]

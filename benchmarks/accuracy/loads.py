@@ -1,8 +1,8 @@
-"""Loads of every length and height: what vans carry, drawn at random, a kind at a time.
+"""Loads of every length and height: usual goods of vans, drawn at random, by kind.
 
-Boxes are what calibrations know. The others have the pitch inertia of their length and height (gateway.sim.vehicle:
-a homogeneous box), their centre at half their height above the floor, and for a part of them another place: on the
-roof. Lengths are parts of the wheelbase, for floors are.
+Calibration drives carry boxes. Other loads have the pitch inertia of their length and height (gateway.sim.vehicle: a
+homogeneous box), their centre at half their height above the floor, and some have a part on the roof. Lengths are parts
+of the wheelbase, like floors.
 """
 
 from collections.abc import Callable
@@ -15,14 +15,14 @@ import numpy as np
 from gateway.core.vehicle import Carries
 from gateway.sim.vehicle import Load, Vehicle
 
-FLOOR_M: Final = 0.6  # above the road, of the vans' load floors
-ROOF_M: Final = 1.9
-ROOF_PARTS: Final = (0.15, 0.35)  # of the load
-FLOOR_PART: Final = 0.85  # of the wheelbase: how long the floor is
+FLOOR_M: Final = 0.6  # chosen: above the road, of the vans' load floors
+ROOF_M: Final = 1.9  # chosen: above the road
+ROOF_PARTS: Final = (0.15, 0.35)  # chosen: of the load
+FLOOR_PART: Final = 0.85  # chosen: length of the floor, of the wheelbase
 
 
 class Shape(StrEnum):
-    """Kinds of load, by what they look like."""
+    """Kinds of load, by shape."""
 
     BOX = "box"  # as calibrations know it: a pallet
     PARCELS = "parcels"  # all over the floor, a metre high
@@ -34,12 +34,12 @@ class Shape(StrEnum):
 
 
 def box(mass_kg: float, position_m: float, length_m: float, tall_m: float) -> Load:
-    """On the floor, its centre at half its height."""
+    """A box on the floor, its centre at half its height."""
     return Load(mass_kg, position_m, height_m=FLOOR_M + 0.5 * tall_m, length_m=length_m, tall_m=tall_m)
 
 
 def drawn_load(van: Vehicle, mass_kg: float, position_m: float, rng: np.random.Generator) -> tuple[Load, ...]:
-    """A load of any shape with its centre at ``position_m`` or, where it would not fit there, as near as it fits."""
+    """A load of any shape with its centre at ``position_m``, or as near to it as it fits."""
     shape = list(Shape)[int(rng.integers(len(Shape)))]
     return shaped_load(shape, van, mass_kg, position_m, rng)
 
@@ -47,7 +47,7 @@ def drawn_load(van: Vehicle, mass_kg: float, position_m: float, rng: np.random.G
 def shaped_load(
     shape: Shape, van: Vehicle, mass_kg: float, position_m: float, rng: np.random.Generator
 ) -> tuple[Load, ...]:
-    """A load of this shape; the numbers of ``rng`` that it takes do not hang on the shape."""
+    """A load of this shape; it takes the same numbers from ``rng`` for any shape."""
     one, other = rng.uniform(size=2).tolist()
     floor_m = FLOOR_PART * van.wheelbase_m
     length_m, tall_m = _EXTENTS[shape](one, other, floor_m)
@@ -81,4 +81,4 @@ SAYS: Final = {
     Shape.PIPES: Carries.LONG_GOODS,
     Shape.ROOF: Carries.PARCELS,
 }
-"""What a fitter would say of a vehicle that carries nothing else; with Shape.ROOF also that it has a roof rack."""
+"""The fitter's answer for a vehicle that carries only this shape; with Shape.ROOF it also has a roof rack."""

@@ -1,4 +1,4 @@
-"""Vehicles that differ: how one van is built unlike its type, and how it changes from one day to another."""
+"""Vehicles that differ: the scatter of vans about their type, and changes from day to day."""
 
 from dataclasses import dataclass, replace
 from typing import Final
@@ -10,7 +10,7 @@ from gateway.sim.vehicle import Axle, Damper, Vehicle
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """Standard deviations of the logarithm of each property; those of an axle are drawn for each axle alone."""
+    """Standard deviations of the logarithm of each property; those of an axle are drawn for each axle separately."""
 
     spring: float = 0.0
     progression: float = 0.0
@@ -34,7 +34,7 @@ FROM_DAY_TO_DAY: Final = Scatter(spring=0.015, damper=0.05, tyre=0.05)  # temper
 def scattered(vehicle: Vehicle, scatter: Scatter, rng: np.random.Generator) -> Vehicle:
     """A vehicle drawn about this one; heavier and longer ones also have more inertia (as mass times length squared).
 
-    It is rated for as large a share of its sprung mass.
+    Its rated payload is the same share of its sprung mass.
     """
     draw = _Draw(rng)
     heavier, longer, inert = draw(scatter.sprung), draw(scatter.wheelbase), draw(scatter.inertia)
@@ -52,7 +52,7 @@ def scattered(vehicle: Vehicle, scatter: Scatter, rng: np.random.Generator) -> V
 
 
 class _Draw:
-    """Factors whose logarithm is normal with a given standard deviation; one number of the generator each."""
+    """Factors whose logarithm is normal with a given standard deviation; each takes one number of the generator."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng

@@ -1,4 +1,4 @@
-"""What each kind of observation could tell at best: Cramer-Rao bounds of payload and front share, by what is seen.
+"""Cramer-Rao bounds of payload and front share for each kind of observation.
 
     bound_of(Seen.BOTH, unknown, scene) -> Bound
 
@@ -6,9 +6,9 @@ On a road of displacement density s(f) the transforms X of the two sensors are c
 
     Sigma = s ( h h^H + slack diag(|front|^2 + |rear|^2) ) + noise,      h = front + rear exp(-j 2 pi f l / v),
 
-and the information in n of them is n tr(Sigma^-1 dSigma Sigma^-1 dSigma) per frequency (Whittle 1953). Without
-their phase only the two powers are left, of covariance [[S_aa^2, |S_ga|^2], [|S_ga|^2, S_gg^2]] / n; with one sensor
-one power. The road's level and slope in log s are always unknown.
+and the information in n of them is n tr(Sigma^-1 dSigma Sigma^-1 dSigma) per frequency (Whittle 1953). Without their
+phase only the two powers are left, of covariance [[S_aa^2, |S_ga|^2], [|S_ga|^2, S_gg^2]] / n; with one sensor one
+power. The road's level and slope in log s are always unknown.
 """
 
 from collections.abc import Callable, Mapping
@@ -27,13 +27,13 @@ from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.spectrum import frequencies_hz
 from gateway.records import C128, F64
 
-STEP: Final = 1e-5
-PAYLOAD_STEP_KG: Final = 0.1
+STEP: Final = 1e-5  # chosen: of a difference quotient
+PAYLOAD_STEP_KG: Final = 0.1  # chosen, likewise
 SPEED: Final = "speed"
 
 
 class Seen(StrEnum):
-    """Which spectra are looked at."""
+    """The observed spectra."""
 
     ACCELERATION = "acceleration alone"
     POWERS = "two auto-spectra, no phase"
@@ -42,7 +42,7 @@ class Seen(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """Smallest standard deviations that are possible."""
+    """The smallest possible standard deviations."""
 
     payload_std_kg: float
     front_share_std_pct: float
@@ -72,11 +72,11 @@ def cramer_rao(
     drive: Drive,
     unknown: Mapping[str, float] | None = None,
 ) -> Bound:
-    """The bound at one load, the vehicle being the calibrated one.
+    """The bound at one load of the calibrated vehicle.
 
-    ``unknown`` maps parameter names (parameters.PARAMETERS) to the standard deviation of what is
-    known of them beforehand (of the logarithm, where these are positive quantities); the others are
-    taken as known. Slack counts as part of the vehicle: it is what model error and roll leave.
+    ``unknown`` maps parameter names (parameters.PARAMETERS) to the prior standard deviation (of the logarithm of
+    positive quantities); the others count as known. Slack counts as part of the vehicle: it is the remainder of model
+    error and roll.
     """
     priors = dict(unknown or {})
     free = [INDEX[name] for name in priors]
@@ -90,10 +90,10 @@ def cramer_rao(
 
 
 def bound_of(seen: Seen, unknown: Mapping[str, float], scene: Scene) -> Bound:
-    """The smallest standard deviations of payload and front share that any estimator without bias can have.
+    """The smallest standard deviations of payload and front share of any unbiased estimator.
 
-    ``unknown`` maps names of parameters.PARAMETERS, or "speed", to what is known of their logarithms beforehand
-    (standard deviations); all else about the vehicle is known.
+    ``unknown`` maps names of parameters.PARAMETERS, or "speed", to the prior standard deviation of their logarithms;
+    everything else about the vehicle is known.
     """
     freq_hz = _frequencies_hz(scene.reading)
     sigma = _sigma(scene, freq_hz)
@@ -162,7 +162,7 @@ def _of_acceleration(sigma: C128, slopes: C128) -> F64:
 
 
 def _of_powers(sigma: C128, slopes: C128) -> F64:
-    """Of the two mean powers, jointly Gaussian about their expectation."""
+    """For the two mean powers, jointly Gaussian about their expectation."""
     power = np.real(np.stack([sigma[0, 0], sigma[1, 1]]))
     shared = np.abs(sigma[1, 0]) ** 2
     covariance = np.moveaxis(np.array([[power[0] ** 2, shared], [shared, power[1] ** 2]]), -1, 0)

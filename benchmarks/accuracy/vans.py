@@ -1,9 +1,7 @@
-"""Fresh simulated vans, one after another or several at a time, each with the drives that calibrate it."""
+"""Fresh simulated vans, each with its calibration drives."""
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
@@ -21,13 +19,12 @@ from gateway.core.vehicle import Vehicle as StatedVehicle
 from gateway.sim.sensors import Sensors
 from gateway.sim.vehicle import Vehicle
 
-Found = TypeVar("Found")
-OnVan = Callable[[int, int], None]  # (vans done, vans in all)
-
 
 @dataclass(frozen=True, slots=True)
 class FreshVan:
-    """A van and its sensors as simulated and as a fitter states them, its known drives, what to draw tests with."""
+    """A van and its sensors, simulated and as a fitter states them, its known drives, and the generators of its
+    tests.
+    """
 
     van: Vehicle
     sensors: Sensors
@@ -46,9 +43,9 @@ def van_of(seed: int, number: int) -> Vehicle:
 def fresh_van(
     scope: Scope, seed: int, number: int, sensors_of: Callable[[Sensors], Sensors] = lambda mounted: mounted
 ) -> FreshVan:
-    """The ``number``-th van of a study with this seed; it does not depend on the others.
+    """The ``number``-th van of a study with this seed, independent of the others.
 
-    ``sensors_of`` replaces the reference unit where it is mounted: van, loads, roads and drives stay the same.
+    ``sensors_of`` replaces the reference unit at its mount: van, loads, roads and drives stay the same.
     """
     van_seed, load_seed, known_seed, test_seed, sensor_seed = np.random.SeedSequence([seed, number]).spawn(5)
     van, rng = draw_van(number, np.random.default_rng(van_seed)), np.random.default_rng(load_seed)
@@ -59,17 +56,3 @@ def fresh_van(
         for i, (carried, one) in enumerate(zip(loads, known_seed.spawn(len(loads)), strict=True), 1)
     ]
     return FreshVan(van, sensors, stated(van, sensors), runs, rng, test_seed)
-
-
-def of_each_van(of_one: Callable[[int], Found], n_vans: int, workers: int, on_van: OnVan) -> Iterator[Found]:
-    """What ``of_one`` finds of each van by its number, in order; so many ``workers`` are processes."""
-    on_van(0, n_vans)
-    if workers <= 1:
-        for number in range(n_vans):
-            yield of_one(number)
-            on_van(number + 1, n_vans)
-        return
-    with ProcessPoolExecutor(workers) as pool:
-        for done, found in enumerate(pool.map(of_one, range(n_vans)), 1):
-            yield found
-            on_van(done, n_vans)

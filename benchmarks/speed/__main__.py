@@ -1,10 +1,10 @@
-"""Everything about speed in one run and one table: `make bench`.
+"""All speed benchmarks in one run and one table: `make bench`.
 
     python -m benchmarks.speed [--only decode,formats] [--quick] [--output docs/performance.json]
 
-Each part is a program of its own (``python -m benchmarks.speed.PART``) and runs alone, one after the other. The figures
-go into a file as JSON, from which docs/performance.md is made (docs/make.py). About a quarter of an hour,
-and ten gigabytes of disk for the day.
+Each part is a program (``python -m benchmarks.speed.PART``) and runs alone, in sequence. The figures are written as
+JSON, from which docs/make.py makes docs/performance.md. It takes about a quarter of an hour, and ten gigabytes of disk
+for the day.
 """
 
 import argparse
@@ -49,7 +49,7 @@ PACKAGES: Final = ("numpy", "python-can", "cantools", "hilspy", "asammdf", "can_
 
 
 def conditions() -> dict[str, Any]:
-    """What was measured, and on what."""
+    """The conditions of the measurement: machine, versions."""
     return {
         "machine": f"{_processor()}, {os.cpu_count()} processors",
         "python": platform.python_version(),

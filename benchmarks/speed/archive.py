@@ -24,7 +24,7 @@ from gateway.units import NS_PER_S
 from gateway.workbench import demo_drive, frames_of
 
 CALIBRATION: Final = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
-HOURS: Final = 2.0
+HOURS: Final = 2.0  # chosen: of each log
 MANIFEST: Final = """\
 signals = "springscale:reference"
 calibration = "vehicle.json"
@@ -49,7 +49,7 @@ def write_archive(folder: Path, n_vehicles: int) -> int:
 
 
 def reprocess(archive: Path, dataset: Path, n_workers: int) -> dict[str, float]:
-    """Time by the clock and batches of one run."""
+    """Wall time and batches of one run."""
     command = [sys.executable, "-m", "gateway", "reprocess", str(archive), "--output", str(dataset)]
     begun_s = time.monotonic()
     done = subprocess.run(

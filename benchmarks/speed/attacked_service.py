@@ -21,7 +21,7 @@ from gateway.setup import setup_of
 
 
 class WaitingDrive(EndlessDrive):
-    """Begins when it is told to."""
+    """An endless drive that begins on request."""
 
     begin = threading.Event()
 

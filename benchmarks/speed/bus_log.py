@@ -16,15 +16,15 @@ from gateway.bus.messages import message_of
 from gateway.bus.signals import shipped_map
 from gateway.records import EXTENDED_ID, Frames
 
-FRAMES_PER_S: Final = 2500
-N_IDS: Final = 60
-START_NS: Final = 1_760_146_908_000_000_000
+FRAMES_PER_S: Final = 2500  # chosen: a bus of 500 kbit/s, well used
+N_IDS: Final = 60  # chosen
+START_NS: Final = 1_760_146_908_000_000_000  # arbitrary, in 2025
 DATABASE: Final = shipped_map("reference").with_name("springscale_reference.dbc")
 FORMATS: Final = (".log", ".log.gz", ".log.zst", ".log.xz", ".blf", ".mf4", ".asc", ".trc", ".csv", ".db")
 
 
 def make_log(path: Path, minutes: float) -> int:
-    """Write the log; returns how many frames it holds."""
+    """Write the log; return its number of frames."""
     rng = np.random.default_rng(20261121)
     n_others = N_IDS - 3
     ids = rng.choice(np.arange(0x200, 0x7FF), n_others, replace=False).astype(np.uint32)
@@ -56,7 +56,7 @@ def _ours(rng: np.random.Generator, begin_ns: int, can_id: int, length: int, n: 
 
 
 def write_as(log: Path, suffix: str) -> Path:
-    """A candump log once more in another format, beside it. Raises ModuleNotFoundError where a library is missing."""
+    """Convert a candump log to another format, in its folder. Raises ModuleNotFoundError if a library is missing."""
     path = log.with_suffix(suffix)
     packers: dict[str, Any] = {".gz": igzip.compress, ".zst": zstd.compress, ".xz": lzma.compress}
     if suffix == ".log":

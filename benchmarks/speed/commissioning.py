@@ -1,6 +1,6 @@
-"""What a commissioning costs on the machine that weighs: the process that fits a quarter of an hour of empty driving.
+"""The cost of a commissioning in the vehicle: the process that fits a quarter of an hour of empty driving.
 
-The drive is cut and kept as the service does it; then the process runs as the service starts it, on the calibration of
+The drive is cut and stored as the service does; then the process runs as the service starts it, with the calibration of
 a sister vehicle as its line.
 """
 
@@ -67,7 +67,7 @@ def _job(campaign: Path, line: Path, folder: Path) -> Job:
 
 
 def kept_of(motion: Motion, signal_map: SignalMap) -> list[KeptBatch]:
-    """What a service keeps of the rows."""
+    """The batches that a service stores of these rows."""
     found: list[KeptBatch] = []
     flow = Flow(BatchSettings(), signal_map.traits, None, "cross_spectrum", Identity("van-17"))
 

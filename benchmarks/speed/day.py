@@ -1,4 +1,4 @@
-"""A working day on the bus through `springscale estimate`: how long it takes, and whether memory grows with the log.
+"""A working day of the bus through `springscale estimate`: its duration, and whether memory grows with the log.
 
     python -m benchmarks.speed.day [--hours 8] [--json]
 
@@ -28,7 +28,7 @@ from gateway.units import NS_PER_S
 from gateway.workbench import demo_drive, frames_of
 from gateway.workbench.wiring import unrelated_traffic
 
-FRAMES_PER_S = 2500
+FRAMES_PER_S = 2500  # as in bus_log
 CALIBRATION = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
 
 
@@ -57,7 +57,7 @@ def write_log(path: Path, hours: float) -> int:
 
 
 def written_in_own_process(path: Path, hours: float) -> int:
-    """Of its own, because a process that is started inherits its parent's peak of memory."""
+    """Written by another process, because a child process inherits its parent's peak of memory."""
     command = [sys.executable, "-m", "benchmarks.speed.day", "--write", str(path), "--hours", str(hours)]
     return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 

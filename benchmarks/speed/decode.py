@@ -1,4 +1,4 @@
-"""Bulk decoding of a candump log, beside `wc -l` and everybody else in the same run.
+"""Bulk decoding of a candump log, compared with `wc -l` and other decoders in the same run.
 
     python -m benchmarks.speed.decode [--minutes 5] [--json]
 
@@ -18,12 +18,12 @@ from benchmarks.speed.peers import PEERS, SLOW
 from gateway.bus.logs import motion_of_log
 from gateway.bus.signals import load_signal_map
 
-SHORT_MINUTES = 2.0
+SHORT_MINUTES = 2.0  # chosen: of the log for the slowest
 OURS = "springscale"
 
 
 def run_springscale(path: Path) -> dict[str, Any]:
-    """Read and decode the whole log with ours."""
+    """Read and decode the complete log with our decoder."""
     signal_map = load_signal_map("springscale:reference")
 
     def run() -> dict[str, Any]:

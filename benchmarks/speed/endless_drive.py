@@ -1,4 +1,4 @@
-"""A bus on which one drive goes by again and again, as fast as the service takes it."""
+"""A bus that repeats one drive, as fast as the service reads it."""
 
 import threading
 import time
@@ -13,13 +13,13 @@ from gateway.bus.live.receiver import Burst
 from gateway.records import Frames
 from gateway.units import NS_PER_S
 
-DAY_S: Final = 86_400
-BURST_S: Final = 10.0
+DAY_S: Final = 86_400  # seconds
+BURST_S: Final = 10.0  # chosen: of driving per burst
 PARKED_BURST: Final = 5000  # frames of the first drive at a time, so that all windows are kept: those wait for the disk
 
 
 class EndlessDrive:
-    """A receiver: the frames of one drive over and over, each day's driving followed by a night of silence."""
+    """A receiver that repeats the frames of one drive, each day's driving followed by a night of silence."""
 
     dropped_kernel = 0
 
@@ -43,7 +43,7 @@ class EndlessDrive:
         return Burst(frames)
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Nothing to release."""
 
     def _all_bursts(self) -> Iterator[Frames]:
         for day in range(self._n_days):
@@ -56,7 +56,9 @@ class EndlessDrive:
 
 
 class ParkedFirst:
-    """A receiver: nothing at first; the beginning of a drive, a day before the week; nothing again; then the week."""
+    """A receiver: silent at first; then the beginning of a drive, a day before the week; silent again; then the
+    week.
+    """
 
     dropped_kernel = 0
 
@@ -78,7 +80,7 @@ class ParkedFirst:
         self._is_going.set()
 
     def receive(self, timeout_s: float) -> Burst:
-        """What comes next."""
+        """The next burst."""
         if self._is_going.is_set():
             return self._week.receive(timeout_s)
         time.sleep(timeout_s)
@@ -88,4 +90,4 @@ class ParkedFirst:
         return Burst(take(self._empty, slice(begin, self._at)))
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Nothing to release."""

@@ -1,4 +1,4 @@
-"""What `springscale feed` takes of one core, and what `springscale import` takes; on a fake device with a FIFO.
+"""The processor time and memory of `springscale feed` and `springscale import`, on a fake device with a FIFO.
 
 python -m benchmarks.speed.feed --output docs/feed_cost.json
 """
@@ -26,9 +26,9 @@ from gateway.sim.scenario import simulate_drive
 from gateway.sim.vans import PAPER_VAN
 from gateway.workbench.phones import PHONE, write_export
 
-RATE_HZ: Final = 100.0
-SHORT_S: Final = 5.0  # the difference of the two runs is what feeding takes, without the start
-LONG_S: Final = 35.0
+RATE_HZ: Final = 100.0  # chosen: of the fake device
+SHORT_S: Final = 5.0  # chosen: the difference of both runs is the cost of feeding without the start
+LONG_S: Final = 35.0  # chosen: of the long run
 MEASURED: Final = """
 import resource, sys
 from gateway.cli import main
@@ -42,7 +42,7 @@ finally:
 
 
 def _run(*arguments: str) -> tuple[dict[str, Any], float, float]:
-    """What the command printed as JSON, its CPU seconds and its greatest memory in MB."""
+    """The command's JSON output, its CPU seconds and its peak memory in MB."""
     done = subprocess.run([sys.executable, "-c", MEASURED, *arguments], capture_output=True, text=True, check=True)
     _, cpu_s, rss_mb = done.stderr.strip().splitlines()[-1].split()
     told: dict[str, Any] = json.loads(done.stdout)
@@ -106,7 +106,7 @@ def _import() -> dict[str, float]:
 @click.command()
 @click.option("--output", type=FILE, default=None, help="file to write the numbers to")
 def measure(output: Path | None) -> None:
-    """Measure, print, and write where asked."""
+    """Measure, print, and write to ``output`` if given."""
     _, short_cpu_s, _ = _feed(SHORT_S)
     told, long_cpu_s, rss_mb = _feed(LONG_S)
     found = {

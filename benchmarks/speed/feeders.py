@@ -1,9 +1,9 @@
-"""What the programs beside the service take of one core: deploy/kuksa/feeder.py and deploy/traccar/feeder.py.
+"""The processor time of the programs beside the service: deploy/kuksa/feeder.py and deploy/traccar/feeder.py.
 
     python -m benchmarks.speed.feeders --output docs/feeders_cost.json
 
-Each asks the real web application, which has a new weight for every question, far more often than it would in a
-vehicle; KUKSA's databroker and Traccar are stand-ins that take everything (KUKSA's by the stubs of its own client).
+Each polls the real web application, which has a new weight for every request, far more often than in a vehicle; KUKSA's
+databroker and Traccar are stand-ins that accept everything (KUKSA's with the stubs of its own client).
 """
 
 import json
@@ -41,21 +41,21 @@ DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 EVERY_S: Final = 0.1  # a question, here
 DEFAULT_EVERY_S: Final = {"kuksa": 5.0, "traccar": 10.0}  # --every-s of the two
 SETTLE_S: Final = 5.0  # the start of Python is not counted
-MEASURED_S: Final = 30.0
-WINDOW_NS: Final = 300 * NS_PER_S
+MEASURED_S: Final = 30.0  # chosen
+WINDOW_NS: Final = 300 * NS_PER_S  # BatchSettings.window_s
 PAYLOAD: Final = "Vehicle.Load.Payload"
 FEEDERS: Final = ("kuksa", "traccar")
 
 
 @dataclass
 class Taken:
-    """How many weights a stand-in was given."""
+    """The number of weights that a stand-in received."""
 
     n: int = 0
 
 
 class Metadata(val_pb2_grpc.VALServicer):  # type: ignore[misc]  # the stubs carry no types
-    """Every path is known; those of the core specification are whole numbers."""
+    """Every path exists; those of the core specification are integers."""
 
     def Get(self, request: Any, context: Any) -> Any:
         answer = val_pb2.GetResponse()
@@ -82,7 +82,7 @@ class Databroker(v2_grpc.VALServicer):  # type: ignore[misc]  # the stubs carry 
 
 @contextmanager
 def databroker() -> Iterator[tuple[list[str], Taken]]:
-    """A stand-in for KUKSA's, the options that name it, and what it was given."""
+    """A stand-in for KUKSA's databroker, the options that name it, and its count."""
     taken, server = Taken(), grpc.server(ThreadPoolExecutor(2))
     val_pb2_grpc.add_VALServicer_to_server(Metadata(), server)
     v2_grpc.add_VALServicer_to_server(Databroker(taken), server)
@@ -165,7 +165,7 @@ def _weigh(board: Board, store: Store, stopping: threading.Event) -> None:
 
 
 def cost_of(name: str) -> dict[str, float]:
-    """CPU seconds of one question with the weight that is new in it, and the most memory, MB."""
+    """CPU seconds per request with its new weight, and peak memory in MB."""
     with weighing() as url, {"kuksa": databroker, "traccar": traccar}[name]() as (options, taken):
         command = [sys.executable, str(DEPLOY / name / "feeder.py"), "--url", url, "--every-s", str(EVERY_S), *options]
         feeder = subprocess.Popen(command)
@@ -185,7 +185,7 @@ def cost_of(name: str) -> dict[str, float]:
 @click.command()
 @click.option("--output", type=FILE, default=None, help="file to write the numbers to")
 def measure(output: Path | None) -> None:
-    """Measure, print, and write where asked."""
+    """Measure, print, and write to ``output`` if given."""
     machine = f"{platform.machine()}, Python {platform.python_version()}"
     text = json.dumps({"machine": machine, **{name: cost_of(name) for name in FEEDERS}}, indent=1) + "\n"
     if output is not None:

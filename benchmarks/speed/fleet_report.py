@@ -1,10 +1,10 @@
-"""The fleet's report over a year: how long it takes, how much memory, and how large its pages are.
+"""The fleet report over a year: its duration, its memory, and the size of its pages.
 
     python -m benchmarks.speed.fleet_report [--vehicles 100] [--days 365] [--hours 2] [--output FILE] [--keep DIR]
 
-Makes a data set as `springscale reprocess` leaves it, with numbers drawn at random: a batch every five minutes of
-driving, seasons that move the dampers of all vehicles, a few vehicles that drift by themselves, a few whose sensor
-fails. The report runs in a process of its own; memory is compared with that of a tenth of the vehicles.
+Makes a data set like that of `springscale reprocess`, with random numbers: a batch every five minutes of driving,
+seasons that change the dampers of all vehicles, a few vehicles that drift, a few with a failing sensor. The report runs
+in a process of its own; memory is compared with that of a tenth of the vehicles.
 """
 
 import argparse
@@ -24,9 +24,9 @@ from gateway.archive.receipts import Slot, text_of
 from gateway.units import NS_PER_S
 
 START_DAY = 20_454  # 2026-01-01
-WINDOW_S = 300
-DRIFTING_EVERY, FAILING_EVERY = 25, 40  # one vehicle in so many
-PER_YEAR = 0.2
+WINDOW_S = 300  # BatchSettings.window_s
+DRIFTING_EVERY, FAILING_EVERY = 25, 40  # chosen: one vehicle in this many
+PER_YEAR = 0.2  # chosen: drift of a damper
 STD_KG, OWN_STD_KG = 8.0, 5.0
 
 
@@ -156,7 +156,7 @@ def main() -> None:
 
 
 def _written_in_own_process(dataset: Path, n_vehicles: int, asked: argparse.Namespace) -> int:
-    """Of its own, because a process that is started inherits its parent's peak of memory."""
+    """Written by another process, because a child process inherits its parent's peak of memory."""
     command = [sys.executable, "-m", "benchmarks.speed.fleet_report", "--write", str(dataset)]
     command += ["--vehicles", str(n_vehicles), "--days", str(asked.days), "--hours", str(asked.hours)]
     return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)

@@ -1,4 +1,4 @@
-"""What is read how fast: the same frames in every format, by ours and by python-can's reader.
+"""The reading speed of each format: the same frames by ours and by python-can's reader.
 
 python -m benchmarks.speed.formats [--minutes 1] [--json]
 """
@@ -15,11 +15,11 @@ from benchmarks.speed.bus_log import FORMATS, make_log, write_as
 from benchmarks.speed.decode import run_springscale
 from benchmarks.speed.meter import best_of, in_own_process, print_run
 
-PEER_FRAMES = 50_000
+PEER_FRAMES = 50_000  # chosen: python-can is slow
 
 
 def run_python_can(path: Path) -> dict[str, Any]:
-    """python-can's reader alone, its messages thrown away; it knows nothing packed but gzip."""
+    """python-can's reader alone, discarding its messages; its only supported compression is gzip."""
     if path.suffix in {".zst", ".xz"}:
         return {"skipped": "python-can does not read it"}
     import can.io.mf4  # noqa: PLC0415 # after ours, which keeps asammdf out of it (gateway/bus)

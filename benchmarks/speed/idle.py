@@ -1,7 +1,7 @@
-"""What the service costs while the vehicle is parked: processor time and disk writes of an hour, bus asleep.
+"""The cost of the service while the vehicle is parked: processor time and disk writes of an hour, bus asleep.
 
-A thousand batches lie in the store; all of them are delivered to a broker and, as events, to nobody's webhook.
-``python -m benchmarks.speed.idle`` prints one JSON object; it wants Debian's mosquitto. Another version is measured
+A thousand batches are in the store; all are delivered to a broker, and as events to a webhook that nobody serves.
+``python -m benchmarks.speed.idle`` prints one JSON object; it needs Debian's mosquitto. Another version is measured
 with this file by ``PYTHONPATH=ITS_FOLDER python benchmarks/speed/idle.py``.
 """
 
@@ -25,9 +25,9 @@ from gateway.estimate_json import estimate_to_json
 from gateway.records import Spectra
 from gateway.store import Store
 
-N_BATCHES: Final = 1000
-WINDOW_NS: Final = 300 * 10**9
-SETTLE_S: Final = 40.0  # everything is delivered, and counted as delivered
+N_BATCHES: Final = 1000  # chosen: a month of driving
+WINDOW_NS: Final = 300 * 10**9  # BatchSettings.window_s
+SETTLE_S: Final = 40.0  # chosen: everything is delivered and acknowledged within it
 SETTINGS: Final = """
 signals = "springscale:reference"
 [vehicle]
@@ -50,7 +50,7 @@ secret_file = "secret"
 
 
 def fill(directory: Path) -> None:
-    """Batches with spectra, as long ago as a history is."""
+    """Write batches with spectra, in the time of the history."""
     numbers = np.linspace(1.0, 15.0, 75)
     spectra = Spectra(*[numbers] * 5)
     store = Store.open(directory)
@@ -66,7 +66,7 @@ def fill(directory: Path) -> None:
 
 
 def cost_of(process: int) -> tuple[float, int]:
-    """Seconds of processor time and bytes that went to the disk so far."""
+    """Seconds of processor time and bytes written to disk so far."""
     fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     seconds = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
     io = dict(line.split(": ") for line in Path(f"/proc/{process}/io").read_text().splitlines())
@@ -80,7 +80,7 @@ def free_port() -> int:
 
 
 def measured(seconds: float) -> dict[str, float]:
-    """Start broker and service, let them settle, and look at the service's cost over so many seconds."""
+    """Start broker and service, let them settle, and measure the service's cost over this time."""
     with TemporaryDirectory(dir=Path.cwd()) as folder:
         here, port, broker = Path(folder), free_port(), free_port()
         (here / "mosquitto.conf").write_text(f"listener {broker} 127.0.0.1\nallow_anonymous true\n")
@@ -112,7 +112,7 @@ def measured(seconds: float) -> dict[str, float]:
 
 
 def main() -> None:
-    """Print what it costs, as JSON."""
+    """Print the figures as JSON."""
     arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     arguments.add_argument("--seconds", type=float, default=120.0, help="how long to look")
     arguments.add_argument(

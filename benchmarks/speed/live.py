@@ -1,4 +1,4 @@
-"""The live path: CPU of receiving and decoding, beside python-can's own receive loop in the same run.
+"""The live path: CPU of receiving and decoding, compared with python-can's own receive loop in the same run.
 
     python -m benchmarks.speed.live [--seconds 6] [--json]
 

@@ -17,7 +17,7 @@ ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "POLARS_MAX_THREADS": "1", "OMP_NUM_T
 
 
 def cpu_s() -> float:
-    """CPU time of this process and of those it has waited for."""
+    """CPU time of this process and of its finished children."""
     return time.process_time() + _children_s()
 
 
@@ -27,7 +27,7 @@ def _children_s() -> float:
 
 
 def best_of(n_times: int, work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """What the work found, with ``seconds``, the CPU time of the quickest run."""
+    """The result of the work, with ``seconds``, the CPU time of the fastest run."""
     quickest: dict[str, Any] = {}
     for _ in range(n_times):
         begun_s = cpu_s()
@@ -39,7 +39,7 @@ def best_of(n_times: int, work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
 
 
 def peak_mb(pid: int | str = "self") -> float:
-    """The most memory a process has held so far; unlike rusage's, none of its parent's."""
+    """Peak memory of a process so far; unlike rusage's it excludes its parent's."""
     status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
     return int(status["VmHWM"].split()[0]) / 1024
 
@@ -51,7 +51,7 @@ def cpu_of_s(pid: int) -> float:
 
 
 def in_own_process(module: str, *arguments: object) -> dict[str, Any]:
-    """What ``python -m benchmarks.speed.MODULE`` prints, one thread each."""
+    """The output of ``python -m benchmarks.speed.MODULE``, with one thread each."""
     command = [sys.executable, "-m", f"benchmarks.speed.{module}", *map(str, arguments)]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, env=os.environ | ONE_THREAD)
     found: dict[str, Any] = json.loads(done.stdout)
@@ -59,7 +59,7 @@ def in_own_process(module: str, *arguments: object) -> dict[str, Any]:
 
 
 def print_run(run: Callable[[], dict[str, Any]]) -> None:
-    """The other end: one run with its peak of memory as JSON, or why there is none."""
+    """In the child process: one run with its peak memory as JSON, or the reason why there is none."""
     try:
         row = run()
     except ModuleNotFoundError as fault:

@@ -1,8 +1,8 @@
-"""Others on the same candump log: what each needs to get our three messages out of it, into arrays or values.
+"""Other libraries on the same candump log: the time to extract our three messages into arrays or values.
 
     python -m benchmarks.speed.peers --run NAME --log FILE
 
-They are the dependency group ``bench``; who is not installed is left out with a word.
+They are the dependency group ``bench``; missing ones are skipped with a message.
 """
 
 import argparse
@@ -13,11 +13,11 @@ from typing import Any
 
 from benchmarks.speed.meter import best_of, print_run
 
-OURS = (0x120, 0x121, 0x130)
+OURS = (0x120, 0x121, 0x130)  # identifiers of the reference map
 
 
 def wc(log: Path) -> dict[str, Any]:
-    """The physical limit of looking at every line."""
+    """The lower bound: looking at every line."""
     return best_of(
         5, lambda: {"frames": int(subprocess.run(["wc", "-l", log], check=True, capture_output=True).stdout.split()[0])}
     )
@@ -106,7 +106,7 @@ def asammdf_path(log: Path) -> dict[str, Any]:
 
 
 def polars_path(log: Path) -> dict[str, Any]:
-    """polars' text parser on one thread, payloads as bytes; vectors of bits would come on top."""
+    """polars' text parser on one thread, payloads as bytes; converting them to bit vectors would cost extra."""
     import numpy as np  # noqa: PLC0415
     import polars as pl  # noqa: PLC0415
 

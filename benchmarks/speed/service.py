@@ -31,7 +31,7 @@ from gateway.setup import setup_of
 from gateway.units import NS_PER_S
 
 PROGRAM: Final = (sys.executable, "-m", "benchmarks.speed.service")
-BEGIN_S: Final = 60.0  # of the drive: it has come to speed by then
+BEGIN_S: Final = 60.0  # chosen: of the drive, which is at speed by then
 
 
 def serve(folder: Path) -> None:
@@ -47,7 +47,7 @@ def serve(folder: Path) -> None:
 
 
 def send(port: int, seconds: float) -> None:
-    """The drive as it comes, in groups of five milliseconds; prints how many frames that were."""
+    """Send the drive in real time, in groups of five milliseconds; print the number of frames."""
     from gateway.workbench import demo_drive, frames_of  # noqa: PLC0415 # nothing that the service's process should hold
 
     drive = frames_of(demo_drive())
@@ -67,7 +67,7 @@ def send(port: int, seconds: float) -> None:
 
 
 def measure(seconds: float) -> dict[str, Any]:
-    """One drive of so many seconds."""
+    """One drive of this many seconds."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         shutil.copy(REPOSITORY / "gateway/demo/paper_van.json", folder / "vehicle.json")

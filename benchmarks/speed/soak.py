@@ -1,10 +1,10 @@
-"""A simulated week in the real service at high speed: memory, file handles, threads and database stay flat.
+"""A simulated week in the real service at high speed: memory, file handles, threads and database do not grow.
 
-`make soak` runs it and prints one line a simulated day; it ends with 1 where something grew. The service begins
-without a calibration and is commissioned over HTTP, from a quarter of an hour of empty driving and the vehicle's line;
-then each day has hours of driving and a night of silence. A client asks for the latest estimate all the while, and
-every frame is recorded. The bus is replaced by a receiver that hands out the frames of one simulated drive again and
-again, stamped later and later; everything behind it is the service as it runs in a vehicle.
+`make soak` runs it and prints one line per simulated day; it exits with 1 if something grew. The service begins without
+a calibration and is commissioned over HTTP, from a quarter of an hour of empty driving and the vehicle's line; then
+each day has hours of driving and a night of silence. A client polls the latest estimate, and every frame is recorded.
+The bus is replaced by a receiver that repeats the frames of one simulated drive with later stamps; everything behind it
+is the service as in a vehicle.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from typing import Final
 from benchmarks.speed.endless_drive import EndlessDrive, ParkedFirst
 from gateway.config import load_settings
 from gateway.service.gateway import Gateway
-from gateway.service.life import live
+from gateway.service.lifecycle import live
 from gateway.workbench import demo_drive, frames_of
 
 SETTINGS: Final = """\
@@ -55,7 +55,7 @@ ANSWERS: Final = {  # of the van that made the demo's drive: axle weights with i
     "sensor_offset_left_m": 0.15,
 }
 EMPTY_S: Final = 910.0  # of the demo's drive: three windows before its load comes on board
-COMMISSIONED_WITHIN_S: Final = 300.0
+COMMISSIONED_WITHIN_S: Final = 300.0  # chosen: timeout
 # What may grow from the end of the first day to the end of the last: caches fill, then nothing more; and one connection
 # more or less is open at any moment.
 GROWTH_ALLOWED: Final = {"memory_mb": 15.0, "handles": 2, "threads": 0}
@@ -64,7 +64,7 @@ MOST_ALLOWED: Final = {"database_mb": 4.5 + 4.2, "record_mb": 16.0}
 
 
 def footprint(state: Path) -> dict[str, float]:
-    """What the process holds now."""
+    """The current resources of the process."""
     status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
     return {
         "memory_mb": round(int(status["VmRSS"].split()[0]) / 1024, 1),
@@ -76,7 +76,7 @@ def footprint(state: Path) -> dict[str, float]:
 
 
 class Service:
-    """The gateway at work; another takes its place once the vehicle is commissioned."""
+    """The running gateway, which restarts once the vehicle is commissioned."""
 
     def __init__(self) -> None:
         self.gateway: Gateway | None = None
@@ -91,12 +91,12 @@ class Service:
 
     @property
     def now(self) -> Gateway:
-        """The gateway at work."""
+        """The running gateway."""
         assert self.gateway is not None
         return self.gateway
 
     def ask(self, path: str, said: object = None) -> bytes:
-        """What it answers, to a question or to what is said."""
+        """Its answer to a GET, or to a POST of ``said``."""
         content = None if said is None else json.dumps(said).encode()
         request = urllib.request.Request(self.now.url + path, content, {"Content-Type": "application/json"})
         with urllib.request.urlopen(request, timeout=30.0) as answer:
@@ -105,7 +105,7 @@ class Service:
 
 
 def commission(service: Service, receiver: ParkedFirst) -> None:
-    """Every step of a commissioning, until the service weighs with what came of it."""
+    """All steps of a commissioning, until the service uses its result."""
     for step, said in (
         ("", {"note": "soak"}),
         ("/line", {"line": {"name": "vehicle.json", "source": "administrator"}}),
@@ -170,14 +170,14 @@ def soak(hours_a_day: float, n_days: int) -> list[dict[str, float]]:
 
 
 def what_grew(days: list[dict[str, float]]) -> list[str]:
-    """Sentences about everything that is not flat."""
+    """A sentence about each resource that grew."""
     first, last = days[0], days[-1]
     allowed = {what: first[what] + growth for what, growth in GROWTH_ALLOWED.items()} | MOST_ALLOWED
     return [f"{what} is {last[what]}, at most {most} is allowed" for what, most in allowed.items() if last[what] > most]
 
 
 def main() -> None:
-    """Print the days; exit with 1 where something grew."""
+    """Print the days; exit with 1 if something grew."""
     arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     arguments.add_argument("--days", type=int, default=7)
     arguments.add_argument("--hours", type=float, default=4.0, help="of driving a day")

@@ -28,13 +28,13 @@ import numpy as np
 import trustme
 
 from gateway.store import Store
-from gateway.web.charting import LIBRARY_URL
+from gateway.web.pages import LIBRARY_URL
 from gateway.workbench import demo_drive, frames_of
 
-MOST_MB: Final = 250.0
+MOST_MB: Final = 250.0  # chosen: bound of the service's memory
 N_STORED: Final = 1200  # records before, with spectra
 STRANGERS: Final = ("127.0.0.2", "127.0.0.3", "127.0.0.4", "127.0.0.5")
-EACH: Final = 120
+EACH: Final = 120  # chosen: connections per address
 HOLD_S: Final = 25.0  # longer than any limit on who is silent or does not read
 PAUSE_S: Final = 0.5  # between two questions of the decent client
 SILENT: Final = ""
@@ -67,7 +67,7 @@ level = "error"
 
 
 class Driven:
-    """The service in a process of its own, and what it has weighed once it is over."""
+    """The service in a process of its own, and its records at the end."""
 
     def __init__(self, folder: Path, drive: Path, hours: float, days: int) -> None:
         self.state = folder / "state"
@@ -97,7 +97,7 @@ class Driven:
         return time.monotonic() - begun_s
 
     def most_mb(self) -> float:
-        """The largest its memory ever was."""
+        """Its peak memory."""
         found = re.search(r"VmHWM:\s+(\d+) kB", Path(f"/proc/{self._process.pid}/status").read_text())
         assert found is not None
         return round(int(found[1]) / 1024, 1)
@@ -194,7 +194,7 @@ async def ask_decently(url: httpx.URL, context: ssl.SSLContext, over: asyncio.Ev
 
 
 async def under_attack(service: Driven, context: ssl.SSLContext, cursor: str) -> dict[str, float]:
-    """The figures of a drive with crowds at the door."""
+    """The figures of a drive under attack."""
     over, url = asyncio.Event(), httpx.URL(service.url)
     attacking = asyncio.create_task(attack(url, context, cursor, over))
     asking = asyncio.create_task(ask_decently(url, context, over))
@@ -251,7 +251,7 @@ def soak_attack(hours: float, days: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Print the figures; exit with 1 where it was not held."""
+    """Print the figures; exit with 1 if a bound was exceeded."""
     arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     arguments.add_argument("--days", type=int, default=3)
     arguments.add_argument("--hours", type=float, default=4.0, help="of driving a day")

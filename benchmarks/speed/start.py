@@ -1,10 +1,10 @@
-"""What a start costs and what an install weighs.
+"""The cost of a start and the size of an installation.
 
     python -m benchmarks.speed.start [--json]
 
-CPU time of the imports, the time from the command to READY=1 of the service as systemd hears it (on an in-process bus,
-with the demo's calibration), the bytes of everything that an install by pip holds, and what the Debian package that
-`make deb` built takes in a vehicle, compiled code included.
+CPU time of the imports, the time from the command to READY=1 of the service (on an in-process bus, with the demo's
+calibration), the bytes of an installation by pip, and the installed size of the Debian package that `make deb` built,
+compiled code included.
 """
 
 import argparse
@@ -40,7 +40,7 @@ directory = "state"
 
 
 def imports_s(module: str) -> float:
-    """CPU time of importing a module in a fresh Python, less that of a Python that imports nothing."""
+    """CPU time of importing a module in a fresh Python, minus that of a Python that imports nothing."""
 
     def run(code: str) -> float:
         command = [sys.executable, "-c", code]
@@ -75,7 +75,7 @@ def ready_s(folder: Path) -> float:
 
 
 def install_mb() -> dict[str, float]:
-    """Megabytes of every package that a vehicle's install holds, the largest first."""
+    """Megabytes of every package in a vehicle's installation, the largest first."""
     sizes = {"springscale": _bytes_under(REPOSITORY / "gateway") + _bytes_under(REPOSITORY / "dbc")}
     waiting = [("springscale", frozenset[str]())]
     while waiting:
@@ -96,7 +96,7 @@ def _bytes_under(folder: Path) -> float:
 
 
 def package_mb() -> float | None:
-    """What the vehicle's Debian package takes when installed; None where none was built, or nobody can read it."""
+    """Installed size of the vehicle's Debian package; None if none was built or it cannot be read."""
     package = max((REPOSITORY / "build").glob("springscale_*.deb"), key=lambda one: one.stat().st_mtime, default=None)
     if package is None or shutil.which("dpkg-deb") is None:
         return None

@@ -1,28 +1,44 @@
-"""The figures as one table, each beside its goal: what `make bench` prints and docs/performance.md says."""
+"""The figures and their goals as one table, for `make bench` and docs/performance.md."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 LEAST_TIMES: Final = {".blf": 15, ".mf4": 10}  # as fast as python-can's reader
-WHOLE_DAY_H: Final = 8.0
+WHOLE_DAY_H: Final = 8.0  # a working day
 MOST_DAY_S: Final = {"cross_spectrum": 10.0}
+HELD_BY: Final = {
+    "cross_spectrum": (
+        "60 solutions of the model and their slopes, one after the other, for each begins where another ended; half "
+        "the time of one is numpy's cost of a call"
+    ),
+    "calibration": "5,000 curvatures by all parameters, most of them in fits that leave a run out",
+    "day": "its batches",
+    "import": "FastAPI, pydantic and cantools",
+}
+"""What keeps a figure from its goal, as profiles of these benchmarks showed it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One figure. ``goal`` is empty where there is none; ``is_met`` then says nothing."""
+    """One figure. ``goal`` is empty where there is none; ``is_met`` then says nothing. ``held_by`` is what keeps the
+    figure from its goal; the table shows it if the goal is missed.
+    """
 
     section: str
     what: str
     figure: str
     goal: str = ""
     is_met: bool = True
+    held_by: str = ""
 
     @property
     def verdict(self) -> str:
-        """The goal and whether it is met."""
-        return f"{self.goal}: {'met' if self.is_met else 'missed'}" if self.goal else ""
+        """The goal, whether it is met and, where it is not, what holds the figure."""
+        if not self.goal:
+            return ""
+        missed = f"missed, held by {self.held_by}" if self.held_by else "missed"
+        return f"{self.goal}: {'met' if self.is_met else missed}"
 
 
 def lines_of(found: Mapping[str, Any]) -> list[Line]:
@@ -34,8 +50,9 @@ def lines_of(found: Mapping[str, Any]) -> list[Line]:
     return [line for name, part in parts.items() if name in found for line in part(found[name])]
 
 
-def _below(section: str, what: str, figure: float, unit: str, most: float, digits: int = 1) -> Line:
-    return Line(section, what, f"{figure:,.{digits}f} {unit}", f"at most {most:g} {unit}", figure <= most)
+def _below(section: str, what: str, figure: float, unit: str, most: float, digits: int = 1, held_by: str = "") -> Line:
+    told = f"{figure:,.{digits}f} {unit}"
+    return Line(section, what, told, f"at most {most:g} {unit}", figure <= most, held_by)
 
 
 def _decode(found: Mapping[str, Any]) -> Iterator[Line]:
@@ -78,7 +95,8 @@ def _day(found: Mapping[str, Any]) -> Iterator[Line]:
         rate = found["frames"] / cpu_s / 1e6
         told = f"{cpu_s:.1f} s, {rate:.1f} million frames/s, {cpu_s / found['wc_s']:.1f} times wc -l"
         most_s = MOST_DAY_S.get(name) if found["hours"] == WHOLE_DAY_H else None
-        yield Line(section, name, told, f"at most {most_s:g} s" if most_s else "", not most_s or cpu_s <= most_s)
+        goal, is_met = f"at most {most_s:g} s" if most_s else "", not most_s or cpu_s <= most_s
+        yield Line(section, name, told, goal, is_met, HELD_BY["day"])
         yield Line(
             section,
             f"{name}, memory",
@@ -87,7 +105,14 @@ def _day(found: Mapping[str, Any]) -> Iterator[Line]:
             peak_mb < 1.1 * hour_mb,
         )
     if found["hours"] == WHOLE_DAY_H:
-        yield _below(section, "both estimators", sum(run["day"]["cpu_s"] for run in runs.values()), "s", 12)
+        yield _below(
+            section,
+            "both estimators",
+            sum(run["day"]["cpu_s"] for run in runs.values()),
+            "s",
+            12,
+            held_by=HELD_BY["day"],
+        )
 
 
 def _live(found: Mapping[str, Any]) -> Iterator[Line]:
@@ -126,8 +151,10 @@ def _web(found: Mapping[str, Any]) -> Iterator[Line]:
 def _weigh(found: Mapping[str, Any]) -> Iterator[Line]:
     section = "weighing"
     for name, seconds in found["batch_s"].items():
-        yield _below(section, f"a batch of 5 minutes, {name}", 1e3 * seconds, "ms", 35, 0)
-    yield _below(section, "calibration on ten drives of 15 minutes", found["calibration"]["cpu_s"], "s", 15, 0)
+        what, held_by = f"a batch of 5 minutes, {name}", HELD_BY.get(name, "")
+        yield _below(section, what, 1e3 * seconds, "ms", 35, 0, held_by)
+    calibration_s = found["calibration"]["cpu_s"]
+    yield _below(section, "calibration on ten drives of 15 minutes", calibration_s, "s", 15, 0, HELD_BY["calibration"])
     if "commissioning" in found:
         fit = found["commissioning"]
         yield Line(section, "a commissioning's fit, memory", f"{fit['peak_mb']:.0f} MB")
@@ -149,7 +176,7 @@ def _archive(found: Mapping[str, Any]) -> Iterator[Line]:
 def _start(found: Mapping[str, Any]) -> Iterator[Line]:
     section = "start and install"
     for module, seconds in found["imports_s"].items():
-        yield _below(section, f"import {module}", seconds, "s", 0.5, 2)
+        yield _below(section, f"import {module}", seconds, "s", 0.5, 2, HELD_BY["import"])
     yield _below(section, "READY", found["ready_s"], "s by the clock", 1.5, 2)
     largest = ", ".join(f"{name} {size:.0f}" for name, size in found["largest_mb"].items())
     size, package = found["install_mb"], found.get("package_mb")

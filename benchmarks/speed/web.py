@@ -1,11 +1,11 @@
-"""The web side: the latest estimate over HTTP, as fast as one core of server gives it.
+"""The web side: the rate of requests for the latest estimate over HTTP on one core.
 
     python -m benchmarks.speed.web [--seconds 5] [--connections 16] [--json]
 
-Server, client and a bus of 2500 frames/s are three processes on the loopback interface. The server is the service:
-it receives and decodes the bus (CAN datagrams over a loopback socket, as in live.py; kernel-filtered, so that
-210 frames/s of ours arrive), holds an estimate with spectra of the usual length and publishes a new one every 100 ms
-into eight open streams. Goal: 5000 requests/s with p99 under 20 ms, and no frame lost.
+Server, client and a bus of 2500 frames/s are three processes on the loopback interface. The server is the service: it
+receives and decodes the bus (CAN datagrams over a loopback socket, as in live.py; kernel-filtered, so that 210 frames/s
+of ours arrive), holds an estimate with spectra of the usual length and publishes a new one every 100 ms into eight open
+streams. Goal: 5000 requests/s with p99 under 20 ms, and no frame lost.
 """
 
 import argparse
@@ -44,7 +44,7 @@ from gateway.web import Board, create_app, server_config
 LATEST = b"GET /api/v1/estimates/latest HTTP/1.1\r\nHost: localhost\r\n\r\n"
 STREAM = b"GET /api/v1/stream HTTP/1.1\r\nHost: localhost\r\n\r\n"
 STATUS = "http://127.0.0.1:{port}/api/v1/status"
-N_STREAMS = 8
+N_STREAMS = 8  # chosen
 BUS_FRAMES_PER_S = 210  # what a kernel filter lets through of 2500
 
 
@@ -97,14 +97,14 @@ def serve(directory: str, port: int) -> None:
 
 
 def bus_of(port: int) -> dict[str, Any]:
-    """What the server says of its bus."""
+    """The server's status of its bus."""
     with urllib.request.urlopen(STATUS.format(port=port)) as answer:
         bus: dict[str, Any] = json.load(answer)["bus"]
     return bus
 
 
 class Asker(asyncio.Protocol):
-    """One connection that asks again as soon as it is answered; notes how long each answer took."""
+    """One connection that repeats its request as soon as it is answered, and notes the time of each answer."""
 
     def __init__(self, took_s: list[float], end_s: float, done: asyncio.Future[None]) -> None:
         self._took_s, self._end_s, self._done = took_s, end_s, done
@@ -136,7 +136,7 @@ class Asker(asyncio.Protocol):
 
 
 async def listen(reader: asyncio.StreamReader) -> None:
-    """Take all that a stream says; what nobody took would sooner or later hold the server up."""
+    """Read all of a stream; unread data would block the server eventually."""
     while await reader.read(1 << 16):
         pass
 

@@ -1,5 +1,5 @@
-"""What weighing costs: one batch of five minutes by each estimator, a calibration on ten drives of 15 minutes, and a
-commissioning on the vehicle's own machine.
+"""The cost of weighing: one batch of five minutes by each estimator, a calibration on ten drives of 15 minutes, and a
+commissioning in the vehicle.
 
     python -m benchmarks.speed.weigh [--json]
 

@@ -1,4 +1,4 @@
-"""Many computers: Dask's scheduler as an executor. The one file that knows Dask."""
+"""Many computers: Dask's scheduler as an executor. Only this file uses Dask."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
@@ -11,11 +11,11 @@ from gateway.errors import ConfigurationError
 Answer = TypeVar("Answer")
 
 MISSING: Final = "--scheduler needs Dask: pip install 'springscale[cluster]', here and on every worker"
-CONNECT_WITHIN_S: Final = 15
+CONNECT_WITHIN_S: Final = 15  # chosen
 
 
 class Cluster(Executor):
-    """The workers of a Dask scheduler, as many as there are now."""
+    """The current workers of a Dask scheduler."""
 
     def __init__(self, client: Any) -> None:
         """``client`` is connected."""
@@ -24,24 +24,24 @@ class Cluster(Executor):
 
     @property
     def n_workers(self) -> int:
-        """Threads of all workers: jobs that run at a time."""
+        """Threads of all workers: the number of concurrent jobs."""
         return max(1, int(sum(self._client.nthreads().values())))
 
     def submit(self, fn: Callable[..., Answer], /, *args: Any, **kwargs: Any) -> Future[Answer]:
-        """Have it done by any worker; what a lost worker was doing is done by another."""
+        """Run it on any worker; the task of a lost worker is repeated by another."""
         told: Future[Answer] = Future()
         asked: Future[Answer] = self._executor.submit(fn, *args, **kwargs)
         asked.add_done_callback(lambda done: _pass_on(done, told))
         return told
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Let go of the cluster; its scheduler and workers go on."""
+        """Disconnect from the cluster; its scheduler and workers continue."""
         self._executor.shutdown(wait=wait and not cancel_futures)
         self._client.close()
 
 
 def cluster(address: str) -> Cluster:
-    """The cluster of a scheduler. Raises ConfigurationError without Dask, PlaceError where nobody answers."""
+    """The cluster of a scheduler. Raises ConfigurationError without Dask, PlaceError if nobody answers."""
     distributed = _distributed()
     try:
         client = distributed.Client(address, timeout=CONNECT_WITHIN_S, set_as_default=False)
@@ -61,7 +61,7 @@ def cluster(address: str) -> Cluster:
 
 
 def _pass_on(done: Future[Answer], told: Future[Answer]) -> None:
-    """The same answer, or the same fault in our own words."""
+    """Pass on the answer, or the fault in our own words."""
     if done.cancelled():
         told.set_exception(PlaceError("the cluster has let go of it: its scheduler went away, or was told to stop"))
         return
@@ -77,7 +77,7 @@ def _pass_on(done: Future[Answer], told: Future[Answer]) -> None:
 
 
 def _distributed() -> Any:
-    """The library, loaded when a cluster is asked for."""
+    """The library, loaded when a cluster is requested."""
     try:
         import distributed  # noqa: PLC0415 - an extra, see above
     except ModuleNotFoundError:

@@ -1,7 +1,8 @@
-"""The table that re-reading an archive makes: one row a batch, as `springscale estimate --json` prints it, and of whom.
+"""The table of a reprocessed archive: one row per batch, as `springscale estimate --json` prints it, with its vehicle.
 
-Every column is of the JSON object of an estimate (gateway.estimate_json), rounded as there, or tells where the row is
-from. A change of columns raises ``SCHEMA_VERSION``; columns are added at the end, none goes or changes its kind.
+Every column is a field of an estimate's JSON object (gateway.estimate_json), rounded as there, or gives the row's
+origin. A change of columns raises ``SCHEMA_VERSION``; columns are added at the end, none is removed or changes its
+kind.
 """
 
 import io
@@ -9,17 +10,17 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, Final
 
-from gateway.archive.places import MISSING, Place
+from gateway.archive.places import MISSING, Location
 from gateway.archive.receipts import Slot
 from gateway.budget import OWN
 from gateway.errors import ConfigurationError
-from gateway.estimate_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, WEIGHTS, EstimateField, Kind
+from gateway.estimate_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, WEIGHTS, EstimateField, FieldKind
 from gateway.estimate_json.kinds import COUNT, INTERVAL, OVER_LIMIT, TEXT, WHOLE, places_over_limit
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-SCHEMA_VERSION: Final = 1
+SCHEMA_VERSION: Final = 1  # of the columns
 
 DIAGNOSTICS: Final = (
     "reach",
@@ -57,7 +58,7 @@ PROVENANCE: Final[Mapping[str, str]] = {
 """Columns that no estimate has; `calibration_id` and `known_weights_id` are among the estimate's own."""
 
 _LEFT_OUT: Final = frozenset({"spectra", "provisional", "way", "posterior", "measured_posterior", "epoch_posterior"})
-"""Large; never true of a whole batch; of many parts."""
+"""Not in the table: large, never true of a whole batch, or of many parts."""
 
 OWN_STD: Final[Mapping[str, tuple[str, str]]] = {
     "payload_own_std_kg": ("payload_kg", "part of `payload_std_kg` that this batch shares with no other"),
@@ -86,7 +87,7 @@ def row_of(record: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def parquet_of(rows: Sequence[Mapping[str, Any]]) -> bytes:
-    """Rows as one Parquet file: the same rows, the same bytes, whoever writes them."""
+    """Rows as one Parquet file: the same rows give the same bytes on any computer."""
     pa = _pyarrow()
     import pyarrow.parquet as pq  # noqa: PLC0415 - an extra; _pyarrow() has told if it is missing
 
@@ -96,8 +97,8 @@ def parquet_of(rows: Sequence[Mapping[str, Any]]) -> bytes:
     return sink.getvalue()
 
 
-def rows_of(dataset: Place, slot: Slot, wanted: Sequence[str] | None = None) -> list[dict[str, Any]]:
-    """The rows that one receipt vouches for, of these columns or of all; instants are aware datetimes, UTC."""
+def rows_of(dataset: Location, slot: Slot, wanted: Sequence[str] | None = None) -> list[dict[str, Any]]:
+    """The rows of one receipt, with these columns or all; instants are aware datetimes, UTC."""
     _pyarrow()
     import pyarrow.parquet as pq  # noqa: PLC0415 - an extra; _pyarrow() has told if it is missing
 
@@ -107,7 +108,7 @@ def rows_of(dataset: Place, slot: Slot, wanted: Sequence[str] | None = None) -> 
 
 
 def table_rows(file: io.BytesIO, where: str) -> list[dict[str, Any]]:
-    """The rows of any Parquet file. Raises ConfigurationError naming ``where`` for what is none."""
+    """The rows of any Parquet file. Raises ConfigurationError naming ``where`` for another file."""
     pa = _pyarrow()
     import pyarrow.parquet as pq  # noqa: PLC0415 - an extra; _pyarrow() has told if it is missing
 
@@ -143,7 +144,7 @@ def _columns_of(one: EstimateField) -> dict[str, str]:
     return dict.fromkeys(one.columns or (one.name,), _kind_name(one.kind))
 
 
-def _kind_name(kind: Kind) -> str:
+def _kind_name(kind: FieldKind) -> str:
     named = ((TEXT, "text"), (WHOLE, "whole"), (COUNT, "whole"), (INSTANT, "instant"), (REASONS, "texts"))
     return next((name for of, name in named if kind is of), "numbers by name" if kind is NUMBERS_BY_NAME else "number")
 
@@ -166,7 +167,7 @@ def _cells(one: EstimateField, told: Any) -> Sequence[Any]:
     return [_cell(one.kind, told)]
 
 
-def _cell(kind: Kind, told: Any) -> Any:
+def _cell(kind: FieldKind, told: Any) -> Any:
     if kind is INSTANT:
         return datetime.fromisoformat(told)
     if kind is COUNT:
@@ -175,7 +176,7 @@ def _cell(kind: Kind, told: Any) -> Any:
 
 
 def _pyarrow() -> Any:
-    """The library, loaded when a table is made: a vehicle lacks it."""
+    """The library, loaded when a table is made; a vehicle does not have it."""
     try:
         import pyarrow  # noqa: PLC0415 - an extra, see above
     except ModuleNotFoundError:

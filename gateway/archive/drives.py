@@ -1,12 +1,13 @@
-"""A job's logs through the pipeline: a drive goes on across the border of two logs where the recording does.
+"""Runs a job's logs through the pipeline; a drive continues from one log to the next where the recording does.
 
-Elsewhere a log begins anew, as a gateway that starts with the ignition, and as `springscale estimate` on that log.
+Otherwise a log begins a new drive, as a gateway that starts with the ignition does, and as `springscale estimate` does
+for that log.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from gateway.archive.jobs import Job, JobLog
+from gateway.archive.jobs import ArchiveJob, JobLog
 from gateway.archive.places import PlaceError
 from gateway.bus.logs import LogReport, motion_of_log
 from gateway.core.flow import Flow
@@ -19,7 +20,7 @@ from gateway.units import NS_PER_S
 
 @dataclass(frozen=True, slots=True)
 class LogRead:
-    """What a log gave: estimates of the batches that ended in it, and its reader's report."""
+    """The result of a log: estimates of the batches that ended in it, and its reader's report."""
 
     estimates: list[Estimate]
     report: LogReport
@@ -27,26 +28,26 @@ class LogRead:
 
 @dataclass(frozen=True, slots=True)
 class _UnderWay:
-    """A log, and the pipeline as its end has left it."""
+    """A log, and the pipeline at its end."""
 
     one: JobLog
     flow: Flow
 
 
-class Drives:
-    """Takes a job's logs in order."""
+class JobDrives:
+    """Processes a job's logs in order."""
 
-    def __init__(self, job: Job) -> None:
-        """Goes on where the logs that lead in have left off."""
+    def __init__(self, job: ArchiveJob) -> None:
+        """Continues from the end of the lead-in logs."""
         self._job = job
-        self._open: _UnderWay | None = None  # where the log before may go on
+        self._open: _UnderWay | None = None  # the log before, if it may continue
         self._lead_in()
 
     def take(self, one: JobLog, next_ns: int | None) -> LogRead:
-        """The next log; ``next_ns`` is the first frame of the one after it.
+        """Process the next log; ``next_ns`` is the first frame of the one after it.
 
-        Raises PlaceError where it cannot be reached now, LogUnreadableError where nothing can be made of it; then
-        :meth:`break_off` is to be asked before the one after it.
+        Raises PlaceError if it cannot be read now, LogUnreadableError if it is invalid; then call :meth:`break_off`
+        before the one after it.
         """
         flow = self._open.flow.branch() if self._open else self._flow()
         with one.log.place.fetched(one.log.path) as fetched:
@@ -68,7 +69,7 @@ class Drives:
         return LogRead(estimates, report)
 
     def break_off(self) -> list[tuple[JobLog, Estimate]]:
-        """Nothing goes on: what the log that was under way still tells, as if none had followed it."""
+        """Close the log under way as if none had followed, and return its remaining estimates."""
         before, self._open = self._open, None
         if before is None:
             return []
@@ -86,7 +87,9 @@ class Drives:
         return found
 
     def _lead_in(self) -> None:
-        """Leave open what the logs before the job leave open; their own estimates are of the job before."""
+        """Process the logs before the job, to start from their open window; their own estimates belong to the job
+        before.
+        """
         before, first_ns = readable(self._job.lead_in), next((one.facts.first_ns for one in self._job.logs), None)
         if not before or not self._leads_on(before[-1], first_ns):
             return
@@ -97,7 +100,7 @@ class Drives:
                 self.break_off()
 
     def _leads_on(self, one: JobLog, first_ns: int | None) -> bool:
-        """Whether the last log before the job is under way when it begins. Decoding tells; nothing is weighed."""
+        """Whether the last log before the job is still under way when it begins, by decoding alone."""
         with one.log.place.fetched(one.log.path) as fetched:
             try:
                 motions, _, _ = motion_of_log(fetched.path, self._job.setup.signal_map)
@@ -108,7 +111,7 @@ class Drives:
 
 
 def readable(logs: Sequence[JobLog]) -> list[JobLog]:
-    """Those with a frame in them."""
+    """Logs with a frame."""
     return [one for one in logs if one.facts.first_ns is not None]
 
 
@@ -125,7 +128,7 @@ def goes_on(newest_ns: int | None, next_ns: int | None, settings: BatchSettings)
 
 
 def _of_the_log(fault: Exception, one: JobLog, path: str) -> Exception:
-    """What a fault while reading means: this computer's, the place's, to be tried again, or the log's, for good."""
+    """Classify a fault while reading: this computer's, the place's (retry), or the log's (final)."""
     told = str(fault).replace(path, one.log.name)
     if isinstance(fault, MemoryError):
         return fault

@@ -1,4 +1,4 @@
-"""What an archive holds and what of it is done: the look before the work, and all of it where only that was asked."""
+"""The content of an archive and its progress, without processing anything."""
 
 import time
 from collections.abc import Iterator
@@ -6,46 +6,46 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from gateway.archive.drives import Drives
-from gateway.archive.jobs import Job, plan
+from gateway.archive.drives import JobDrives
+from gateway.archive.jobs import ArchiveJob, plan
 from gateway.archive.manifest import Assignment, Manifest
-from gateway.archive.places import Place, PlaceError
+from gateway.archive.places import Location, PlaceError
 from gateway.archive.receipts import Slot, receipts, slots_done, slots_failed
 from gateway.archive.survey import Facts, LogFile, keep_facts, known_facts, logs_of, survey
 from gateway.errors import ConfigurationError, SpringscaleError
 
-AT_A_TIME: Final = 16  # requests to a store
-RECEIPTS_ASKED: Final = 20  # for how fast it went before
-WORTH_TIMING: Final = 1_000_000  # bytes of a log
+AT_A_TIME: Final = 16  # chosen: concurrent requests to a store
+RECEIPTS_ASKED: Final = 20  # chosen: receipts read for the earlier speed
+WORTH_TIMING: Final = 1_000_000  # chosen: least bytes of a timed log
 
 
 @dataclass(slots=True)
 class Inventory:
-    """Every vehicle's logs, and what is known of their content."""
+    """Every vehicle's logs, and the known facts about their content."""
 
     manifest: Manifest
-    dataset: Place
+    dataset: Location
     logs: list[list[LogFile]]  # by assignment
     facts: dict[str, Facts]  # by vehicle
     lost: dict[str, str] = field(default_factory=dict)  # what could not be reached, and why
 
     @property
     def all_logs(self) -> list[LogFile]:
-        """Of all vehicles, each once: a folder may be one vehicle's by one calibration, and later by another."""
+        """The logs of all vehicles, each once: a folder may occur under several calibrations of a vehicle."""
         return list({log.key: log for group in self.logs for log in group}.values())
 
     @property
     def size(self) -> int:
-        """Their bytes."""
+        """Bytes of all logs."""
         return sum(log.size for log in self.all_logs)
 
     @property
     def n_vehicles(self) -> int:
-        """That the manifest names."""
+        """The number of vehicles in the manifest."""
         return len(self.facts)
 
     def unknown(self) -> Iterator[tuple[str, list[LogFile]]]:
-        """By vehicle: the logs that nobody has looked into yet."""
+        """By vehicle: the logs that were not surveyed yet."""
         logs: dict[str, dict[str, LogFile]] = {vehicle: {} for vehicle in self.facts}
         for assignment, group in zip(self.manifest.assignments, self.logs, strict=True):
             facts = self.facts[assignment.vehicle]
@@ -53,15 +53,15 @@ class Inventory:
         return ((vehicle, list(new.values())) for vehicle, new in logs.items() if new)
 
     def learn(self, vehicle: str, facts: Facts) -> None:
-        """What was found, kept in the data set for the next run."""
+        """Store the facts in the data set for the next run."""
         self.facts[vehicle] |= facts
         keep_facts(self.dataset, vehicle, self.facts[vehicle])
 
-    def jobs(self) -> list[Job]:
-        """Of every vehicle of which all is known: without one of its logs a job would be another. Largest first."""
+    def jobs(self) -> list[ArchiveJob]:
+        """The jobs of every fully surveyed vehicle, the largest first: a missing log would change its job."""
         pairs = list(zip(self.manifest.assignments, self.logs, strict=True))
         in_part = {assignment.vehicle for assignment, group in pairs if not self._is_known(assignment, group)}
-        found: list[Job] = []
+        found: list[ArchiveJob] = []
         for assignment, group in pairs:
             if assignment.vehicle not in in_part:
                 facts = self.facts[assignment.vehicle]
@@ -73,8 +73,8 @@ class Inventory:
         return str(assignment.logs) not in self.lost and all(log.key in facts for log in group)
 
 
-def look(manifest: Manifest, dataset: Place) -> Inventory:
-    """List every vehicle's logs. Raises ConfigurationError where there is not one, PlaceError for the data set."""
+def look(manifest: Manifest, dataset: Location) -> Inventory:
+    """List every vehicle's logs. Raises ConfigurationError if there are none, PlaceError for the data set."""
     vehicles = sorted({assignment.vehicle for assignment in manifest.assignments})
     with ThreadPoolExecutor(AT_A_TIME) as asking:  # a store takes its time for each, and many at once
         listed = list(asking.map(lambda assignment: _listed(manifest, assignment), manifest.assignments))
@@ -99,9 +99,9 @@ def _listed(manifest: Manifest, assignment: Assignment) -> list[LogFile] | Place
 
 @dataclass(frozen=True, slots=True)
 class Forecast:
-    """How much there is to do, and how long it will take; seconds are None where nothing tells them.
+    """The remaining work and its duration; seconds are None if unknown.
 
-    ``n_new_logs`` were never looked into, so that their jobs are not among ``n_jobs`` yet.
+    ``n_new_logs`` were not surveyed, so their jobs are not yet in ``n_jobs``.
     """
 
     n_vehicles: int
@@ -118,11 +118,11 @@ class Forecast:
 
     @property
     def remaining_s(self) -> float | None:
-        """On so many workers."""
+        """The duration with this number of workers."""
         return 0.0 if not self.size_to_do else self.size_to_do / (self.rate * self.n_workers) if self.rate else None
 
     def to_json(self) -> dict[str, Any]:
-        """For machines."""
+        """The forecast as JSON."""
         told = {
             name: getattr(self, name) for name in ("n_vehicles", "n_logs", "n_new_logs", "n_jobs", "n_done", "n_failed")
         }
@@ -131,7 +131,7 @@ class Forecast:
 
 
 def forecast(inventory: Inventory, n_workers: int) -> Forecast:
-    """What a run would do. Nothing is written; without receipts to tell how fast it goes, one log is timed."""
+    """The jobs that a run would execute. Writes nothing; without receipts to estimate the speed, one log is timed."""
     dataset, jobs = inventory.dataset, inventory.jobs()
     done, failed = set(slots_done(dataset)), set(slots_failed(dataset))
     to_do = [job for job in jobs if job.slot not in done | failed]
@@ -154,8 +154,8 @@ def forecast(inventory: Inventory, n_workers: int) -> Forecast:
     )
 
 
-def rate_before(dataset: Place, done: list[Slot]) -> float | None:
-    """Bytes a second of one worker, as some receipts tell it; None without any."""
+def rate_before(dataset: Location, done: list[Slot]) -> float | None:
+    """Bytes per second of one worker, from some receipts; None without any."""
     asked = set(done[:: max(1, len(done) // RECEIPTS_ASKED)])
     told = [receipt["run"] for receipt in receipts(dataset, lambda slot: slot in asked)]
     took_s = sum(run["took_s"] for run in told)
@@ -163,7 +163,7 @@ def rate_before(dataset: Place, done: list[Slot]) -> float | None:
 
 
 def rate_of_one_log(inventory: Inventory) -> float | None:
-    """Bytes a second with which one log is surveyed and weighed here; None where it cannot be."""
+    """Bytes per second of surveying and weighing one log here; None if that fails."""
     pairs = [(log, i) for i, group in enumerate(inventory.logs) for log in group if log.size]
     worth = [pair for pair in pairs if pair[0].size >= WORTH_TIMING]
     if not pairs:
@@ -175,7 +175,7 @@ def rate_of_one_log(inventory: Inventory) -> float | None:
         for job in plan(
             inventory.dataset, inventory.manifest.assignments[i], [log], facts, inventory.manifest.settings
         ):
-            Drives(job).take(job.logs[0], None)
+            JobDrives(job).take(job.logs[0], None)
     except SpringscaleError:
         return None
     return log.size / (time.monotonic() - begun_s)

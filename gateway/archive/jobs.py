@@ -1,7 +1,7 @@
-"""Which logs make which jobs: one vehicle's drives of one month in order, by one calibration, named by their inputs.
+"""Jobs: one vehicle's drives of one month in order, by one calibration, named by the hash of their inputs.
 
-Where a log goes on where the one before it ended, the drive goes on: its window and its load epoch. So a job
-begins as the last logs before it leave the pipeline (``lead_in``), and leaves a window open that the next job ends.
+If a log continues the one before it, the drive continues with its window and load epoch. So a job begins with the
+pipeline at the end of the logs before it (``lead_in``), and may leave a window open for the next job.
 """
 
 import functools
@@ -18,9 +18,9 @@ from typing import Any, Final
 
 from gateway.archive.dataset import SCHEMA_VERSION
 from gateway.archive.manifest import FOREVER_NS, Assignment
-from gateway.archive.places import Place
+from gateway.archive.places import Location
 from gateway.archive.receipts import Slot
-from gateway.archive.survey import Facts, LogFacts, LogFile
+from gateway.archive.survey import Facts, LogFile, SurveyedLog
 from gateway.calibration.known_weights_file import KnownWeights
 from gateway.core.flow import Identity
 from gateway.core.known_weights import Knowledge
@@ -52,7 +52,7 @@ def software() -> str:
 
 
 def code_id() -> str:
-    """Hash of those files as they are installed."""
+    """Hash of those files as installed."""
     package = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for path in sorted(found for named in WEIGHING for found in _sources(package / named)):
@@ -72,7 +72,7 @@ UNKNOWN_MONTH: Final = "unknown"
 
 @dataclass(frozen=True, slots=True)
 class KnowledgeSpan:
-    """What known weights taught, and when that was in use."""
+    """The effect of known weights, and when it applied."""
 
     knowledge: Knowledge
     since_ns: int
@@ -81,26 +81,26 @@ class KnowledgeSpan:
 
 @dataclass(frozen=True, slots=True)
 class JobLog:
-    """A log of a job: where it lies, what the survey found, and when it begins or, without a frame, belongs."""
+    """A log of a job: its place, its surveyed facts, and its start, or its place in time if it has no frame."""
 
     log: LogFile
-    facts: LogFacts
+    facts: SurveyedLog
     start_ns: int
 
     @property
     def month(self) -> str:
-        """By which it is filed, UTC."""
+        """The month under which it is filed, UTC."""
         return f"{datetime.fromtimestamp(self.start_ns // NS_PER_S, UTC):%Y-%m}" if self.start_ns else UNKNOWN_MONTH
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
-    """All that a worker needs, and all that its result follows from.
+class ArchiveJob:
+    """Everything that a worker needs, and that determines its result.
 
-    ``next_ns`` is the first frame of the log that follows in another job; None where none does.
+    ``next_ns`` is the first frame of the following log in another job; None without one.
     """
 
-    dataset: Place
+    dataset: Location
     slot: Slot
     identity: Identity
     setup: Setup
@@ -117,13 +117,13 @@ class Job:
         return sum(one.log.size for one in self.logs)
 
     def knowledge_at(self, t_ns: int) -> Knowledge | None:
-        """What known weights had taught when a batch ended."""
+        """The knowledge from known weights at the end of a batch."""
         return next((span.knowledge for span in self.known_weights if span.since_ns < t_ns <= span.until_ns), None)
 
 
 def plan(
-    dataset: Place, assignment: Assignment, logs: Sequence[LogFile], facts: Facts, settings: BatchSettings
-) -> Iterator[Job]:
+    dataset: Location, assignment: Assignment, logs: Sequence[LogFile], facts: Facts, settings: BatchSettings
+) -> Iterator[ArchiveJob]:
     """The jobs of one assignment, month by month. Logs without facts are left out."""
     setup = assignment.setup
     common = {
@@ -149,11 +149,11 @@ def plan(
             "next_ns": next_ns,
         }
         slot = Slot(assignment.vehicle, month, hash_of(inputs))
-        yield Job(dataset, slot, identity, setup, settings, known, tuple(lead_in), tuple(own), next_ns, inputs)
+        yield ArchiveJob(dataset, slot, identity, setup, settings, known, tuple(lead_in), tuple(own), next_ns, inputs)
 
 
 def _months(logs: Sequence[JobLog]) -> Iterator[tuple[str, Sequence[JobLog], Sequence[JobLog], int | None]]:
-    """Month by month: the logs that lead in, those of the month, and when the next one begins."""
+    """Month by month: the lead-in logs, those of the month, and the start of the next one."""
     end = 0
     for month, group in groupby(logs, key=lambda one: one.month):
         begin, end = end, end + len(list(group))
@@ -162,7 +162,7 @@ def _months(logs: Sequence[JobLog]) -> Iterator[tuple[str, Sequence[JobLog], Seq
 
 
 def _in_order(logs: Sequence[LogFile], facts: Facts, span_ns: tuple[int, int]) -> list[JobLog]:
-    """The logs of a span of time by first frame; one without a frame keeps its place among the names."""
+    """The logs of a span of time by first frame; one without a frame keeps its place by name."""
     known = [(log, facts[log.key]) for log in sorted(logs, key=lambda log: log.name) if log.key in facts]
     start_ns = next((told.first_ns for _, told in known if told.first_ns is not None), 0)
     found = []
@@ -173,20 +173,22 @@ def _in_order(logs: Sequence[LogFile], facts: Facts, span_ns: tuple[int, int]) -
 
 
 def hash_of(inputs: Mapping[str, Any]) -> str:
-    """The same for the same inputs, on any computer: a job's name."""
+    """A job's name: the same for the same inputs, on any computer."""
     text = json.dumps(inputs, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def signals_id(setup: Setup) -> str:
-    """Hash of what a signal map says, its databases resolved; not of its name or its comments."""
+    """Hash of a signal map's content with its databases resolved, without names and comments."""
     held = setup.signal_map
     content = repr((held.channel, held.j1939, [(m, sorted(m.fields.items())) for m in held.messages]))
     return "sha256:" + hashlib.sha256(content.encode()).hexdigest()
 
 
 def _spans(known: KnownWeights, setup: Setup, start_ns: int, end_ns: int) -> tuple[KnowledgeSpan, ...]:
-    """What the known weights of a gateway taught, from each change of their list to the next, within a span of time."""
+    """The knowledge from a gateway's known weights, from each change of their list to the next, within a span of
+    time.
+    """
     calibration_id = setup.calibration.id if setup.calibration else None
     moments = {
         ns_of(moment)

@@ -1,8 +1,8 @@
-"""The manifest of an archive: whose logs lie where, and by which signal map, calibration and known weights they are
-read, when.
+"""The manifest of an archive: the vehicles' log folders, with the signal map, calibration and known weights for each
+span of time.
 
-TOML, or Parquet with one row for each entry of ``[[vehicles]]``. Paths in it are relative to the manifest, which may
-lie in an object store like everything else.
+TOML, or Parquet with one row for each entry of ``[[vehicles]]``. Paths in it are relative to the manifest, which may be
+in an object store.
 """
 
 import fnmatch
@@ -19,7 +19,7 @@ from typing import Annotated, Any, Final
 from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from gateway.archive.dataset import table_rows
-from gateway.archive.places import Place, place_of
+from gateway.archive.places import Location, place_of
 from gateway.bus.logs import is_named_as_log
 from gateway.calibration.known_weights_file import KnownWeights, known_weights_of
 from gateway.config import BatchSection, EstimatorName, TrustSection
@@ -32,13 +32,13 @@ from gateway.setup import Setup, load_setup
 from gateway.toml_file import checked
 from gateway.units import NS_PER_S
 
-NAMES: Final = ("archive.toml", "archive.parquet")  # what a folder's own manifest is called
+NAMES: Final = ("archive.toml", "archive.parquet")  # names of a folder's own manifest
 EVERYBODY: Final = Trust()
-FOREVER_NS: Final = (1 << 63) - 1
+FOREVER_NS: Final = (1 << 63) - 1  # the largest 64-bit integer
 
 
 def _instant(told: Any) -> Any:
-    """A day means its first instant, UTC."""
+    """A date means its first instant, UTC."""
     if isinstance(told, date) and not isinstance(told, datetime):
         return datetime.combine(told, time(), UTC)
     return told
@@ -47,14 +47,14 @@ def _instant(told: Any) -> Any:
 Instant = Annotated[AwareDatetime, BeforeValidator(_instant)]
 
 
-class Table(BaseModel):
-    """Of the file."""
+class ManifestTable(BaseModel):
+    """A table of the file."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class Means(Table):
-    """By what logs are read and weights judged: at the top for every vehicle, in an entry for this one."""
+class Means(ManifestTable):
+    """How logs are read and weights judged: at the top for every vehicle, in an entry for this one."""
 
     signals: str | None = Field(None, description="signal map: a TOML file, or springscale:NAME")
     calibration: str | None = Field(None, description="calibration file; without it batches carry reasons only")
@@ -67,7 +67,7 @@ class Means(Table):
 
 
 class VehicleEntry(Means):
-    """[[vehicles]]: one vehicle, for all time or from one instant to another. Several may be of one vehicle."""
+    """[[vehicles]]: one vehicle, for all time or for a span of it. A vehicle may have several entries."""
 
     id: str | None = Field(
         None, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}$", description="the vehicle's name [default: its VIN]"
@@ -90,17 +90,17 @@ class VehicleEntry(Means):
 
     @property
     def name(self) -> str:
-        """Under which the data set knows the vehicle."""
+        """The vehicle's name in the data set."""
         return self.id or self.vin or ""
 
     def covers(self, other: "VehicleEntry") -> bool:
-        """Whether both count at some instant."""
+        """Whether both apply at some instant."""
         mine, theirs = self.span_ns, other.span_ns
         return mine[0] < theirs[1] and theirs[0] < mine[1]
 
     @property
     def span_ns(self) -> tuple[int, int]:
-        """First instant at which it counts, and the first at which it no longer does."""
+        """The first instant at which it applies, and the first at which it no longer does."""
         since_ns = -FOREVER_NS if self.since is None else _ns(self.since)
         return since_ns, FOREVER_NS if self.until is None else _ns(self.until)
 
@@ -120,11 +120,11 @@ class ManifestFile(Means):
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """One vehicle's logs for a span of time, and what they are read by."""
+    """One vehicle's logs for a span of time, and how they are read."""
 
     vehicle: str
     vin: str | None
-    logs: Place
+    logs: Location
     shown: str  # of its folder, as the data set names its logs
     span_ns: tuple[int, int]
     setup: Setup
@@ -133,7 +133,7 @@ class Assignment:
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """An archive, checked: every signal map, calibration and known weight of it could be loaded."""
+    """A checked archive: all its signal maps, calibrations and known weights could be loaded."""
 
     where: str
     assignments: tuple[Assignment, ...]
@@ -151,8 +151,8 @@ class Manifest:
 def load_manifest(named: str, pinned: Trust = EVERYBODY) -> Manifest:
     """The manifest ``named``, or the one in the folder ``named``. Raises ConfigurationError naming every fault.
 
-    A key of ``pinned``, if there is any, must have signed it; one of these or of its own ``[trust]`` signal maps,
-    databases and calibrations.
+    If there are ``pinned`` keys, one of them must have signed it; one of these or of its own ``[trust]`` must have
+    signed signal maps, databases and calibrations.
     """
     base, name, content = _found(named, pinned)
     where = base.path(name)
@@ -178,13 +178,13 @@ def load_manifest(named: str, pinned: Trust = EVERYBODY) -> Manifest:
 
 @dataclass(frozen=True)
 class _Loader:
-    """Loads what the manifest names from where the manifest lies."""
+    """Loads the manifest's files, relative to the manifest."""
 
-    base: Place
+    base: Location
     trust: Trust
 
     def read(self, path: Path) -> bytes:
-        """What a file beside the manifest holds. Raises FileNotFoundError, UntrustedFileError."""
+        """The content of a file beside the manifest. Raises FileNotFoundError, UntrustedFileError."""
         return self.trust.read(path, self._raw)
 
     def _raw(self, path: Path) -> bytes:
@@ -193,14 +193,14 @@ class _Loader:
         return self.base.read(path.relative_to(self.base.path("")).as_posix())
 
     def setup(self, signals: str, calibration: str | None, estimator: str | None, limits: Limits) -> Setup:
-        """One for all vehicles that share it."""
+        """A setup shared by all vehicles with the same inputs."""
         named = signals if signals.startswith("springscale:") else self.base.path(signals)
         return load_setup(
             named, self.base.path(calibration) if calibration else None, estimator, read=self.read, limits=limits
         )
 
 
-def _assignment(base: Place, told: ManifestFile, entry: VehicleEntry, load: Any, where: str) -> Assignment:
+def _assignment(base: Location, told: ManifestFile, entry: VehicleEntry, load: Any, where: str) -> Assignment:
     signals = entry.signals or told.signals
     if signals is None:
         raise ConfigurationError(f"{where}.signals: missing; give it here, or at the top for every vehicle")
@@ -216,7 +216,7 @@ def _assignment(base: Place, told: ManifestFile, entry: VehicleEntry, load: Any,
     return Assignment(entry.name, entry.vin, place, folder.rstrip("/"), entry.span_ns, setup, known)
 
 
-def _found(named: str, pinned: Trust) -> tuple[Place, str, bytes]:
+def _found(named: str, pinned: Trust) -> tuple[Location, str, bytes]:
     """Folder, name and content of the manifest."""
     if named.endswith((".toml", ".parquet")):
         folder, _, name = named.rpartition("/")
@@ -233,7 +233,7 @@ def _found(named: str, pinned: Trust) -> tuple[Place, str, bytes]:
     )
 
 
-def _read(base: Place, name: str, trust: Trust = EVERYBODY) -> bytes:
+def _read(base: Location, name: str, trust: Trust = EVERYBODY) -> bytes:
     try:
         return _Loader(base, trust).read(base.path(name))
     except FileNotFoundError:
@@ -242,8 +242,8 @@ def _read(base: Place, name: str, trust: Trust = EVERYBODY) -> bytes:
         raise ConfigurationError(f"{base.path(name)}: cannot be read: {fault.strerror or fault}") from None
 
 
-def _below(base: Place, named: str) -> Place:
-    """A folder that a manifest names: another place where it is a URL or an absolute path."""
+def _below(base: Location, named: str) -> Location:
+    """A folder in a manifest: another place if it is a URL or an absolute path."""
     return place_of(named) if "://" in named or named.startswith("/") else base.at(_plain(named))
 
 
@@ -259,21 +259,21 @@ def _tables(content: bytes, where: Path) -> dict[str, Any]:
 
 
 def _entries(content: bytes, where: Path) -> list[dict[str, Any]]:
-    """Rows of a Parquet file; null is what was not given."""
+    """Rows of a Parquet file; null means not given."""
     rows = table_rows(io.BytesIO(content), str(where))
     return [{key: cell for key, cell in row.items() if cell is not None} for row in rows]
 
 
 def _require_distinct(entries: Sequence[VehicleEntry], where: Path) -> None:
-    """No instant of a vehicle, and none of a folder or what lies in it, belongs to two entries."""
+    """No instant of a vehicle or folder may belong to two entries."""
     by_key: dict[str, list[tuple[int, VehicleEntry]]] = {}
     for i, entry in enumerate(entries, 1):
         for key in (f"vehicle {entry.name}", f"folder {_folder(entry)}"):
             _require_apart(i, entry, by_key.get(key, []), f"{where}: vehicles[{i}]: {key} is in")
             by_key.setdefault(key, []).append((i, entry))
     for i, entry in enumerate(entries, 1):
-        for around in _around(_folder(entry)):
-            others = by_key.get(f"folder {around}", [])
+        for parent in _parent_folders(_folder(entry)):
+            others = by_key.get(f"folder {parent}", [])
             _require_apart(i, entry, others, f"{where}: vehicles[{i}]: folder {_folder(entry)} lies in that of")
 
 
@@ -284,13 +284,13 @@ def _require_apart(i: int, entry: VehicleEntry, others: Sequence[tuple[int, Vehi
 
 
 def _folder(entry: VehicleEntry) -> str:
-    """However it is written."""
+    """The folder in a normal form."""
     named = entry.logs or entry.name
     return named.rstrip("/") if "://" in named else normpath(named)
 
 
-def _around(folder: str) -> list[str]:
-    """Folders in which it lies."""
+def _parent_folders(folder: str) -> list[str]:
+    """The folders that contain this folder; none for a URL."""
     parents = [str(parent) for parent in PurePosixPath(folder).parents]
     return [] if "://" in folder or folder == ".." else parents
 

@@ -1,7 +1,7 @@
-"""Folders that may be anywhere: on this computer or in an object store (s3://, gs://, az://), by obstore alone.
+"""Folders on this computer or in an object store (s3://, gs://, az://), through obstore.
 
 place = place_of("s3://fleet/logs")
-place.create("a/b.json", b"...")      # False where it is already there: the store decides, not we
+place.create("a/b.json", b"...")      # False if it exists: the store decides atomically
 """
 
 import functools
@@ -25,17 +25,17 @@ SCHEMES: Final = ("file", "s3", "gs", "az")
 MISSING: Final = (
     "reading and writing archives needs packages that a vehicle does not: pip install 'springscale[archive]'"
 )
-CHUNK_BYTES: Final = 8 << 20  # of a large object, held at a time
+CHUNK_BYTES: Final = 8 << 20  # chosen: of a large object, in memory at a time
 _URL: Final = re.compile(r"^[a-z][a-z0-9]+://")
 
 
 class PlaceError(SpringscaleError):
-    """A folder or store cannot be read or written now; what was not done can be tried again."""
+    """A folder or store cannot be read or written now; the work can be repeated later."""
 
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """A file below a place. ``stamp`` changes whenever its content does, as far as the place can tell."""
+    """A file below a place. ``stamp`` changes with its content, as far as the place can tell."""
 
     path: str
     size: int
@@ -43,8 +43,8 @@ class Item:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """A folder by its URL. It holds no connection: each process makes its own, and keeps it."""
+class Location:
+    """A folder by its URL. It has no connection: each process makes and keeps its own."""
 
     url: str
 
@@ -52,24 +52,24 @@ class Place:
         local = self.local("")
         return self.url if local is None else str(local)
 
-    def at(self, path: str) -> "Place":
+    def at(self, path: str) -> "Location":
         """A folder inside it."""
         here = self.local(path)
         if here is not None:
             return place_of(here)
-        return Place(f"{self.url}/{path.strip('/')}") if path.strip("/") else self
+        return Location(f"{self.url}/{path.strip('/')}") if path.strip("/") else self
 
     def local(self, path: str) -> Path | None:
-        """Where a file of it lies on this computer; None where it does not."""
+        """The path of one of its files on this computer; None if it is elsewhere."""
         parts = urlsplit(self.url)
         return Path(unquote(parts.path)) / path if parts.scheme == "file" else None
 
     def path(self, name: str) -> Path:
-        """Of a file of it, as messages show it."""
+        """The path of one of its files for messages."""
         return self.local(name) or Path(f"{self.url}/{name}")
 
     def items(self, below: str = "") -> list[Item]:
-        """Every file below a folder of it, in order of path; none where the folder is not there."""
+        """Every file below one of its folders, in order of path; none if the folder is absent."""
         obs, here = _obstore(), self.local("")
         if here is not None and not here.is_dir():
             return []
@@ -78,7 +78,7 @@ class Place:
         return sorted((_item(one) for one in found), key=lambda item: item.path)
 
     def read(self, path: str) -> bytes:
-        """What a small file holds. Raises FileNotFoundError, else PlaceError."""
+        """The content of a small file. Raises FileNotFoundError, else PlaceError."""
         here = self.local(path)
         if here is not None and not here.is_file():
             raise FileNotFoundError(f"{here}: no such file")
@@ -86,7 +86,7 @@ class Place:
             return bytes(_obstore().get(self._store(), path).bytes())
 
     def create(self, path: str, content: bytes) -> bool:
-        """Write a file that is not there yet, whole or not at all; False where there is one, which then stays."""
+        """Write a new file atomically; False if it exists, which is then kept."""
         obs = _obstore()
         with self._faults(path):
             try:
@@ -97,13 +97,13 @@ class Place:
         return True
 
     def replace(self, path: str, content: bytes) -> None:
-        """Write a file, whole or not at all, whatever is there."""
+        """Write a file atomically, replacing an existing one."""
         with self._faults(path):
             _obstore().put(self._store(), path, content, use_multipart=False)
             self._settle(path)
 
     def remove(self, path: str) -> None:
-        """Remove a file; one that is not there is no fault."""
+        """Remove a file if it exists."""
         with self._faults(path):
             try:
                 _obstore().delete(self._store(), path)
@@ -112,9 +112,9 @@ class Place:
 
     @contextmanager
     def fetched(self, path: str) -> "Iterator[Fetched]":
-        """A file of any size on this computer's disk for as long as the block lasts, and its hash.
+        """A file of any size on this computer's disk for the duration of the block, and its hash.
 
-        A local one stays where it is; another comes in chunks. Raises FileNotFoundError, else PlaceError.
+        A local one is used in place; another is copied in chunks. Raises FileNotFoundError, else PlaceError.
         """
         here = self.local(path)
         if here is not None:
@@ -130,7 +130,9 @@ class Place:
             yield Fetched(copy, digest.hexdigest())
 
     def _settle(self, path: str) -> None:
-        """On a disk, a power cut must not keep what is written after it and lose this; object stores answer for it."""
+        """On a local disk, sync the file, so that a power cut cannot keep later writes and lose this; object stores
+        guarantee it.
+        """
         here = self.local(path)
         for settled in () if here is None else (here, here.parent):
             handle = os.open(settled, os.O_RDONLY)
@@ -144,7 +146,7 @@ class Place:
 
     @contextmanager
     def _faults(self, path: str) -> Iterator[None]:
-        """Turns what the library raises into one line that names the place."""
+        """Turn the library's exceptions into one line that names the place."""
         obs = _obstore()
         where = f"{self}/{path}".rstrip("/")
         try:
@@ -157,25 +159,25 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Fetched:
-    """A file on this computer's disk and the sha256 of what it holds."""
+    """A file on this computer's disk and its sha256."""
 
     path: Path
     sha256: str
 
 
-def place_of(named: str | Path) -> Place:
-    """The place that a person means: a URL or a folder's path. Raises ConfigurationError for another scheme."""
+def place_of(named: str | Path) -> Location:
+    """The place of a URL or a folder's path. Raises ConfigurationError for another scheme."""
     text = str(named)
     if not _URL.match(text):
-        return Place(Path(os.path.normpath(Path(text).absolute())).as_uri())
+        return Location(Path(os.path.normpath(Path(text).absolute())).as_uri())
     scheme = urlsplit(text).scheme
     if scheme not in SCHEMES:
         raise ConfigurationError(f"{text}: {scheme}:// is not read here; there are {', '.join(SCHEMES)}, and paths")
-    return Place(text.rstrip("/"))
+    return Location(text.rstrip("/"))
 
 
 def _obstore() -> Any:
-    """The library, loaded when something is read: a vehicle lacks it."""
+    """The library, loaded when something is read; a vehicle does not have it."""
     try:
         import obstore  # noqa: PLC0415 - an extra, see above
     except ModuleNotFoundError:
@@ -185,7 +187,7 @@ def _obstore() -> Any:
 
 @functools.lru_cache(maxsize=64)
 def _store_of(url: str) -> "ObjectStore":
-    """One connection a process and place. Credentials come from the environment, as the clouds' own tools read it."""
+    """One connection per process and place. Credentials come from the environment, as for the clouds' own tools."""
     from obstore.store import LocalStore, from_url  # noqa: PLC0415 - an extra; _obstore() has told if it is missing
 
     parts = urlsplit(url)
@@ -209,5 +211,5 @@ def _sha256_of(path: Path) -> str:
 
 
 def _first_words(fault: BaseException) -> str:
-    """The first line of the library's account, without the debug dump that follows it."""
+    """The first line of the library's message, without its debug dump."""
     return str(fault).strip().partition("\n")[0][:400]

@@ -1,6 +1,6 @@
-"""All cores of this computer: an executor of single processes, of which a killed one costs what it was doing.
+"""All cores of this computer: an executor of independent processes; a killed one loses only its current task.
 
-The standard library's pool of processes breaks as a whole when one of them dies; here each stands alone.
+The standard library's process pool breaks as a whole if one process dies.
 """
 
 import multiprocessing
@@ -17,21 +17,23 @@ from gateway.errors import SpringscaleError
 
 Answer = TypeVar("Answer")
 
-MOST_DEATHS: Final = 3  # of workers over one job: more, and it is the job that kills them
+MOST_DEATHS: Final = 3  # chosen: of workers over one job; after that the job is the cause
 ONE_THREAD: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _STARTING: Final = multiprocessing.get_context("forkserver")  # a plain fork would copy our threads and connections
 _STARTING.set_forkserver_preload(["gateway.archive.run"])  # once for all of them
 
 
 class WorkerKilledError(SpringscaleError):
-    """A job's workers die, again and again, without a word."""
+    """A job's workers were killed repeatedly."""
 
 
 class Processes(Executor):
-    """As concurrent.futures has executors; a function and its arguments must be importable by name and picklable."""
+    """An executor like those of concurrent.futures; functions and arguments must be importable by name and
+    picklable.
+    """
 
     def __init__(self, n_workers: int | None = None) -> None:
-        """``n_workers`` processes, or one for each core that this one may use."""
+        """``n_workers`` processes, or one for each core available to this process."""
         self.n_workers = n_workers or len(os.sched_getaffinity(0))
         self._own = threading.local()
         self._workers: set[_Worker] = set()
@@ -40,11 +42,11 @@ class Processes(Executor):
         self._threads = ThreadPoolExecutor(self.n_workers, thread_name_prefix="worker")
 
     def submit(self, fn: Callable[..., Answer], /, *args: Any, **kwargs: Any) -> Future[Answer]:
-        """Have it done by the next free process."""
+        """Run it in the next free process."""
         return self._threads.submit(self._done_by_worker, fn, args, kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End every process; with ``cancel_futures`` at once, whatever it is doing."""
+        """End every process; with ``cancel_futures`` immediately."""
         if not cancel_futures:
             self._threads.shutdown(wait=wait)
         with self._lock:
@@ -89,7 +91,7 @@ class Processes(Executor):
 
 
 class _Worker:
-    """A process that answers one question after the other."""
+    """A process that handles one request after another."""
 
     def __init__(self) -> None:
         for name in ONE_THREAD:
@@ -100,20 +102,20 @@ class _Worker:
         theirs.close()
 
     def ask(self, question: Any) -> tuple[bool, Any]:
-        """Whether it went well, and what came of it. Raises EOFError or OSError where the process has died."""
+        """Whether the request succeeded, and its result. Raises EOFError or OSError if the process has died."""
         self._pipe.send(question)
         answer: tuple[bool, Any] = self._pipe.recv()
         return answer
 
     def end(self) -> None:
-        """At once."""
+        """Kill the process."""
         self._process.kill()
         self._process.join()
         self._pipe.close()
 
 
 def _answer(pipe: "Connection[Any, Any]") -> None:
-    """What a process does all its life. The driver alone hears Ctrl-C, and ends it."""
+    """The main loop of a process. It ignores Ctrl-C; the driver handles it and ends the process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     keep_freed_memory()
     while True:

@@ -1,4 +1,4 @@
-"""A whole archive: look what there is, plan, do what has no receipt, and tell how it went.
+"""Reprocesses a whole archive: survey, plan, run the jobs without a receipt, and summarise.
 
 with Processes() as workers:
     summary = reprocess(load_manifest("fleet/archive.toml"), place_of("DATASET"), workers)
@@ -13,35 +13,35 @@ from itertools import islice
 from typing import Any, Final, Protocol, TypeVar
 
 from gateway.archive.inventory import Inventory, look
-from gateway.archive.jobs import Job
+from gateway.archive.jobs import ArchiveJob
 from gateway.archive.manifest import Manifest
-from gateway.archive.places import Place
+from gateway.archive.places import Location
 from gateway.archive.processes import WorkerKilledError
 from gateway.archive.receipts import Slot, failure_files, slots_done, slots_failed
-from gateway.archive.run import Outcome, Status, fail, run
+from gateway.archive.run import JobOutcome, JobStatus, fail, run
 from gateway.archive.survey import Facts, LogFile, Surveyed, in_goes, survey
 from gateway.errors import ConfigurationError
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
-AHEAD: Final = 2  # tasks under way for each worker, so that none waits for the driver
+AHEAD: Final = 2  # chosen: tasks queued per worker, so that none waits for the driver
 
 
 class Workers(Protocol):
-    """An executor (concurrent.futures) that knows how many work for it."""
+    """An executor (concurrent.futures) with its number of workers."""
 
     @property
     def n_workers(self) -> int:
-        """Tasks that are done at a time."""
+        """The number of concurrent tasks."""
 
     def submit(self, fn: Callable[..., Answer], /, *args: Any, **kwargs: Any) -> "Future[Answer]":
-        """Have it done by one of them."""
+        """Run it on one of them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a run is: bytes done of all, and pieces of all."""
+    """The progress of a run: bytes done of all, and pieces of all."""
 
     what: str
     done: int
@@ -52,12 +52,12 @@ class Progress:
 
     @property
     def rate(self) -> float:
-        """Bytes a second so far; 0 before the first piece."""
+        """Bytes per second so far; 0 before the first piece."""
         return self.done / self.elapsed_s if self.elapsed_s > 0.0 else 0.0
 
     @property
     def remaining_s(self) -> float | None:
-        """At that rate; None before the first piece."""
+        """The remaining time at that rate; None before the first piece."""
         return (self.total - self.done) / self.rate if self.rate > 0.0 else None
 
 
@@ -67,7 +67,7 @@ OnProgress = Callable[[Progress], None]
 def done_by(
     workers: Workers, fn: Callable[[Task], Answer], tasks: Iterable[Task]
 ) -> "Iterator[tuple[Task, Future[Answer]]]":
-    """Each task with its future, in the order in which they finish; ``tasks`` may be endless."""
+    """Each task with its future, in the order of completion; ``tasks`` may be endless."""
     waiting = iter(tasks)
     under_way: dict[Future[Answer], Task] = {}
     while True:
@@ -80,12 +80,12 @@ def done_by(
 
 
 def unseen(progress: Progress) -> None:
-    """Nobody looks."""
+    """Ignore the progress."""
 
 
 @dataclass(slots=True)
 class Summary:
-    """How a run went. ``outcomes`` are of the jobs that it tried; ``n_already`` had a receipt before."""
+    """The result of a run. ``outcomes`` are those of the jobs that it tried; ``n_already`` had a receipt before."""
 
     n_vehicles: int
     n_logs: int
@@ -93,37 +93,37 @@ class Summary:
     n_jobs: int
     n_already: int
     n_failed_before: int
-    outcomes: list[Outcome] = field(default_factory=list)
-    lost: dict[str, str] = field(default_factory=dict)  # logs and jobs that were not done, and why: try again
+    outcomes: list[JobOutcome] = field(default_factory=list)
+    lost: dict[str, str] = field(default_factory=dict)  # logs and jobs to retry, with reasons
     took_s: float = 0.0
 
-    def count(self, status: Status) -> int:
-        """Jobs of this run that ended so."""
+    def count(self, status: JobStatus) -> int:
+        """Jobs of this run with this status."""
         return sum(outcome.status is status for outcome in self.outcomes)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Jobs by what became of them."""
+        """Jobs by status."""
         return {
-            "done": self.count(Status.DONE),
-            "already": self.n_already + self.count(Status.ALREADY),
-            "failed": self.count(Status.FAILED),
+            "done": self.count(JobStatus.DONE),
+            "already": self.n_already + self.count(JobStatus.ALREADY),
+            "failed": self.count(JobStatus.FAILED),
             "failed_before": self.n_failed_before,
-            "lost": self.count(Status.LOST),
+            "lost": self.count(JobStatus.LOST),
         }
 
     @property
     def n_failed_logs(self) -> int:
-        """Logs that this run could make nothing of."""
+        """Unreadable logs of this run."""
         return sum(outcome.n_failed_logs for outcome in self.outcomes)
 
     @property
     def is_good(self) -> bool:
-        """Nothing failed in this run, and nothing is left to do."""
-        return not (self.count(Status.FAILED) or self.n_failed_logs or self.lost)
+        """Whether nothing failed in this run, and nothing remains to do."""
+        return not (self.count(JobStatus.FAILED) or self.n_failed_logs or self.lost)
 
     def to_json(self) -> dict[str, Any]:
-        """For machines."""
+        """The summary as JSON."""
         return {
             "n_vehicles": self.n_vehicles,
             "n_logs": self.n_logs,
@@ -141,16 +141,16 @@ class Summary:
 
 def reprocess(
     manifest: Manifest,
-    dataset: Place,
+    dataset: Location,
     workers: Workers,
     on_progress: OnProgress = unseen,
     *,
     retry_failed: bool = False,
 ) -> Summary:
-    """Do every job of the archive that has no receipt.
+    """Run every job of the archive without a receipt.
 
-    Raises PlaceError where the data set cannot be reached, ConfigurationError where there is no log at all, or where a
-    worker runs another springscale.
+    Raises PlaceError if the data set cannot be reached, ConfigurationError if there is no log, or a worker runs another
+    version of springscale.
     """
     begun_s = time.monotonic()
     inventory = look(manifest, dataset)
@@ -175,7 +175,7 @@ def reprocess(
 
 
 def _survey(inventory: Inventory, workers: Workers, on_progress: OnProgress) -> None:
-    """Look into every log that nobody has looked into; each vehicle's findings are kept when it is through."""
+    """Survey every new log; each vehicle's facts are stored when it is complete."""
     goes = [(vehicle, go) for vehicle, logs in inventory.unknown() for go in in_goes(logs)]
     total, done, begun_s = sum(log.size for _, go in goes for log in go), 0, time.monotonic()
     left = Counter(vehicle for vehicle, _ in goes)
@@ -204,30 +204,30 @@ def _of_survey(go: tuple[LogFile, ...], answer: "Future[Surveyed]") -> Surveyed:
         return Surveyed({}, {log.name: str(fault) or repr(fault) for log in go})
 
 
-def _weigh(jobs: Sequence[Job], workers: Workers, summary: Summary, on_progress: OnProgress) -> None:
+def _weigh(jobs: Sequence[ArchiveJob], workers: Workers, summary: Summary, on_progress: OnProgress) -> None:
     total, done, begun_s = sum(job.size for job in jobs), 0, time.monotonic()
     for n, (job, answer) in enumerate(done_by(workers, run, jobs), 1):
         outcome = _outcome(job, answer)
         summary.outcomes.append(outcome)
-        if outcome.status is Status.LOST:
+        if outcome.status is JobStatus.LOST:
             summary.lost[f"{job.slot.folder}/{job.slot.job}"] = outcome.failures[0]
         done += job.size
         on_progress(Progress("weighing", done, total, n, len(jobs), time.monotonic() - begun_s))
 
 
-def _outcome(job: Job, answer: "Future[Outcome]") -> Outcome:
+def _outcome(job: ArchiveJob, answer: "Future[JobOutcome]") -> JobOutcome:
     try:
         return answer.result()
     except WorkerKilledError as fault:
         return fail(job, str(fault))
-    except ConfigurationError:  # nothing would go better elsewhere: a library or another springscale
+    except ConfigurationError:  # a missing library or another version: no worker would do better
         raise
     except Exception as fault:  # noqa: BLE001 - a store, a cluster or a bug: the other jobs go on, this one is told
-        return Outcome(job.slot, Status.LOST, job.size, failures=(str(fault) or repr(fault),))
+        return JobOutcome(job.slot, JobStatus.LOST, job.size, failures=(str(fault) or repr(fault),))
 
 
-def _retire(dataset: Place, jobs: Sequence[Job]) -> None:
-    """Take back what stands for a month whose inputs have changed, once all of its new jobs have receipts."""
+def _retire(dataset: Location, jobs: Sequence[ArchiveJob]) -> None:
+    """Remove outdated results of a month whose inputs changed, once all its new jobs have receipts."""
     planned: defaultdict[str, set[Slot]] = defaultdict(set)
     for job in jobs:
         planned[job.slot.folder].add(job.slot)

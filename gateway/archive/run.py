@@ -1,8 +1,8 @@
-"""One job: a vehicle's drives of a month in, a table and its receipt out, a small account of it back.
+"""Runs one job: a vehicle's drives of a month become a table and its receipt, with a small summary.
 
-    outcome = run(job)        # on any worker, any number of times: what is done is found done
+    outcome = run(job)        # on any worker, any number of times: a finished job is skipped
 
-The table is written first, its receipt last, and that only where there is none.
+The table is written first and its receipt last, and only if there is none.
 """
 
 import hashlib
@@ -15,32 +15,34 @@ from enum import StrEnum
 from typing import Any, Final
 
 from gateway.archive.dataset import SCHEMA_VERSION, parquet_of, row_of
-from gateway.archive.drives import Drives, followed, readable
-from gateway.archive.jobs import Job, JobLog, software
+from gateway.archive.drives import JobDrives, followed, readable
+from gateway.archive.jobs import ArchiveJob, JobLog, software
 from gateway.archive.receipts import Slot, text_of
 from gateway.bus.logs import LogReport
 from gateway.errors import ConfigurationError, LogUnreadableError
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 
-TOLD_FAILURES: Final = 5  # in what goes back; all of them are in the data set
+TOLD_FAILURES: Final = 5  # chosen: in the outcome; the data set has all of them
 
 
-class Status(StrEnum):
-    """How a job ended."""
+class JobStatus(StrEnum):
+    """The result of a job."""
 
     DONE = "done"
     ALREADY = "already"  # by an earlier run, or by another worker
-    FAILED = "failed"  # not one log could be read, nor did the month before leave a window: told, and no receipt
-    LOST = "lost"  # a store or a worker failed: to be tried again
+    FAILED = (
+        "failed"  # no log was readable and no window was left open by the month before: recorded, without a receipt
+    )
+    LOST = "lost"  # a store or a worker failed: retry
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
-    """What a job gives back to who asked for it; everything else is in the data set."""
+class JobOutcome:
+    """The summary of a job; everything else is in the data set."""
 
     slot: Slot
-    status: Status
+    status: JobStatus
     size: int = 0  # bytes of logs
     took_s: float = 0.0
     n_batches: int = 0
@@ -49,16 +51,16 @@ class Outcome:
     failures: tuple[str, ...] = ()  # the first few
 
 
-def run(job: Job) -> Outcome:
-    """Do a job, unless it is done. Raises PlaceError where logs or data set cannot be reached now."""
+def run(job: ArchiveJob) -> JobOutcome:
+    """Run a job unless it is done. Raises PlaceError if logs or data set cannot be reached now."""
     _require_same_software(job)
     if _is_done(job):
-        return Outcome(job.slot, Status.ALREADY, job.size)
+        return JobOutcome(job.slot, JobStatus.ALREADY, job.size)
     begun_s = time.monotonic()
     rows: list[dict[str, Any]] = []
     told: list[dict[str, Any]] = []
     failures = {one: one.facts.fault or "" for one in job.logs if one.facts.first_ns is None}
-    drives = Drives(job)
+    drives = JobDrives(job)
     for one, next_ns in followed(readable(job.logs), job.next_ns):
         try:
             read = drives.take(one, next_ns)
@@ -70,9 +72,9 @@ def run(job: Job) -> Outcome:
         told.append(_told(one, read.report))
     for one, reason in failures.items():
         _tell_failure(job, one, reason)
-    outcome = Outcome(
+    outcome = JobOutcome(
         slot=job.slot,
-        status=Status.DONE if told or rows else Status.FAILED,
+        status=JobStatus.DONE if told or rows else JobStatus.FAILED,
         size=job.size,
         took_s=time.monotonic() - begun_s,
         n_batches=len(rows),
@@ -83,14 +85,14 @@ def run(job: Job) -> Outcome:
     return _written(job, outcome, rows, told, failures) if told or rows else _failed(job, outcome)
 
 
-def fail(job: Job, reason: str) -> Outcome:
-    """Tell in the data set that a job gave nothing, and why."""
+def fail(job: ArchiveJob, reason: str) -> JobOutcome:
+    """Record in the data set that a job failed, and why."""
     content = {"vehicle": job.slot.vehicle, "month": job.slot.month, "job": job.slot.job, "log": None, "reason": reason}
     job.dataset.replace(job.slot.failure(), text_of(content))
-    return Outcome(job.slot, Status.FAILED, job.size, failures=(reason,))
+    return JobOutcome(job.slot, JobStatus.FAILED, job.size, failures=(reason,))
 
 
-def _require_same_software(job: Job) -> None:
+def _require_same_software(job: ArchiveJob) -> None:
     if job.inputs["software"] != software():
         raise ConfigurationError(
             f"{platform.node()}: runs {software()}, the job is for {job.inputs['software']}: "
@@ -98,7 +100,7 @@ def _require_same_software(job: Job) -> None:
         )
 
 
-def _is_done(job: Job) -> bool:
+def _is_done(job: ArchiveJob) -> bool:
     try:
         job.dataset.read(job.slot.receipt)
     except FileNotFoundError:
@@ -106,7 +108,7 @@ def _is_done(job: Job) -> bool:
     return True
 
 
-def _row(job: Job, one: JobLog, found: Estimate) -> dict[str, Any]:
+def _row(job: ArchiveJob, one: JobLog, found: Estimate) -> dict[str, Any]:
     provenance = {
         "log": one.log.name,
         "log_sha256": one.facts.sha256,
@@ -118,26 +120,30 @@ def _row(job: Job, one: JobLog, found: Estimate) -> dict[str, Any]:
 
 
 def _told(one: JobLog, report: LogReport) -> dict[str, Any]:
-    """What a receipt says of a log."""
+    """A receipt's entry for a log."""
     told = {"log": one.log.name, "sha256": one.facts.sha256, "bytes": one.log.size, "frames": report.wanted}
     return told | {"rejected_lines": report.n_rejected, "ended_early": report.ended_early}
 
 
-def _tell_failure(job: Job, one: JobLog, reason: str) -> None:
+def _tell_failure(job: ArchiveJob, one: JobLog, reason: str) -> None:
     slot = job.slot
     content = {"vehicle": slot.vehicle, "month": slot.month, "job": slot.job, "log": one.log.name, "reason": reason}
     job.dataset.replace(slot.failure(one.log.name), text_of({**content, "sha256": one.facts.sha256}))
 
 
-def _failed(job: Job, outcome: Outcome) -> Outcome:
+def _failed(job: ArchiveJob, outcome: JobOutcome) -> JobOutcome:
     fail(job, f"none of its {len(job.logs)} logs could be read; the first: {outcome.failures[0]}")
     return outcome
 
 
 def _written(
-    job: Job, outcome: Outcome, rows: list[dict[str, Any]], told: list[dict[str, Any]], failures: dict[JobLog, str]
-) -> Outcome:
-    """The table, then its receipt; another worker's are left as they are."""
+    job: ArchiveJob,
+    outcome: JobOutcome,
+    rows: list[dict[str, Any]],
+    told: list[dict[str, Any]],
+    failures: dict[JobLog, str],
+) -> JobOutcome:
+    """Write the table, then its receipt; those of another worker are kept."""
     table = parquet_of(rows)
     if not job.dataset.create(job.slot.table, table):
         table = job.dataset.read(job.slot.table)  # of a worker that was killed before its receipt
@@ -157,4 +163,4 @@ def _written(
         "run": {"bytes": job.size, "took_s": round(outcome.took_s, 3), "at": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"},
     }
     is_ours = job.dataset.create(job.slot.receipt, text_of(receipt))
-    return outcome if is_ours else replace(outcome, status=Status.ALREADY)
+    return outcome if is_ours else replace(outcome, status=JobStatus.ALREADY)

@@ -1,7 +1,7 @@
-"""What there is before anything is weighed: every log's hash and the instant of its first frame.
+"""Surveys logs before processing: every log's hash and the time of its first frame.
 
-A log is read once for that, whole, on any worker; what was found is kept in the data set (``logs/vehicle=X.json``), and
-holds as long as the log's size and stamp do.
+Each log is read completely once, on any worker; the facts are stored in the data set (``logs/vehicle=X.json``), and are
+valid as long as the log's size and stamp are unchanged.
 """
 
 import json
@@ -10,20 +10,20 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.archive.manifest import Assignment, Manifest
-from gateway.archive.places import Place, PlaceError
+from gateway.archive.places import Location, PlaceError
 from gateway.bus.logs import open_whole_log
 from gateway.errors import ConfigurationError, LogUnreadableError, ReaderMissingError
 
 KNOWN: Final = "logs"  # folder of the data set
-MOST_LOGS: Final = 32  # surveyed in one go
-MOST_BYTES: Final = 64_000_000
+MOST_LOGS: Final = 32  # chosen: surveyed in one task
+MOST_BYTES: Final = 64_000_000  # chosen, likewise
 
 
 @dataclass(frozen=True, slots=True)
 class LogFile:
-    """A log where it lies. ``name`` is what rows and receipts call it."""
+    """A log and its place. ``name`` is its name in rows and receipts."""
 
-    place: Place
+    place: Location
     path: str
     name: str
     size: int
@@ -31,25 +31,25 @@ class LogFile:
 
     @property
     def key(self) -> str:
-        """Different for any other log, and for this one with another content."""
+        """Unique for each log and content."""
         return f"{self.place.url}/{self.path} {self.size} {self.stamp}"
 
 
 @dataclass(frozen=True, slots=True)
-class LogFacts:
-    """What a log's content tells. ``first_ns`` is None, and ``fault`` says why, where it has no readable frame."""
+class SurveyedLog:
+    """Facts about a log's content. ``first_ns`` is None without a readable frame; ``fault`` then has the reason."""
 
     sha256: str
     first_ns: int | None
     fault: str | None = None
 
 
-Facts = dict[str, LogFacts]  # by LogFile.key
+Facts = dict[str, SurveyedLog]  # by LogFile.key
 
 
 @dataclass(frozen=True, slots=True)
 class Surveyed:
-    """Of one go: what was found, and what could not be reached (by name: why)."""
+    """The result of one task: facts, and unreachable logs with reasons."""
 
     facts: Facts
     lost: dict[str, str]
@@ -63,7 +63,7 @@ def logs_of(manifest: Manifest, assignment: Assignment) -> list[LogFile]:
 
 
 def survey(logs: Sequence[LogFile]) -> Surveyed:
-    """Read every log once; what cannot be reached now is told as lost. Raises ConfigurationError without a library."""
+    """Read every log once; unreachable ones are listed as lost. Raises ConfigurationError without a library."""
     facts: Facts = {}
     lost: dict[str, str] = {}
     for log in logs:
@@ -75,7 +75,7 @@ def survey(logs: Sequence[LogFile]) -> Surveyed:
 
 
 def in_goes(logs: Iterable[LogFile]) -> Iterator[tuple[LogFile, ...]]:
-    """Logs in groups that are worth a worker's turn."""
+    """Logs in groups of a suitable size for a task."""
     group: list[LogFile] = []
     for log in logs:
         group.append(log)
@@ -86,17 +86,17 @@ def in_goes(logs: Iterable[LogFile]) -> Iterator[tuple[LogFile, ...]]:
         yield tuple(group)
 
 
-def known_facts(dataset: Place, vehicle: str) -> Facts:
-    """What an earlier run has found of a vehicle's logs."""
+def known_facts(dataset: Location, vehicle: str) -> Facts:
+    """Facts about a vehicle's logs from an earlier run."""
     try:
         told: Mapping[str, Any] = json.loads(dataset.read(_path(vehicle)))
-        return {key: LogFacts(**facts) for key, facts in told.items()}
-    except (FileNotFoundError, ValueError, TypeError):  # none yet, or not as this version writes it: looked at anew
+        return {key: SurveyedLog(**facts) for key, facts in told.items()}
+    except (FileNotFoundError, ValueError, TypeError):  # none yet, or of another version: survey again
         return {}
 
 
-def keep_facts(dataset: Place, vehicle: str, facts: Facts) -> None:
-    """Remember what was found, for the next run."""
+def keep_facts(dataset: Location, vehicle: str, facts: Facts) -> None:
+    """Store the facts for the next run."""
     told = {key: {"sha256": one.sha256, "first_ns": one.first_ns, "fault": one.fault} for key, one in facts.items()}
     dataset.replace(_path(vehicle), (json.dumps(told, indent=0, sort_keys=True) + "\n").encode())
 
@@ -105,7 +105,7 @@ def _path(vehicle: str) -> str:
     return f"{KNOWN}/vehicle={vehicle}.json"
 
 
-def _facts_of(log: LogFile) -> LogFacts:
+def _facts_of(log: LogFile) -> SurveyedLog:
     with log.place.fetched(log.path) as fetched:
         try:
             chunks, report = open_whole_log(fetched.path)
@@ -115,7 +115,7 @@ def _facts_of(log: LogFile) -> LogFacts:
         except ReaderMissingError as fault:  # no fault of the log
             raise ConfigurationError(str(fault).replace(str(fetched.path), log.name)) from None
         except LogUnreadableError as fault:
-            return LogFacts(fetched.sha256, None, str(fault).replace(str(fetched.path), log.name))
+            return SurveyedLog(fetched.sha256, None, str(fault).replace(str(fetched.path), log.name))
         except Exception as fault:  # noqa: BLE001 - a reader's surprise is this log's fault, not that of the others
-            return LogFacts(fetched.sha256, None, f"{log.name}: cannot be read: {fault!r}")
-    return LogFacts(fetched.sha256, first_ns)
+            return SurveyedLog(fetched.sha256, None, f"{log.name}: cannot be read: {fault!r}")
+    return SurveyedLog(fetched.sha256, first_ns)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def _without(module: str) -> "Iterator[None]":
-    """During that time ``module`` cannot be imported, unless it already was."""
+    """Block the import of ``module`` within the context, unless it is already imported."""
     modules = cast(dict[str, Any], sys.modules)
     is_absent = modules.setdefault(module, None) is None
     yield
@@ -22,7 +22,7 @@ def _without(module: str) -> "Iterator[None]":
         del modules[module]
 
 
-# python-can imports asammdf, and with it pandas, wherever these are installed: seconds of every start, for a reader of
-# .mf4 that is not used here (logs.mf4 is).
+# python-can imports asammdf and pandas if they are installed, which costs seconds at every start, for a reader of .mf4
+# that is not used here (logs.mf4 is).
 with _without("asammdf"):
-    import can  # noqa: F401 # here before anybody else imports it
+    import can  # noqa: F401 # before any other module imports it

@@ -11,7 +11,7 @@ LAST_SECOND: Final = 9_223_372_035  # int64 nanoseconds reach no further
 
 
 def empty_frames(width: int) -> Frames:
-    """No frames, with payload rows of ``width`` bytes."""
+    """An empty table of frames with payload rows of ``width`` bytes."""
     return Frames(np.empty(0, np.int64), np.empty(0, np.uint32), np.empty(0, np.uint8), np.empty((0, width), np.uint8))
 
 
@@ -21,7 +21,7 @@ def take(frames: Frames, rows: I64 | Bool | slice) -> Frames:
 
 
 def join(parts: Sequence[Frames], width: int) -> Frames:
-    """One after the other; all have payload rows of ``width`` bytes."""
+    """Concatenate tables of frames; all have payload rows of ``width`` bytes."""
     if len(parts) == 1:
         return parts[0]
     if not parts:
@@ -50,7 +50,7 @@ def gathered(chunks: Iterable[Frames], n: int, width: int) -> Iterator[Frames]:
 
 
 def in_order(places: Sequence[I64], parts: Sequence[Frames], width: int) -> Frames:
-    """Together, sorted by each frame's place (n,)."""
+    """Join tables of frames and sort them by the key of each frame (n,)."""
     joined = join(parts, width)
     return joined if len(parts) < 2 else take(joined, np.argsort(np.concatenate(places), kind="stable"))
 

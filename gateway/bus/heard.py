@@ -1,22 +1,25 @@
-"""Identifiers heard: each identifier of a channel, how often, and how long its frames are."""
+"""Survey of the identifiers on a channel: rate and lengths of each, and those that resemble a missing one.
 
-from collections.abc import Iterable
+A device may be set to another identifier than the database says, or to 29 bits.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
 from gateway.bus.frames import join, take
-from gateway.bus.signals import CAN_FD_BYTES, id_name
+from gateway.bus.signals import CAN_FD_BYTES, MappedMessage, SignalMap, id_name
 from gateway.records import EXTENDED_ID, Frames
 from gateway.units import NS_PER_S
 
-KEPT_FRAMES: Final = 100_000  # of one identifier: a quarter of an hour at 100 Hz; counts and rates know them all
+KEPT_FRAMES: Final = 100_000  # stored of one identifier: a quarter of an hour at 100 Hz; counts cover all frames
 
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """One identifier of one channel: its frames in all, the usual number of bytes, and the first of its frames."""
+    """One identifier of one channel: the number of its frames, their time span, and the first of them."""
 
     channel: str | None
     can_id: int
@@ -31,7 +34,7 @@ class Heard:
 
     @property
     def lengths(self) -> tuple[int, ...]:
-        """Every number of bytes that occurs, the usual one first."""
+        """The payload lengths that occur, the most frequent first."""
         lengths, n_times = np.unique(self.frames.length, return_counts=True)
         return tuple(int(length) for length in lengths[np.argsort(-n_times, kind="stable")])
 
@@ -43,7 +46,7 @@ class Heard:
 
 @dataclass(slots=True)
 class _Count:
-    """What was counted of one identifier so far."""
+    """Counts of one identifier so far."""
 
     n: int = 0
     first_ns: int = 0
@@ -52,7 +55,7 @@ class _Count:
     kept: list[Frames] = field(default_factory=list)
 
     def add(self, frames: Frames) -> None:
-        """Further frames of it."""
+        """Count further frames."""
         self.first_ns = int(frames.t_ns.min()) if not self.n else min(self.first_ns, int(frames.t_ns.min()))
         self.last_ns = max(self.last_ns, int(frames.t_ns.max()))
         self.n += len(frames)
@@ -65,7 +68,7 @@ Counts = dict[int, _Count]
 
 
 def counted(chunks: Iterable[Frames]) -> Counts:
-    """Frames of every identifier in them."""
+    """Count the frames of each identifier."""
     counts: Counts = {}
     for frames in chunks:
         for can_id in np.unique(frames.can_id):
@@ -74,8 +77,46 @@ def counted(chunks: Iterable[Frames]) -> Counts:
 
 
 def heard_on(channel: str | None, counts: Counts) -> tuple[Heard, ...]:
-    """The counts, in order of the identifiers."""
+    """The counts of a channel as ``Heard``, ordered by identifier."""
     return tuple(
         Heard(channel, can_id, count.n, (count.last_ns - count.first_ns) / NS_PER_S, join(count.kept, CAN_FD_BYTES))
         for can_id, count in sorted(counts.items(), key=lambda item: (item[0] & EXTENDED_ID, item[0]))
     )
+
+
+NEAR: Final = 0x20  # devices that are set to other identifiers mostly keep them together
+MOST_SIMILAR: Final = 3
+
+
+def similar_to(message: MappedMessage, signal_map: SignalMap, heard: Sequence[Heard]) -> tuple[str, ...]:
+    """Descriptions of unmapped identifiers that resemble ``message``, the most similar first."""
+    return tuple(_told(one) for one in _similar(message, signal_map, heard))
+
+
+def _told(one: Heard) -> str:
+    on = f" on {one.channel}" if one.channel else ""
+    return f"{one.name}{on}, {one.rate_hz:.0f} times a second, {one.lengths[0]} bytes"
+
+
+def _similar(message: MappedMessage, signal_map: SignalMap, heard: Sequence[Heard]) -> Iterator[Heard]:
+    """Identifiers without a mapping, the most similar first: another source, the other width, or a near number."""
+    mapped = [m.id_filter for m in signal_map.messages]
+    free = [
+        one for one in heard
+        if not any(ids.matches(np.array([one.can_id], np.uint32))[0] for ids in mapped)
+        or message.id_filter.matches(np.array([one.can_id], np.uint32))[0]
+    ]  # fmt: skip
+    ranked = sorted((_distance(message, one), one.can_id, i) for i, one in enumerate(free))
+    for distance, _, i in ranked[:MOST_SIMILAR]:
+        if distance[0] <= NEAR:
+            yield free[i]
+
+
+def _distance(message: MappedMessage, one: Heard) -> tuple[int, bool]:
+    """Distance of the numbers, 29 bits or 11, source addresses aside; then whether the length differs."""
+    ours, theirs = message.frame_id & ~EXTENDED_ID, one.can_id & ~EXTENDED_ID
+    is_both_long = bool(message.frame_id & one.can_id & EXTENDED_ID)
+    apart = abs(ours - theirs)
+    if is_both_long:
+        apart = min(apart, abs((ours >> 8 & 0x3FFFF) - (theirs >> 8 & 0x3FFFF)))
+    return apart, message.length not in one.lengths

@@ -11,9 +11,9 @@ from typing import Final
 from gateway.errors import CampaignError
 from gateway.stated import DIVISION_KG
 
-UNSPRUNG_SHARE: Final = 0.065  # of the empty sprung mass, an axle; docs/campaign.md holds it against measured cars
-ESTIMATED_UNSPRUNG_STD: Final = 0.3  # of an unsprung mass that nobody gives
-WEIGHED_STD: Final = 0.1  # of one that the campaign gives
+UNSPRUNG_SHARE: Final = 0.065  # of the empty sprung mass, per axle; docs/campaign.md compares it with measured cars
+ESTIMATED_UNSPRUNG_STD: Final = 0.3  # chosen: of an unsprung mass that is estimated
+WEIGHED_STD: Final = 0.1  # chosen: of one that the campaign states
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,7 +41,7 @@ class Outcome:
 
     @property
     def split(self) -> tuple[SplitRun, ...]:
-        """The runs without a fault, which calibrated."""
+        """The runs without a fault, which were used for the calibration."""
         return self.inspection.usable
 
 

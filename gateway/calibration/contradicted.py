@@ -20,7 +20,6 @@ from math import exp, sqrt
 from typing import Final
 
 import numpy as np
-from scipy.special import chdtri
 
 from gateway.calibration.half_car.known_spectra import known_spectra
 from gateway.calibration.half_car.most_probable_vehicle import fit_half_car
@@ -28,20 +27,21 @@ from gateway.calibration.half_car.prior import Inherited, Prior, prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, upright
+from gateway.core.late import special
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights import unsprung_kg
 from gateway.estimate import Z95
 from gateway.records import F64
 from gateway.stated.doubt import Doubt, DoubtKind
 
-SELDOM: Final = 1e-3  # so seldom true weights are doubted; a question costs less than a false calibration
-SELDOM_LINE: Final = 1e-4  # so seldom a vehicle of the line is called none
-LINES_DIFFER: Final = 2.0  # variance of vehicles of a line over what is believed before siblings told it; chosen
-STATED_STD: Final = 0.02  # of each axle's weight: fuel, driver, what lies about, the scales' step; chosen
-DOUBTED_STDS: Final = 4.0  # of a length that the drive tells
-LOOKED_STDS: Final = 3.0  # of the time between the axles: from here on it is sought anew, free
-FREE_SCALE_STD: Final = 0.1  # of that time, where the wheelbase is not believed
-LEAST_SCALE: Final = 0.02  # of a wheelbase: less is within what tyres and a receiver's speed may do
+SELDOM: Final = 1e-3  # chosen: probability of doubting true weights; a question costs less than a false calibration
+SELDOM_LINE: Final = 1e-4  # chosen: probability of doubting a vehicle that is of the line
+LINES_DIFFER: Final = 2.0  # chosen: variance within a line over its default
+STATED_STD: Final = 0.02  # chosen: of each axle's weight, for fuel, driver, loose items and the scales' step
+DOUBTED_STDS: Final = 4.0  # chosen: of a length estimated from the drive
+LOOKED_STDS: Final = 3.0  # chosen: of the time between the axles; beyond it the fit is repeated with this time free
+FREE_SCALE_STD: Final = 0.1  # chosen: of that time, if the wheelbase is in doubt
+LEAST_SCALE: Final = 0.02  # chosen: of a wheelbase; tyres and a receiver's speed explain less
 
 _N: Final = len(PARAMETERS)
 _OF_AXLE: Final = ("spring_{}_npm", "damper_{}_nspm", "damper_mount_{}_npm", "tyre_{}_npm", "unsprung_{}_kg")
@@ -127,7 +127,7 @@ def _weight(fitted: _Fitted, vehicle: Vehicle) -> Iterator[Doubt]:
     """Both axles together: a load aboard, wrong or exchanged weights, pounds."""
     off, covariance = fitted.amount(_axle_directions(vehicle))
     covariance = covariance + STATED_STD**2 * np.eye(len(_AXLES))
-    if off @ np.linalg.solve(covariance, off) <= chdtri(len(_AXLES), SELDOM):
+    if off @ np.linalg.solve(covariance, off) <= special.chdtri(len(_AXLES), SELDOM):
         return
     shares = (vehicle.empty_front_share, 1.0 - vehicle.empty_front_share)
     unsprung = np.nan_to_num(unsprung_kg(vehicle))  # nobody stated them: the weights are of what is sprung
@@ -159,5 +159,5 @@ def _axle_directions(vehicle: Vehicle) -> F64:
 def _line(fitted: _Fitted) -> Iterator[Doubt]:
     """Whether it is of this line at all: all figures that vehicles of a line share, each by itself."""
     off, covariance = fitted.amount(np.eye(_N)[:, _BUILT])
-    if off @ np.linalg.solve(LINES_DIFFER * covariance, off) > chdtri(len(_BUILT), SELDOM_LINE):
+    if off @ np.linalg.solve(LINES_DIFFER * covariance, off) > special.chdtri(len(_BUILT), SELDOM_LINE):
         yield Doubt.of(DoubtKind.DRIVEN_LINE)

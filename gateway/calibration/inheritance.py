@@ -29,7 +29,7 @@ class Seen:
 
     @classmethod
     def of(cls, calibration: CrossSpectrumCalibration) -> Self:
-        """What one vehicle saw."""
+        """The ranges that one vehicle's drives covered."""
         return cls(**{one.name: getattr(calibration, one.name) for one in fields(cls)})
 
     @classmethod
@@ -58,7 +58,7 @@ def _hull(spans: Sequence[tuple[float, float]]) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class ModelLimits:
     """Results of runs, or siblings, left out; fields as in CrossSpectrumCalibration."""
 
     __pydantic_config__ = STRICT
@@ -75,7 +75,7 @@ class Limits:
         return cls(**{one.name: getattr(calibration, one.name) for one in fields(cls)})
 
     @classmethod
-    def widest(cls, limits: Sequence["Limits"]) -> Self:
+    def widest(cls, limits: Sequence["ModelLimits"]) -> Self:
         """Of several, each as wide as the widest."""
         return cls(**{one.name: _widest([getattr(each, one.name) for each in limits]) for one in fields(cls)})
 
@@ -84,8 +84,8 @@ class Limits:
 
         Its misfit on its own runs is always known.
         """
-        own = Limits.of(calibration)
-        widest = Limits.widest([self, own])
+        own = ModelLimits.of(calibration)
+        widest = ModelLimits.widest([self, own])
         limits = widest if is_tested else replace(self, misfit_limit=widest.misfit_limit)
         return replace(calibration, **{one.name: getattr(limits, one.name) for one in fields(limits)})
 

@@ -1,4 +1,4 @@
-"""What a stated weight makes known of a load: payload and front share of the sprung mass."""
+"""Payload and front share of the sprung mass from a stated weight."""
 
 import math
 from collections.abc import Mapping
@@ -13,9 +13,12 @@ from gateway.core.weights import Unsprung
 from gateway.errors import WeightRefusedError
 from gateway.stated_weight import StatedWeight
 
-LEAST_PAYLOAD_SHARE: Final = -0.1  # of the empty mass: a lighter vehicle is another one, or another unit
-MOST_PAYLOAD_SHARE: Final = 3.0
-SHARES_PCT: Final = (5.0, 95.0)  # on the front axle: beyond, it is another vehicle's ticket or axles are swapped
+LEAST_PAYLOAD_SHARE: Final = -0.1  # chosen: of the empty mass; less means another vehicle or another unit
+MOST_PAYLOAD_SHARE: Final = 3.0  # chosen: of the empty mass; more means another unit
+SHARES_PCT: Final = (
+    5.0,
+    95.0,
+)  # chosen: on the front axle; beyond, the ticket is another vehicle's or the axles are exchanged
 
 
 STD_KG: Final[Mapping[KnownWeightKind, float]] = MappingProxyType(
@@ -23,15 +26,15 @@ STD_KG: Final[Mapping[KnownWeightKind, float]] = MappingProxyType(
         KnownWeightKind.EMPTY: 10.0,  # a tank of 60 l anywhere between a quarter and full
         KnownWeightKind.TICKET: 5.0,  # a weighbridge that shows steps of 10 kg (class III, OIML R 76)
         KnownWeightKind.AXLE_PADS: 10.0,  # portable pads, 1 % of an axle of a ton
-        KnownWeightKind.DELIVERY_NOTE: 10.0,  # packing and what is aboard beside the goods
+        KnownWeightKind.DELIVERY_NOTE: 10.0,  # packing and other items on board
     }
 )
-"""Standard deviations where nobody states one, of each number that is weighed; chosen."""
-PLACE_STD_M: Final = 0.1  # of a load's stated place; chosen
+"""Chosen: default standard deviation of each weighed number."""
+PLACE_STD_M: Final = 0.1  # chosen: of a load's stated place
 
 
 class WeightRefusal(StrEnum):
-    """Why a stated weight cannot be used. docs/known-weights.md says what each asks of a person."""
+    """Why a stated weight cannot be used. docs/known-weights.md says what to do about each."""
 
     NO_CALIBRATION = "no_calibration"
     NO_UNSPRUNG_MASS = "no_unsprung_mass"
@@ -50,11 +53,11 @@ class WeightRefusal(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class StatedLoad:
-    """A load in a calibration's terms; ``front_share_pct`` None: nobody stated where it lies.
+    """A load in a calibration's terms; ``front_share_pct`` is None if no place was stated.
 
-    ``gross_kg`` and the axles' weights are as they stand on the road, None where no unsprung mass is known. The
-    ``_std`` fields are the standard deviations of what was stated. ``is_share_weighed`` is false where the front share
-    follows from the empty vehicle's, whose error it then has in common with every estimate.
+    ``gross_kg`` and the axles' weights are those on the road, None without unsprung masses. The ``_std`` fields are the
+    standard deviations of the stated numbers. ``is_share_weighed`` is false if the front share follows from the empty
+    vehicle's, whose error it then shares with every estimate.
     """
 
     payload_kg: float
@@ -70,11 +73,11 @@ class StatedLoad:
 def load_of(
     stated: StatedWeight, vehicle: Vehicle, unsprung: Unsprung, kind: KnownWeightKind = KnownWeightKind.TICKET
 ) -> StatedLoad:
-    """Statics: what stands on an axle is its share of the sprung mass M + L and its unsprung mass u.
+    """Statics: an axle carries its share of the sprung mass M + L and its unsprung mass u.
 
         L = G - M - u_front - u_rear,    D = (F_front - u_front) / (M + L)
 
-    ``unsprung`` is what calibration found, for where nobody stated any. Raises WeightRefusedError.
+    ``unsprung`` is used where no unsprung mass was stated. Raises WeightRefusedError.
     """
     below = unsprung.unless_stated(vehicle)
     front_u, rear_u = below.front.number, below.rear.number
@@ -110,14 +113,14 @@ def load_of(
 def _share_std_pct(
     stated: StatedWeight, share_pct: float | None, sprung_kg: float, std_kg: float, vehicle: Vehicle
 ) -> float | None:
-    """To first order: of two weighed axles, or of a payload of so much at a place of so much."""
+    """To first order: from two weighed axles, or from a payload and its place."""
     if share_pct is None:
         return None
     share = share_pct / 100.0
     if stated.front_axle_kg is not None:
         return 100.0 * std_kg * math.hypot(1.0 - share, share) / sprung_kg
     position_m = stated.position_m if stated.payload_kg else None
-    # without a place an empty vehicle's tank and tools lie anywhere between the axles, at worst over one of them
+    # without a stated place an empty vehicle's tank and tools may be anywhere between the axles, at worst over one
     by_weight = 0.5 if position_m is None else 1.0 - position_m / vehicle.wheelbase_m - share
     by_place = (stated.payload_kg or 0.0) * PLACE_STD_M / vehicle.wheelbase_m
     return 100.0 * math.hypot(by_weight * std_kg, by_place) / sprung_kg
@@ -133,8 +136,8 @@ def _require_unsprung(front_kg: float, rear_kg: float) -> None:
     if math.isnan(front_kg + rear_kg):
         raise WeightRefusedError(
             WeightRefusal.NO_UNSPRUNG_MASS,
-            "a weight on the road makes no payload known: neither unsprung masses nor kerb axle weights are stated in "
-            "the campaign's [vehicle], and calibration found none; state the payload instead",
+            "no payload follows from a weight on the road: the campaign's [vehicle] states neither unsprung masses nor "
+            "kerb axle weights, and calibration found none; state the payload instead",
         )
 
 

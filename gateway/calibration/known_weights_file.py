@@ -1,7 +1,7 @@
-"""known_weights.json: every weight that somebody made known, the newest last, and what became of it.
+"""known_weights.json: every known weight, the newest last, with its confirmation and its end.
 
-It lies beside the database, apart from the calibration file, which no known weight changes. What they teach is computed
-from the list (core.known_weights), so that each can be taken back. Written by the service alone, in one step.
+It is beside the database and separate from the calibration file, which no known weight changes. Their effect is
+computed from the list (core.known_weights), so that each can be taken back. Only the service writes it, atomically.
 """
 
 from pathlib import Path
@@ -21,11 +21,11 @@ from gateway.stated import Confirmation, Ending, KnownWeightFields
 from gateway.toml_file import describe_faults
 
 FILE_NAME: Final = "known_weights.json"
-MOST_KNOWN_WEIGHTS: Final = 200  # the oldest that were taken back are forgotten beyond
+MOST_KNOWN_WEIGHTS: Final = 200  # chosen: beyond it the oldest withdrawn ones are dropped
 
 
 class KnownWeight(KnownWeightFields):
-    """A known weight with the load it is of as it was measured: what the file keeps.
+    """A known weight with its load as measured, as stored in the file.
 
     ``id`` is the hash of all but its confirmation and its end.
     """
@@ -33,7 +33,7 @@ class KnownWeight(KnownWeightFields):
     posterior: dict[str, Any] = Field(description="the load as measured, before any known weight")
 
     def content_id(self) -> str:
-        """What ``id`` has to be."""
+        """The id that the content should have."""
         return content_id(self.model_dump(mode="json", exclude={"id", "confirmed", "ended"}))
 
     @property
@@ -55,33 +55,33 @@ class KnownWeight(KnownWeightFields):
 
     @property
     def is_held(self) -> bool:
-        """True where its estimate contradicts it and nobody has confirmed it: it teaches nothing yet."""
+        """True if its estimate contradicts it and nobody confirmed it: it has no effect yet."""
         return self.ended is None and self.confirmed is None and self.is_contradicted
 
     @property
     def teaches(self) -> bool:
-        """Whether estimates take it into account."""
+        """Whether estimates use it."""
         return self.ended is None and not self.is_held
 
 
 class KnownWeights(Part):
-    """All that is remembered, oldest first."""
+    """All stored known weights, oldest first."""
 
     format: Literal["springscale-known-weights"] = "springscale-known-weights"
     version: Literal[1] = 1
     entries: tuple[KnownWeight, ...] = ()
 
     def of(self, calibration_id: str | None, estimator: str) -> tuple[KnownWeight, ...]:
-        """Those that teach something of this calibration and estimator."""
+        """Those with an effect on this calibration and estimator."""
         wanted = (calibration_id, estimator)
         return tuple(one for one in self.entries if (one.calibration_id, one.estimator) == wanted and one.teaches)
 
     def knowledge(self, calibration_id: str | None, estimator: str) -> Knowledge | None:
-        """What they teach together; None: nothing."""
+        """Their joint knowledge; None without any."""
         return Knowledge.of([one.observation for one in self.of(calibration_id, estimator)])
 
     def as_of(self, t_ns: int) -> "KnownWeights":
-        """As they stood at that time: later entries, confirmations and ends are not there yet."""
+        """The list at an earlier time, without later entries, confirmations and ends."""
 
         def then(moment: Confirmation | Ending | None) -> bool:
             return moment is not None and ns_of(moment.at) < t_ns
@@ -106,7 +106,7 @@ class KnownWeights(Part):
         return self
 
     def with_entry(self, entry: KnownWeight) -> "KnownWeights":
-        """With one more; those that stand are never forgotten."""
+        """The list with one more entry; entries in force are never dropped."""
         ended = [one.id for one in self.entries if one.ended is not None]
         forgotten = set(ended[: max(0, len(self.entries) + 1 - MOST_KNOWN_WEIGHTS)])
         kept = tuple(one for one in self.entries if one.id not in forgotten)
@@ -119,7 +119,7 @@ class KnownWeights(Part):
 
 
 def load_known_weights(path: Path) -> KnownWeights:
-    """The file's entries, none where there is no file yet. Raises ConfigurationError for a file that is none."""
+    """The file's entries, none without a file. Raises ConfigurationError for an invalid file."""
     try:
         return known_weights_of(KeptFiles(path.parent).read(path.name), path)
     except FileNotFoundError:
@@ -129,7 +129,7 @@ def load_known_weights(path: Path) -> KnownWeights:
 
 
 def known_weights_of(content: bytes, path: Path | str) -> KnownWeights:
-    """What such a file holds. Raises ConfigurationError, naming ``path``, where it cannot be believed."""
+    """The content of such a file. Raises ConfigurationError, naming ``path``, if it is invalid."""
     try:
         return KnownWeights.model_validate_json(content)
     except ValidationError as fault:

@@ -1,4 +1,4 @@
-"""Lines and their files: the line of calibration files, a line as a file holds it, and the file of a built line."""
+"""Lines and their files: from calibration files to a line, and to and from its file."""
 
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
@@ -19,35 +19,35 @@ from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAME
 from gateway.errors import LineError
 
 NOT_LEFT_OUT = "siblings_not_left_out"
-"""The line's intervals are as wide as its widest member's: no vehicle was calibrated as the next one will be."""
+"""The line's intervals are as wide as its widest member's: they were not tested on a vehicle left out."""
 
 
 def sister_of(file: CalibrationFile) -> Sister:
-    """What a calibration says of other vehicles of its line. Raises LineError where it holds no half-car."""
+    """A calibration as a member of its line. Raises LineError if it has no half-car."""
     if file.cross_spectrum is None:
         raise LineError(
-            f"{file.vehicle.name} ({file.id}): holds no cross_spectrum calibration, of which alone a line is made: "
+            f"{file.vehicle.name} ({file.id}): has no cross_spectrum calibration, which a line needs: "
             "calibrate it again without --estimator ratio_index"
         )
     return Sister(file.id, file.vehicle, file.cross_spectrum, line_in(file.line) if file.line else None)
 
 
 def line_of_files(files: Sequence[LikeFile]) -> Line:
-    """The line that these make together: calibrations of sister vehicles, and at most one line file.
+    """The line of calibrations of sister vehicles and at most one line file.
 
-    Raises LineError where they make none.
+    Raises LineError if they make none.
     """
     lines = [line_in(one.line) for one in files if isinstance(one, LineFile)]
     if len(lines) > 1:
         raise LineError(
-            "two line files: whether their vehicles are of one line is for you to say: build one line of all "
-            "calibrations with `springscale line build`"
+            "two line files: if their vehicles are of one line, build one line of all their calibrations with "
+            "`springscale line build`"
         )
     return line_of([sister_of(one) for one in files if isinstance(one, CalibrationFile)], *lines)
 
 
 def line_part(line: Line) -> LinePart:
-    """The line as a file holds it."""
+    """The line in the form of its file."""
     stds = zip(NAMES, line.scatter_std.tolist(), strict=True)
     half_car = EvidencePart.of(line.half_car.information, line.half_car.pull, PARAMETERS)
     return LinePart(
@@ -65,7 +65,7 @@ def line_part(line: Line) -> LinePart:
 
 
 def line_in(part: LinePart) -> Line:
-    """The line that a file holds. Raises CalibrationFileError where the model has other parameters today."""
+    """The line in a file. Raises CalibrationFileError if the model now has other parameters."""
     part.require_known()
     return Line(
         members=part.members,
@@ -88,9 +88,8 @@ def build_line(
 ) -> LineFile:
     """The line of ``files``, each once however often it is named.
 
-    With the ``runs`` of two or more of them, by id, each is left out in turn: no twin must tell what it is asked.
-    ``on_sibling`` is called after each that was. Raises LineError where the files make no line, or what is given of
-    runs is too little to leave one out.
+    With the ``runs`` of two or more of them, by id, each is left out in turn. ``on_sibling`` is called after each.
+    Raises LineError if the files make no line, or the runs do not suffice to leave one out.
     """
     files = list({one.id: one for one in files}.values())
     line = line_of_files(files)

@@ -1,10 +1,9 @@
-"""How a vehicle and its gyro have changed since calibration: what batches found, week by week.
+"""Changes of a vehicle and its gyro since calibration, from batches, week by week.
 
-Each batch finds its dampers and the scale of its delay beside the load (core.cross_spectrum.drift), and bends tell the
-gyro's gain (core.bends). A trend is a robust slope over months. A level is where the newest batches stand, which shows
-what changed at once. The delay is held near the calibration by what the search believes: a real change is larger than
-what is found of it. Springs are not found batch by batch; what they change moves the zero, which each "it is empty now"
-shows.
+Each batch estimates its dampers and the scale of its delay beside the load (core.cross_spectrum.drift), and bends give
+the gyro's gain (core.bends). A trend is a robust slope over months. A level is the mean of the newest batches, which
+shows sudden changes. The search's prior holds the delay near its calibration: the true change is larger than the
+estimated one. Springs are not estimated per batch; their change moves the zero, which each "it is empty now" shows.
 """
 
 import math
@@ -24,16 +23,16 @@ from gateway.records import F64, Why
 from gateway.units import NS_PER_S
 
 FILE_NAME: Final = "trend.json"
-MOST_WEEKS: Final = 520  # of all calibrations together, the newest
+MOST_WEEKS: Final = 520  # chosen: of all calibrations together, ten years; the newest are kept
 LEAST_POINTS: Final = {"week": 8, "zero": 5}
-CONFIDENCE: Final = 0.99  # of a change's interval
-LEAST_BATCHES: Final = 24  # of a level: two hours, which one load or road seldom fills; chosen
-ALIKE_BATCHES: Final = 6  # of one load and road err alike; chosen
-ZERO_CHANGE_SHARE: Final = 0.01  # of the empty mass; likewise
+CONFIDENCE: Final = 0.99  # chosen: of a change's interval
+LEAST_BATCHES: Final = 24  # chosen: for a level; two hours, seldom with a single load or road
+ALIKE_BATCHES: Final = 6  # chosen: batches of one load and road with correlated errors
+ZERO_CHANGE_SHARE: Final = 0.01  # chosen: of the empty mass
 
 
 @dataclass(frozen=True, slots=True)
-class Watched:
+class WatchedParameter:
     """A parameter whose trend is kept, and the diagnostic that reports it: a ratio to the calibrated, or a deviation.
 
     A trend below ``least_change_pct`` or a level below ``least_level_pct`` is no finding; without the latter no level
@@ -48,28 +47,30 @@ class Watched:
     higher: str = ""
 
     def off_pct(self, found: float) -> float | None:
-        """How far a batch's diagnostic is off the calibration, in percent; None if it says nothing."""
+        """Deviation of a batch's diagnostic from the calibration, in percent; None without a value."""
         if not self.is_ratio:
             return 100.0 * found
         return 100.0 * math.log(found) if found > 0.0 else None
 
 
-def _dampers(which: str) -> Watched:
-    return Watched(
+def _dampers(which: str) -> WatchedParameter:
+    return WatchedParameter(
         f"damper_{which}_freed_ratio",
-        least_change_pct=5.0,  # the search's own belief lets a damper go 3 % (core.cross_spectrum.drift)
-        least_level_pct=20.0,  # friction on rough roads hides as much of them in single batches
+        least_change_pct=5.0,  # the search's prior allows a damper 3 % (core.cross_spectrum.drift)
+        least_level_pct=20.0,  # on rough roads friction hides this much of them in single batches
         lower=f"the {which} dampers are {{:.0f}} % weaker",
         higher=f"the {which} dampers are {{:.0f}} % stiffer",
     )
 
 
-WATCHED: Final[Mapping[str, Watched]] = MappingProxyType(
+WATCHED: Final[Mapping[str, WatchedParameter]] = MappingProxyType(
     {
         "damper_front": _dampers("front"),
         "damper_rear": _dampers("rear"),
-        "delay": Watched("delay_scale", least_change_pct=1.0, is_ratio=False),  # the search believes in 0.3 %
-        "gyro_gain": Watched(
+        "delay": WatchedParameter(
+            "delay_scale", least_change_pct=1.0, is_ratio=False
+        ),  # the search's prior allows 0.3 %
+        "gyro_gain": WatchedParameter(
             "gyro_gain_ratio",
             least_change_pct=2.0,  # temperature alone moves it by 0.4 %
             least_level_pct=2.0,
@@ -81,14 +82,14 @@ WATCHED: Final[Mapping[str, Watched]] = MappingProxyType(
 
 
 class Sums(Part):
-    """Of what so many batches found of one parameter, in percent off the calibration."""
+    """Sums over n batches of one parameter's deviation from the calibration, in percent."""
 
     n: int = Field(ge=1)
     sum_pct: float
     square_pct2: float
 
     def plus(self, other: "Sums") -> "Sums":
-        """Of both."""
+        """The sums of both."""
         return Sums(
             n=self.n + other.n,
             sum_pct=self.sum_pct + other.sum_pct,
@@ -97,7 +98,7 @@ class Sums(Part):
 
 
 class Week(Part):
-    """What the batches of one week found, by parameter."""
+    """The parameters found in the batches of one week."""
 
     monday: str
     calibration_id: str
@@ -105,7 +106,7 @@ class Week(Part):
 
 
 class TrendHistory(Part):
-    """Everything up to ``cursor`` in the store's history, oldest week first."""
+    """All weeks up to ``cursor`` in the store's history, oldest first."""
 
     format: Literal["springscale-trend"] = "springscale-trend"
     version: Literal[2] = 2
@@ -113,7 +114,7 @@ class TrendHistory(Part):
     weeks: tuple[Week, ...] = Field((), max_length=MOST_WEEKS)
 
     def with_batches(self, estimates: Iterable[Estimate], cursor: str | None) -> "TrendHistory":
-        """With more batches, in any order; those that found no parameters are passed over."""
+        """The history with more batches, in any order; those without parameters are ignored."""
         weeks = {(week.monday, week.calibration_id): week for week in self.weeks}
         for estimate in estimates:
             if (found := found_pct(estimate)) is None or estimate.calibration_id is None:
@@ -128,8 +129,8 @@ class TrendHistory(Part):
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
-    """One mean: when, what, and of how many."""
+class TrendPoint:
+    """One mean: its time, its value and the number of batches."""
 
     t: str
     number: float
@@ -138,16 +139,16 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Trend:
-    """A parameter's course and its change from the first point to the last; None where there are too few points.
+    """A parameter's course and its change from the first point to the last; None with too few points.
 
-    ``interval99`` is of the change; it drifts where this excludes 0 and the change is not small. ``level`` is where the
-    newest batches stand off the calibration, ``level99`` its interval; it is off where this excludes 0 and the level is
-    not small.
+    ``interval99`` is that of the change; it drifts if this excludes 0 and the change is not small. ``level`` is the
+    newest batches' deviation from the calibration, ``level99`` its interval; it is off if this excludes 0 and the level
+    is not small.
     """
 
     name: str
     unit: str
-    points: tuple[Point, ...]
+    points: tuple[TrendPoint, ...]
     change: float | None = None
     interval99: tuple[float, float] | None = None
     is_drifting: bool = False
@@ -156,7 +157,7 @@ class Trend:
     is_off: bool = False
 
     def sentence(self) -> str | None:
-        """The warning of one that is off or drifts."""
+        """The warning if it is off or drifts."""
         if self.is_off and self.level is not None and self.level99 is not None:
             low, high = sorted(abs(end) for end in self.level99)
             watched = WATCHED[self.name]
@@ -172,10 +173,10 @@ class Trend:
 
 
 def found_pct(estimate: Estimate) -> dict[str, float] | None:
-    """What a batch found of vehicle and gyro, in percent off its calibration; None where it found nothing.
+    """A batch's parameters of vehicle and gyro, in percent off the calibration; None without any.
 
-    A vehicle that drifts far is refused as a misfit, a gyro's gain as a sensor that changed: what such a batch found
-    counts too, of the gyro alone where the sensor changed.
+    A vehicle that drifts far is refused as a misfit, a changed gain of the gyro as a changed sensor. Such batches count
+    too, for the gyro alone if the sensor changed.
     """
     if estimate.rejected == (Why.SENSOR_CHANGED,):
         believed = {"gyro_gain"}
@@ -200,20 +201,22 @@ def monday_of(t_ns: int) -> str:
 def trends_of(
     weeks: Sequence[Week], zeros: Sequence[tuple[str, float]], calibration_id: str | None, empty_mass_kg: float
 ) -> tuple[Trend, ...]:
-    """Of the calibration in use; ``zeros`` say when the vehicle was empty and what the calibration alone read (kg)."""
+    """Trends for the calibration in use; ``zeros`` are times when the vehicle was empty with the payload (kg) read
+    then.
+    """
     own = [week for week in weeks if week.calibration_id == calibration_id]
     found = []
     for name, watched in WATCHED.items():
         sums = [(week.monday, week.found[name]) for week in own if name in week.found]
-        points = tuple(Point(monday, one.sum_pct / one.n, one.n) for monday, one in sums)
+        points = tuple(TrendPoint(monday, one.sum_pct / one.n, one.n) for monday, one in sums)
         trend = trend_of(name, "%", points, LEAST_POINTS["week"], watched.least_change_pct)
         found.append(_with_level(trend, [one for _, one in sums]))
-    empty = tuple(Point(at, payload_kg, 1) for at, payload_kg in zeros)
+    empty = tuple(TrendPoint(at, payload_kg, 1) for at, payload_kg in zeros)
     return (*found, trend_of("zero", "kg", empty, LEAST_POINTS["zero"], ZERO_CHANGE_SHARE * empty_mass_kg))
 
 
 def _with_level(trend: Trend, weeks: Sequence[Sums]) -> Trend:
-    """Where the newest batches stand, as a share of the calibrated; ``weeks`` are the trend's, oldest first."""
+    """The mean of the newest batches, relative to the calibrated value; ``weeks`` are the trend's, oldest first."""
     newest: Sums | None = None
     for week in reversed(weeks):
         newest = week if newest is None else newest.plus(week)
@@ -230,11 +233,11 @@ def _with_level(trend: Trend, weeks: Sequence[Sums]) -> Trend:
     return replace(trend, level=level, level99=(low, high), is_off=is_clear and abs(level) >= least_pct)
 
 
-def trend_of(name: str, unit: str, points: tuple[Point, ...], least_points: int, least_change: float) -> Trend:
+def trend_of(name: str, unit: str, points: tuple[TrendPoint, ...], least_points: int, least_change: float) -> Trend:
     """The median of the slopes between any two points, with its interval by Kendall's tau.
 
-    P. K. Sen, J. Am. Stat. Assoc. 63, 1968: a few odd points move it little. Over the span from the first point to the
-    last it is a change.
+    P. K. Sen, J. Am. Stat. Assoc. 63, 1968: robust against a few outliers. The change is the slope times the span from
+    the first point to the last.
     """
     days = [datetime.fromisoformat(point.t).replace(tzinfo=UTC).timestamp() / 86_400.0 for point in points]
     if len(points) < least_points or days[-1] <= days[0]:
@@ -250,10 +253,10 @@ def theil_sen(x: Sequence[float], y: Sequence[float], confidence: float = CONFID
     """The median of the slopes between any two points (n,), and the ends of its interval.
 
     P. K. Sen, Estimates of the regression coefficient based on Kendall's tau (1968), with his correction for ties.
-    scipy.stats has the same, and costs a vehicle's service a second and tens of megabytes to import.
+    scipy.stats has the same, but its import costs the service a second and tens of megabytes.
     """
     slopes, variance = pair_slopes(x, y), variance_of_s(x, y)
-    if variance < 0.0:  # so many ties that they say nothing of it
+    if variance < 0.0:  # too many ties for an interval
         return float(np.median(slopes)), math.nan, math.nan
     reach = NormalDist().inv_cdf(0.5 + confidence / 2.0) * math.sqrt(variance)
     return float(np.median(slopes)), *around_the_median(slopes, reach)
@@ -268,12 +271,12 @@ def pair_slopes(x: Sequence[float] | F64, y: Sequence[float] | F64) -> F64:
 
 
 def variance_of_s(x: Sequence[float] | F64, y: Sequence[float] | F64) -> float:
-    """Of Kendall's S where there is no trend, with its correction for ties; below 0 where there is little but ties."""
+    """Variance of Kendall's S without a trend, with its correction for ties; below 0 with hardly anything but ties."""
     return (_pairs(len(x)) - sum(map(_pairs, _ties(x))) - sum(map(_pairs, _ties(y)))) / 18.0
 
 
 def around_the_median(slopes: F64, reach: float) -> tuple[float, float]:
-    """The slopes that lie ``reach`` ranks of S to either side; the outermost where that is beyond them."""
+    """The slopes ``reach`` ranks of S on either side of the median, or the outermost ones."""
     low = max(round((len(slopes) - reach) / 2.0) - 1, 0)
     high = min(round((len(slopes) + reach) / 2.0), len(slopes) - 1)
     return float(slopes[low]), float(slopes[high])

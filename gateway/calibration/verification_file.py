@@ -1,4 +1,4 @@
-"""verifications.json: known loads that were weighed without learning from them, with their errors and a verdict."""
+"""verifications.json: known loads weighed for verification, with their errors and a verdict."""
 
 from typing import Annotated, Final, Literal
 
@@ -11,15 +11,17 @@ from gateway.core.vehicle import Vehicle
 from gateway.stated_weight import StatedWeight
 
 FILE_NAME: Final = "verifications.json"
-MOST_ENTRIES: Final = 500  # the oldest beyond are forgotten
-MOST_LOADS: Final = 10
+MOST_ENTRIES: Final = 500  # chosen: beyond it the oldest are dropped
+MOST_LOADS: Final = 10  # chosen: of one verification
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Verdict = Literal["passed", "failed"]
 
 
 class VerificationRule(Part):
-    """What a verification asks for: by how much the gross weight, and each axle's, may err, and how many loads."""
+    """The requirements of a verification: permitted errors of the gross weight and of each axle, and the number of
+    loads.
+    """
 
     permitted_error_pct: float
     permitted_axle_error_pct: float | None
@@ -27,7 +29,7 @@ class VerificationRule(Part):
 
 
 class AxleError(Part):
-    """How an axle was weighed: weighed less known, and that in percent of the known."""
+    """The error of an axle load: weighed minus known, in kg and in percent of the known load."""
 
     known_kg: Finite
     error_kg: Finite
@@ -35,7 +37,7 @@ class AxleError(Part):
 
 
 class VerifiedLoad(Part):
-    """One known load: what was stated, what it was weighed as, and the errors."""
+    """One known load: as stated, as weighed, and the errors."""
 
     stated: StatedWeight
     t_start: str = Field(description="of the load epoch that was weighed")
@@ -69,26 +71,28 @@ class Verification(Part):
     verdict: Verdict
 
     def content_id(self) -> str:
-        """What ``id`` has to be."""
+        """The id that the content should have."""
         return content_id(self.model_dump(mode="json", exclude={"id"}))
 
 
 class VerificationHistory(Part):
-    """All that is remembered, oldest first. Records are never changed."""
+    """All stored records, oldest first. Records are never changed."""
 
     format: Literal["springscale-verifications"] = "springscale-verifications"
     version: Literal[1] = 1
     entries: tuple[Verification, ...] = ()
 
     def with_entry(self, entry: Verification) -> "VerificationHistory":
-        """With one more record."""
+        """The history with one more record."""
         return self.model_copy(update={"entries": (*self.entries, entry)[-MOST_ENTRIES:]})
 
 
 def axle_errors(
     known: StatedLoad, payload_kg: float, front_share_pct: float, vehicle: Vehicle
 ) -> tuple[AxleError | None, AxleError | None]:
-    """Of the front and the rear axle; None where the known load has no place. Unsprung masses drop out of an error."""
+    """Errors of the front and the rear axle; None if the known load has no place. Unsprung masses cancel in an
+    error.
+    """
     if known.front_share_pct is None:
         return None, None
     known_sprung_kg, sprung_kg = vehicle.empty_mass_kg + known.payload_kg, vehicle.empty_mass_kg + payload_kg
@@ -105,7 +109,7 @@ def _axle_error(known_kg: float, error_kg: float) -> AxleError:
 
 
 def is_within(rule: VerificationRule, error_pct: float, *axles: AxleError | None) -> bool:
-    """The gross weight errs no more than is permitted, nor does an axle where axles are judged."""
+    """Whether the gross weight's error, and each axle's if axles are judged, is within the permitted error."""
     most_axle_pct = rule.permitted_axle_error_pct
     return abs(error_pct) <= rule.permitted_error_pct and all(
         axle is None or most_axle_pct is None or abs(axle.error_pct) <= most_axle_pct for axle in axles
@@ -113,5 +117,5 @@ def is_within(rule: VerificationRule, error_pct: float, *axles: AxleError | None
 
 
 def verdict_of(rule: VerificationRule, loads: tuple[VerifiedLoad, ...]) -> Verdict:
-    """Passed where every load is within, and there are as many as the rule asks for."""
+    """Passed if every load is within its limits and there are as many as the rule requires."""
     return "passed" if len(loads) >= rule.loads and all(load.is_within for load in loads) else "failed"

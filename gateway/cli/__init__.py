@@ -39,10 +39,8 @@ _COMMANDS = {
     "simulate": "Simulate drives, as log files or onto a bus.",
     "token": "Make, list and revoke access tokens for other machines.",
     "verification": "Known loads compared with the estimates of a running service, as dated records.",
-}  # each in the module of its name, or a room of ours
-_ROOMS = {"fleet-report": "fleet", "line": "fleet", "record": "asked", "verification": "asked", "commission": "asked"}
-_ROOMS |= {"campaign": "logs", "events": "logs", "feed": "logs", "import": "logs"}
-_NAMES = {"import": "import_recording"}  # a word of the language names no module
+}  # each in the module of its name
+_NAMES = {"import": "import_recording"}  # a module cannot be called import
 
 
 INTERRUPTED = 130  # 128 and the number of SIGINT, as shells have it
@@ -64,8 +62,7 @@ class _Lazy(click.Group):
         if cmd_name not in _COMMANDS:
             return None
         name = _NAMES.get(cmd_name, cmd_name.replace("-", "_"))
-        room = f".{_ROOMS[cmd_name]}" if cmd_name in _ROOMS else ""
-        command: click.Command = getattr(import_module(f"gateway.cli{room}.{name}"), name)
+        command: click.Command = getattr(import_module(f"gateway.cli.{name}"), name)
         return command
 
     def resolve_command(
@@ -132,13 +129,13 @@ def _call(arguments: list[str] | None) -> None:
 
 
 def _leave_threads_behind(leaving: SystemExit) -> None:
-    """End the process while threads that would not stop in time still work.
+    """End the process although threads that did not stop in time still run.
 
-    Python's own end unwinds them wherever they are; C++ code that must not throw (scipy's) then aborts the process.
+    Python's normal exit would unwind these threads, and C++ code that must not throw (scipy) would abort the process.
     """
     code = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError):  # nobody reads it any more
+        with suppress(OSError, ValueError):  # the reader may have gone
             stream.flush()
     os._exit(code)
 

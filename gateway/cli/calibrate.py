@@ -15,10 +15,9 @@ from gateway.calibration.judgement import LearningCurve, curve_of
 from gateway.calibration.line_files import line_of_files
 from gateway.calibration.plan import LoadPlan, StatedWidths, plan_first, plan_next, stated_widths, usual_drive
 from gateway.calibration.ratio_index import BandChoice, StructureChoice
-from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, window
-from gateway.cli.text.inspection import inspection_json, inspection_sentences
-from gateway.cli.text.plan import plan_sentences, widths_sentence
-from gateway.cli.text.progress import counted, on_share
+from gateway.cli.calibrate_text import inspection_json, inspection_sentences, plan_sentences, widths_sentence
+from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, require_output_place, window
+from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
@@ -172,7 +171,7 @@ def _ask_for_payload_range(campaign: Campaign, *, is_needed: bool) -> None:
 
 
 def _tell_inspection(inspection: Inspection, *, as_json: bool, is_all: bool) -> None:
-    """Text always; JSON only if no calibration follows whose object would contain it."""
+    """Print the inspection: as text always, as JSON only if no calibration follows, whose JSON contains it."""
     if not as_json:
         click.echo(inspection_sentences(inspection))
     elif is_all or inspection.refusal is not None:
@@ -181,10 +180,8 @@ def _tell_inspection(inspection: Inspection, *, as_json: bool, is_all: bool) -> 
 
 def _require_places(output: Path | None, report: Path | None) -> None:
     """Checked before minutes of work: the file and the directory can be written."""
-    if output is not None and output.is_dir():
-        raise click.UsageError(f"--output {output}: is a folder, not a file")
-    if output is not None and not output.parent.is_dir():
-        raise click.UsageError(f"--output {output}: there is no folder {output.parent}; make it first")
+    if output is not None:
+        require_output_place(output)
     if report is not None and report.exists() and not report.is_dir():
         raise click.UsageError(f"--report {report}: is a file, not a directory")
 
@@ -236,7 +233,7 @@ def _sentences(
     widths: StatedWidths | None,
     said: Sequence[str],
 ) -> str:
-    """The finished calibration, with the warnings that were not ``said`` above it."""
+    """The finished calibration in sentences, without the warnings that were printed already (``said``)."""
     low, high = file.seen.payload_kg
     lines = [
         f"{output or 'no file written'}: {', '.join(file.estimators)}; payloads {low:g} to {high:g} kg, "

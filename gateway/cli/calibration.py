@@ -1,27 +1,30 @@
 """springscale calibration: look at calibration files, compare and check them; state known weights to a service."""
 
 import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import click
 
-from gateway.calibration.axle_weights import AxleWeights, sprung_of
+from gateway.calibration.axle_weights import UNSPRUNG_SHARE, AxleWeights, Sprung, sprung_of
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file import (
     CalibrationFile,
     Check,
     Difference,
+    ExpectedErrorsPart,
+    FittedFigure,
+    LinePart,
     check_against_campaign,
     differences,
+    figures_of,
     load_calibration,
 )
-from gateway.calibration.file.check import Verdict
-from gateway.cli.asked.known_weights import tare_commands, ticket_commands
+from gateway.calibration.file.check import CheckResult
+from gateway.cli.known_weights import tare_commands, ticket_commands
 from gateway.cli.options import FILE, NumberRange, as_json
-from gateway.cli.text.axle_weights import vehicle_block
-from gateway.cli.text.calibration import calibration_text
 from gateway.records import json_line
 from gateway.stated import DIVISION_KG
 
@@ -73,7 +76,7 @@ def verify(file: Path, campaign: Path | None, as_json: bool) -> None:
     held = load_calibration(file)
     held.for_core()  # raises where this springscale does not know the model
     checks = [*_own_checks(held), *(check_against_campaign(held, load_campaign(campaign)) if campaign else ())]
-    is_good = all(check.verdict is not Verdict.FAULT for check in checks)
+    is_good = all(check.verdict is not CheckResult.FAULT for check in checks)
     if as_json:
         click.echo(json_line({"id": held.id, "is_good": is_good, "checks": [asdict(check) for check in checks]}))
     else:
@@ -117,10 +120,10 @@ def _own_checks(held: CalibrationFile) -> tuple[Check, ...]:
     """Checks that reading the file has already made."""
     members = held.line.members if held.line else ()
     return (
-        Check("content", Verdict.GOOD, f"matches its id {held.id}"),
-        Check("shape", Verdict.GOOD, f"version {held.version}"),
-        Check("model", Verdict.GOOD, f"known to this springscale: {', '.join(held.estimators) or 'no estimator'}"),
-        *(Check("line", Verdict.GOOD, f"inherited from {member}, kept in this file") for member in members),
+        Check("content", CheckResult.GOOD, f"matches its id {held.id}"),
+        Check("shape", CheckResult.GOOD, f"version {held.version}"),
+        Check("model", CheckResult.GOOD, f"known to this springscale: {', '.join(held.estimators) or 'no estimator'}"),
+        *(Check("line", CheckResult.GOOD, f"inherited from {member}, kept in this file") for member in members),
     )
 
 
@@ -137,3 +140,98 @@ def _plain(fact: Any) -> str:
 
 def _finite(n_std: float | None) -> float | None:
     return None if n_std is None or n_std == float("inf") else n_std
+
+
+def vehicle_block(sprung: Sprung) -> str:
+    """The table with a comment on the source of its figures. The keys that a tape measures are named, not made up."""
+    head = [
+        "[vehicle]",
+        f"# unsprung masses: front {_unsprung(sprung.unsprung_front_kg, sprung.weights.unsprung_front_kg)},",
+        f"#                   rear {_unsprung(sprung.unsprung_rear_kg, sprung.weights.unsprung_rear_kg)}",
+        f"# standard deviation of empty_mass_kg: {sprung.mass_std_kg:.0f} kg",
+    ]
+    keys = [f"{name} = {number}" for name, number in sprung.vehicle_keys().items()]
+    return "\n".join([*head, *keys, "# still to be given: name, wheelbase_m, sensor_position_m"])
+
+
+def _unsprung(kg: float, given_kg: float | None) -> str:
+    told = "as given" if given_kg is not None else f"estimated, {100.0 * UNSPRUNG_SHARE:.1f} % of the sprung mass"
+    return f"{kg:.1f} kg ({told})"
+
+
+def calibration_text(held: CalibrationFile) -> str:
+    """The whole file but its arrays, in lines."""
+    sections = {
+        "vehicle (as the campaign stated it)": _vehicle(held),
+        "calibrated for": _ranges(held),
+        "expected errors (runs left out of the fit)": _expected(held),
+        **({"inherited from its line": _line(held.line)} if held.line else {}),
+        **{_title(part, figures): _figures(figures, held.line) for part, figures in figures_of(held).items()},
+        "warnings": iter(held.warnings or ("none",)),
+        "made by": _provenance(held),
+    }
+    lines = [held.id, f"version {held.version}"]
+    lines.append(f"estimators: {', '.join(held.estimators) or 'none'}")
+    for title, rows in sections.items():
+        lines += ["", title, *(f"  {row}" for row in rows)]
+    return "\n".join(lines)
+
+
+def _vehicle(held: CalibrationFile) -> Iterator[str]:
+    for name, stated in asdict(held.vehicle).items():
+        if stated is not None:
+            yield f"{name:28}{_stated(stated)}"
+
+
+def _stated(stated: object) -> str:
+    if isinstance(stated, tuple):
+        return " to ".join(map(_stated, stated))
+    return f"{stated:g}" if isinstance(stated, float) else str(stated)
+
+
+def _ranges(held: CalibrationFile) -> Iterator[str]:
+    for name, span in held.seen.model_dump().items():
+        yield f"{name:28}{'unknown' if span is None else f'{span[0]:.4g} to {span[1]:.4g}'}"
+
+
+def _expected(held: CalibrationFile) -> Iterator[str]:
+    for estimator in held.estimators:
+        errors = held.expected_errors.get(estimator)
+        running = "; the service runs this one by default" if estimator == held.estimators[0] else ""
+        yield f"{estimator:28}{'unknown' if errors is None else _errors(errors)}{running}"
+
+
+def _errors(errors: ExpectedErrorsPart) -> str:
+    payload, share = errors.payload_rms_kg, errors.front_share_rms_pct
+    parts = ["payload unknown" if payload is None else f"payload {payload:.1f} kg rms"]
+    parts.append("front share unknown" if share is None else f"front share {share:.2f} percentage points rms")
+    return ", ".join(parts)
+
+
+def _title(part: str, figures: Sequence[FittedFigure]) -> str:
+    return f"{part}: {len(figures)} parameters ± their standard deviations"
+
+
+def _figures(figures: Sequence[FittedFigure], line: LinePart | None) -> Iterator[str]:
+    """With a line, inherited parameters are distinguished from the vehicle's own."""
+    for figure in figures:
+        row = f"{figure.name:28}{figure.centre:>12.5g} ± {figure.std:.2g}"
+        yield row if line is None else f"{row:52}{'inherited' if figure.name in line.scatter_std else 'its own'}"
+
+
+def _line(line: LinePart) -> Iterator[str]:
+    scatter = f"estimated from {line.n_siblings} of them" if line.n_siblings else "the defaults"
+    yield f"{'scatter between vehicles':28}{scatter}"
+    yield from (f"{'ancestor':28}{member}" for member in line.members)
+
+
+def _provenance(held: CalibrationFile) -> Iterator[str]:
+    made = held.provenance
+    yield made.software
+    yield made.command
+    yield f"campaign sha256 {made.campaign_sha256}"
+    for run in made.runs:
+        yield (
+            f"run {run.number:<3} {run.payload_kg:7.1f} kg {run.front_share_pct:6.2f} %  {run.n_batches:3} batches  "
+            f"{run.log}  sha256 {run.sha256[:12]}..."
+        )

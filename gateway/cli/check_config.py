@@ -12,7 +12,7 @@ from gateway.core.weights import Limits
 from gateway.errors import ConfigurationError, UntrustedFileError
 from gateway.records import json_line
 from gateway.service.commissioning import with_commissioned
-from gateway.service.startable import startable_faults
+from gateway.service.startup_checks import startable_faults
 from gateway.setup import Setup, setup_of
 from gateway.uplink import uplink_settings
 from gateway.uplink.webhook import webhook_settings

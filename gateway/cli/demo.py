@@ -13,8 +13,8 @@ import click
 
 from gateway.bus.sink import BusSink, replay_frames
 from gateway.cli.demo_fleet import fleet_demo
+from gateway.cli.estimate import sentence
 from gateway.cli.options import NumberRange
-from gateway.cli.text.estimate import sentence
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
 from gateway.log import set_up_log
 from gateway.records import json_line

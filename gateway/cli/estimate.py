@@ -2,20 +2,20 @@
 
 import csv
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from io import StringIO
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import click
 
 from gateway.bus.logs import LogReport
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.known_weights_file import FILE_NAME
+from gateway.cli import options
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
-from gateway.cli.text.estimate import sentence
 from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError, NothingWeighedError
@@ -25,13 +25,14 @@ from gateway.offline.estimates import with_remainders
 from gateway.reasons import EXPLANATIONS
 from gateway.records import Why, json_line
 from gateway.setup import Setup, load_setup, setup_of
+from gateway.units import si_factor
 
 
 @click.command("estimate")
 @click.argument("logs", nargs=-1, required=True, type=FILE)
-@click.option("--config", "config_path", type=FILE, default=None, help="springscale.toml of the service")
-@click.option("--signals", default=None, help="signal map: a TOML file, or springscale:NAME")
-@click.option("--calibration", type=FILE, default=None, help="calibration file")
+@options.config
+@options.signals
+@options.calibration
 @click.option(
     "--known-weights", type=FILE, default=None, help="known_weights.json of a service [default: that of --config]"
 )
@@ -80,7 +81,7 @@ def estimate(
         raise NothingWeighedError("\n".join([_in_words(reasons), *_other_vehicle(reasons, setup.calibration)]))
 
 
-Found = Iterable[tuple[Path | None, Estimate]]  # the log, where there are several
+Found = Iterable[tuple[Path | None, Estimate]]  # the log, if there are several
 
 
 def _in_words(reasons: Counter[Why | None]) -> str:
@@ -172,3 +173,42 @@ def with_known_weights(setup: Setup, named: Path | None, state: Path | None) -> 
             f"{named}: no known weight in use for the estimator {setup.estimator} and the calibration {calibration_id}"
         )
     return known
+
+
+def sentence(record: Mapping[str, Any]) -> str:
+    """One line of the object of ``estimate_to_json``: when, how much, with its interval; or why not."""
+    when = f"{record['t_start'][:19]}Z"
+    if record["rejected"]:
+        return f"{when}  no estimate: {', '.join(record['rejected'])}"
+    payload = _told(record, "payload", "kg", "7.1f", "5.1f")
+    front_share = _told(record, "front_share", "pct", "5.2f", "4.2f")
+    speed_kmh = record["mean_speed_mps"] / si_factor("speed", "km/h")
+    return f"{when}  {payload}   {front_share}   {_aside(record)}{speed_kmh:5.1f} km/h{_too_much(record)}"
+
+
+def _told(record: Mapping[str, Any], name: str, unit: str, form: str, half_form: str) -> str:
+    """A quantity and half its interval; a calibration may contain one of the two alone."""
+    words, number = name.replace("_", " "), record[f"{name}_{unit}"]
+    if number is None:
+        return f"{words} unknown"
+    half = _half(record[f"{name}_interval95_{unit}"])
+    return f"{words} {number:{form}} {'%' if unit == 'pct' else unit} ± {half:{half_form}} (95 %)"
+
+
+def _aside(record: Mapping[str, Any]) -> str:
+    """The lateral position of the sprung mass, if known."""
+    if record["cg_left_m"] is None:
+        return ""
+    half_mm = 1000.0 * _half(record["cg_left_interval95_m"])
+    return f"{1000.0 * record['cg_left_m']:+5.0f} mm left ± {half_mm:3.0f} (95 %)   "
+
+
+def _too_much(record: Mapping[str, Any]) -> str:
+    """The places over their limit."""
+    over = [place.replace("_", " ") for place, weight in record["weights"].items() if weight["is_over_limit"]]
+    return f"   over the limit: {', '.join(over)}" if over else ""
+
+
+def _half(interval95: Sequence[float]) -> float:
+    """Half its width: the number after ±."""
+    return (interval95[1] - interval95[0]) / 2.0

@@ -9,17 +9,17 @@ from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.judgement import (
     TARGETS,
+    BatchSet,
     Errors,
     ErrorTable,
     Judged,
-    Part,
     TargetErrors,
     assess_evaluation,
     error_table,
     width_of,
 )
 from gateway.cli.options import CAMPAIGN, FILE, as_json, batch_settings, one_estimator, window
-from gateway.cli.text.progress import counted
+from gateway.cli.progress import counted
 from gateway.errors import ConfigurationError
 from gateway.offline import judge_campaign
 from gateway.offline.campaigns import Split
@@ -67,7 +67,7 @@ def evaluate(
 def _report(directory: Path, campaign: Campaign, held: CalibrationFile, split: Split, table: ErrorTable) -> None:
     from gateway.reports.calibration import report as calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
 
-    assessment = assess_evaluation(campaign, held, Part(split), table)
+    assessment = assess_evaluation(campaign, held, BatchSet(split), table)
     with counted("drawing") as on_chart:
         written = calibration_report.write_evaluation_report(directory, assessment, on_chart)
     click.echo(str(written), err=True)

@@ -9,7 +9,7 @@ from gateway.bus.sink import ReplayProgress, Speed
 from gateway.bus.sink import replay as send_log
 from gateway.cli import options
 from gateway.cli.options import FILE, as_json
-from gateway.cli.text.progress import StatusLine
+from gateway.cli.progress import StatusLine
 from gateway.errors import LogUnreadableError
 from gateway.records import json_line
 

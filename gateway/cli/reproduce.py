@@ -6,7 +6,7 @@ from typing import Final
 import click
 
 from gateway.cli.options import FILE, as_json
-from gateway.cli.text.progress import counted
+from gateway.cli.progress import counted
 from gateway.records import json_line
 from gateway.reports.paper.experiments import N_STEPS, Extent
 from gateway.reports.paper.reproduce import reproduce as write_report

@@ -10,7 +10,7 @@ import click
 from gateway.cli.options import FILE, trusted_keys
 from gateway.config import load_settings
 from gateway.log import set_up_log
-from gateway.service.life import live, start_anew
+from gateway.service.lifecycle import live, restart
 
 
 @click.command("run")
@@ -23,4 +23,4 @@ def run(config_path: Path, trusted_keys: Path | None) -> None:
     faulthandler.enable()  # systemd's watchdog ends a hung process with SIGABRT: every stack goes to the journal
     set_up_log(settings.log.level, under_journald="JOURNAL_STREAM" in os.environ)
     if live(settings, load):
-        start_anew()
+        restart()

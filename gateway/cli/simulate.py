@@ -10,7 +10,7 @@ import click
 from gateway.bus.sink import ReplayProgress, Speed
 from gateway.cli import options
 from gateway.cli.options import FILE, NumberRange, as_json
-from gateway.cli.text.progress import StatusLine, counted
+from gateway.cli.progress import StatusLine, counted
 from gateway.records import json_line
 from gateway.sim.vans import VANS
 from gateway.workbench import Bench, bench_of, write_campaign

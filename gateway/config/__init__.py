@@ -5,9 +5,9 @@ sent in ``outward``.
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
-from pydantic import AfterValidator, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
 from gateway.config.alarms import AlarmsSection, WebhookSection
@@ -20,7 +20,7 @@ from gateway.config.sections import (
     PositionSection,
     RecordSection,
     Seconds,
-    Section,
+    SettingsSection,
     VerificationSection,
 )
 from gateway.core.settings import BatchSettings
@@ -28,13 +28,14 @@ from gateway.errors import ConfigurationError
 from gateway.files.signed import PublicKey, Trust, load_public_keys
 from gateway.toml_file import describe_faults, read_toml
 
+Section = TypeVar("Section", bound=BaseModel)
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 
 EstimatorName = Literal["cross_spectrum", "ratio_index"]  # those of core.estimator, which loads too much for this
 ESTIMATOR_NAMES: tuple[EstimatorName, ...] = get_args(EstimatorName)
 
 
-class VehicleSection(Section):
+class VehicleSection(SettingsSection):
     """The vehicle's identity, and its limits."""
 
     id: str = Field("vehicle", min_length=1, max_length=64, description="name under which the fleet knows the vehicle")
@@ -53,7 +54,7 @@ class VehicleSection(Section):
     rear_wheel_limit_kg: LimitKg = Field(None, description=f"the same at the rear {OF_CALIBRATION}")
 
 
-class BusSection(Section):
+class BusSection(SettingsSection):
     """The source of the frames."""
 
     interface: str = Field("socketcan", description="any python-can interface: socketcan, slcan, pcan, virtual, ...")
@@ -67,7 +68,7 @@ class BusSection(Section):
     silence_s: Seconds = Field(2.0, description="the bus counts as silent (asleep) after this long without a frame")
 
 
-class BatchSection(Section):
+class BatchSection(SettingsSection):
     """How batches are formed and gated."""
 
     window_s: float = Field(300.0, ge=20.0, le=3600.0, description="length of a batch")
@@ -112,7 +113,7 @@ class BatchSection(Section):
         return BatchSettings(**chosen)
 
 
-class WebSection(Section):
+class WebSection(SettingsSection):
     """The HTTP side."""
 
     host: str = Field("127.0.0.1", description="address to listen on")
@@ -133,7 +134,7 @@ class WebSection(Section):
         return self
 
 
-class StoreSection(Section):
+class StoreSection(SettingsSection):
     """Where estimates are kept."""
 
     directory: Path = Field(Path("/var/lib/springscale"), description="folder of the database")
@@ -149,7 +150,7 @@ def _of_a_key(line: str) -> str:
 KeyLine = Annotated[str, AfterValidator(_of_a_key)]
 
 
-class TrustSection(Section):
+class TrustSection(SettingsSection):
     """Whose signature is required on files that decide a weight: calibration file, signal map, databases."""
 
     public_keys: tuple[KeyLine, ...] = Field(
@@ -163,7 +164,7 @@ class TrustSection(Section):
         return Trust(tuple(dict.fromkeys(map(PublicKey.of, self.public_keys))))
 
 
-class LogSection(Section):
+class LogSection(SettingsSection):
     """What the service writes to its log."""
 
     level: Literal["debug", "info", "warning", "error"] = Field("info", description="least level that is written")
@@ -242,23 +243,18 @@ def load_settings(path: Path, trusted_keys: Path | None = None) -> Settings:
 
 
 def _with_absolute_paths(settings: Settings, folder: Path) -> Settings:
-    """Paths as seen from the folder of the configuration file."""
-    changed: dict[str, Any] = {
-        "store": settings.store.model_copy(update={"directory": folder / settings.store.directory})
-    }
-    if settings.record.directory is not None:
-        changed["record"] = settings.record.model_copy(update={"directory": folder / settings.record.directory})
-    tls = {key: getattr(settings.web, key) for key in ("tls_certificate", "tls_key", "tls_client_ca")}
-    changed["web"] = settings.web.model_copy(update={key: folder / path for key, path in tls.items() if path})
-    files = settings.uplink.model_dump(include={"ca", "certificate", "key", "password_file"}, exclude_none=True)
-    changed["uplink"] = settings.uplink.model_copy(update={name: folder / path for name, path in files.items()})
-    files = settings.webhook.model_dump(include={"ca", "secret_file"}, exclude_none=True)
-    changed["webhook"] = settings.webhook.model_copy(update={name: folder / path for name, path in files.items()})
-    if settings.commissioning.lines is not None:
-        lines = folder / settings.commissioning.lines
-        changed["commissioning"] = settings.commissioning.model_copy(update={"lines": lines})
-    if settings.calibration is not None:
-        changed["calibration"] = folder / settings.calibration
-    if not settings.signals.startswith("springscale:"):
-        changed["signals"] = str(folder / settings.signals)
-    return settings.model_copy(update=changed)
+    """Every path of the settings, relative to the folder of the configuration file."""
+    absolute = _absolute(settings, folder)
+    if settings.signals.startswith("springscale:"):
+        return absolute
+    return absolute.model_copy(update={"signals": str(folder / settings.signals)})
+
+
+def _absolute(section: Section, folder: Path) -> Section:
+    changed: dict[str, Any] = {}
+    for name, value in section:
+        if isinstance(value, Path):
+            changed[name] = folder / value
+        elif isinstance(value, BaseModel):
+            changed[name] = _absolute(value, folder)
+    return section.model_copy(update=changed)

@@ -1,4 +1,4 @@
-"""Tables of springscale.toml about alarms: when one is raised, and where it is sent."""
+"""Tables of springscale.toml about alarms: when one is raised, and if it is sent."""
 
 from pathlib import Path
 from typing import Annotated, Final, Literal, Self
@@ -6,7 +6,7 @@ from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from gateway.config.sections import Section
+from gateway.config.sections import SettingsSection
 
 CAUSE_NAMES: Final = (  # those of core.alarms, which loads too much for this
     *("overload", "imbalance", "sensor_fault", "drift", "no_estimate"),
@@ -26,7 +26,7 @@ def _of_a_cause(name: str) -> str:
 CauseName = Annotated[str, AfterValidator(_of_a_cause)]
 
 
-class AlarmsSection(Section):
+class AlarmsSection(SettingsSection):
     """When an alarm is raised, confirmed and ended. Permitted weights are those of the vehicle."""
 
     off: tuple[CauseName, ...] = Field(
@@ -70,7 +70,7 @@ class AlarmsSection(Section):
 _LOCAL: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
-class WebhookSection(Section):
+class WebhookSection(SettingsSection):
     """Where alarms and events are pushed to: an address that takes signed HTTP requests."""
 
     url: str | None = Field(

@@ -4,10 +4,10 @@ from pathlib import Path
 
 from pydantic import Field, model_validator
 
-from gateway.config.sections import Seconds, Section
+from gateway.config.sections import Seconds, SettingsSection
 
 
-class UplinkSection(Section):
+class UplinkSection(SettingsSection):
     """Where estimates are forwarded to: an MQTT 5 broker, for vehicles that cannot be reached from outside."""
 
     host: str | None = Field(None, min_length=1, description="the broker; without it nothing is forwarded")
@@ -53,7 +53,7 @@ class UplinkSection(Section):
         return self
 
 
-class BroadcastSection(Section):
+class BroadcastSection(SettingsSection):
     """Weights sent as J1939 frames onto another CAN bus than the one that the service listens to."""
 
     interface: str | None = Field(

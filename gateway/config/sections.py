@@ -5,25 +5,25 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Seconds = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]  # 32 years, in nanoseconds within 64 bits
-LimitKg = Annotated[float | None, Field(gt=0.0, le=100_000.0, allow_inf_nan=False)]  # more is no road vehicle's
+Seconds = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]  # 32 years: fits 64 bits in nanoseconds
+LimitKg = Annotated[float | None, Field(gt=0.0, le=100_000.0, allow_inf_nan=False)]  # road vehicles weigh less
 OF_CALIBRATION = "[default: as the calibration has it]"
 
 
-class Section(BaseModel):
+class SettingsSection(BaseModel):
     """A table of the file."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class KeepSection(Section):
+class KeepSection(SettingsSection):
     """The batches kept for later calibrations, which then need no logs."""
 
     batches: int = Field(256, ge=0, le=100_000, description="batches kept at most, the newest (0: none)")
     size_mb: float = Field(128.0, ge=1.0, le=100_000.0, description="disk space for them; the oldest are removed")
 
 
-class RecordSection(Section):
+class RecordSection(SettingsSection):
     """The ring log: the mapped frames themselves, kept on disk as long as there is room."""
 
     enabled: bool = Field(False, description="whether frames are recorded")
@@ -36,7 +36,7 @@ class RecordSection(Section):
     )
 
 
-class VerificationSection(Section):
+class VerificationSection(SettingsSection):
     """Requirements of a verification with known loads, and how often it is due: choose what your law or your customer
     requires.
     """
@@ -51,7 +51,7 @@ class VerificationSection(Section):
     every_days: float = Field(0.0, ge=0.0, le=36_500.0, description="due so long after the last that passed (0: never)")
 
 
-class CommissioningSection(Section):
+class CommissioningSection(SettingsSection):
     """Calibrating on the vehicle itself, from an empty drive."""
 
     is_allowed: bool = Field(True, description="whether users with scope operate may make a calibration here")
@@ -72,7 +72,7 @@ class CommissioningSection(Section):
     )
 
 
-class PositionSection(Section):
+class PositionSection(SettingsSection):
     """The vehicle's positions that are kept, and whether they may leave the vehicle."""
 
     decimals: int | None = Field(

@@ -1,4 +1,4 @@
-"""One window of decoded samples -> one Batch on a uniform grid, gated. A pure function of its rows."""
+"""One window of decoded samples -> one Batch on a uniform grid, with its gates applied. A pure function of the rows."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,17 +13,17 @@ from gateway.core.timeline import in_order_of_time, onto_grid, sample_rate_hz, s
 from gateway.records import F64, I64, Batch, Bool, Motion, SensorTraits, Signal, Why
 from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
 
-GRAVITY_TOLERANCE_MPS2 = 2.0  # allows a mount tilted by 37 degrees, not a missing or turned axis
-RATE_MIN_SHARE = 0.8  # a sensor slower than this share of the grid's rate cannot fill it
-REASON_SHARE_MIN = 0.1  # a cause that masked at least this much of a refused window is named
-SATURATION_HALO_S = 0.1
+GRAVITY_TOLERANCE_MPS2 = 2.0  # chosen: allows a mount tilted by 37 degrees, not a missing or turned axis
+RATE_MIN_SHARE = 0.8  # chosen: of the grid's rate; a slower sensor cannot fill the grid
+REASON_SHARE_MIN = 0.1  # chosen: share of a refused window from which a cause is named
+SATURATION_HALO_S = 0.1  # chosen: a sensor's filter settles within it
 
 Traits = Mapping[Signal, SensorTraits]
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
-    """Which stretch of a drive a batch covers, and how it came to end."""
+class BatchWindow:
+    """The stretch of a drive that a batch covers, and why it ended."""
 
     t_start_ns: int
     t_end_ns: int
@@ -32,7 +32,7 @@ class Window:
     is_provisional: bool = False
 
 
-def build_batch(rows: Motion, window: Window, settings: BatchSettings, traits: Traits) -> Batch:
+def build_batch(rows: Motion, window: BatchWindow, settings: BatchSettings, traits: Traits) -> Batch:
     """Rows of one window -> Batch. Only rows within [t_start, t_end) count; their order does not matter."""
     n = round((window.t_end_ns - window.t_start_ns) * settings.rate_hz / NS_PER_S)
     inside = (rows.t_ns >= window.t_start_ns) & (rows.t_ns < window.t_end_ns)
@@ -84,9 +84,9 @@ _MISSING = (Why.GAP, Why.ACCELERATION_MISSING, Why.PITCH_RATE_MISSING)
 
 @dataclass(frozen=True, slots=True)
 class _Sensed:
-    """One inertial sensor on the grid (n,), where each fault says it cannot be used, and how often it sends.
+    """One inertial sensor on the grid (n,), its faults, and its sampling rate.
 
-    faults: missing, untimed, stuck, saturated, (n,) each; empty where the sensor is not mapped.
+    faults: missing, untimed, stuck, saturated, (n,) each; empty if the signal map lacks the sensor.
     """
 
     on_grid: F64
@@ -94,7 +94,9 @@ class _Sensed:
     rate_hz: float
 
 
-def _sensed(rows: Motion, signal: Signal, window: Window, n: int, settings: BatchSettings, traits: Traits) -> _Sensed:
+def _sensed(
+    rows: Motion, signal: Signal, window: BatchWindow, n: int, settings: BatchSettings, traits: Traits
+) -> _Sensed:
     if signal not in rows.signals:
         return _Sensed(np.full(n, np.nan), (), 0.0)
     trait = traits.get(signal, SensorTraits())
@@ -115,14 +117,14 @@ def _sensed(rows: Motion, signal: Signal, window: Window, n: int, settings: Batc
 
 def _gyro_gain(
     rows: Motion,
-    window: Window,
+    window: BatchWindow,
     roll_radps: F64 | None,
     speed: F64,
     usable: Bool,
     settings: BatchSettings,
     traits: Traits,
 ) -> tuple[float, float] | None:
-    """As bends tell it, where the signal map has all that it takes."""
+    """The gyro's gain measured in bends; None if the signal map lacks a signal that this needs."""
     if roll_radps is None or not {Signal.LATERAL_ACCELERATION, Signal.YAW_RATE} <= set(rows.signals):
         return None
     pushed, turned = (
@@ -133,7 +135,7 @@ def _gyro_gain(
 
 
 def _slower_hz(*sensors: _Sensed) -> float:
-    """How often the slower one sends; NaN where any is silent."""
+    """The lower of the sampling rates; NaN if any sensor is silent."""
     slower_hz = min(sensor.rate_hz for sensor in sensors)
     return slower_hz if slower_hz > 0.0 else float("nan")
 
@@ -153,7 +155,7 @@ def _constant_runs(t_ns: I64, x: F64, at_least_ns: float) -> I64:
 
 
 def _saturated_spans(t_ns: I64, x: F64, trait: SensorTraits) -> I64:
-    """(k, 2) a tenth of a second either side of each sample at the end of the sensor's range."""
+    """(k, 2) spans of 0.1 s on either side of each sample at the end of the sensor's range."""
     step = trait.resolution if np.isfinite(trait.resolution) else 0.0
     at_end = (x >= trait.maximum - 0.5 * step) | (x <= trait.minimum + 0.5 * step)  # False where NaN
     halo_ns = round(SATURATION_HALO_S * NS_PER_S)
@@ -166,7 +168,7 @@ def _spans_of(t_ns: I64, chosen: Bool) -> I64:
     return np.column_stack([t_ns[first], t_ns[end - 1]])
 
 
-def _spans_onto_grid(spans_ns: I64, window: Window, n: int, rate_hz: float) -> Bool:
+def _spans_onto_grid(spans_ns: I64, window: BatchWindow, n: int, rate_hz: float) -> Bool:
     """True on the grid points that any span (k, 2) covers."""
     edges = np.zeros(n + 1, np.int64)
     bounds = np.clip(np.rint((spans_ns - window.t_start_ns) * rate_hz / NS_PER_S), 0, n).astype(np.int64)
@@ -177,14 +179,14 @@ def _spans_onto_grid(spans_ns: I64, window: Window, n: int, rate_hz: float) -> B
 
 
 def _known(sensed: _Sensed, settings: BatchSettings) -> F64:
-    """A sensor on the grid (n,), NaN wherever a fault forbids its use; all of it where it is too slow."""
+    """A sensor on the grid (n,), NaN at every fault; all NaN if its sampling rate is too low."""
     is_slow = sensed.rate_hz < RATE_MIN_SHARE * settings.rate_hz
     unknown = np.logical_or.reduce([np.full(len(sensed.on_grid), is_slow), *sensed.faults])
     return np.where(unknown, np.nan, sensed.on_grid)
 
 
-def _speed(rows: Motion, window: Window, n: int, settings: BatchSettings, traits: Traits) -> tuple[F64, Bool]:
-    """Speed on the grid, wheel speed where GNSS has none, and where GNSS froze."""
+def _speed(rows: Motion, window: BatchWindow, n: int, settings: BatchSettings, traits: Traits) -> tuple[F64, Bool]:
+    """Speed on the grid (n,), wheel speed where GNSS has none; and (n,) where the GNSS speed is frozen."""
     speed, frozen = np.full(n, np.nan), np.zeros(n, bool)
     for signal in (Signal.SPEED, Signal.WHEEL_SPEED):
         trait = traits.get(signal, SensorTraits())
@@ -208,8 +210,10 @@ def _speed_causes(speed: F64, frozen: Bool, settings: BatchSettings) -> dict[Why
     }
 
 
-def _trailer_cause(rows: Motion, window: Window, n: int, settings: BatchSettings) -> dict[Why, Bool]:
-    """Where a trailer is drawn, each reading holding until the next and the first one from the start; none without."""
+def _trailer_cause(rows: Motion, window: BatchWindow, n: int, settings: BatchSettings) -> dict[Why, Bool]:
+    """Where a trailer is attached: each reading holds until the next, the first one from the start. Empty without
+    readings.
+    """
     t_ns, x = sort_by_time(*rows.of(Signal.TRAILER))
     if not len(t_ns):
         return {}
@@ -219,12 +223,12 @@ def _trailer_cause(rows: Motion, window: Window, n: int, settings: BatchSettings
 
 
 def _either(one: dict[Why, Bool], other: dict[Why, Bool]) -> dict[Why, Bool]:
-    """Causes of both sensors; what both can have is there where either has it."""
+    """The causes of both sensors; a cause that both can have is set where either sensor has it."""
     return one | {why: masked | one[why] if why in one else masked for why, masked in other.items()}
 
 
 def _merge_missing(causes: dict[Why, Bool]) -> dict[Why, Bool]:
-    """Both sensors silent at once is a gap; one alone is that sensor's fault."""
+    """Where both sensors are silent the cause is a gap; where one is silent it is that sensor's fault."""
     a, g = causes.get(Why.ACCELERATION_MISSING), causes.get(Why.PITCH_RATE_MISSING)
     if a is None or g is None:
         return causes
@@ -242,14 +246,14 @@ def _mean(x: F64, usable: Bool) -> float:
 
 def _reasons(
     sensors: tuple[_Sensed, ...],
-    window: Window,
+    window: BatchWindow,
     n: int,
     usable: Bool,
     gravity: float,
     shares: Mapping[Why, float],
     settings: BatchSettings,
 ) -> tuple[Why, ...]:
-    """Every reason that keeps any estimator from using the window, in a fixed order."""
+    """Every reason for which no estimator may use the window, in a fixed order."""
     found: list[Why] = []
     whole_n = settings.window_s * settings.rate_hz
     if not window.is_provisional and n < settings.last_batch_share_min * whole_n:

@@ -1,14 +1,12 @@
-"""What a vehicle carries, and so how long and how high its loads are: the one table of shapes.
+"""What a vehicle carries, and so how long and how high its loads are: the table of load shapes.
 
-A load that is long or high is harder to pitch than a compact one of the same weight at the same place. All that the
-half-car feels of its shape is the squared radius of gyration in pitch about the front-to-rear line through the body's
-centre of gravity,
+A long or high load is harder to pitch than a compact one of the same weight at the same place. The half-car sees of its
+shape only the squared radius of gyration in pitch, about the front-to-rear line through the body's centre of gravity:
 
     s = (length^2 + height^2) / 12 + k (height of the load's centre - height of the body's centre)^2,
 
-k = M / (M + L) being the empty vehicle's part of the mass (parallel axis theorem: both turn about their common
-centre). Part of a load that stands far from the rest, on the roof or on a tow bar, adds f (1 - f) times the squared
-distance, f being its part of the load.
+with k = M / (M + L) the empty vehicle's part of the mass (parallel axis theorem: both turn about their common centre).
+A part f of the load that is far from the rest, on the roof or on a tow bar, adds f (1 - f) times the squared distance.
 """
 
 from collections.abc import Iterator, Mapping
@@ -25,7 +23,7 @@ from gateway.records import F64
 
 
 @dataclass(frozen=True, slots=True)
-class Extent:
+class LoadExtent:
     """Medians of a load's length and height (m) and the standard deviations of their logarithms."""
 
     length_m: float
@@ -36,44 +34,46 @@ class Extent:
 
 FLOOR_PER_WHEELBASE: Final = 0.8
 """Load floors of vans are 0.65 (small ones) to 0.93 (large ones) of their wheelbase long, by their makers' figures."""
-USUAL_HEIGHT_M: Final = (0.7, 0.4)  # of a load whose length alone is stated: median and scatter; chosen
+USUAL_HEIGHT_M: Final = (0.7, 0.4)  # chosen: median and scatter for a load of which only the length is stated
 LENGTH_SCATTER: Final = 0.2  # of loads about the stated length; chosen
 FLOOR_BELOW_BODY_M: Final = 0.15  # load floor below the body's centre of gravity: 0.6 m against 0.75 m above the road
 BODY_MASS_PART: Final = 0.8  # k above at half the payload of a van; it varies from 0.7 to 1
-COMPACT_SCATTER: Final = 0.4  # of s of loads like the known ones
-SPREAD_PART: Final = 0.5  # share of undeclared loads that are spread out; the others are like the known loads
+COMPACT_SCATTER: Final = 0.4  # chosen: of log s, for loads like the known ones
+SPREAD_PART: Final = 0.5  # chosen: share of undeclared loads that are spread out; the others are like the known loads
 ROOF_ABOVE_FLOOR_LOAD_M: Final = 1.1  # roof loads of vans: 1.9 m above the road against 0.8 to 0.9 m
 TOW_BAR_BEHIND_LOAD_M: Final = 1.7  # coupling 0.9 m behind the rear axle, loads about 0.8 m ahead of it
-OUTLYING_PARTS: Final = (0.1, 0.2, 0.3, 0.4)  # of a load, on a roof rack or a tow bar where there is one; chosen
-SMOOTHING: Final = 0.15  # kernel width in log s: the tables are no finer than that
+OUTLYING_PARTS: Final = (0.1, 0.2, 0.3, 0.4)  # chosen: part of a load on the roof rack or tow bar, if there is one
+SMOOTHING: Final = 0.15  # chosen: kernel width in log s, about the resolution of the table
 
 
 @dataclass(frozen=True, slots=True)
 class _Row:
-    """One kind of goods; ``is_of_floor``: the length is a part of the load floor's."""
+    """One kind of goods; ``is_of_floor``: the length is a fraction of the load floor's length."""
 
-    extent: Extent
+    extent: LoadExtent
     is_of_floor: bool = False
 
 
 CARRIED: Final[Mapping[Carries, _Row]] = MappingProxyType(
     {
-        Carries.PALLETS: _Row(Extent(1.5, 0.35, 1.1, 0.3)),  # one or two, 1.2 m long (ISO 6780), as they are stacked
-        Carries.PARCELS: _Row(Extent(0.9, 0.25, 1.0, 0.3), is_of_floor=True),
-        Carries.LONG_GOODS: _Row(Extent(3.0, 0.3, 0.4, 0.5)),
-        Carries.TOOLS: _Row(Extent(0.8, 0.25, 1.1, 0.3), is_of_floor=True),  # racks along the walls
-        Carries.MIXED: _Row(Extent(0.9, 0.3, 0.9, 0.35), is_of_floor=True),  # and as many compact loads
+        Carries.PALLETS: _Row(
+            LoadExtent(1.5, 0.35, 1.1, 0.3)
+        ),  # one or two, 1.2 m long (ISO 6780), as they are stacked
+        Carries.PARCELS: _Row(LoadExtent(0.9, 0.25, 1.0, 0.3), is_of_floor=True),
+        Carries.LONG_GOODS: _Row(LoadExtent(3.0, 0.3, 0.4, 0.5)),
+        Carries.TOOLS: _Row(LoadExtent(0.8, 0.25, 1.1, 0.3), is_of_floor=True),  # racks along the walls
+        Carries.MIXED: _Row(LoadExtent(0.9, 0.3, 0.9, 0.35), is_of_floor=True),  # and as many compact loads
     }
 )
-"""Chosen from what such goods measure; `benchmarks.accuracy budget` shows what each row costs and holds."""
+"""Chosen from the dimensions of such goods; `benchmarks.accuracy budget` measures the effect of each row."""
 
-HABIT_PART: Final = 0.5  # of the variance of log s: what one vehicle's loads have in common; chosen
+HABIT_PART: Final = 0.5  # chosen: part of the variance of log s that all loads of one vehicle share
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShapePrior:
     """Probabilities (m,) of the logarithm of s (m,), s in m2; they add up to 1. ``habit`` (0 to 1) is the part of its
-    variance that is the same for all loads of the vehicle.
+    variance that all loads of the vehicle share.
     """
 
     log_s: F64
@@ -82,30 +82,30 @@ class ShapePrior:
 
     @property
     def mean(self) -> float:
-        """Of log s."""
+        """Mean of log s."""
         return float(self.probability @ self.log_s)
 
     @property
     def median(self) -> float:
-        """Of log s."""
+        """Median of log s."""
         return float(np.interp(0.5, np.cumsum(self.probability), self.log_s))
 
     @property
     def variance(self) -> float:
-        """Of log s."""
+        """Variance of log s."""
         return float(self.probability @ (self.log_s - self.mean) ** 2)
 
 
 def is_said(vehicle: Vehicle) -> bool:
-    """Whether the fitter said anything of the shape of loads."""
+    """Whether the fitter stated anything about the shape of loads."""
     return vehicle.payload_length_m is not None or vehicle.carries not in (None, Carries.MIXED)
 
 
 def shape_prior(vehicle: Vehicle, known_s_m2: float, known_std: float) -> ShapePrior:
-    """What is believed of a load's shape before it is weighed.
+    """The prior of a load's shape.
 
-    ``known_s_m2`` is s of the known loads as calibration found it, ``known_std`` the standard deviation of its
-    logarithm. Where nobody said what is carried, half of all loads are like those.
+    ``known_s_m2`` is s of the known loads as calibrated, ``known_std`` the standard deviation of its logarithm. If
+    nobody stated what is carried, half of all loads are taken to be like those.
     """
     log_s = np.linspace(log(0.002), log(0.4), 96) + 2.0 * log(vehicle.wheelbase_m)
     density = np.zeros_like(log_s)
@@ -120,7 +120,7 @@ def shape_prior(vehicle: Vehicle, known_s_m2: float, known_std: float) -> ShapeP
 
 
 def _points(vehicle: Vehicle) -> Iterator[tuple[float, float]]:
-    """s (m2) with its weight over all lengths, heights and outlying parts that the vehicle's loads may have."""
+    """s (m2) with its weight, over the lengths, heights and outlying parts that the vehicle's loads may have."""
     extent = _extent(vehicle)
     normal, weights = np.polynomial.hermite_e.hermegauss(7)
     for (x, wx), (y, wy) in product(zip(normal, weights, strict=True), repeat=2):
@@ -133,22 +133,22 @@ def _points(vehicle: Vehicle) -> Iterator[tuple[float, float]]:
             yield float(own + apart + BODY_MASS_PART * lifted_m**2), float(wx * wy * weight)
 
 
-def _extent(vehicle: Vehicle) -> Extent:
+def _extent(vehicle: Vehicle) -> LoadExtent:
     if vehicle.payload_length_m is not None:
         height_m, height_scatter = USUAL_HEIGHT_M
         if vehicle.payload_height_m is not None:
             height_m, height_scatter = vehicle.payload_height_m, LENGTH_SCATTER
-        return Extent(vehicle.payload_length_m, LENGTH_SCATTER, height_m, height_scatter)
+        return LoadExtent(vehicle.payload_length_m, LENGTH_SCATTER, height_m, height_scatter)
     row = CARRIED[Carries(vehicle.carries or Carries.MIXED)]
     extent = row.extent
     floor_m = FLOOR_PER_WHEELBASE * vehicle.wheelbase_m if row.is_of_floor else 1.0
     height_m = extent.height_m if vehicle.payload_height_m is None else vehicle.payload_height_m
-    return Extent(extent.length_m * floor_m, extent.length_scatter, height_m, extent.height_scatter)
+    return LoadExtent(extent.length_m * floor_m, extent.length_scatter, height_m, extent.height_scatter)
 
 
 def _outlying(vehicle: Vehicle) -> list[tuple[float, float, float, float]]:
-    """Which part of a load stands how far behind and above the rest, with weights: in half of all loads where the
-    vehicle has a roof rack or a tow bar.
+    """The part of a load that is away from the rest, its distance behind and above (m), and the weight of each case.
+    Half of all loads have such a part if the vehicle has a roof rack or a tow bar.
     """
     places = [(0.0, ROOF_ABOVE_FLOOR_LOAD_M)] * vehicle.roof_rack + [(TOW_BAR_BEHIND_LOAD_M, 0.0)] * vehicle.tow_bar
     if not places:

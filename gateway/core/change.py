@@ -1,15 +1,15 @@
-"""How likely it is that the load changed between two groups of batches, and by how much: the one detector of changes.
+"""The probability that the load changed between two groups of batches, and the size of the change.
 
-What batches of one load share hides no change (gateway.posterior), so that without a change the difference x of two
-groups, of payload, front share and lateral place, is N(0, V0) with the covariance of their own errors. With a change of
-d kg, d ~ N(0, s^2), the payload differs by d, and what is moved moves the centre of gravity by g_f d and g_y d for a
-place nobody knows, so that x ~ N((d, 0, 0), V1 + diag(0, (g_f d)^2, (g_y d)^2)), V1 being the covariance of two loads'
-difference. The Bayes factor is the ratio of the densities,
+Errors that batches of one load share do not hide a change (gateway.posterior). So without a change the difference x of
+two groups, in payload, front share and lateral place, is N(0, V0), V0 being the covariance of their own errors. With a
+change of d kg, d ~ N(0, s^2), the payload differs by d, and the moved goods shift the centre of gravity by g_f d and
+g_y d, at an unknown place. So x ~ N((d, 0, 0), V1 + diag(0, (g_f d)^2, (g_y d)^2)), V1 being the covariance of the
+difference of two loads. The Bayes factor is the ratio of the densities,
 
     B = int N(d; 0, s^2) N(x; (d, 0, 0), V(d)) dd / N(x; 0, V0),
 
-and the probability of a change p B / (1 - p + p B) with p what it was before (Kass & Raftery, Bayes factors,
-J. Am. Stat. Assoc. 90 (1995) 773-795, equations 1 and 2).
+and the probability of a change is p B / (1 - p + p B) with the prior probability p (Kass & Raftery, Bayes factors, J.
+Am. Stat. Assoc. 90 (1995) 773-795, equations 1 and 2).
 """
 
 import math
@@ -17,33 +17,33 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.special import expit, logit
 
+from gateway.core.late import special
 from gateway.core.vehicle import Vehicle
 from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, difference
 from gateway.quantity import Quantity
 from gateway.records import F64
 
-SPREAD_SHARE: Final = 0.25  # of the payload range: what is loaded or unloaded at a stop, one standard deviation
-PLACE_ALONG_SHARE: Final = 0.3  # of the wheelbase: where it lies, about the centre of gravity
-PLACE_ACROSS_M: Final = 0.3
-LEAST_RANGE_KG: Final = 100.0
-ROLLING: Final = 0.001  # how likely a change is between two batches without a stop
-EVEN: Final = 0.5
+SPREAD_SHARE: Final = 0.25  # chosen: of the payload range, standard deviation of the change at a stop
+PLACE_ALONG_SHARE: Final = 0.3  # chosen: of the wheelbase, standard deviation of the moved goods' place
+PLACE_ACROSS_M: Final = 0.3  # chosen: likewise across, within the body's width
+LEAST_RANGE_KG: Final = 100.0  # chosen: a narrower payload range is not what the vehicle can carry
+ROLLING: Final = 0.001  # chosen: prior probability of a change between two batches without a stop
+EVEN: Final = 0.5  # more likely than not
 _NODES: Final = np.linspace(-6.0, 6.0, 241)  # standard deviations about the difference found
 _STEP: Final = float(_NODES[1] - _NODES[0])
 
 
 @dataclass(frozen=True, slots=True)
 class Rules:
-    """What a vehicle's size says of loads: how much they change at a stop, and what an empty one is."""
+    """The scale of load changes and the vehicle's mass, from its size."""
 
     range_kg: float = 1000.0
     mass_kg: float = 2000.0
 
     @classmethod
     def of(cls, vehicle: Vehicle) -> "Rules":
-        """By the campaign's vehicle."""
+        """The rules for a campaign's vehicle."""
         low, high = vehicle.payload_range_kg
         return cls(max(high - low, LEAST_RANGE_KG), vehicle.empty_mass_kg + 0.5 * (low + high))
 
@@ -53,15 +53,15 @@ class Rules:
 
 
 def probability(before: Posterior, after: Posterior, prior: float, rules: Rules) -> float:
-    """That the load changed between them, 0 to 1; ``prior`` is what it was before anything was weighed.
+    """The probability, 0 to 1, that the load changed between two groups; ``prior`` is the probability before weighing.
 
-    By logarithms of odds: after a round of short hops the prior is 1 to the last digit, and its odds are no number.
+    It adds logarithms of odds: after several short stops the prior rounds to 1, and its odds are infinite.
     """
-    return float(expit(logit(prior) + _log_bayes_factor(before, after, rules)))
+    return float(special.expit(special.logit(prior) + _log_bayes_factor(before, after, rules)))
 
 
 def change_of(before: Posterior, after: Posterior) -> Quantity:
-    """By how many kg the load changed, the two being different loads."""
+    """The change of payload in kg, given that the two are different loads."""
     mean, covariance = difference(before, after, is_one_load=False)
     return Quantity.normal(float(mean[PAYLOAD]), math.sqrt(float(covariance[PAYLOAD, PAYLOAD])))
 
@@ -83,7 +83,7 @@ def _log_bayes_factor(before: Posterior, after: Posterior, rules: Rules) -> floa
 
 
 def _log_normal(x: F64, covariance: F64) -> F64:
-    """(m,) logarithms of the densities at x (m, d) of N(0, covariance (m, d, d))."""
+    """(m,) log densities of N(0, covariance (m, d, d)) at x (m, d)."""
     _, log_determinant = np.linalg.slogdet(2.0 * math.pi * covariance)
     scaled = np.linalg.solve(covariance, x[..., None])[..., 0]
     logs: F64 = -0.5 * (np.sum(x * scaled, axis=-1) + log_determinant)

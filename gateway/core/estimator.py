@@ -1,4 +1,4 @@
-"""The one interface of every estimator, the list of them, and the gates they have in common."""
+"""The common interface of the estimators, their table, and their common gates."""
 
 import math
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ from gateway.records import Batch, Why
 
 
 class Estimator(Protocol):
-    """Turns a batch that passed the common gates into numbers, or into reasons of its own."""
+    """Turns a batch that passed the common gates into numbers, or into reasons."""
 
     def __call__(self, batch: Batch, calibrated: CalibratedVehicle, blank: Estimate) -> Estimate:
         """Return ``blank`` with numbers filled in, or with ``rejected`` set."""
@@ -28,16 +28,16 @@ class Estimator(Protocol):
 
 
 BROKEN_DOWN: Final = (ArithmeticError, ValueError)
-"""What numpy.linalg (LinAlgError is a ValueError), math and scipy.linalg raise on numbers."""
+"""The numerical errors of numpy.linalg (LinAlgError is a ValueError), math and scipy.linalg."""
 
 
 def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str) -> Estimate:
-    """What ``batch`` tells by the named estimator: numbers, or why not.
+    """The estimate of ``batch`` by the named estimator: numbers, or reasons for a refusal.
 
-    Never raises on a batch, whatever its samples are: where the numbers break down on the way, or the answer is not
-    finite, the batch is refused for it. Raises KeyError for an estimator that does not exist.
+    Never raises on a batch, whatever its samples. If the computation breaks down or its result is not finite, the batch
+    is refused with NO_SOLUTION. Raises KeyError for an unknown estimator.
     """
-    with np.errstate(all="ignore"):  # an overflow is judged by what becomes of it
+    with np.errstate(all="ignore"):  # overflows show up as non-finite results below
         blank = _blank(batch, calibrated, estimator)
         if calibrated is None or batch.rejected:
             return blank
@@ -49,7 +49,9 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
             if not found.counted:
                 return found
             if calibrated.is_out_of_range(found.payload.interval95, found.front_share.interval95):
-                return found.refused(Why.OUT_OF_RANGE)  # known loads have the error of the stated share in common
+                return found.refused(
+                    Why.OUT_OF_RANGE
+                )  # checked without the error of the stated share, which known loads share
             answer = _as_stated(found, calibrated.vehicle)
             return answer if _is_sound(answer.posterior) else answer.refused(Why.NO_SOLUTION)
         except BROKEN_DOWN:
@@ -57,7 +59,7 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
 
 
 def _is_sound(posterior: Posterior | None) -> bool:
-    """Finite throughout, with errors of its own in every direction; so is no posterior at all."""
+    """Whether the posterior is finite and its own covariance is positive definite; True for None."""
     if posterior is None:
         return True
     parts = (posterior.mean, posterior.own, np.array(posterior.tails), *posterior.sources.values())
@@ -65,7 +67,7 @@ def _is_sound(posterior: Posterior | None) -> bool:
 
 
 def _blank(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str) -> Estimate:
-    """Without an answer: what every estimate tells of its batch."""
+    """The estimate without an answer: the fields that describe the batch."""
     spectra = spectra_of(batch)
     return Estimate(
         t_start_ns=batch.t_start_ns,
@@ -85,11 +87,11 @@ def _blank(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str) -
 
 
 def _as_stated(found: Estimate, vehicle: Vehicle) -> Estimate:
-    """With the error of the empty vehicle's front share, in proportion to the empty vehicle's part of the mass.
+    """``found`` with the error of the empty vehicle's stated front share as a source.
 
-    Known loads are placed by it, and the half-car that they calibrate takes an error of it up: refitted with another
-    share s it finds payloads as before and front shares D moved as statics has it, D (M + L) = s M + the part of L that
-    rests on the front axle, so that dD / ds = M / (M + L).
+    Known loads are placed by the stated share s, and the half-car they calibrate absorbs its error: refitted with
+    another s it gives the same payloads, and front shares D that follow from statics, D (M + L) = s M + the part of L
+    on the front axle. So dD / ds = M / (M + L).
     """
     if found.posterior is None or found.posterior.size <= FRONT_SHARE:
         return found
@@ -100,13 +102,13 @@ def _as_stated(found: Estimate, vehicle: Vehicle) -> Estimate:
 
 
 def _roll_usable_share(batch: Batch) -> float:
-    """NaN without a roll rate in the signal map, and where nothing of the batch is usable."""
+    """NaN if the signal map has no roll rate, or no sample of the batch is usable."""
     share = batch.roll_usable_share
     return share if share is not None and batch.usable.any() else math.nan
 
 
 def _by_cross_spectrum(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate) -> Estimate:
-    """The half-car held against both sensors' cross-spectra; the ratio indexes are shown beside it if calibrated."""
+    """Fit the half-car to both sensors' cross-spectra; add the ratio indexes for display if they are calibrated."""
     if calibrated.cross_spectrum is None:
         return replace(blank, rejected=(Why.NO_CALIBRATION,))
     if calibrated.ratio_index is not None:
@@ -116,7 +118,7 @@ def _by_cross_spectrum(batch: Batch, calibrated: CalibratedVehicle, blank: Estim
 
 
 def _by_ratio_index(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate) -> Estimate:
-    """The paper's estimator, kept for comparison."""
+    """The paper's estimator, for comparison."""
     if calibrated.ratio_index is None:
         return replace(blank, rejected=(Why.NO_CALIBRATION,))
     found = by_ratio_index(batch, calibrated.ratio_index, blank)

@@ -42,7 +42,7 @@ from gateway.records import Batch, Motion, Why
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Whose estimates these are."""
+    """The vehicle that the estimates belong to."""
 
     vehicle_id: str | None = None
     vin: str | None = None
@@ -50,18 +50,17 @@ class Identity:
 
 OnBatch = Callable[[Batch, Estimate, Motion], None]
 _TOO_LITTLE: Final = frozenset({Why.TOO_SHORT, Why.SPEED_SPREAD, Why.TOO_UNCERTAIN, Why.AMBIGUOUS})
-"""More driving mends these."""
+"""Reasons that go away with more driving."""
 
 
 class Flow:
-    """Scheduler, pool and estimator in a row. Feed it decoded rows in order of arrival.
+    """Scheduler, pool and estimator in sequence. Feed it decoded rows in order of arrival.
 
-    What comes out are estimates and refusals, one after the other in time, and between them remainders: windows with
-    too little driving in them, which wait in the pool (core.pool) for what follows.
-
-    ``knowledge``, what known weights taught, may be set from any thread and counts from the next batch on; ``weighed``
-    is the last load epoch with a counted batch, as measured: what a known weight is of. ``on_batch`` hears of every
-    window before its estimate leaves: with the last one that it gave, and with the rows it was made of.
+    It yields estimates and refusals in order of time, and between them remainders: windows with too little driving,
+    which wait in the pool (core.pool) for later windows.
+    ``knowledge`` (from known weights) may be set from any thread and applies from the next batch on. ``weighed`` is the
+    last load epoch with a counted batch, as measured; a known weight refers to it. ``on_batch`` is called for each
+    window before its estimate is returned, with the last estimate and the rows.
     """
 
     def __init__(
@@ -83,7 +82,7 @@ class Flow:
         self._drive_start_ns: int | None = None
         self._is_epoch_over = False
         self._pool: Parts = ()
-        self._open_s = 0.0  # usable, of the window that is open, as the last look at it has told
+        self._open_s = 0.0  # usable time in the open window, by its last provisional estimate
         self.knowledge = knowledge
         self.weighed: WeighedLoad | None = None
         self._rules = Rules.of(calibrated.vehicle) if calibrated else Rules()
@@ -91,7 +90,7 @@ class Flow:
 
     @property
     def load_may_have_changed(self) -> bool:
-        """True where the vehicle has driven on since ``weighed`` after a stop long enough to load or unload."""
+        """True if the vehicle has driven on since ``weighed`` after a stop long enough to load or unload."""
         weighed, drive_start_ns = self.weighed, self.scheduler.drive_start_ns
         if weighed is None or drive_start_ns is None:
             return False
@@ -99,28 +98,28 @@ class Flow:
 
     @property
     def missing_s(self) -> float:
-        """How much usable driving the next batch still lacks, as far as the window that is open was looked at."""
+        """Usable driving (s) that the next batch still lacks, as of the last provisional estimate."""
         return max(0.0, missing_s(self._pool, self.settings) - self._open_s)
 
     def branch(self) -> "Flow":
-        """Another that goes on from here: what either is fed leaves no trace in the other."""
+        """An independent copy that continues from here."""
         other = copy(self)
         other.scheduler = self.scheduler.branch()
         return other
 
     def feed(self, motion: Motion) -> Iterator[Estimate]:
-        """What the windows that end with these rows gave, provisional looks among it."""
+        """The estimates of the windows that end with these rows, provisional ones included."""
         for window in self.scheduler.feed(motion):
             yield from self.weigh(window)
 
     def flush(self, ended_by: Why | None = None) -> Iterator[Estimate]:
-        """The stream has ended, or something has broken it: what the open window still tells."""
+        """Close the open window, because the stream ended or broke, and yield its estimates."""
         for window in self.scheduler.flush(ended_by):
             yield from self.weigh(window)
 
     def weigh(self, window: Batch) -> list[Estimate]:
-        """What a window of ``scheduler`` taught, one estimate at least; they come in order, each once. :meth:`feed` and
-        :meth:`flush` do it.
+        """The estimates of a window of ``scheduler``, at least one, in order of time. :meth:`feed` and :meth:`flush`
+        call it.
         """
         rows = self.scheduler.take_rows()
         found = [self._early(window)] if window.is_provisional else self._of_window(window, rows)
@@ -157,9 +156,9 @@ class Flow:
         return [self._remainder(window, way)]
 
     def _of_parts(self, parts: Parts, rows: Motion) -> list[Estimate]:
-        """As much as a batch must have: one estimate, or one for each load where the load changed at a stop.
+        """The estimates once the pool holds enough for a batch: one, or one per load if the load changed at a stop.
 
-        Loads that were gone before this window had too little for a batch, and are told no more.
+        Loads that were gone before this window had too little driving for a batch, and get no estimate.
         """
         window, way = parts[-1].batch, parts[-1].way
         begin_ns, end_ns = parts[0].batch.t_start_ns, window.t_end_ns
@@ -175,7 +174,7 @@ class Flow:
         return [self._of_load(parts, rows, *load) for load in loads if load[1] > window.t_start_ns]
 
     def _of_load(self, parts: Parts, rows: Motion, begin_ns: int, end_ns: int) -> Estimate:
-        """One of several loads, from begin to end. The last one, where it is too short to be told, waits."""
+        """The estimate of one of several loads, from begin to end. If the last is too short, it waits in the pool."""
         window = parts[-1].batch
         batch, piece = (spanned(which, begin_ns, end_ns) for which in (parts, parts[-1:]))
         before = parts[-1].way.before if piece.t_start_ns == window.t_start_ns else UNWATCHED
@@ -190,19 +189,19 @@ class Flow:
         return self._remainder(piece, way)
 
     def _posterior(self, stretch: Batch) -> Posterior | None:
-        """As measured; None where it cannot be weighed."""
+        """The posterior as measured; None if the stretch cannot be weighed."""
         found = estimate(stretch, self._calibrated, self._estimator)
         return found.posterior if found.counted else None
 
     def _remainder(self, window: Batch, way: Way) -> Estimate:
-        """Of a window that is no batch, or a piece of one."""
+        """The result for a window, or a piece of one, that is not a batch."""
         blank = estimate(replace(window, rejected=window.rejected or (Why.TOO_SHORT,)), None, self._estimator)
         calibration_id = self._calibrated.id if self._calibrated else None
         found = replace(blank, rejected=window.rejected or (Why.TOO_SHORT,), calibration_id=calibration_id)
         return self._finished(window, replace(self._named(found), is_remainder=True, way=way, spectra=None))
 
     def _counted(self, batch: Batch, way: Way, way_start_ns: int, *, is_new_load: bool = False) -> Estimate:
-        """An estimate or a refusal; its way may begin later than the batch."""
+        """An estimate or a refusal. Its distance may be counted from later than the batch's start."""
         since_ns = None if way_start_ns == batch.t_start_ns else way_start_ns
         found = self._named(estimate(batch, self._calibrated, self._estimator))
         return self._finished(batch, replace(found, way=replace(way, since_ns=since_ns)), is_new_load=is_new_load)
@@ -217,7 +216,7 @@ class Flow:
         return replace(found, vehicle_id=self._identity.vehicle_id, vin=self._identity.vin)
 
     def _shown(self, found: Estimate, epoch: LoadEpoch | None = None) -> Estimate:
-        """As it leaves: with what known weights taught, the weights that follow and the budget of the error."""
+        """The estimate as published: corrected by known weights, with the weights on the road and the error budget."""
         if found.posterior is not None:
             found = self._with_knowledge(found, epoch)
         if self._calibrated is None:
@@ -242,7 +241,7 @@ class Flow:
         return replace(answer, epoch=None if epoch is None else epoch_of(known(epoch.posterior), epoch.n_batches))
 
     def _fused(self, batch: Batch, found: Estimate, is_new_load: bool) -> LoadEpoch | None:
-        """The load epoch that this batch belongs to; a new drive, a long stop or a load changed at a stop opens one."""
+        """The load epoch of this batch; a new drive, a long stop or a changed load opens a new one."""
         is_new_drive = batch.drive_start_ns != self._drive_start_ns
         self._drive_start_ns = batch.drive_start_ns
         could_have_changed = is_new_load or is_new_drive or batch.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S

@@ -1,10 +1,10 @@
-"""Load epochs: what consecutive batches show together while nobody can have changed the load.
+"""Load epochs: consecutive batches fused while the load cannot have changed.
 
     epoch = fused_epoch(epoch, estimate, rules)      # epoch is None at first
     replace(estimate, epoch=epoch_of(epoch.posterior, epoch.n_batches))
 
-Only a batch's own error averages out; what batches of one load share stays, and cancels when two are compared
-(gateway.posterior). A batch that does not fit opens a new epoch by itself.
+Only a batch's own error averages out. The error that batches of one load share remains, and cancels in a comparison of
+two batches (gateway.posterior). A batch that does not fit opens a new epoch.
 """
 
 import math
@@ -16,15 +16,15 @@ from gateway.core.change import EVEN, ROLLING, Rules, probability
 from gateway.estimate import Epoch, Estimate
 from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, fused
 
-STOP_THAT_ENDS_EPOCH_S: Final = 60.0
-BATCH_IDS: Final = 20  # the newest that a weighed load names; it may rest on more
+STOP_THAT_ENDS_EPOCH_S: Final = 60.0  # chosen: time enough to load or unload
+BATCH_IDS: Final = 20  # chosen: newest batch ids kept per weighed load
 
 
 @dataclass(frozen=True)
 class LoadEpoch:
-    """All that is known of one load, since t_start_ns: the posteriors of its batches, as measured.
+    """The posteriors, as measured, of the batches of one load since t_start_ns.
 
-    ``is_change`` is true where a jump opened it.
+    ``is_change`` is true if a jump between batches opened the epoch.
     """
 
     t_start_ns: int
@@ -33,7 +33,7 @@ class LoadEpoch:
 
     @cached_property
     def posterior(self) -> Posterior:
-        """Of all batches together."""
+        """The posterior of all batches together."""
         return fused(self.batches)
 
     @property
@@ -43,9 +43,10 @@ class LoadEpoch:
 
 @dataclass(frozen=True, slots=True)
 class WeighedLoad:
-    """The last load that was weighed, and the batches it rests on: what a known weight is of.
+    """The last weighed load and its batches; a known weight refers to it.
 
-    ``drive_start_ns`` and ``t_end_ns`` are of its last counted batch; ``batch_ids`` the newest, newest last.
+    ``drive_start_ns`` and ``t_end_ns`` are those of its last counted batch; ``batch_ids`` are the newest, in order of
+    time.
     """
 
     epoch: LoadEpoch
@@ -57,9 +58,9 @@ class WeighedLoad:
 def remembered(
     before: WeighedLoad | None, epoch: LoadEpoch | None, shown: Estimate, drive_start_ns: int
 ) -> WeighedLoad | None:
-    """The load after one more full batch; ``shown`` is its estimate as it leaves, ``epoch`` the epoch after it.
+    """The weighed load after one more full batch; ``shown`` is its published estimate, ``epoch`` the epoch after it.
 
-    A batch that taught nothing changes nothing, nor does a stop: the last load stays until there is another.
+    A refused batch changes nothing, nor does a stop: the last load stays until the next one is weighed.
     """
     if epoch is None or (before is not None and before.epoch is epoch):
         return before
@@ -73,8 +74,8 @@ def fused_epoch(
 ) -> LoadEpoch | None:
     """The epoch after ``estimate``: continued, or a new one after a stop or at a jump.
 
-    Rejected and provisional estimates teach nothing; after a stop they still end the old epoch. So do estimates without
-    payload and front share.
+    Rejected and provisional estimates, and those without payload and front share, add nothing; after a stop they still
+    end the old epoch.
     """
     kept = None if could_have_changed else epoch
     posterior = estimate.as_measured
@@ -88,13 +89,13 @@ def fused_epoch(
 
 
 def epoch_of(posterior: Posterior, n_batches: int) -> Epoch:
-    """The quantities of a posterior that so many batches make up."""
+    """The quantities of a posterior fused from ``n_batches``."""
     payload, front_share, cg_left = (posterior.quantity(i) for i in (PAYLOAD, FRONT_SHARE, CG_LEFT))
     return Epoch(payload, front_share, n_batches, cg_left, posterior)
 
 
 def teaches(estimate: Estimate) -> bool:
-    """Whether a load can be learned from it: a whole batch with payload and front share."""
+    """Whether a load can be fused from this estimate: a whole batch with payload and front share."""
     posterior = estimate.posterior
     if not estimate.counted or estimate.is_provisional or posterior is None or posterior.size <= FRONT_SHARE:
         return False

@@ -1,4 +1,4 @@
-"""From the rows of a window to the way of its batch; from rows between drives to what was seen meanwhile."""
+"""The way of a batch from the rows of its window, and the door and ignition state between drives."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -13,17 +13,17 @@ from gateway.estimate import NOWHERE, UNWATCHED, Place, Stop, Watched, Way
 from gateway.records import F64, I64, JOURNEY, Batch, Bool, Motion, SensorTraits, Signal
 from gateway.units import NS_PER_S
 
-LEAST_STOP_S: Final = 10.0  # a shorter one is traffic
-MOST_STOPS: Final = 30  # of a batch: stamps that leap must not fill a record
-COARSEST_ODOMETER_M: Final = 100.0  # one that counts whole kilometres tells less than the speed does
+LEAST_STOP_S: Final = 10.0  # chosen: a shorter stop is traffic
+MOST_STOPS: Final = 30  # chosen: limit per batch, so that jumping time stamps cannot fill a record
+COARSEST_ODOMETER_M: Final = 100.0  # chosen: an odometer in whole kilometres is less precise than the integrated speed
 _FIRST_NS, _LAST_NS = int(np.iinfo(np.int64).min), int(np.iinfo(np.int64).max)
-PLACE_WITHIN_S: Final = 10.0  # a position this far from the moment still counts as its place
+PLACE_WITHIN_S: Final = 10.0  # chosen: oldest position that still counts for a moment
 
 
 def way_of(
     rows: Motion, batch: Batch, settings: BatchSettings, traits: Mapping[Signal, SensorTraits], before: Watched
 ) -> Way:
-    """The way of a batch, from the rows of its window (and maybe some beyond) and its speed on the grid."""
+    """The way of a batch, from the rows of its window (more rows do no harm) and its speed on the grid."""
     rows = rows.rows((rows.t_ns >= batch.t_start_ns) & (rows.t_ns < batch.t_end_ns)) if _has_journey(rows) else rows
     speed_mps, rate_hz = batch.speed_mps, batch.rate_hz
     known = np.isfinite(speed_mps)
@@ -52,7 +52,7 @@ def _has_journey(rows: Motion) -> bool:
 
 
 def watched(rows: Motion, begin_ns: int, end_ns: int) -> Watched:
-    """What door and ignition did from begin to end, both included."""
+    """Whether the door opened and the ignition went off from begin to end, both inclusive."""
     return Watched(
         _happened(rows, Signal.DOOR, begin_ns, end_ns, lambda x: x > 0.0),
         _happened(rows, Signal.IGNITION, begin_ns, end_ns, lambda x: x == 0.0),
@@ -60,7 +60,7 @@ def watched(rows: Motion, begin_ns: int, end_ns: int) -> Watched:
 
 
 def watched_all(parts: Iterable[Motion]) -> Watched:
-    """Likewise over all rows, whatever their stamps."""
+    """The same over all rows, whatever their time stamps."""
     seen = UNWATCHED
     for rows in parts:
         if _has_journey(rows):
@@ -75,7 +75,7 @@ def _happened(rows: Motion, signal: Signal, begin_ns: int, end_ns: int, is_so: C
 
 
 def _stands(still: Bool, rate_hz: float, start_ns: int) -> list[tuple[int, int]]:
-    """From and to of every standstill that is long enough, or that touches an end of the batch."""
+    """Begin and end (ns) of every standstill that is long enough or touches an end of the batch."""
     return [
         (start_ns + round(begin / rate_hz * NS_PER_S), start_ns + round(end / rate_hz * NS_PER_S))
         for begin, end in runs_of(still).tolist()
@@ -84,7 +84,7 @@ def _stands(still: Bool, rate_hz: float, start_ns: int) -> list[tuple[int, int]]
 
 
 def _odometer(rows: Motion, traits: Mapping[Signal, SensorTraits]) -> tuple[float, float]:
-    """First and last reading; unknown where it counts too coarsely."""
+    """First and last reading (m); NaN if the odometer's resolution is too coarse."""
     _, x = sort_by_time(*rows.of(Signal.ODOMETER))
     trait = traits.get(Signal.ODOMETER, SensorTraits())
     if not x.size or trait.resolution > COARSEST_ODOMETER_M:
@@ -93,7 +93,7 @@ def _odometer(rows: Motion, traits: Mapping[Signal, SensorTraits]) -> tuple[floa
 
 
 class _Places:
-    """Positions of a window by time; none where they may not be kept."""
+    """Positions of a window by time; none if the settings forbid to keep them."""
 
     def __init__(self, rows: Motion, decimals: int | None) -> None:
         self._decimals = decimals
@@ -102,7 +102,7 @@ class _Places:
         self._longitude = empty if decimals is None else sort_by_time(*rows.of(Signal.LONGITUDE))
 
     def at(self, t_ns: int) -> Place:
-        """The nearest position in time, rounded."""
+        """The position nearest in time, rounded."""
         latitude, longitude = self._nearest(self._latitude, t_ns), self._nearest(self._longitude, t_ns)
         return NOWHERE if latitude is None or longitude is None else Place(latitude, longitude)
 

@@ -1,18 +1,17 @@
-"""What known weights teach: a vehicle weighed empty, on a scale, or by its delivery note conditions the sources of
-error.
+"""Known weights (an empty vehicle, a weighbridge ticket, a delivery note) condition the sources of error.
 
     knowledge = Knowledge.of(observations, now_ns)
     known = knowledge.applied(posterior, t_ns)
 
 The error of an estimate is its own error plus the columns of its sources times their unknown z ~ N(0, I)
-(gateway.posterior). A load that is known makes the error of its estimate known, up to what is its own, and so says
-something of z: a Kalman update (R. E. Kalman, J. Basic Eng. 82, 1960). Every later estimate then becomes
+(gateway.posterior). With a known load the error of the estimate is known except for its own part, which conditions z: a
+Kalman update (R. E. Kalman, J. Basic Eng. 82, 1960). Every later estimate then becomes
 
     mean + S E[z],    own + S Cov[z] S'
 
-The day's sources forget, as temperature and wear do. What lasts for one load is part of the observation's noise. The
-state is computed from the list of observations whenever it is asked for, so that taking one back restores the numbers
-to the last bit.
+Knowledge of the daily sources (temperature, wear) decays. Errors that last for one load are part of the observation's
+noise. The state is always recomputed from the list of observations, so that removing one restores the earlier numbers
+exactly.
 """
 
 import hashlib
@@ -28,8 +27,10 @@ from gateway.posterior import ONE_LOAD, PAYLOAD, Posterior, Source
 from gateway.records import F64
 from gateway.units import NS_PER_S
 
-DAY_MEMORY_S: Final = 3.0 * 86_400.0  # over which what is known of the day's sources falls to 1/e; chosen
-CONTRADICTED: Final = 3.0  # standard deviations between a known weight and its estimate: somebody has to confirm it
+DAY_MEMORY_S: Final = 3.0 * 86_400.0  # chosen: time in which knowledge of the daily sources decays to 1/e
+CONTRADICTED: Final = (
+    3.0  # chosen: standard deviations between a known weight and its estimate beyond which a person must confirm it
+)
 
 
 class KnownWeightKind(StrEnum):
@@ -43,8 +44,8 @@ class KnownWeightKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """A known load: what was weighed, as measured (posterior), and its true payload (kg) and front share (%), the first
-    one or both, with the covariance (k, k) of their errors. It belongs to one calibration and one estimator.
+    """A known load: the posterior as measured, and the true payload (kg) and front share (%), the payload alone or
+    both, with the covariance (k, k) of their errors. It belongs to one calibration and one estimator.
     """
 
     id: str
@@ -57,18 +58,18 @@ class Observation:
 
     @property
     def off(self) -> F64:
-        """(k,) by how much the estimate exceeds the truth."""
+        """(k,) estimate minus truth."""
         return self.posterior.mean[: len(self.truth)] - self.truth
 
     @property
     def distance(self) -> float:
-        """Of the known payload from its estimate, in standard deviations of both errors."""
+        """Distance of the known payload from its estimate, in standard deviations of both errors."""
         variance = float(self.posterior.covariance[PAYLOAD, PAYLOAD] + self.truth_covariance[PAYLOAD, PAYLOAD])
         return abs(float(self.off[PAYLOAD])) / math.sqrt(variance)
 
     @property
     def is_contradicted(self) -> bool:
-        """True where the estimate under which it was made speaks against it."""
+        """True if the estimate contradicts the known weight."""
         return self.distance > CONTRADICTED
 
 
@@ -79,7 +80,7 @@ _LASTING: Final = tuple(name for name in Source if name not in ONE_LOAD)
 class Knowledge:
     """E[z] (n,) and Cov[z] (n, n) of the sources that outlast a load, after the last observation at t_ns.
 
-    ``slots`` says where each source's columns are. ``id`` is the hash of what it was learned from.
+    ``slots`` maps each source to its columns. ``id`` is the hash of the observations.
     """
 
     id: str
@@ -92,9 +93,9 @@ class Knowledge:
 
     @classmethod
     def of(cls, observations: Sequence[Observation]) -> "Knowledge | None":
-        """What these teach, in the order of their times; None where there is none.
+        """The knowledge from these observations, in order of time; None if there are none.
 
-        Raises ValueError where they are not all of one calibration and one estimator.
+        Raises ValueError if they are of several calibrations or estimators.
         """
         observations = sorted(observations, key=lambda one: (one.t_ns, one.id))
         if not observations:
@@ -111,14 +112,14 @@ class Knowledge:
         return known
 
     def is_for(self, calibration_id: str | None, estimator: str) -> bool:
-        """Whether estimates by this calibration and estimator have these sources."""
+        """Whether it applies to estimates of this calibration and estimator."""
         return (self.calibration_id, self.estimator) == (calibration_id, estimator)
 
     def applied(self, posterior: Posterior, t_ns: int) -> Posterior:
-        """``posterior`` of a batch at t_ns with what is known of its sources.
+        """``posterior`` of a batch at t_ns, conditioned on what is known of its sources.
 
-        Columns of lasting sources become R S with R R = Cov[z]: they still stand for causes that all batches share. R
-        is the symmetric root, the one closest to the identity, so that each column keeps most of its own source.
+        Columns of lasting sources become R S with R R = Cov[z], so that they still stand for causes that all batches
+        share. R is the symmetric root, the closest to the identity, so that each column keeps most of its own source.
         """
         now = self._at(t_ns)
         columns = now._columns(posterior)
@@ -131,7 +132,7 @@ class Knowledge:
         return replace(posterior, mean=posterior.mean - columns.T @ now.mean, sources={**posterior.sources, **known})
 
     def _at(self, t_ns: int) -> "Knowledge":
-        """What is still known later: the day's part decays towards what any day may be."""
+        """The knowledge at a later time: the daily part decays towards its prior."""
         place = self.slots.get(Source.DAY)
         kept = math.exp(-max(0.0, (t_ns - self.t_ns) / NS_PER_S) / DAY_MEMORY_S)
         if place is None or kept == 1.0:

@@ -1,12 +1,12 @@
 """Stretches of one load, pooled until they make a batch.
 
     parts = (*parts, Part(window, way))      # windows in order, each as the scheduler cut it
-    spanned(parts, begin_ns, end_ns)         # all that was driven in that time, as one batch
+    spanned(parts, begin_ns, end_ns)         # all driving in that time, as one batch
     changes_of(parts, weigh, rules)          # the stops at which the load changed
 
-A window with too little driving in it is no batch, and what it has is not lost: it waits for the windows after it, over
-the stops between them. Every stop of 10 s and more is a possible border of a load. The stretches between the borders
-are weighed one by one, and neighbours that agree are joined (core.loads); what is left are the loads.
+A window with too little driving is no batch, but its data are not lost: it waits for later windows, across the stops
+between them. Every stop of 10 s or more may separate two loads. The stretches between such stops are weighed one by
+one, and neighbours that agree are merged (core.loads).
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +19,7 @@ import numpy as np
 from gateway.core.bends import joined_gains
 from gateway.core.change import Rules
 from gateway.core.journey import LEAST_STOP_S
-from gateway.core.loads import Halt, Link, Weighing, halts_of, loads_of
+from gateway.core.loads import Halt, LoadLink, Weighing, halts_of, loads_of
 from gateway.core.settings import BatchSettings
 from gateway.core.spectrum import longest_run
 from gateway.estimate import Estimate, Way
@@ -27,13 +27,12 @@ from gateway.posterior import Posterior
 from gateway.records import F64, Batch, Bool, Why
 from gateway.units import NS_PER_S
 
-LEAST_RUN_S: Final = 6.0  # of unbroken usable driving, in which a segment of a spectrum fits
-LEAST_SIDE_S: Final = 30.0  # usable on one side of a border, to be weighed against the other
-LEAST_LOAD_S: Final = 60.0  # usable with one load after a change, to be told: as early as an early look
-PARTED_FROM: Final = 0.9  # as likely must a change be, as for an event to be told: stretches are short, and scatter
-MOST_DRIVEN_S: Final = 1800.0  # without a batch; then the time is refused, and the pool begins anew
-MOST_BREAK_S: Final = 3600.0  # springs and sensors are no longer as warm as they were
-# all of them chosen
+LEAST_RUN_S: Final = 6.0  # chosen: unbroken usable driving that holds one segment of a spectrum
+LEAST_SIDE_S: Final = 30.0  # chosen: usable driving on each side of a border between loads
+LEAST_LOAD_S: Final = 60.0  # chosen: usable driving for an estimate after a change, as for a provisional estimate
+PARTED_FROM: Final = 0.9  # chosen: least probability of a change; short stretches scatter
+MOST_DRIVEN_S: Final = 1800.0  # chosen: driving without a batch, after which it is refused and the pool is emptied
+MOST_BREAK_S: Final = 3600.0  # chosen: after a longer break springs and sensors have another temperature
 
 _FAULTS: Final = frozenset({Why.GRAVITY_MISSING, Why.SENSOR_RATE_LOW, Why.TIME_STAMPS})
 
@@ -51,7 +50,7 @@ class Part:
 
     @property
     def driven_s(self) -> float:
-        """Of the whole window, stops included."""
+        """Duration of the whole window, stops included."""
         return self.batch.duration_s
 
 
@@ -60,7 +59,7 @@ Weigh = Callable[[Batch], Posterior | None]
 
 
 def can_be_pooled(window: Batch, settings: BatchSettings) -> bool:
-    """True where nothing but too little driving keeps a window from being a batch: no fault of a sensor."""
+    """True if only a lack of driving keeps a window from being a batch, and no fault of a sensor."""
     if not _FAULTS.isdisjoint(window.rejected) or window.gap_share > settings.gap_share_max:
         return False
     n_at_speed = np.count_nonzero(~(window.speed_mps < settings.speed_min_mps))
@@ -68,13 +67,13 @@ def can_be_pooled(window: Batch, settings: BatchSettings) -> bool:
 
 
 def has_stretch(window: Batch) -> bool:
-    """Whether any spectrum fits into what is usable of it."""
+    """Whether its usable driving holds a segment of a spectrum."""
     return longest_run(window.usable) >= LEAST_RUN_S * window.rate_hz
 
 
 def continued(parts: Parts, window: Batch) -> Parts:
-    """What a window may be pooled with: nothing after a long break or a clock put back; nor, where it is a batch by
-    itself, anything of another drive.
+    """The parts that a window may be pooled with: none after a long break or a clock set back; and, if the window is a
+    batch by itself, none of another drive.
     """
     if not parts:
         return ()
@@ -85,22 +84,22 @@ def continued(parts: Parts, window: Batch) -> Parts:
 
 
 def is_batch(parts: Parts, settings: BatchSettings) -> bool:
-    """Whether they are as long, and as much of them usable, as a batch must be."""
+    """Whether the parts have the duration and the usable driving of a batch."""
     return missing_s(parts, settings) <= 0.0 and driven_s(parts) >= settings.last_batch_share_min * settings.window_s
 
 
 def driven_s(parts: Parts) -> float:
-    """Of all windows, stops included."""
+    """Duration of all windows, stops included."""
     return sum(part.driven_s for part in parts)
 
 
 def missing_s(parts: Parts, settings: BatchSettings) -> float:
-    """How much usable driving a batch still lacks."""
+    """Usable driving (s) that a batch still lacks."""
     return settings.usable_share_min * settings.window_s - sum(part.usable_s for part in parts)
 
 
 def changes_of(parts: Parts, weigh: Weigh, rules: Rules) -> list[int]:
-    """The middles (ns) of the stops at which the load changed, in order. Weighs nothing where there is no border."""
+    """The middles (ns) of the stops at which the load changed, in order. Weighs nothing if there is no such stop."""
     blanks = [Estimate(one.batch.t_start_ns, one.batch.t_end_ns, "", way=one.way) for one in parts]
     begin_ns, end_ns = blanks[0].t_start_ns, blanks[-1].t_end_ns
     borders = [
@@ -115,7 +114,7 @@ def changes_of(parts: Parts, weigh: Weigh, rules: Rules) -> list[int]:
     found = [weigh(spanned(parts, *span)) for span in pairwise(bounds)]
     weighings = [Weighing(i, (None, ""), one, one) for i, one in enumerate(found) if one is not None]
     links = [
-        Link(tuple(halts[one.at : other.at]), bounds[one.at + 1], bounds[other.at])
+        LoadLink(tuple(halts[one.at : other.at]), bounds[one.at + 1], bounds[other.at])
         for one, other in pairwise(weighings)
     ]
     loads = loads_of(weighings, links, rules, PARTED_FROM).loads if weighings else ()
@@ -123,7 +122,7 @@ def changes_of(parts: Parts, weigh: Weigh, rules: Rules) -> list[int]:
 
 
 def _with_sides(parts: Parts, halts: list[Halt]) -> list[Halt]:
-    """The borders that have enough on either side to be weighed; the unlikeliest go first."""
+    """The borders with enough driving on either side; drops the least likely ones first."""
     begin_ns, end_ns = parts[0].batch.t_start_ns, parts[-1].batch.t_end_ns
     while halts:
         bounds = [begin_ns, *(halt.middle[1] for halt in halts), end_ns]
@@ -144,10 +143,10 @@ def usable_s(parts: Parts, begin_ns: int, end_ns: int) -> float:
 
 
 def spanned(parts: Sequence[Part], begin_ns: int, end_ns: int) -> Batch:
-    """What was driven from begin to end (at least a part of one window), as one batch that nothing keeps from counting.
+    """The driving from begin to end (at least a part of one window) as one batch without rejections.
 
-    Breaks between windows are left out: its arrays hold what its windows hold, and the last sample of each window is
-    masked, so that no segment crosses into the next. Shares are those of the windows by their length.
+    Breaks between windows are left out: the arrays are those of the windows joined, with the last sample of each
+    masked, so that no segment crosses into the next. Shares are weighted by the windows' lengths.
     """
     cuts = [cut for part in parts if len((cut := _cut(part.batch, begin_ns, end_ns)).usable)]
     if len(cuts) == 1:
@@ -202,7 +201,7 @@ def _cut(window: Batch, begin_ns: int, end_ns: int) -> Batch:
 
 
 def _samples(window: Batch, begin_ns: int, end_ns: int) -> slice:
-    """Those of a window from begin to end; none where it lies elsewhere."""
+    """The slice of a window's samples from begin to end; empty if the window is elsewhere."""
     n, since_ns = len(window.usable), window.t_start_ns
     begin, end = (round((t_ns - since_ns) * window.rate_hz / NS_PER_S) for t_ns in (begin_ns, end_ns))
     begin = min(max(begin, 0), n)

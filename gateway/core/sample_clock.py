@@ -1,16 +1,16 @@
-"""When samples were taken, told from when their frames came: the steady clock of the sensor behind late stamps.
+"""When samples were taken, inferred from when their frames came: the sensor's steady clock behind late stamps.
 
-    sample_times(t_ns)  -> Timing, or None where no steady clock can be believed
-    retimed(t_ns, x)    -> times of samples x, by the clock where that shows them smoother, and which can be believed
+    sample_times(t_ns)  -> Timing, or None if no steady clock explains the stamps
+    retimed(t_ns, x)    -> times of samples x, by the clock where that makes them smoother, and which are believed
 
-Both take the message counter as well, where there is one: it tells lost frames from late ones whatever the delays.
+Both also take a message counter, if there is one: it distinguishes lost frames from late ones whatever the delays.
 
-A sensor samples at a steady rate. A stamp is later than its sample by what bus, driver and computer took, and
-that is never less than a certain least: delays come and go, but a lost frame shifts all that follow by one period
-for good. So the number of a sample is its place in the row, plus as many periods as the least delay of the samples
-that follow has grown (the lower envelope: V. Paxson, "On calibrating measurements of packet transit times",
-SIGMETRICS 1998). That least delay, but for whole periods, is how the two clocks run against one another, and
-moves slowly. A line through stamps over numbers, piece by piece, is then the sensor's clock.
+A sensor samples at a steady rate. A stamp is later than its sample by the delay of bus, driver and computer, which has
+a lower bound. Delays come and go, but a lost frame shifts all later frames by one period for good. So the number of a
+sample is its index plus the growth, in periods, of the least delay of the samples after it (the lower envelope: V.
+Paxson, "On calibrating measurements of packet transit times", SIGMETRICS 1998). Apart from whole periods, that least
+delay is the drift between the two clocks, which is slow. A piecewise line through stamps over numbers is then the
+sensor's clock.
 """
 
 from dataclasses import dataclass
@@ -18,40 +18,40 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
+from gateway.core.late import ndimage
 from gateway.records import F64, I64, Bool
 from gateway.units import NS_PER_S
 
-LEAST_SAMPLES: Final = 200  # fewer fill no segment of a spectrum
-SILENCE_S: Final = 1.0  # longer than a computer stalls
-AHEAD: Final = 101  # samples of which one is taken to come without delay: a second at 100 Hz
-SLOWLY: Final = 400  # samples over which the two clocks are taken to run alike
-LAG: Final = 512  # a mean interval over so many samples hardly knows of heaps
-ROUNDS: Final = 3  # each makes the period about as much more accurate as there are samples in SLOWLY
-FEW_LOST_SHARE: Final = 0.01  # a mean interval is the period only where hardly a frame is lost
-STEADY_SHARE: Final = 0.2  # of a period: stamps that scatter less about a clock tell every lost frame
-MOST_LOST_SHARE: Final = 0.5
-UNSURE_SHARE: Final = 0.3  # of a period: a least delay so far from whole periods tells no number
-MOST_UNSURE_SHARE: Final = 0.15  # of the samples; by chance it would be two fifths
-FEW_SHORT_SHARE: Final = 0.01
-CLEARLY: Final = 1.05  # as much as a mean distance from the neighbours may differ and change no estimate
-OUTLYING: Final = 10.0  # of the median distance: more counts no more
-SHORT_PIECE: Final = 200
-MOST_SHORT_PIECES: Final = 16
-USUAL_WITHIN: Final = 0.1  # of the median interval: jitter moves it no further
-PIECE: Final = 1000  # samples of one piece of the line
-OFTEN_ROUND: Final = 20  # a counter that would have gone round so often has shown its highest number
-MOSTLY: Final = 0.5  # of the intervals: a message counter goes on by one same step where no frame is lost
-OFF_S: Final = 0.25  # no frame is so late by rule: stamps and counter contradict each other
-FEW_OFF_SHARE: Final = 0.01
+LEAST_SAMPLES: Final = 200  # chosen: fewer do not fill a segment of a spectrum
+SILENCE_S: Final = 1.0  # chosen: longer than a computer stalls
+AHEAD: Final = 101  # chosen: at least one sample in this many has no delay; a second at 100 Hz
+SLOWLY: Final = 400  # chosen: samples over which the drift between the clocks is constant
+LAG: Final = 512  # chosen: over this many samples bursts hardly affect the mean interval
+ROUNDS: Final = 3  # chosen: each round improves the period by about a factor SLOWLY
+FEW_LOST_SHARE: Final = 0.01  # chosen: the mean interval is the period only if fewer frames are lost
+STEADY_SHARE: Final = 0.2  # chosen: of a period; with less scatter every lost frame shows
+MOST_LOST_SHARE: Final = 0.5  # chosen: with more lost frames the numbering is a guess
+UNSURE_SHARE: Final = 0.3  # chosen: of a period; a least delay further from whole periods gives no number
+MOST_UNSURE_SHARE: Final = 0.15  # chosen: of the samples; random delays would give 0.4
+FEW_SHORT_SHARE: Final = 0.01  # chosen: of the intervals of even stamps
+CLEARLY: Final = 1.05  # chosen: a smaller ratio of mean distances does not change an estimate
+OUTLYING: Final = 10.0  # chosen: of the median distance, where distances are clipped
+SHORT_PIECE: Final = 200  # chosen: samples per piece of the periodogram
+MOST_SHORT_PIECES: Final = 16  # chosen: enough for a peak, and fast
+USUAL_WITHIN: Final = 0.1  # chosen: of the median interval; jitter shifts it less
+PIECE: Final = 1000  # chosen: samples per piece of the line
+OFTEN_ROUND: Final = 20  # chosen: after this many turns a counter has shown its highest number
+MOSTLY: Final = 0.5  # chosen: of the intervals; without losses a message counter advances by a constant step
+OFF_S: Final = 0.25  # chosen: a larger delay means that stamps and counter contradict each other
+FEW_OFF_SHARE: Final = 0.01  # chosen: of the samples; more contradictions disqualify the counter
 
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """Times of samples (n,) in ns, rising; period_s is the clock's, delay_s (n,) by how much each stamp came late.
+    """Times of samples (n,) in ns, rising; period_s is the clock's period, delay_s (n,) the delay of each stamp.
 
-    delay_s is about its own median: the least delay there is cannot be seen.
+    delay_s is relative to its own median: the absolute least delay cannot be observed.
     """
 
     t_ns: I64
@@ -61,11 +61,11 @@ class Timing:
 
 
 def retimed(t_ns: I64, x: F64, counter: I64 | None = None, modulus: int = 0) -> tuple[I64, Bool]:
-    """Stamps and samples (n,), in order of arrival -> times (n,), and whether each can be believed (n,).
+    """Stamps and samples (n,), in order of arrival -> times (n,), and whether each is believed (n,).
 
-    Stretches that silence parts have each a clock of their own. A stamp was measured, a clock is inferred: stamps
-    stay unless the samples are clearly smoother over the clock's times. Without a clock they are believed where
-    they are even; a stretch too short to tell is left as it is.
+    Stretches separated by silence have a clock each. A stamp is measured and a clock is inferred, so stamps are kept
+    unless the samples are clearly smoother over the clock's times. If there is no clock, even stamps are believed; a
+    stretch too short to judge is left as it is.
     """
     edges = np.r_[0, np.flatnonzero(np.diff(t_ns) > SILENCE_S * NS_PER_S) + 1, len(t_ns)]
     times_ns, is_believed = t_ns.copy(), np.ones(len(t_ns), np.bool_)
@@ -82,13 +82,13 @@ def retimed(t_ns: I64, x: F64, counter: I64 | None = None, modulus: int = 0) -> 
 
 
 def _is_even(t_ns: I64) -> bool:
-    """Whether hardly an interval is so short that what is drawn through its two samples swings out beyond them."""
+    """Whether few intervals are so short that a curve through their two samples would overshoot."""
     intervals_ns = np.diff(t_ns)
     return float(np.mean(intervals_ns < 0.5 * np.median(intervals_ns))) < FEW_SHORT_SHARE
 
 
 def _is_smoother(clock_ns: I64, stamps_ns: I64, x: F64) -> bool:
-    """Whether each sample follows clearly better from its neighbours over the clock's times than over the stamps."""
+    """Whether samples agree clearly better with their neighbours over the clock's times than over the stamps."""
     by_clock, by_stamps = _off_neighbours(clock_ns, x), _off_neighbours(stamps_ns, x)
     most = OUTLYING * float(np.median(by_clock)) + np.finfo(float).tiny
     return float(np.mean(np.minimum(by_stamps, most))) > CLEARLY * float(np.mean(np.minimum(by_clock, most)))
@@ -105,14 +105,14 @@ def _off_neighbours(t_ns: I64, x: F64) -> F64:
             others = [other for other in nodes if other is not node]
             drawn += x[k : len(x) - 4 + k] * np.prod([(at - other) / (node - other) for other in others], axis=0)
     off = np.abs(x[2:-2] - drawn)
-    return np.where(np.isfinite(off), off, np.inf)  # two samples at one time: nothing can be drawn through them
+    return np.where(np.isfinite(off), off, np.inf)  # two samples with one time stamp have no interpolating cubic
 
 
 def sample_times(t_ns: I64, counter: I64 | None = None, modulus: int = 0) -> Timing | None:
-    """When samples were taken whose frames were stamped t_ns (n,), in order of arrival and never falling.
+    """The sampling times of frames with stamps t_ns (n,), in order of arrival and never falling.
 
-    ``counter`` (n,) counts messages modulo ``modulus``; one that the stamps contradict is passed over. None where no
-    steady clock is behind the stamps, and where lost and late frames cannot be told apart.
+    ``counter`` (n,) counts messages modulo ``modulus``; a counter that the stamps contradict is ignored. None if no
+    steady clock explains the stamps, or if lost and late frames cannot be distinguished.
     """
     if len(t_ns) < LEAST_SAMPLES:
         return None
@@ -145,10 +145,10 @@ def _timing(t_ns: I64, numbers: I64) -> Timing:
 
 
 def _usual_period_s(t_s: F64) -> float:
-    """The period near the usual interval to which most stamps keep, whatever was lost; 0 where there is none.
+    """The period near the median interval that most stamps keep, whatever was lost; 0 if there is none.
 
-    The period of largest |sum exp(j 2 pi t / T)| over short pieces (the periodogram of a point process: M. S.
-    Bartlett, "The spectral analysis of point processes", J. R. Stat. Soc. B 25, 1963).
+    The period of largest |sum exp(j 2 pi t / T)| over short pieces (the periodogram of a point process: M. S. Bartlett,
+    "The spectral analysis of point processes", J. R. Stat. Soc. B 25, 1963).
     """
     usual_s = float(np.median(np.diff(t_s)))
     if not usual_s > 0.0:
@@ -162,12 +162,12 @@ def _usual_period_s(t_s: F64) -> float:
 
 
 def _numbered(t_s: F64, period_s: float) -> I64 | None:
-    """Numbers (n,) of the samples, rising from 0, by how the least delay grows; None where it tells too few."""
+    """Numbers (n,) of the samples, rising from 0, from the growth of the least delay; None if too few are certain."""
     place = np.arange(len(t_s))
     for _ in range(ROUNDS):
         least_s = _least_ahead(t_s - place * period_s)
         turn = np.exp(2j * np.pi / period_s * least_s)  # whole periods do not turn it
-        slow = uniform_filter1d(turn.real, SLOWLY) + 1j * uniform_filter1d(turn.imag, SLOWLY)
+        slow = ndimage.uniform_filter1d(turn.real, SLOWLY) + 1j * ndimage.uniform_filter1d(turn.imag, SLOWLY)
         drift_s = np.unwrap(np.angle(slow)) * (period_s / (2.0 * np.pi))
         lost = (least_s - drift_s) / period_s
         whole = np.rint(lost)
@@ -179,12 +179,12 @@ def _numbered(t_s: F64, period_s: float) -> I64 | None:
 
 
 def _least_ahead(late_s: F64) -> F64:
-    """(n,) the least of each sample and those that follow it, AHEAD in all."""
-    return np.asarray(minimum_filter1d(late_s, AHEAD, mode="nearest", origin=-(AHEAD // 2)), float)
+    """(n,) the minimum over each sample and those after it, AHEAD in all."""
+    return np.asarray(ndimage.minimum_filter1d(late_s, AHEAD, mode="nearest", origin=-(AHEAD // 2)), float)
 
 
 def _timing_by(counter: I64, modulus: int, t_ns: I64, mean_s: float) -> Timing | None:
-    """The clock by the message counter; None where it is none, or goes round too fast for stamps so late."""
+    """The clock by the message counter; None if it does not count, or wraps too fast for such late stamps."""
     if len(counter) >= OFTEN_ROUND * modulus:
         modulus = int(np.max(counter)) + 1  # four bits often count from 0 to 14 only
     ahead = np.diff(counter) % modulus if modulus > 1 else np.zeros(len(counter) - 1, np.int64)
@@ -203,9 +203,9 @@ def _timing_by(counter: I64, modulus: int, t_ns: I64, mean_s: float) -> Timing |
 
 
 def _unrolled(ahead: I64, modulus: int, waits: F64) -> I64:
-    """Numbers (n + 1,) from steps of the counter; ``waits`` (n,) in steps tell how often it went round meanwhile.
+    """Numbers (n + 1,) from steps of the counter; ``waits`` (n,) in steps give how often it wrapped in between.
 
-    A frame sent twice makes no step, and one that was overtaken a step back.
+    A frame sent twice gives no step, and an overtaken one a step back.
     """
     rounds = np.rint((waits - ahead) / modulus)
     numbers: I64 = np.r_[0, np.cumsum(ahead + modulus * rounds)].astype(np.int64)
@@ -213,7 +213,7 @@ def _unrolled(ahead: I64, modulus: int, waits: F64) -> I64:
 
 
 def _clock(t_s: F64, numbers: I64) -> tuple[F64, float]:
-    """Times (n,) by a line through stamps over numbers that bends from piece to piece, and its mean period."""
+    """Times (n,) by a piecewise line through stamps over numbers, and its mean period in s."""
     slope_s, begin_s = np.polyfit(numbers, t_s, 1)
     line_s = begin_s + slope_s * numbers
     off_s = t_s - line_s
@@ -225,6 +225,6 @@ def _clock(t_s: F64, numbers: I64) -> tuple[F64, float]:
 
 
 def _midmean(x: F64) -> float:
-    """Mean of the middle half: as firm as a median, and steady where heaps leave only a few delays there are."""
+    """Mean of the middle half: as robust as a median, and steady where bursts leave only a few distinct delays."""
     quarter = len(x) // 4
     return float(np.mean(np.sort(x)[quarter : len(x) - quarter]))

@@ -1,7 +1,7 @@
 """The batch scheduler: cuts the stream of decoded rows into drives, and drives into windows.
 
-What it decides depends on the rows and their order alone, never on how they were chunked or on any
-clock: the live service and the offline tools therefore form the same batches.
+Its decisions depend on the rows and their order alone, not on how they were chunked or on any clock. So the live
+service and the offline tools form the same batches.
 """
 
 from collections.abc import Generator, Iterator
@@ -9,7 +9,7 @@ from copy import copy
 
 import numpy as np
 
-from gateway.core.batch import Traits, Window, build_batch
+from gateway.core.batch import BatchWindow, Traits, build_batch
 from gateway.core.journey import watched_all, way_of
 from gateway.core.settings import BatchSettings
 from gateway.estimate import UNWATCHED, Watched, Way
@@ -19,20 +19,19 @@ from gateway.units import NS_PER_S
 _NEVER_NS = int(np.iinfo(np.int64).max)  # later than any stamp
 _MOVING = _NEVER_NS  # "standing since never"
 _SPEEDS = (Signal.SPEED, Signal.WHEEL_SPEED)
-_MOST_ROWS_PER_S = 3000  # of a window: no bus carries more of an inertial sensor; stamps that stand still would
-_MOST_ROWS = 1_500_000
-_LOOSE = 512  # rows come in small parts; so many become one, for a part costs more than the row in it
+_MOST_ROWS_PER_S = 3000  # chosen: no bus carries more of an inertial sensor; only stuck time stamps reach it
+_MOST_ROWS = 1_500_000  # chosen: of a window, for bounded memory
+_LOOSE = 512  # chosen: small parts merged into one, because each part has a fixed cost
 
 
 class Scheduler:
     """Feed it rows in order of arrival; it yields a Batch whenever a window ends.
 
-    A drive begins with the first row and ends after ``standstill_s`` of standstill, ``silence_s``
-    without a row, a step back of the clock, or when its stamps stand all but still: a window holds no
-    more rows than a bus can carry in its time. Windows follow one another from its first row. After
-    a standstill the next drive begins when the vehicle moves again. Rows that come later than their
-    window are counted in ``n_late_rows``. A row of nothing but a roll rate is kept, and decides nothing; so are rows
-    aside, as many of them as of the others at most.
+    A drive begins with the first row. It ends after ``standstill_s`` of standstill, after ``silence_s`` without a row,
+    at a backward step of the clock, or when time stamps hardly advance: a window holds no more rows than a bus can
+    carry in its time. Windows follow one another from the first row. After a standstill the next drive begins when the
+    vehicle moves again. ``n_late_rows`` counts rows that come after their window. Rows with nothing but a roll rate,
+    and rows aside, are kept but decide nothing; the number of rows aside is limited like that of the others.
     """
 
     def __init__(self, settings: BatchSettings, traits: Traits) -> None:
@@ -47,8 +46,8 @@ class Scheduler:
         self._provisional_ns = 0
         self._newest_ns: int | None = None  # None between drives
         self._still_since_ns: int = _MOVING
-        self._between: Watched = UNWATCHED  # what was seen since the last drive ended
-        self._before: Watched = UNWATCHED  # and before the first window that is open now
+        self._between: Watched = UNWATCHED  # door and ignition since the last drive ended
+        self._before: Watched = UNWATCHED  # the same before the open window, if it is the drive's first
         self.is_parked = False
         self.n_late_rows = 0
         self._rows_of_last: Motion | None = None
@@ -56,34 +55,36 @@ class Scheduler:
 
     @property
     def silence_s(self) -> float:
-        """So long without a row ends a drive."""
+        """Silence (s) that ends a drive."""
         return self._settings.silence_s
 
     @property
     def drive_start_ns(self) -> int | None:
-        """Of the drive that is under way; None between drives. Safe from any thread."""
+        """Start of the current drive; None between drives. Safe from any thread."""
         return None if self._newest_ns is None else self._drive_start_ns
 
     @property
     def newest_ns(self) -> int | None:
-        """The newest stamp of the drive that is under way; None between drives. Safe from any thread."""
+        """The newest stamp of the current drive; None between drives. Safe from any thread."""
         return self._newest_ns
 
     @property
     def open_window_ns(self) -> tuple[int, int] | None:
-        """Where the open window begins, and the newest stamp in it; None between drives. Safe from any thread."""
+        """Begin of the open window and its newest stamp; None between drives. Safe from any thread."""
         newest_ns = self._newest_ns
         return None if newest_ns is None else (self._window_start_ns, max(self._window_start_ns, newest_ns))
 
     def take_rows(self) -> Motion:
-        """Those that the batch yielded last was made of, and maybe some beyond its window; given once."""
+        """The rows of the batch yielded last, possibly with rows beyond its window. Can be taken once. Raises
+        ValueError if there is none.
+        """
         rows, self._rows_of_last = self._rows_of_last, None
         if rows is None:
             raise ValueError("no batch was yielded since rows were last taken")
         return rows
 
     def branch(self) -> "Scheduler":
-        """Another that goes on from here: what either is fed leaves no trace in the other."""
+        """An independent copy that continues from here."""
         other = copy(self)
         other._rows, other._loose = list(self._rows), list(self._loose)
         return other
@@ -98,7 +99,7 @@ class Scheduler:
                 begin += yield from self._advance(motion.part(begin, len(motion)))
 
     def flush(self, ended_by: Why | None = None) -> Iterator[Batch]:
-        """The stream has ended, or something has broken it: close the window that is open."""
+        """Close the open window, because the stream ended or broke."""
         if self._newest_ns is not None:
             yield from self._end_drive(self._newest_ns, ended_by)
 
@@ -129,12 +130,14 @@ class Scheduler:
         return n
 
     def _deciding_times(self, t_ns: I64, decides: Bool) -> I64:
-        """(n,) the stamp of each row; of one that decides nothing, that of the last one before it that does."""
+        """(n,) the stamp of each row; a row that decides nothing gets the stamp of the last row before it that does."""
         last = np.maximum.accumulate(np.where(decides, np.arange(len(t_ns)), -1))
         return np.where(last >= 0, t_ns[last], self._newest_ns or 0)
 
     def _next_break(self, t_ns: I64) -> tuple[int, Why | None]:
-        """First row that silence or a backward clock step parts from those before it, and which."""
+        """Index of the first row after silence or a backward clock step, and which of both; all rows and None without
+        one.
+        """
         newest_ns = np.maximum.accumulate(np.r_[self._newest_ns or 0, t_ns])[:-1]
         ahead_ns = t_ns - newest_ns
         is_silence = ahead_ns > self._ns(self._settings.silence_s)
@@ -145,7 +148,7 @@ class Scheduler:
         return first, Why.GAP if is_silence[first] else Why.CLOCK_STEP
 
     def _standing_since(self, rows: Motion) -> I64:
-        """(n,) since when the vehicle stands, as the speeds up to each row tell; _MOVING where it does not."""
+        """(n,) time since which the vehicle stands, by the speeds up to each row; _MOVING if it moves."""
         moving, still = self._moving_and_still(rows)
         at = np.arange(len(rows))
         last_moving = np.maximum.accumulate(np.where(moving, at, -1))
@@ -158,13 +161,13 @@ class Scheduler:
         return np.where(stands, since_ns, _MOVING)
 
     def _moving_and_still(self, rows: Motion) -> tuple[Bool, Bool]:
-        """(n,) rows whose speeds say that the vehicle moves, or stands; neither where they say nothing."""
+        """(n,) rows whose speeds say that the vehicle moves, and (n,) that it stands; neither without a speed."""
         speeds = [rows.columns[:, rows.signals.index(s)] for s in _SPEEDS if s in rows.signals]
         fastest = np.fmax.reduce([np.full(len(rows), np.nan), *speeds])
         return fastest >= self._settings.standstill_speed_mps, fastest < self._settings.standstill_speed_mps
 
     def _cut(self, rows: Motion, newest_ns: I64) -> Iterator[Batch]:
-        """Unbroken rows of one drive: kept, and cut at window ends and provisional marks."""
+        """Keep the unbroken rows of one drive, and cut them at window ends and provisional marks."""
         begin = 0
         while begin < len(rows):
             mark_ns = self._next_mark_ns()
@@ -202,7 +205,7 @@ class Scheduler:
         return min(window_end_ns, self._provisional_ns) if self._settings.provisional_every_s else window_end_ns
 
     def _reach(self, mark_ns: int) -> Batch:
-        """A row at or past ``mark_ns`` has come: the window ends there, or is looked at provisionally."""
+        """A row at or after ``mark_ns`` has come: end the window there, or build a provisional batch."""
         if mark_ns < self._window_start_ns + self._ns(self._settings.window_s):
             self._provisional_ns += self._ns(self._settings.provisional_every_s)
             return self._build(mark_ns, is_provisional=True)
@@ -212,7 +215,7 @@ class Scheduler:
         return batch
 
     def _overflow(self) -> Batch:
-        """A window that holds all it may ends where it stands, by a nanosecond at least."""
+        """End a full window at its newest stamp, at least a nanosecond after its start."""
         t_end_ns = max(self._newest_ns or 0, self._window_start_ns + 1)
         batch = self._build(t_end_ns, Why.TIME_STAMPS)
         self._begin_window(t_end_ns)
@@ -241,7 +244,7 @@ class Scheduler:
         self._newest_ns = None
 
     def _skip_until_moving(self, motion: Motion) -> int:
-        """How many rows to pass over until the vehicle moves; a moving row wakes the scheduler."""
+        """How many rows to skip until the vehicle moves; a moving row ends the parked state."""
         moving = np.flatnonzero(self._moving_and_still(motion)[0])
         n = int(moving[0]) if moving.size else len(motion)
         self._between = self._between.joined(watched_all([motion.part(0, n)]))
@@ -251,7 +254,7 @@ class Scheduler:
     def _build(self, t_end_ns: int, ended_by: Why | None = None, *, is_provisional: bool = False) -> Batch:
         self._rows, self._loose = [joined([*self._rows, *self._loose])], []
         self._rows_of_last = self._rows[0]
-        window = Window(self._window_start_ns, t_end_ns, self._drive_start_ns, ended_by, is_provisional)
+        window = BatchWindow(self._window_start_ns, t_end_ns, self._drive_start_ns, ended_by, is_provisional)
         batch = build_batch(self._rows[0], window, self._settings, self._traits)
         self.way_of_last = way_of(self._rows[0], batch, self._settings, self._traits, self._before)
         return batch
@@ -262,7 +265,7 @@ class Scheduler:
 
 
 def _decides(rows: Motion) -> Bool:
-    """(n,) False where a row is aside, or carries nothing but a roll rate: drives and windows do not hang on it."""
+    """(n,) False for rows that do not affect drives and windows: rows aside, and rows with nothing but a roll rate."""
     decides: Bool = np.ones(len(rows), bool) if rows.aside is None else ~rows.aside
     if Signal.ROLL_RATE not in rows.signals:
         return decides

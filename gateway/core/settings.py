@@ -1,4 +1,4 @@
-"""How batches are formed and gated. Defaults are those of the service; config.py describes them to people."""
+"""How batches are formed and gated. The defaults are the service's; config.py describes them to users."""
 
 from dataclasses import dataclass
 

@@ -7,27 +7,27 @@ import numpy as np
 
 from gateway.records import C128, F64, I64, Batch, Bool, Spectra
 
-BAND_HZ: Final = (1.0, 15.0)
-REFERENCE_SPEED_MPS: Final = 80.0 / 3.6
+BAND_HZ: Final = (1.0, 15.0)  # chosen: of the roughness, body and wheel resonances
+REFERENCE_SPEED_MPS: Final = 80.0 / 3.6  # chosen: speed that the roughness refers to
 
-DISPLAY_SEGMENT_N = 256
-DISPLAY_BAND_HZ = (0.5, 15.0)
+DISPLAY_SEGMENT_N = 256  # chosen: 0.2 Hz at 50 Hz
+DISPLAY_BAND_HZ = (0.5, 15.0)  # chosen: around the bands of the estimators
 
 
 def runs_of(mask: Bool) -> I64:
-    """(k, 2) begin and end of every unbroken run of True in ``mask`` (n,); the end is the first sample after it."""
+    """(k, 2) begin and end of every unbroken run of True in ``mask`` (n,); the end is the first index after it."""
     return np.flatnonzero(np.diff(np.r_[False, mask, False].astype(np.int8))).reshape(-1, 2)
 
 
 def longest_run(mask: Bool) -> int:
-    """How many samples the longest unbroken run of True has; 0 if there is none."""
+    """Length of the longest unbroken run of True, in samples; 0 if there is none."""
     return int(np.max(np.diff(runs_of(mask)), initial=0))
 
 
 def segment_starts(usable: Bool, n_segment: int, n_step: int) -> I64:
-    """First samples (k,) of the segments of ``n_segment`` samples that lie wholly in ``usable`` (n,).
+    """First samples (k,) of the segments of ``n_segment`` samples that are entirely usable.
 
-    Within each unbroken run segments follow one another every ``n_step`` samples.
+    Within each unbroken run of ``usable`` (n,) a segment begins every ``n_step`` samples.
     """
     runs = [np.arange(begin, end - n_segment + 1, n_step) for begin, end in runs_of(usable).tolist()]
     return np.concatenate([*runs, np.empty(0, np.int64)]).astype(np.int64)
@@ -57,7 +57,7 @@ def frequencies_hz(n_segment: int, rate_hz: float) -> F64:
 
 
 def _detrended(segments: F64) -> F64:
-    """Each row less its least-squares straight line."""
+    """Each row minus its least-squares straight line."""
     n = segments.shape[1]
     ramp = np.linspace(-1.0, 1.0, n)
     slope = segments @ ramp / np.sum(ramp**2)
@@ -66,7 +66,7 @@ def _detrended(segments: F64) -> F64:
 
 
 def spectra_of(batch: Batch) -> Spectra | None:
-    """Auto- and cross-spectra of a batch for display; None where no segment fits between the gaps."""
+    """Auto- and cross-spectra of a batch for display; None if no segment fits between the gaps."""
     has_both = np.isfinite(batch.vertical_acceleration_mps2) & np.isfinite(batch.pitch_rate_radps)
     starts = segment_starts(batch.usable & has_both, DISPLAY_SEGMENT_N, DISPLAY_SEGMENT_N // 2)
     if not starts.size:
@@ -89,11 +89,11 @@ def spectra_of(batch: Batch) -> Spectra | None:
 
 
 def roughness_mps2(spectra: Spectra | None, mean_speed_mps: float) -> float:
-    """Root mean square of the vertical acceleration within BAND_HZ, in m/s2, brought to 80 km/h. NaN where unknown.
+    """RMS of the vertical acceleration within BAND_HZ, in m/s2, normalised to 80 km/h. NaN where unknown.
 
-    A road of ISO 8608 has a displacement density that falls with the square of wavenumber; met at speed v
-    its power at every frequency grows in proportion to v. Divided by that, the acceleration tells road
-    from speed: sqrt(integral S_aa df) sqrt(v_ref / v). It is this vehicle's own measure, at its sensor.
+    The displacement density of a road (ISO 8608) falls with the square of the wavenumber; at speed v the power at every
+    frequency is proportional to v. So sqrt(integral S_aa df) sqrt(v_ref / v) separates road from speed. It is specific
+    to this vehicle and its sensor's place.
     """
     if spectra is None or not mean_speed_mps > 0.0 or len(spectra.freq_hz) < 2:
         return math.nan

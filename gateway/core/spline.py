@@ -1,21 +1,23 @@
-"""Piecewise cubics through points: smooth ones for signals, monotone ones for what must not overshoot.
+"""Piecewise cubics through points: smooth ones for signals, monotone ones that do not overshoot.
 
-Either is a cubic Hermite polynomial between neighbouring points; they differ in the slopes at these. scipy.interpolate
-has both, and takes as long to import as the rest of the estimator together.
+Either is a cubic Hermite polynomial between neighbouring points; they differ in the slopes there. scipy.interpolate has
+both, but its import takes as long as the rest of the estimator's.
 """
 
 from typing import Final
 
 import numpy as np
-from scipy.linalg import solve_banded
 
+from gateway.core.late import linalg
 from gateway.records import F64
 
-MOST_END_SLOPE: Final = 3.0  # of the outermost chord's: no cubic that is steeper at its end is monotone
+MOST_END_SLOPE: Final = (
+    3.0  # of the outermost chord's slope: a cubic that is steeper at its end is not monotone (Fritsch and Butland 1984)
+)
 
 
 def between(at: F64, t: F64, x: F64, slopes: F64) -> F64:
-    """(m, ...) at ``at`` (m,) of the cubics through x (n, ...) at rising t (n,), with these slopes (n, ...) there."""
+    """(m, ...) at ``at`` (m,) of the cubics through x (n, ...) at rising t (n,), with slopes (n, ...) there."""
     i = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
     several = (slice(None), *(None,) * (x.ndim - 1))
     step = np.diff(t)[several]
@@ -28,8 +30,10 @@ def between(at: F64, t: F64, x: F64, slopes: F64) -> F64:
 
 
 def smooth_slopes(t: F64, x: F64) -> F64:
-    """(n,) of the cubic spline through x (n,) at t (n,), four or more: bends are continuous, and at the second point
-    from either end the third derivative too ("not-a-knot"; C. de Boor, A Practical Guide to Splines, 1978, ch. IV).
+    """(n,) slopes of the cubic spline through x (n,) at t (n,), n >= 4, with not-a-knot ends.
+
+    Second derivatives are continuous, and at the second point from either end the third derivative too (C. de Boor, A
+    Practical Guide to Splines, 1978, ch. IV).
     """
     step, chord = np.diff(t), np.diff(x) / np.diff(t)
     first, last = t[2] - t[0], t[-1] - t[-3]
@@ -40,12 +44,14 @@ def smooth_slopes(t: F64, x: F64) -> F64:
     right[1:-1] = 3.0 * (step[1:] * chord[:-1] + step[:-1] * chord[1:])
     right[0] = ((step[0] + 2.0 * first) * step[1] * chord[0] + step[0] ** 2 * chord[1]) / first
     right[-1] = (step[-1] ** 2 * chord[-2] + (2.0 * last + step[-1]) * step[-2] * chord[-1]) / last
-    return np.asarray(solve_banded((1, 1), bands, right, overwrite_ab=True, overwrite_b=True), float)
+    return np.asarray(linalg.solve_banded((1, 1), bands, right, overwrite_ab=True, overwrite_b=True), float)
 
 
 def monotone_slopes(t: F64, x: F64) -> F64:
-    """(n, ...) with which each cubic rises or falls as its points x (n, ...) do: weighted harmonic means of the chords
-    on either side, and nothing at a peak (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat. Comput. 5, 1984).
+    """(n, ...) slopes with which each cubic is monotone between its points x (n, ...).
+
+    They are weighted harmonic means of the neighbouring chords, and 0 at a peak (F. N. Fritsch and J. Butland, SIAM J.
+    Sci. Stat. Comput. 5, 1984).
     """
     step = np.diff(t).reshape(-1, *(1,) * (x.ndim - 1))
     chord = np.diff(x, axis=0) / step
@@ -60,7 +66,7 @@ def monotone_slopes(t: F64, x: F64) -> F64:
 
 
 def _end_slope(step: F64, next_step: F64, chord: F64, next_chord: F64) -> F64:
-    """Of the parabola through the outermost three points, as far as that leaves the end monotone."""
+    """Slope of the parabola through the outermost three points, limited so that the end stays monotone."""
     slope = ((2.0 * step + next_step) * chord - step * next_chord) / (step + next_step)
     slope = np.where(slope * chord > 0.0, slope, 0.0)
     is_too_steep = (chord * next_chord <= 0.0) & (np.abs(slope) > MOST_END_SLOPE * np.abs(chord))

@@ -1,32 +1,32 @@
-"""From time-stamped samples to one uniform time line. Gaps stay gaps (NaN)."""
+"""Time-stamped samples onto one uniform time line. Gaps remain gaps (NaN)."""
 
 from functools import lru_cache
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
+from gateway.core.late import ndimage
 from gateway.core.spline import between, smooth_slopes
 from gateway.records import F64, I64, Bool
 from gateway.units import NS_PER_S
 
 PASSBAND_HZ = 16.0  # the estimators read up to 14 Hz
-STOPBAND_DB = 70.0
-FINEST_HZ = 1000.0  # no vehicle's inertial sensor is faster; stamps that say so must not cost memory for it
+STOPBAND_DB = 70.0  # chosen: aliases fall below the sensors' noise
+FINEST_HZ = 1000.0  # chosen: no vehicle's inertial sensor is faster; bounds the memory for bad stamps
 
 
 def in_order_of_time(t_ns: I64) -> I64:
-    """Rows (n,) of samples in order of time, those of equal stamps in order of arrival."""
+    """Indexes (n,) that sort samples by time; equal stamps stay in order of arrival."""
     return np.argsort(t_ns, kind="stable")
 
 
 def sort_by_time(t_ns: I64, x: F64) -> tuple[I64, F64]:
-    """Samples in order of time, those of equal stamps in order of arrival."""
+    """Samples sorted by time; equal stamps stay in order of arrival."""
     order = in_order_of_time(t_ns)
     return t_ns[order], x[order]
 
 
 def sample_rate_hz(t_ns: I64) -> float:
-    """Median rate of a sensor's samples; 0 where there are fewer than two."""
+    """Median rate of a sensor's samples in Hz; 0 with fewer than two."""
     if len(t_ns) < 2:
         return 0.0
     interval_ns = float(np.median(np.diff(t_ns)))
@@ -36,11 +36,10 @@ def sample_rate_hz(t_ns: I64) -> float:
 def onto_grid(t_ns: I64, x: F64, t_start_ns: int, n: int, rate_hz: float, gap_s: float) -> F64:
     """Samples (m,) at their own times -> (n,) at ``rate_hz`` from ``t_start_ns``, NaN where unknown.
 
-    A cubic spline carries the samples to a multiple of the grid's rate near their own, and a
-    linear-phase low-pass (flat to 16 Hz, 70 dB down where it would alias below that) precedes the
-    decimation: engine firing at 40-60 Hz would otherwise fold onto the bands of the estimators.
-    Where neighbouring samples lie further apart than ``gap_s`` (and than two and a half of their
-    usual intervals), the time between them is unknown.
+    A cubic spline resamples to a multiple of the grid's rate near the sensor's own. A linear-phase low-pass (flat to 16
+    Hz, 70 dB at the frequencies that alias below that) precedes the decimation: engine firing at 40-60 Hz would
+    otherwise alias into the bands of the estimators. Where neighbouring samples are further apart than ``gap_s`` (and
+    than two and a half of their usual intervals), the time between them is unknown.
     """
     t_ns, first = np.unique(t_ns, return_index=True)
     x = x[first]
@@ -84,10 +83,10 @@ def _low_pass_taps(step: int, rate_hz: float) -> F64:
 
 
 def _low_pass(fine: F64, step: int, rate_hz: float) -> F64:
-    """Zero-phase low-pass; NaN wherever its support touches an unknown sample, the ends excepted.
+    """Zero-phase low-pass; NaN wherever its support touches an unknown sample, except at the ends.
 
-    At the ends of the window the signal is continued by odd reflection, so that a batch needs
-    nothing from before or after it.
+    At the ends of the window the signal is continued by odd reflection, so that a batch needs no samples from before or
+    after it.
     """
     taps = _low_pass_taps(step, rate_hz)
     half = len(taps) // 2
@@ -97,15 +96,15 @@ def _low_pass(fine: F64, step: int, rate_hz: float) -> F64:
     known = np.where(unknown, 0.0, fine)
     padded = np.concatenate([2 * known[0] - known[half:0:-1], known, 2 * known[-1] - known[-2 : -half - 2 : -1]])
     smooth = np.convolve(padded, taps, mode="valid")
-    touched = maximum_filter1d(unknown.astype(np.uint8), 2 * half + 1, mode="constant")
+    touched = ndimage.maximum_filter1d(unknown.astype(np.uint8), 2 * half + 1, mode="constant")
     return np.where(touched, np.nan, smooth)
 
 
 def speed_onto_grid(t_ns: I64, speed_mps: F64, t_start_ns: int, n: int, rate_hz: float, hold_s: float) -> F64:
     """GNSS speed (m,) at its own (latency-corrected) times -> (n,), linear between samples.
 
-    Between samples further apart than ``hold_s`` the speed is unknown (NaN); before the first and
-    after the last it is held for at most ``hold_s``.
+    Between samples further apart than ``hold_s`` the speed is unknown (NaN); before the first and after the last sample
+    it is held for at most ``hold_s``.
     """
     t_ns, speed_mps = sort_by_time(t_ns, speed_mps)
     if not len(t_ns):

@@ -1,4 +1,4 @@
-"""The vehicle as calibration knows it, and the statics that follow from it."""
+"""The vehicle as the campaign states it, and its statics."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -9,7 +9,7 @@ from annotated_types import Interval
 from gateway.schema import STRICT, described
 
 MEASURED_OFFSET_STD_M: Final = 0.02
-"""Of a sensor's place measured with a tape, from a wall or sill to its case and half the vehicle's width."""
+"""Chosen: a sensor's place measured with a tape, from a wall or sill to its case, and half the vehicle's width."""
 
 UNKNOWN_OFFSET_STD_M: Final = 0.3
 """Of a place nobody stated: behind either end of a dashboard, beside a seat, on a wheel arch are 0.3 to 0.6 m off."""
@@ -21,14 +21,14 @@ A choice, not a measurement: a pallet 0.8 m wide has 0.2 m to either side betwee
 """
 
 PAYLOAD_LEFT_NOTED_STD_M: Final = 0.02
-"""Of a place that was noted, measured with a tape."""
+"""Chosen: a noted place of the payload, measured with a tape."""
 
 
 class Load(NamedTuple):
-    """A payload and the front share that it gives the sprung mass.
+    """A payload and the resulting front share of the sprung mass.
 
-    The share is in percent, as people state it and files hold it; the half-car's formulas take ``front_share``,
-    0..1. The two properties of this module by that name are where one becomes the other.
+    The share is in percent, as people state it and files hold it; the half-car's formulas take ``front_share``, 0..1.
+    Only the two properties of this module with that name convert between the two.
     """
 
     payload_kg: float
@@ -41,7 +41,7 @@ class Load(NamedTuple):
 
 
 class Carries(StrEnum):
-    """What a fitter says that the vehicle usually carries."""
+    """The usual goods, as the fitter states them."""
 
     PALLETS = "pallets"
     PARCELS = "parcels"
@@ -59,10 +59,10 @@ WeightKg = Annotated[float, Interval(gt=0.0, le=100_000.0)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleFields:
-    """What a vehicle and the answers of who commissions it have in common; each field has its words and bounds once.
+    """The fields that a vehicle shares with the answers given at commissioning, each with its description and bounds.
 
-    Campaign file, calibration file, web and pages are derived from the metadata, which names pydantic's constraints.
-    The bounds are beyond any road vehicle, so that a fraction for percent, millimetres or tonnes are named at once.
+    Campaign file, calibration file, web and pages derive from the metadata, which uses pydantic's constraints. The
+    bounds exclude any road vehicle, so that fractions for percent, millimetres or tonnes are rejected at once.
     """
 
     __pydantic_config__ = STRICT
@@ -197,12 +197,12 @@ class Vehicle(VehicleFields):
 
     @property
     def sensor_left_m(self) -> float:
-        """The sensor's place left of the centre line; amidships where nobody stated it."""
+        """The sensor's place left of the centre line; 0 if nobody stated it."""
         return self.sensor_offset_left_m or 0.0
 
     @property
     def sensor_left_std_m(self) -> float:
-        """How sure that place is: as stated, else measured with a tape, else unknown."""
+        """Standard deviation of that place: as stated, else that of a tape measure, else that of an unknown place."""
         if self.sensor_offset_left_std_m is not None:
             return self.sensor_offset_left_std_m
         return UNKNOWN_OFFSET_STD_M if self.sensor_offset_left_m is None else MEASURED_OFFSET_STD_M
@@ -223,9 +223,9 @@ def front_share_pct(vehicle: Vehicle, payload_kg: float, position_m: float | Non
 
 
 def payload_position_m(vehicle: Vehicle, payload_kg: float, share_pct: float) -> float:
-    """d that gives ``share_pct`` with ``payload_kg`` aboard: the inverse of :func:`front_share_pct`.
+    """d that gives ``share_pct`` with ``payload_kg`` on board: the inverse of :func:`front_share_pct`.
 
-    Raises ZeroDivisionError without payload, where no position follows from the share.
+    Raises ZeroDivisionError without payload, where the share determines no position.
     """
     total_kg = vehicle.empty_mass_kg + payload_kg
     front_kg = share_pct / 100.0 * total_kg - vehicle.empty_front_share * vehicle.empty_mass_kg
@@ -233,7 +233,7 @@ def payload_position_m(vehicle: Vehicle, payload_kg: float, share_pct: float) ->
 
 
 def cg_left_m(vehicle: Vehicle, payload_kg: float, payload_left_m: float) -> float:
-    """Centre of gravity of the sprung mass left of the centre line, from where the payload's lies.
+    """Centre of gravity of the sprung mass, metres left of the centre line, from that of the payload.
 
     Moments about the vehicle's long axis, with y0 and y of the empty vehicle M and of the payload L:
 
@@ -244,9 +244,9 @@ def cg_left_m(vehicle: Vehicle, payload_kg: float, payload_left_m: float) -> flo
 
 
 def left_share_pct(cg_left_m: float, track_width_m: float) -> float:
-    """Share of the sprung weight on the left wheels, in percent, of a vehicle that stands on level ground.
+    """Share of the sprung weight on the left wheels, in percent, for a vehicle on level ground.
 
-    Moments about the right wheels' line of contact, with y the centre of gravity left of the centre line and w the
-    track width:  F_left w = (M + L) g (w/2 + y), so that the share is 100 (1/2 + y / w).
+    Moments about the right wheels' contact line, with y the centre of gravity left of the centre line and w the track
+    width: F_left w = (M + L) g (w/2 + y), so the share is 100 (1/2 + y / w).
     """
     return 50.0 + 100.0 * cg_left_m / track_width_m

@@ -1,4 +1,4 @@
-"""The one JSON object of an estimate, in both directions: command line, store and HTTP all show this.
+"""The JSON object of an estimate, written and read: the same on the command line, in the store and over HTTP.
 
 ``FIELDS`` is the one place that knows its names, its schema and its columns in a CSV file.
 """
@@ -11,7 +11,7 @@ from gateway.estimate_json.kinds import (
     REASONS,
     SPECTRA,
     WEIGHTS,
-    Kind,
+    FieldKind,
     spectra_from_json,
     spectra_to_json,
 )
@@ -26,7 +26,7 @@ __all__ = [
     "SPECTRA",
     "WEIGHTS",
     "EstimateField",
-    "Kind",
+    "FieldKind",
     "Presence",
     "csv_cells",
     "estimate_from_json",

@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.budget import BudgetLine, Remedy
-from gateway.estimate_json.kinds import Kind, rounded
+from gateway.estimate_json.kinds import FieldKind, rounded
 from gateway.posterior import NORMAL_TAILS, Posterior, Source
 from gateway.records import F64
 
@@ -14,7 +14,7 @@ DIGITS: Final = 7
 
 
 def posterior_to_json(posterior: Posterior) -> dict[str, Any]:
-    """Names as in the class; arrays as lists."""
+    """The JSON object of a posterior: names as in the class, arrays as lists."""
     return {
         "mean": [rounded(x, 9) for x in posterior.mean.tolist()],
         "own": _rows(posterior.own),
@@ -24,7 +24,7 @@ def posterior_to_json(posterior: Posterior) -> dict[str, Any]:
 
 
 def posterior_from_json(record: Mapping[str, Any]) -> Posterior:
-    """The inverse of :func:`posterior_to_json`, as exact as that rounds."""
+    """The inverse of :func:`posterior_to_json`, within its rounding."""
     low, high = record.get("tails", NORMAL_TAILS)
     sources = {Source(name): np.array(rows, float) for name, rows in record["sources"].items()}
     return Posterior(np.array(record["mean"], float), np.array(record["own"], float), sources, (low, high))
@@ -35,7 +35,7 @@ def _rows(matrix: F64) -> list[list[float | None]]:
 
 
 def budget_to_json(budget: Sequence[BudgetLine]) -> list[dict[str, Any]]:
-    """One object a source, as the contract has it."""
+    """The JSON array of a budget: one object per source."""
     return [
         {
             "source": line.source,
@@ -50,7 +50,7 @@ def budget_to_json(budget: Sequence[BudgetLine]) -> list[dict[str, Any]]:
 
 
 def budget_from_json(records: Sequence[Mapping[str, Any]]) -> tuple[BudgetLine, ...]:
-    """The inverse of :func:`budget_to_json`, as exact as that rounds."""
+    """The inverse of :func:`budget_to_json`, within its rounding."""
     numbers = ("payload_kg", "front_share_pct", "cg_left_m", "payload_with_remedy_kg")
     return tuple(
         BudgetLine(
@@ -62,7 +62,7 @@ def budget_from_json(records: Sequence[Mapping[str, Any]]) -> tuple[BudgetLine, 
     )
 
 
-POSTERIOR: Final = Kind(
+POSTERIOR: Final = FieldKind(
     dict[str, Any] | None, lambda one: None if one is None else posterior_to_json(one), posterior_from_json
 )
-BUDGET: Final = Kind(list[dict[str, Any]], budget_to_json, budget_from_json)
+BUDGET: Final = FieldKind(list[dict[str, Any]], budget_to_json, budget_from_json)

@@ -1,4 +1,4 @@
-"""The names of an estimate's fields in JSON, their order, kinds, words and columns in a CSV file: one table."""
+"""The table of an estimate's fields in JSON: names, order, kinds, descriptions and columns of CSV files."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from gateway.estimate_json.kinds import (
     WEIGHT_COLUMNS,
     WEIGHTS,
     WHOLE,
-    Kind,
+    FieldKind,
     weights_to_json,
 )
 from gateway.estimate_json.way import EXAMPLE, WAY
@@ -31,7 +31,7 @@ _INTERVAL95: Final = "95 % interval [low, high]"
 
 
 class Presence(Enum):
-    """Whether a field stands in every object."""
+    """Whether a field is in every object."""
 
     ALWAYS = "always"
     WHERE_KNOWN = "where_known"
@@ -46,7 +46,7 @@ class EstimateField:
 
     name: str
     path: str
-    kind: Kind
+    kind: FieldKind
     description: str | None = None
     example: Any = None
     presence: Presence = Presence.ALWAYS
@@ -54,7 +54,7 @@ class EstimateField:
 
 
 def _field(
-    name: str, path: str, kind: Kind, description: str | None = None, example: Any = None, **more: Any
+    name: str, path: str, kind: FieldKind, description: str | None = None, example: Any = None, **more: Any
 ) -> EstimateField:
     """A field that is also a column of the CSV file, by the same name."""
     return EstimateField(name, path, kind, description, example, **{"columns": (name,), **more})

@@ -12,7 +12,7 @@ from gateway.records import F64, Spectra, Why, iso_utc, ns_of
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class FieldKind:
     """How fields of one kind are written, read back and typed. ``read`` never sees null: unknown stays unknown.
 
     ``cells`` makes what was written the cells of a line of CSV.
@@ -36,13 +36,13 @@ def spectra_to_json(spectra: Spectra) -> dict[str, list[float | None]]:
 
 
 def spectra_from_json(told: Mapping[str, Sequence[float | None]]) -> Spectra:
-    """The inverse of :func:`spectra_to_json`, as exact as that rounds."""
+    """The inverse of :func:`spectra_to_json`, within its rounding."""
     names = spectra_to_json(Spectra(*[np.empty(0)] * 5))
     return Spectra(*(np.array([math.nan if x is None else x for x in told[name]]) for name in names))
 
 
 def rounded(x: float, digits: int) -> float | None:
-    """To so many significant digits; None where it is not finite."""
+    """Round to so many significant digits; None if the number is not finite."""
     return float(f"{x:.{digits}g}") if math.isfinite(x) else None
 
 
@@ -95,34 +95,34 @@ def _weight_cells(shown: Mapping[str, Mapping[str, Any]]) -> list[Any]:
 
 
 def places_over_limit(shown: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Of the JSON object of weights, those that bear more than they may."""
+    """The places over their limit in the JSON object of weights."""
     return [place for place in PLACES if shown[place]["is_over_limit"]]
 
 
-TEXT: Final = Kind(str | None, _as_is, _as_is)
-FLAG: Final = Kind(bool | None, _as_is, _as_is)
-WHOLE: Final = Kind(int | None, _as_is, _as_is)
-COUNT: Final = Kind(float | None, float, int)
-INSTANT: Final = Kind(str | None, iso_utc, ns_of)
-NUMBER: Final = Kind(float | None, lambda x: rounded(x, 9), float)
-ROUGH_NUMBER: Final = Kind(float | None, lambda x: rounded(x, 6), float)
-INTERVAL: Final = Kind(list[float] | None, _interval, tuple, cells=list)
-NUMBERS_BY_NAME: Final = Kind(
+TEXT: Final = FieldKind(str | None, _as_is, _as_is)
+FLAG: Final = FieldKind(bool | None, _as_is, _as_is)
+WHOLE: Final = FieldKind(int | None, _as_is, _as_is)
+COUNT: Final = FieldKind(float | None, float, int)
+INSTANT: Final = FieldKind(str | None, iso_utc, ns_of)
+NUMBER: Final = FieldKind(float | None, lambda x: rounded(x, 9), float)
+ROUGH_NUMBER: Final = FieldKind(float | None, lambda x: rounded(x, 6), float)
+INTERVAL: Final = FieldKind(list[float] | None, _interval, tuple, cells=list)
+NUMBERS_BY_NAME: Final = FieldKind(
     dict[str, float | None],
     lambda numbers: {name: rounded(x, 6) for name, x in numbers.items()},
     lambda told: {name: math.nan if x is None else x for name, x in told.items()},
 )
-REASONS: Final = Kind(
+REASONS: Final = FieldKind(
     list[str],
     lambda whys: [str(why) for why in whys],
     lambda told: tuple(map(Why, told)),
     lambda shown: [" ".join(shown)],
 )
-WEIGHTS: Final = Kind(dict[str, dict[str, Any]], weights_to_json, _weights_of, _weight_cells)
+WEIGHTS: Final = FieldKind(dict[str, dict[str, Any]], weights_to_json, _weights_of, _weight_cells)
 OVER_LIMIT: Final = "over_limit"
 WEIGHT_COLUMNS: Final = (
     *(f"{place}{unit}" for place in PLACES for unit in ("_kg", "_std_kg")),
     *(f"{place}_limit_kg" for place in PLACES),
     OVER_LIMIT,
 )
-SPECTRA: Final = Kind(dict[str, list[float | None]] | None, spectra_to_json, spectra_from_json)
+SPECTRA: Final = FieldKind(dict[str, list[float | None]] | None, spectra_to_json, spectra_from_json)

@@ -11,7 +11,7 @@ _FOLLOWS: Final = frozenset(one.name for one in FIELDS if one.name.startswith("r
     "id",
     "t_end",
 }
-"""From other fields: not read back."""
+"""Fields that follow from others and are not read back."""
 
 
 def estimate_to_json(estimate: Estimate) -> dict[str, Any]:
@@ -27,7 +27,7 @@ def estimate_to_json(estimate: Estimate) -> dict[str, Any]:
 def estimate_from_json(told: Mapping[str, Any]) -> Estimate:
     """The inverse of :func:`estimate_to_json`, as exact as that rounds; the instants and the id are exact.
 
-    ``t_start_ns`` stands behind ``t_start``, which has whole microseconds, and so counts where it is there.
+    ``t_start_ns`` stands behind ``t_start``, which has whole microseconds, and so counts if it is there.
     """
     known = {
         one.path: one.kind.read(told[one.name])
@@ -72,12 +72,12 @@ def csv_cells(told: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def table_row(estimate: Estimate) -> dict[str, Any]:
-    """The columns of a CSV file, all of them, for a table of estimates such as pandas makes; None where unknown."""
+    """The columns of a CSV file, all of them, for a table of estimates such as pandas makes; None if unknown."""
     return {**dict.fromkeys(COLUMNS), **csv_cells(estimate_to_json(estimate))}
 
 
 def _at(estimate: Estimate, path: str) -> Any:
-    """What stands at the path; None where a part of it is None."""
+    """The attribute at the path; None if a part of it is None."""
     known: Any = estimate
     for name in path.split("."):
         if known is not None:

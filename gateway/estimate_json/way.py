@@ -1,11 +1,11 @@
-"""The way of a batch as JSON: distances, standstills, what door and ignition did, and places where they are kept."""
+"""The journey part of a batch as JSON: distances, standstills, door and ignition, and positions if they are kept."""
 
 import math
 from collections.abc import Mapping
 from typing import Any
 
 from gateway.estimate import NOWHERE, UNWATCHED, Place, Stop, Watched, Way
-from gateway.estimate_json.kinds import INSTANT, Kind
+from gateway.estimate_json.kinds import INSTANT, FieldKind
 
 _DIGITS = 9
 
@@ -27,7 +27,7 @@ def way_to_json(way: Way) -> dict[str, Any]:
 
 
 def way_from_json(told: Mapping[str, Any]) -> Way:
-    """The inverse of :func:`way_to_json`, as exact as that rounds."""
+    """The inverse of :func:`way_to_json`, within its rounding."""
     return Way(
         distance_m=_known(told["distance_m"]),
         known_s=told["known_s"],
@@ -43,7 +43,7 @@ def way_from_json(told: Mapping[str, Any]) -> Way:
 
 
 def place_to_json(place: Place) -> dict[str, float] | None:
-    """Latitude and longitude in degrees; None where they are unknown or not kept."""
+    """Latitude and longitude in degrees; None if they are unknown or not kept."""
     if not place.is_known:
         return None
     return {"latitude_deg": place.latitude_deg, "longitude_deg": place.longitude_deg}
@@ -83,7 +83,7 @@ def _known(told: float | None) -> float:
     return math.nan if told is None else told
 
 
-WAY = Kind(dict[str, Any] | None, lambda way: None if way is None else way_to_json(way), way_from_json)
+WAY = FieldKind(dict[str, Any] | None, lambda way: None if way is None else way_to_json(way), way_from_json)
 EXAMPLE = way_to_json(
     Way(3521.4, 299.8, 251.2, 18_204_300.0, 18_207_800.0, stops=(Stop(0, 20_000_000_000, Watched(True, False)),))
 )

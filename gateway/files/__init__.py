@@ -1,1 +1,1 @@
-"""Files by their bytes: those a service keeps beside its database, that must be signed, that a person asked for."""
+"""Files: the service's own beside its database, signed files, and output files that are replaced in one step."""

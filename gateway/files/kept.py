@@ -1,7 +1,7 @@
-"""One directory of the service, worked in by its handle: no name in it is followed elsewhere.
+"""Files in the service's own directory, accessed through its file descriptor without following links.
 
-Its owner may have been broken into, and root works in it too (`sudo springscale token create`). So a link, a pipe or a
-device is never opened, new files are made where nothing was, and root becomes the owner before it does anything.
+The service account may be compromised, and root works in the directory too (`sudo springscale token create`). So a
+link, a pipe or a device is never opened, new files are created exclusively, and root first becomes the owner.
 """
 
 import errno
@@ -28,7 +28,7 @@ class KeptFiles:
         self.directory = directory
 
     def read(self, name: str) -> bytes:
-        """What a plain file holds. FileNotFoundError where there is none."""
+        """The content of a plain file. Raises FileNotFoundError if there is none."""
         with opened_folder(self.directory) as folder:
             file = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
             if not stat.S_ISREG(os.fstat(file).st_mode):
@@ -49,17 +49,17 @@ class KeptFiles:
                 os.unlink(fresh, dir_fd=folder)
             flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
             with os.fdopen(os.open(fresh, flags, 0o600, dir_fd=folder), "wb") as file:
-                if os.geteuid() == 0:  # made just now, and so no other's
+                if os.geteuid() == 0:  # the file is new, so nobody else owns it
                     owner = os.fstat(folder)
                     os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
             os.rename(fresh, name, src_dir_fd=folder, dst_dir_fd=folder)
-            os.fsync(folder)  # the new name, too, outlives a power cut
+            os.fsync(folder)  # so that the new name survives a power cut
 
     def set_aside(self, name: str) -> str:
-        """Rename what lies under ``name`` out of the way, whatever it is -> the new name."""
+        """Rename whatever is at ``name`` -> the new name."""
         with opened_folder(self.directory) as folder:
             stem = f"{name}.broken-{datetime.now(UTC):%Y%m%dT%H%M%S}"
             taken = _names(folder)
@@ -68,7 +68,7 @@ class KeptFiles:
             return aside
 
     def set_aside_earlier(self, name: str) -> list[str]:
-        """What was set aside under this name and still lies there, oldest first."""
+        """Names of the files that were set aside under this name, oldest first."""
         try:
             with opened_folder(self.directory) as folder:
                 return sorted(other for other in _names(folder) if other.startswith(f"{name}.broken-"))
@@ -76,7 +76,7 @@ class KeptFiles:
             return []
 
     def stamp(self, name: str) -> tuple[int, int, int] | None:
-        """Another one whenever the file is another; None where there is none."""
+        """Inode, time and size of the file, which change with its content; None if there is no file."""
         try:
             status = (self.directory / name).lstat()
         except OSError:
@@ -85,7 +85,7 @@ class KeptFiles:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Alone among all processes that lock this directory. TimeoutError where another does not let go."""
+        """Hold the lock of this directory among processes. Raises TimeoutError if another process keeps it."""
         self.directory.mkdir(parents=True, exist_ok=True)
         end_s = time.monotonic() + LOCK_TIMEOUT_S
         with opened_folder(self.directory) as folder:
@@ -102,7 +102,7 @@ class KeptFiles:
 
 @contextmanager
 def opened_folder(directory: Path) -> Iterator[int]:
-    """A directory's handle, to work in it whatever its path leads to meanwhile. Raises OSError."""
+    """File descriptor of a directory, independent of later changes to its path. Raises OSError."""
     folder = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         yield folder
@@ -116,7 +116,7 @@ def _names(folder: int) -> set[str]:
 
 
 def become_owner_of(directory: Path) -> None:
-    """Where root asks, give up its rights for good and go on as the directory's owner."""
+    """If root calls, drop its rights permanently and continue as the owner of the directory."""
     if os.geteuid() != 0:
         return
     try:
@@ -127,3 +127,29 @@ def become_owner_of(directory: Path) -> None:
         os.setgroups([])
         os.setgid(owner.st_gid)
         os.setuid(owner.st_uid)
+
+
+class BrokenFile:
+    """Sets an invalid file at ``path`` aside instead of overwriting it. Not thread-safe."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._is_in_the_way = False
+
+    def set_aside(self) -> str:
+        """Rename the file -> what became of it, as a clause for people."""
+        self._is_in_the_way = True
+        try:
+            return f"is set aside as {self._moved()}"
+        except OSError as refusal:
+            return f"cannot be set aside: {refusal}"
+
+    def make_way(self) -> None:
+        """Call before writing to ``path``: moves the invalid file if that failed before. Raises OSError."""
+        if self._is_in_the_way:
+            self._moved()
+
+    def _moved(self) -> str:
+        name = KeptFiles(self._path.parent).set_aside(self._path.name)
+        self._is_in_the_way = False
+        return name

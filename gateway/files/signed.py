@@ -1,7 +1,7 @@
-"""Files that somebody must have signed: FILE.sig beside FILE, as `ssh-keygen -Y sign` writes it for an ed25519 key.
+"""Verification of signed files: FILE.sig beside FILE, as `ssh-keygen -Y sign` writes it for an ed25519 key.
 
-Nothing here can sign. A signature is not parsed but written anew around its own key and its last 64 bytes, and must
-then agree byte for byte: there is one way to write it.
+This module cannot sign. It does not parse a signature: it writes one from the key and the last 64 bytes of the file,
+and requires both to be identical, because the format allows only one form.
 
 Format: PROTOCOL.sshsig of OpenSSH; public keys: RFC 8709, section 4; ed25519: RFC 8032.
 """
@@ -20,36 +20,36 @@ from nacl.signing import VerifyKey
 
 from gateway.errors import ConfigurationError, UntrustedFileError
 
-Read = Callable[[Path], bytes]  # what a file holds; raises OSError, and UntrustedFileError where that is not believed
+Read = Callable[[Path], bytes]  # reads a file; raises OSError, and UntrustedFileError for an untrusted one
 
 SUFFIX: Final = ".sig"
 COMMAND: Final = "ssh-keygen -Y sign -n springscale -f KEY"
-NAMESPACE: Final = b"springscale"  # a signature of a commit or a letter by the same key is none of a calibration
+NAMESPACE: Final = b"springscale"  # a signature for another purpose by the same key is not valid here
 KEY_TYPE: Final = b"ssh-ed25519"
 MAGIC: Final = b"SSHSIG"
 VERSION: Final = (1).to_bytes(4)
 NO_SIGNATURE: Final = (
     f"its {SUFFIX} is no signature of an ed25519 key for the namespace springscale; sign it where the key is"
 )
-HASHES: Final = ("sha512", "sha256")  # ssh-keygen takes the first unless told otherwise
+HASHES: Final = ("sha512", "sha256")  # ssh-keygen uses the first by default
 BEGIN: Final = "-----BEGIN SSH SIGNATURE-----\n"
 END: Final = "\n-----END SSH SIGNATURE-----\n"
 COLUMNS: Final = 70
 KEY_BYTES: Final = 32
 SIGNATURE_BYTES: Final = 64
-MOST_BYTES: Final = 4096  # of a signature's file; it has some 300
+MOST_BYTES: Final = 4096  # of a signature file, which has about 300
 
 
 def _string(content: bytes) -> bytes:
-    """As SSH writes one: its length before it (RFC 4251, section 5)."""
+    """A string in SSH's encoding: its length, then its bytes (RFC 4251, section 5)."""
     return len(content).to_bytes(4) + content
 
 
 @dataclass(frozen=True, slots=True)
 class PublicKey:
-    """An ed25519 key whose signatures are believed."""
+    """An ed25519 public key that is trusted."""
 
-    blob: bytes  # type and key, as SSH writes them
+    blob: bytes  # type and key in SSH's encoding
 
     def __post_init__(self) -> None:
         if self.blob != _string(KEY_TYPE) + _string(self.point) or len(self.point) != KEY_BYTES:
@@ -57,9 +57,9 @@ class PublicKey:
 
     @classmethod
     def of(cls, line: str) -> "PublicKey":
-        """Of a line as ssh-keygen writes it into KEY.pub: ssh-ed25519 AAAA... and maybe whose it is.
+        """Parse a line of KEY.pub as ssh-keygen writes it: ssh-ed25519 AAAA... and an optional comment.
 
-        Raises ValueError where the line is another.
+        Raises ValueError for any other line.
         """
         kind, encoded, *_ = (*line.split(), "", "")
         try:
@@ -72,25 +72,25 @@ class PublicKey:
 
     @property
     def point(self) -> bytes:
-        """The key itself."""
+        """The 32 bytes of the key."""
         return self.blob[-KEY_BYTES:]
 
     @property
     def fingerprint(self) -> str:
-        """As `ssh-keygen -l` shows it."""
+        """The fingerprint that `ssh-keygen -l` shows."""
         return "SHA256:" + base64.b64encode(hashlib.sha256(self.blob).digest()).decode().rstrip("=")
 
 
 @dataclass(frozen=True, slots=True)
 class Trust:
-    """Whose files are believed: those that one of the keys has signed; without any key, all."""
+    """The trusted keys. A file must be signed by one of them; without keys every file is trusted."""
 
     keys: tuple[PublicKey, ...] = ()
 
     def read(self, path: Path, raw: Read = Path.read_bytes) -> bytes:
-        """What the file holds; ``raw`` gets it, and its signature, where these do not lie on this computer.
+        """The content of a trusted file; ``raw`` reads the file and its signature, for example from an object store.
 
-        Raises OSError; UntrustedFileError saying what is wrong and how to mend it.
+        Raises OSError, and UntrustedFileError that says what is wrong and how to mend it.
         """
         content = raw(path)
         if self.keys:
@@ -112,7 +112,7 @@ class Trust:
 
 
 def load_public_keys(path: Path) -> tuple[str, ...]:
-    """Lines of a file of public keys, at least one; what begins with # is for people. Raises ConfigurationError."""
+    """Lines of a file of public keys, at least one; lines with # are comments. Raises ConfigurationError."""
     try:
         lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]
     except (OSError, UnicodeDecodeError) as fault:
@@ -129,25 +129,25 @@ def load_public_keys(path: Path) -> tuple[str, ...]:
 
 
 def pinned_by(path: Path | None) -> Trust:
-    """Trust in a file of public keys alone; in everybody where none is given. Raises ConfigurationError."""
+    """Trust in the public keys of a file; without a file every file is trusted. Raises ConfigurationError."""
     return Trust(tuple(map(PublicKey.of, load_public_keys(path)))) if path else Trust()
 
 
 def to_be_signed(content: bytes, hash_name: str) -> bytes:
-    """What the key signs instead of the content."""
+    """The message that the key signs, which contains the hash of the content."""
     digest = hashlib.new(hash_name, content).digest()
     return MAGIC + b"".join(map(_string, (NAMESPACE, b"", hash_name.encode(), digest)))
 
 
 def armoured(key: PublicKey, hash_name: str, signed: bytes) -> str:
-    """The file in which ssh-keygen delivers the 64 bytes ``signed``."""
+    """The text of a signature file for the 64 bytes ``signed``."""
     inner = _string(KEY_TYPE) + _string(signed)
     blob = MAGIC + VERSION + b"".join(map(_string, (key.blob, NAMESPACE, b"", hash_name.encode(), inner)))
     return BEGIN + "\n".join(textwrap.wrap(base64.b64encode(blob).decode(), COLUMNS)) + END
 
 
 def signature_path(path: Path) -> Path:
-    """Where the signature of ``path`` lies."""
+    """Path of the signature of ``path``."""
     return path.with_name(path.name + SUFFIX)
 
 
@@ -164,7 +164,7 @@ def _signature_of(path: Path, raw: Read) -> str:
 
 
 def _taken_apart(signature: str) -> tuple[PublicKey, str, bytes]:
-    """Who signed, over which hash, and the 64 bytes. Raises ValueError for what no ssh-keygen wrote."""
+    """Key, hash name and the 64 bytes of a signature. Raises ValueError if ssh-keygen did not write it."""
     try:
         blob = base64.b64decode("".join(signature.removeprefix(BEGIN).removesuffix(END).split()), validate=True)
         start = len(MAGIC) + len(VERSION) + len(_string(b""))

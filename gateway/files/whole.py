@@ -1,4 +1,4 @@
-"""A file that a person asked for: it has its name once it is whole, and what was there before stays until then."""
+"""Atomic output files: a file gets its name when it is complete; an earlier file stays until then."""
 
 import os
 import shutil
@@ -12,7 +12,7 @@ from gateway.errors import SpringscaleError
 
 @contextmanager
 def written_whole(output: Path) -> Iterator[BinaryIO]:
-    """To write ``output`` by; links are followed, a pipe or a terminal is written as it comes. Raises OSError."""
+    """A file that becomes ``output`` on success. Links are followed; a pipe is written directly. Raises OSError."""
     place = output.resolve()
     if place.exists() and not place.is_file():
         with place.open("wb") as file:
@@ -33,7 +33,7 @@ def written_whole(output: Path) -> Iterator[BinaryIO]:
 
 @contextmanager
 def refusal_told(output: Path, error: type[SpringscaleError]) -> Iterator[None]:
-    """Where the disk refuses ``output``, ``error`` says so, to people."""
+    """Turn an OSError while writing ``output`` into ``error`` with a message for people."""
     try:
         yield
     except OSError as fault:
@@ -41,6 +41,6 @@ def refusal_told(output: Path, error: type[SpringscaleError]) -> Iterator[None]:
 
 
 def write_whole(output: Path, text: str) -> None:
-    """All of it at once."""
+    """Write ``text`` to ``output`` atomically, as UTF-8. Raises OSError."""
     with written_whole(output) as file:
         file.write(text.encode("utf-8"))

@@ -1,6 +1,6 @@
-"""A fleet at its desk: what vehicles sent to the broker, kept in one file, and a page with a line per vehicle.
+"""The fleet's subscriber: records that vehicles sent to the broker, in one file, and a page with a line per vehicle.
 
-The subscriber (deploy/fleet) and `springscale demo --fleet` use it; nothing of it runs in a vehicle.
+deploy/fleet and `springscale demo --fleet` use it; it does not run in a vehicle.
 """
 
 from gateway.fleet.book import Message, SqliteBook, address

@@ -1,4 +1,4 @@
-"""The fleet's records in one SQLite file: every record once, the last revision of what changes."""
+"""The fleet's records in one SQLite file: every record once, in its last revision."""
 
 import json
 import sqlite3
@@ -36,7 +36,7 @@ WHERE excluded.revision > entry.revision
 _STATUS: Final = """
 INSERT INTO vehicle VALUES (?, ?) ON CONFLICT (vehicle_id) DO UPDATE
 SET record = json_patch(vehicle.record, excluded.record) WHERE excluded.record <> vehicle.record
-"""  # a death says less than a birth: what it leaves out stays
+"""  # the will has fewer fields than the birth message: fields that it lacks stay as they are
 _VEHICLES: Final = """
 SELECT vehicle_id FROM vehicle UNION SELECT DISTINCT vehicle_id FROM estimate ORDER BY vehicle_id
 """
@@ -55,26 +55,26 @@ class Arrived(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One that needs no broker."""
+    """A message without a broker, for the demonstration."""
 
     topic: str
     payload: bytes
 
 
 def address(branch: str, topic: str) -> tuple[str, str]:
-    """Whose record it is, and of which kind: ``branch`` has a + where each vehicle has its name.
+    """Vehicle and kind of a record, from its topic; ``branch`` has a + at the place of the vehicle's name.
 
-    The name is the broker's, which lets a vehicle write below its own alone. Raises LookupError.
+    The broker enforces the name, since each vehicle may publish below its own topic only. Raises LookupError.
     """
     at, levels = branch.split("/").index("+"), topic.split("/")
     return levels[at], levels[at + 1]
 
 
 class SqliteBook:
-    """May be used from any thread. A message that cannot be understood is kept as such, so that the rest goes on."""
+    """Thread-safe. A message that cannot be read is stored as unreadable and does not stop the others."""
 
     def __init__(self, path: Path, branch: str, clock_s: Callable[[], float] = time.time) -> None:
-        """Opens or makes the file. Raises sqlite3.Error."""
+        """Opens or creates the file. Raises sqlite3.Error."""
         self._branch = branch
         self._clock_s = clock_s
         self._lock = threading.Lock()
@@ -83,7 +83,7 @@ class SqliteBook:
         self.counts: Counter[str] = Counter()
 
     def write(self, arrivals: Sequence[Arrived]) -> None:
-        """All of them, or none: on disk when this returns. Raises sqlite3.OperationalError, as for a full disk."""
+        """Store all messages or none; on disk when this returns. Raises sqlite3.OperationalError if the disk fails."""
         with self._lock:
             self._database.execute("BEGIN IMMEDIATE")
             try:
@@ -100,7 +100,7 @@ class SqliteBook:
             return [self._line(vehicle) for (vehicle,) in self._database.execute(_VEHICLES).fetchall()]
 
     def close(self) -> None:
-        """Done."""
+        """Close the file."""
         with self._lock:
             self._database.close()
 
@@ -127,7 +127,7 @@ class SqliteBook:
 
 
 def _row(vehicle: str, kind: str, told: Any) -> tuple[str, tuple[Any, ...]]:
-    """The statement and its values; what a line needs is looked at here, so that no page stumbles over it later."""
+    """The statement and its values. Checks all that a line needs, so that the page never fails on a stored record."""
     if not isinstance(told, dict):
         raise TypeError("no JSON object")
     text = json.dumps(told)

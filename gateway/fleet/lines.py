@@ -1,4 +1,4 @@
-"""One vehicle of the fleet as a line of a table, whatever database its records come from."""
+"""One vehicle of the fleet as a line of a table, independent of the database."""
 
 from collections.abc import Iterable, Mapping
 from datetime import datetime
@@ -46,7 +46,7 @@ def line_of(
 ) -> Line:
     """A vehicle's line from its last status, the last estimate with an answer, and alarms in their last revision.
 
-    ``now_s`` is POSIX time. Raises ValueError or LookupError for a record that is none of ours.
+    ``now_s`` is POSIX time. Raises ValueError or LookupError for a record of another program.
     """
     weighed = estimate or {}
     weights: Mapping[str, Mapping[str, Any]] = weighed.get("weights") or {}
@@ -70,7 +70,7 @@ def line_of(
 
 
 def _used(payload_kg: float | None, gross_kg: float | None, limit_kg: float | None) -> float | None:
-    """p / (p + F_max - F): without this payload the vehicle may take that much; None where it may take nothing."""
+    """Used share of the capacity: p / (p + F_max - F). None if the vehicle may carry nothing."""
     if payload_kg is None or gross_kg is None or limit_kg is None:
         return None
     capacity_kg = payload_kg + limit_kg - gross_kg

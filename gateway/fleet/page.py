@@ -1,4 +1,4 @@
-"""The page of the fleet, /fleet, and what it asks: /api/v1/fleet."""
+"""The fleet's page, /fleet, and its API, /api/v1/fleet."""
 
 import threading
 from collections import Counter
@@ -11,18 +11,18 @@ from starlette.responses import FileResponse, RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from gateway.fleet.lines import Line
-from gateway.web.door import SecurityHeaders
+from gateway.web.access import SecurityHeaders
 from gateway.web.pages import ASSETS
 
 
 class Fleet(BaseModel):
-    """Every vehicle that was ever heard, by name."""
+    """Every vehicle that has ever sent a record, by name."""
 
     items: list[Line]
 
 
 def fleet_app(lines: Callable[[], list[Line]]) -> FastAPI:
-    """The application; ``lines`` are asked for in a worker thread. Raises what they raise, as status 500."""
+    """The application; it calls ``lines`` in a worker thread and answers 500 if that raises."""
     app = FastAPI(title="Springscale fleet", docs_url=None, redoc_url=None)
     app.add_middleware(SecurityHeaders, counts=Counter())
 
@@ -44,7 +44,7 @@ def fleet_app(lines: Callable[[], list[Line]]) -> FastAPI:
 
 
 class FleetPage:
-    """Serves the application from a thread of its own, so that whoever writes the book is not held up."""
+    """Serves the application from its own thread, so that it does not delay the subscriber."""
 
     def __init__(self, app: FastAPI, host: str, port: int) -> None:
         config = uvicorn.Config(
@@ -52,14 +52,14 @@ class FleetPage:
         )
         self._server = uvicorn.Server(config)
         config.host, config.port = host, port
-        self._socket = config.bind_socket()  # here, so that a port in use is told at once
+        self._socket = config.bind_socket()  # here, so that a port in use is reported at once
         self._thread = threading.Thread(
             target=self._server.run, kwargs={"sockets": [self._socket]}, name="fleet-page", daemon=True
         )
 
     @property
     def port(self) -> int:
-        """Where it listens; of use where the system chose one."""
+        """The port it listens on, which the system may have chosen."""
         return int(self._socket.getsockname()[1])
 
     def start(self) -> None:
@@ -67,6 +67,6 @@ class FleetPage:
         self._thread.start()
 
     def stop(self) -> None:
-        """End; answers under way have a second."""
+        """Stop; requests in progress have one second."""
         self._server.should_exit = True
         self._thread.join(5.0)

@@ -1,6 +1,6 @@
-"""The same pipeline without clock or network: what the service does live, over log files.
+"""The service's pipeline over log files, without clock or network.
 
-Logs and campaign files come in; batches, estimates, calibrations and their errors go out.
+Logs and campaign files go in; batches, estimates, calibrations and their errors come out.
 """
 
 from gateway.offline.campaigns import calibrate, inspect, judge_campaign, split_runs

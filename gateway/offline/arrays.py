@@ -1,4 +1,4 @@
-"""Arrays in, estimates out: for measurements that come from no CAN log."""
+"""Estimates from arrays, for measurements without a CAN log."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -29,12 +29,12 @@ def estimate_arrays(
     estimator: str | None = None,
     settings: BatchSettings = AS_THE_SERVICE,
 ) -> list[Estimate]:
-    """Every batch of one drive, by the same path as the service's: one row of each array an instant.
+    """Every batch of one drive, through the service's pipeline; each index of the arrays is one instant.
 
-    All of shape (n,): times in s since 1970 or any other start, in order; acceleration upwards with gravity in it;
-    pitch rate positive nose down, roll rate left side up (ISO 8855); NaN where a sensor says nothing at that instant.
-    ``estimator`` is the file's best where none is named. Raises ArraysError for arrays that do not fit, or an estimator
-    that is not there.
+    All of shape (n,): times in s since 1970 or any other start, in order; acceleration upwards including gravity; pitch
+    rate positive nose down, roll rate left side up (ISO 8855); NaN where a sensor has no sample at that instant.
+    ``estimator`` defaults to the file's best. Raises ArraysError for arrays that do not fit together, or an unknown
+    estimator.
     """
     chosen = estimator or calibration.estimators[0]
     if chosen not in calibration.estimators:
@@ -52,7 +52,7 @@ def estimate_arrays(
 
 
 def _motion(t_s: F64, columns: Mapping[Signal, F64]) -> Motion:
-    """The rows that a decoder would have given."""
+    """The rows that a decoder would return."""
     times_s = np.asarray(t_s, dtype=np.float64)
     sensed = [np.asarray(column, dtype=np.float64) for column in columns.values()]
     if times_s.ndim != 1 or any(column.shape != times_s.shape for column in sensed):

@@ -1,7 +1,7 @@
-"""A campaign with its logs in one archive, to hand on: what was driven, what it weighed, and who permits its use.
+"""A campaign with its logs in one archive, for sharing: the drives, their loads, and the permission to use them.
 
-    pack(FOLDER, FILE)   campaign.toml, its signal map and databases, contribution.toml, and of each log the mapped
-                         frames alone, without the position: nothing else that was on the bus leaves the vehicle
+    pack(FOLDER, FILE)   campaign.toml, its signal map and databases, contribution.toml, and of each log only the mapped
+                         frames, without the position: no other bus traffic leaves the vehicle
     unpacked(FILE, DIR)  the campaign file in it, every file checked against the sums of manifest.json
 
 The same folder gives the same bytes.
@@ -37,11 +37,11 @@ from gateway.units import NS_PER_S
 CAMPAIGN: Final = "campaign.toml"
 CONTRIBUTION: Final = "contribution.toml"
 MANIFEST: Final = "manifest.json"
-LARGEST_BYTES: Final = 8 << 30  # of all files unpacked: days of drives
+LARGEST_BYTES: Final = 8 << 30  # chosen: of all unpacked files, days of drives
 NEEDED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
 POSITION: Final = frozenset({Signal.LATITUDE, Signal.LONGITUDE})
 _LOG_LINE: Final = re.compile(r"""^([ \t]*log[ \t]*=[ \t]*)(?:"(?:[^"\\]|\\.)*"|'[^']*')""", re.MULTILINE)
-_ZIP_EPOCH: Final = (1980, 1, 1, 0, 0, 0)
+_ZIP_EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # the earliest date that the format has
 OnRun = Callable[[int, int], None]
 
 TEMPLATE: Final = """\
@@ -66,43 +66,43 @@ mounting = "where, and how it was fixed"
 """
 
 
-class _Table(BaseModel):
+class _BundleTable(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class Permission(_Table):
-    """[permission]: who allows what."""
+class Permission(_BundleTable):
+    """[permission]: who permits which use."""
 
     given_by: str = Field(min_length=1)
     licence: Literal["CC0-1.0", "CC-BY-4.0"]
     may_be_published: Literal[True]
 
 
-class Truth(_Table):
-    """[truth]: where the payloads of campaign.toml come from."""
+class Truth(_BundleTable):
+    """[truth]: the source of the payloads in campaign.toml."""
 
     weighed_by: Literal["weighbridge", "axle_pads", "wheel_pads", "platform_scale", "bathroom_scale", "stated_by_maker"]
     scale_std_kg: float = Field(gt=0.0, le=1000.0)
     note: str = ""
 
 
-class VehicleNote(_Table):
-    """[vehicle]: what no key of campaign.toml holds."""
+class VehicleNote(_BundleTable):
+    """[vehicle]: facts that campaign.toml has no key for."""
 
     make_and_model: str = Field(min_length=1)
     suspension: str = ""
     tyres: str = ""
 
 
-class SensorNote(_Table):
-    """[sensor]: what recorded, and how it was fixed."""
+class SensorNote(_BundleTable):
+    """[sensor]: the sensor and its mounting."""
 
     device: str = Field(min_length=1)
     mounting: str = Field(min_length=1)
 
 
-class Contribution(_Table):
-    """contribution.toml."""
+class Contribution(_BundleTable):
+    """The content of contribution.toml."""
 
     permission: Permission
     truth: Truth
@@ -112,7 +112,7 @@ class Contribution(_Table):
 
 @dataclass(frozen=True, slots=True)
 class PackedRun:
-    """One run as it lies in the archive; its frames are those of the signal map."""
+    """One run in the archive; its frames are those of the signal map."""
 
     number: int
     log: str
@@ -123,14 +123,14 @@ class PackedRun:
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """What was packed."""
+    """The result of packing."""
 
     output: Path
     contribution: Contribution
     runs: tuple[PackedRun, ...]
 
     def to_json(self) -> dict[str, Any]:
-        """For programs."""
+        """The result as JSON."""
         return {
             "written": str(self.output),
             "sha256": file_sha256(self.output),
@@ -140,7 +140,7 @@ class Bundle:
 
 
 def pack(folder: Path, output: Path, *, with_position: bool = False, on_run: OnRun = lambda done, of: None) -> Bundle:
-    """Write the archive. Raises ConfigurationError, CampaignError or LogUnreadableError naming what to mend."""
+    """Write the archive. Raises ConfigurationError, CampaignError or LogUnreadableError naming what to correct."""
     if output.exists():
         raise ConfigurationError(f"{output}: is there already, and is not written over; name another --output")
     campaign = load_campaign(folder / CAMPAIGN)
@@ -168,7 +168,9 @@ def pack(folder: Path, output: Path, *, with_position: bool = False, on_run: OnR
 
 
 def unpacked(bundle: Path, folder: Path) -> Path:
-    """Unpack into an empty folder; the path of its campaign file. Raises CampaignError for what is no whole bundle."""
+    """Unpack into an empty folder and return the path of its campaign file. Raises CampaignError for an invalid
+    bundle.
+    """
     try:
         with zipfile.ZipFile(bundle) as archive:
             if sum(each.file_size for each in archive.infolist()) > LARGEST_BYTES:
@@ -192,7 +194,7 @@ def _contribution(path: Path) -> Contribution:
 
 
 def _position_messages(signal_map: SignalMap) -> tuple[MappedMessage, ...]:
-    """Messages that tell where the vehicle was. Raises ConfigurationError for one that tells more than that."""
+    """Messages with the vehicle's position. Raises ConfigurationError for one that also has other signals."""
     telling = [m for m in signal_map.messages if POSITION & {mapped.signal for mapped in m.signals}]
     for message in telling:
         others = sorted({str(mapped.signal) for mapped in message.signals} - set(map(str, POSITION)))
@@ -220,7 +222,7 @@ def _map_members(campaign: Campaign, folder: Path) -> dict[str, bytes]:
 def _mapped_frames(
     campaign: Campaign, run: RunTable, signal_map: SignalMap, left_out: Sequence[MappedMessage]
 ) -> Frames:
-    """The frames that weigh. Raises CampaignError where a signal that is needed never comes."""
+    """The frames of the mapped signals. Raises CampaignError if a needed signal is absent."""
     chunks, report = open_log(campaign.log_of(run), signal_map)
     frames = join(list(chunks), signal_map.payload_width)
     report.require_frames()
@@ -234,7 +236,7 @@ def _mapped_frames(
 
 
 def _renamed(path: Path, logs: Sequence[str]) -> bytes:
-    """campaign.toml with the logs as they are named in the archive, and nothing else changed."""
+    """campaign.toml with the log names of the archive and no other change."""
     names: Iterator[str] = iter(logs)
     renamed = _LOG_LINE.sub(lambda line: f'{line[1]}"{next(names, "")}"', path.read_text(encoding="utf-8"))
     expected = read_toml(path)
@@ -256,7 +258,7 @@ def _manifest(members: dict[str, bytes], *, with_position: bool) -> bytes:
 
 
 def _zipped(members: dict[str, bytes]) -> bytes:
-    """A zip without dates; logs are packed already."""
+    """A zip without dates; logs are already compressed."""
     whole = io.BytesIO()
     with zipfile.ZipFile(whole, "w") as archive:
         for name, content in sorted(members.items()):

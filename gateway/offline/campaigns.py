@@ -1,4 +1,4 @@
-"""A campaign's drives: read, cut into identification and validation, inspected, calibrated from and judged by."""
+"""A campaign's drives: read, split into identification and validation, inspected, calibrated and judged."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -34,9 +34,9 @@ from gateway.units import NS_PER_S
 
 
 def read_whole_log(log: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]:
-    """All rows of one log that weigh, at once, and what the reader met.
+    """All rows of one log that the estimate needs, and the reader's report.
 
-    Raises LogUnreadableError where nothing can be read.
+    Raises LogUnreadableError if nothing can be read.
     """
     motions, report, _ = motion_of_log(log, signal_map)
     parts = list(motions)
@@ -46,14 +46,14 @@ def read_whole_log(log: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Part of a log, in seconds from the first frame that tells motion; an open end is None."""
+    """Part of a log, in seconds from the first motion frame; an open end is None."""
 
     start_s: float = 0.0
     end_s: float | None = None
 
 
 def rows_within(motion: Motion, stretch: Stretch) -> Motion:
-    """Rows whose stamps lie in [start, end) of the stretch."""
+    """Rows with stamps in [start, end) of the stretch."""
     since_ns = motion.t_ns - motion.t_ns[0]
     inside = since_ns >= round(stretch.start_s * NS_PER_S)
     if stretch.end_s is not None:
@@ -62,14 +62,14 @@ def rows_within(motion: Motion, stretch: Stretch) -> Motion:
 
 
 def batches_of_motion(motion: Motion, signal_map: SignalMap, settings: BatchSettings) -> tuple[Batch, ...]:
-    """Every batch of rows that are already there."""
+    """Every batch of these rows."""
     scheduler = Scheduler(settings, signal_map.traits)
     return (*scheduler.feed(motion), *scheduler.flush())
 
 
 Split = Literal["identification", "validation", "all"]
 
-LOST_LINES_SHARE: Final = 1e-3
+LOST_LINES_SHARE: Final = 1e-3  # chosen: of a log's lines; fewer are not reported
 
 
 def split_runs(
@@ -80,9 +80,9 @@ def split_runs(
     on_run: OnRun = lambda done, of: None,
     keeps_unreadable: bool = False,
 ) -> list[SplitRun]:
-    """Reads the logs of the chosen runs. Batches begin anew at the cut between the two parts.
+    """Read the logs of the chosen runs. Batches restart at the cut between the two parts.
 
-    Raises LogUnreadableError for a log that cannot be read, or keeps it as a run without rows whose ``log`` says why.
+    Raises LogUnreadableError for an unreadable log, or keeps it as a run without rows whose ``log`` has the reason.
     """
     signal_map = load_signal_map(campaign.signals)
     runs = chosen_runs(campaign, numbers)
@@ -130,14 +130,14 @@ def _known_run(campaign: Campaign, number: int, run: RunTable, batches: tuple[Ba
 
 
 def _silent(log: Path, motion: Motion, signal_map: SignalMap) -> dict[Signal, str]:
-    """Why mapped inertial signals have no sample to speak of."""
+    """Why mapped inertial signals have hardly a sample."""
     wanted = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE)
     silent = [signal for signal in wanted if signal in motion.signals and len(motion.of(signal)[1]) < 2]
     return {signal: why_silent(log, signal_map, signal) for signal in silent}
 
 
 def _damage(report: LogReport) -> str | None:
-    """What of a log was lost on its way, in words; None where hardly a line was."""
+    """The lost part of a log, in words; None if it is negligible."""
     if report.ended_early is not None:
         return f"the log ends early: {report.ended_early}"
     if report.n_rejected > LOST_LINES_SHARE * report.lines:
@@ -146,7 +146,7 @@ def _damage(report: LogReport) -> str | None:
 
 
 def _parts(motion: Motion, run: RunTable, fraction: float) -> tuple[Stretch | None, Stretch | None]:
-    """Identification and validation stretch of a run; None where there is none."""
+    """Identification and validation stretch of a run; None if it has none."""
     if run.split is not None:
         whole = Stretch()
         return (whole, None) if run.split == "identification" else (None, whole)
@@ -165,14 +165,14 @@ def inspect(
     numbers: Sequence[int] | None = None,
     on_run: OnRun = lambda done, of: None,
 ) -> Inspection:
-    """Reads the logs of the chosen runs and tells of each what is wrong with it, if anything."""
+    """Read the logs of the chosen runs and find their faults."""
     split = split_runs(campaign, settings, numbers=numbers, on_run=on_run, keeps_unreadable=True)
     verdicts, findings = inspect_campaign(split, campaign.vehicle, settings)
     return Inspection(tuple(split), verdicts, (*findings, *_sideways_findings(campaign)))
 
 
 def _sideways_findings(campaign: Campaign) -> Iterator[Finding]:
-    """What would tell where loads lie to the side, and is not there."""
+    """Findings about missing data for lateral places."""
     signal_map = load_signal_map(campaign.signals)
     if Signal.ROLL_RATE not in signal_map.signals:
         yield from unmapped_roll_findings(unmapped_roll_rate(signal_map))
@@ -190,7 +190,7 @@ def calibrate(
     command: str = "",
     on_run: OnRun = lambda done, of: None,
 ) -> Outcome:
-    """Inspects the chosen runs and fits every named estimator on the identification parts of those without a fault.
+    """Inspect the chosen runs and fit every named estimator on the identification parts of those without a fault.
 
     Raises as :func:`calibrate_inspected` does.
     """
@@ -211,7 +211,7 @@ def judge_campaign(
 ) -> list[Judged]:
     """Every batch of one part of every run with its estimate.
 
-    Raises CalibrationImpossibleError where that part holds no batch, for then there is nothing to judge.
+    Raises CalibrationImpossibleError if that part has no batch to judge.
     """
     runs = split_runs(campaign, settings, on_run=on_run)
     judged = judge((part for run in runs for part in _judged_parts(run, split)), calibrated, estimator)

@@ -1,4 +1,4 @@
-"""Logs in, estimates out: what `springscale estimate` prints."""
+"""Estimates of logs, as `springscale estimate` prints them."""
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
@@ -24,9 +24,9 @@ def estimates_of_logs(
     *,
     on_read: Callable[[LogReport], None] = lambda report: None,
 ) -> Iterator[Estimate]:
-    """Every batch of every log in turn; each log is a drive of its own. Raises LogUnreadableError.
+    """Every batch of every log in turn; each log is a drive. Raises LogUnreadableError.
 
-    ``on_read`` hears of each log, once it is read, what its reader met. What is too short to be a batch is left out.
+    ``on_read`` gets the reader's report of each log. Stretches too short for a batch are left out.
     """
     return (one for one in with_remainders(logs, setup, settings, on_read=on_read) if not one.is_remainder)
 
@@ -38,7 +38,7 @@ def with_remainders(
     *,
     on_read: Callable[[LogReport], None] = lambda report: None,
 ) -> Iterator[Estimate]:
-    """Likewise, and between the batches what is too short to be one (``is_remainder``): it has a way."""
+    """The same with the stretches too short for a batch (``is_remainder``), which have a way."""
     for log in logs:
         flow = setup.flow(settings)
         motions, report, _ = motion_of_log(log, setup.signal_map)
@@ -50,9 +50,9 @@ def with_remainders(
 
 
 def require_order(logs: Sequence[Path], signal_map: SignalMap) -> None:
-    """Raises LogUnreadableError where a log begins before the one that is named before it.
+    """Raises LogUnreadableError if a log begins before the preceding one.
 
-    Loads and trips are told between drives, so that logs out of order would tell of loads that nobody moved.
+    Loads and trips depend on the order of drives; logs out of order would give false changes of load.
     """
     begun = [(log, start_ns) for log in logs if (start_ns := _start_ns(log, signal_map)) is not None]
     for (before, before_ns), (log, start_ns) in pairwise(begun):
@@ -61,7 +61,7 @@ def require_order(logs: Sequence[Path], signal_map: SignalMap) -> None:
 
 
 def _start_ns(log: Path, signal_map: SignalMap) -> int | None:
-    """Of the first frame that the map reads; None where there is none, of which the reader tells."""
+    """The time of the first mapped frame; None without one, which the reader reports."""
     try:
         chunks, _ = open_log(log, signal_map)
         return next((int(chunk.t_ns[0]) for chunk in chunks if len(chunk)), None)
@@ -72,9 +72,9 @@ def _start_ns(log: Path, signal_map: SignalMap) -> int | None:
 def entries_of_logs(
     logs: Sequence[Path | str], setup: Setup, settings: BatchSettings = AS_THE_SERVICE
 ) -> Iterator[Entry]:
-    """Every event and trip of the logs in turn, as their last batch left them.
+    """Every event and trip of the logs, in its last revision.
 
-    Raises LogUnreadableError at the first log of which nothing can be read, once those of the logs before are told.
+    Raises LogUnreadableError at the first unreadable log, after yielding those of the logs before.
     """
     ledger = Ledger(Rules.of(setup.calibrated.vehicle) if setup.calibrated else Rules())
     told: dict[str, Entry] = {}

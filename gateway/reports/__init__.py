@@ -1,6 +1,6 @@
-"""Pages and figures for the desk: HTML that is whole in its directory, SVG, and the numbers beside them as JSON.
+"""Reports: self-contained HTML pages with SVG charts, and the same numbers as JSON.
 
-``charts`` describes charts and draws them still or live, ``calibration`` reports a calibration or an evaluation,
-``paper`` drives the paper's section 4 again. Reports lean on the rooms below and nothing leans on them;
-matplotlib and plotly are known here alone, and loaded when a report is asked for.
+``charts`` describes charts and draws them static or interactive, ``calibration`` reports a calibration or an
+evaluation, ``paper`` repeats the drives of the paper's section 4. Only this package imports matplotlib and plotly, and
+only when a report is requested.
 """

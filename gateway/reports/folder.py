@@ -1,4 +1,4 @@
-"""Where a report goes."""
+"""The output directory of a report."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from gateway.errors import ConfigurationError
 
 
 def made_folder(directory: Path) -> None:
-    """Make it, unless it is there. Raises ConfigurationError where it cannot be."""
+    """Create the directory if needed and return it. Raises ConfigurationError if that fails."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as fault:

@@ -1,7 +1,7 @@
-"""The service: one process, from the bus to the web, started, watched and stopped in one place.
+"""The service: one process from the bus to the web. This package builds, starts, supervises and stops its parts.
 
-Settings and their files (signal map, calibration) come in, and frames from the bus; estimates go out to the store, the
-web and the uplink, and every change of state to the log and to systemd. It builds all parts and owns their threads.
+Inputs are the settings with their files (signal map, calibration) and frames from the bus. Estimates go to the store,
+the web and the uplink; every change of state goes to the log and to systemd.
 """
 
 from gateway.service.gateway import Gateway, GatewayFailedError, OnStarted

@@ -1,4 +1,4 @@
-"""The service itself: starts every part in order, watches them, stops them in the reverse order."""
+"""The service itself: starts its parts in order, supervises them, and stops them in reverse order."""
 
 import asyncio
 import contextlib
@@ -9,17 +9,18 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from gateway.bus.live import OpenReceiver, SourceState, around_of
+from gateway.bus.live import OpenReceiver, SourceState, bus_survey_of
 from gateway.bus.signals import Decoder
+from gateway.calibration.verification_file import VerificationRule
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event
 from gateway.notify import Notifier
-from gateway.service.alarm_desk import AlarmDesk, rules_of
-from gateway.service.changes import BatchLog, StateLog, told_in_turn
-from gateway.service.day_book import DayBook
+from gateway.service.alarms import AlarmService, rules_of
+from gateway.service.change_log import BatchLog, StateLog, call_each
 from gateway.service.last_good import keep_copy
-from gateway.service.part import CLOSE_WITHIN_S, Deadline, Part, Questions, Sending, in_own_thread, stop_in_turn
+from gateway.service.load_events import LoadEventLog
+from gateway.service.part import CLOSE_WITHIN_S, Deadline, Questions, Sending, ServicePart, in_own_thread, stop_in_turn
 from gateway.service.parts import (
     Forwarding,
     board_of,
@@ -33,11 +34,12 @@ from gateway.service.parts import (
     webhook_of,
 )
 from gateway.service.pipeline import Pipeline
-from gateway.service.proving import Proving
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
 from gateway.service.subject import Subject
-from gateway.service.web_server import WebServer
+from gateway.service.verification.known_weights import KnownWeightService
+from gateway.service.verification.trend import TrendService
+from gateway.service.verification.verification import VerificationService
 from gateway.setup import Setup
 from gateway.status import State
 from gateway.store import Store
@@ -50,24 +52,25 @@ from gateway.web import (
     server_config,
     weigh_latest,
 )
+from gateway.web.access.serving import WebServer
 
-SUPERVISE_S = 0.25  # how soon a dead part is seen
-LOOK_S = 1.0  # how often the whole status is looked at
-ASLEEP_SUPERVISE_S = 2.0  # likewise while the bus is silent: a parked vehicle's battery pays for every look
+SUPERVISE_S = 0.25  # interval between checks for dead parts
+LOOK_S = 1.0  # interval between checks of the whole status
+ASLEEP_SUPERVISE_S = 2.0  # the same while the bus is silent, to save the battery of a parked vehicle
 ASLEEP_LOOK_S = 5.0
-BUS_WITHIN_S = 2.0  # of a stop
-PIPELINE_WITHIN_S = 10.0  # a full inbox holds several windows
-FLUSH_WITHIN_S = 8.0  # likewise the disk
+BUS_WITHIN_S = 2.0  # for the bus reader during a stop
+PIPELINE_WITHIN_S = 10.0  # for the pipeline: a full inbox contains several windows
+FLUSH_WITHIN_S = 8.0  # for writing to the disk
 
 OnStarted = Callable[["Gateway"], None]
 
 
 class GatewayFailedError(SpringscaleError):
-    """A part of the running service died; the process ends so that systemd restarts it."""
+    """A vital part of the running service died; the process ends so that systemd restarts it."""
 
 
 class Gateway:
-    """One vehicle's service. :meth:`run` returns when it was asked to stop, and raises when a part died."""
+    """The service of one vehicle. :meth:`run` returns after a stop request, and raises if a vital part dies."""
 
     def __init__(
         self,
@@ -80,10 +83,10 @@ class Gateway:
         open_receiver: OpenReceiver | None = None,
         setup_fault: str | None = None,
     ) -> None:
-        """``load`` reads the settings again for a reload; without it a reload finds them unchanged.
+        """``load`` reads the settings again for a reload; without it they never change.
 
-        ``setup_fault`` says why the setup is not the one that the settings name (last_good).
-        ``open_receiver`` replaces the interface (the soak run).
+        ``setup_fault`` says why the setup is not the one that the settings name (last_good). ``open_receiver`` replaces
+        the bus interface (soak run).
         """
         self._settings = settings
         self._on_started = on_started
@@ -100,33 +103,39 @@ class Gateway:
             self.store.write_event("setup_fault", {"fault": setup_fault})
         self.board = board_of(settings.web.stale_after_s, self.store, setup)
         self.source = source_of(settings.bus, setup, open_receiver)
-        self.around = around_of(settings.bus.interface, settings.bus.channel, settings.bus.options)
+        self.bus_survey = bus_survey_of(settings.bus.interface, settings.bus.channel, settings.bus.options)
         flow = setup.flow(replace(settings.batch.for_core(is_live=True), position_decimals=settings.position.decimals))
         self.keeper = keeper_of(settings.keep, settings.store, setup)
         self.commissioning = commissioning_of(settings, setup, self.keeper, flow, self.store)
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.ring_log = ring_log_of(settings, setup)
         subject = Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id)
-        self.alarms = AlarmDesk(rules_of(settings.alarms), subject, self.store)
+        self.alarms = AlarmService(rules_of(settings.alarms), subject, self.store)
         self.pipeline = Pipeline(
             self.source.inbox,
             Decoder(setup.signal_map),
             flow,
             self.store,
             self.board,
-            told_in_turn(log_batch, DayBook(setup, self.store), self.alarms),
+            call_each(log_batch, LoadEventLog(setup, self.store), self.alarms),
             self.ring_log.put if self.ring_log else lambda frames: None,
         )
         self.uplink = uplink_of(forwarding.broker, setup, self.store, with_places=with_places)
         self.webhook = webhook_of(forwarding.webhook, self.store, with_places=with_places)
-        self.proving = Proving(
-            settings.store.directory,
-            settings.verification,
-            subject,
-            self.pipeline,
-            self.store,
-            stale_after_s=settings.web.stale_after_s,
+        directory, ask, on_event = settings.store.directory, self.store.reader().estimates, self.store.write_event
+        self.known_weights = KnownWeightService(
+            directory, subject, self.pipeline, ask, stale_after_s=settings.web.stale_after_s, on_event=on_event
         )
+        self.verification = VerificationService(
+            directory,
+            subject,
+            ask,
+            VerificationRule(**settings.verification.model_dump(exclude={"every_days"})),
+            payload_without=self.known_weights.payload_without,
+            every_days=settings.verification.every_days,
+            on_event=on_event,
+        )
+        self.trend = TrendService(directory, subject, ask, self.known_weights.zeros)
         self.broadcaster = broadcaster_of(settings.broadcast, self.board)
         self.status = StatusReport(
             settings,
@@ -138,8 +147,8 @@ class Gateway:
             self.uplink,
             self.webhook,
             self.ring_log,
-            self.proving.verification.status,
-            around=self.around,
+            self.verification.status,
+            bus_survey=self.bus_survey,
             alarms=self.alarms.summary,
             warnings=self._warnings,
         )
@@ -149,12 +158,12 @@ class Gateway:
             self.status,
             calibrated=setup.calibrated,
             tokens=token_file,
-            known_weights=self.proving.known_weights,
+            known_weights=self.known_weights,
             commissioning=self.commissioning,
             known_loads=known_loads,
             record=self.ring_log,
-            verification=self.proving.verification,
-            trend=self.proving.trend,
+            verification=self.verification,
+            trend=self.trend,
             alarms=self.alarms,
             draws_trailers=settings.broadcast.draws_trailers,
         )
@@ -167,13 +176,15 @@ class Gateway:
         self._web_fault: str | None = None
         self._reloading: asyncio.Task[None] | None = None
         self._vital, self._beside = self._parts()
-        self.is_to_start_anew = False  # with the calibration that was made meanwhile; see life.py
+        self.needs_restart = False  # with the calibration that was made meanwhile; see life.py
 
-    def _parts(self) -> tuple[tuple[Part, ...], tuple[Part, ...]]:
-        """Vital parts of the weighing, and the other parts; each in the order of the start."""
+    def _parts(self) -> tuple[tuple[ServicePart, ...], tuple[ServicePart, ...]]:
+        """The vital parts and the other parts, each in the order of their start."""
         vital = (
-            Part("database writer", lambda: None, self.store.close, death=lambda: _ended(self.store), is_vital=True),
-            Part(
+            ServicePart(
+                "database writer", lambda: None, self.store.close, death=lambda: _ended(self.store), is_vital=True
+            ),
+            ServicePart(
                 "pipeline",
                 self.pipeline.start,
                 self.pipeline.stop,
@@ -181,7 +192,7 @@ class Gateway:
                 lambda: _died(self.pipeline.failure) or _ended(self.pipeline),
                 is_vital=True,
             ),
-            Part(
+            ServicePart(
                 "bus reader",
                 self.source.start,
                 self.source.stop,
@@ -190,21 +201,24 @@ class Gateway:
             ),
         )
         beside = [
-            Part("commissioning", self.commissioning.start, self.commissioning.stop, lambda: self.commissioning.fault),
-            Part("batch keeper", self.keeper.start, self.keeper.stop, lambda: self.keeper.fault),
-            Part("proving", self.proving.start, lambda _left_s: self.proving.stop()),
+            ServicePart(
+                "commissioning", self.commissioning.start, self.commissioning.stop, lambda: self.commissioning.fault
+            ),
+            ServicePart("batch keeper", self.keeper.start, self.keeper.stop, lambda: self.keeper.fault),
+            ServicePart("trend", self.trend.start, self.trend.stop, lambda: self.trend.fault),
         ]
         if (ring_log := self.ring_log) is not None:
-            beside.append(Part("recorder", ring_log.start, ring_log.stop, lambda: ring_log.fault))
+            beside.append(ServicePart("recorder", ring_log.start, ring_log.stop, lambda: ring_log.fault))
         senders: tuple[Sending | None, ...] = (self.broadcaster, self.uplink, self.webhook)
         beside += [_sender_part(sender) for sender in senders if sender is not None]
-        beside.append(Part("survey of the bus", lambda: None, self.around.stop))
+        beside.append(ServicePart("survey of the bus", lambda: None, self.bus_survey.stop))
         return vital, tuple(beside)
 
     def _warnings(self) -> tuple[str, ...]:
-        """Faults that do not stop the weighing, for people."""
-        faults = [self._tokens.fault, self._reload.fault, self._web_fault, *self.proving.faults]
-        faults += [part.told() for part in (*self._vital, *self._beside)]
+        """Faults that do not stop the weighing, as sentences for people."""
+        faults = [self._tokens.fault, self._reload.fault, self._web_fault, self.known_weights.fault]
+        faults.append(self.verification.fault)
+        faults += [part.shown_fault() for part in (*self._vital, *self._beside)]
         return tuple(fault for fault in faults if fault)
 
     @property
@@ -216,11 +230,11 @@ class Gateway:
 
     @property
     def has_caught_up(self) -> bool:
-        """True while every frame that came in has been worked through."""
+        """Whether every received frame has been processed."""
         return self.pipeline.n_frames == self.source.counts().frames - self.source.inbox.dropped
 
     def request_stop(self) -> None:
-        """Begin to stop; from the event loop's thread (other threads: loop.call_soon_threadsafe)."""
+        """Request a stop, from the thread of the event loop (other threads: loop.call_soon_threadsafe)."""
         self._stopping.set()
 
     def run(self) -> None:
@@ -244,7 +258,7 @@ class Gateway:
         serving = asyncio.create_task(self._serve_web())
         try:
             await self._supervise(serving)
-        except Exception as failure:  # noqa: BLE001 - whatever ends the watching, what was accepted reaches the disk
+        except Exception as failure:  # noqa: BLE001 - accepted records still have to reach the disk
             self._failure = f"the supervisor died: {failure!r}"
         await in_own_thread(self._stop_parts)
         self._server.end()
@@ -252,12 +266,12 @@ class Gateway:
         self._notifier.close()
 
     def _reload_told(self) -> None:
-        """Reload beside the event loop: databases and calibrations take seconds to read. One at a time."""
+        """Start a reload in a thread, because reading databases and calibrations takes seconds. One at a time."""
         if self._server.started and (self._reloading is None or self._reloading.done()):
             self._reloading = asyncio.create_task(self._reload_beside())
 
     async def _reload_beside(self) -> None:
-        """And notify systemd when it begins and ends."""
+        """Reload, and notify systemd before and after."""
         self._notifier.send_reloading()
         try:
             await in_own_thread(self._reload)
@@ -265,14 +279,14 @@ class Gateway:
             self._notifier.send(READY="1")
 
     async def _serve_web(self) -> None:
-        """uvicorn until it ends; a failed start raises SystemExit, which must not leave a task."""
+        """Run uvicorn. A failed start raises SystemExit, which must not leave the task."""
         with contextlib.suppress(SystemExit):
             await self._server.serve()
 
     async def _supervise(self, serving: asyncio.Task[None]) -> None:
-        """Until asked to stop or a part dies: readiness, watchdog by progress, status line."""
+        """Report readiness, watchdog and status to systemd until a stop request or the death of a vital part."""
         is_ready, seen = False, -1
-        look = Look(self)
+        look = PeriodicCheck(self)
         while not self._stopping.is_set() and self._failure is None:
             self._failure = self._dead_part(serving)
             if self._server.started and not is_ready:
@@ -286,28 +300,28 @@ class Gateway:
             is_asleep = is_ready and self.source.state is SourceState.BUS_SILENT
             look.go_on(ASLEEP_LOOK_S if is_asleep else LOOK_S)
             if self.commissioning.is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
-                self.is_to_start_anew = True
+                self.needs_restart = True
                 self.request_stop()
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._stopping.wait(), ASLEEP_SUPERVISE_S if is_asleep else SUPERVISE_S)
 
     def look(self, log_state: StateLog) -> None:
-        """Periodic checks of the service's state; in a thread, for they may wait for a lock or a disk."""
+        """One check of the service's state, in a thread because it may wait for a lock or a disk."""
         now = self.status()
         log_state(now)
-        self.alarms.watch(now, self.proving.trend.trends)
+        self.alarms.watch(now, self.trend.trends)
         self._look_around(now.state)
         self._notifier.send_status(now.sentence())
 
     def _look_around(self, state: State) -> None:
-        """A silent sensor may send under another identifier, which the bus's filters exclude."""
+        """Survey the bus while a sensor is silent: it may send under an identifier that the filters exclude."""
         if state in (State.WAITING_FOR_BUS, State.SENSOR_FAULT):
-            self.around.look()
+            self.bus_survey.look()
         else:
-            self.around.forget()
+            self.bus_survey.forget()
 
     def _dead_part(self, serving: asyncio.Task[None]) -> str | None:
-        """The vital part that died, and its exception; None while all live."""
+        """Which vital part died, and why; None while all work."""
         for part in self._vital:
             if (death := part.death()) is not None:
                 return f"the {part.name} {death}"
@@ -319,14 +333,14 @@ class Gateway:
         return None
 
     def _stop_parts(self) -> None:
-        """The bus first, then its consumers, then the disk: every accepted estimate is on it before the other parts
-        stop.
+        """Stop the bus, then the pipeline, then flush the store, so that every accepted estimate is on disk before the
+        other parts stop.
 
-        One deadline for all. Parts that hang are abandoned.
+        All share one deadline. Parts that hang are abandoned.
         """
         deadline = Deadline()
         self._notifier.send(STOPPING="1", STATUS="Stopping.")
-        self.commissioning.hear_no_more()  # what the end cuts short is no end of a window
+        self.commissioning.ignore_batches()  # a batch cut short by the stop is not the end of a window
         self.source.stop(deadline.left_s(BUS_WITHIN_S))
         self.pipeline.stop(deadline.left_s(PIPELINE_WITHIN_S))
         self.store.flush(deadline.left_s(FLUSH_WITHIN_S))
@@ -338,8 +352,8 @@ class Gateway:
         log_event(Event.STOPPED, level=level, failure=self._failure, rows_lost=n_lost)
 
 
-class Look:
-    """Looks at the service again and again, in a thread; the next look waits for the one before, and a while."""
+class PeriodicCheck:
+    """Runs :meth:`Gateway.look` periodically in a thread; a check never overlaps the one before."""
 
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
@@ -348,7 +362,7 @@ class Look:
         self._begun_s = -ASLEEP_LOOK_S
 
     def go_on(self, every_s: float) -> None:
-        """Begin the next look where ``every_s`` are over. Raises what the last one raised."""
+        """Start the next check if ``every_s`` have passed. Raises what the last one raised."""
         if self._task is not None and self._task.done():
             task, self._task = self._task, None
             task.result()
@@ -366,8 +380,8 @@ def _ended(part: Store | Pipeline | Sending) -> str | None:
     return None if part.is_alive() else "died"
 
 
-def _sender_part(sender: Sending) -> Part:
-    return Part(
+def _sender_part(sender: Sending) -> ServicePart:
+    return ServicePart(
         sender.NAME,
         sender.start,
         sender.stop,

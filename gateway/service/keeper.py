@@ -1,4 +1,4 @@
-"""The thread that keeps batches for later calibrations: the pipeline queues them, and never waits for the disk."""
+"""The thread that stores batches for later calibrations, so that the pipeline never waits for the disk."""
 
 import logging
 import queue
@@ -14,7 +14,7 @@ from gateway.estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.records import Batch, Motion
 
-MOST_WAITING: Final = 4  # each with its rows, some megabytes; one comes in minutes
+MOST_WAITING: Final = 4  # batches in the queue; each has some megabytes of rows, and one comes every few minutes
 STOP_WITHIN_S: Final = 3.0
 
 
@@ -26,36 +26,36 @@ class _Handed:
 
 
 class Listener(Protocol):
-    """The listener that receives batches after those that count are kept, in the keeper's thread."""
+    """Receives batches in the keeper's thread, after those that count are stored."""
 
     @property
     def wants_all(self) -> bool:
-        """Whether provisional and rejected ones are heard of too. Safe from any thread."""
+        """Whether it also receives provisional and rejected batches. Safe from any thread."""
         ...
 
     def hear(self, kept: KeptBatch) -> None:
-        """Of one batch."""
+        """Receive one batch."""
         ...
 
 
-class Nobody:
-    """Hears nothing."""
+class NoListener:
+    """A listener that ignores every batch."""
 
     wants_all = False
 
     def hear(self, kept: KeptBatch) -> None:
-        """And says nothing."""
+        """Do nothing."""
 
 
 class BatchKeeper:
-    """Puts every batch that any estimator could use on ``shelf``, and passes all to ``listener``.
+    """Stores every batch that an estimator could use on ``shelf``, and passes all batches to ``listener``.
 
     ``fault`` is the last fault of the disk, if any.
     """
 
     def __init__(self, shelf: Shelf, signal_map: SignalMap) -> None:
         self.shelf = shelf
-        self.listener: Listener = Nobody()
+        self.listener: Listener = NoListener()
         self.fault: str | None = None
         self.n_lost = 0  # batches that should have been kept and were not
         self._signal_map = signal_map
@@ -63,11 +63,11 @@ class BatchKeeper:
         self._thread = threading.Thread(target=self._run, name="batch-keeper", daemon=True)
 
     def start(self) -> None:
-        """Begin to keep."""
+        """Start the thread."""
         self._thread.start()
 
     def keep(self, batch: Batch, found: Estimate, rows: Motion) -> None:
-        """Take a batch over, from the pipeline's thread; one too many is lost and counted."""
+        """Queue a batch, from the pipeline's thread; if the queue is full the batch is lost and counted."""
         if not (_counts(batch) or self.listener.wants_all):
             return
         try:
@@ -77,11 +77,11 @@ class BatchKeeper:
                 self._lose(f"{MOST_WAITING} batches wait for the disk already")
 
     def flush(self) -> None:
-        """Wait until all that was handed over is kept or lost."""
+        """Wait until every queued batch is stored or lost."""
         self._waiting.join()
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
-        """Keep the waiting batches, then end; those not kept in time are lost and counted."""
+        """Store the queued batches, then end; those not stored in time are lost and counted."""
         end_s = time.monotonic() + timeout_s
         with suppress(queue.Full):
             self._waiting.put(None, timeout=timeout_s)
@@ -99,7 +99,7 @@ class BatchKeeper:
                 if handed is None:
                     return
                 self._put(handed)
-            except Exception as failure:  # noqa: BLE001 - what one batch meets must not keep the next from being kept
+            except Exception as failure:  # noqa: BLE001 - a failure with one batch must not stop the thread
                 self._lose(repr(failure))
             finally:
                 self._waiting.task_done()
@@ -119,11 +119,11 @@ class BatchKeeper:
 
     def _lose(self, why: str) -> None:
         self.n_lost += 1
-        if self.fault is None:  # once until it works again
+        if self.fault is None:  # log it once until it works again
             log_event(Event.BATCH_NOT_KEPT, level=logging.WARNING, fault=why)
         self.fault = f"batches cannot be kept for later calibrations: {why}; weighing goes on"
 
 
 def _counts(batch: Batch) -> bool:
-    """Whether an estimator could use it: provisional and rejected ones are for the listener alone."""
+    """Whether an estimator could use the batch; provisional and rejected batches go to the listener only."""
     return not (batch.is_provisional or batch.rejected)

@@ -1,6 +1,6 @@
-"""The last good copy of the calibration, for the start at which the file that was named cannot be used any more.
+"""The last good copy of the calibration file, used if the file cannot be read at a later start.
 
-The copy lies in the service's own folder, one for each path that was ever named: another path never gets its numbers.
+The copies are in the service's own directory, one for each configured path, so a copy is never used for another path.
 """
 
 import hashlib
@@ -17,9 +17,9 @@ from gateway.setup import Setup, setup_of
 
 
 def setup_or_last_good(settings: Settings) -> tuple[Setup, str | None]:
-    """The setup, and the fault of the calibration file if its last good copy replaces it.
+    """The setup, and the fault of the calibration file if its last good copy replaces it, else None.
 
-    Raises as ``setup_of``; for a broken calibration file if there is no good copy of it.
+    Raises as ``setup_of``; for a broken calibration file only if there is no good copy.
     """
     try:
         return setup_of(settings), None
@@ -35,12 +35,12 @@ def setup_or_last_good(settings: Settings) -> tuple[Setup, str | None]:
 
 
 def keep_copy(settings: Settings, calibration: CalibrationFile) -> None:
-    """Keep it for later starts; a disk fault is logged and does not stop the weighing."""
+    """Store a copy for later starts; a disk fault is logged and does not stop the weighing."""
     if settings.calibration is None or settings.calibration.parent == settings.store.directory:  # it lies there already
         return
     files, name, path = KeptFiles(settings.store.directory), _name_of(settings.calibration), settings.calibration
     try:
-        if settings.trust.public_keys:  # the copy must be believed like the file itself: its very bytes, and who signed
+        if settings.trust.public_keys:  # the copy needs the signature, and therefore the identical bytes
             kept = {name: settings.trust.for_reading().read(path), name + SUFFIX: signature_path(path).read_bytes()}
         else:
             kept = {name: calibration.to_json().encode()}

@@ -1,4 +1,4 @@
-"""The common interface of the service's parts: started, watched and stopped in time in the same way."""
+"""The common interface of the service's parts, and stopping them within one deadline."""
 
 import asyncio
 import logging
@@ -12,18 +12,18 @@ from typing import ClassVar, Final, Protocol
 
 from gateway.log import Event, log_event
 
-STOP_WITHIN_S: Final = 25.0  # all parts together: less than systemd waits before it kills
-PART_WITHIN_S: Final = 5.0  # one of them, where the pipeline and the disk are done
-CLOSE_WITHIN_S: Final = 3.0  # kept for the last records of the stop itself
+STOP_WITHIN_S: Final = 25.0  # for all parts together: less than systemd waits before it kills the process
+PART_WITHIN_S: Final = 5.0  # for one part, after the pipeline and the store
+CLOSE_WITHIN_S: Final = 3.0  # reserved for the last records of the stop itself
 
 
 @dataclass(frozen=True)
-class Part:
-    """A row of the gateway's table.
+class ServicePart:
+    """One part of the service.
 
-    ``stop`` is given the seconds it may take. ``fault`` says what is wrong, for people; ``death`` why it no longer
-    works, None while it does. The death of a vital part ends the process, so that systemd restarts it; that of another
-    is shown, and the weighing goes on.
+    ``stop`` receives the seconds it may take. ``fault`` describes a fault for people; ``death`` says why the part has
+    ended, None while it works. The death of a vital part ends the process, so that systemd restarts it. The death of
+    another part is shown, and the weighing goes on.
     """
 
     name: str
@@ -33,8 +33,8 @@ class Part:
     death: Callable[[], str | None] = lambda: None
     is_vital: bool = False
 
-    def told(self) -> str | None:
-        """Its fault, or its death."""
+    def shown_fault(self) -> str | None:
+        """The fault to show in the status: the death of a part that is not vital, else its fault."""
         death = None if self.is_vital else self.death()
         return self.fault() if death is None else f"{death}; weighing goes on, a restart brings it back"
 
@@ -52,29 +52,29 @@ class Sending(Protocol):
 
 
 class Deadline:
-    """One moment for all parts of a stop."""
+    """The deadline shared by all parts of a stop."""
 
     def __init__(self, within_s: float = STOP_WITHIN_S, clock_s: Callable[[], float] = time.monotonic) -> None:
         self._clock_s = clock_s
         self._end_s = clock_s() + within_s
 
     def left_s(self, most_s: float = STOP_WITHIN_S, *, keep_s: float = 0.0) -> float:
-        """The share of one part of the time left, without the last ``keep_s``."""
+        """Seconds left for one part, at most ``most_s``, with the last ``keep_s`` reserved."""
         return max(0.0, min(most_s, self._end_s - keep_s - self._clock_s()))
 
 
 class Questions(ThreadPoolExecutor):
-    """Threads in which clients' questions wait for a lock or a disk. Its end waits for none of them."""
+    """Thread pool for client requests that may wait for a lock or a disk. Its shutdown does not wait for them."""
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Abandon tasks that hang: the event loop, which waits for its executor, would wait for ever."""
+        """Abandon hanging tasks, because the event loop would wait for its executor forever."""
         super().shutdown(wait=False, cancel_futures=True)
 
 
 async def in_own_thread(work: Callable[[], object]) -> None:
-    """Run it in a thread of its own while the event loop goes on. Raises what it raises.
+    """Run ``work`` in its own thread while the event loop goes on. Raises what ``work`` raises.
 
-    Not in the loop's pool: clients' requests may have used it up, and one that hangs keeps the process from ending.
+    It does not use the loop's pool, which client requests may have exhausted.
     """
     loop = asyncio.get_running_loop()
     done: asyncio.Future[None] = loop.create_future()
@@ -87,7 +87,7 @@ async def in_own_thread(work: Callable[[], object]) -> None:
         failure: BaseException | None = None
         try:
             work()
-        except Exception as raised:  # noqa: BLE001 - raised again where it is awaited
+        except Exception as raised:  # noqa: BLE001 - raised again if it is awaited
             failure = raised
         with suppress(RuntimeError):  # the loop is closed: nobody waits any more
             loop.call_soon_threadsafe(end, failure)
@@ -96,10 +96,11 @@ async def in_own_thread(work: Callable[[], object]) -> None:
     await done
 
 
-def stop_in_turn(parts: Sequence[Part], deadline: Deadline) -> list[str]:
-    """Stop the last first -> names of those that did not stop in time; they are left behind.
+def stop_in_turn(parts: Sequence[ServicePart], deadline: Deadline) -> list[str]:
+    """Stop the parts in reverse order -> names of those that did not stop in time, which are abandoned.
 
-    Each stops in a thread of its own: if it waits for a lock or a disk, the others wait no longer than the deadline.
+    Each part stops in its own thread, so a part that waits for a lock or a disk delays the others only up to the
+    deadline.
     """
     late = []
     for part in reversed(parts):

@@ -16,7 +16,7 @@ from gateway.core.flow import Flow
 from gateway.errors import StoreError
 from gateway.estimate import Estimate
 from gateway.log import Event, log_event
-from gateway.service.commissioning import Commissioning, Jobs, Lines, Vehicle, why_not_allowed
+from gateway.service.commissioning import Commissioning, Jobs, Lines, ServiceVehicle, why_not_allowed
 from gateway.service.keeper import BatchKeeper
 from gateway.setup import Setup
 from gateway.store import Retention, Store
@@ -50,13 +50,13 @@ def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with
 
 
 def _queue_name(wanted: UplinkSettings) -> str:
-    """The place in the queue belongs to the receiver: another broker or branch begins at the first row."""
+    """Name of the queue position. It belongs to the receiver: another broker or topic starts at the first record."""
     return f"mqtt://{wanted.broker}/{wanted.topic}"
 
 
 @dataclass(frozen=True, slots=True)
 class Forwarding:
-    """The listeners to stored records, by the settings; None if there are none."""
+    """The senders that follow the journal, by the settings; None for those that are not configured."""
 
     broker: UplinkSettings | None
     webhook: WebhookSettings | None
@@ -70,7 +70,7 @@ class Forwarding:
 
     @property
     def queues(self) -> tuple[str, ...]:
-        """Names of their places in the queue."""
+        """Names of their queue positions."""
         broker = () if self.broker is None else (_queue_name(self.broker),)
         return broker if self.webhook is None else (*broker, self.webhook.queue)
 
@@ -93,7 +93,7 @@ def store_of(wanted: StoreSection, undelivered_to: tuple[str, ...]) -> Store:
 
 
 def board_of(stale_after_s: float, store: Store, setup: Setup) -> Board:
-    """It shows the last known state; an unreadable disk is no reason not to start."""
+    """The board with the last stored estimates; an unreadable disk does not prevent the start."""
     board = Board(stale_after_s=stale_after_s, unweighed=Scales(setup.calibrated).weigh(None))
     try:
         board.restore(**asdict(store.reader().latest()))
@@ -112,7 +112,7 @@ def keeper_of(wanted: KeepSection, store: StoreSection, setup: Setup) -> BatchKe
 
 
 def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow: Flow, store: Store) -> Commissioning:
-    """Which hears of every batch that the flow hands to the keeper."""
+    """The commissioning, subscribed to every batch that the flow passes to the keeper."""
     own_name = settings.vehicle.calibrated_as
     directory = settings.store.directory
     desk = Commissioning(
@@ -120,7 +120,7 @@ def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow
         Lines(directory, settings.commissioning.lines, settings.trust.for_reading()),
         keeper.shelf,
         flow.scheduler,
-        Vehicle(
+        ServiceVehicle(
             name=own_name or settings.vehicle.id,
             signals_id=setup.signal_map.id,
             is_calibrated=setup.calibration is not None,
@@ -146,7 +146,7 @@ def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | No
 
 
 def broadcaster_of(wanted: BroadcastSection, board: Board) -> Broadcaster | None:
-    """None if nothing is to be sent. A stale estimate is not sent to a bus, which cannot mark it."""
+    """None if nothing is to be sent. A stale estimate is not sent, because a frame cannot mark it as stale."""
     if wanted.interface is None or wanted.channel is None or wanted.source_address is None:
         return None
 
@@ -159,7 +159,7 @@ def broadcaster_of(wanted: BroadcastSection, board: Board) -> Broadcaster | None
 
 
 def ring_log_of(settings: Settings, setup: Setup) -> RingLog | None:
-    """None if nothing is to be recorded. Frames get the channel that the signal map reads them from."""
+    """None if nothing is to be recorded. Frames are recorded with the channel of the signal map."""
     wanted = settings.record
     if not wanted.enabled:
         return None

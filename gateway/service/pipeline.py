@@ -1,4 +1,4 @@
-"""The pipeline thread: inbox -> decode -> batches -> estimates -> store and board. It owns all of that state."""
+"""The pipeline thread: inbox -> decoder -> batches -> estimates -> store and board."""
 
 import contextlib
 import logging
@@ -19,12 +19,12 @@ from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.log import Event, log_event
 from gateway.records import Frames, Why
-from gateway.service.watching import SignalWatch, StandingWatch
+from gateway.service.signal_watch import SignalWatch, StandingWatch
 from gateway.store import Store
 from gateway.web import Board, boot_clock_s
 
-DRAIN_S = 0.5  # longest wait for frames, which end it at once: how soon a drive's end is seen
-ASLEEP_DRAIN_S = 2.0  # likewise while no drive is under way
+DRAIN_S = 0.5  # longest wait for frames, and so the delay with which the end of a drive is noticed
+ASLEEP_DRAIN_S = 2.0  # the same between drives
 ROLL_RATE_KNOWN_SHARE: Final = 0.9  # of a batch's usable samples; with fewer the sensor is at fault
 ROLL_RATE_LOST: Final = (
     "the roll rate is known in only {:.0%} of the last batch (silent, stuck, at the end of its range or too slow): "
@@ -34,7 +34,7 @@ NOISY: Final = (
     "{} {:.1f} times as noisy as expected in the last batch: look for a loose mount, a bad supply or a changed filter "
     "or range in the device; weighing goes on where possible"
 )
-LATE_S: Final = 1.0  # a frame may be so much later here than its stamp
+LATE_S: Final = 1.0  # longest delay between the stamp of a frame and its arrival here
 STOP_WITHIN_S: Final = 6.0  # a full inbox holds several windows
 
 
@@ -62,7 +62,7 @@ class Pipeline:
         self.noise_fault: str | None = None  # likewise
         self.failure: BaseException | None = None
         self.n_frames = 0  # frames whose estimates, if any, are handed over
-        self.progress = 0  # grows with every turn of the loop: what the watchdog follows
+        self.progress = 0  # increases with every turn of the loop; the watchdog checks it
         self._silent_s = 0.0
         self._weighed_at: tuple[WeighedLoad | None, float] = (None, 0.0)
         self._inbox = inbox
@@ -129,8 +129,8 @@ class Pipeline:
         return True
 
     def _hear_nothing(self, for_s: float) -> None:
-        """The bus sleeps: the drive ends now, as the first row after it would end it. Only time spent listening counts,
-        so that a stalled machine first reads the frames that have gathered meanwhile.
+        """End the drive if the bus has been silent for long enough, as the next row would. Only time spent waiting for
+        frames counts, so that a stalled machine first reads the frames that have gathered.
         """
         self._silent_s += for_s
         if self.flow.scheduler.drive_start_ns is not None and self._silent_s > self.flow.scheduler.silence_s + LATE_S:
@@ -144,7 +144,7 @@ class Pipeline:
             if found.is_remainder:
                 self._store.write_remainder(estimate_to_json(found))
             else:
-                self._board.publish(found)  # first: whoever hears of it by the journal finds it there
+                self._board.publish(found)  # before the store, so that followers of the journal find it on the board
                 if not found.is_provisional:
                     self._store.write_estimate(estimate_to_json(found))
             self._on_batch(found)
@@ -172,12 +172,12 @@ class Pipeline:
 
 
 def noise_fault(found: Estimate) -> str | None:
-    """Which sensor has become noisy and by how much, for people; None if none has."""
+    """Which sensor has become noisy and how much, as a sentence; None if none has."""
     ratio, name = max((found.diagnostics.get(key, 0.0), name) for key, name in SENSOR_OF.items())
     return NOISY.format(name, ratio) if ratio > NOISY_RATIO else None
 
 
 def _name_this_thread(name: str) -> None:
-    """So that `ps -L`, `top -H` and debuggers show which of the process's threads works (Linux only)."""
+    """Name the thread for `ps -L`, `top -H` and debuggers (Linux only)."""
     with contextlib.suppress(OSError):
         Path(f"/proc/self/task/{threading.get_native_id()}/comm").write_text(name)

@@ -1,8 +1,8 @@
-"""Changes of a running service by SIGHUP: the log's level and the web's certificate. The rest needs a restart.
+"""Reload by SIGHUP: changes the log level and the certificate of the web. All other settings need a restart.
 
-A new calibration or signal map in the middle of a batch would give numbers that no offline run could repeat, so they
-take effect at a restart, which takes about two seconds and loses the open window only; a reload checks them and reports
-what the restart will find. Access tokens need neither: the service follows their file.
+A new calibration or signal map in the middle of a batch would give numbers that no offline run could reproduce. They
+take effect at a restart, which takes about two seconds and loses only the open window; a reload checks them and reports
+what the restart will find. Access tokens need no reload: the service watches their file.
 """
 
 import logging
@@ -34,9 +34,9 @@ class Reloader:
         setup: Setup | None = None,
         fault: str | None = None,
     ) -> None:
-        """``setup`` is the one in use: files that changed at the same path are compared with it.
+        """``setup`` is the one in use, with which the present files are compared.
 
-        ``fault`` is their fault from the start on; later reloads renew it, the status shows it.
+        ``fault`` is the fault of the files at the start; each reload updates it, and the status shows it.
         """
         self._running = running
         self._load = load
@@ -45,7 +45,7 @@ class Reloader:
         self.fault = fault
 
     def __call__(self) -> bool:
-        """True if the present settings and files are good; the log says what changed and what waits."""
+        """Reload -> whether the present settings and files are good. The log lists what needs a restart."""
         try:
             wanted = self._load()
             tls = tls_of(wanted)
@@ -58,11 +58,11 @@ class Reloader:
         waiting = sorted({*waiting, *self._changed_files(wanted)})
         level = logging.WARNING if waiting else logging.INFO
         log_event(Event.RELOADED, level=level, log_level=wanted.log.level, waits_for_restart=waiting)
-        set_log_level(wanted.log.level)  # last: "warning" would hide that it was done
+        set_log_level(wanted.log.level)  # last, because the level "warning" would hide the line above
         return self.fault is None
 
     def _changed_files(self, wanted: Settings) -> list[str]:
-        """Keys whose files differ from those in use. Files that cannot be used are a fault."""
+        """Keys whose files differ from those in use. Invalid files become ``fault``."""
         if self._setup is None:
             return []
         try:
@@ -77,7 +77,7 @@ class Reloader:
         return [key for key, it_has in has_changed.items() if it_has]
 
     def _is_live(self, key: str, tls: Tls | None) -> bool:
-        """Turning TLS on or off changes the listening socket: for that a certificate's path is not live."""
+        """Whether a key can change without a restart. Turning TLS on or off needs one: it changes the socket."""
         return key in LIVE and (not key.startswith("web.tls") or self._web.is_ssl == (tls is not None))
 
 

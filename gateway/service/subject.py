@@ -1,14 +1,8 @@
-"""What a service weighs, and with what."""
+"""The vehicle that a service weighs, with its calibration and estimator."""
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
 
 from gateway.core.calibrated import CalibratedVehicle
-
-SERVICE: Final = "service"  # who did it where nobody asked for it
-
-OnEvent = Callable[[str, Mapping[str, Any]], object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,5 +15,5 @@ class Subject:
 
     @property
     def calibration_id(self) -> str | None:
-        """Of the calibration in use."""
+        """Identifier of the calibration in use; None without one."""
         return None if self.calibrated is None else self.calibrated.id

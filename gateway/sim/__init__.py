@@ -1,5 +1,5 @@
-"""A test bench of our own: road, vehicle, sensors, drives.
+"""The simulator: road, vehicle, sensors, drives.
 
-A vehicle with its loads, a road, a drive and a seed come in; what the sensors record and what was true go out. It
-shares no model with core, so that it can prove the estimators wrong.
+A vehicle with its loads, a road, a drive and a seed go in; the sensors' recording and the truth come out. It shares no
+model with core, so that it can prove the estimators wrong.
 """

@@ -27,11 +27,11 @@ Records = NDArray[np.void]  # rows of CORNER or ELASTIC; one array passes betwee
 
 
 class Chassis(NamedTuple):
-    """Everything the equations of motion need.
+    """The data of the equations of motion.
 
-    corners (4,) of CORNER; elastic (k,) of ELASTIC, the loads on a base of their own. inverse_mass
-    (3, 3) and weight (3,) belong to heave, pitch and roll of the body with its welded loads;
-    height_moment_kgm is the sum of mass times height above the ground of all that is sprung.
+    corners (4,) of CORNER; elastic (k,) of ELASTIC, the loads on a base of their own. inverse_mass (3, 3) and weight
+    (3,) belong to heave, pitch and roll of the body with its welded loads; height_moment_kgm is the sum of mass times
+    height above the ground of the whole sprung mass.
     """
 
     corners: Records
@@ -42,7 +42,7 @@ class Chassis(NamedTuple):
 
 
 def chassis_of(vehicle: Vehicle, loads: tuple[Load, ...]) -> Chassis:
-    """Assemble the equations. Loads may stand anywhere; wheels get their places and preloads."""
+    """Assemble the equations. Loads may be anywhere; wheels get their places and preloads."""
     elastic = tuple(load for load in loads if load.is_elastic)
     mass = _mass_matrix(vehicle, loads)
     rigid = _masses_and_levers(vehicle, tuple(load for load in loads if not load.is_elastic))

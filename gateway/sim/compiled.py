@@ -1,4 +1,4 @@
-"""One typed door to numba: what passes through it runs as machine code and is cached on disk."""
+"""The only entry to numba: compiles functions to machine code, cached on disk."""
 
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar, cast
@@ -12,7 +12,7 @@ R = TypeVar("R")
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile ``function`` on its first call, release the GIL in it, keep the machine code on disk.
 
-    Where no directory for the cache can be written, the code is compiled anew in each process.
+    If no cache directory is writable, each process compiles again.
     """
     try:
         return cast(Callable[P, R], njit(cache=True, nogil=True, error_model="numpy")(function))

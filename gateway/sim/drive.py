@@ -13,8 +13,8 @@ import numpy as np
 
 from gateway.records import F64
 
-STEP_S: Final = 0.05
-JERK_MPS3: Final = 1.5
+STEP_S: Final = 0.05  # chosen: of a drive's samples
+JERK_MPS3: Final = 1.5  # chosen: bound of a calm driver
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,16 +14,16 @@ from gateway.sim.chassis import Chassis, Records
 from gateway.sim.compiled import compiled
 from gateway.units import STANDARD_GRAVITY_MPS2
 
-N_BODY = 3
-N_WHEELS = 4
+N_BODY = 3  # heave, pitch, roll
+N_WHEELS = 4  # lifts of the wheels
 FIRST_LOAD = N_BODY + N_WHEELS
 
 
 class Course(NamedTuple):
-    """The road under the tracks and the way the vehicle takes along it.
+    """The road under the tracks and the vehicle's speed along it.
 
-    left_m, right_m heights every road_step_m; speed, longitudinal and lateral acceleration (n,) every
-    drive_step_s, linear in between; travelled_m (n,) how far the front axle has come at each.
+    left_m, right_m heights every road_step_m; speed, longitudinal and lateral acceleration (n,) every drive_step_s,
+    linear in between; travelled_m (n,) the front axle's distance at each.
     """
 
     road_step_m: float
@@ -61,7 +61,7 @@ def look_up_ground(course: Course, corners: Records, t_s: float, ground: Records
 
 @compiled
 def _feel(course: Course, corner: Any, wheel: int, front_m: float, speed_mps: float, ground: Any) -> None:
-    """What one wheel meets: its track's height and slope, its own run-out and imbalance."""
+    """Height and slope of the track under one wheel, with its run-out and imbalance."""
     s = front_m if wheel < 2 else front_m - course.wheelbase_m
     track = course.left_m if wheel % 2 == 0 else course.right_m
     at = min(max(s / course.road_step_m, 0.0), track.size - 1.000001)

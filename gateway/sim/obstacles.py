@@ -1,4 +1,4 @@
-"""What is built upon or broken into a road: rougher and smoother stretches, potholes, speed humps."""
+"""Unevenness of a road: rougher and smoother stretches, potholes, speed humps."""
 
 import math
 from dataclasses import dataclass
@@ -81,7 +81,7 @@ def with_bumps(road: Road, bumps: list[Bump]) -> Road:
 
 
 def _shape(bump: Bump, road: Road) -> tuple[slice, F64]:
-    """Which samples a bump covers, and its heights there."""
+    """The samples that a bump covers, and its heights there."""
     half = bump.length_m / 2.0
     first = max(math.ceil((bump.position_m - half) / road.step_m), 0)
     last = min(math.floor((bump.position_m + half) / road.step_m), len(road.left_m) - 1)

@@ -1,4 +1,4 @@
-"""A vehicle drives over a road: what body and wheels do."""
+"""A vehicle on a road: the movement of body and wheels."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -13,17 +13,16 @@ from gateway.sim.road import Road
 from gateway.sim.vehicle import Load, Vehicle
 from gateway.units import STANDARD_GRAVITY_MPS2
 
-STEP_S: Final = 0.001
-RECORD_EVERY: Final = 2
+STEP_S: Final = 0.001  # chosen: of the integration
+RECORD_EVERY: Final = 2  # chosen: steps; 500 Hz, above all sensors
 
 
 @dataclass(frozen=True, slots=True)
 class Ride:
-    """What happened, every step_s from the drive's start: rows (n,).
+    """The movement every step_s from the drive's start: rows (n,).
 
-    Body motion about the empty body's centre of gravity, as heave [m], pitch and roll [rad], columns
-    of position, rate and acceleration (n, 3); wheel loads tyre_n (n, 4) in N; speed and
-    accelerations of the course (n,).
+    Body motion about the empty body's centre of gravity, as heave [m], pitch and roll [rad], columns of position, rate
+    and acceleration (n, 3); wheel loads tyre_n (n, 4) in N; speed and accelerations of the course (n,).
     """
 
     step_s: float
@@ -52,10 +51,9 @@ def ride(
     step_s: float = STEP_S,
     record_every: int = RECORD_EVERY,
 ) -> Ride:
-    """Drive over the road, the front axle at start_m (default: the wheelbase) of it at first.
+    """Drive over the road, starting with the front axle at start_m (default: the wheelbase).
 
-    Begins in the static equilibrium on the heights found there. Raises ValueError where the road
-    ends before the drive does.
+    Begins in the static equilibrium on the heights there. Raises ValueError if the road ends before the drive.
     """
     begin_m = vehicle.wheelbase_m if start_m is None else start_m
     travelled = begin_m + drive.travelled_m
@@ -80,7 +78,7 @@ def ride(
 
 
 def equilibrium(chassis: Chassis, course: Course) -> tuple[F64, F64]:
-    """Where the vehicle rests at the course's start: position (7 + k,), wheel loads (4,) in N.
+    """The vehicle's rest at the course's start: position (7 + k,), wheel loads (4,) in N.
 
     Newton's method on the equations of motion themselves, so a simulation begun there stays there.
     """
@@ -102,7 +100,7 @@ def equilibrium(chassis: Chassis, course: Course) -> tuple[F64, F64]:
 
 
 def wheel_loads_kg(vehicle: Vehicle, loads: tuple[Load, ...]) -> F64:
-    """What scales under the four wheels (front left and right, rear left and right) show at rest on level ground."""
+    """Readings of scales under the four wheels (front left and right, rear left and right) at rest on level ground."""
     level = np.zeros(2)
     course = Course(1.0, level, level, vehicle.wheelbase_m, 1.0, level, level, level, level)
     _, tyre_n = equilibrium(chassis_of(vehicle, loads), course)

@@ -14,7 +14,7 @@ from scipy import fft
 from gateway.records import F64
 from gateway.sim.compiled import compiled
 
-STEP_M: Final = 0.05
+STEP_M: Final = 0.05  # chosen: finer than a tyre's contact patch
 
 PAPER_CORNER_RADPM: Final = 0.15  # alpha_r of (1)
 PAPER_SIGMA_M: Final = 0.006  # gives IRI 4 m/km
@@ -33,7 +33,7 @@ class Road:
         return self.step_m * (len(self.left_m) - 1)
 
     def enveloped(self, patch_m: float) -> "Road":
-        """What a tyre feels: each height is the mean over the contact patch (moving average)."""
+        """The road as a tyre averages it: each height is the mean over the contact patch (moving average)."""
         n_patch = round(patch_m / self.step_m)
         if n_patch < 2:
             return self

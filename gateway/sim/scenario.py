@@ -16,8 +16,8 @@ from gateway.sim.sensors import Recording, Sensors
 from gateway.sim.vehicle import Load, Vehicle, axle_loads_kg, cg_left_m, front_share_pct, payload_kg
 
 START_NS: Final = 1_767_225_600_000_000_000  # 2026-01-01 00:00:00 UTC
-_SETTLE_S: Final = 5.0
-_MARGIN_M: Final = 50.0
+_SETTLE_S: Final = 5.0  # chosen: transients of the start decay within it
+_MARGIN_M: Final = 50.0  # chosen: of road beyond the drive
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class LoadStep:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What was carried, from t_ns (k,) on: payload_kg, front_share_pct, cg_left_m (k,), and what scales showed.
+    """What was carried, from t_ns (k,) on: payload_kg, front_share_pct, cg_left_m (k,), and the scale readings.
 
     cg_left_m is the sprung mass's centre of gravity left of the centre line; axle_loads_kg (k, 2) front and rear;
     wheel_loads_kg (k, 4) front left and right, rear left and right.
@@ -107,7 +107,7 @@ def _preceded(drive: Drive) -> tuple[Drive, float]:
 def _drive_in_parts(
     vehicle: Vehicle, steps: list[LoadStep], road: Road, drive: Drive, sensors: Sensors, settle_s: float
 ) -> Felt:
-    """One ride a load; each begins in the equilibrium of its own load."""
+    """One ride per load; each begins in the equilibrium of its own load."""
     begins = [0.0, *(step.t_s + settle_s for step in steps[1:])]
     ends = [*begins[1:], drive.duration_s]
     travelled = drive.travelled_m

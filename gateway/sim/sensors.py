@@ -67,7 +67,7 @@ class Imu:
 
 @dataclass(frozen=True, slots=True)
 class Gps:
-    """Speed that is late by latency_s. Drop-outs: on average so many an hour, so long."""
+    """Speed that is late by latency_s. Drop-outs: mean number per hour and mean duration."""
 
     rate_hz: float = 5.0
     latency_s: float = 0.0
@@ -104,7 +104,7 @@ class Sensors:
     engine: Engine = field(default_factory=Engine)
 
 
-_DEG: Final = math.pi / 180.0
+_DEG: Final = math.pi / 180.0  # radians
 
 REFERENCE: Final = Sensors(
     mount=Mount(left_m=0.15, roll_deg=1.0, pitch_deg=-1.5, yaw_deg=2.0),

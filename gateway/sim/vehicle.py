@@ -1,4 +1,4 @@
-"""What a vehicle and its load are: masses, springs, dampers, tyres, and where they sit.
+"""Parameters of a vehicle and its load: masses, springs, dampers, tyres, and their positions.
 
 Places are (x behind the front axle, y left of the centre line, height above the ground), in metres.
 Rates and forces are those felt at the wheel. Positive travel compresses.

@@ -1,12 +1,12 @@
 """One journal of all records on disk, in SQLite: one writer, bounded in age and size.
 
-Records come in from any thread and never wait for the disk; pages of the history in order of arrival go out through
-read-only readers, what is not yet on disk among them. A disk that refuses is told of, and waited for in memory.
+Any thread may write a record, and none waits for the disk. Read-only readers return the history in order of arrival,
+including the records that are not yet on disk. If the disk fails, the store reports it and keeps records in memory.
 """
 
 from gateway.store.follower import Follower
-from gateway.store.reader import Event, Latest, StoreReader
+from gateway.store.reader import Latest, ServiceEvent, StoreReader
 from gateway.store.retention import Retention
 from gateway.store.writer import Store
 
-__all__ = ["Event", "Follower", "Latest", "Retention", "Store", "StoreReader"]
+__all__ = ["Follower", "Latest", "Retention", "ServiceEvent", "Store", "StoreReader"]

@@ -1,9 +1,9 @@
-"""Whether the wall clock may be believed when records are removed for their age.
+"""Plausibility check of the wall clock before records are removed for their age.
 
-A clock that is years ahead for one start must not erase a history. Evidence that only goes up: the stamp of the newest
-row on disk, and the time since it was read, on a clock that never steps. A wall clock far ahead of both is doubted
-until it has gone on for a while without another leap; a vehicle that stood in a garage for a season just keeps its old
-records a little longer.
+A clock that is years ahead for one start must not erase the history. The check compares the wall clock with the stamp
+of the newest row on disk plus the time since that row was read, measured on a monotonic clock. A wall clock far ahead
+of that sum is distrusted until it has advanced for BELIEVED_AFTER_NS without another leap. A vehicle that stood in a
+garage for a season therefore keeps its old records a little longer.
 """
 
 import logging
@@ -26,10 +26,10 @@ def _boot_ns() -> int:
 
 
 class AgeClock:
-    """One opened database's view of the time; what is doubted outlives a restart, in the table ``clock``."""
+    """Decides for one open database whether the wall clock is plausible; the table ``clock`` stores the distrust."""
 
     def __init__(self, connection: sqlite3.Connection, boot_ns: Callable[[], int] = _boot_ns) -> None:
-        """Reads the evidence: to be made before any row is added."""
+        """Reads the newest stamp; create the clock before any row is added."""
         self._connection = connection
         self._boot_ns = boot_ns
         self._read_ns = boot_ns()
@@ -38,7 +38,7 @@ class AgeClock:
         self._doubted_since_ns: int | None = None if found is None else found[0]
 
     def is_believed(self, now_ns: int) -> bool:
-        """Whether what is too old by ``now_ns`` is too old. Raises sqlite3.Error where a doubt cannot be kept."""
+        """Whether ``now_ns`` is plausible. Raises sqlite3.Error if the distrust cannot be stored."""
         if now_ns < CLOCK_UNSET_NS:
             return False
         boot_ns = self._boot_ns()
@@ -51,7 +51,7 @@ class AgeClock:
         elif since_ns is not None and not since_ns <= now_ns < since_ns + BELIEVED_AFTER_NS:
             self._keep(None)
             log_event(Event.CLOCK_BELIEVED)
-            if now_ns < since_ns:  # it has come back: what it said meanwhile is no evidence
+            if now_ns < since_ns:  # the clock was set back: its stamps in between are no evidence
                 newest_ns = now_ns
         self._newest_ns, self._read_ns = newest_ns, boot_ns
         return self._doubted_since_ns is None
@@ -62,7 +62,7 @@ class AgeClock:
 
 
 def _newest_stamp_ns(connection: sqlite3.Connection) -> int | None:
-    """When the newest record came that was received under a clock that was set."""
+    """Time of receipt of the newest record that was received while the clock was set."""
     sql = "SELECT received_ns FROM journal WHERE received_ns >= ? ORDER BY seq DESC LIMIT 1"
     found = connection.execute(sql, (CLOCK_UNSET_NS,)).fetchone()
     return None if found is None else int(found[0])

@@ -1,4 +1,4 @@
-"""The database file as its one writer sees it: open, add, prune, set aside."""
+"""The database file for its only writer: open, add, prune, set aside."""
 
 import fcntl
 import itertools
@@ -16,7 +16,7 @@ from gateway.errors import StoreError
 from gateway.history import BATCHES, ESTIMATE, KINDS
 from gateway.log import Event, log_event
 from gateway.store.age import AgeClock
-from gateway.store.questions import INSERT, Stored, is_good, stored_row
+from gateway.store.queries import INSERT, Stored, is_good, stored_row
 from gateway.store.retention import Retention, remove_old, remove_share
 from gateway.store.rows import Chain, DeliveryRow, DocumentRow, JournalRow, Row, checksum
 from gateway.store.schema import connect_writer, pragma
@@ -32,7 +32,7 @@ MOST_BAD_RECORDS: Final = 1000  # likewise records
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """Whose numbers an opened database continues."""
+    """The epoch and the last numbers of an opened database."""
 
     epoch: str
     last_seq: int
@@ -45,7 +45,7 @@ class DamagedError(sqlite3.DatabaseError):
 
 
 def is_damaged(error: sqlite3.Error) -> bool:
-    """True where the file itself is broken, not merely refused by the disk."""
+    """Whether the file itself is damaged, as opposed to a failing disk."""
     if isinstance(error, DamagedError):
         return True
     code = getattr(error, "sqlite_errorcode", None)  # absent on errors raised by the Python module itself
@@ -54,7 +54,7 @@ def is_damaged(error: sqlite3.Error) -> bool:
 
 @contextmanager
 def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """All or nothing; after a failure the connection can go on."""
+    """A transaction that is rolled back on failure; the connection stays usable."""
     connection.execute("BEGIN IMMEDIATE")
     try:
         yield
@@ -66,7 +66,7 @@ def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
 
 
 def _identity(path: Path) -> tuple[int, int] | None:
-    """None where there is none, or none that can be seen."""
+    """Device and inode of a file; None if it does not exist or cannot be read."""
     try:
         status = path.stat()
     except OSError:
@@ -75,7 +75,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
 
 
 def _last_number(connection: sqlite3.Connection, table: str) -> int:
-    """The last number that was ever given in a table."""
+    """The highest number ever used in a table."""
     found = connection.execute("SELECT seq FROM sqlite_sequence WHERE name = ?", (table,)).fetchone()
     return 0 if found is None else int(found[0])
 
@@ -96,7 +96,7 @@ class Database:
 
     @property
     def is_open(self) -> bool:
-        """True while connected to the very files that lie at ``path``: not to ones that were moved or deleted."""
+        """Whether the connection is to the files at ``path``, and not to files that were moved or deleted."""
         return self._connection is not None and self._identities() == self._opened_identity
 
     def open(self, new_epoch: str) -> Opened:
@@ -117,7 +117,7 @@ class Database:
             raise
 
     def add(self, rows: Sequence[Row], boot_id: str) -> tuple[list[JournalRow], int]:
-        """Commit rows in one transaction -> (records that are new, batches that were there already)."""
+        """Commit rows in one transaction -> (new records, number of batches that were already stored)."""
         connection = self._connected()
         stored: list[JournalRow] = []
         n_known = 0
@@ -140,7 +140,7 @@ class Database:
         return stored, n_known
 
     def prune(self, now_ns: int) -> int:
-        """Remove what is too old, then the oldest until the size fits -> rows removed."""
+        """Remove records that are too old, then the oldest until the size fits -> number of rows removed."""
         connection = self._connected()
         n_removed = 0
         if self._age is not None and self._age.is_believed(now_ns):
@@ -161,14 +161,14 @@ class Database:
         return n_pages * pragma(connection, "page_size")
 
     def check(self) -> None:
-        """Look through the whole file, which somebody found damaged, and mend its indexes. Raises DamagedError."""
+        """Check the whole file after a reader reported damage, and rebuild its indexes. Raises DamagedError."""
         verdict = self._connected().execute("PRAGMA quick_check(1)").fetchone()[0]
         if verdict != "ok":
             raise DamagedError(verdict)
         self._reindex("a reader met damage that a look at the whole file did not find")
 
     def set_records_aside(self, seqs: Iterable[int], now_ns: int) -> list[int]:
-        """Take those of these rows that fail their sum out of the history and keep what is left of them -> which."""
+        """Move those of these rows that fail their checksum into the table ``damaged`` -> their numbers."""
         connection = self._connected()
         rows = [row for seq in sorted(seqs) if (row := stored_row(connection, seq)) is not None and not is_good(row)]
         if rows:
@@ -188,7 +188,7 @@ class Database:
             connection.execute("DELETE FROM damaged WHERE n <= ?", (newest - MOST_BAD_RECORDS,))
 
     def _mending(self, work: Callable[[], T]) -> T:
-        """Do it; where an index does not know a row as it is now, make the indexes anew and do it again."""
+        """Run ``work``; if an index disagrees with the table, rebuild the indexes and run it again."""
         try:
             return work()
         except sqlite3.DatabaseError as error:
@@ -198,13 +198,13 @@ class Database:
             return work()
 
     def _reindex(self, why: str) -> None:
-        """Once an opening: where that did not help, it is more than the indexes. Raises DamagedError."""
+        """Rebuild the indexes, once for each opening. Raises DamagedError if that did not help before."""
         if self._is_reindexed:
             raise DamagedError(why)
         self._is_reindexed = True
         try:
             self._connected().execute("REINDEX")
-        except sqlite3.IntegrityError as error:  # two rows of one id: the file tells of one too many
+        except sqlite3.IntegrityError as error:  # two rows with one id
             raise DamagedError(str(error)) from None
 
     def disconnect(self) -> None:
@@ -214,14 +214,14 @@ class Database:
             connection.close()
 
     def close(self) -> None:
-        """Close the connection and give the directory free."""
+        """Close the connection and release the lock of the directory."""
         self.disconnect()
         if self._lock_fd is not None:
             os.close(self._lock_fd)
             self._lock_fd = None
 
     def set_aside(self) -> str:
-        """Rename the file and its companions out of the way -> the new name. Raises OSError."""
+        """Rename the file with its WAL and shared-memory files -> the new name. Raises OSError."""
         self.disconnect()
         stem = f"{FILE_NAME}.damaged-{datetime.now(UTC):%Y%m%dT%H%M%S}"
         names = (f"{stem}-{n}" if n else stem for n in itertools.count())
@@ -234,7 +234,7 @@ class Database:
         return name
 
     def _forget_oldest_aside(self) -> None:
-        """A card that damages files goes on doing so: as many are kept as are worth looking at."""
+        """Remove old damaged files: a failing memory card keeps producing them."""
         whole = [
             file for file in self.path.parent.glob(f"{FILE_NAME}.damaged-*") if not file.name.endswith(("-wal", "-shm"))
         ]
@@ -244,7 +244,7 @@ class Database:
             log_event(Event.STORE_FORGETS, level=logging.WARNING, removed=file.name)
 
     def _identities(self) -> tuple[tuple[int, int] | None, ...]:
-        """Of the file and its companions: where the log was deleted, readers see the file without what is new."""
+        """Identities of the file, its WAL and its shared memory: without the WAL, readers miss the newest records."""
         return tuple(_identity(self.path.with_name(FILE_NAME + suffix)) for suffix in ("", "-wal", "-shm"))
 
     def _connected(self) -> sqlite3.Connection:
@@ -277,7 +277,7 @@ class Database:
 
 
 def _add_record(connection: sqlite3.Connection, row: JournalRow) -> bool:
-    """False for a batch that is there already; a later revision takes the place of the one before it."""
+    """Insert a record -> False if the batch was already stored. A later revision replaces the earlier one."""
     if row.kind in KINDS and KINDS[row.kind].is_revised:
         connection.execute("DELETE FROM journal WHERE id = ? AND seq < ?", (row.id, row.seq))
     columns = row.columns()
@@ -296,7 +296,7 @@ def _keep_delivery(connection: sqlite3.Connection, row: DeliveryRow) -> None:
 
 
 def _keep_receipt(connection: sqlite3.Connection, stored: Sequence[JournalRow], boot_id: str) -> None:
-    """When the newest estimate was received, and the number of the newest batch."""
+    """Store the time of receipt of the newest estimate, and the number of the newest batch."""
     batches = [row for row in stored if row.kind in BATCHES]
     if batches:
         connection.execute("UPDATE epochs SET last_batch = ?", (batches[-1].seq,))

@@ -1,8 +1,8 @@
-"""Following the journal: each record of some kinds once, in order, as it is accepted."""
+"""Follows the journal: returns each record of the chosen kinds once, in order, as it is accepted."""
 
 from collections.abc import Callable, Sequence
 
-from gateway.history import BATCHES, Record
+from gateway.history import BATCHES, JournalRecord
 from gateway.store.reader import StoreReader, seq_after
 from gateway.store.rows import JournalRow
 from gateway.store.write_buffer import WriteBuffer
@@ -11,13 +11,11 @@ Link = Callable[[Sequence[JournalRow]], tuple[JournalRow, ...]]
 
 
 class Follower:
-    """A place in the journal. One thread reads; any thread may close it.
+    """A read position in the journal. One thread reads; any thread may close it.
 
-    It costs nothing while nothing comes: no thread, no connection, no question.
-
-    Close behind the newest records it reads memory; further back it asks the disk. Where a database is found that had
-    been out of reach, records in memory get new numbers, and the place moves with them; a place in a database that is
-    gone begins from the first record.
+    An idle follower costs nothing: it has no thread, no connection and sends no query. It reads recent records from
+    memory and older ones from disk. If a database that was out of reach comes back, records in memory get new numbers
+    and the position moves with them. A position in a database that no longer exists starts again at the first record.
     """
 
     def __init__(
@@ -29,7 +27,7 @@ class Follower:
         after: str | None,
         on_news: Callable[[], None],
     ) -> None:
-        """Raises ValueError for a cursor we never gave."""
+        """Raises ValueError if ``after`` is not a cursor of this program."""
         seq_after(after, buffer.epoch)
         self._buffer, self._reader, self._link = buffer, reader, link
         self._kinds = tuple(kinds)
@@ -41,8 +39,8 @@ class Follower:
         """Cursor of the last record read, or of the place from which it follows."""
         return self._after or f"{self._buffer.epoch}-0"
 
-    def read(self, limit: int) -> list[Record]:
-        """The next records of its kinds in order of their numbers; none where there is nothing new.
+    def read(self, limit: int) -> list[JournalRecord]:
+        """The next records of its kinds in order of their numbers; none if there is nothing new.
 
         Raises StoreError or TimeoutError.
         """
@@ -61,7 +59,9 @@ class Follower:
             stored = self._reader.behind(self._kinds, seq, limit)
             last = stored[-1].seq if stored else seq
             rows = stored + ([] if len(stored) >= limit else [row for row in rows if row.seq > last])
-        found = [Record(f"{memory.epoch}-{row.seq}", row.kind, row.id, row.previous, row.text) for row in rows[:limit]]
+        found = [
+            JournalRecord(f"{memory.epoch}-{row.seq}", row.kind, row.id, row.previous, row.text) for row in rows[:limit]
+        ]
         if len(found) == limit:
             self._after = found[-1].cursor
         else:  # all up to there was looked through
@@ -69,11 +69,11 @@ class Follower:
         return found
 
     def go_to(self, cursor: str | None) -> None:
-        """Follow from behind another place; None: from the first record."""
+        """Continue after another cursor; None: from the first record."""
         self._after = cursor
 
     def close(self) -> None:
-        """Follow no more."""
+        """Stop following."""
         self._buffer.unlisten(self)
 
     def _seq(self, epoch: str) -> int:

@@ -1,4 +1,4 @@
-"""Answers from the store: read-only, bounded in time, blind to nothing that was accepted."""
+"""Read-only queries to the store, limited in time; they include every accepted record."""
 
 import sqlite3
 import time
@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, TypedDict, Unpack
 
 from gateway.errors import StoreError
-from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, SERVICE, Delivery, Page
-from gateway.store import questions
+from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, SERVICE, Delivery, HistoryPage
+from gateway.store import queries
 from gateway.store.database import is_damaged
-from gateway.store.questions import LAST, Window, without_spectra
+from gateway.store.queries import LAST, JournalQuery, without_spectra
 from gateway.store.rows import Chain, JournalRow, checksum
 from gateway.store.schema import connect_reader
 from gateway.units import NS_PER_S
@@ -28,8 +28,8 @@ _STEPS_PER_LOOK: Final = 10_000  # SQLite instructions between two looks at the 
 class Latest:
     """The last answer and the last rejection, as JSON.
 
-    ``age_s`` is the answer's, by a clock that never steps; None where the machine was started since: no clock tells
-    then how long ago it was.
+    ``age_s`` is the age of the answer on a monotonic clock; None if the machine has been restarted since, because no
+    clock then knows the age.
     """
 
     estimate: str | None
@@ -38,7 +38,7 @@ class Latest:
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class ServiceEvent:
     """Something that happened to the service; ``detail`` is JSON."""
 
     t_ns: int
@@ -46,8 +46,8 @@ class Event:
     detail: str
 
 
-class Question(TypedDict, total=False):
-    """What :meth:`StoreReader.page` takes beside the kinds."""
+class PageQuery(TypedDict, total=False):
+    """Keyword arguments of :meth:`StoreReader.page`."""
 
     since_ns: int | None
     until_ns: int | None
@@ -60,9 +60,8 @@ class Question(TypedDict, total=False):
 class StoreReader:
     """Read-only view of a store, safe in any thread.
 
-    Each question opens its own connection, so no handle outlives a database that was set aside. A
-    question that takes longer than ``limit_s`` raises TimeoutError; a database that cannot be read
-    raises StoreError.
+    Each query opens its own connection, so no handle outlives a database that was set aside. A query that takes longer
+    than ``limit_s`` raises TimeoutError; a database that cannot be read raises StoreError.
     """
 
     def __init__(self, store: "Store", limit_s: float = QUERY_LIMIT_S) -> None:
@@ -79,16 +78,16 @@ class StoreReader:
         cursor: str | None = None,
         newest_first: bool = False,
         with_spectra: bool = True,
-    ) -> Page:
+    ) -> HistoryPage:
         """Records of these kinds with since_ns <= t_end_ns < until_ns, in the order of their arrival.
 
-        Following ``next_cursor`` misses nothing and repeats nothing while records arrive. A cursor of a
-        database that is gone begins from the first record. Raises ValueError for a cursor we never gave.
+        Following ``next_cursor`` neither misses nor repeats a record while records arrive. A cursor of a database that
+        no longer exists starts at the first record. Raises ValueError for a text that is not a cursor.
         """
-        # What is held must be read before the file: a row that moves to disk meanwhile is then seen twice
-        # and merged by its number, instead of not at all.
+        # Read the rows in memory before the file: a row that moves to disk in between is then seen twice and merged by
+        # its number, instead of being missed.
         epoch, held = self._store.held()
-        window = Window(
+        window = JournalQuery(
             tuple(kinds),
             seq_after(cursor, epoch),
             None if since_ns is None else _within_64_bits(since_ns),
@@ -106,7 +105,7 @@ class StoreReader:
         rows = sorted(newest.values(), key=lambda row: row.seq, reverse=newest_first)
         has_more, shown = len(rows) > limit, rows[:limit]
         cursors = tuple(f"{epoch}-{row.seq}" for row in shown)
-        return Page(
+        return HistoryPage(
             items=tuple(row.text if with_spectra or not row.boot_ns else without_spectra(row.text) for row in shown),
             cursors=cursors,
             previous=tuple(row.previous for row in shown),
@@ -114,11 +113,11 @@ class StoreReader:
             last_cursor=cursors[0 if newest_first else -1] if shown else cursor,
         )
 
-    def estimates(self, **question: Unpack[Question]) -> Page:
+    def estimates(self, **question: Unpack[PageQuery]) -> HistoryPage:
         """Estimates and rejections, as ``page``."""
         return self.page(BATCHES, **question)
 
-    def entries(self, *, kind: str | None = None, **question: Unpack[Question]) -> Page:
+    def entries(self, *, kind: str | None = None, **question: Unpack[PageQuery]) -> HistoryPage:
         """Load events, trips and alarms, each in its last revision, as ``page``; ``kind`` None: all."""
         return self.page(ENTRIES if kind is None else (kind,), **question)
 
@@ -133,7 +132,7 @@ class StoreReader:
     def behind(self, kinds: Sequence[str], seq: int, limit: int) -> list[JournalRow]:
         """The first records on disk behind a number."""
         with self._connection() as connection:
-            return self._stored(connection, Window(tuple(kinds), seq), limit)
+            return self._stored(connection, JournalQuery(tuple(kinds), seq), limit)
 
     def latest(self) -> Latest:
         """The last answer and the last rejection ever accepted."""
@@ -147,20 +146,20 @@ class StoreReader:
             age_s=age_s,
         )
 
-    def events(self, limit: int = 100) -> list[Event]:
-        """The last things that happened to the service, newest first."""
+    def events(self, limit: int = 100) -> list[ServiceEvent]:
+        """The last events of the service itself, newest first."""
         _, held = self._store.held()
-        window = Window((SERVICE,), newest_first=True)
+        window = JournalQuery((SERVICE,), newest_first=True)
         with self._connection() as connection:
             stored = self._stored(connection, window, limit)
         rows = {row.seq: row for row in (*stored, *held) if row.kind == SERVICE}
         return [
-            Event(row.received_ns, *row.text.split("\n", 1))
+            ServiceEvent(row.received_ns, *row.text.split("\n", 1))
             for row in (rows[seq] for seq in sorted(rows, reverse=True)[:limit])
         ]
 
     def document(self, name: str) -> str | None:
-        """A document by its name; None where there is none that is as it was written."""
+        """A document by its name; None if there is none with a valid checksum."""
         with self._connection() as connection:
             if connection is None:
                 return None
@@ -173,20 +172,20 @@ class StoreReader:
         return self.document(f"calibration {calibration_id}")
 
     def delivery(self, uplink: str, kinds: Sequence[str] = (*BATCHES, *ENTRIES)) -> Delivery:
-        """How far ``uplink`` has delivered, as it is on disk; the cursor is None before its first delivery.
+        """The position up to which ``uplink`` has delivered, as on disk; the cursor is None before its first delivery.
 
-        What waits is counted of these ``kinds``.
+        Waiting records are counted for these ``kinds``.
         """
         with self._connection() as connection:
-            return Delivery(None, 0, 0) if connection is None else questions.delivery(connection, uplink, kinds)
+            return Delivery(None, 0, 0) if connection is None else queries.delivery(connection, uplink, kinds)
 
     def _stored(
-        self, connection: sqlite3.Connection | None, window: Window, limit: int, *, with_spectra: bool = True
+        self, connection: sqlite3.Connection | None, window: JournalQuery, limit: int, *, with_spectra: bool = True
     ) -> list[JournalRow]:
-        """None where there is no database (yet)."""
+        """Records on disk; none if there is no database yet."""
         if connection is None:
             return []
-        return questions.page(connection, window, limit, self._store.suspect_records, with_spectra=with_spectra)
+        return queries.page(connection, window, limit, self._store.suspect_records, with_spectra=with_spectra)
 
     def _newest(
         self, connection: sqlite3.Connection | None, held: Sequence[JournalRow], kind: str
@@ -194,7 +193,7 @@ class StoreReader:
         fresh = [row for row in held if row.kind == kind]
         if fresh:
             return fresh[-1]
-        found = self._stored(connection, Window((kind,), newest_first=True), 1)
+        found = self._stored(connection, JournalQuery((kind,), newest_first=True), 1)
         return found[0] if found else None
 
     def _age_s(self, connection: sqlite3.Connection | None, answer: JournalRow) -> float | None:
@@ -210,14 +209,14 @@ class StoreReader:
 
     @contextmanager
     def _connection(self) -> Iterator[sqlite3.Connection | None]:
-        """A connection under the time limit; None where there is no database (yet)."""
+        """A connection with the time limit; None if there is no database yet."""
         if not self._store.path.exists():
             yield None
             return
         try:
             with closing(connect_reader(self._store.path)) as connection:
                 self._limit_time(connection)
-                connection.execute("BEGIN")  # one snapshot for all that one question looks at
+                connection.execute("BEGIN")  # one snapshot for the whole query
                 yield connection
         except sqlite3.Error as error:
             raise self._explained(error) from error
@@ -237,7 +236,7 @@ class StoreReader:
 
 
 def seq_after(cursor: str | None, epoch: str) -> int | None:
-    """The number in a cursor; None for one of another database. Raises ValueError for a cursor we never gave."""
+    """The number in a cursor; None for one of another database. Raises ValueError for a text that is not a cursor."""
     if cursor is None:
         return None
     of_epoch, _, digits = cursor.partition("-")
@@ -247,13 +246,13 @@ def seq_after(cursor: str | None, epoch: str) -> int | None:
 
 
 def _within_64_bits(t_ns: int) -> int:
-    """Years before 1677 and after 2262 mean the first and the last instant there is."""
+    """Clip a time to 64 bits: the years 1677 to 2262."""
     return min(max(t_ns, -LAST - 1), LAST)
 
 
 def _not_stored(connection: sqlite3.Connection | None, held: Sequence[JournalRow]) -> Iterator[JournalRow]:
-    """Those of the held records that are not on disk, in their last revision: neither moved there meanwhile nor batches
-    that are there already under another number.
+    """The last revisions of the records in memory, without those that were written meanwhile and without batches that
+    are on disk under another number.
     """
     chain = Chain()
     known: dict[str, int] = {}

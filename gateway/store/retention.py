@@ -1,4 +1,4 @@
-"""How much is kept, and the removal of what is beyond."""
+"""Retention: limits of age and size, and the removal of records beyond them."""
 
 import sqlite3
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Final
 from gateway.errors import StoreError
 from gateway.history import SERVICE
 from gateway.store.age import CLOCK_UNSET_NS
-from gateway.store.questions import count_pruned
+from gateway.store.queries import count_pruned
 from gateway.units import NS_PER_S
 
 _SHARE: Final = 0.05  # of the rows, removed at a time until the size fits
@@ -16,11 +16,11 @@ _LAST: Final = 1 << 62  # above every number of a row
 
 @dataclass(frozen=True, slots=True)
 class Retention:
-    """How much is kept.
+    """Limits of the store.
 
-    max_age_s counts from receipt; max_bytes bounds the database without its write-ahead log (which
-    stays under about 8 MB); max_held bounds the rows kept in memory while the disk refuses. Age alone
-    removes nothing that one of the uplinks ``undelivered_to`` has still to deliver.
+    ``max_age_s`` counts from receipt. ``max_bytes`` limits the database without its write-ahead log, which stays below
+    about 8 MB. ``max_held`` limits the rows kept in memory while the disk fails. A record that one of the uplinks
+    ``undelivered_to`` still has to deliver is not removed for its age alone.
     """
 
     max_age_s: float = 400 * 86_400.0
@@ -36,10 +36,10 @@ class Retention:
 
 
 def remove_old(connection: sqlite3.Connection, kept: Retention, now_ns: int) -> int:
-    """Records removed for their age: oldest first, ending at the first one young enough, so that each is paid for once.
+    """Remove records that are too old -> how many. Stops at the first record that is young enough.
 
-    Records received before the clock was set have no known age, and what still has to be delivered is not removed
-    for its age: only the limit of size removes them.
+    Records received before the clock was set have no known age. They, and undelivered records, are removed only by the
+    limit of size.
     """
     cut_ns = now_ns - int(min(kept.max_age_s * NS_PER_S, now_ns))
     first_kept = connection.execute(
@@ -52,7 +52,7 @@ def remove_old(connection: sqlite3.Connection, kept: Retention, now_ns: int) -> 
 
 
 def remove_share(connection: sqlite3.Connection) -> int:
-    """The oldest twentieth of the records -> how many."""
+    """Remove the oldest twentieth of the records -> how many."""
     n_rows = connection.execute("SELECT count(*) FROM journal").fetchone()[0]
     last = connection.execute(
         "SELECT seq FROM journal ORDER BY seq LIMIT 1 OFFSET ?", (int(n_rows * _SHARE),)
@@ -68,6 +68,6 @@ def _remove(connection: sqlite3.Connection, condition: str, asked: tuple[int, ..
 
 
 def _last_delivered(connection: sqlite3.Connection, uplinks: tuple[str, ...]) -> int:
-    """Number of the last record that nobody waits for."""
+    """Number of the last record that every uplink has delivered."""
     known = (connection.execute("SELECT seq FROM uplinks WHERE name = ?", (name,)).fetchone() for name in uplinks)
     return min((-1 if row is None else int(row[0]) for row in known), default=_LAST)

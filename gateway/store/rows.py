@@ -1,4 +1,4 @@
-"""The rows that the store writes: records of the journal, documents, and places of uplinks."""
+"""The rows that the store writes: records of the journal, documents, and positions of uplinks."""
 
 import zlib
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from typing import Any, Final
 class JournalRow:
     """One record. ``seq`` orders all records and never repeats; ``previous`` links batches into a chain.
 
-    ``boot_ns`` is when it was received, on a clock that never steps (receipts); it is no column of the journal.
+    ``boot_ns`` is the time of receipt on a monotonic clock (table ``receipts``); it is no column of the journal.
     """
 
     seq: int
@@ -32,7 +32,7 @@ class JournalRow:
 
 @dataclass(frozen=True, slots=True)
 class DocumentRow:
-    """A text that is kept under a name, in its last version."""
+    """The last version of a text, stored under a name."""
 
     name: str
     received_ns: int
@@ -53,22 +53,22 @@ JOURNAL_COLUMNS: Final = "seq, kind, id, revision, t_end_ns, previous, received_
 
 
 def checksum(columns: Sequence[Any]) -> int:
-    """CRC-32 of a row's columns, the sum itself left out: finds every single flipped bit, and any burst of 32."""
+    """CRC-32 of a row's columns without the sum itself. Detects every single-bit error and every burst of 32 bits."""
     parts = (column if isinstance(column, bytes) else str(column).encode() for column in columns)
     return zlib.crc32(b"\x1f".join(parts))
 
 
 class Chain:
-    """Links batches to the one before them; one that was there already and is not stored again is no link."""
+    """Links each batch to the one before it and leaves out batches that were already stored."""
 
     def __init__(self, known: "Chain | None" = None) -> None:
-        """Go on from ``known``, which stays as it is."""
+        """Continues a copy of ``known``."""
         self._skipped: dict[int, int] = {} if known is None else dict(known._skipped)
 
     def linked(self, row: JournalRow) -> JournalRow:
-        """The row behind the last one that counts."""
+        """The row, linked to the last batch that was stored."""
         return replace(row, previous=self._skipped.pop(row.previous, row.previous)) if row.previous else row
 
     def skip(self, row: JournalRow) -> None:
-        """Whoever comes behind this row is linked to the one before it."""
+        """Leave this row out: the batch after it is linked to the one before it."""
         self._skipped[row.seq] = row.previous

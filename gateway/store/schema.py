@@ -1,4 +1,4 @@
-"""The shape of the database: one journal, one table of documents, and the places of those who follow."""
+"""The schema of the database: one journal, one table of documents, and the positions of its followers."""
 
 import sqlite3
 from pathlib import Path
@@ -46,10 +46,9 @@ COMMIT;
 
 
 def connect_writer(path: Path) -> sqlite3.Connection:
-    """The one connection that writes; every commit reaches the disk.
+    """Open the only connection that writes; every commit reaches the disk.
 
-    Raises StoreRefusedError for a file of another version or of another program, sqlite3.Error for what
-    the disk refuses.
+    Raises StoreRefusedError for a file of another version or of another program, sqlite3.Error if the disk fails.
     """
     connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False, timeout=5.0)
     try:
@@ -67,20 +66,20 @@ def connect_writer(path: Path) -> sqlite3.Connection:
 
 
 def connect_reader(path: Path) -> sqlite3.Connection:
-    """A connection that can only read. Raises sqlite3.OperationalError where there is no file."""
+    """Open a read-only connection. Raises sqlite3.OperationalError if there is no file."""
     connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, isolation_level=None, timeout=1.0)
     connection.execute("PRAGMA query_only = ON")
-    connection.text_factory = lambda text: text.decode("utf-8", "replace")  # a flipped bit must not end the question
+    connection.text_factory = lambda text: text.decode("utf-8", "replace")  # a flipped bit must not abort the query
     return connection
 
 
 def pragma(connection: sqlite3.Connection, name: str) -> int:
-    """One of SQLite's numbers about the file."""
+    """An integer pragma of the file."""
     return int(connection.execute(f"PRAGMA {name}").fetchone()[0])
 
 
 def _is_new(connection: sqlite3.Connection, path: Path) -> bool:
-    """Whether the tables are still to be made. Raises StoreRefusedError for a file that is not ours to write."""
+    """Whether the tables must be created. Raises StoreRefusedError for a file of another program or version."""
     version = pragma(connection, "user_version")
     is_empty = connection.execute("SELECT 1 FROM sqlite_schema LIMIT 1").fetchone() is None
     if is_empty and version == 0:

@@ -1,4 +1,4 @@
-"""The bounded memory between those who write and the disk; it gives the numbers, and wakes whoever follows."""
+"""The bounded buffer between writers and the disk. It numbers the records and notifies the followers."""
 
 import threading
 from collections import deque
@@ -15,7 +15,7 @@ RECENT: Final = 16  # records on disk that stay in memory: whoever follows close
 
 @dataclass(frozen=True, slots=True)
 class InMemory:
-    """All records behind number ``floor`` as they are in memory at one moment, oldest first."""
+    """Snapshot of the records in memory, which are all those after number ``floor``; oldest first."""
 
     epoch: str
     floor: int
@@ -26,12 +26,12 @@ class InMemory:
 class WriteBuffer:
     """Rows accepted but not yet on disk, oldest first, and the numbers of all records. Thread-safe.
 
-    While the disk works a row stays here for milliseconds; while it refuses, this is the memory the store degrades to.
-    Over ``capacity`` the oldest row that is not just being written gives way and is counted.
+    A row stays here for milliseconds while the disk works, and until it recovers while it fails. Beyond ``capacity``
+    the oldest row that is not being written is dropped and counted.
 
-    One lock gives numbers and publishes: a record is visible to every follower with the number it has, in order.
-    ``epoch`` and number make the cursor of a record. Numbers go up and are never used twice within an epoch, not even
-    after a kill that lost records somebody has read: each opening jumps to a new stride.
+    One lock numbers and publishes the records, so every follower sees them in order. A cursor consists of ``epoch`` and
+    number. A number is never used twice within an epoch, not even after a kill that lost records which a client had
+    read: each opening of the database starts a new stride.
     """
 
     def __init__(self, capacity: int, epoch: str) -> None:
@@ -53,7 +53,7 @@ class WriteBuffer:
         return self._epoch
 
     def rebase(self, epoch: str, last_seq: int, last_batch: int, newest: Mapping[str, int]) -> None:
-        """Go on in a database that was found later, behind what it already holds."""
+        """Continue after the last record of a database that was opened later."""
         with self._changed:
             before, first_seq = self._epoch, last_seq
             self._epoch, self._newest = epoch, dict(newest)
@@ -61,7 +61,7 @@ class WriteBuffer:
             moved = {0: first_seq}
             kept: deque[Row] = deque()
             for row in self._waiting:
-                if isinstance(row, DeliveryRow):  # in numbers that are void now
+                if isinstance(row, DeliveryRow):  # its number is no longer valid
                     continue
                 if isinstance(row, JournalRow):
                     again = self._numbered(row)
@@ -71,7 +71,7 @@ class WriteBuffer:
             self._rebased = (before, moved)
 
     def place_of(self, epoch: str, seq: int) -> int | None:
-        """Where a place of the epoch before ``rebase`` is now; None for any other epoch."""
+        """The new number of a position of the epoch before ``rebase``; None for any other epoch."""
         with self._changed:
             before, moved = self._rebased
             if epoch != before:
@@ -93,7 +93,7 @@ class WriteBuffer:
             self._add(document)
 
     def add_delivery(self, name: str, cursor: str) -> bool:
-        """Accept how far an uplink has delivered, in place of what waits of it; False for another epoch's cursor."""
+        """Accept the position up to which an uplink has delivered, replacing a waiting one; False for another epoch."""
         with self._changed:
             epoch, _, digits = cursor.partition("-")
             if epoch != self._epoch:
@@ -115,7 +115,7 @@ class WriteBuffer:
             self._listeners.pop(key, None)
 
     def newest(self, kinds: Sequence[str]) -> int:
-        """The newest number given to any of these kinds, 0 where there is none."""
+        """The newest number given to any of these kinds, 0 if there is none."""
         with self._changed:
             return max((self._newest.get(kind, 0) for kind in kinds), default=0)
 
@@ -142,7 +142,7 @@ class WriteBuffer:
             self._changed.wait_for(lambda: bool(self._waiting) or has_other_work(), timeout_s)
 
     def take(self) -> tuple[Row, ...]:
-        """All that waits, now in flight: end with ``settle`` or ``give_back``, and then ``rest``."""
+        """Take all waiting rows for writing; the caller ends with ``settle`` or ``give_back``, and then ``rest``."""
         with self._changed:
             self._is_at_work = True
             self._in_flight = tuple(self._waiting)
@@ -150,7 +150,7 @@ class WriteBuffer:
             return self._in_flight
 
     def settle(self, stored: Sequence[JournalRow] = ()) -> None:
-        """What was in flight is on disk; ``stored`` are the records of it that are new there."""
+        """The rows taken are on disk; ``stored`` are those of their records that were new."""
         with self._changed:
             self._in_flight = ()
             self._recent.extend(stored)
@@ -158,13 +158,13 @@ class WriteBuffer:
                 self._floor = self._recent.popleft().seq
 
     def rest(self) -> None:
-        """Nothing is done to the disk until rows wait again or other work is found."""
+        """The writer pauses until rows wait or other work appears."""
         with self._changed:
             self._is_at_work = False
             self._changed.notify_all()
 
     def give_back(self) -> None:
-        """What was in flight could not be written: it waits again, in its old order."""
+        """The rows taken could not be written: put them back in their order."""
         with self._changed:
             self._waiting.extendleft(reversed(self._in_flight))
             self._in_flight = ()
@@ -175,7 +175,7 @@ class WriteBuffer:
             self._changed.notify_all()
 
     def wait_until_empty(self, timeout_s: float) -> bool:
-        """True once all is on disk and the disk is left alone."""
+        """Wait until every row is on disk and the writer pauses; False if the time ran out."""
         with self._changed:
             return self._changed.wait_for(
                 lambda: not self._waiting and not self._in_flight and not self._is_at_work, timeout_s
@@ -196,7 +196,7 @@ class WriteBuffer:
             self.n_dropped += 1
 
     def _number_behind(self, last_seq: int, last_batch: int) -> None:
-        """The next number is the first of the stride behind ``last_seq``."""
+        """Set the next number to the first of the stride after ``last_seq``."""
         self._floor, self._last_batch = last_seq, last_batch
         self._next_seq = (last_seq // SEQ_STRIDE + 1) * SEQ_STRIDE
 

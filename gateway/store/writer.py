@@ -1,4 +1,4 @@
-"""The store: one thread writes, nobody waits for the disk, nothing is lost without being counted."""
+"""The store: one thread writes, no caller waits for the disk, and every lost record is counted."""
 
 import logging
 import secrets
@@ -33,8 +33,8 @@ PAGE_OF_BAD: Final = 1000  # numbers of bad records that wait to be set aside; r
 class Store:
     """Estimates, events and calibrations in one directory. Every method may be called from any thread.
 
-    A disk that is full, read-only or gone degrades the store to memory, with a warning in ``health``
-    and in the log; it comes back by itself and then writes what it held.
+    If the disk is full, read-only or gone, the store keeps records in memory and says so in ``health`` and in the log.
+    It retries by itself and then writes the records it kept.
     """
 
     def __init__(self, directory: Path, retention: Retention, clock_ns: Callable[[], int]) -> None:
@@ -59,8 +59,8 @@ class Store:
     ) -> "Store":
         """Open or create the database in ``directory`` and start its writer.
 
-        Raises StoreError where going on would do harm: a newer schema, another program's file, another
-        Springscale at work there. A disk that refuses is no error: the store starts degraded.
+        Raises StoreError if continuing would do harm: a newer schema, another program's file, or another Springscale
+        that uses the directory. A failing disk is no error: the store starts degraded.
         """
         store = cls(directory, retention or Retention(), clock_ns)
         try:
@@ -82,36 +82,35 @@ class Store:
         return self._append(kind, record["id"], record["t_end_ns"], json_line(record))
 
     def write_remainder(self, record: Mapping[str, Any]) -> None:
-        """Accept what is too short to be a batch; no history shows it, and no uplink sends it."""
+        """Accept a remainder that is too short to be a batch; it is neither shown in the history nor sent."""
         self._append(REMAINDER, record["id"], record["t_end_ns"], json_line(record))
 
     def write_entry(self, kind: str, entry_id: str, t_end_ns: int, text: str, revision: int = 1) -> str:
-        """Accept a load event, trip or alarm in a new revision -> its cursor; it takes the place of the one before."""
+        """Accept a new revision of a load event, trip or alarm -> its cursor; it replaces the earlier revision."""
         return self._append(kind, entry_id, t_end_ns, text, revision)
 
     def write_event(self, kind: str, detail: Mapping[str, Any]) -> None:
-        """Accept something that happened to the service."""
+        """Accept an event of the service itself."""
         self._append(SERVICE, "", self._clock_ns(), f"{kind}\n{json_line(detail)}")
 
     def write_document(self, name: str, text: str) -> None:
-        """Keep a text under a name, in place of what was there."""
+        """Store a text under a name, replacing the earlier one."""
         self._buffer.add(DocumentRow(name, self._clock_ns(), text))
 
     def write_calibration(self, calibration_id: str, text: str) -> None:
-        """Keep the calibration that estimates will name."""
+        """Store the calibration that later estimates refer to."""
         self.write_document(f"calibration {calibration_id}", text)
 
     def write_delivery(self, uplink: str, cursor: str) -> bool:
-        """Remember that ``uplink`` has delivered everything up to ``cursor``.
+        """Store that ``uplink`` has delivered everything up to ``cursor``.
 
-        False, and nothing is remembered, for a cursor of a database that is gone.
+        Returns False and stores nothing for a cursor of a database that no longer exists.
         """
         return self._buffer.add_delivery(uplink, cursor)
 
     def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> Follower:
-        """Follow these kinds from behind a cursor (None: from the first record). ``on_news`` is called with each record
-        that is accepted, from the thread that writes it: quick, and never blocking. Raises ValueError for a cursor that
-        is none.
+        """Follow these kinds after a cursor (None: from the first record). ``on_news`` is called for each accepted
+        record, in the thread that writes it, and must not block. Raises ValueError for a text that is not a cursor.
         """
         return Follower(self._buffer, self.reader(), self._linked, kinds, after, on_news)
 
@@ -124,11 +123,11 @@ class Store:
         return self.reader().delivery(uplink, kinds)
 
     def flush(self, timeout_s: float) -> bool:
-        """Wait until all that was accepted is on disk; False where the time did not suffice."""
+        """Wait until every accepted record is on disk; False if the time ran out."""
         return self._buffer.wait_until_empty(timeout_s)
 
     def reader(self) -> StoreReader:
-        """Answers questions from any thread, from what is on disk and what is held."""
+        """A reader for any thread; it sees the records on disk and those in memory."""
         return StoreReader(self)
 
     def health(self) -> StoreStatus:
@@ -150,7 +149,7 @@ class Store:
         return self._thread.is_alive()
 
     def close(self, timeout_s: float = STOP_WITHIN_S) -> int:
-        """Write what is held, end the writer -> rows that could not be stored."""
+        """Write the rows in memory and end the writer -> number of rows that could not be stored."""
         self._closing.set()
         self._buffer.wake()
         self._thread.join(timeout_s)
@@ -165,7 +164,7 @@ class Store:
         return epoch, self._linked(rows)
 
     def boot(self) -> tuple[str, int]:
-        """This start of the machine, and the nanoseconds since then, sleep included."""
+        """Identifier of the machine's boot, and the nanoseconds since then, including sleep."""
         return self._boot_id, _boot_ns()
 
     def suspect_damage(self) -> None:
@@ -174,12 +173,12 @@ class Store:
         self._buffer.wake()
 
     def suspect_loss(self) -> None:
-        """A reader found no file it could open: the next attempt looks whether ours is still the one there."""
+        """A reader could not open the file: the next attempt checks whether it is still the same file."""
         self._lost.set()
         self._buffer.wake()
 
     def suspect_records(self, seqs: Sequence[int]) -> None:
-        """A reader found these records to be other than they were written."""
+        """A reader found that these records fail their checksum."""
         self._bad_seqs.extend(seqs)
         self._buffer.wake()
 
@@ -212,13 +211,13 @@ class Store:
     def _try(self) -> bool:
         try:
             return self._attempt()
-        except StoreError as error:  # since the start somebody put a foreign file there
+        except StoreError as error:  # the file was replaced by a foreign one after the start
             return self._degrade(str(error))
         finally:
-            self._buffer.rest()  # whoever waits in flush finds the counters and the state as they are now
+            self._buffer.rest()  # callers of flush then see the present counters and state
 
     def _attempt(self) -> bool:
-        """Bring to disk what is held; False where the disk refuses, and then it is still held."""
+        """Write the rows in memory; returns False and keeps them if the disk fails."""
         try:
             self._lost.clear()
             self._open_if_closed()
@@ -265,7 +264,7 @@ class Store:
         self._size_bytes = self._database.size_bytes()
 
     def _degrade(self, reason: str) -> bool:
-        """Note what the disk refuses. The connection stays: as long as it lives, readers need no new file."""
+        """Report that the disk fails. The connection stays open, so readers need no new file."""
         if self._reason != reason:
             log_event(Event.STORE_HOLDS, level=logging.WARNING, reason=reason)
         self._reason = reason
@@ -279,7 +278,7 @@ class Store:
             return self._degrade(f"{self.path} is damaged ({error}) and cannot be set aside: {refusal}")
         fault = f"{self.path} is damaged ({error})"
         log_event(Event.STORE_DAMAGED, level=logging.ERROR, fault=fault, set_aside=self._set_aside)
-        return self._degrade(f"{self.path} was damaged and set aside as {self._set_aside}, a new one is on its way")
+        return self._degrade(f"{self.path} was damaged and set aside as {self._set_aside}; a new one is being created")
 
 
 def _boot_ns() -> int:
@@ -287,7 +286,7 @@ def _boot_ns() -> int:
 
 
 def _boot_id() -> str:
-    """Another one after each start of the machine; a name of this process where the kernel does not tell."""
+    """The kernel's identifier of this boot; a random one if the kernel gives none."""
     try:
         return BOOT_ID.read_text().strip()
     except OSError:

@@ -1,7 +1,7 @@
-"""Estimates on their way to a fleet's MQTT broker: stored first, then forwarded, at least once and in order.
+"""Forwarding of records to a fleet's MQTT broker and to a webhook: at least once and in order.
 
-Pages of the stored history come in; messages to the broker go out, and how far they have come is remembered in the
-store, which is the queue. A link that breaks is made again with growing pauses.
+The store is the queue: senders follow its journal, deliver each record, and store the position they have reached. A
+broken connection is opened again with growing pauses.
 """
 
 from gateway.uplink.outbox import Outbox

@@ -1,5 +1,6 @@
-"""What every sender is: one thread that takes letters out of an outbox, and a report of how it goes."""
+"""Base class of the senders: one thread that takes messages from an outbox, back-off, and a status report."""
 
+import random
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -11,11 +12,34 @@ from gateway.errors import StoreError
 from gateway.history import Delivery
 from gateway.status import UplinkStatus, WebhookStatus
 from gateway.units import NS_PER_S
-from gateway.uplink.back_off import BackOff
 from gateway.uplink.outbox import Outbox
 
+
+class BackOff:
+    """Exponential with full jitter: uniform between nothing and a ceiling that doubles up to ``last_s``.
+
+    Source: M. Brooker, "Exponential Backoff And Jitter", AWS Architecture Blog, 2015.
+    """
+
+    def __init__(self, first_s: float, last_s: float, draw: random.Random | None = None) -> None:
+        self._first_s = first_s
+        self._last_s = last_s
+        self._ceiling_s = first_s
+        self._draw = draw or random.Random()  # of the system's entropy: vehicles must not agree
+
+    def next_s(self) -> float:
+        """The next pause."""
+        pause_s = self._draw.uniform(0.0, self._ceiling_s)
+        self._ceiling_s = min(2.0 * self._ceiling_s, self._last_s)
+        return pause_s
+
+    def reset(self) -> None:
+        """Start again at ``first_s``, after a success."""
+        self._ceiling_s = self._first_s
+
+
 LOOK_S: Final = 5.0  # how often the backlog is counted
-PAGE: Final = 100  # letters asked for at once
+PAGE: Final = 100  # messages asked for at once
 FIRST_PAUSE_S: Final = 1.0
 STOP_WITHIN_S: Final = 1.0
 
@@ -23,12 +47,12 @@ Report = TypeVar("Report", UplinkStatus, WebhookStatus)
 
 
 class Forwarder(ABC, Generic[Report]):
-    """Owns the thread, which alone writes the report; a sender says in ``_run`` what the thread does."""
+    """Owns the thread, which alone writes the report; a sender implements ``_deliver`` and ``_note``."""
 
     NAME: ClassVar[str]
 
     def __init__(self, outbox: Outbox, report: Report, back_off: BackOff | None, back_off_max_s: float) -> None:
-        """``back_off`` tells the pauses; without one they grow to ``back_off_max_s``."""
+        """``back_off`` gives the pauses; without it they grow to ``back_off_max_s``."""
         self._outbox = outbox
         self._report: Report = report
         self._back_off = back_off or BackOff(FIRST_PAUSE_S, back_off_max_s)
@@ -41,7 +65,7 @@ class Forwarder(ABC, Generic[Report]):
         self._thread.start()
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
-        """End; what is not delivered goes out after the next start."""
+        """Stop; undelivered messages are sent after the next start."""
         self._stop.set()
         self._outbox.tell_news()
         if self._thread.ident is not None:
@@ -52,11 +76,11 @@ class Forwarder(ABC, Generic[Report]):
         return self._thread.is_alive()
 
     def report(self) -> Report:
-        """How it is; safe from any thread. What waits and what was pruned is of a few seconds ago."""
+        """The present report; safe from any thread. Its counts of waiting and pruned records are a few seconds old."""
         return self._report
 
     def _run(self) -> None:
-        """Deliver until asked to stop. Whatever goes wrong is told in the report and tried again."""
+        """Deliver until stopped. Every failure goes into the report and is retried."""
         while not self._stop.is_set():
             try:
                 self._deliver()
@@ -67,26 +91,26 @@ class Forwarder(ABC, Generic[Report]):
 
     @property
     def fault(self) -> str | None:
-        """Nothing here: what goes wrong stands in the report."""
+        """None: failures are in the report."""
         return None
 
     @abstractmethod
     def _deliver(self) -> None:
-        """Until asked to stop, or until something goes wrong."""
+        """Deliver until stopped; raises an exception on failure."""
 
     @abstractmethod
     def _note(self, fault: str) -> None:
-        """Keep what went wrong, and tell it where it is news."""
+        """Put a failure into the report, and log it if it is new."""
 
     def _n_pruned(self, found: Delivery) -> int:
-        """How many of those that this sender would have delivered were removed before."""
+        """Number of records that retention removed before this sender delivered them."""
         return found.n_pruned
 
     def _pause(self, pause_s: float) -> None:
-        """Until it is time to try again, or to stop; what waits meanwhile is still counted."""
+        """Wait before the next attempt, or until stopped, and keep counting the waiting records."""
         end_s = time.monotonic() + pause_s
         while not self._stop.is_set():
-            with suppress(StoreError, TimeoutError, OSError):  # told where letters are asked for
+            with suppress(StoreError, TimeoutError, OSError):  # told where messages are asked for
                 self._look()
             left_s = end_s - time.monotonic()
             if left_s <= 0.0:
@@ -94,7 +118,7 @@ class Forwarder(ABC, Generic[Report]):
             self._stop.wait(min(left_s, LOOK_S))
 
     def _look(self) -> None:
-        """Count what waits, where the last count is old."""
+        """Count the waiting records, at most every LOOK_S."""
         if time.monotonic() - self._looked_s < LOOK_S:
             return
         self._looked_s = time.monotonic()
@@ -108,6 +132,6 @@ class Forwarder(ABC, Generic[Report]):
 
 
 def _age_s(oldest_ns: int | None) -> float | None:
-    """None where none waits, and where the clock was put back since."""
+    """Age of the oldest waiting record; None if none waits or the clock was set back since."""
     age_s = -1.0 if oldest_ns is None else (time.time_ns() - oldest_ns) / NS_PER_S
     return age_s if age_s >= 0.0 else None

@@ -1,9 +1,9 @@
-"""What Home Assistant is told, so that the vehicle appears there by itself: MQTT device discovery.
+"""MQTT device discovery for Home Assistant: the vehicle appears there without configuration.
 
-One retained message names the device and its entities. The weights are templates over the newest estimate, which is
-retained under ``latest``: they are there after a restart of Home Assistant and while the vehicle is parked, which is no
-reason to hide them; "Weighed" tells how old they are, "Connected" whether the vehicle is there. As
-https://www.home-assistant.io/integrations/mqtt, "Device discovery payload", has it (Home Assistant 2024.11 and later).
+One retained message describes the device and its entities. The weights are templates over the newest estimate, which is
+retained under ``latest``, so they survive a restart of Home Assistant and stay visible while the vehicle is parked;
+"Weighed" gives their time, "Connected" the presence of the vehicle. Format: "Device discovery payload" of
+https://www.home-assistant.io/integrations/mqtt (Home Assistant 2024.11 and later).
 """
 
 import hashlib
@@ -34,7 +34,7 @@ def _measured(one: Outward, path: str, label: str) -> tuple[str, str, dict[str, 
 
 
 _STD: Final = _measured(BY_NAME["payload"], "payload_std_kg", "Payload standard deviation")
-# Name, template, and what Home Assistant has to know of it. None, an unknown number, is its "unknown"
+# Name, template, and attributes for Home Assistant. It shows None, an unknown number, as "unknown"
 ENTITIES: Final[dict[str, tuple[str, str, dict[str, Any]]]] = {
     **{one.name: _measured(one, one.json_path, one.label) for one in QUANTITIES if one.label},
     "payload_std": (*_STD[:2], _STD[2] | _DIAGNOSTIC),
@@ -54,7 +54,7 @@ ENTITIES: Final[dict[str, tuple[str, str, dict[str, Any]]]] = {
 
 
 def discovery(prefix: str, topic: str, birth: Mapping[str, Any]) -> tuple[str, str]:
-    """Topic and JSON of the message; ``birth`` is what the vehicle says of itself when it connects."""
+    """Topic and JSON of the message; ``birth`` is the birth message of the vehicle."""
     vehicle = _object_id(str(birth["vehicle_id"]))
     device = {
         "identifiers": [f"springscale_{vehicle}"],
@@ -83,11 +83,11 @@ def discovery(prefix: str, topic: str, birth: Mapping[str, Any]) -> tuple[str, s
 
 
 def _below(topic: str, more: Mapping[str, Any]) -> dict[str, Any]:
-    """A topic of an entity's own is one below the vehicle's."""
+    """An entity with its own topic gets it below that of the vehicle."""
     return {**more, "state_topic": f"{topic}/{more['state_topic']}"} if "state_topic" in more else dict(more)
 
 
 def _object_id(name: str) -> str:
-    """As the topic allows it; a name that had to be changed for it stays different from every other."""
+    """The name with the characters that a topic allows; a changed name gets a hash, so that it stays unique."""
     safe = re.sub(r"[^A-Za-z0-9_-]", "_", name)
     return safe if safe == name else f"{safe}_{hashlib.sha256(name.encode()).hexdigest()[:8]}"

@@ -1,4 +1,4 @@
-"""One MQTT 5 connection, driven by whoever owns it: paho-mqtt without its own thread or queue of retries."""
+"""One MQTT 5 connection, driven by its owner's thread: paho-mqtt without its own thread and retry queue."""
 
 import json
 import os
@@ -16,7 +16,7 @@ from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
 from gateway.uplink.home_assistant import discovery
-from gateway.uplink.outbox import Letter
+from gateway.uplink.outbox import OutboxMessage
 from gateway.uplink.settings import UplinkSettings
 
 CONNECT_TIMEOUT_S: Final = 10.0
@@ -29,8 +29,8 @@ class LinkError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
-    """The broker's word on one message. ``is_hopeless``: it will never take this one, however often it comes."""
+class BrokerAnswer:
+    """The broker's answer for one message. ``is_hopeless``: the broker will never accept this message."""
 
     mid: int
     is_accepted: bool
@@ -51,15 +51,15 @@ ReasonCode.names = {
 
 
 class MqttLink:
-    """Connects when made; the birth is announced, the will is left with the broker.
+    """Connects on construction, publishes the birth message and leaves the will with the broker.
 
-    Raises LinkError where the broker cannot be reached or does not want us, ConfigurationError where
-    a TLS or password file cannot be used. Not thread-safe: one owner.
+    Raises LinkError if the broker cannot be reached or refuses the connection, ConfigurationError if a TLS or password
+    file cannot be used. Not thread-safe: one owner.
     """
 
     def __init__(self, settings: UplinkSettings, birth: Mapping[str, Any]) -> None:
         self._settings = settings
-        self._answers: list[Answer] = []
+        self._answers: list[BrokerAnswer] = []
         self._connack: ReasonCode | None = None
         self._loss: str | None = None
         self._most_bytes: int | None = None  # the broker's Maximum Packet Size
@@ -76,20 +76,22 @@ class MqttLink:
         if settings.home_assistant is not None:
             self._introduce(*discovery(settings.home_assistant, settings.topic, birth))
 
-    def send(self, letter: Letter) -> int:
-        """Hand a letter to the broker -> the number its answer will carry. What it said is too large is not sent."""
-        if self._most_bytes is not None and len(letter.text.encode()) > self._most_bytes:
-            self._answers.append(Answer(_NOTHING, False, True, f"larger than the broker's {self._most_bytes} bytes"))
+    def send(self, message: OutboxMessage) -> int:
+        """Send a message -> packet identifier of its answer. A message larger than the broker's limit is not sent."""
+        if self._most_bytes is not None and len(message.text.encode()) > self._most_bytes:
+            self._answers.append(
+                BrokerAnswer(_NOTHING, False, True, f"larger than the broker's {self._most_bytes} bytes")
+            )
             return _NOTHING
-        said = {"ContentType": "application/json", "PayloadFormatIndicator": 1, "UserProperty": [("id", letter.id)]}
+        said = {"ContentType": "application/json", "PayloadFormatIndicator": 1, "UserProperty": [("id", message.id)]}
         properties = _properties(PacketTypes.PUBLISH, said)
-        self._under_way = self._publish(letter.branch, letter.text, retain=letter.is_retained, properties=properties)
+        self._under_way = self._publish(message.branch, message.text, retain=message.is_retained, properties=properties)
         return self._under_way
 
-    def turn(self, timeout_s: float) -> list[Answer]:
-        """Read and write what the socket allows -> answers that came; returns at the first that moves.
+    def turn(self, timeout_s: float) -> list[BrokerAnswer]:
+        """Read and write on the socket -> answers received; returns after the first activity.
 
-        A broker may give its last answer by ending the connection: then that comes first, and LinkError with the next.
+        A broker may answer by closing the connection: this call then returns the answer, and the next raises LinkError.
         """
         code = self._move(0.0 if self._answers else min(timeout_s, self._settings.keep_alive_s / 4.0))
         if not self._answers and (code != mqtt.MQTT_ERR_SUCCESS or self._loss is not None):
@@ -104,9 +106,9 @@ class MqttLink:
                 os.eventfd_write(self._bell, 1)
 
     def _move(self, timeout_s: float) -> int:
-        """Wait until the socket moves, somebody wakes us, or the time is out; read and write what can be.
+        """Wait until the socket is ready, ``wake`` is called, or the time is over; then read and write.
 
-        By poll(): select(), which paho would use, knows no file beyond the first 1024 of a process.
+        Uses poll(), because paho's select() fails for file descriptors above 1023.
         """
         client, sock = self._client, self._client.socket()
         if sock is None:
@@ -126,7 +128,7 @@ class MqttLink:
         return next((int(code) for code in codes if code != mqtt.MQTT_ERR_SUCCESS), int(mqtt.MQTT_ERR_SUCCESS))
 
     def close(self) -> None:
-        """Say goodbye, so that the will is not carried out."""
+        """Disconnect cleanly, so that the broker does not publish the will."""
         try:
             farewell = self._announce({"state": "offline", "reason": "stopped"})
             for _ in range(5):
@@ -134,12 +136,12 @@ class MqttLink:
                     break
             self._client.disconnect()
             self._move(_TURN_S)
-        except LinkError:  # it was broken already
+        except LinkError:  # the connection was already broken
             pass
         self._hang_up()
 
     def abandon(self) -> None:
-        """Drop a broken connection; the broker carries out the will."""
+        """Drop a broken connection; the broker publishes the will."""
         sock = self._client.socket()
         if sock is not None:
             sock.close()
@@ -197,7 +199,7 @@ class MqttLink:
         return self._publish("status", json.dumps(presence), retain=True)
 
     def _introduce(self, topic: str, text: str) -> None:
-        """To Home Assistant; a broker that does not want it there is no reason not to deliver."""
+        """Publish the discovery message of Home Assistant; its refusal does not stop the delivery."""
         self._client.publish(topic, text.encode(), qos=1, retain=True)
 
     def _publish(self, leaf: str, text: str, *, retain: bool = False, properties: Properties | None = None) -> int:
@@ -224,7 +226,9 @@ class MqttLink:
         if mid == self._under_way:
             self._under_way = _NOTHING
         is_in_vain = self._settings.wait_for_listener and code.value == _NOBODY
-        self._answers.append(Answer(mid, not code.is_failure and not is_in_vain, code.value in _HOPELESS, str(code)))
+        self._answers.append(
+            BrokerAnswer(mid, not code.is_failure and not is_in_vain, code.value in _HOPELESS, str(code))
+        )
 
 
 def _properties(packet: int, fields: Mapping[str, Any]) -> Properties:

@@ -1,4 +1,4 @@
-"""Where the broker is, and who we are to it."""
+"""Settings of the connection to the broker."""
 
 import ssl
 from dataclasses import dataclass
@@ -16,9 +16,9 @@ MOST_NAME_BYTES: Final = 65_535
 class UplinkSettings:
     """A broker and how to reach it.
 
-    ``topic`` is the branch of this vehicle: estimates go to ``topic/estimates``, presence is retained
-    at ``topic/status``. ``ca`` is the authority the broker's certificate must come from, absent for
-    the system's; certificate and key are ours where the broker asks for them.
+    ``topic`` is the branch of this vehicle: estimates go to ``topic/estimates``, presence is retained at
+    ``topic/status``. ``ca`` is the authority that must have signed the broker's certificate; None: those of the system.
+    ``certificate`` and ``key`` are the client's, if the broker requires them.
     """
 
     host: str
@@ -56,9 +56,9 @@ class UplinkSettings:
         return context
 
     def password(self) -> str | None:
-        """Read anew at every connection, so that it can be changed while the service runs.
+        """The password, read at every connection, so that it can be changed while the service runs.
 
-        Raises ConfigurationError where the file cannot be read.
+        Raises ConfigurationError if the file cannot be read.
         """
         if self.password_file is None:
             return None
@@ -71,9 +71,9 @@ class UplinkSettings:
 
 
 def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSettings | None:
-    """What [uplink] says of this vehicle; None without a host.
+    """The settings of [uplink] for this vehicle; None without a host.
 
-    Raises ConfigurationError for a name MQTT forbids, and for a vehicle without a name of its own.
+    Raises ConfigurationError for a name that MQTT forbids, and if the vehicle still has the default id.
     """
     if section.host is None:
         return None
@@ -103,7 +103,7 @@ def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSe
 
 
 def require_own_id(key: str, vehicle: VehicleSection, why: str) -> None:
-    """Raises ConfigurationError for a vehicle that was given no name, where ``key`` makes it send."""
+    """Raises ConfigurationError if ``key`` makes the vehicle send while it has the default id."""
     if vehicle.id == VehicleSection().id:
         raise ConfigurationError(
             f"{key} is set, but [vehicle] id is {vehicle.id!r}, that of every vehicle that was given none: "

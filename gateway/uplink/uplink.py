@@ -1,4 +1,4 @@
-"""The uplink thread: takes letters from the outbox to the broker, and starts over when the link breaks."""
+"""The uplink thread: takes messages from the outbox to the broker, and starts over when the link breaks."""
 
 import logging
 import time
@@ -9,10 +9,9 @@ from typing import Any, Final, Protocol
 
 from gateway.log import Event, log_event
 from gateway.status import UplinkStatus
-from gateway.uplink.back_off import BackOff
-from gateway.uplink.forwarder import PAGE, Forwarder
-from gateway.uplink.link import Answer, LinkError, MqttLink
-from gateway.uplink.outbox import Letter, Outbox
+from gateway.uplink.forwarder import PAGE, BackOff, Forwarder
+from gateway.uplink.link import BrokerAnswer, LinkError, MqttLink
+from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import UplinkSettings
 
 IDLE_S: Final = 5.0  # a turn with nothing to do; a new record ends it
@@ -20,21 +19,21 @@ TURN_S: Final = 0.5  # likewise while an answer is awaited
 ANSWER_TIMEOUT_S: Final = 30.0  # a broker that takes longer is as good as gone
 
 
-class Link(Protocol):
+class BrokerLink(Protocol):
     """A connection to a broker."""
 
-    def send(self, letter: Letter) -> int: ...
-    def turn(self, timeout_s: float) -> list[Answer]: ...
+    def send(self, message: OutboxMessage) -> int: ...
+    def turn(self, timeout_s: float) -> list[BrokerAnswer]: ...
     def wake(self) -> None: ...
     def close(self) -> None: ...
     def abandon(self) -> None: ...
 
 
 class Uplink(Forwarder[UplinkStatus]):
-    """Runs until :meth:`stop`, where it says goodbye. At least once, in order: no letter overtakes an earlier one.
+    """Runs until :meth:`stop`, which announces that the vehicle is offline. Delivers at least once and in order.
 
-    After a break the one letter under way may arrive a second time; it carries its id. After a kill
-    those may whose delivery was not on disk yet. What fails is told in :meth:`report` and tried again.
+    After a broken connection the message in flight may arrive twice, with the same id; after a kill, also those whose
+    delivery was not on disk yet. Failures are in :meth:`report` and are retried.
     """
 
     NAME = "uplink"
@@ -44,7 +43,7 @@ class Uplink(Forwarder[UplinkStatus]):
         settings: UplinkSettings,
         outbox: Outbox,
         birth: Mapping[str, Any],
-        connect: Callable[[UplinkSettings, Mapping[str, Any]], Link] = MqttLink,
+        connect: Callable[[UplinkSettings, Mapping[str, Any]], BrokerLink] = MqttLink,
         back_off: BackOff | None = None,
     ) -> None:
         super().__init__(outbox, UplinkStatus(settings.broker), back_off, settings.back_off_max_s)
@@ -53,7 +52,7 @@ class Uplink(Forwarder[UplinkStatus]):
         self._connect = connect
 
     def _deliver(self) -> None:
-        """Deliver until asked to stop, or until LinkError."""
+        """Deliver until stopped. Raises LinkError if the connection breaks."""
         link = self._connect(self._settings, self._birth)
         self._report = replace(
             self._report, is_connected=True, n_connections=self._report.n_connections + 1, last_fault=None
@@ -71,38 +70,38 @@ class Uplink(Forwarder[UplinkStatus]):
             self._outbox.call(lambda: None)
             self._report = replace(self._report, is_connected=False)
 
-    def _deliver_in_turn(self, link: Link) -> None:
-        """One letter at a time: the next leaves when the broker has answered for the last, so order cannot break."""
-        waiting: deque[Letter] = deque()
+    def _deliver_in_turn(self, link: BrokerLink) -> None:
+        """Send one message at a time and wait for the broker's acknowledgement, which keeps the order."""
+        waiting: deque[OutboxMessage] = deque()
         while not self._stop.is_set():
             if not waiting:
-                waiting.extend(self._outbox.next_letters(PAGE))
+                waiting.extend(self._outbox.next_messages(PAGE))
                 self._look()
             if waiting:
                 self._deliver_one(link, waiting.popleft())
             else:
                 link.turn(IDLE_S)
 
-    def _deliver_one(self, link: Link, letter: Letter) -> None:
-        """Until the broker has answered for it. Raises LinkError where it did not, or may take it another time."""
-        answer = self._answer_for(link, link.send(letter))
-        if answer is None or letter.is_extra:  # a broker that does not want the copy gets the letter all the same
+    def _deliver_one(self, link: BrokerLink, message: OutboxMessage) -> None:
+        """Send one message and wait for its acknowledgement. Raises LinkError if there is none or it asks to retry."""
+        answer = self._answer_for(link, link.send(message))
+        if answer is None or message.is_extra:  # the refusal of a copy does not matter
             return
         report = self._report
         if answer.is_accepted:
             self._report = replace(report, n_delivered=report.n_delivered + 1)
         elif answer.is_hopeless:
             log_event(
-                Event.UPLINK_REFUSED, level=logging.ERROR, broker=report.broker, id=letter.id, reason=answer.reason
+                Event.UPLINK_REFUSED, level=logging.ERROR, broker=report.broker, id=message.id, reason=answer.reason
             )
             self._report = replace(report, n_refused=report.n_refused + 1)
         else:
             raise LinkError(f"{report.broker} does not take estimates: {answer.reason}")
-        self._outbox.delivered(letter)
+        self._outbox.delivered(message)
         self._back_off.reset()
 
-    def _answer_for(self, link: Link, mid: int) -> Answer | None:
-        """None where the service stopped meanwhile."""
+    def _answer_for(self, link: BrokerLink, mid: int) -> BrokerAnswer | None:
+        """The broker's answer; None if the service was stopped meanwhile. Raises LinkError after ANSWER_TIMEOUT_S."""
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
         while not self._stop.is_set():
             for answer in link.turn(TURN_S):
@@ -113,7 +112,7 @@ class Uplink(Forwarder[UplinkStatus]):
         return None
 
     def _note(self, fault: str) -> None:
-        """As the forwarder's; a connection that was there had no fault."""
+        """Report a failure: as a lost connection if there was one, else as a broker that was not reached."""
         if fault != self._report.last_fault:
             was_connected = self._report.n_connections > 0 and self._report.last_fault is None
             event = Event.UPLINK_LOST if was_connected else Event.UPLINK_NOT_REACHED

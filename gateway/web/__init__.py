@@ -1,12 +1,11 @@
 """The HTTP side: latest estimate, history, stream, status, health, metrics, dashboard.
 
 The board supplies estimates, a reader the history, and a call the service's status; the web answers every client with a
-token. The application is made by ``create_app``, from the door, the live board and the routes.
+token. ``create_app`` builds the application from access control, the live board and the routes.
 """
 
 from gateway.store import StoreReader
-from gateway.web.app import create_app
-from gateway.web.door import (
+from gateway.web.access import (
     Scope,
     Tls,
     Token,
@@ -15,10 +14,10 @@ from gateway.web.door import (
     renew_certificate,
     server_config,
 )
+from gateway.web.app import WebSettings, create_app
 from gateway.web.live import Board, boot_clock_s
 from gateway.web.routes.known_loads import KnownLoad, KnownLoads
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
-from gateway.web.settings import WebSettings
 
 __all__ = [
     "Board",

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from typing import Any, Final
 
 from fastapi import FastAPI
@@ -12,18 +13,18 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.status import Status
 from gateway.store import StoreReader
 from gateway.web import pages
-from gateway.web.door import (
-    AnswersHead,
-    Failures,
+from gateway.web.access import (
+    ConcurrencyLimit,
     Guard,
-    InPieces,
+    HeadAsGet,
+    InChunks,
     SecurityHeaders,
     TokenFile,
-    Turns,
+    WrongTokens,
     describe_guard,
     problems,
 )
-from gateway.web.live import Board, LatestFirst
+from gateway.web.live import Board, LatestShortcut
 from gateway.web.routes.absent import (
     NO_ALARMS,
     NO_COMMISSIONING,
@@ -32,36 +33,43 @@ from gateway.web.routes.absent import (
     NO_TREND,
     NO_VERIFICATION,
 )
-from gateway.web.routes.alarms import AlarmDesk, alarms_router
+from gateway.web.routes.alarms import AlarmBackend, alarms_router
 from gateway.web.routes.cab import cab_router
-from gateway.web.routes.calibration import (
-    KnownWeightService,
-    TrendDesk,
-    VerificationDesk,
-    known_weights_router,
-    trend_router,
-    verification_router,
-)
-from gateway.web.routes.commissioning import CommissioningDesk, commissioning_router
+from gateway.web.routes.commissioning import CommissioningBackend, commissioning_router
 from gateway.web.routes.estimates import api_router
 from gateway.web.routes.events import events_router
 from gateway.web.routes.export import export_router
 from gateway.web.routes.health import health_router
 from gateway.web.routes.j1939 import j1939_router
 from gateway.web.routes.known_loads import KNOWN_LOADS_PATH, KnownLoads, known_loads_router
+from gateway.web.routes.known_weights import KnownWeightBackend, known_weights_router
 from gateway.web.routes.metrics import metrics_registry
 from gateway.web.routes.reasons import reasons_router
 from gateway.web.routes.record import FrameLog, record_router
 from gateway.web.routes.spectra import spectra_router
+from gateway.web.routes.trend import TrendBackend, trend_router
 from gateway.web.routes.vehicle import vehicle_router
+from gateway.web.routes.verification import VerificationBackend, verification_router
 from gateway.web.routes.vss import vss_router
 from gateway.web.routes.weights import Scales, weights_router
-from gateway.web.settings import WebSettings
 
 API_VERSION: Final = "1.0.0"
 _DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed while it drives.
 
 Names end in the unit. Unknown is null. Errors are problem details (RFC 9457)."""
+
+
+@dataclass(frozen=True, slots=True)
+class WebSettings:
+    """Limits of the application.
+
+    ``keep_alive_s`` is the time between comments on a quiet stream. Beyond ``n_streams_max`` open streams the answer is
+    503. After ``n_wrong_tokens_per_min`` wrong tokens from one address, further ones are answered with 429.
+    """
+
+    keep_alive_s: float = 15.0
+    n_streams_max: int = 100
+    n_wrong_tokens_per_min: int = 10
 
 
 def create_app(
@@ -71,13 +79,13 @@ def create_app(
     settings: WebSettings | None = None,
     calibrated: CalibratedVehicle | None = None,
     tokens: TokenFile | None = None,
-    known_weights: KnownWeightService | None = None,
-    commissioning: CommissioningDesk | None = None,
+    known_weights: KnownWeightBackend | None = None,
+    commissioning: CommissioningBackend | None = None,
     known_loads: KnownLoads | None = None,
     record: FrameLog | None = None,
-    verification: VerificationDesk | None = None,
-    trend: TrendDesk | None = None,
-    alarms: AlarmDesk | None = None,
+    verification: VerificationBackend | None = None,
+    trend: TrendBackend | None = None,
+    alarms: AlarmBackend | None = None,
     *,
     draws_trailers: bool = False,
 ) -> FastAPI:
@@ -95,10 +103,10 @@ def create_app(
         yield
         board.close()
 
-    failures = Failures(chosen.n_wrong_tokens_per_min)
+    failures = WrongTokens(chosen.n_wrong_tokens_per_min)
     app = _Application(
         wrap=lambda inner: SecurityHeaders(
-            InPieces(AnswersHead(Guard(LatestFirst(Turns(inner), board), tokens, failures))), responses
+            InChunks(HeadAsGet(Guard(LatestShortcut(ConcurrencyLimit(inner), board), tokens, failures))), responses
         ),
         title="Springscale",
         version=API_VERSION,
@@ -112,7 +120,7 @@ def create_app(
     scales = Scales(calibrated)
     metrics = metrics_registry(board, scales, status, responses)
     routers = [
-        api_router(board, reader, status, chosen),
+        api_router(board, reader, status, chosen.keep_alive_s, chosen.n_streams_max),
         reasons_router(),
         vehicle_router(status, calibrated),
         spectra_router(board, calibrated),
@@ -166,7 +174,7 @@ def _describe(app: FastAPI, tokens: TokenFile | None) -> None:
     told: dict[bool, dict[str, Any]] = {}
 
     def openapi() -> dict[str, Any]:
-        is_guarded = tokens is not None and tokens.are_asked_for()
+        is_guarded = tokens is not None and tokens.are_required()
         if is_guarded not in told:
             app.openapi_schema = None
             schema = told[is_guarded] = describe()

@@ -1,7 +1,7 @@
-"""The simulator at work: campaigns to drive, their frames as the sensors of a signal map send them, a live stream.
+"""Simulated campaigns as candump logs, or as frames sent live to a bus by the sensors of a signal map.
 
-A kind of campaign and a van come in; candump logs with their campaign file, or frames on a bus, go out. It knows the
-simulator and the bus, and nothing of what is weighed from them.
+Input: a kind of campaign and a van. Output: candump logs with their campaign file, or frames on a bus. This package
+uses the simulator and the bus; it does not depend on the estimators.
 """
 
 from gateway.workbench.demo_drive import demo_drive, frames_of

@@ -1,4 +1,4 @@
-"""Campaigns that can be simulated: which vehicle drives where, how fast and with what on board.
+"""The campaigns that can be simulated: roads, speeds and loads of each drive.
 
 Loads and places are the paper's for its van (450 kg rated, 2.8 m wheelbase) and scaled to other vehicles.
 """
@@ -24,9 +24,9 @@ from gateway.sim.road import (
 from gateway.sim.scenario import LoadStep
 from gateway.sim.vehicle import Load, Vehicle, front_share_pct, load_for_share
 
-PAPER_PAYLOAD_KG: Final = 450.0
-PAPER_WHEELBASE_M: Final = 2.8
-PAPER_SPEED_MPS: Final = 50.0 / 3.6
+PAPER_PAYLOAD_KG: Final = 450.0  # of the paper, section 4
+PAPER_WHEELBASE_M: Final = 2.8  # likewise
+PAPER_SPEED_MPS: Final = 50.0 / 3.6  # likewise
 PAPER_ROUGHNESS_M3: Final = (
     2.0 * PAPER_CORNER_RADPM * PAPER_SIGMA_M**2 / math.pi
 )  # (1) at short waves, as C of ISO 8608
@@ -36,7 +36,7 @@ CHANGE_S: Final = 90.0  # standing still while the load changes: longer than wha
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """A stretch of one drive with one load, seconds from its start."""
+    """One load on board during part of a drive; times in seconds from the start of the drive."""
 
     loads: tuple[Load, ...]
     start_s: float
@@ -45,7 +45,7 @@ class Carried:
 
 @dataclass(frozen=True, slots=True)
 class PlannedDrive:
-    """One log to be: where it goes, and what is carried when. Times of ``carried`` are those worth judging."""
+    """One log to simulate: its route and its loads. ``carried`` covers only the times that are to be judged."""
 
     name: str
     drive: Drive
@@ -56,7 +56,7 @@ class PlannedDrive:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A campaign to be. split, where given, is what every run serves."""
+    """A campaign to simulate. ``split``, if given, is the split (identification or validation) of every run."""
 
     drives: tuple[PlannedDrive, ...]
     identification_fraction: float = 0.667
@@ -64,7 +64,7 @@ class Plan:
 
     @property
     def rolls(self) -> bool:
-        """Whether any road lifts the wheels of one side alone; the paper's has one profile under both."""
+        """Whether any road excites roll; the paper's road has the same profile under both wheels."""
         return not all(isinstance(planned.road, PaperRoad) for planned in self.drives)
 
 
@@ -165,7 +165,7 @@ def sensitivity(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) ->
 
 
 def mixed(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
-    """Town, country and motorway in one drive a load, on roads that change, with potholes; the load on pallets."""
+    """One drive per load over town, country and motorway, on changing roads with potholes; the load is on pallets."""
     road = ObstacleRoad(UnevenRoad(iso_road("B"), stretch_m=400.0, spread=0.4), potholes_per_km=1.0)
     drives = []
     for welded in _experiment_loads(vehicle):
@@ -195,7 +195,7 @@ PLANS: Final[Mapping[str, Callable[[Vehicle, np.random.Generator, float], Plan]]
 
 
 def plan_of(kind: str, vehicle: Vehicle, seed: int, longest_s: float = math.inf) -> Plan:
-    """The plan of a kind; the seed decides speeds, roads and random loads. No load is driven longer than longest_s.
+    """The plan of a kind. The seed sets speeds, roads and random loads; each load is driven for at most longest_s.
 
     Raises KeyError for a kind that is not in PLANS.
     """
@@ -203,19 +203,19 @@ def plan_of(kind: str, vehicle: Vehicle, seed: int, longest_s: float = math.inf)
 
 
 def share_range_pct(vehicle: Vehicle) -> tuple[float, float]:
-    """The range of shares that (12) normalises by: 20 points about the middle of the plans, 40 to 60 for the paper."""
+    """The range of shares [%] that (12) normalises by: the plans' middle +- 10 points, 40 to 60 for the paper's van."""
     middle = _middle_share_pct(vehicle)
     return middle - 10.0, middle + 10.0
 
 
 def _middle_share_pct(vehicle: Vehicle) -> float:
-    """Half of the rated payload over the middle of the wheelbase brings the share here, in whole points."""
+    """The share [%, rounded] with half the rated payload at the middle of the wheelbase."""
     half = (Load(vehicle.rated_payload_kg / 2.0, vehicle.wheelbase_m / 2.0),)
     return round(front_share_pct(vehicle, half))
 
 
 def _placed(vehicle: Vehicle, mass_kg: float, share_pct: float | None) -> tuple[Load, ...] | None:
-    """The load placed for a share; None where it would stand outside the axles (not feasible)."""
+    """The load placed so that it gives this share; None if its centre would be outside the axles (not feasible)."""
     if mass_kg == 0.0 or share_pct is None:
         return ()
     try:
@@ -234,7 +234,7 @@ def _experiment_loads(vehicle: Vehicle) -> list[tuple[Load, ...]]:
 def _paper_grid(
     vehicle: Vehicle, loads: Sequence[tuple[Load, ...] | None], rng: np.random.Generator, longest_s: float
 ) -> Plan:
-    """Ten minutes with each feasible load on the paper's road, all of it to identify."""
+    """Ten minutes with each feasible load on the paper's road, all for identification."""
     feasible = [placed for placed in loads if placed is not None]
     drives = [_steady(vehicle, placed, min(600.0, longest_s), PaperRoad(), rng) for placed in feasible]
     return Plan(tuple(drives), identification_fraction=1.0)
@@ -264,7 +264,7 @@ def _name(vehicle: Vehicle, loads: tuple[Load, ...]) -> str:
 
 
 def _with_changes(name: str, loads: Sequence[tuple[Load, ...]], each_s: float, rng: np.random.Generator) -> Plan:
-    """One drive at 50 km/h on IRI 4; for each change of load it stops for a while."""
+    """One drive at 50 km/h on IRI 4 with a stop at each change of load."""
     whole: Drive | None = None
     carried, steps = [], []
     for on_board in loads:
@@ -280,7 +280,7 @@ def _with_changes(name: str, loads: Sequence[tuple[Load, ...]], each_s: float, r
 
 
 def _from_rest_to_rest(duration_s: float, rng: np.random.Generator) -> tuple[Drive, float, float]:
-    """Standing for the change, 50 km/h for a little over duration_s, a stop; and when that speed begins and ends."""
+    """Stop, 50 km/h for slightly more than duration_s, stop; also returns when the constant speed begins and ends."""
     ramp = drive_of([Leg(PAPER_SPEED_MPS, duration_s + 5.0), Leg(0.0, 1.0)])
     at_speed_s = CHANGE_S + np.flatnonzero(ramp.speed_mps > 0.999 * PAPER_SPEED_MPS) * ramp.step_s
     wandering = constant(PAPER_SPEED_MPS, ramp.duration_s + 1.0, rng).speed_mps[: len(ramp.speed_mps)]

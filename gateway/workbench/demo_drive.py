@@ -1,4 +1,4 @@
-"""The drives of the demo: a van drives empty, is loaded, and drives on; each time with another load."""
+"""The drives of the demo: a van drives empty, is loaded, and drives on. Each drive has another load."""
 
 from typing import Final
 
@@ -17,20 +17,20 @@ from gateway.workbench.wiring import Wiring
 
 MAP_NAME: Final = "reference"
 LOADS: Final = (Load(270.0, 1.3), Load(400.0, 1.8), Load(150.0, 0.6))  # in turn
-WINDOW_S: Final = 300.0
-N_EMPTY_WINDOWS: Final = 3
-N_LOADED_WINDOWS: Final = 2
+WINDOW_S: Final = 300.0  # BatchSettings.window_s
+N_EMPTY_WINDOWS: Final = 3  # chosen
+N_LOADED_WINDOWS: Final = 2  # chosen
 STOP_S: Final = 75.0  # longer than the minute of standstill that ends a drive
 _JITTER_MPS: Final = 0.4  # how well a driver holds a speed
 
 
 def frames_of(driven: SimulatedDrive) -> Frames:
-    """The frames of a drive as the map "reference" has them."""
+    """The frames of a drive, encoded by the signal map "reference"."""
     return Wiring(MAP_NAME).frames_of(driven.recording)
 
 
 def demo_drive(seed: int = 1, start_ns: int = START_NS) -> SimulatedDrive:
-    """Three windows of five minutes empty, a stop where a load comes on board, two windows more; with the truth.
+    """Three empty windows of five minutes, a stop for loading, two loaded windows; returned with the true loads.
 
     The first seed's load is 270 kg.
     """
@@ -45,7 +45,7 @@ def demo_drive(seed: int = 1, start_ns: int = START_NS) -> SimulatedDrive:
 
 
 def _near_50_kmh(hold_s: float, rng: np.random.Generator, *, stops: bool) -> Drive:
-    """From rest to that speed, held for hold_s: with the ramp a little more than whole windows."""
+    """Accelerate from rest and hold the speed for hold_s; with the ramp this is slightly more than whole windows."""
     legs = [Leg(PAPER_SPEED_MPS, hold_s)]
     planned = drive_of([*legs, Leg(0.0, 1.0)] if stops else legs)
     wandering = constant(PAPER_SPEED_MPS, planned.duration_s + 1.0, rng, _JITTER_MPS).speed_mps

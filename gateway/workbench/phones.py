@@ -1,9 +1,9 @@
-"""Simulated drives as a phone's app exports them: Sensor Logger on Android and iOS, phyphox.
+"""Simulated drives in the export formats of phone apps: Sensor Logger on Android and iOS, phyphox.
 
-The formats are those that gateway.offline.phone reads, written from their descriptions alone; noise, rates and gaps are
-those of phones: Sensor Logger's SAMPLING.md (100 Hz on iOS, 60 to 210 Hz on Android, a fix a second), and the data
-sheets of the inertial units that phones carry (Bosch BMI160, ST LSM6DSO: 70 to 180 ug/sqrt(Hz), 0.004 to 0.007
-deg/s/sqrt(Hz)).
+The formats are those that gateway.offline.phone reads, written from the apps' documentation alone. Noise, rates and
+gaps are typical of phones. Sources: Sensor Logger's SAMPLING.md (100 Hz on iOS, 60 to 210 Hz on Android, a fix a
+second), and the data sheets of inertial units in phones (Bosch BMI160, ST LSM6DSO: 70 to 180 ug/sqrt(Hz), 0.004 to
+0.007 deg/s/sqrt(Hz)).
 """
 
 import math
@@ -21,8 +21,8 @@ from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
 App = Literal["sensor_logger_android", "sensor_logger_ios", "phyphox"]
 APPS: Final[tuple[App, ...]] = ("sensor_logger_android", "sensor_logger_ios", "phyphox")
 
-_DEG: Final = math.pi / 180.0
-_EARTH_M: Final = 6_371_000.0
+_DEG: Final = math.pi / 180.0  # radians
+_EARTH_M: Final = 6_371_000.0  # mean radius (IUGG)
 
 PHONE: Final = Sensors(  # on the floor of the load room, in the middle
     mount=Mount(position_m=2.4, height_m=0.5, roll_deg=1.0, pitch_deg=-1.5, yaw_deg=2.0),
@@ -40,9 +40,9 @@ PHONE: Final = Sensors(  # on the floor of the load room, in the middle
 
 @dataclass(frozen=True, slots=True)
 class Lying:
-    """How the phone lies: turned about its up axis, tilted; laid down after ``handled_s`` and picked up at the end.
+    """How the phone is placed: yawed and tilted; it is put down after ``handled_s`` and picked up at the end.
 
-    From moved_at_s on (none where NaN) it lies tilted by 20 degrees more, within a second.
+    At moved_at_s (NaN: never) it tilts by another 20 degrees within one second.
     """
 
     turned_deg: float = 130.0
@@ -52,7 +52,7 @@ class Lying:
 
 
 def write_export(recording: Recording, path: Path, app: App, lying: Lying | None = None, seed: int = 1) -> None:
-    """Write a recording in the vehicle's axes as the zip that this app exports. Raises OSError."""
+    """Write a recording (vehicle axes) as the zip that this app exports. Raises OSError."""
     lying = lying or Lying()
     t_ns, accel, gyro = _as_held(recording, lying, np.random.default_rng(seed))
     fixes = _fixes(recording, np.random.default_rng([seed, 1]))
@@ -64,7 +64,7 @@ def write_export(recording: Recording, path: Path, app: App, lying: Lying | None
 
 
 def _as_held(recording: Recording, lying: Lying, rng: np.random.Generator) -> tuple[I64, F64, F64]:
-    """Times, acceleration and rates in the phone's axes, a hand before and after the drive included."""
+    """Times, acceleration and rates in the phone's axes, including handling before and after the drive."""
     turn = _turn(lying.turned_deg, lying.tilted_deg)
     accel, gyro = recording.accel_mps2 @ turn.T, recording.gyro_radps @ turn.T
     t_s = (recording.imu_t_ns - recording.imu_t_ns[0]) / NS_PER_S
@@ -82,7 +82,7 @@ def _as_held(recording: Recording, lying: Lying, rng: np.random.Generator) -> tu
 
 
 def _turn(turned_deg: float, tilted_deg: float) -> F64:
-    """(3, 3) vehicle axes to the phone's."""
+    """Rotation matrix (3, 3) from the vehicle's axes to the phone's."""
     a, b = math.radians(turned_deg), math.radians(tilted_deg)
     about_up = np.array([[math.cos(a), math.sin(a), 0.0], [-math.sin(a), math.cos(a), 0.0], [0.0, 0.0, 1.0]])
     about_x = np.array([[1.0, 0.0, 0.0], [0.0, math.cos(b), math.sin(b)], [0.0, -math.sin(b), math.cos(b)]])
@@ -100,7 +100,7 @@ class _Fixes:
 
 
 def _fixes(recording: Recording, rng: np.random.Generator) -> _Fixes:
-    """Course and place by the turn rate and speed, from 48 degrees north, 9 east; fixes that were lost are absent."""
+    """Course and position integrated from turn rate and speed, starting at 48 N, 9 E [deg]; lost fixes are omitted."""
     t_s = (recording.imu_t_ns - recording.imu_t_ns[0]) / NS_PER_S
     turned = np.concatenate(([0.0], np.cumsum(recording.gyro_radps[1:, 2] * np.diff(t_s))))
     at_s = (recording.gps_t_ns - recording.imu_t_ns[0]) / NS_PER_S

@@ -1,4 +1,4 @@
-"""Simulated drives as campaigns on disk, or as frames for a bus."""
+"""Write simulated drives as campaigns on disk, or send them as frames to a bus."""
 
 import csv
 import math
@@ -32,7 +32,7 @@ from gateway.workbench.wiring import Wiring, unrelated_traffic
 
 
 def sideways(plan: Plan, most_m: float, rng: np.random.Generator) -> Plan:
-    """The same plan with every load somewhere within most_m of the centre line, at one place throughout a drive."""
+    """The same plan with random lateral load positions within most_m of the centre line, constant during a drive."""
     return replace(plan, drives=tuple(_sideways(planned, most_m, rng) for planned in plan.drives))
 
 
@@ -63,11 +63,11 @@ SENSORS_OF_MAP: Final = {"reference": REFERENCE, "canmod_gps": CANMOD, "j1939": 
 
 @dataclass(frozen=True, slots=True)
 class Bench:
-    """What is simulated: a plan of this kind with this vehicle, its sensors sending as a shipped signal map tells.
+    """A simulated vehicle on a kind of plan, whose sensors send the messages of a shipped signal map.
 
-    n_unrelated other identifiers share the bus. No load is driven longer than longest_s. The inertial unit sits
-    sensor_left_m left of the centre line (None: where its mount has it); every load stands somewhere within loads_off_m
-    of that line (0: where the plan has it).
+    n_unrelated other identifiers share the bus. Each load is driven for at most longest_s. The inertial unit is
+    sensor_left_m left of the centre line (None: as its mount says); loads are at random lateral positions within
+    loads_off_m of that line (0: as the plan says).
     """
 
     kind: str
@@ -94,12 +94,12 @@ class Bench:
         return sideways(plan, self.loads_off_m, rng)
 
     def simulate(self, planned: PlannedDrive, number: int, start_ns: int) -> SimulatedDrive:
-        """Drive ``number`` of the plan, begun at start_ns."""
+        """Simulate drive ``number`` of the plan, starting at start_ns."""
         seed = int(np.random.SeedSequence([self.seed, number]).generate_state(1)[0])
         return simulate_drive(self.vehicle, planned.steps, planned.road, planned.drive, self.sensors, seed, start_ns)
 
     def frames_of(self, planned: PlannedDrive, number: int, driven: SimulatedDrive) -> Frames:
-        """Its frames in order of time, with what else is on the bus."""
+        """Its frames in order of time, together with the unrelated traffic."""
         frames = Wiring(self.map_name).frames_of(driven.recording)
         if self.n_unrelated == 0:
             return frames
@@ -118,7 +118,7 @@ def bench_of(
     sensor_left_m: float | None = None,
     loads_off_m: float = 0.0,
 ) -> Bench:
-    """A bench from names. Raises ConfigurationError for a name that is not there, naming those that are."""
+    """Build a bench from names. Raises ConfigurationError for an unknown name and lists the known ones."""
     for what, name, known in (
         ("campaign", kind, PLANS),
         ("vehicle", vehicle, VANS),
@@ -134,10 +134,10 @@ def bench_of(
 def write_campaign(
     bench: Bench, directory: Path, *, workers: int = 1, on_drive: OnDrive = lambda done, of: None
 ) -> Path:
-    """Write campaign.toml, signals.toml with its DBC, the logs and truth.csv; the path of campaign.toml.
+    """Write campaign.toml, signals.toml with its DBC, the logs and truth.csv; return the path of campaign.toml.
 
-    The same bench writes the same frames, however many processes work. Raises ConfigurationError where
-    the directory holds a campaign already.
+    The frames depend on the bench only, not on the number of processes. Raises ConfigurationError if the
+    directory already contains a campaign.
     """
     campaign = directory / "campaign.toml"
     if campaign.exists():
@@ -158,7 +158,7 @@ def write_campaign(
 
 
 def simulated_frames(bench: Bench) -> Iterator[Frames]:
-    """The plan's drives one after the other, the vehicle parked in between; a chunk of frames a drive."""
+    """The plan's drives in sequence with the vehicle parked in between; yields one chunk of frames per drive."""
     start_ns = START_NS
     for number, planned in enumerate(bench.plan().drives):
         driven = bench.simulate(planned, number, start_ns)
@@ -175,7 +175,7 @@ def stream(
     on_progress: OnProgress | None = None,
     stop: threading.Event | None = None,
 ) -> int:
-    """Send the plan's drives to a bus, paced by their time; how many frames. Raises BusError."""
+    """Send the plan's drives to a bus in real time; return the number of frames. Raises BusError."""
     with BusSink(interface, channel) as sink:
         return replay_frames(simulated_frames(bench), sink, speed, on_progress, stop)
 
@@ -189,7 +189,7 @@ def _mapped(write: Callable[[int], list[list[str]]], numbers: Sequence[int], wor
 
 
 def _write_drive(bench: Bench, plan: Plan, directory: Path, logs: Sequence[str], number: int) -> list[list[str]]:
-    """Simulate one drive and write its log; its rows of truth.csv."""
+    """Simulate one drive and write its log; return its rows of truth.csv."""
     planned = plan.drives[number]
     driven = bench.simulate(planned, number, START_NS + number * 86_400 * NS_PER_S)
     log = directory / logs[number]
@@ -211,7 +211,7 @@ def _kg(weights: F64) -> list[str]:
 
 
 def _write_truth(path: Path, drives: Sequence[Sequence[Sequence[str]]]) -> None:
-    """One row a load: it was on board from t_ns on."""
+    """Write one row per load; the load is on board from t_ns on."""
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(TRUTH_COLUMNS)
@@ -258,7 +258,7 @@ def _campaign_text(bench: Bench, plan: Plan, logs: Sequence[str]) -> str:
 
 
 def _length_lines(carried: Sequence[tuple[Load, ...]]) -> list[str]:
-    """How far along the floor these loads usually reach."""
+    """The campaign-file lines that state the usual length of the loads."""
     if not carried:
         return []
     reaches_m = [

@@ -1,4 +1,4 @@
-"""Which message of a shipped DBC carries which sensor reading: a simulated recording becomes frames."""
+"""Encode a simulated recording as CAN frames: which DBC message carries which sensor reading."""
 
 import math
 from collections.abc import Mapping
@@ -15,8 +15,8 @@ from gateway.records import F64, I64, Frames
 from gateway.sim.sensors import Recording
 from gateway.units import NS_PER_S
 
-_DEG: Final = math.pi / 180.0
-_KMH: Final = 1.0 / 3.6
+_DEG: Final = math.pi / 180.0  # radians
+_KMH: Final = 1.0 / 3.6  # m/s
 
 _X, _Y, _Z = 0, 1, 2
 
@@ -25,7 +25,7 @@ _X, _Y, _Z = 0, 1, 2
 class Wire:
     """One message: DBC signal -> the reading it carries and the DBC's unit in SI.
 
-    delay_ns is how long after the sample it is on the bus.
+    delay_ns is the time from the sample to the frame on the bus.
     """
 
     message: str
@@ -111,7 +111,7 @@ class Wiring:
     def frames_of(self, recording: Recording) -> Frames:
         """All frames in order of time, stamped in whole microseconds as candump writes them.
 
-        Where a message has no signal to say so, a sample without a satellite fix is not sent.
+        A sample without a satellite fix is not sent if its message has no signal for a missing fix.
         """
         return merge_frames([self._frames(wire, recording) for wire in self._wires])
 
@@ -138,9 +138,9 @@ def _satellite_readings(recording: Recording) -> dict[str, F64]:
 
 
 def unrelated_traffic(start_ns: int, duration_s: float, n_ids: int, rng: np.random.Generator) -> Frames:
-    """What else a bus carries: n_ids identifiers every 10 ms to 1 s, a fifth of them 29 bits long, random bytes.
+    """Unrelated traffic: n_ids identifiers every 10 ms to 1 s with random bytes, a fifth of them with 29 bits.
 
-    The identifiers lie between 0x300 and 0x4FF, and 0x0CF10000 up: away from those of the shipped maps.
+    The identifiers are in 0x300 to 0x4FF and from 0x0CF10000 up, which no shipped map uses.
     """
     parts = []
     for i in range(n_ids):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from support.archive import object_store
 
-from gateway.archive import Place, PlaceError, place_of
+from gateway.archive import Location, PlaceError, place_of
 from gateway.errors import ConfigurationError
 
 
@@ -18,11 +18,11 @@ def bucket() -> Iterator[str]:
 
 
 @pytest.fixture(params=["local", "s3"])
-def place(request: pytest.FixtureRequest, tmp_path: Path, bucket: str) -> Place:
+def place(request: pytest.FixtureRequest, tmp_path: Path, bucket: str) -> Location:
     return place_of(tmp_path if request.param == "local" else f"{bucket}/{tmp_path.name}")
 
 
-def test_what_is_there_is_never_written_again(place: Place) -> None:
+def test_what_is_there_is_never_written_again(place: Location) -> None:
     assert place.create("receipts/vehicle=a/1.json", b"first")
     assert not place.create("receipts/vehicle=a/1.json", b"second")
     assert place.read("receipts/vehicle=a/1.json") == b"first"
@@ -30,7 +30,7 @@ def test_what_is_there_is_never_written_again(place: Place) -> None:
     assert place.read("receipts/vehicle=a/1.json") == b"third"
 
 
-def test_a_listing_names_every_file_below_in_order(place: Place) -> None:
+def test_a_listing_names_every_file_below_in_order(place: Location) -> None:
     for path in ("b/2", "b/1", "a=x/3", "bb/1"):
         place.create(path, path.encode())
     assert [item.path for item in place.items()] == ["a=x/3", "b/1", "b/2", "bb/1"]
@@ -39,7 +39,7 @@ def test_a_listing_names_every_file_below_in_order(place: Place) -> None:
     assert [item.path for item in place.at("b").items()] == ["1", "2"]
 
 
-def test_a_stamp_follows_the_content(place: Place) -> None:
+def test_a_stamp_follows_the_content(place: Location) -> None:
     place.create("log", b"one")
     [before] = place.items()
     place.replace("log", b"two")
@@ -48,7 +48,7 @@ def test_a_stamp_follows_the_content(place: Place) -> None:
     assert before.stamp != after.stamp
 
 
-def test_what_is_not_there_is_told_by_name(place: Place) -> None:
+def test_what_is_not_there_is_told_by_name(place: Location) -> None:
     with pytest.raises(FileNotFoundError, match="nowhere: no such file"):
         place.read("nowhere")
     with pytest.raises(FileNotFoundError, match=r"nowhere\.log: no such file"), place.fetched("nowhere.log"):
@@ -56,7 +56,7 @@ def test_what_is_not_there_is_told_by_name(place: Place) -> None:
     place.remove("nowhere")
 
 
-def test_a_large_file_comes_to_disk_and_goes(place: Place) -> None:
+def test_a_large_file_comes_to_disk_and_goes(place: Location) -> None:
     content = bytes(range(256)) * 80_000
     place.create("van/1.log.gz", content)
     with place.fetched("van/1.log.gz") as fetched:

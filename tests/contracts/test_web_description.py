@@ -22,7 +22,7 @@ from support.web import Gateway
 
 from gateway.core.alarms import AlarmRules
 from gateway.records import Why
-from gateway.service.alarm_desk import AlarmDesk
+from gateway.service.alarms import AlarmService
 from gateway.web import Scope, TokenFile, WebSettings
 
 COMMISSIONING = "/api/v1/calibration/commissioning"
@@ -109,7 +109,7 @@ def schema(token_file: TokenFile) -> Iterator[BaseSchema]:
         ) as gateway,
     ):
         gateway.publish(*(make_estimate(n, *([Why.GAP] if n % 3 == 0 else []), with_spectra=True) for n in range(20)))
-        AlarmDesk(AlarmRules(), SUBJECT, gateway.store)(of_load(0, LIMIT_KG + 60.0))
+        AlarmService(AlarmRules(), SUBJECT, gateway.store)(of_load(0, LIMIT_KG + 60.0))
         assert gateway.store.flush(PATIENCE_S)
         gateway.board.close()  # so that the stream has an end
         yield schemathesis.openapi.from_asgi("/openapi.json", gateway.app)
@@ -148,7 +148,7 @@ WITH_PARAMETERS = [label for label in LABELS if not label.endswith(WITHOUT_PARAM
 def test_every_answer_is_as_described(
     schema: BaseSchema, headers: dict[str, str], label: str, mode: GenerationMode
 ) -> None:
-    @settings(max_examples=20, derandomize=True, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=12, derandomize=True, suppress_health_check=list(HealthCheck))
     @given(case=operations(schema)[label].as_strategy(generation_mode=mode))
     def ask(case: schemathesis.Case) -> None:
         assume(all(value is not None and value not in ([], {}) for value in (case.query or {}).values()))  # never sent

@@ -15,8 +15,9 @@ from support.web import Client, Gateway, serving
 
 from gateway.errors import ConfigurationError
 from gateway.web import Scope, Tls, TokenFile, WebSettings, refuse_open_address, server_config
-from gateway.web.door import connection, tls
-from gateway.web.door.guard import Failures, is_loopback
+from gateway.web.access import connection
+from gateway.web.access import serving as web_serving
+from gateway.web.access.guard import WrongTokens, is_loopback
 
 GUARDED = ["/api/v1/estimates/latest", "/api/v1/estimates", "/api/v1/status", "/api/v1/stream", "/metrics"]
 GUARDED += ["/api/v1/vehicle", "/api/v1/export.csv", "/health/ready", "/nothing", "/api/v1/estimates/latest/"]
@@ -107,7 +108,7 @@ def test_many_wrong_tokens_are_told_to_wait_and_right_ones_still_pass(client: Cl
 
 def test_failures_are_forgotten_after_a_minute_and_never_fill_the_memory() -> None:
     now_s = 0.0
-    failures = Failures(2, clock_s=lambda: now_s)
+    failures = WrongTokens(2, clock_s=lambda: now_s)
     assert [failures.note("a") for _ in range(3)] == [None, None, 60]
     assert failures.note("b") is None
     now_s = 60.0
@@ -222,7 +223,7 @@ def test_a_handshake_takes_a_place_and_is_soon_over(tmp_path: Path, monkeypatch:
             assert wait_until(lambda: len(places) == 10)
             url = server.url.replace("http://", "https://")
             assert httpx.get(f"{url}/health/live", verify=trusting, timeout=PATIENCE_S).status_code == 200
-            monkeypatch.setattr(tls, "REQUEST_S", 0.1)
+            monkeypatch.setattr(web_serving, "REQUEST_S", 0.1)
             silent.close()
             assert wait_until(lambda: not any(place.is_idle and place.client[0] == "127.0.0.2" for place in places))
             late = silent.enter_context(socket.create_connection(address, source_address=("127.0.0.2", 0)))

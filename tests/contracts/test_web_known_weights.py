@@ -15,8 +15,8 @@ from support.web import Client, Gateway
 
 from gateway.calibration.known_weights_file import FILE_NAME, load_known_weights
 from gateway.web import Scope, TokenFile
-from gateway.web.door import problems
-from gateway.web.routes.calibration import known_weights_router
+from gateway.web.access import problems
+from gateway.web.routes.known_weights import known_weights_router
 
 URL = "/api/v1/calibration/tare"
 TICKETS = "/api/v1/calibration/tickets"

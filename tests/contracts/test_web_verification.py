@@ -15,7 +15,7 @@ from gateway.cli import springscale
 from gateway.errors import SpringscaleError
 from gateway.records import iso_utc
 from gateway.web import Scope, TokenFile
-from gateway.web.routes.calibration.verification_page import verification_page
+from gateway.web.routes.verification_page import verification_page
 
 URL = "/api/v1/calibration/verifications"
 AT = iso_utc(START_NS + 60_000_000_000)
@@ -125,7 +125,7 @@ def test_the_command_records_shows_and_exports(gateway: Gateway, tmp_path: Path)
         assert "payload 100.0 kg known, 112.0 ± " in made.output
         assert "front axle +6.0 kg, +0.90 %" in made.output
         shown = run(server.url, "show")
-        assert shown.output.splitlines()[0] == "asked for: at most 5 % of the gross weight, 1 load(s)"
+        assert shown.output.splitlines()[0] == "rule: error at most 5 % of the gross weight, one load or more"
         assert made.output.strip() in shown.output
         record_id = json.loads(run(server.url, "show", "--json").output)["history"][0]["id"]
         output = tmp_path / "verification.html"

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from support.dashboard import Watched
+from support.dashboard import Watched, furnished
 from support.patience import PATIENCE_S
+from support.web import serving
 
 
 @pytest.fixture(scope="module")
@@ -29,3 +30,11 @@ def watched(browser: Any) -> Iterator[Watched]:
     made.page.route("**/plotly-*", lambda route: route.abort())
     yield made
     made.page.close()
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Where a gateway with something to look at is; nobody changes it."""
+    with furnished(tmp_path_factory.mktemp("site")) as gateway, serving(gateway.app) as server:
+        yield server.url
+        gateway.board.close()

@@ -1,4 +1,4 @@
-"""A day of a hundred vehicles in an object store, on a cluster of real processes of which one is killed midway."""
+"""A day of fifty vehicles in an object store, on a cluster of real processes of which one is killed midway."""
 
 import json
 import os
@@ -19,8 +19,8 @@ from gateway.archive.reprocess import Progress, reprocess
 from gateway.cli import springscale
 from gateway.errors import ConfigurationError
 
-N_VEHICLES = 100
-KILL_AFTER = 20  # jobs
+N_VEHICLES = 50
+KILL_AFTER = 10  # jobs
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ class Killer:
             os.kill(self.killed, signal.SIGKILL)
 
 
-def test_a_hundred_vehicles_on_a_cluster_that_loses_a_worker(tmp_path: Path, bucket: str, scheduler: str) -> None:
+def test_fifty_vehicles_on_a_cluster_that_loses_a_worker(tmp_path: Path, bucket: str, scheduler: str) -> None:
     archive = write_fleet(tmp_path / "archive", N_VEHICLES).parent
     alone, together = place_of(tmp_path / "alone"), place_of(f"{bucket}/dataset")
     assert reprocess(load_manifest(str(archive)), alone, Here()).is_good

@@ -12,7 +12,7 @@ from gateway.bus.signals import Decoder, load_signal_map
 from gateway.calibration.campaign import load_campaign
 from gateway.cli import main, springscale
 from gateway.cli import reproduce as reproduce_command
-from gateway.cli.text.progress import StatusLine, counted
+from gateway.cli.progress import StatusLine, counted
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.reports.paper.experiments import Extent

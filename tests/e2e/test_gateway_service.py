@@ -256,7 +256,7 @@ def test_a_service_whose_watching_fails_stops_its_parts_and_says_why(
         if gateways:
             raise ArithmeticError("the watch broke")
 
-    monkeypatch.setattr("gateway.service.gateway.AlarmDesk.watch", broken)
+    monkeypatch.setattr("gateway.service.gateway.AlarmService.watch", broken)
     settings = load_settings(config)
     with pytest.raises(GatewayFailedError, match="the watch broke"):
         Gateway(settings, setup_of(settings), on_started=gateways.append).run()

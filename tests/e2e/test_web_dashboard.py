@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Watched, furnished
+from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Watched
 from support.estimates import make_estimate
 from support.web import Gateway, serving
 
@@ -17,14 +17,6 @@ from gateway.web import Scope, TokenFile
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
 expect = playwright.expect
-
-
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Where a gateway with something to look at is; nobody changes it."""
-    with furnished(tmp_path_factory.mktemp("site")) as gateway, serving(gateway.app) as server:
-        yield server.url
-        gateway.board.close()
 
 
 @pytest.fixture(scope="module")
@@ -166,13 +158,15 @@ def test_in_german_on_a_phone_and_on_a_wide_desk(site: str, browser: Any, width:
 
 
 def test_a_wide_screen_is_used(site: str, browser: Any) -> None:
-    """Three cards beside each other, to the edges, and the first is filled."""
+    """Three cards beside each other, to the edges; the rarer ones fill columns below them."""
     made = Watched(browser, viewport={"width": 1800, "height": 1000})
     made.page.goto(site)
     expect(made.page.locator("#payload")).to_have_text("270 kg")
     boxes = [made.page.locator(card).bounding_box() for card in ("#latest", "#place", "#day")]
     assert len({box["y"] for box in boxes}) == 1
     assert boxes[-1]["x"] + boxes[-1]["width"] > 1750
+    packed = [card.bounding_box() for card in made.page.locator("#packed > .card").all()]
+    assert len({box["x"] for box in packed}) == 3
     made.page.close()
 
 
@@ -356,7 +350,7 @@ def test_the_keyboard_reaches_everything_in_order(site: str, watched: Watched) -
         order.append(page.evaluate(FOCUSED))
         assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid", order[-1]
     assert order[:4] == ["Skip to the load", "Theme: system", "24", "History as a table"]
-    assert order[4:7] == ["Bus and sensors", "Spectra as a table", "Verify with a known load …"]
+    assert order[4:7] == ["Spectra as a table", "Bus and sensors", "Verify with a known load …"]
     assert order[7:] == ["In the cab", "API", "Metrics"]
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.dashboard import STATUS, Watched, demo_calibration, furnished, weighed
+from support.dashboard import STATUS, Watched, demo_calibration, weighed
 from support.estimates import make_estimate
 from support.web import Gateway, serving
 
@@ -27,14 +27,6 @@ def gateway(tmp_path: Path) -> Iterator[Gateway]:
     with Gateway(tmp_path / "store", calibrated=demo_calibration()) as opened:
         opened.status = STATUS
         yield opened
-
-
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Where a gateway with something to look at is; nobody changes it."""
-    with furnished(tmp_path_factory.mktemp("site")) as gateway, serving(gateway.app) as server:
-        yield server.url
-        gateway.board.close()
 
 
 @pytest.mark.parametrize("options", [{"viewport": {"width": 1240, "height": 800}}, PHONE], ids=["laptop", "phone"])

@@ -73,7 +73,7 @@ def test_a_fitter_walks_through_it(gateway: Gateway, bench: Bench, browser: Any,
         expect(page.get_by_text("Which vehicles is it like?")).to_be_visible()
         page.locator("#commissioning-file").set_input_files(str(sister))
         page.get_by_role("button", name="Take this line").click()
-        expect(page.locator("#commissioning-refusal")).to_contain_text("holds no cross_spectrum calibration")
+        expect(page.locator("#commissioning-refusal")).to_contain_text("has no cross_spectrum calibration")
         page.locator("#commissioning-file").set_input_files([])
         page.locator("#commissioning-choice").select_option("")
         page.get_by_role("button", name="Take this line").click()

@@ -10,7 +10,7 @@ from support.epochs import drive_of, stored
 from support.verification import CALIBRATED, verification_desk
 from support.web import Gateway, serving
 
-from gateway.service.proving.verification_desk import VerificationDesk
+from gateway.service.verification.verification import VerificationService
 from gateway.store import Store
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
@@ -26,18 +26,18 @@ def store(tmp_path: Path) -> Iterator[Store]:
 
 
 @pytest.fixture
-def desk(tmp_path: Path, store: Store) -> VerificationDesk:
+def desk(tmp_path: Path, store: Store) -> VerificationService:
     return verification_desk(tmp_path, store, every_days=30.0)
 
 
 @pytest.fixture
-def gateway(tmp_path: Path, desk: VerificationDesk) -> Iterator[Gateway]:
+def gateway(tmp_path: Path, desk: VerificationService) -> Iterator[Gateway]:
     with Gateway(tmp_path / "store", verification=desk) as opened:
         opened.status = STATUS
         yield opened
 
 
-def test_a_known_load_is_judged_after_a_question(gateway: Gateway, desk: VerificationDesk, watched: Watched) -> None:
+def test_a_known_load_is_judged_after_a_question(gateway: Gateway, desk: VerificationService, watched: Watched) -> None:
     page = watched.page
     with serving(gateway.app) as server:
         page.goto(server.url)
@@ -57,7 +57,7 @@ def test_a_known_load_is_judged_after_a_question(gateway: Gateway, desk: Verific
         expect(
             page.get_by_role("alert").filter(has_text="no load was weighed around 2020-01-01T00:00Z")
         ).to_be_visible()
-        assert json.loads(desk.told())["history"] == []
+        assert json.loads(desk.state())["history"] == []
         dialog.get_by_label("When it was so").fill("2026-09-21T14:15")  # within the drive
         page.get_by_role("button", name="Add another load").click()
         expect(page.locator("#known-listed")).to_have_text("1 more in this record.")
@@ -72,7 +72,7 @@ def test_a_known_load_is_judged_after_a_question(gateway: Gateway, desk: Verific
         with page.expect_download() as download:
             page.get_by_role("button", name="Save the page of").click()
         assert "Verification of on-board weighing" in Path(download.value.path()).read_text()
-        (record,) = json.loads(desk.told())["history"]
+        (record,) = json.loads(desk.state())["history"]
         assert (len(record["loads"]), record["note"]) == (2, "yard")
         refusals = [said for said in watched.complaints if "409" not in said]
         assert refusals == []

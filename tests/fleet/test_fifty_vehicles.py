@@ -39,7 +39,7 @@ def test_nothing_is_lost_and_nothing_doubled(tmp_path: Path) -> None:
             view.vehicles.drive(N_BATCHES // (2 * len(BLOWS)))
             time.sleep(dice.uniform(0.0, 1.0))  # somewhere in the middle of it
             strike(view, blow)
-        view.vehicles.drive(N_BATCHES - view.vehicles.told()[0].n_estimates)
+        view.vehicles.drive(N_BATCHES - view.vehicles.state()[0].n_estimates)
         wait_for_all(view)
         seconds = time.monotonic() - begun_s
         view.compare()
@@ -89,7 +89,7 @@ def counts(view: FleetView, seconds: float) -> dict[str, Any]:
         row = connection.execute("SELECT version()").fetchone()
         size = connection.execute("SELECT pg_total_relation_size('estimate')").fetchone()
     n_rows = view.count("estimate") + view.count("entry")
-    told = view.vehicles.told()
+    told = view.vehicles.state()
     n_acknowledged = sum(vehicle.n_delivered for vehicle in told)
     n_revised = view.count("entry WHERE revision = 2")
     return {

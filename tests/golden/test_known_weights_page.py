@@ -18,6 +18,6 @@ def test_every_refusal_is_explained_and_no_other() -> None:
 def test_the_numbers_are_those_of_the_code() -> None:
     usual = re.findall(r"^\| `(\w+)` \|.*\| (\d+) kg", PAGE, re.MULTILINE)
     assert {kind: float(kg) for kind, kg in usual} == {str(kind): kg for kind, kg in STD_KG.items()}
-    assert f"forgotten beyond {MOST_KNOWN_WEIGHTS} entries" in PAGE
+    assert f"Beyond {MOST_KNOWN_WEIGHTS} entries it forgets the oldest" in PAGE
     assert CONTRADICTED == 3.0
     assert "more than three standard deviations" in PAGE

@@ -10,14 +10,14 @@ from gateway.calibration.line.scatter import SCATTER_STD
 PAGE = (Path(__file__).parents[2] / "docs" / "line.md").read_text(encoding="utf-8")
 ROWS = {
     "springs": ("spring_front_npm", "spring_rear_npm"),
-    "their slope, each bend": ("spring_slope_rear_per_kn", "spring_bend_front_0_per_kn"),
+    "slope, each bend of the springs": ("spring_slope_rear_per_kn", "spring_bend_front_0_per_kn"),
     "dampers": ("damper_front_nspm", "damper_rear_nspm"),
-    "their mounts": ("damper_mount_front_npm",),
+    "mounts of the dampers": ("damper_mount_front_npm",),
     "tyres": ("tyre_front_npm", "tyre_rear_npm"),
     "friction shares": ("damper_friction_front", "spring_friction_rear"),
     "unsprung masses": ("unsprung_front_kg", "unsprung_rear_kg"),
     "pitch and roll inertia": ("pitch_inertia_kgm2", "roll_inertia_kgm2"),
-    "by how much the rear axle answers later": ("rear_lag_s",),
+    "additional delay of the rear axle": ("rear_lag_s",),
     "anti-roll bars, dampers against roll": ("anti_roll_front_npm", "anti_roll_rear_npm", "damper_against_front"),
     "the payload's gyration, the floor's damping": (
         "payload_gyration_m2", "payload_roll_gyration_m2", "payload_damping_ratio",

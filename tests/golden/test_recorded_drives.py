@@ -5,6 +5,7 @@ The bounds are promises to users, not fits: they may only ever be tightened.
 
 import json
 import tomllib
+from functools import cache
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
@@ -42,6 +43,7 @@ def test_ten_sound_runs_are_sound(calibrated: tuple[Path, dict[str, Any]]) -> No
     assert [one["findings"] for one in inspection["runs"]] == [[]] * 10
 
 
+@cache
 def table(campaign: str, calibration: Path, *arguments: str) -> dict[str, Any]:
     text = run("evaluate", recordings() / campaign, "--calibration", calibration, "--json", *arguments)
     found: dict[str, Any] = json.loads(text)

@@ -1,14 +1,11 @@
 """A sample of `python -m benchmarks.accuracy faults`: recorded drives with faulty sensors mislead nobody."""
 
-from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
-from support.recordings import recordings
+from support.recordings import calibrated_with_roll_rate, recordings
 
 from benchmarks.accuracy.faults import Study, faults
-from gateway.cli import springscale
 from gateway.records import Why
 
 NAMES = (
@@ -24,18 +21,11 @@ MOST_OUTSIDE = 0.5  # of a half-width, of either quantity: where an interval fai
 
 
 @pytest.fixture(scope="module")
-def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    output = tmp_path_factory.mktemp("vehicle") / "vehicle.json"
-    campaign = recordings() / "known_loads/campaign_roll.toml"
-    arguments = ["calibrate", str(campaign), "--output", str(output), "--estimator", "cross_spectrum"]
-    assert CliRunner().invoke(springscale, arguments, catch_exceptions=False).exit_code == 0
-    return output
-
-
-@pytest.fixture(scope="module")
-def study(calibration: Path, tmp_path_factory: pytest.TempPathFactory) -> Study:
+def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
     kept = tmp_path_factory.mktemp("kept")
-    return Study(recordings() / "mixed/campaign_roll.toml", calibration, runs=(3,), names=NAMES, kept=kept)
+    return Study(
+        recordings() / "mixed/campaign_roll.toml", calibrated_with_roll_rate(), runs=(3,), names=NAMES, kept=kept
+    )
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ from benchmarks.accuracy.coverage_drives import TRIPS
 from benchmarks.accuracy.coverage_page import coverage_page
 from benchmarks.accuracy.coverage_table import ALL_KINDS
 from benchmarks.accuracy.disturbances_page import disturbances_page
+from benchmarks.accuracy.false_facts import false_facts_page
 from benchmarks.accuracy.faults_page import faults_page
 from benchmarks.accuracy.grades import GRADES
 from benchmarks.accuracy.grades_page import grades_page
@@ -23,6 +24,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "coverage": coverage_page,
     "disturbances": disturbances_page,
+    "false-facts": false_facts_page,
     "phone_accuracy": phones_page,
     "sensor-faults": faults_page,
     "sensor-grades": grades_page,

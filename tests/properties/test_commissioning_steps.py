@@ -34,7 +34,7 @@ class Commissioned(RuleBasedStateMachine):
 
     @property
     def told(self) -> dict[str, Any]:
-        text = self.bench.desk.told()
+        text = self.bench.desk.state()
         CommissioningState.model_validate_json(text)
         state: dict[str, Any] = json.loads(text)
         return state

@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.half_car_road import RATE_HZ, VAN, batch_of, batch_over_road, weighed
-from support.rolling_road import WIDE_VAN, batch_over_two_tracks
+from support.half_car_road import RATE_HZ, VAN, batch_of, batch_over_road, calibrated_on_known_loads, weighed
+from support.rolling_road import WIDE_VAN, batch_over_two_tracks, calibrated_with_roll
 
-from gateway.calibration.half_car import calibrate_cross_spectrum
-from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.change import Rules
 from gateway.core.cross_spectrum import estimator as cross_spectrum
@@ -28,19 +26,13 @@ from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.records import F64, Batch, Motion, Signal, Why
 
-KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))
-KNOWN_ROLLING = ((0.0, 52.0, 0.0), (300.0, 46.0, 0.0))
 GOOD = batch_over_road(200.0, 50.0, seed=3, duration_s=60.0)
 LARGEST_FLOAT32 = 3.4e38  # what a signal of 32 bits can say
 
 
 @pytest.fixture(scope="module")
 def calibration() -> CrossSpectrumCalibration:
-    runs = [
-        KnownRun(i, f"run {i}", *load, tuple(batch_over_road(*load, seed=10 * i + k) for k in range(2)))
-        for i, load in enumerate(KNOWN)
-    ]
-    return calibrate_cross_spectrum(runs, VAN)
+    return calibrated_on_known_loads()
 
 
 @pytest.fixture(scope="module")
@@ -58,11 +50,7 @@ def credulous(calibration: CrossSpectrumCalibration) -> CrossSpectrumCalibration
 
 @pytest.fixture(scope="module")
 def rolling() -> CrossSpectrumCalibration:
-    runs = [
-        KnownRun(i, f"run {i}", *load[:2], (batch_over_two_tracks(*load, seed=50 + i, duration_s=120.0),))
-        for i, load in enumerate(KNOWN_ROLLING)
-    ]
-    return calibrate_cross_spectrum(runs, WIDE_VAN)
+    return calibrated_with_roll()
 
 
 def rolled(calibration: CrossSpectrumCalibration) -> Estimate:

@@ -12,7 +12,7 @@ from support.odd_content import GONE, ODD, changed, places
 from gateway.calibration.file import LineFile, SiblingPart, load_like
 from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.half_car import prior_of
-from gateway.calibration.line import Evidence, Limits, Line, Seen, Usual
+from gateway.calibration.line import Evidence, Line, ModelLimits, Seen, Usual
 from gateway.calibration.line.scatter import default_scatter_std, is_inherited
 from gateway.calibration.line_files import line_of_files, line_part
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
@@ -36,7 +36,7 @@ def line() -> Line:
         scatter_std=default_scatter_std(PARAMETERS + ROLL_PARAMETERS),
         n_siblings=0,
         seen=Seen((0.0, 400.0), (40.0, 55.0), (13.0, 15.0), 0.8, 0.02, (Load(0.0, 52.0), Load(400.0, 41.0))),
-        limits=Limits((10.0, 0.2, 0.002), (3.0, 3.0), 5.0, 6.0, 6.0),
+        limits=ModelLimits((10.0, 0.2, 0.002), (3.0, 3.0), 5.0, 6.0, 6.0),
     )
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.drives import T0_NS, drive
 
-from gateway.core.batch import Window, build_batch
+from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.sample_clock import retimed, sample_times
 from gateway.core.settings import BatchSettings
 from gateway.records import F64, I64, Motion, Why
@@ -143,7 +143,7 @@ def test_a_batch_nobody_can_time_says_so() -> None:
     def shuffled(t_s: F64, rng: np.random.Generator) -> F64:
         return np.sort(rng.uniform(0.0, 100.0, len(t_s)))
 
-    window = Window(T0_NS, T0_NS + 100_000_000_000, T0_NS)
+    window = BatchWindow(T0_NS, T0_NS + 100_000_000_000, T0_NS)
     batch = build_batch(stamped(drive(100.0), shuffled), window, BatchSettings(window_s=100.0), {})
     assert batch.rejected[0] is Why.TIME_STAMPS
 
@@ -151,6 +151,6 @@ def test_a_batch_nobody_can_time_says_so() -> None:
 @pytest.mark.parametrize("stamping", [bunched, lambda t_s, rng: np.floor(t_s / 10.0) * 10.0])
 def test_bunched_stamps_cost_no_more_than_even_ones(stamping: Stamping) -> None:
     """The grid once followed the median interval, however short: 20 us made arrays of a gigabyte."""
-    window = Window(T0_NS, T0_NS + 100_000_000_000, T0_NS)
+    window = BatchWindow(T0_NS, T0_NS + 100_000_000_000, T0_NS)
     batch = build_batch(stamped(drive(100.0), stamping), window, BatchSettings(window_s=100.0), {})
     assert len(batch.usable) == 5000

@@ -107,8 +107,7 @@ def test_frames_of_a_roll_rate_alone_change_no_other_number(
         assert_same_batch(one, replace(other, roll_rate_radps=None))
 
 
-@pytest.mark.parametrize("rolls", [False, True])
-@pytest.mark.parametrize("name", DRIVES)
+@pytest.mark.parametrize(("name", "rolls"), [*((name, False) for name in DRIVES), ("with_all_of_it", True)])
 @settings(max_examples=3, derandomize=True)
 @given(share_cuts=st.lists(st.floats(0.0, 1.0), max_size=20))
 def test_frames_aside_change_no_batch(name: str, rolls: bool, share_cuts: list[float]) -> None:

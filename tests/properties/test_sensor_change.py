@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import chdtri
 from support.half_car_road import CAR, batch_over_road, calibrated_on_known_loads, weighed
 
 from gateway.core.cross_spectrum import located
@@ -37,6 +38,10 @@ def answered(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
     estimate = weighed(batch, calibration)
     assert estimate.counted, estimate.rejected
     return estimate
+
+
+def test_the_limit_of_tension_is_the_quantile_that_it_says() -> None:
+    assert pytest.approx(chdtri(5, 1e-4), rel=1e-9) == MOST_TENSION
 
 
 @pytest.mark.parametrize("seed", range(4))

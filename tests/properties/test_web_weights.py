@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct, left_share_pct
 from gateway.core.weights import (
     RELEASE_SHARE,
-    Place,
+    PayloadPlace,
     is_over_limit,
     place_of,
     unsprung_kg,
@@ -54,7 +54,7 @@ def axle_loads(
 
 def placed(
     vehicle: Vehicle, kg: float, std_kg: float, share_pct: float, share_std_pct: float, correlation: float = 0.0
-) -> Place | None:
+) -> PayloadPlace | None:
     return place_of(vehicle, believed([kg, share_pct], [std_kg, share_std_pct], correlation))
 
 

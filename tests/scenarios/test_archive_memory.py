@@ -7,7 +7,7 @@ from support.archive import MIDNIGHT_NS, S, write_drive, write_manifest
 
 from gateway.archive import place_of
 from gateway.archive.inventory import look
-from gateway.archive.jobs import Job
+from gateway.archive.jobs import ArchiveJob
 from gateway.archive.manifest import load_manifest
 from gateway.archive.run import run
 from gateway.archive.survey import survey
@@ -17,7 +17,7 @@ N_SHORT = 4  # longer than what is read at a time
 PIECE_S = 300
 
 
-def most_bytes_held(job: Job) -> int:
+def most_bytes_held(job: ArchiveJob) -> int:
     """The most that Python and numpy hold at a time while a job is done."""
     tracemalloc.start()
     try:

@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 from support.archive import MIDNIGHT_NS, Here, S, tables_of, uploaded, write_drive, write_manifest
 
-from gateway.archive import Place, PlaceError, failures, place_of, receipts, rows_of, slots_done
+from gateway.archive import Location, PlaceError, failures, place_of, receipts, rows_of, slots_done
 from gateway.archive.inventory import forecast, look
-from gateway.archive.jobs import Job
+from gateway.archive.jobs import ArchiveJob
 from gateway.archive.manifest import load_manifest
 from gateway.archive.processes import WorkerKilledError
 from gateway.archive.reprocess import Summary, reprocess
-from gateway.archive.run import Outcome, Status, fail, run
+from gateway.archive.run import JobOutcome, JobStatus, fail, run
 from gateway.errors import ConfigurationError, ReaderMissingError
 
 HOUR = 3600 * S
@@ -32,7 +32,7 @@ def _archive(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def dataset_of(archive: Path) -> Place:
+def dataset_of(archive: Path) -> Location:
     return place_of(archive / "dataset")
 
 
@@ -51,7 +51,7 @@ class Refusing(Here):
         self.vehicle, self.fault = vehicle, fault
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        if isinstance(args[0], Job) and args[0].slot.vehicle == self.vehicle:
+        if isinstance(args[0], ArchiveJob) and args[0].slot.vehicle == self.vehicle:
             future: Future[Any] = Future()
             future.set_exception(self.fault)
             return future
@@ -115,15 +115,15 @@ def test_a_log_of_another_vehicle_s_frames_is_told(archive: Path) -> None:
 def test_a_worker_killed_between_table_and_receipt_leaves_no_lie(
     archive: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    create = Place.create
+    create = Location.create
 
-    def killed(place: Place, path: str, content: bytes) -> bool:
+    def killed(place: Location, path: str, content: bytes) -> bool:
         if path.startswith("receipts/"):
             raise KeyboardInterrupt
         return create(place, path, content)
 
     with monkeypatch.context() as killing:
-        killing.setattr(Place, "create", killed)
+        killing.setattr(Location, "create", killed)
         with pytest.raises(KeyboardInterrupt):
             done(archive)
     assert [item.path for item in dataset_of(archive).items("estimates")]
@@ -137,7 +137,7 @@ def test_a_receipt_that_another_worker_wrote_stands(archive: Path) -> None:
     done(archive)
     jobs = look(manifest, dataset_of(archive)).jobs()
     before = files_of(archive)
-    assert {run(job).status for job in jobs} == {Status.ALREADY}
+    assert {run(job).status for job in jobs} == {JobStatus.ALREADY}
     assert files_of(archive) == before
 
 
@@ -147,7 +147,7 @@ def test_two_workers_at_one_job_agree_on_one_receipt(archive: Path, monkeypatch:
     before = files_of(archive)
     job = look(load_manifest(str(archive)), dataset_of(archive)).jobs()[0]
     monkeypatch.setattr("gateway.archive.run._is_done", lambda job: False)
-    assert run(job).status is Status.ALREADY
+    assert run(job).status is JobStatus.ALREADY
     assert files_of(archive) == before
 
 
@@ -229,7 +229,7 @@ def test_a_vehicle_with_a_log_out_of_reach_is_not_weighed_without_it(
 ) -> None:
     from gateway.archive import survey
 
-    def unreachable(log: survey.LogFile) -> survey.LogFacts:
+    def unreachable(log: survey.LogFile) -> survey.SurveyedLog:
         if log.name == "van-1/1.log":
             raise PlaceError(f"{log.name}: timed out")
         return facts_of(log)
@@ -255,14 +255,14 @@ def test_a_folder_out_of_reach_takes_nothing_back(archive: Path, monkeypatch: py
     assert done(archive).counts["done"] == 2
     before = files_of(archive)
 
-    def unreachable(place: Place, below: str = "") -> list[Any]:
+    def unreachable(place: Location, below: str = "") -> list[Any]:
         if place.url.endswith("/later"):
             raise PlaceError(f"{place}: timed out")
         return items(place, below)
 
-    items = Place.items
+    items = Location.items
     with monkeypatch.context() as breaking:
-        breaking.setattr(Place, "items", unreachable)
+        breaking.setattr(Location, "items", unreachable)
         summary = done(archive)
     assert (list(summary.lost), summary.n_jobs, summary.is_good) == ([str(archive / "later")], 0, False)
     assert files_of(archive) == before
@@ -307,7 +307,7 @@ def test_what_comes_back_from_a_job_is_small(archive: Path) -> None:
 
     done(archive)
     jobs = look(load_manifest(str(archive)), dataset_of(archive)).jobs()
-    assert len(pickle.dumps(Outcome(jobs[0].slot, Status.DONE, failures=("x" * 200,) * 5))) < 4000
+    assert len(pickle.dumps(JobOutcome(jobs[0].slot, JobStatus.DONE, failures=("x" * 200,) * 5))) < 4000
     assert json.loads(dataset_of(archive).read(jobs[0].slot.receipt))["run"]["bytes"] == jobs[0].size
 
 

@@ -8,7 +8,7 @@ from support.known_load_logs import write_known_loads
 
 from gateway.calibration.calibrate import calibrate_inspected
 from gateway.calibration.campaign import load_campaign
-from gateway.cli.text.progress import counted, on_share
+from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.settings import BatchSettings
 from gateway.offline import inspect

@@ -22,9 +22,9 @@ from support.ports import first_answer, free_port
 from gateway.config import load_settings
 from gateway.log import Event
 from gateway.service import gateway
-from gateway.service.part import CLOSE_WITHIN_S, STOP_WITHIN_S, Deadline, Part, stop_in_turn
+from gateway.service.part import CLOSE_WITHIN_S, STOP_WITHIN_S, Deadline, ServicePart, stop_in_turn
 from gateway.setup import setup_of
-from gateway.web.door import serving
+from gateway.web.access import serving
 
 ROOT = Path(__file__).parents[2]
 
@@ -80,8 +80,10 @@ def test_parts_stop_in_the_reverse_of_their_start_and_one_that_hangs_holds_nobod
     monkeypatch.setattr("gateway.service.part.PART_WITHIN_S", 0.05)
     stopped: list[str] = []
     for_ever = threading.Event()
-    parts = [Part(name, lambda: None, lambda left_s, name=name: stopped.append(name)) for name in ("first", "last")]
-    parts.insert(1, Part("stuck", lambda: None, lambda left_s: for_ever.wait()))
+    parts = [
+        ServicePart(name, lambda: None, lambda left_s, name=name: stopped.append(name)) for name in ("first", "last")
+    ]
+    parts.insert(1, ServicePart("stuck", lambda: None, lambda left_s: for_ever.wait()))
     assert stop_in_turn(parts, Deadline()) == ["stuck"]
     assert stopped == ["last", "first"]
     assert names(caplog) == [Event.PART_LATE]

@@ -15,7 +15,7 @@ from gateway.errors import StoreError
 from gateway.history import BATCHES
 from gateway.log import Event
 from gateway.records import Why, json_line
-from gateway.store import Store, questions, schema
+from gateway.store import Store, queries, schema
 from gateway.uplink import Outbox
 
 N_RECORDS = 12
@@ -62,10 +62,10 @@ def ask(store: Store) -> set[str]:
     told |= set(reader.estimates(since_ns=0, limit=1000).items)
     latest = reader.latest()
     told |= {text for text in (latest.estimate, latest.rejection) if text is not None}
-    letters = Outbox(store, "fleet").next_letters(1000)
+    messages = Outbox(store, "fleet").next_messages(1000)
     reader.delivery("fleet")
     reader.events()
-    assert {without_sequence(letter.text) for letter in letters} <= set(PLAIN)
+    assert {without_sequence(message.text) for message in messages} <= set(PLAIN)
     return told
 
 
@@ -123,8 +123,8 @@ def test_pages_are_full_and_lead_on_over_bad_records(tmp_path: Path, database: b
     with closing(schema.connect_reader(tmp_path / "springscale.db")) as connection:
         for newest_first in (False, True):
             bad: list[int] = []
-            window = questions.Window(BATCHES, newest_first=newest_first)
-            good = questions.page(connection, window, 5, bad.extend)
+            window = queries.JournalQuery(BATCHES, newest_first=newest_first)
+            good = queries.page(connection, window, 5, bad.extend)
             assert len(good) == 5
             assert len(bad) == (1 if newest_first else 4)
 

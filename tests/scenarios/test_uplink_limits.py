@@ -14,7 +14,7 @@ from support.small_broker import Refusal, SmallBroker
 from gateway.log import Event
 from gateway.store import Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings
-from gateway.uplink.back_off import BackOff
+from gateway.uplink.forwarder import BackOff
 
 LARGE = (1, 4)
 

@@ -18,7 +18,7 @@ from support.sequence import BackEnd
 from gateway.records import json_line
 from gateway.store import Retention, Store
 from gateway.uplink import Outbox
-from gateway.uplink.outbox import Letter
+from gateway.uplink.outbox import OutboxMessage
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = json.loads((ROOT / "docs/uplink.schema.json").read_text())
@@ -43,15 +43,15 @@ def write(store: Store, *numbers: int) -> None:
     assert store.flush(PATIENCE_S)
 
 
-def deliver(store: Store, back_end: BackEnd, is_lost: Callable[[Letter], bool] = lambda letter: False) -> None:
+def deliver(store: Store, back_end: BackEnd, is_lost: Callable[[OutboxMessage], bool] = lambda message: False) -> None:
     """All that waits; what is lost is lost behind the broker's acknowledgement, or refused."""
     outbox = Outbox(store, "fleet")
-    while letters := outbox.next_letters(7):
-        for letter in letters:
-            jsonschema.validate(json.loads(letter.text), SCHEMA)
-            if not is_lost(letter):
-                back_end.take(letter.text)
-            outbox.delivered(letter)
+    while messages := outbox.next_messages(7):
+        for message in messages:
+            jsonschema.validate(json.loads(message.text), SCHEMA)
+            if not is_lost(message):
+                back_end.take(message.text)
+            outbox.delivered(message)
     assert store.flush(PATIENCE_S)
 
 
@@ -73,7 +73,7 @@ def test_what_is_lost_on_the_way_or_refused_leaves_a_gap(tmp_path: Path) -> None
     back_end = BackEnd()
     with closing(Store.open(tmp_path)) as store:
         write(store, *range(100))
-        deliver(store, back_end, lambda letter: letter.id in lost_ids)
+        deliver(store, back_end, lambda message: message.id in lost_ids)
     assert len(back_end.missing) == n_gaps
     assert len(back_end.ids) == 80
 
@@ -82,7 +82,7 @@ def test_the_first_ones_are_missed_too(tmp_path: Path) -> None:
     back_end = BackEnd()
     with closing(Store.open(tmp_path)) as store:
         write(store, 0, 1, 2)
-        deliver(store, back_end, lambda letter: letter.id == make_record(0)["id"])
+        deliver(store, back_end, lambda message: message.id == make_record(0)["id"])
     assert len(back_end.missing) == 1
 
 
@@ -108,8 +108,8 @@ def test_what_memory_had_to_drop_leaves_a_gap(tmp_path: Path) -> None:
         for n in range(9):
             store.write_estimate(make_record(n))
         outbox = Outbox(store, "fleet")
-        for letter in outbox.next_letters(100):
-            back_end.take(letter.text)
+        for message in outbox.next_messages(100):
+            back_end.take(message.text)
     assert (len(back_end.missing), len(back_end.ids)) == (1, 4)  # the queue's own place takes one of five
 
 
@@ -205,7 +205,7 @@ def test_kills_leave_no_gap_and_what_is_lost_afterwards_does(tmp_path: Path) -> 
         process.stdout.close()
         with closing(Store.open(tmp_path)) as store:
             newest = store.reader().estimates(newest_first=True, limit=1).items
-            deliver(store, back_end, lambda letter, kill=kill: kill == 3)
+            deliver(store, back_end, lambda message, kill=kill: kill == 3)
         begin = max(begin, int(json.loads(newest[0])["t_end_ns"]) // (300 * 10**9)) if newest else begin
     assert len(back_end.missing) == 1
     assert len(back_end.ids) > 6

@@ -13,7 +13,7 @@ import uvicorn
 from support.patience import PATIENCE_S, until
 from support.web import Client, Gateway, Server, serving
 
-from gateway.web.door import connection, turns
+from gateway.web.access import concurrency, connection
 
 STRANGER = "127.0.0.2"  # another address of this machine
 
@@ -224,8 +224,8 @@ def test_who_reads_nothing_gives_way_to_a_newcomer(tmp_path: Path, monkeypatch: 
 
 
 def test_one_address_waits_for_its_own_answers_and_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(turns, "WAIT_S", 0.2)
-    monkeypatch.setattr(turns, "STREAMS_PER_CLIENT", 2)
+    monkeypatch.setattr(concurrency, "WAIT_S", 0.2)
+    monkeypatch.setattr(concurrency, "STREAMS_PER_CLIENT", 2)
 
     async def scenario(server: Server) -> None:
         crowd = [await connect(server) for _ in range(3)]
@@ -247,8 +247,8 @@ def test_one_address_waits_for_its_own_answers_and_no_other(tmp_path: Path, monk
 
 def test_whatever_reads_the_history_waits_for_its_turn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Events, trips and alarms, as pages and as files, did not: one client could have taken every thread with them."""
-    monkeypatch.setattr(turns, "WAIT_S", 0.0)
-    monkeypatch.setattr(turns, "ANSWERS_PER_CLIENT", 0)
+    monkeypatch.setattr(concurrency, "WAIT_S", 0.0)
+    monkeypatch.setattr(concurrency, "ANSWERS_PER_CLIENT", 0)
     with Gateway(tmp_path) as gateway:
         client = Client(gateway.app)
         described = client.get("/openapi.json").json()["paths"]

@@ -27,7 +27,7 @@ from gateway.offline import estimates_of_logs
 from gateway.records import Spectra
 from gateway.setup import setup_of
 from gateway.store import Store
-from gateway.web.charting import LIBRARY_URL
+from gateway.web.pages import LIBRARY_URL
 
 MOST_MB = 250.0
 N_STORED = 1200
@@ -104,14 +104,14 @@ def test_a_crowd_that_reads_nothing_is_bounded_and_keeps_nobody_from_the_scales(
     settings = load_settings(config)
     cursor = fill(settings.store.directory)
     log = config.parent / "drive.log"
-    write_candump(bus_drive(310.0, seed=5), "can0", log)
+    write_candump(bus_drive(45.0, seed=5), "can0", log)
     n_expected = len(list(estimates_of_logs([log], setup_of(settings), settings.batch.for_core())))
     url = f"http://127.0.0.1:{settings.web.port}"
 
     async def attack(process: "subprocess.Popen[str]") -> None:
         crowd = await ask_and_read_nothing(settings.web.port, ASKED[kind], cursor)
         tell(process)
-        for _ in range(20):
+        for _ in range(10):
             answer = await asyncio.to_thread(httpx.get, f"{url}/health/live", timeout=PATIENCE_S)
             assert answer.status_code == 200
             await asyncio.sleep(0.1)

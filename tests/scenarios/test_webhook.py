@@ -20,7 +20,7 @@ from support.receiver import SECRET_TEXT, Fault, Receiver, cut, slow, status, tr
 from gateway.records import json_line
 from gateway.store import Store
 from gateway.uplink import Outbox
-from gateway.uplink.back_off import BackOff
+from gateway.uplink.forwarder import BackOff
 from gateway.uplink.webhook import Webhook, WebhookSettings
 from gateway.uplink.webhook.webhook import TRIES
 
@@ -30,7 +30,7 @@ SENDER = """
 import pathlib, sys, time
 from gateway.store import Store
 from gateway.uplink import Outbox
-from gateway.uplink.back_off import BackOff
+from gateway.uplink.forwarder import BackOff
 from gateway.uplink.webhook import Webhook, WebhookSettings
 
 store = Store.open(pathlib.Path(sys.argv[1]))
@@ -199,7 +199,10 @@ def test_a_letter_that_the_receiver_will_never_take_holds_nobody_up(tmp_path: Pa
 
 def test_refused_for_long_enough_the_queue_moves_on(tmp_path: Path, secret_file: Path) -> None:
     """A 404 is of the address, and is waited out; not for ever."""
-    with Receiver([status(404)] * 500) as receiver, Sending(tmp_path / "state", receiver.port, secret_file) as sending:
+    with (
+        Receiver([status(404)] * 500) as receiver,
+        Sending(tmp_path / "state", receiver.port, secret_file) as sending,
+    ):
         wanted = tell(sending.store, *range(6))
         assert wait_until(lambda: len(receiver.seen) >= 2 * TRIES)
         assert set(receiver.seen) == {wanted[0]}
@@ -217,7 +220,10 @@ def test_refused_for_long_enough_the_queue_moves_on(tmp_path: Path, secret_file:
 @pytest.mark.parametrize("code", [400, 401, 403, 422, 500])
 def test_no_alarm_is_given_up_at_a_receiver_that_refuses_all(tmp_path: Path, secret_file: Path, code: int) -> None:
     """Its clock or its secret is off: a 400 buried twenty alarms in 32 s."""
-    with Receiver([status(code)] * 40) as receiver, Sending(tmp_path / "state", receiver.port, secret_file) as sending:
+    with (
+        Receiver([status(code)] * 40) as receiver,
+        Sending(tmp_path / "state", receiver.port, secret_file) as sending,
+    ):
         wanted = tell(sending.store, *range(20))
         assert wait_until(lambda: len(receiver.ids) == len(wanted))
         assert receiver.ids == wanted

@@ -12,7 +12,7 @@ from gateway.core.vehicle import Vehicle
 from gateway.core.weights import weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
-from gateway.service.alarm_desk import AlarmDesk
+from gateway.service.alarms import AlarmService
 from gateway.service.subject import Subject
 from gateway.store import Store
 from gateway.web import Board
@@ -64,7 +64,7 @@ class AlarmBench:
     def start(self) -> None:
         """As a new start of the service would."""
         self.store, self.board = Store.open(self.directory), Board()
-        self.desk = AlarmDesk(self.rules, SUBJECT, self.store, lambda: at(self.clock_s / 60.0), lambda: self.clock_s)
+        self.desk = AlarmService(self.rules, SUBJECT, self.store, lambda: at(self.clock_s / 60.0), lambda: self.clock_s)
 
     def restart(self) -> None:
         self.store.close()

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import httpx
 import pytest
 
-from gateway.archive import Place, place_of, slots_done
+from gateway.archive import Location, place_of, slots_done
 from gateway.bus.frames import take
 from gateway.bus.logs import write_candump
 from gateway.records import Frames
@@ -88,13 +88,13 @@ def write_fleet(folder: Path, n_vehicles: int) -> Path:
     return write_manifest(folder, *names)
 
 
-def uploaded(folder: Path, place: Place) -> None:
+def uploaded(folder: Path, place: Location) -> None:
     """Every file of a folder, in a place."""
     for item in place_of(folder).items():
         place.create(item.path, (folder / item.path).read_bytes())
 
 
-def tables_of(dataset: Place) -> dict[str, bytes]:
+def tables_of(dataset: Location) -> dict[str, bytes]:
     """What receipts vouch for, byte by byte."""
     return {slot.table: dataset.read(slot.table) for slot in slots_done(dataset)}
 

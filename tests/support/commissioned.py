@@ -12,7 +12,7 @@ from typing import Any
 from gateway.bus.sink import replay
 from gateway.config import Settings, load_settings
 from gateway.service.gateway import Gateway
-from gateway.service.life import live
+from gateway.service.lifecycle import live
 from support.patience import wait_until
 
 PATH = "/api/v1/calibration/commissioning"

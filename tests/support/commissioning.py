@@ -14,7 +14,7 @@ from gateway.config.sections import CommissioningSection
 from gateway.core.settings import BatchSettings
 from gateway.files.signed import Trust
 from gateway.records import Batch, Why
-from gateway.service.commissioning import Commissioning, Jobs, Lines, Vehicle
+from gateway.service.commissioning import Commissioning, Jobs, Lines, ServiceVehicle
 from gateway.stated import VehicleAnswers
 from gateway.units import NS_PER_S
 from support.calibrated import calibration_file
@@ -27,7 +27,7 @@ ANSWERS: dict[str, Any] = {
     "wheelbase_m": 2.75,
     "sensor_position_m": 1.2,
 }
-VEHICLE = Vehicle(name="van-17", signals_id="as mapped", is_calibrated=False)
+VEHICLE = ServiceVehicle(name="van-17", signals_id="as mapped", is_calibrated=False)
 
 
 class FakeDrives:
@@ -75,7 +75,7 @@ class Bench:
     def __init__(
         self,
         directory: Path,
-        vehicle: Vehicle = VEHICLE,
+        vehicle: ServiceVehicle = VEHICLE,
         trust: Trust | None = None,
         lines: Path | None = None,
         **settings: Any,
@@ -155,6 +155,6 @@ def in_steps(bench: Bench, *, until: str = "drive") -> None:
         bench.desk.is_empty("workshop")
 
 
-def replaced(vehicle: Vehicle = VEHICLE, **changes: Any) -> Vehicle:
+def replaced(vehicle: ServiceVehicle = VEHICLE, **changes: Any) -> ServiceVehicle:
     """Another vehicle."""
     return replace(vehicle, **changes)

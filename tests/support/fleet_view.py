@@ -177,11 +177,11 @@ class FleetView:
 
     @property
     def n_estimates(self) -> int:
-        return sum(vehicle.n_estimates for vehicle in self.vehicles.told())
+        return sum(vehicle.n_estimates for vehicle in self.vehicles.state())
 
     def has_all(self) -> bool:
         """Every estimate and entry, the latter in their last revision."""
-        told = self.vehicles.told()
+        told = self.vehicles.state()
         n_entries = sum(vehicle.n_entries for vehicle in told)
         return (
             self.count("estimate") >= sum(vehicle.n_estimates for vehicle in told)
@@ -190,7 +190,7 @@ class FleetView:
 
     def compare(self) -> None:
         """Nothing lost, nothing doubled, nothing of one vehicle under the name of another."""
-        for vehicle, kept in zip(self.vehicles.told(), self.vehicles.kept(), strict=True):
+        for vehicle, kept in zip(self.vehicles.state(), self.vehicles.kept(), strict=True):
             assert len(kept.estimates) == vehicle.n_estimates
             assert len(kept.entries) == vehicle.n_entries
             with self.database.connect() as connection:

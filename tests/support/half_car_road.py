@@ -13,6 +13,7 @@ from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
 from gateway.records import F64, Batch
+from support.kept import kept
 
 KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))  # payload (kg), front share (%)
 RATE_HZ = 50.0
@@ -114,13 +115,16 @@ def _in_time(spectrum: F64, n: int) -> F64:
     return np.fft.irfft(np.r_[0.0, spectrum], n)
 
 
+def run_over_road(number: int, payload_kg: float, share_pct: float) -> KnownRun:
+    """Two batches of a known load."""
+    batches = tuple(batch_over_road(payload_kg, share_pct, seed=10 * number + i) for i in range(2))
+    return KnownRun(number, f"run {number}", payload_kg, share_pct, batches)
+
+
+@kept
 def calibrated_on_known_loads() -> CrossSpectrumCalibration:
     """Two batches of each of four loads."""
-    runs = [
-        KnownRun(i, str(i), *load, tuple(batch_over_road(*load, seed=10 * i + k) for k in range(2)))
-        for i, load in enumerate(KNOWN)
-    ]
-    return calibrate_cross_spectrum(runs, VAN)
+    return calibrate_cross_spectrum([run_over_road(i, *load) for i, load in enumerate(KNOWN)], VAN)
 
 
 def weighed(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:

@@ -14,5 +14,5 @@ def never(*_: Any) -> str:
 
 
 if __name__ == "__main__":
-    Commissioning.told = never  # type: ignore[method-assign]  # a fault, put in
+    Commissioning.state = never  # type: ignore[method-assign]  # a fault, put in
     main()

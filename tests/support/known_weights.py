@@ -13,12 +13,12 @@ from gateway.core.known_weights import Knowledge, KnownWeightKind
 from gateway.estimate import Estimate
 from gateway.posterior import Posterior, Source
 from gateway.records import iso_utc
-from gateway.service.proving.known_weights import KnownWeightService
 from gateway.service.subject import Subject
+from gateway.service.verification.known_weights import KnownWeightService
 from gateway.stated_weight import StatedWeight
 from gateway.store import Store
 from gateway.units import NS_PER_S
-from gateway.web.routes.calibration.known_weights import KnownWeightEntry, KnownWeightState
+from gateway.web.routes.known_weights import KnownWeightEntry, KnownWeightState
 from support.calibrated import calibration_file
 from support.epochs import START_NS, WINDOW_NS, stored
 

@@ -1,9 +1,13 @@
-"""Where recorded drives lie on a machine that has them."""
+"""Recorded drives on a machine that has them, and the calibration that several tests weigh them by."""
 
 import os
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
+
+from gateway.cli import springscale
+from support.kept import kept_file
 
 FOLDER = Path(os.environ.get("SPRINGSCALE_DATA", Path(__file__).parents[3] / "shared" / "data"))
 
@@ -13,3 +17,15 @@ def recordings() -> Path:
     if not FOLDER.is_dir():
         pytest.skip(f"the recorded drives are not at {FOLDER} (set SPRINGSCALE_DATA)")
     return FOLDER
+
+
+def calibrated_with_roll_rate() -> Path:
+    """The cross spectrum on the identification parts of all ten known loads, none of which lies sideways."""
+    campaign = recordings() / "known_loads/campaign_roll.toml"
+
+    def calibrate(output: Path) -> None:
+        asked = ["calibrate", str(campaign), "--output", str(output), "--estimator", "cross_spectrum"]
+        done = CliRunner().invoke(springscale, asked, catch_exceptions=False)
+        assert done.exit_code == 0, done.output
+
+    return kept_file("calibrated_with_roll_rate.json", calibrate)

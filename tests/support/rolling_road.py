@@ -4,11 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.known_run import KnownRun
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.rolling_car import RollingCar, SidewaysLoad, rolling_response
 from gateway.records import Batch
 from support.half_car_road import RATE_HZ, VAN, batch_of
+from support.kept import kept
 from support.rolling_car import HALF_TRACK_M, ROLLING_CAR
 
+KNOWN_ROLLING = ((0.0, 52.0, 0.0), (300.0, 46.0, 0.0))  # payload (kg), front share (%), to the left (m)
 WIDE_VAN = replace(VAN, track_width_m=2.0 * HALF_TRACK_M, sensor_offset_left_m=0.3, sensor_offset_left_std_m=0.02)
 
 
@@ -44,3 +49,17 @@ def batch_over_two_tracks(
     signals = signals + noise * signals.std(axis=1, keepdims=True) * rng.standard_normal(signals.shape)
     batch = batch_of(signals[0], signals[1], np.full(n, speed_mps))
     return replace(batch, roll_rate_radps=signals[2])
+
+
+def runs_over_two_tracks() -> list[KnownRun]:
+    """A short drive with each of KNOWN_ROLLING."""
+    return [
+        KnownRun(i, f"run {i}", *load[:2], (batch_over_two_tracks(*load, seed=50 + i, duration_s=120.0),))
+        for i, load in enumerate(KNOWN_ROLLING)
+    ]
+
+
+@kept
+def calibrated_with_roll() -> CrossSpectrumCalibration:
+    """From those drives."""
+    return calibrate_cross_spectrum(runs_over_two_tracks(), WIDE_VAN)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gateway.config import load_settings
-from gateway.core.alarms.alarm import Alarm, AlarmKind, AlarmState, Cause, Figure, Step, alarm_to_json
+from gateway.core.alarms.alarm import Alarm, AlarmCause, AlarmFigure, AlarmKind, AlarmState, AlarmStep, alarm_to_json
 from gateway.core.events import EntryKind
 from gateway.core.events.entry import entry_id
 from gateway.estimate import Estimate, Weight, Weights
@@ -19,7 +19,7 @@ from gateway.records import iso_utc, json_line
 from gateway.store import Store
 from gateway.units import NS_PER_S
 from gateway.uplink import Outbox, Uplink, uplink_settings
-from gateway.uplink.back_off import BackOff
+from gateway.uplink.forwarder import BackOff
 from support.estimates import WINDOW_NS, make_estimate
 from support.patience import PATIENCE_S
 
@@ -78,7 +78,7 @@ class SimulatedVehicle:
         weights = Weights(gross=Weight(gross_kg, 8.0, 2000.0, None), front_axle=axle, rear_axle=axle)
         return replace(found, weights=weights)
 
-    def told(self) -> "Told":
+    def state(self) -> "Told":
         done = self.uplink.report()
         return Told(self.id, self.n_estimates, self.n_entries, done.n_delivered, done.n_connections)
 
@@ -106,8 +106,8 @@ def _entries(found: Estimate) -> Iterator[dict[str, Any]]:
         }
     way = {"distance_m": 12_000.0, "carried_tkm": 2.4, "empty_share": 0.5, "overloaded_share": 0.0}
     yield {"id": entry_id(EntryKind.TRIP, found.vehicle_id, found.t_end_ns), "revision": 1, **shared, **way}
-    step = Step(AlarmState.FINAL, found.t_end_ns, Figure(2050.0, 8.0, 2000.0, "kg", 0.99))
-    yield alarm_to_json(Alarm.begun(Cause(AlarmKind.OVERLOAD, "gross"), found.vehicle_id, step), "50 kg too much")
+    step = AlarmStep(AlarmState.FINAL, found.t_end_ns, AlarmFigure(2050.0, 8.0, 2000.0, "kg", 0.99))
+    yield alarm_to_json(Alarm.begun(AlarmCause(AlarmKind.OVERLOAD, "gross"), found.vehicle_id, step), "50 kg too much")
 
 
 class SimulatedVehicles(list[SimulatedVehicle]):
@@ -124,8 +124,8 @@ class SimulatedVehicles(list[SimulatedVehicle]):
         for vehicle in self:
             vehicle.drive(n)
 
-    def told(self) -> list[Told]:
-        return [vehicle.told() for vehicle in self]
+    def state(self) -> list[Told]:
+        return [vehicle.state() for vehicle in self]
 
     def kept(self) -> list[Kept]:
         return [vehicle.kept() for vehicle in self]
@@ -149,7 +149,7 @@ class VehicleProcesses:
         """All processes at once."""
         self._ask("drive", n)
 
-    def told(self) -> list[Told]:
+    def state(self) -> list[Told]:
         return [one for each in self._ask("told") for one in each]
 
     def kept(self) -> list[Kept]:

@@ -10,11 +10,11 @@ from gateway.bus import sink
 from gateway.bus.live import source
 from gateway.bus.ring import RingLog
 from gateway.cli import main
-from gateway.cli.asked import service as asked_service
+from gateway.cli import service as asked_service
 from gateway.service.pipeline import Pipeline
 from gateway.store import Store, StoreReader
 from gateway.uplink import Uplink, link
-from gateway.web.door import connection
+from gateway.web.access import connection
 from support.patience import PATIENCE_S
 
 CONSTANTS = (

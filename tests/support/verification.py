@@ -4,8 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gateway.calibration.verification_file import VerificationRule
-from gateway.service.proving.verification_desk import VerificationDesk
 from gateway.service.subject import Subject
+from gateway.service.verification.verification import VerificationService
 from gateway.store import Store
 from support.calibrated import calibration_file
 from support.epochs import START_NS
@@ -21,9 +21,9 @@ def verification_desk(
     *,
     every_days: float = 0.0,
     clock_ns: Callable[[], int] = lambda: START_NS,
-) -> VerificationDesk:
+) -> VerificationService:
     """It tells nobody."""
-    return VerificationDesk(
+    return VerificationService(
         directory,
         Subject(CALIBRATED, "ratio_index", "van-17"),
         store.reader().estimates,

@@ -19,9 +19,10 @@ from gateway.estimate_json import estimate_to_json
 from gateway.status import State, Status
 from gateway.store import Store
 from gateway.web import Board, KnownLoads, TokenFile, WebSettings, create_app, server_config
-from gateway.web.routes.calibration import KnownWeightService, VerificationDesk
-from gateway.web.routes.commissioning import CommissioningDesk
+from gateway.web.routes.commissioning import CommissioningBackend
+from gateway.web.routes.known_weights import KnownWeightBackend
 from gateway.web.routes.record import FrameLog
+from gateway.web.routes.verification import VerificationBackend
 from support.patience import PATIENCE_S
 
 
@@ -33,12 +34,12 @@ class Gateway:
         directory: Path,
         settings: WebSettings | None = None,
         tokens: TokenFile | None = None,
-        known_weights: KnownWeightService | None = None,
-        commissioning: CommissioningDesk | None = None,
+        known_weights: KnownWeightBackend | None = None,
+        commissioning: CommissioningBackend | None = None,
         calibrated: CalibratedVehicle | None = None,
         known_loads: KnownLoads | None = None,
         record: FrameLog | None = None,
-        verification: VerificationDesk | None = None,
+        verification: VerificationBackend | None = None,
     ) -> None:
         self.clock_s = 1000.0
         self.status = Status(version="1.2.3", state=State.COLLECTING, uptime_s=5.0, vehicle_id="van-17")

@@ -14,6 +14,7 @@ from benchmarks.accuracy.pages import advice_page
 from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.calibration.inspection import SplitRun
 from gateway.calibration.known_run import KnownRun
+from gateway.calibration.plan.loads import weighed_loads
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
@@ -82,6 +83,7 @@ def test_every_set_of_runs_is_calibrated_once_and_from_identification_parts(monk
         return CalibratedVehicle("always", vehicle, (0.0, 400.0), (40.0, 60.0), cross_spectrum=known)
 
     monkeypatch.setattr(advice, "calibrated_on", stand_in)
+    monkeypatch.setattr(advice, "weighed_loads", lambda vehicle: weighed_loads(vehicle)[::10])  # a coarser grid
     steps: list[tuple[int, int]] = []
     found = advice_of(split, VAN, name="van", on_fit=lambda done, of: steps.append((done, of)))
     identification = {one.identification.number: one.identification for one in split}

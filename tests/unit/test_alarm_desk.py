@@ -10,14 +10,14 @@ from support.alarms import LIMIT_KG, AlarmBench, of_load
 from support.days import batch
 from support.patience import PATIENCE_S
 
-from gateway.calibration.trend import Point, Trend
+from gateway.calibration.trend import Trend, TrendPoint
 from gateway.config import alarms as settings
 from gateway.core.alarms import CAUSE_NAMES, AlarmRules
 from gateway.core.events import Rules
 from gateway.errors import AlarmRefusedError
 from gateway.records import Why
-from gateway.service.alarm_desk import rules_of
-from gateway.service.day_book import ledger_of
+from gateway.service.alarms import rules_of
+from gateway.service.load_events import ledger_of
 from gateway.status import BusStatus, SignalHealth, State, Status
 
 OVER = LIMIT_KG + 60.0
@@ -112,11 +112,11 @@ def test_a_silent_sensor_is_told_after_a_while_and_for_sure_later(bench: AlarmBe
     assert look(1200.0, State.READER_FAULT) == [("silent", "final")]
     assert [step["detail"] for step in bench.history()[0]["steps"]] == ["pitch_rate", "can0 is down"]
     assert look(1201.0, State.ESTIMATING) == []
-    assert bench.history()[0]["sentence"] == "Not heard: can0 is down (ended)"
+    assert bench.history()[0]["sentence"] == "No signal: can0 is down (ended)"
 
 
 def test_drift_is_final_at_once_and_judged_only_when_it_was_judged_anew(bench: AlarmBench) -> None:
-    points = tuple(Point(f"2026-0{n}-01T00:00:00.000000Z", 3.0 * n, 5) for n in range(1, 9))
+    points = tuple(TrendPoint(f"2026-0{n}-01T00:00:00.000000Z", 3.0 * n, 5) for n in range(1, 9))
     drifting = (Trend("damper_front", "%", points, 21.0, (15.0, 27.0), is_drifting=True),)
     for _ in range(3):
         bench.desk.watch(status(State.ESTIMATING), drifting)

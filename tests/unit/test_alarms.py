@@ -14,14 +14,14 @@ from support.estimates import posterior_of
 from gateway.core.alarms import (
     CAUSE_NAMES,
     Alarm,
+    AlarmCause,
+    AlarmFigure,
     AlarmKind,
     AlarmRules,
     AlarmState,
+    AlarmVerdict,
     AlarmWatch,
-    Cause,
-    Figure,
     Says,
-    Verdict,
     alarm_from_json,
     alarm_to_json,
     sentence,
@@ -34,7 +34,7 @@ from gateway.estimate import Estimate, Quantity
 from gateway.records import Why, json_line
 
 RULES = AlarmRules()
-GROSS = Cause(AlarmKind.OVERLOAD, "gross")
+GROSS = AlarmCause(AlarmKind.OVERLOAD, "gross")
 
 
 def told(watch: AlarmWatch, *estimates: Estimate) -> list[tuple[str, str]]:
@@ -99,7 +99,7 @@ def test_without_a_limit_nothing_is_too_much_and_what_stood_is_over() -> None:
     lighter = replace(VAN, gross_limit_kg=None)
     (ended,) = watch.weigh(of_load(1, LIMIT_KG + 60.0), lighter)
     assert (ended.state, ended.steps[-1].figure.detail) == (AlarmState.CLEARED, "no limit is given")
-    assert ended.told_by.figure.found == over.weights.gross.kg
+    assert ended.last_active_step.figure.found == over.weights.gross.kg
 
 
 def test_a_weight_that_nobody_knows_changes_nothing() -> None:
@@ -215,16 +215,16 @@ def test_an_alarm_that_ended_can_still_be_acknowledged() -> None:
     assert watch.unseen() == []
 
 
-VERDICTS = st.lists(st.tuples(st.sampled_from([GROSS, SILENT, REFUSED, NO_ESTIMATE]), st.sampled_from(Verdict)))
+VERDICTS = st.lists(st.tuples(st.sampled_from([GROSS, SILENT, REFUSED, NO_ESTIMATE]), st.sampled_from(AlarmVerdict)))
 
 
-def run(says: list[tuple[Cause, Verdict]], cut: int | None = None) -> list[Alarm]:
+def run(says: list[tuple[AlarmCause, AlarmVerdict]], cut: int | None = None) -> list[Alarm]:
     """Every revision told; at ``cut`` the service is started anew from what it stored."""
     watch, revisions = AlarmWatch(RULES, "van"), []
     for n, (cause, verdict) in enumerate(says):
         if n == cut:
             watch = AlarmWatch(RULES, "van", [stored(alarm) for alarm in revisions])
-        revisions += watch.note([Says(cause, verdict, Figure(detail=str(n)))], T0_NS + n)
+        revisions += watch.note([Says(cause, verdict, AlarmFigure(detail=str(n)))], T0_NS + n)
     return [stored(alarm) for alarm in revisions]
 
 
@@ -233,7 +233,7 @@ def stored(alarm: Alarm) -> Alarm:
 
 
 @given(VERDICTS)
-def test_each_alarm_goes_forward_and_says_each_word_once(says: list[tuple[Cause, Verdict]]) -> None:
+def test_each_alarm_goes_forward_and_says_each_word_once(says: list[tuple[AlarmCause, AlarmVerdict]]) -> None:
     order = list(AlarmState)
     last: dict[str, Alarm] = {}
     for alarm in run([(cause, verdict) for cause, verdict in says]):
@@ -248,7 +248,7 @@ def test_each_alarm_goes_forward_and_says_each_word_once(says: list[tuple[Cause,
 
 
 @given(VERDICTS, st.integers(0, 20))
-def test_a_restart_changes_nothing_of_what_is_told(says: list[tuple[Cause, Verdict]], cut: int) -> None:
+def test_a_restart_changes_nothing_of_what_is_told(says: list[tuple[AlarmCause, AlarmVerdict]], cut: int) -> None:
     assert run(says, cut) == run(says)
 
 
@@ -256,7 +256,7 @@ def test_an_alarm_that_never_stood_is_none() -> None:
     (alarm,) = watching().weigh(of_load(0, LIMIT_KG + 60.0), VAN)
     told_json = alarm_to_json(alarm, "")
     told_json["steps"][0]["state"] = "cleared"
-    with pytest.raises(ValueError, match="never stood"):
+    with pytest.raises(ValueError, match="without an early or final step"):
         alarm_from_json(told_json)
 
 

@@ -9,9 +9,9 @@ from support.archive import MIDNIGHT_NS, write_drive, write_manifest
 
 from gateway.archive.receipts import Slot
 from gateway.archive.reprocess import Progress, Summary
-from gateway.archive.run import Outcome, Status
+from gateway.archive.run import JobOutcome, JobStatus
 from gateway.cli import main, springscale
-from gateway.cli.text.reprocess import duration, how_far, size, summary_in_words
+from gateway.cli.reprocess import duration, how_far, size, summary_in_words
 
 SLOT = Slot("van-1", "2026-11", "abc")
 
@@ -93,8 +93,8 @@ def test_sizes_and_durations_are_in_units_that_suit() -> None:
 def test_the_summary_names_a_few_of_many_and_says_what_to_do_next() -> None:
     summary = Summary(n_vehicles=2, n_logs=30, size=100, n_jobs=3, n_already=0, n_failed_before=1)
     summary.outcomes = [
-        Outcome(SLOT, Status.FAILED, failures=tuple(f"log {n}" for n in range(14)), n_failed_logs=14),
-        Outcome(SLOT, Status.LOST, failures=("timed out",)),
+        JobOutcome(SLOT, JobStatus.FAILED, failures=tuple(f"log {n}" for n in range(14)), n_failed_logs=14),
+        JobOutcome(SLOT, JobStatus.LOST, failures=("timed out",)),
     ]
     summary.lost = {"vehicle=van-1/month=2026-11/abc": "timed out"}
     told = summary_in_words(summary, "DATASET")

@@ -10,10 +10,10 @@ from support.archive import MIDNIGHT_NS, S, write_manifest
 from support.calibrated import calibration_file
 from support.known_weights import with_all_sources
 
-from gateway.archive import Place, place_of
-from gateway.archive.jobs import Job, code_id, hash_of, plan, software
+from gateway.archive import Location, place_of
+from gateway.archive.jobs import ArchiveJob, code_id, hash_of, plan, software
 from gateway.archive.manifest import Assignment, Manifest, load_manifest
-from gateway.archive.survey import LogFacts, LogFile, in_goes
+from gateway.archive.survey import LogFile, SurveyedLog, in_goes
 from gateway.calibration.known_weights_file import KnownWeight, KnownWeights
 from gateway.core.known_weights import Knowledge
 from gateway.core.settings import BatchSettings
@@ -34,14 +34,14 @@ def _van(manifest: Manifest) -> Assignment:
     return manifest.assignments[0]
 
 
-def jobs_of(van: Assignment, starts: Sequence[int | None], settings: BatchSettings | None = None) -> list[Job]:
+def jobs_of(van: Assignment, starts: Sequence[int | None], settings: BatchSettings | None = None) -> list[ArchiveJob]:
     """Of logs 0.log, 1.log, ... that begin then; None: without a readable frame."""
     logs = [LogFile(van.logs, f"{n}.log", f"van/{n}.log", 100, "x") for n in range(len(starts))]
-    facts = {log.key: LogFacts(f"sha{n}", starts[n], None if starts[n] else "bad") for n, log in enumerate(logs)}
+    facts = {log.key: SurveyedLog(f"sha{n}", starts[n], None if starts[n] else "bad") for n, log in enumerate(logs)}
     return list(plan(DATASET, van, logs, facts, settings or BatchSettings()))
 
 
-def names(jobs: Sequence[Job]) -> list[tuple[str, list[str], list[str]]]:
+def names(jobs: Sequence[ArchiveJob]) -> list[tuple[str, list[str], list[str]]]:
     return [(job.slot.month, [one.log.path for one in job.lead_in], [one.log.path for one in job.logs]) for job in jobs]
 
 
@@ -173,7 +173,7 @@ def test_the_software_is_the_code_that_weighs() -> None:
 
 def test_logs_are_surveyed_in_groups_worth_a_turn() -> None:
     def logs(*sizes: int) -> list[LogFile]:
-        return [LogFile(Place("file:///x"), f"{n}", f"{n}", size, "") for n, size in enumerate(sizes)]
+        return [LogFile(Location("file:///x"), f"{n}", f"{n}", size, "") for n, size in enumerate(sizes)]
 
     assert [len(go) for go in in_goes(logs(*[1] * 70))] == [32, 32, 6]
     assert [len(go) for go in in_goes(logs(60_000_000, 60_000_000, 1))] == [2, 1]

@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.drives import T0_NS, assert_same_batch, changed, drive, steady, with_roll
 
-from gateway.core.batch import Window, build_batch
+from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.settings import BatchSettings
 from gateway.records import F64, Batch, Motion, SensorTraits, Signal, Why
 
 LENGTH_S = 100.0
 SETTINGS = BatchSettings(window_s=LENGTH_S)
-WINDOW = Window(T0_NS, T0_NS + 100_000_000_000, T0_NS)
+WINDOW = BatchWindow(T0_NS, T0_NS + 100_000_000_000, T0_NS)
 TRAITS = {
     Signal.VERTICAL_ACCELERATION: SensorTraits(minimum=-20.0, maximum=39.0, resolution=0.01),
     Signal.PITCH_RATE: SensorTraits(minimum=-4.0, maximum=4.0, resolution=0.001),

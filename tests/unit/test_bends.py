@@ -7,7 +7,7 @@ import pytest
 from support.drives import drive
 
 from gateway.bus.signals import Decoder, load_signal_map
-from gateway.core.batch import Window, build_batch
+from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.bends import Bends, gyro_gain_of, joined_gains
 from gateway.core.cross_spectrum.sensor_change import gyro_gain_ratio, is_gyro_gain_changed
 from gateway.core.settings import BatchSettings
@@ -113,7 +113,7 @@ def amplified(rows: Motion, by: float) -> Motion:
 def batch_of(rows: Motion) -> Batch:
     t_ns = int(rows.t_ns[0])
     settings = BatchSettings(window_s=360.0)
-    return build_batch(rows, Window(t_ns, t_ns + 360 * NS_PER_S, t_ns), settings, {})
+    return build_batch(rows, BatchWindow(t_ns, t_ns + 360 * NS_PER_S, t_ns), settings, {})
 
 
 def test_without_the_signals_nothing_is_told_and_nothing_else_changes() -> None:

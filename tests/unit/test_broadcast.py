@@ -18,8 +18,8 @@ from support.log import names
 from support.patience import wait_until
 
 import gateway
+from gateway.bus import broadcast as broadcaster_module
 from gateway.bus.broadcast import Broadcaster, Sender, WeightFrames
-from gateway.bus.broadcast import broadcaster as broadcaster_module
 from gateway.bus.messages import message_of
 from gateway.bus.sink import BusSink
 from gateway.cli import springscale
@@ -192,4 +192,4 @@ def test_one_file_alone_can_send_on_a_bus() -> None:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in SENDING
         if path.parent.name != "feed"  # a program of its own, which the service never loads
     }
-    assert senders == {"sink.py", "broadcaster.py"}
+    assert senders == {"sink.py", "broadcast.py"}

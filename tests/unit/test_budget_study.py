@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.half_car_road import CAR, VAN, batch_over_road
-from support.known_runs import LOADS, known_run
+from support.known_runs import LOADS, calibrated_on_loads, known_run
 
 from benchmarks.accuracy.budget import budget_page
 from benchmarks.accuracy.budget.alone import Shift, row_of
@@ -23,7 +23,6 @@ from benchmarks.accuracy.budget.nature import (
 )
 from benchmarks.accuracy.budget.response import day_covariance, response_to
 from benchmarks.accuracy.budget.together import Weighing, refusals_of, rows_of_weighings
-from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.core.cargo import shape_prior
 from gateway.core.cross_spectrum.drift import NATURE_STD, NATURE_TOGETHER_STD
 from gateway.core.cross_spectrum.estimator import Weighed, weigh
@@ -91,7 +90,7 @@ def test_a_fitter_who_errs_places_known_loads_by_the_share_that_was_stated() -> 
 
 def test_the_response_foretells_what_another_day_does() -> None:
     """In the half-car's own world: tyres 3 % stiffer, and the same load weighed."""
-    calibration = calibrate_cross_spectrum([known_run(i, *load, seed=1) for i, load in enumerate(LOADS)], VAN)
+    calibration = calibrated_on_loads(seed=1)
     day = {"tyre_front_npm": 0.03, "tyre_rear_npm": 0.03}
     front, rear = (replace(end, tyre_npm=end.tyre_npm * np.exp(0.03)) for end in (CAR.front, CAR.rear))
     usual, other = (

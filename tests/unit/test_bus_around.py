@@ -7,10 +7,10 @@ from contextlib import contextmanager
 import can
 from support.patience import PATIENCE_S, wait_until
 
-from gateway.bus.live import Around, around_of
-from gateway.bus.live import around as around_module
+from gateway.bus.heard import similar_to
+from gateway.bus.live import BusSurvey, bus_survey_of
+from gateway.bus.live import bus_survey as around_module
 from gateway.bus.signals import load_signal_map
-from gateway.bus.similar import similar_to
 
 MAP = load_signal_map("springscale:reference")
 ACCELERATION = next(message for message in MAP.messages if message.frame_id == 0x120)
@@ -39,7 +39,7 @@ def chatter(channel, *messages):
 
 def test_every_identifier_of_either_width_is_heard_and_the_nearest_named(request):
     channel = request.node.name
-    around = around_of("virtual", channel, {})
+    around = bus_survey_of("virtual", channel, {})
     with chatter(channel, (0x122, False, 8), (0x120, True, 8), (0x7DF, False, 3), (0x121, False, 8)):
         around.look()
         assert wait_until(lambda: around.heard)
@@ -60,7 +60,7 @@ def test_one_look_at_a_time_and_one_a_minute(monkeypatch):
         n_opened.append(1)
         raise OSError(errno.ENETDOWN, "Network is down")
 
-    around = Around(broken)
+    around = BusSurvey(broken)
     for _ in range(5):
         around.look()
     around.stop()
@@ -78,7 +78,7 @@ def test_a_sensor_that_comes_and_goes_begins_no_second_look_beside_the_first():
         is_over.wait(PATIENCE_S)
         raise OSError(errno.ENETDOWN, "Network is down")
 
-    around = Around(slow)
+    around = BusSurvey(slow)
     around.look()
     assert wait_until(lambda: n_opened)
     around.forget()
@@ -89,7 +89,7 @@ def test_a_sensor_that_comes_and_goes_begins_no_second_look_beside_the_first():
 
 
 def test_an_adapter_that_one_program_alone_may_open_is_left_alone():
-    around = around_of("slcan", "/dev/ttyUSB0", {})
+    around = bus_survey_of("slcan", "/dev/ttyUSB0", {})
     around.look()
     around.stop()
     assert around.heard == ()

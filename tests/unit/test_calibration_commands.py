@@ -17,7 +17,7 @@ from support.calibrated import calibration_file
 from gateway.calibration.campaign import file_sha256, load_campaign
 from gateway.calibration.file import (
     CalibrationFile,
-    Figure,
+    FittedFigure,
     check_against_campaign,
     differences,
     figures_of,
@@ -77,10 +77,12 @@ def test_half_car_parameters_are_shown_in_their_units() -> None:
 
 
 def test_a_parameter_held_as_a_logarithm_has_a_spread_of_first_order() -> None:
-    assert Figure("k", 200.0, 20.0, True).distance(Figure("k", 200.0, 1.0, True)) == 0.0
-    assert Figure("k", 100.0, 3.0, True).distance(Figure("k", 271.828182846, 0.0, True)) == pytest.approx(1.0 / 0.03)
-    assert Figure("k", -1.0, 3.0).distance(Figure("k", 9.0, 4.0)) == pytest.approx(2.0)
-    assert Figure("k", 1.0, 0.0).distance(Figure("k", 2.0, 0.0)) == float("inf")
+    assert FittedFigure("k", 200.0, 20.0, True).distance(FittedFigure("k", 200.0, 1.0, True)) == 0.0
+    assert FittedFigure("k", 100.0, 3.0, True).distance(FittedFigure("k", 271.828182846, 0.0, True)) == pytest.approx(
+        1.0 / 0.03
+    )
+    assert FittedFigure("k", -1.0, 3.0).distance(FittedFigure("k", 9.0, 4.0)) == pytest.approx(2.0)
+    assert FittedFigure("k", 1.0, 0.0).distance(FittedFigure("k", 2.0, 0.0)) == float("inf")
 
 
 def test_a_file_does_not_differ_from_itself(tmp_path: Path) -> None:

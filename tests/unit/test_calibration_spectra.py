@@ -11,7 +11,7 @@ from gateway.core.ratio_index.index import Band
 from gateway.records import Batch
 from gateway.reports.calibration.half_car import fits_of
 from gateway.reports.calibration.spectra import ACCELERATION, N_SEGMENT, PITCH_RATE, density_of, spectra_section
-from gateway.reports.charts import Line, Ribbon, Span
+from gateway.reports.charts import LineMark, Ribbon, Span
 
 
 def white(seed: int, n: int = 20_000) -> Batch:
@@ -60,8 +60,8 @@ def test_a_curve_for_every_load_and_the_bands_where_they_are() -> None:
     section = spectra_section(runs, ratio_index_calibration())
     assert section is not None
     of_load, of_share = (chart.panels[0] for chart in section.charts)
-    assert [mark.label for mark in of_load.marks if isinstance(mark, Line)] == ["0 kg", "200 kg"]
-    assert [mark.label for mark in of_share.marks if isinstance(mark, Line)] == ["47.0 %", "50.0 %", "52.0 %"]
+    assert [mark.label for mark in of_load.marks if isinstance(mark, LineMark)] == ["0 kg", "200 kg"]
+    assert [mark.label for mark in of_share.marks if isinstance(mark, LineMark)] == ["47.0 %", "50.0 %", "52.0 %"]
     assert sum(isinstance(mark, Ribbon) for mark in of_share.marks) == 3
     bands = ratio_index_calibration().acceleration_bands
     assert bands is not None

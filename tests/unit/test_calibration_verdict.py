@@ -13,7 +13,16 @@ from gateway.budget import BudgetLine, Remedy
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection import Finding, Inspection, RunVerdict, Severity
 from gateway.calibration.inspection.finding import Kind
-from gateway.calibration.judgement import Assessment, Grade, Judged, Judgement, Part, Verdict, error_table, verdicts_of
+from gateway.calibration.judgement import (
+    Assessment,
+    BatchSet,
+    Grade,
+    Judged,
+    Judgement,
+    Verdict,
+    error_table,
+    verdicts_of,
+)
 from gateway.calibration.plan import Expected
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate, Quantity
@@ -39,7 +48,7 @@ def refused(run: int) -> Judged:
     return Judged(run, f"{run}.log", 200.0, 50.0, Estimate(0, 1, "cross_spectrum", rejected=(Why.GAP,)))
 
 
-def judgement(parts: dict[Part, list[Judged]], estimator: str = "cross_spectrum") -> Judgement:
+def judgement(parts: dict[BatchSet, list[Judged]], estimator: str = "cross_spectrum") -> Judgement:
     return Judgement(estimator, {part: error_table(rows, VAN, estimator) for part, rows in parts.items()})
 
 
@@ -51,8 +60,8 @@ def verdict(
     expected: Expected | None = None,
 ) -> Verdict:
     file = calibration_file().model_copy(update={"warnings": warnings})
-    parts = {Part.LEFT_OUT: left_out} if left_out else {}
-    parts |= {Part.VALIDATION: validation} if validation else {}
+    parts = {BatchSet.LEFT_OUT: left_out} if left_out else {}
+    parts |= {BatchSet.VALIDATION: validation} if validation else {}
     outcome = None if runs is None else Outcome(file, Inspection((), runs, ()))
     (found,) = verdicts_of(Assessment("", file, VAN, (judgement(parts),), outcome), expected)
     return found
@@ -94,7 +103,7 @@ def test_true_intervals_that_hold_nearly_every_load_are_of_no_use(half_kg: float
     found = verdict([judged(run, half_kg=half_kg) for run in range(6)])
     assert grade_of(found, "payload_half_width") is grade
     text = next(one.text for one in found.reasons if one.rule == "payload_half_width")
-    assert f"± {half_kg:.0f} kg in the mean, {half_kg / 4.5:.0f} % of the range" in text
+    assert f"± {half_kg:.0f} kg on average, {half_kg / 4.5:.0f} % of the range" in text
 
 
 def test_the_width_names_its_main_cause_and_what_would_narrow_it() -> None:
@@ -106,7 +115,7 @@ def test_the_width_names_its_main_cause_and_what_would_narrow_it() -> None:
     rows = [replace(one, estimate=replace(one.estimate, error_budget=lines)) for one in rows]
     text = next(one.text for one in verdict(rows).reasons if one.rule == "payload_half_width")
     assert text.endswith(
-        "Mostly by the length and height of this very load: state in the vehicle's data what it carries, with its "
+        "Mostly due to the length and height of this very load: state in the vehicle's data what it carries, with its "
         "length and height (then ± 69 kg)."
     )
 
@@ -193,8 +202,8 @@ def test_what_it_states_of_all_loads_counts_too(std_kg: float, grade: Grade) -> 
 
 def test_the_headline_judges_the_estimator_that_the_service_runs_though_the_other_is_better() -> None:
     file = calibration_file()
-    bad = judgement({Part.LEFT_OUT: [judged(run, 100.0, 200.0) for run in range(1, 5)]}, "cross_spectrum")
-    good = judgement({Part.LEFT_OUT: [judged(run, 10.0) for run in range(1, 5)]}, "ratio_index")
+    bad = judgement({BatchSet.LEFT_OUT: [judged(run, 100.0, 200.0) for run in range(1, 5)]}, "cross_spectrum")
+    good = judgement({BatchSet.LEFT_OUT: [judged(run, 10.0) for run in range(1, 5)]}, "ratio_index")
     found = verdicts_of(Assessment("", file, VAN, (good, bad)))
     assert [one.estimator for one in found] == ["cross_spectrum", "ratio_index"]
     assert found[0].grade is Grade.UNFIT

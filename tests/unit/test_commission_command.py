@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 from support.commissioning import Bench, fitted
 from support.web import Gateway, serving
 
-from gateway.cli.asked import commission as command
+from gateway.cli import commission as command
 from gateway.core.cargo import is_said
 from gateway.errors import ConfigurationError, SpringscaleError
 

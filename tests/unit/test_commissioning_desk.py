@@ -37,7 +37,7 @@ FAULT = Found(kind="pitch_rate_sign", severity="fault", text="turned over", advi
 
 
 def told(bench: Bench) -> dict[str, Any]:
-    text = bench.desk.told()
+    text = bench.desk.state()
     CommissioningState.model_validate_json(text)  # the shape that the API promises
     state: dict[str, Any] = json.loads(text)
     return state
@@ -438,7 +438,7 @@ def test_a_full_disk_while_driving_is_told_and_the_next_window_counts(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patch:
-        patch.setattr("gateway.service.commissioning.book.save_record", full)
+        patch.setattr("gateway.service.commissioning.record_store.save_record", full)
         driving.drive(0)
     assert driving.desk.fault is not None
     assert Event.COMMISSIONING_NOT_KEPT in names(caplog)

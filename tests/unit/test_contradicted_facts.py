@@ -5,20 +5,15 @@ from typing import Any
 
 import pytest
 from support.half_car_road import CAR, VAN
-from support.known_runs import LOADS, known_run
+from support.known_runs import SIBLING, calibrated_on_loads, known_run
 
 from gateway.calibration.contradicted import contradictions
-from gateway.calibration.half_car import calibrate_cross_spectrum, fit_cross_spectrum
+from gateway.calibration.half_car import fit_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.line import Line, Sister, line_of
 from gateway.core.vehicle import Vehicle
 from gateway.stated.doubt import Doubt, DoubtKind
 
-SIBLING = replace(
-    CAR,
-    front=replace(CAR.front, spring_npm=0.97 * CAR.front.spring_npm, damper_nspm=1.1 * CAR.front.damper_nspm),
-    rear=replace(CAR.rear, spring_npm=1.03 * CAR.rear.spring_npm, tyre_npm=0.96 * CAR.rear.tyre_npm),
-)
 OTHER_MODEL = replace(
     CAR,
     front=replace(CAR.front, spring_npm=0.7 * CAR.front.spring_npm, damper_nspm=0.8 * CAR.front.damper_nspm),
@@ -28,8 +23,7 @@ OTHER_MODEL = replace(
 
 @pytest.fixture(scope="module")
 def line() -> Line:
-    runs = [known_run(i, *load, seed=1) for i, load in enumerate(LOADS)]
-    return line_of([Sister("a", VAN, calibrate_cross_spectrum(runs, VAN))])
+    return line_of([Sister("a", VAN, calibrated_on_loads(seed=1))])
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
-from support.half_car_road import CAR, VAN, batch_of, batch_over_road, weighed
+from support.half_car_road import (
+    CAR,
+    KNOWN,
+    VAN,
+    batch_of,
+    batch_over_road,
+    calibrated_on_known_loads,
+    run_over_road,
+    weighed,
+)
 
 from gateway.calibration.half_car import calibrate_cross_spectrum, fit_cross_spectrum
 from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED
@@ -24,17 +33,10 @@ from gateway.estimate_json import estimate_to_json
 from gateway.posterior import Source
 from gateway.records import F64, Batch, Why
 
-KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))
-
-
-def known_run(number: int, payload_kg: float, share_pct: float) -> KnownRun:
-    batches = tuple(batch_over_road(payload_kg, share_pct, seed=10 * number + i) for i in range(2))
-    return KnownRun(number, f"run {number}", payload_kg, share_pct, batches)
-
 
 @pytest.fixture(scope="module")
 def calibration() -> CrossSpectrumCalibration:
-    return calibrate_cross_spectrum([known_run(i, *load) for i, load in enumerate(KNOWN)], VAN)
+    return calibrated_on_known_loads()
 
 
 def test_calibration_finds_the_vehicle(calibration: CrossSpectrumCalibration) -> None:
@@ -146,14 +148,14 @@ def roughness_ratio(calibration: CrossSpectrumCalibration) -> float:
 
 
 def test_one_empty_run_is_enough_and_says_so() -> None:
-    calibration = calibrate_cross_spectrum([known_run(1, 0.0, 52.0)], VAN)
+    calibration = calibrate_cross_spectrum([run_over_road(1, 0.0, 52.0)], VAN)
     assert calibration.warnings == (SPRINGS_FROM_PRIORS, UNTESTED)
     found = weighed(batch_over_road(0.0, 52.0, seed=77), calibration)
     assert found.payload.number == pytest.approx(0.0, abs=20.0)
 
 
 def test_a_zero_point_is_not_believed_at_other_speeds() -> None:
-    calibration = calibrate_cross_spectrum([known_run(1, 0.0, 52.0)], VAN)
+    calibration = calibrate_cross_spectrum([run_over_road(1, 0.0, 52.0)], VAN)
     assert weighed(batch_over_road(0.0, 52.0, seed=77, speed_mps=20.0), calibration).rejected == (
         Why.SPEED_UNCALIBRATED,
     )
@@ -260,7 +262,7 @@ def test_a_vehicle_without_a_pitch_rate_is_told_that_both_sensors_are_needed() -
 
 def test_a_run_left_out_teaches_the_others_nothing_by_its_label() -> None:
     """What the others weigh it at must not have started from a fit that was told the answer."""
-    runs = [known_run(i, *load) for i, load in enumerate(KNOWN[:3])]
+    runs = [run_over_road(i, *load) for i, load in enumerate(KNOWN[:3])]
     as_told = fit_cross_spectrum(runs, VAN).without
     for i, run in enumerate(runs):
         relabelled = [*runs[:i], replace(run, payload_kg=run.payload_kg + 80.0), *runs[i + 1 :]]
@@ -272,5 +274,5 @@ def test_a_run_left_out_teaches_the_others_nothing_by_its_label() -> None:
 
 def test_every_step_of_a_fit_is_told() -> None:
     told: list[tuple[int, int]] = []
-    fit_cross_spectrum([known_run(i, *load) for i, load in enumerate(KNOWN)], VAN, lambda *step: told.append(step))
+    fit_cross_spectrum([run_over_road(i, *load) for i, load in enumerate(KNOWN)], VAN, lambda *step: told.append(step))
     assert told == [(i, len(told)) for i in range(1, len(told) + 1)]

@@ -13,7 +13,7 @@ from gateway.core.events import Rules
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.history import ENTRIES
-from gateway.service.day_book import DayBook
+from gateway.service.load_events import LoadEventLog
 from gateway.setup import load_setup
 from gateway.store import Store
 
@@ -23,7 +23,7 @@ WHOLE = day(0.0, 500.0, 500.0, 320.0, 200.0, batches=2)
 def run(directory: Path, estimates: list[Estimate]) -> dict[str, dict]:
     """One run of the service over these; what is stored afterwards, by id."""
     with closing(Store.open(directory)) as store:
-        book = DayBook(load_setup("springscale:reference"), store)
+        book = LoadEventLog(load_setup("springscale:reference"), store)
         for one in estimates:
             store.write_estimate(estimate_to_json(one))
             book(one)
@@ -52,7 +52,7 @@ def test_a_restart_after_the_clock_was_put_back_doubles_and_forgets_nothing(tmp_
 
 def test_what_was_told_is_sent_to_whoever_listens(tmp_path: Path) -> None:
     with closing(Store.open(tmp_path)) as store:
-        book = DayBook(load_setup("springscale:reference"), store)
+        book = LoadEventLog(load_setup("springscale:reference"), store)
         for one in WHOLE:
             book(one)
         sent = store.follow(ENTRIES, None, lambda: None).read(1000)

@@ -15,6 +15,7 @@ from gateway.core.cross_spectrum.drift import (
     day_columns,
     drift_precision,
     packing_columns,
+    wear_of,
 )
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.records import F64
@@ -91,3 +92,10 @@ def test_noise_that_is_free_leaves_the_rest_as_it_is() -> None:
     assert np.diag(held)[is_noise] ** 0.5 == pytest.approx(HELD_STD)
     assert np.diag(free)[is_noise] ** 0.5 == pytest.approx(NOISE_STD)
     assert np.allclose(held[~is_noise], free[~is_noise])
+
+
+def test_wear_is_what_dampers_lie_off_beyond_nature() -> None:
+    std = np.hypot(NATURE_STD["damper_front_nspm"], NATURE_TOGETHER_STD["damper"])
+    assert wear_of(np.zeros(2)) == wear_of(np.array([std, -std])) == 0.0
+    assert wear_of(np.array([3.0 * std, -3.0 * std])) == pytest.approx(np.sqrt(8.0))
+    assert wear_of(np.array([0.0, 3.0 * std])) == pytest.approx(np.sqrt(3.5))

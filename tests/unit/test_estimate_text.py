@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from support.estimates import make_estimate
 
-from gateway.cli.text.estimate import sentence
+from gateway.cli.estimate import sentence
 from gateway.estimate import UNKNOWN, Estimate, Quantity, Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Why

@@ -11,7 +11,7 @@ from support.drives import T0_NS, drive, joined, later
 
 from gateway.calibration.judgement import Comparison, Judged, error_table, errors_of, judge
 from gateway.calibration.known_run import KnownRun
-from gateway.core.batch import Window, build_batch
+from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
 from gateway.core.flow import Flow, Identity
@@ -32,7 +32,7 @@ VAN = Vehicle(
     unsprung_front_kg=60.0,
     unsprung_rear_kg=100.0,
 )
-BATCH = build_batch(drive(100.0), Window(T0_NS, T0_NS + 100_000_000_000, T0_NS), BatchSettings(window_s=100.0), {})
+BATCH = build_batch(drive(100.0), BatchWindow(T0_NS, T0_NS + 100_000_000_000, T0_NS), BatchSettings(window_s=100.0), {})
 
 
 def judged(true_kg: float, found_kg: float | None, true_pct: float = 50.0, found_pct: float = 50.0) -> Judged:

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from gateway.cli.text.events import entry_sentence
+from gateway.cli.events import entry_sentence
 from gateway.core.events import Entry, EntryKind
 
 EVENT: dict[str, Any] = {

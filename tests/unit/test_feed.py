@@ -22,8 +22,8 @@ from gateway.bus.feed.feeder import Numbering
 from gateway.bus.messages import frames_of
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.cli import springscale
-from gateway.cli.logs.feed import SILENT_S
-from gateway.cli.logs.feed import feed as feed_command
+from gateway.cli.feed import SILENT_S
+from gateway.cli.feed import feed as feed_command
 from gateway.core.sample_clock import sample_times
 from gateway.errors import BusError, ConfigurationError
 from gateway.records import Motion, Signal

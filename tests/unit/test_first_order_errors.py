@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct
-from gateway.core.weights import Place, place_of, weights_of
+from gateway.core.weights import PayloadPlace, place_of, weights_of
 from gateway.estimate import PLACES, Quantity, Weights
 from gateway.posterior import Posterior, Source
 
@@ -58,7 +58,7 @@ def weights(state: State) -> Weights:
     return weights_of(VAN, posterior(state), Quantity(state.roll_share, STDS[3]))
 
 
-def place(state: State) -> Place:
+def place(state: State) -> PayloadPlace:
     found = place_of(VAN, posterior(state).with_source(Source.EMPTY_SHARE, np.array([[0.0, 0.8, 0.0]])))
     assert found is not None
     return found

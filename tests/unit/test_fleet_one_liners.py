@@ -10,7 +10,7 @@ import pytest
 from support.fleet import week, write_table
 
 from gateway.archive import place_of
-from gateway.archive.fleet import Fleet, fleet_of
+from gateway.archive.fleet import FleetSummary, fleet_of
 
 TEXT = (Path(__file__).parents[2] / "docs/fleet-report.md").read_text(encoding="utf-8")
 SQL = [one for block in re.findall(r"```sql\n(.*?)```", TEXT, re.DOTALL) for one in block.split(";") if one.strip()]
@@ -30,11 +30,11 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def fleet(dataset: Path) -> Fleet:
+def fleet(dataset: Path) -> FleetSummary:
     return fleet_of(place_of(dataset))
 
 
-def loads(fleet: Fleet) -> dict[tuple[str, str], tuple[int, float | None]]:
+def loads(fleet: FleetSummary) -> dict[tuple[str, str], tuple[int, float | None]]:
     """Number of answers and mean by vehicle and Monday, as the report has them."""
     return {
         (vehicle.name, str(monday)): (int(n), float(mean) if n else None)
@@ -45,7 +45,7 @@ def loads(fleet: Fleet) -> dict[tuple[str, str], tuple[int, float | None]]:
     }
 
 
-def refusals(fleet: Fleet) -> dict[tuple[str, str], int]:
+def refusals(fleet: FleetSummary) -> dict[tuple[str, str], int]:
     return {(vehicle.name, reason): n for vehicle in fleet.vehicles for reason, n in vehicle.n_refused.items()}
 
 
@@ -57,13 +57,13 @@ def shown(number: int, names: dict[str, Any], replaced: dict[str, str]) -> dict[
     return names
 
 
-def test_duckdb_counts_what_the_report_counts(dataset: Path, fleet: Fleet) -> None:
+def test_duckdb_counts_what_the_report_counts(dataset: Path, fleet: FleetSummary) -> None:
     by_reason, by_week = (duckdb.sql(one.replace("DATASET", str(dataset))).fetchall() for one in SQL)
     assert {(vehicle, reason): n for vehicle, reason, n in by_reason} == refusals(fleet)
     assert {(vehicle, str(at)[:10]): (n, mean) for vehicle, at, n, mean in by_week} == loads(fleet)
 
 
-def test_polars_counts_what_the_report_counts(dataset: Path, fleet: Fleet) -> None:
+def test_polars_counts_what_the_report_counts(dataset: Path, fleet: FleetSummary) -> None:
     found = shown(0, {}, {"DATASET": str(dataset)})
     by_week = found["loads"].rows()
     assert {(vehicle, str(at)[:10]): (n, mean) for vehicle, at, n, mean in by_week} == loads(fleet)

@@ -3,7 +3,6 @@
 import json
 import sqlite3
 import threading
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -18,17 +17,10 @@ from gateway.history import BATCHES, ENTRIES, KINDS
 from gateway.log import Event
 from gateway.store import Store, reader, writer
 from gateway.uplink import Outbox, Uplink
-from gateway.uplink.back_off import BackOff
+from gateway.uplink.forwarder import BackOff
 from gateway.web import Board
 
 DAY_S = 86_400.0
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    opened = Store.open(tmp_path)
-    yield opened
-    opened.close()
 
 
 def entry(store: Store, n: int, kind: str = "event", revision: int = 1) -> str:
@@ -57,7 +49,7 @@ def test_a_flipped_bit_in_an_event_is_passed_over_counted_and_shown(
         assert uplink.is_alive()
         assert len(store.reader().entries().items) == 4
         uplink.stop()
-    assert [letter.id for letter in broker.taken] == [f"event-{n}-1" for n in (0, 1, 3, 4)]
+    assert [message.id for message in broker.taken] == [f"event-{n}-1" for n in (0, 1, 3, 4)]
     assert Event.STORE_BAD_RECORD in names(caplog)
 
 
@@ -70,12 +62,12 @@ def test_a_record_that_no_sender_can_read_is_passed_over_and_told(
     entry(store, 2)
     store.write_entry("event", "event-3", 0, "{}")
     outbox = Outbox(store, "fleet")
-    letters = outbox.next_letters(10)
-    assert [letter.id for letter in letters] == ["event-0-1", "event-2-1"]
+    messages = outbox.next_messages(10)
+    assert [message.id for message in messages] == ["event-0-1", "event-2-1"]
     assert names(caplog) == [Event.STORE_BAD_RECORD] * 2
-    for letter in letters:
-        outbox.delivered(letter)
-    assert outbox.next_letters(10) == []
+    for message in messages:
+        outbox.delivered(message)
+    assert outbox.next_messages(10) == []
     assert store.flush(PATIENCE_S)
     assert store.reader().delivery("fleet").n_waiting == 0
 
@@ -136,19 +128,19 @@ def test_idle_followers_open_no_database(store: Store, monkeypatch: pytest.Monke
     for n in range(3):
         store.write_estimate(make_record(n))
     outbox = Outbox(store, "fleet")
-    for letter in outbox.next_letters(10):
-        outbox.delivered(letter)
+    for message in outbox.next_messages(10):
+        outbox.delivered(message)
     assert store.flush(PATIENCE_S)
     outbox.look()
     monkeypatch.setattr("gateway.uplink.outbox.SETTLES_S", 0.0)
     opened: list[Any] = []
     monkeypatch.setattr(reader, "connect_reader", opened.append)
     for _ in range(50):
-        assert outbox.next_letters(10) == []
+        assert outbox.next_messages(10) == []
         assert outbox.look().n_waiting == 0
     assert opened == []
     store.write_estimate(make_record(9))  # what comes is in memory
-    assert len(outbox.next_letters(10)) == 1
+    assert len(outbox.next_messages(10)) == 1
     assert opened == []
 
 

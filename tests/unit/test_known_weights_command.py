@@ -74,7 +74,7 @@ def test_a_ticket_is_added_confirmed_and_withdrawn(url: str, tokens: TokenFile, 
     made = ticket("add", weight, "--kind", "delivery_note", "--note", "no. 17", *asked)
     assert made.exit_code == 0, made.exception
     assert "delivery note: 400.0 ± 19.6 kg known, 276.0 ± " in made.output
-    assert "HELD: it contradicts the estimate" in made.output
+    assert "not used, for it contradicts the estimate: `springscale calibration ticket confirm sha256:" in made.output
     entry_id = json.loads(ticket("show", "--json", *asked).output)["history"][0]["id"]
     assert isinstance(ticket("confirm", "sha256:none", *asked).exception, SpringscaleError)
     confirmed = ticket("confirm", entry_id[:19], *asked)
@@ -83,6 +83,17 @@ def test_a_ticket_is_added_confirmed_and_withdrawn(url: str, tokens: TokenFile, 
     refused = ticket("add", "payload_kg=1,at=2020-01-01T00:00:00Z", *asked).exception
     assert isinstance(refused, SpringscaleError)
     assert "no_epoch" in str(refused)
+
+
+def test_an_empty_vehicle_that_contradicts_is_shown_and_withdrawn_as_a_ticket(
+    url: str, tokens: TokenFile, pipeline: FakePipeline
+) -> None:
+    asked = ("--url", url, "--token", tokens.create("workshop", Scope.OPERATE))
+    pipeline.weigh(276.0)
+    assert "not used, for it contradicts the estimate" in run("set", "--empty", *asked).output
+    shown = json.loads(ticket("show", "--json", *asked).output)["history"]
+    assert [(one["kind"], one["state"]) for one in shown] == [("empty", "held")]
+    assert "withdrawn" in ticket("withdraw", shown[0]["id"][:14], *asked).output
 
 
 def test_a_refusal_comes_in_the_services_own_words(url: str, tokens: TokenFile, pipeline: FakePipeline) -> None:

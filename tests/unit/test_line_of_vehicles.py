@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.half_car_road import CAR, VAN, batch_over_road, weighed
-from support.known_runs import LOADS, known_run
+from support.known_runs import LOADS, SIBLING, calibrated_on_loads, known_run
 
 from gateway.calibration.half_car import calibrate_cross_spectrum, fit_cross_spectrum, prior_of
 from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED
@@ -18,25 +18,15 @@ from gateway.core.cross_spectrum.model.half_car import HalfCar
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.errors import LineError
 
-SIBLING = replace(
-    CAR,
-    front=replace(CAR.front, spring_npm=0.97 * CAR.front.spring_npm, damper_nspm=1.1 * CAR.front.damper_nspm),
-    rear=replace(CAR.rear, spring_npm=1.03 * CAR.rear.spring_npm, tyre_npm=0.96 * CAR.rear.tyre_npm),
-)
-
 
 def sister(name: str, calibration: CrossSpectrumCalibration, line: Line | None = None) -> Sister:
     return Sister(name, VAN, calibration, line)
 
 
-def calibrated(seed: int, car: HalfCar = CAR) -> CrossSpectrumCalibration:
-    return calibrate_cross_spectrum([known_run(i, *load, seed=seed, car=car) for i, load in enumerate(LOADS)], VAN)
-
-
 @pytest.fixture(scope="module")
 def known() -> CrossSpectrumCalibration:
     """A sister, driven with known loads."""
-    return calibrated(seed=1)
+    return calibrated_on_loads(seed=1)
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +103,7 @@ def same(one: Prior, other: Prior) -> bool:
 
 
 def test_in_what_order_sisters_are_named_changes_nothing(known: CrossSpectrumCalibration) -> None:
-    other = sister("b", calibrated(seed=2, car=SIBLING))
+    other = sister("b", calibrated_on_loads(seed=2, car=SIBLING))
     forward, backward = line_of([sister("a", known), other]), line_of([other, sister("a", known), other])
     assert forward.members == backward.members == ("a", "b")
     assert same(forward.prior_of(VAN, with_roll=False), backward.prior_of(VAN, with_roll=False))
@@ -140,7 +130,7 @@ def test_lines_that_share_vehicles_are_refused(line: Line, inheriting: CrossSpec
 
 def test_from_three_on_scatter_is_estimated(known: CrossSpectrumCalibration) -> None:
     cars: Sequence[HalfCar] = (SIBLING, replace(CAR, rear=replace(CAR.rear, damper_nspm=0.6 * CAR.rear.damper_nspm)))
-    sisters = [sister("a", known), *(sister(f"b{i}", calibrated(i + 5, car)) for i, car in enumerate(cars))]
+    sisters = [sister("a", known), *(sister(f"b{i}", calibrated_on_loads(i + 5, car)) for i, car in enumerate(cars))]
     two, three = line_of(sisters[:2]), line_of(sisters)
     assert (two.n_siblings, three.n_siblings) == (0, 3)
     damper = INDEX["damper_rear_nspm"]
@@ -159,7 +149,7 @@ def test_a_calibration_that_says_not_how_much_it_moved_is_refused(known: CrossSp
 
 
 def test_siblings_left_out_tell_how_far_intervals_are_widened(known: CrossSpectrumCalibration, line: Line) -> None:
-    other = calibrated(seed=2, car=SIBLING)
+    other = calibrated_on_loads(seed=2, car=SIBLING)
     siblings = [
         Sibling(sister(name, held), tuple(known_run(i, *load, seed=seed, car=car) for i, load in enumerate(LOADS)))
         for name, held, seed, car in (("a", known, 1, CAR), ("b", other, 2, SIBLING))

@@ -6,7 +6,7 @@ import pytest
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.signals.database import DatabaseSignal
 from gateway.offline.look.look import journey_of
-from gateway.offline.look.readings import Reading
+from gateway.offline.look.readings import SignalReading
 from gateway.records import Signal
 
 
@@ -18,10 +18,10 @@ class Described:
     heard = Heard()
 
 
-def reading(name: str, quantity: str, x: list[float], scale: float = 1.0) -> Reading:
+def reading(name: str, quantity: str, x: list[float], scale: float = 1.0) -> SignalReading:
     field = BitField(0, 32, coding=Coding.SIGNED, scale=scale)
     signal = DatabaseSignal(name, field, "deg", None, None, {}, None, ())
-    return Reading(Described(), signal, quantity, np.arange(len(x), dtype=float), np.array(x))
+    return SignalReading(Described(), signal, quantity, np.arange(len(x), dtype=float), np.array(x))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from support.drives import T0_NS
 from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.encode import Encoder
 from gateway.bus.signals.signal_map import load_signal_map, shipped_map
-from gateway.core.batch import Window, build_batch
+from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.sample_clock import sample_times
 from gateway.core.settings import BatchSettings
 from gateway.errors import SignalMapError
@@ -54,7 +54,7 @@ def seen(stamped_s: F64, kept: Bool, counting: Counting = lambda k: k % 256) -> 
 
 
 def batch_of(motion: Motion) -> Batch:
-    window = Window(T0_NS, T0_NS + round(DURATION_S * 1e9), T0_NS)
+    window = BatchWindow(T0_NS, T0_NS + round(DURATION_S * 1e9), T0_NS)
     return build_batch(motion, window, BatchSettings(window_s=DURATION_S, gap_share_max=0.2), REFERENCE.traits)
 
 

@@ -1,6 +1,5 @@
 """An outbox for one who wants some kinds only: all of these, in order, and nothing of the rest holds retention."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,13 +11,6 @@ from gateway.store import Retention, Store
 from gateway.uplink import Outbox
 
 NAME = "https://fleet.example/hook"
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    opened = Store.open(tmp_path)
-    yield opened
-    opened.close()
 
 
 def tell(store: Store, *what: str) -> None:
@@ -38,7 +30,7 @@ def outbox(store: Store, *only: str) -> Outbox:
 
 def drained(box: Outbox, limit: int = 2) -> list[str]:
     found: list[str] = []
-    while letters := box.next_letters(limit):
+    while letters := box.next_messages(limit):
         found += [letter.id for letter in letters]
         for letter in letters:
             box.delivered(letter)
@@ -68,7 +60,7 @@ def test_estimates_too(store: Store) -> None:
 def test_what_nobody_wants_is_passed_over_on_disk_so_that_age_may_remove_it(store: Store) -> None:
     tell(store, *["estimate"] * 7, "trip-1")
     box = outbox(store, "alarm")
-    assert box.next_letters(2) == []
+    assert box.next_messages(2) == []
     assert store.flush(PATIENCE_S)
     kept = store.reader().delivery(NAME)
     assert kept.n_waiting == 0
@@ -83,7 +75,7 @@ def test_what_nobody_wants_is_passed_over_on_disk_so_that_age_may_remove_it(stor
 def test_what_was_handed_out_and_not_delivered_comes_again(store: Store) -> None:
     tell(store, *MIXED)
     box = outbox(store, "alarm")
-    assert [letter.id for letter in box.next_letters(10)] == ["alarm-1-1", "alarm-2-1"]
+    assert [letter.id for letter in box.next_messages(10)] == ["alarm-1-1", "alarm-2-1"]
     box.rewind()
     assert drained(box) == ["alarm-1-1", "alarm-2-1"]
 
@@ -93,9 +85,9 @@ def test_entries_that_retention_takes_undelivered_are_counted_and_newer_revision
 
     store = Store.open(tmp_path, Retention(max_age_s=100.0), lambda: now_ns[0])
     box = outbox(store, "alarm")
-    assert box.next_letters(1) == []
+    assert box.next_messages(1) == []
     tell(store, "alarm-0", "estimate")
-    first = box.next_letters(1)
+    first = box.next_messages(1)
     box.delivered(first[0])
     tell(store, "alarm-1", "alarm-1", "alarm-2")  # the second takes the place of the first
     now_ns[0] += 1_000_000_000_000

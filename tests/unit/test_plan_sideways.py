@@ -6,9 +6,9 @@ import numpy as np
 from support.half_car_road import VAN, batch_over_road
 
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.plan import Advice, Expected, LoadPlan, PlacedLoad, SidewaysLoad
+from gateway.calibration.plan import Advice, Expected, LoadPlan, OffCentreLoad, PlacedLoad
 from gateway.calibration.plan.plan import sideways_load
-from gateway.cli.text.plan import plan_sentences
+from gateway.cli.calibrate_text import plan_sentences
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.reports.calibration.runs import plan_section
 
@@ -50,7 +50,7 @@ def test_a_limit_of_single_wheels_bounds_the_load() -> None:
 def test_people_read_it() -> None:
     load = PlacedLoad(450.0, 1.4, 51.0)
     plan = LoadPlan("van", 3, Drive(600.0, 14.0), EXPECTED, (Advice(load, EXPECTED),), None)
-    advised = replace(plan, sideways=SidewaysLoad(load, 0.4))
+    advised = replace(plan, sideways=OffCentreLoad(load, 0.4))
     assert "payload_left_m = 0.4 or -0.4" in plan_sentences(advised)
     assert "payload_left_m" not in plan_sentences(plan)
     assert "450 kg 0.4 m left of the centre line" in " ".join(plan_section(advised).paragraphs)

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from gateway.cli import springscale
-from gateway.cli.asked.service import Service
+from gateway.cli.service import Service
 from gateway.errors import SpringscaleError
 
 CONTENT = bytes(range(256)) * 40

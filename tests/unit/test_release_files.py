@@ -16,7 +16,7 @@ import yaml
 from support.locks import ROOT, pins
 from support.patience import PATIENCE_S
 
-from gateway.web.door.guard import PUBLIC_PATHS
+from gateway.web.access.guard import PUBLIC_PATHS
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 IMAGE = (ROOT / "deploy/container/Containerfile").read_text()

@@ -9,12 +9,12 @@ from support.half_car_road import VAN
 
 from gateway.calibration.half_car import prior_of
 from gateway.calibration.judgement import (
+    BatchSet,
     CgLeftErrors,
     Errors,
     ErrorTable,
     Judged,
     Judgement,
-    Part,
     TargetErrors,
     WheelErrors,
 )
@@ -82,7 +82,7 @@ def judged(cg_left: CgLeftErrors | None, wheels: WheelErrors | None) -> Judgemen
     errors = Errors(0, 0, {}, none, replace(none, unit="pp"), cg_left, wheels)
     told = replace(make_estimate(0, Why.TOO_SLOW), cg_left=Quantity.normal(0.01, 0.02))
     batches = (Judged(1, "1.log", 0.0, 52.0, told, 0.0), Judged(2, "2.log", 100.0, 50.0, told))
-    return Judgement("cross_spectrum", {Part.VALIDATION: ErrorTable("cross_spectrum", batches, errors, ())})
+    return Judgement("cross_spectrum", {BatchSet.VALIDATION: ErrorTable("cross_spectrum", batches, errors, ())})
 
 
 def test_how_well_places_to_the_side_were_told_stands_with_the_accuracy() -> None:

@@ -7,7 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.reports.charts import Axis, Chart, Line, Link, Mark, Panel, Points, Ribbon, Rule, Section, Span, Table
+from gateway.reports.charts import (
+    Axis,
+    Chart,
+    ChartLink,
+    LineMark,
+    Mark,
+    Panel,
+    Points,
+    Ribbon,
+    Rule,
+    Section,
+    Span,
+    Table,
+)
 from gateway.reports.charts.chart import COLOURS
 from gateway.reports.charts.html import section_html, table_html
 from gateway.reports.charts.live import live, plotly_json, plotly_script
@@ -15,7 +28,7 @@ from gateway.reports.charts.still import draw, save_still
 
 X = np.linspace(1.0, 3.0, 5)
 MARKS: tuple[Mark, ...] = (
-    Line(X, X**2, "line"),
+    LineMark(X, X**2, "line"),
     Points(X, X, "points", 1, "diamond", X - 1.0, X + 2.0, tuple("abcde")),
     Ribbon(X, X - 1.0, X + 1.0, "ribbon", 2),
     Rule(2.0, is_vertical=True, label="rule"),
@@ -62,10 +75,10 @@ def test_numbers_reach_plotly_as_they_are() -> None:
 
 
 def test_a_label_stands_in_the_legend_once_and_switches_every_panel() -> None:
-    traces = live(chart(panel(Line(X, X, "same")), panel(Line(X, -X, "same"), Line(X, X, "other")))).data
+    traces = live(chart(panel(LineMark(X, X, "same")), panel(LineMark(X, -X, "same"), LineMark(X, X, "other")))).data
     assert [trace.showlegend for trace in traces] == [True, False, True]
     assert [trace.legendgroup for trace in traces] == ["same", "same", "other"]
-    (legend,) = draw(chart(panel(Line(X, X, "same")), panel(Line(X, -X, "same")))).legends
+    (legend,) = draw(chart(panel(LineMark(X, X, "same")), panel(LineMark(X, -X, "same")))).legends
     assert [text.get_text() for text in legend.get_texts()] == ["same"]
 
 
@@ -79,14 +92,14 @@ def test_on_a_phone_panels_stand_below_one_another() -> None:
 
 
 def test_axes_say_what_they_are() -> None:
-    one = chart(Panel(Axis("f", limits=(1.0, 9.0)), Axis("", places=("low", "high")), (Line(X, X),)))
+    one = chart(Panel(Axis("f", limits=(1.0, 9.0)), Axis("", places=("low", "high")), (LineMark(X, X),)))
     layout = json.loads(plotly_json(one))["layout"]
     assert layout["xaxis"]["title"]["text"] == "f"
     assert layout["xaxis"]["range"] == [1.0, 9.0]
     assert layout["yaxis"]["ticktext"] == ["low", "high"]
     (axes,) = draw(one).axes
     assert [label.get_text() for label in axes.get_yticklabels()] == ["low", "high"]
-    logarithmic = live(chart(Panel(Axis("f", is_log=True, limits=(0.1, 10.0)), Axis("y"), (Line(X, X),))))
+    logarithmic = live(chart(Panel(Axis("f", is_log=True, limits=(0.1, 10.0)), Axis("y"), (LineMark(X, X),))))
     assert logarithmic.layout.xaxis.range == (-1.0, 1.0)
 
 
@@ -104,7 +117,7 @@ def test_the_script_is_the_installed_packages_own() -> None:
 
 def test_named_positions_stand_on_both_charts() -> None:
     weeks = Axis("week", ticks=((1.0, "2026-01"), (3.0, "2026-02")))
-    named = chart(Panel(weeks, Axis("y"), (Line(X, X),)))
+    named = chart(Panel(weeks, Axis("y"), (LineMark(X, X),)))
     axis = json.loads(plotly_json(named))["layout"]["xaxis"]
     assert (axis["tickvals"], axis["ticktext"]) == ([1.0, 3.0], ["2026-01", "2026-02"])
     [axes, *_] = draw(named).axes
@@ -112,12 +125,12 @@ def test_named_positions_stand_on_both_charts() -> None:
 
 
 def test_a_cell_may_lead_to_another_page_and_nothing_breaks_out_of_it() -> None:
-    cells = table_html(Table("of vans", ("Van",), ((Link("<b>", 'a"b.html'),),)))
+    cells = table_html(Table("of vans", ("Van",), ((ChartLink("<b>", 'a"b.html'),),)))
     assert '<th scope="row"><a href="a&quot;b.html">&lt;b&gt;</a></th>' in cells
 
 
 def test_a_chart_without_a_still_picture_names_none() -> None:
-    still = chart(panel(Line(X, X)))
+    still = chart(panel(LineMark(X, X)))
     live_only = replace(still, has_still=False)
     pages = [section_html(Section("a", "A", (), (one,)), {one.name: "{}"}) for one in (still, live_only)]
     assert ["<img" in page for page in pages] == [True, False]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.half_car_road import VAN
-from support.rolling_road import WIDE_VAN, batch_over_two_tracks
+from support.rolling_road import WIDE_VAN, batch_over_two_tracks, calibrated_with_roll, runs_over_two_tracks
 
 from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.calibration.half_car.prior import can_roll
@@ -21,19 +21,14 @@ from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Vehicle
 from gateway.estimate import Estimate
 from gateway.records import Batch
 
-LOADS = ((0.0, 52.0, 0.0), (300.0, 46.0, 0.0))
-
 
 def silent(batch: Batch) -> Batch:
     return replace(batch, roll_rate_radps=None)
 
 
 def runs(*, with_roll: bool) -> list[KnownRun]:
-    found = []
-    for i, load in enumerate(LOADS):
-        batch = batch_over_two_tracks(*load, seed=50 + i, duration_s=120.0)
-        found.append(KnownRun(i, f"run {i}", *load[:2], (batch if with_roll else silent(batch),)))
-    return found
+    rolling = runs_over_two_tracks()
+    return rolling if with_roll else [replace(run, batches=tuple(map(silent, run.batches))) for run in rolling]
 
 
 def weighed(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
@@ -89,7 +84,7 @@ def test_a_vehicle_of_which_too_little_is_known_does_not_use_roll(vehicle: Vehic
 
 @pytest.fixture(scope="module")
 def rolled() -> CrossSpectrumCalibration:
-    return calibrate_cross_spectrum(runs(with_roll=True), WIDE_VAN)
+    return calibrated_with_roll()
 
 
 def test_a_roll_rate_is_used_where_enough_is_known(rolled: CrossSpectrumCalibration) -> None:

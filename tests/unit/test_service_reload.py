@@ -29,7 +29,7 @@ from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.errors import ConfigurationError
 from gateway.log import LOGGER, set_log_level
 from gateway.notify import Notifier
-from gateway.service import life
+from gateway.service import lifecycle as life
 from gateway.service.commissioning import commissioned, with_commissioned
 from gateway.service.gateway import Gateway as Service
 from gateway.service.reload import Reloader, changed_keys, tls_of
@@ -281,14 +281,14 @@ def test_who_is_to_start_anew_under_systemd_leaves_with_the_code_that_the_unit_k
 ) -> None:
     """A service that began anew inside its process had to clear private caches of FastAPI."""
     unit = (Path(__file__).parents[2] / "deploy/springscale.service").read_text()
-    assert f"RestartForceExitStatus={life.START_ANEW}\n" in unit
-    assert f"SuccessExitStatus={life.START_ANEW}\n" in unit
+    assert f"RestartForceExitStatus={life.RESTART_CODE}\n" in unit
+    assert f"SuccessExitStatus={life.RESTART_CODE}\n" in unit
     monkeypatch.setenv("NOTIFY_SOCKET", "/run/nobody")
     with pytest.raises(SystemExit) as leaving:
-        life.start_anew()
-    assert leaving.value.code == life.START_ANEW
+        life.restart()
+    assert leaving.value.code == life.RESTART_CODE
     monkeypatch.delenv("NOTIFY_SOCKET")
     called: list[list[str]] = []
     monkeypatch.setattr(life.os, "execv", lambda path, arguments: called.append(arguments))
-    life.start_anew()
+    life.restart()
     assert called == [[sys.executable, *sys.orig_argv[1:]]]

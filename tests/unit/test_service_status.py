@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 
-from gateway.bus.live import Around, SourceState
+from gateway.bus.live import BusSurvey, SourceState
 from gateway.records import Signal
 from gateway.service.status import SENSOR_LOST_S, StatusReport
 from gateway.status import State
@@ -36,10 +36,10 @@ def report(
         "pipeline": SimpleNamespace(watch=SimpleNamespace(last_heard=heard), flow=SimpleNamespace(scheduler=scheduler)),
         "store": None,
         "board": SimpleNamespace(age_s=lambda: estimate_age_s, is_stale=lambda: is_stale),
-        "around": Around(None),
+        "bus_survey": BusSurvey(None),
     }
     told = StatusReport(**cast(Any, parts))
-    told._started = now - 60.0  # instead of waiting for a minute
+    told.started_s = now - 60.0  # instead of waiting for a minute
     return told.state()
 
 
@@ -93,7 +93,7 @@ def test_an_estimate_is_collected_shown_and_grows_old() -> None:
 def test_it_is_ready_while_estimates_can_come(state: State, calibration: object, reason: str | None) -> None:
     """Without a calibration none can come, whatever the bus says: /health/ready once answered 200."""
     told: Any = StatusReport.__new__(StatusReport)
-    told._setup, told._source = SimpleNamespace(calibration=calibration), SimpleNamespace(reason="can0: no such device")
+    told.setup, told.source = SimpleNamespace(calibration=calibration), SimpleNamespace(reason="can0: no such device")
     why = told._why_not_ready(state)
     assert (why or "").startswith(reason or "")
     assert (why is None) is (reason is None)

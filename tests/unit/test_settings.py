@@ -10,7 +10,7 @@ from support.drives import drive
 from support.patience import PATIENCE_S
 
 from gateway.config import ESTIMATOR_NAMES, Settings, load_settings
-from gateway.config.sections import Section
+from gateway.config.sections import SettingsSection
 from gateway.core.estimator import ESTIMATORS
 from gateway.core.scheduler import Scheduler
 from gateway.errors import ConfigurationError, SignalMapError
@@ -147,7 +147,7 @@ def numeric_keys() -> list[tuple[str, str]]:
     return [
         (name, key)
         for name, section in sections.items()
-        if isinstance(section, type) and issubclass(section, Section)
+        if isinstance(section, type) and issubclass(section, SettingsSection)
         for key, field in section.model_fields.items()
         if {field.annotation, *get_args(field.annotation)} & {int, float}
     ]

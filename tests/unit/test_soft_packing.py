@@ -4,10 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.half_car_road import CAR, VAN, batch_over_road, weighed
+from support.half_car_road import CAR, batch_over_road, calibrated_on_known_loads, weighed
 
-from gateway.calibration.half_car import calibrate_cross_spectrum
-from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum import located
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import DRIFTING, drift_precision
@@ -15,19 +13,21 @@ from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT
 from gateway.core.cross_spectrum.packing import DECISIVE, SOFT_COST, Packing, packings
 from gateway.core.cross_spectrum.search import Found
 from gateway.estimate import Estimate, Quantity
+from gateway.posterior import Source
 
-KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))
 FIRM_HZ = CAR.payload_mode_hz
 
 
 @pytest.fixture(scope="module")
 def calibration() -> CrossSpectrumCalibration:
     """Of loads that stood firmly."""
-    runs = [
-        KnownRun(i, f"run {i}", *load, tuple(batch_over_road(*load, seed=10 * i + k) for k in range(2)))
-        for i, load in enumerate(KNOWN)
-    ]
-    return calibrate_cross_spectrum(runs, VAN)
+    return calibrated_on_known_loads()
+
+
+def of_model(found: Estimate) -> float:
+    """Standard deviation of the payload by the model's own error."""
+    assert found.posterior is not None
+    return float(np.linalg.norm(found.posterior.sources[Source.MODEL][:, 0]))
 
 
 def holds(quantity: Quantity, truth: float) -> bool:
@@ -70,6 +70,8 @@ def test_dampers_that_have_worn_are_found_and_do_not_spoil_the_weight(
     assert holds(found.front_share, load[1])
     assert found.diagnostics["damper_front_freed_ratio"] == pytest.approx(front, rel=0.1)
     assert found.diagnostics["damper_rear_freed_ratio"] == pytest.approx(rear, rel=0.1)
+    healthy = weighed(batch_over_road(*load, seed=43), calibration)
+    assert of_model(found) > 3.0 * of_model(healthy)  # the rest of the vehicle is no longer as calibrated either
 
 
 def test_healthy_dampers_are_not_sought_as_worn_ones(calibration: CrossSpectrumCalibration) -> None:

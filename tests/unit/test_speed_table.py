@@ -28,6 +28,12 @@ def test_a_goal_is_met_or_missed():
     assert verdicts["wc -l"] == ""
 
 
+@pytest.mark.parametrize(("seconds", "is_told"), [(0.034, False), (0.036, True)])
+def test_what_holds_a_figure_is_told_where_its_goal_is_missed(seconds: float, is_told: bool):
+    batch, *_ = lines_of({"weigh": {"batch_s": {"cross_spectrum": seconds}, "calibration": {"cpu_s": 1.0}}})
+    assert ("missed, held by" in batch.verdict) == is_told
+
+
 def test_who_is_not_installed_is_left_out_with_a_word():
     figures = {line.what: line.figure for line in lines_of({"decode": DECODE})}
     assert figures["hilspy, by DBC"] == "left out: hilspy is not installed"

@@ -5,8 +5,8 @@ import re
 from support.estimates import make_record
 
 from gateway.calibration.plan import Advice, Expected, LoadPlan, PlacedLoad
-from gateway.cli.text.estimate import sentence
-from gateway.cli.text.plan import plan_sentences
+from gateway.cli.calibrate_text import plan_sentences
+from gateway.cli.estimate import sentence
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.reports.calibration.runs import best_next, plan_section
 

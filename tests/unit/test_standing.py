@@ -8,7 +8,7 @@ from support.estimates import make_estimate
 
 from gateway.estimate import Estimate
 from gateway.records import Motion, Signal
-from gateway.service.watching import SignalWatch, StandingWatch
+from gateway.service.signal_watch import SignalWatch, StandingWatch
 
 S = 1_000_000_000
 

@@ -7,8 +7,7 @@ import sys
 HEAVY = (
     "scipy.stats",
     "scipy.signal",
-    "scipy.optimize",
-    "scipy.interpolate",
+    "scipy",
     "asammdf",
     "pandas",
     "matplotlib",

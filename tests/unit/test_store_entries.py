@@ -138,13 +138,13 @@ def test_the_outbox_hands_out_both_in_order_and_positions_only_where_asked(tmp_p
         write(store, entry(1, 2))
         assert store.flush(PATIENCE_S)
         outbox = Outbox(store, "there", with_places=with_places)
-        letters = outbox.next_letters(100)
+        letters = outbox.next_messages(100)
         assert [one.branch for one in letters] == ["estimates", "trips", "estimates", "events"]
         assert letters[-1].id == "event-1-abc-2"
         assert ("latitude_deg" in "".join(one.text for one in letters)) is with_places
         outbox.delivered(letters[1])
         outbox.rewind()
-        assert [one.id for one in outbox.next_letters(100)] == [one.id for one in letters[2:]]
+        assert [one.id for one in outbox.next_messages(100)] == [one.id for one in letters[2:]]
 
 
 def test_small_pages_of_the_outbox_lose_nothing(tmp_path):
@@ -155,6 +155,6 @@ def test_small_pages_of_the_outbox_lose_nothing(tmp_path):
                 write(store, entry(10 * n + k))
         assert store.flush(PATIENCE_S)
         outbox, ids = Outbox(store, "there"), []
-        while letters := outbox.next_letters(2):
+        while letters := outbox.next_messages(2):
             ids += [one.id for one in letters]
         assert len(ids) == len(set(ids)) == 7 + 6

@@ -1,7 +1,6 @@
 """What goes into the store comes out of it, once, in order and unchanged."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +13,6 @@ from gateway.records import Why
 from gateway.status import StoreState
 from gateway.store import Retention, Store
 from gateway.units import NS_PER_S
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    opened = Store.open(tmp_path)
-    yield opened
-    opened.close()
 
 
 def write(store: Store, *records: dict[str, Any]) -> list[str]:

@@ -120,7 +120,7 @@ def test_siblings_are_told_way_by_way(tmp_path: Path, monkeypatch: pytest.Monkey
         for i in range(20)
     ]
     refused = JudgedBatch("van 0", "van 0 20", "mixed", Way.ALONE, ("gap",), 9.0, 9.0, False, False)
-    monkeypatch.setattr("benchmarks.accuracy.siblings.study.of_each_van", lambda *_: [batches, [refused]])
+    monkeypatch.setattr("benchmarks.accuracy.siblings.study.run_each", lambda *_: [batches, [refused]])
     page = run("siblings", "--vans", "4", "--output", str(tmp_path / "out"))
     assert "3 simulated vans of 2 lines" in page
     assert f"| {Way.ALONE} | 21 | 1: 1 gap | 2.00 | 2.33 | 95 % (" in page

@@ -18,12 +18,12 @@ from support.patience import PATIENCE_S, wait_until
 from gateway.calibration.trend import Sums, TrendHistory, Week, found_pct, monday_of, theil_sen, trends_of
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
-from gateway.history import Page
+from gateway.history import HistoryPage
 from gateway.log import Event
 from gateway.records import Why
-from gateway.service.proving import trend_keeper
-from gateway.service.proving.trend_keeper import TrendKeeper
 from gateway.service.subject import Subject
+from gateway.service.verification import trend as trend_keeper
+from gateway.service.verification.trend import TrendService
 from gateway.units import NS_PER_S
 
 MONDAY_NS = 1_790_035_200 * NS_PER_S  # 2026-09-22 is a Tuesday
@@ -197,10 +197,10 @@ def test_the_keeper_goes_on_where_it_was_and_counts_nothing_twice(tmp_path: Path
             )
             store.write_estimate(estimate_to_json(one))
         assert store.flush(PATIENCE_S)
-        keeper = TrendKeeper(tmp_path, subject, store.reader().estimates, lambda: [])  # a restart
+        keeper = TrendService(tmp_path, subject, store.reader().estimates, lambda: [])  # a restart
         keeper.catch_up()
         keeper.catch_up()
-    told = json.loads(keeper.told())
+    told = json.loads(keeper.state())
     (rear,) = [one for one in told["parameters"] if one["name"] == "damper_rear"]
     assert [point["n"] for point in rear["points"]] == [1] * 12
     assert rear["is_drifting"] is True
@@ -212,11 +212,11 @@ def test_a_file_that_cannot_be_believed_is_set_aside_and_made_anew(tmp_path: Pat
     (tmp_path / "trend.json").write_text("{")
     store = stored(tmp_path / "store", [batch(MONDAY_NS, calibration_id=CALIBRATED.id)])
     subject = Subject(CALIBRATED, "cross_spectrum", "van-17")
-    keeper = TrendKeeper(tmp_path, subject, store.reader().estimates, lambda: [])
+    keeper = TrendService(tmp_path, subject, store.reader().estimates, lambda: [])
     assert "set aside" in str(keeper.fault)
     keeper.catch_up()
     assert keeper.fault is None
-    assert json.loads(keeper.told())["parameters"][0]["points"][0]["n"] == 1
+    assert json.loads(keeper.state())["parameters"][0]["points"][0]["n"] == 1
     store.close()
 
 
@@ -228,11 +228,11 @@ def test_what_no_version_wrote_ends_no_following(
     monkeypatch.setattr(trend_keeper, "EVERY_S", 0.01)
     asked: list[object] = []
 
-    def ask(**question: object) -> Page:
+    def ask(**question: object) -> HistoryPage:
         asked.append(question)
-        return Page(("[]",), ("a-1",), (None,), None, "a-1")
+        return HistoryPage(("[]",), ("a-1",), (None,), None, "a-1")
 
-    keeper = TrendKeeper(tmp_path, Subject(CALIBRATED, "cross_spectrum", "van-17"), ask, lambda: [])
+    keeper = TrendService(tmp_path, Subject(CALIBRATED, "cross_spectrum", "van-17"), ask, lambda: [])
     keeper.start()
     assert wait_until(lambda: len(asked) >= 2)
     keeper.stop()

@@ -4,7 +4,7 @@ import os
 import random
 import resource
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,29 +20,22 @@ from gateway.errors import ConfigurationError
 from gateway.log import Event
 from gateway.store import Retention, Store
 from gateway.uplink import Outbox, Uplink, UplinkSettings, uplink_settings
-from gateway.uplink.back_off import BackOff
-from gateway.uplink.link import Answer, LinkError
-from gateway.uplink.outbox import Letter
+from gateway.uplink.forwarder import BackOff
+from gateway.uplink.link import BrokerAnswer, LinkError
+from gateway.uplink.outbox import OutboxMessage
 
 KNOWN = dict(UplinkSection(host="fleet.example"))
 SETTINGS = UplinkSettings("broker.example", 8883, "springscale/van-17", "springscale-van-17")
 
 
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    opened = Store.open(tmp_path)
-    yield opened
-    opened.close()
-
-
 class FakeBroker:
     """Takes what it is sent; ``answer`` says what to reply to the n-th message, or breaks the link."""
 
-    def __init__(self, answer: Callable[[int, Letter], Answer | None]) -> None:
-        self.taken: list[Letter] = []
+    def __init__(self, answer: Callable[[int, OutboxMessage], BrokerAnswer | None]) -> None:
+        self.taken: list[OutboxMessage] = []
         self.n_connections = 0
         self._answer = answer
-        self._answers: list[Answer] = []
+        self._answers: list[BrokerAnswer] = []
         self._n_sent = 0
 
     def __call__(self, _settings: UplinkSettings, _birth: Any) -> "FakeBroker":
@@ -50,16 +43,16 @@ class FakeBroker:
         self._answers = []
         return self
 
-    def send(self, letter: Letter) -> int:
+    def send(self, message: OutboxMessage) -> int:
         self._n_sent += 1
-        answer = self._answer(self._n_sent, letter)
+        answer = self._answer(self._n_sent, message)
         if answer is not None:
             if answer.is_accepted:
-                self.taken.append(letter)
+                self.taken.append(message)
             self._answers.append(answer)
         return self._n_sent
 
-    def turn(self, timeout_s: float) -> list[Answer]:
+    def turn(self, timeout_s: float) -> list[BrokerAnswer]:
         if not self._answers:
             time.sleep(0.001)
         answers, self._answers = self._answers, []
@@ -70,8 +63,8 @@ class FakeBroker:
     def abandon(self) -> None: ...
 
 
-def accepted(n: int, _letter: Letter) -> Answer:
-    return Answer(n, True, False, "Success")
+def accepted(n: int, _letter: OutboxMessage) -> BrokerAnswer:
+    return BrokerAnswer(n, True, False, "Success")
 
 
 def fill(store: Store, n: int) -> list[str]:
@@ -97,7 +90,7 @@ def test_everything_stored_is_delivered_once_and_in_order(store: Store) -> None:
     ids = fill(store, 250)
     broker = FakeBroker(accepted)
     deliver(store, broker, lambda uplink: uplink.report().n_delivered == 250)
-    assert [letter.id for letter in broker.taken] == ids
+    assert [message.id for message in broker.taken] == ids
     assert store.reader().delivery("fleet").n_waiting == 0
 
 
@@ -108,23 +101,23 @@ def test_a_later_start_goes_on_where_the_last_one_ended(store: Store) -> None:
     store.write_estimate(new)
     broker = FakeBroker(accepted)
     deliver(store, broker, lambda uplink: uplink.report().n_delivered == 1)
-    assert [letter.id for letter in broker.taken] == [new["id"]]
+    assert [message.id for message in broker.taken] == [new["id"]]
 
 
 def test_after_a_break_only_the_letter_under_way_comes_again(store: Store) -> None:
     ids = fill(store, 40)
     breaks = {7, 8, 23}
 
-    def answer(n: int, letter: Letter) -> Answer | None:
+    def answer(n: int, message: OutboxMessage) -> BrokerAnswer | None:
         if n in breaks:
-            broker.taken.append(letter)  # it arrived, its answer did not
+            broker.taken.append(message)  # it arrived, its answer did not
             raise LinkError("cut")
-        return accepted(n, letter)
+        return accepted(n, message)
 
     broker = FakeBroker(answer)
     uplink = deliver(store, broker, lambda uplink: uplink.report().n_delivered >= 40)
     assert uplink.report().n_cuts == len(breaks)
-    came = [letter.id for letter in broker.taken]
+    came = [message.id for message in broker.taken]
     assert list(dict.fromkeys(came)) == ids
     assert len(came) - len(ids) == len(breaks)
     assert broker.n_connections == 1 + len(breaks)
@@ -134,13 +127,13 @@ def test_what_the_broker_may_take_later_is_tried_again(store: Store) -> None:
     ids = fill(store, 3)
     answers = iter(["Quota exceeded", "Not authorized"])
 
-    def answer(n: int, letter: Letter) -> Answer:
+    def answer(n: int, message: OutboxMessage) -> BrokerAnswer:
         reason = next(answers, None)
-        return accepted(n, letter) if reason is None else Answer(n, False, False, reason)
+        return accepted(n, message) if reason is None else BrokerAnswer(n, False, False, reason)
 
     broker = FakeBroker(answer)
     uplink = deliver(store, broker, lambda uplink: uplink.report().n_delivered == 3)
-    assert [letter.id for letter in broker.taken] == ids
+    assert [message.id for message in broker.taken] == ids
     assert uplink.report().n_refused == 0
 
 
@@ -149,24 +142,24 @@ def test_what_the_broker_will_never_take_is_counted_and_holds_nothing_up(
 ) -> None:
     ids = fill(store, 6)
 
-    def answer(n: int, letter: Letter) -> Answer:
-        if letter.id == ids[2]:
-            return Answer(n, False, True, "Packet too large")
-        return accepted(n, letter)
+    def answer(n: int, message: OutboxMessage) -> BrokerAnswer:
+        if message.id == ids[2]:
+            return BrokerAnswer(n, False, True, "Packet too large")
+        return accepted(n, message)
 
     broker = FakeBroker(answer)
     uplink = deliver(store, broker, lambda uplink: uplink.report().n_delivered == 5)
-    assert [letter.id for letter in broker.taken] == [*ids[:2], *ids[3:]]
+    assert [message.id for message in broker.taken] == [*ids[:2], *ids[3:]]
     assert uplink.report().n_refused == 1
     assert fields_of(caplog, Event.UPLINK_REFUSED)["id"] == ids[2]
 
 
 def test_nothing_leaves_before_the_letter_ahead_is_answered(store: Store) -> None:
     fill(store, 3)
-    sent: list[Letter] = []
+    sent: list[OutboxMessage] = []
 
-    def silent(_n: int, letter: Letter) -> None:
-        sent.append(letter)
+    def silent(_n: int, message: OutboxMessage) -> None:
+        sent.append(message)
 
     uplink = deliver(store, FakeBroker(silent), lambda uplink: bool(sent))
     assert len(sent) == 1
@@ -236,14 +229,14 @@ def test_a_database_that_was_replaced_is_delivered_from_its_first_row(tmp_path: 
     store = Store.open(tmp_path / "a")
     fill(store, 3)
     outbox = Outbox(store, "fleet")
-    for letter in outbox.next_letters(10):
-        outbox.delivered(letter)
+    for message in outbox.next_messages(10):
+        outbox.delivered(message)
     assert store.flush(PATIENCE_S)
     store.close()
     other = Store.open(tmp_path / "b")
     ids = fill(other, 2)
     outbox._journal, outbox._follower = other, other.follow(outbox._kinds, outbox._follower.place, lambda: None)
-    assert [letter.id for letter in outbox.next_letters(10)] == ids
+    assert [message.id for message in outbox.next_messages(10)] == ids
     other.close()
 
 
@@ -327,10 +320,10 @@ def test_the_log_tells_of_a_link_when_it_comes_and_when_it_goes(store: Store, ca
             raise LinkError(fault)
         return broker(settings, birth)
 
-    def answer(n: int, letter: Letter) -> Answer:
+    def answer(n: int, message: OutboxMessage) -> BrokerAnswer:
         if n == 2:
             raise LinkError("cut")
-        return accepted(n, letter)
+        return accepted(n, message)
 
     broker = FakeBroker(answer)
     uplink = Uplink(SETTINGS, Outbox(store, "fleet"), {}, connect, BackOff(0.001, 0.002))

@@ -39,7 +39,7 @@ def delivered(outbox: Outbox, n: int, clock: Clock) -> list[str]:
     """The next ``n``, one a second."""
     said = []
     for _ in range(n):
-        (letter,) = outbox.next_letters(1)
+        (letter,) = outbox.next_messages(1)
         clock.now_s += 1.0
         outbox.delivered(letter)
         said.append(letter.id)
@@ -52,7 +52,7 @@ def test_what_was_delivered_lately_is_said_again(store: Store, clock: Clock) -> 
     clock.now_s += 1000.0  # a dead link may be noticed late: what counts is the time before the last delivery
     outbox.rewind()
     outbox.rewind()  # no connection yet
-    assert [letter.id for letter in outbox.next_letters(9)] == IDS[2:]
+    assert [letter.id for letter in outbox.next_messages(9)] == IDS[2:]
 
 
 def test_a_second_break_in_the_middle_begins_no_later(store: Store, clock: Clock) -> None:
@@ -61,14 +61,14 @@ def test_a_second_break_in_the_middle_begins_no_later(store: Store, clock: Clock
     outbox.rewind()
     assert delivered(outbox, 1, clock) == IDS[2:3]
     outbox.rewind()
-    assert [letter.id for letter in outbox.next_letters(9)] == IDS[2:]
+    assert [letter.id for letter in outbox.next_messages(9)] == IDS[2:]
 
 
 def test_without_it_nothing_that_was_delivered_comes_again(store: Store, clock: Clock) -> None:
     outbox = Outbox(store, "fleet")
     delivered(outbox, 4, clock)
     outbox.rewind()
-    assert [letter.id for letter in outbox.next_letters(9)] == IDS[4:]
+    assert [letter.id for letter in outbox.next_messages(9)] == IDS[4:]
 
 
 def test_a_replaced_database_is_not_asked_for_the_old_ones_places(store: Store, clock: Clock, tmp_path: Path) -> None:
@@ -79,5 +79,5 @@ def test_a_replaced_database_is_not_asked_for_the_old_ones_places(store: Store, 
     assert another.flush(PATIENCE_S)
     outbox._journal, outbox._follower = another, another.follow(outbox._kinds, outbox._follower.place, lambda: None)
     outbox.rewind()
-    assert [letter.id for letter in outbox.next_letters(9)] == [make_record(9)["id"]]
+    assert [letter.id for letter in outbox.next_messages(9)] == [make_record(9)["id"]]
     another.close()

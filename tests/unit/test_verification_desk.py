@@ -74,7 +74,7 @@ def test_several_loads_in_one_record_pass_together_or_fail(tmp_path: Path, store
 def test_records_stay_and_are_told_newest_first(tmp_path: Path, store: Store) -> None:
     ids = [verified(tmp_path, store, StatedWeight(AT, payload_kg=float(kg)))["id"] for kg in (100, 110)]
     desk = verification_desk(tmp_path, store)
-    told = json.loads(desk.told())
+    told = json.loads(desk.state())
     assert [entry["id"] for entry in told["history"]] == ids[::-1]
     found = desk.record(ids[0])
     assert found is not None
@@ -86,7 +86,7 @@ def refusal_of(tmp_path: Path, store: Store, stated: StatedWeight) -> str:
     desk = verification_desk(tmp_path, store)
     with pytest.raises(WeightRefusedError) as refused:
         desk.verify("workshop", None, [stated])
-    assert json.loads(desk.told())["history"] == []
+    assert json.loads(desk.state())["history"] == []
     return refused.value.reason
 
 
@@ -138,4 +138,4 @@ def test_a_file_that_cannot_be_believed_is_set_aside(tmp_path: Path, store: Stor
     assert desk.fault is None
     (aside,) = tmp_path.glob("*.broken-*")
     assert aside.read_text() == content
-    assert len(json.loads(verification_desk(tmp_path, store).told())["history"]) == 1
+    assert len(json.loads(verification_desk(tmp_path, store).state())["history"]) == 1

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.records import iso_utc
-from gateway.web.instant import parse_instant
+from gateway.web.schemas import parse_instant
 
 US_LAST = 253_402_300_799_999_999  # the end of 9999
 

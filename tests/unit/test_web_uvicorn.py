@@ -1,4 +1,4 @@
-"""What the door relies on of uvicorn's insides: they have no promise, so the range is pinned and each is named here.
+"""The internals of uvicorn that the web server relies on: none is promised, so the version is pinned.
 
 A new minor version of uvicorn: raise the bound in pyproject.toml, run this and tests/scenarios/test_web_flood.py.
 """
@@ -17,9 +17,8 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResp
 from uvicorn.protocols.utils import get_remote_addr
 from uvicorn.server import ServerState
 
-from gateway.service.web_server import WebServer
-from gateway.web.door.connection import GuardedConnection
-from gateway.web.door.tls import TlsConfig
+from gateway.web.access.connection import GuardedConnection
+from gateway.web.access.serving import TlsConfig, WebServer
 
 # Callbacks of the protocol that are overridden and call the one above them, with their arguments
 OVERRIDDEN = {
@@ -81,7 +80,7 @@ def test_the_server_and_its_settings_have_what_is_looked_at() -> None:
 
 
 def test_a_server_that_sleeps_ends_as_soon_as_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.service.web_server.TICK_S", 3600.0)
+    monkeypatch.setattr("gateway.web.access.serving.TICK_S", 3600.0)
 
     async def serve() -> None:
         config = uvicorn.Config(lambda: None)  # type: ignore[arg-type,return-value]  # no app: nobody asks

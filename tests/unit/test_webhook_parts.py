@@ -15,9 +15,9 @@ from gateway.config import VehicleSection
 from gateway.config.alarms import WebhookSection
 from gateway.errors import ConfigurationError
 from gateway.records import json_line
-from gateway.uplink.outbox import Letter
-from gateway.uplink.webhook import SecretError, Verdict, secrets_of, signed, webhook_settings
-from gateway.uplink.webhook.receiver import MOST_PAUSE_S, _seconds, body_of, verdict_of
+from gateway.uplink.outbox import OutboxMessage
+from gateway.uplink.webhook import PostVerdict, SecretError, secrets_of, signed, webhook_settings
+from gateway.uplink.webhook.receiver import MOST_PAUSE_S, _seconds, body_of, post_verdict_of
 
 VAN = VehicleSection(id="van-17")
 
@@ -49,36 +49,53 @@ def test_what_is_no_secret_is_refused(text: str) -> None:
 @pytest.mark.parametrize(
     ("status", "verdict"),
     [
-        (200, Verdict.TAKEN), (202, Verdict.TAKEN), (204, Verdict.TAKEN),
-        (301, Verdict.REFUSED), (400, Verdict.REFUSED), (401, Verdict.REFUSED), (403, Verdict.REFUSED),
-        (404, Verdict.REFUSED), (410, Verdict.UNWANTED), (413, Verdict.UNWANTED), (422, Verdict.REFUSED),
-        (429, Verdict.AWAY), (500, Verdict.REFUSED), (502, Verdict.AWAY), (503, Verdict.AWAY), (504, Verdict.AWAY),
+        (200, PostVerdict.TAKEN),
+        (202, PostVerdict.TAKEN),
+        (204, PostVerdict.TAKEN),
+        (301, PostVerdict.REFUSED),
+        (400, PostVerdict.REFUSED),
+        (401, PostVerdict.REFUSED),
+        (403, PostVerdict.REFUSED),
+        (404, PostVerdict.REFUSED),
+        (410, PostVerdict.UNWANTED),
+        (413, PostVerdict.UNWANTED),
+        (422, PostVerdict.REFUSED),
+        (429, PostVerdict.AWAY),
+        (500, PostVerdict.REFUSED),
+        (502, PostVerdict.AWAY),
+        (503, PostVerdict.AWAY),
+        (504, PostVerdict.AWAY),
     ],
-)  # fmt: skip
-def test_what_a_status_means(status: int, verdict: Verdict) -> None:
-    assert verdict_of(status) is verdict
+)
+def test_what_a_status_means(status: int, verdict: PostVerdict) -> None:
+    assert post_verdict_of(status) is verdict
 
 
 @pytest.mark.parametrize(
     ("header", "seconds"),
     [
-        (None, 0.0), ("17", 17.0), ("999999", MOST_PAUSE_S), ("-3", 0.0), ("soon", 0.0),
-        ("Thu, 01 Jan 1970 00:17:10 GMT", 30.0), ("Thu, 01 Jan 1970 00:00:10 GMT", 0.0),
+        (None, 0.0),
+        ("17", 17.0),
+        ("999999", MOST_PAUSE_S),
+        ("-3", 0.0),
+        ("soon", 0.0),
+        ("Thu, 01 Jan 1970 00:17:10 GMT", 30.0),
+        ("Thu, 01 Jan 1970 00:00:10 GMT", 0.0),
         ("Thu, 01 Jan 99999999999 00:00:00 GMT", 0.0),  # ended the thread, and with it the service
         ("1 Jan 2020 01:01:01 +99999999999999", 0.0),
     ],
-)  # fmt: skip
+)
 def test_retry_after_is_seconds_or_a_date(header: str | None, seconds: float) -> None:
     assert _seconds(header, now_s=1000.0) == seconds
 
 
 def test_the_body_says_what_it_is_and_when_it_happened() -> None:
     record = {"id": "event-5-a", "revision": 2, "t_end": "2026-11-22T08:00:00.000000Z"}
-    letter = Letter("e-1", "event-5-a-2", json_line(record), "events", kind="event")
-    assert json.loads(body_of(letter)) == {"type": "event", "timestamp": record["t_end"], "data": record}
+    message = OutboxMessage("e-1", "event-5-a-2", json_line(record), "events", kind="event")
+    assert json.loads(body_of(message)) == {"type": "event", "timestamp": record["t_end"], "data": record}
     seen = {"steps": [{"t": "2026-11-22T08:00:00.000000Z"}], "acknowledged": {"at": "2026-11-22T09:00:00.000000Z"}}
-    letter = Letter("e-1", "alarm-5-a-2", json_line(seen), "alarms/drift/zero", kind="alarm")
-    assert json.loads(body_of(letter))["timestamp"] == "2026-11-22T09:00:00.000000Z"
+    message = OutboxMessage("e-1", "alarm-5-a-2", json_line(seen), "alarms/drift/zero", kind="alarm")
+    assert json.loads(body_of(message))["timestamp"] == "2026-11-22T09:00:00.000000Z"
 
 
 @pytest.fixture
@@ -103,9 +120,18 @@ def test_an_address_in_its_parts(secret_file: Path) -> None:
 
 @pytest.mark.parametrize(
     "url",
-    ["http://fleet.example/hook", "ftp://fleet.example", "fleet.example", "https://", "https://u:p@fleet.example/",
-     "https://fleet.example/#here", "https://fleet.example:99999/", "https://fleet.example/a b", "https://flöte.example/"],
-)  # fmt: skip
+    [
+        "http://fleet.example/hook",
+        "ftp://fleet.example",
+        "fleet.example",
+        "https://",
+        "https://u:p@fleet.example/",
+        "https://fleet.example/#here",
+        "https://fleet.example:99999/",
+        "https://fleet.example/a b",
+        "https://flöte.example/",
+    ],
+)
 def test_addresses_that_cannot_be_meant(url: str, secret_file: Path) -> None:
     with pytest.raises(ValidationError):
         WebhookSection(url=url, secret_file=secret_file)
@@ -133,7 +159,7 @@ def test_a_vehicle_without_a_name_is_refused(secret_file: Path) -> None:
 
 def test_the_check_in_the_document_believes_what_is_signed_and_nothing_else() -> None:
     page = (Path(__file__).parents[2] / "docs/webhook.md").read_text()
-    block = page[page.index("    import base64") : page.index("**Another secret**")]
+    block = page[page.index("    import base64") : page.index("**To change the secret**")]
     known: dict[str, Any] = {}
     exec(textwrap.dedent(block), known)
     check, now_s, body = known["is_from_our_vehicle"], int(time.time()), b'{"type": "alarm"}'

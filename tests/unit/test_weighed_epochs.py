@@ -16,7 +16,7 @@ from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json, estimate_to_json
 from gateway.posterior import PAYLOAD
 from gateway.records import Why
-from gateway.service.proving.epochs import NEAR_NS, WeighedEpoch, epoch_at, epochs_of
+from gateway.service.verification.epochs import NEAR_NS, WeighedEpoch, epoch_at, epochs_of
 from gateway.stated_weight import Drive
 
 HOUR_NS = 3_600_000_000_000

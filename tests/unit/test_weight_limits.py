@@ -143,8 +143,8 @@ def test_a_vehicle_that_nobody_can_ask_tells_its_overload(tmp_path: Path) -> Non
     setup = loaded(tmp_path, "gross_limit_kg = 1850.0")
     with Gateway(tmp_path / "state", calibrated=setup.calibrated) as gateway:
         gateway.publish(batch(setup))
-        [letter] = Outbox(gateway.store, "fleet").next_letters(10)
-        told = json.loads(letter.text)["weights"]
+        [message] = Outbox(gateway.store, "fleet").next_messages(10)
+        told = json.loads(message.text)["weights"]
         ask = Client(gateway.app)
         metrics = ask.get("/metrics").text
         points = {point["path"]: point["value"] for point in ask.get("/api/v1/vss").json()}

@@ -1,10 +1,10 @@
-"""Each source alone: the same drive with one cause and without it, the shift found against the shift predicted.
+"""Each source alone: the same drive with one cause and without it, the observed shift against the predicted one.
 
-    alone(n_vans, seed) -> one Row a source
+    alone(n_vans, seed) -> one Row per source
 
-The vans have no roll rate and no declared load, so every source is present. ``slope`` is the regression of the shifts
-found on the shifts that the estimator's own slopes predict for the cause that was drawn. ``z2`` is the mean square of
-the shifts found over the variance that the columns state.
+The vans have no roll rate and no declared load, so every source is present. ``slope`` is the regression of the observed
+shifts on those that the estimator's own derivatives predict for the drawn cause. ``z2`` is the mean square of the
+observed shifts over the stated variance.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -30,7 +30,8 @@ from benchmarks.accuracy.budget.nature import (
 )
 from benchmarks.accuracy.budget.response import day_covariance, response_to
 from benchmarks.accuracy.coverage_drives import TRIPS, Scope, Trip, known_run, rows_of, without_roll_rate
-from benchmarks.accuracy.vans import FreshVan, OnVan, fresh_van, of_each_van
+from benchmarks.accuracy.runner import OnDone, run_each
+from benchmarks.accuracy.vans import FreshVan, fresh_van
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cargo import ShapePrior
@@ -43,14 +44,14 @@ from gateway.sim.vehicle import Load, Vehicle
 ESTIMATOR: Final = "cross_spectrum"
 MIXED: Final = TRIPS["mixed"]
 ON_THE_LINE: Final = replace(MIXED, off_m=(0.0, 0.0))
-PARTS: Final = (0.3, 0.9)  # of the rated payload
-PLACES: Final = (0.35, 0.85)  # of the wheelbase
+PARTS: Final = (0.3, 0.9)  # chosen: of the rated payload
+PLACES: Final = (0.35, 0.85)  # chosen: of the wheelbase
 
 
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """Of one batch by one source, payload in kg and front share in percent: found and predicted (2,), and the
-    variances (2,) that its columns state.
+    """The shift of one batch by one source, payload in kg and front share in percent: found and predicted (2,), and the
+    stated variances (2,).
     """
 
     source: str
@@ -61,7 +62,7 @@ class Shift:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One source over all batches; a figure is None where it moves no such quantity."""
+    """One source over all batches; None for a quantity that it does not affect."""
 
     source: str
     n: int
@@ -75,9 +76,9 @@ class Row:
     front_share_found_pct: float
 
 
-def alone(n_vans: int, seed: int, *, workers: int = 1, on_van: OnVan = lambda done, of: None) -> list[dict[str, Any]]:
-    """Drive every van once for each source, and as it was calibrated."""
-    vans = of_each_van(partial(of_one_van, Scope(n_vans=n_vans), seed), n_vans, workers, on_van)
+def alone(n_vans: int, seed: int, *, workers: int = 1, on_van: OnDone = lambda done, of: None) -> list[dict[str, Any]]:
+    """Drive every van once as calibrated and once for each source."""
+    vans = run_each(partial(of_one_van, Scope(n_vans=n_vans), seed), n_vans, workers, on_van)
     shifts = [shift for of_van in vans for shift in of_van]
     sources = dict.fromkeys(shift.source for shift in shifts)
     return [asdict(row_of(source, [one for one in shifts if one.source == source])) for source in sources]
@@ -112,7 +113,7 @@ def of_one_van(scope: Scope, seed: int, number: int) -> list[Shift]:
 
 
 class _Bench:
-    """A calibrated van, a load as it was calibrated with, and one drive that is repeated with each cause."""
+    """A calibrated van, a load of the calibrated shape, and one drive that is repeated with each cause."""
 
     def __init__(self, fresh: FreshVan, calibrated: CalibratedVehicle, scope: Scope) -> None:
         if calibrated.cross_spectrum is None:
@@ -128,18 +129,18 @@ class _Bench:
     def driven(
         self, van: Vehicle, load: Load, trip: Trip = ON_THE_LINE, gains: Gains | None = None
     ) -> tuple[Batch, ...]:
-        """The one drive with this van, load and gains, without its roll rate."""
+        """The drive with this van, load and gains, without its roll rate."""
         rows, today, carried = rows_of(van, (load,), trip, self._scope, self.fresh.test_seed, self.fresh.sensors)
         run = known_run(rows if gains is None else amplified(rows, gains), 1, "budget", today, carried)
         self.left_m = carried[0].left_m
         return without_roll_rate(run).batches
 
     def weighed(self, batches: Sequence[Batch], prior: ShapePrior | None) -> list[Weighed | Why]:
-        """Each batch by the calibration, whether the service would refuse it or not."""
+        """Each batch by the calibration, even if the service would refuse it."""
         return [Why.TOO_SHORT if batch.rejected else weigh(batch, self.known, prior) for batch in batches]
 
     def pairs(self, batches: Sequence[Batch], prior: ShapePrior | None) -> Iterator[tuple[int, Weighed, Weighed]]:
-        """Batches, by their number, that were answered in both drives: with the cause, and as calibrated."""
+        """Batches, by their number, answered in both drives: with the cause, and as calibrated."""
         both = zip(self.weighed(batches, prior), self.reference, strict=False)
         for i, (one, usual) in enumerate(both):
             if isinstance(one, Weighed) and isinstance(usual, Weighed):
@@ -196,7 +197,7 @@ def _shape(bench: _Bench) -> Iterator[Shift]:
 
 
 def _sideways(bench: _Bench) -> Iterator[Shift]:
-    """A load beside the centre line, which no roll rate shows."""
+    """A load off the centre line, which is unobservable without a roll rate."""
     std_m = place_std_m(bench.fresh.vehicle)
     batches = bench.driven(bench.van, bench.load, to_one_side(MIXED, std_m * float(bench.rng.standard_normal())))
     z = bench.left_m / std_m * float(np.sign(bench.fresh.sensors.mount.left_m))
@@ -207,7 +208,7 @@ def _sideways(bench: _Bench) -> Iterator[Shift]:
 
 
 def _empty_share(bench: _Bench, runs: list[Any]) -> Iterator[Shift]:
-    """A calibration by a fitter who was wrong about the empty vehicle."""
+    """A calibration with a wrong front share of the empty vehicle."""
     off_pct = drawn_share_pct(bench.fresh.vehicle, bench.rng)
     vehicle, stated_runs = as_stated(bench.fresh.vehicle, runs, off_pct)
     wrong = calibrated_on(stated_runs, vehicle, ESTIMATOR).cross_spectrum

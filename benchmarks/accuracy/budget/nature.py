@@ -1,4 +1,4 @@
-"""What differs from the calibration: each cause drawn from the distribution that the estimator states of it."""
+"""Differences from the calibration, each drawn from the distribution that the estimator states."""
 
 import math
 from collections.abc import Mapping
@@ -19,14 +19,14 @@ from gateway.sim.vehicle import Axle, Load, Vehicle
 
 
 def drawn_day(rng: np.random.Generator) -> dict[str, float]:
-    """Logarithms of springs, tyres and dampers over what they were at calibration, by the names of parameters."""
+    """Logarithms of springs, tyres and dampers relative to calibration, by the names of parameters."""
     common = {kind: std * rng.standard_normal() for kind, std in NATURE_TOGETHER_STD.items()}
     own = {name: std * rng.standard_normal() for name, std in NATURE_STD.items()}
     return {name: x + common[kind] for name, x in own.items() if (kind := name.split("_")[0]) in common}
 
 
 def on_that_day(van: Vehicle, day: Mapping[str, float]) -> Vehicle:
-    """The same van with its springs, tyres and dampers so changed."""
+    """The same van with its springs, tyres and dampers changed."""
     return replace(van, front=_axle(van.front, day, "front"), rear=_axle(van.rear, day, "rear"))
 
 
@@ -50,7 +50,7 @@ def _axle(axle: Axle, day: Mapping[str, float], end: str) -> Axle:
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """Logarithms of both sensors' gains over those at calibration, and the accelerometer's offset."""
+    """Logarithms of both sensors' gains relative to calibration, and the accelerometer's offset."""
 
     acceleration: float = 0.0
     rate: float = 0.0
@@ -58,7 +58,7 @@ class Gains:
 
 
 def drawn_gains(rng: np.random.Generator) -> Gains:
-    """As another temperature of the sensors makes them, by their data sheets."""
+    """Gains at another temperature of the sensors, by their data sheets."""
     acceleration, rate, offset = rng.standard_normal(3).tolist()
     gain_std = TEMPERATURE_STD_K * GAIN_PER_K
     return Gains(gain_std * acceleration, gain_std * rate, TEMPERATURE_STD_K * OFFSET_PER_K_MPS2 * offset)
@@ -76,40 +76,40 @@ def amplified(rows: Motion, gains: Gains) -> Motion:
 
 
 def drawn_log_s(prior: ShapePrior, rng: np.random.Generator) -> float:
-    """A load's squared radius of gyration (logarithm of m2) from what is believed of loads."""
+    """A load's squared radius of gyration (logarithm of m2) from the prior of loads."""
     return float(rng.choice(prior.log_s, p=prior.probability))
 
 
 def load_of_shape(van: Vehicle, mass_kg: float, position_m: float, log_s: float) -> Load:
-    """A flat load at the height of the body's centre of gravity, as long as its radius of gyration asks for."""
+    """A flat load at the height of the body's centre of gravity, with the length of its radius of gyration."""
     tall_m = 0.1
     length_m = math.sqrt(max(12.0 * exp(log_s) - tall_m**2, 0.0))
     return Load(mass_kg, position_m, height_m=van.cog_height_m, length_m=length_m, tall_m=tall_m)
 
 
 def exactly_known(log_s: float) -> ShapePrior:
-    """What is believed of a load whose shape somebody measured."""
+    """The prior of a load whose shape was measured."""
     return ShapePrior(log_s + np.array([-0.01, 0.0, 0.01]), np.array([0.25, 0.5, 0.25]), 0.0)
 
 
 def place_std_m(vehicle: StatedVehicle) -> float:
-    """Of a load's place across the vehicle."""
+    """Standard deviation of a load's lateral place."""
     assert vehicle.track_width_m is not None
     return PAYLOAD_LEFT_PER_TRACK * vehicle.track_width_m
 
 
 def to_one_side(trip: Trip, left_m: float) -> Trip:
-    """The same drive with its load so far from the centre line, to either side."""
+    """The same drive with its load at this distance from the centre line, on either side."""
     return replace(trip, off_m=(abs(left_m), abs(left_m)))
 
 
 def drawn_share_pct(vehicle: StatedVehicle, rng: np.random.Generator) -> float:
-    """By how much the fitter's front share of the empty vehicle is off, in percentage points."""
+    """Error of the fitter's front share of the empty vehicle, in percentage points."""
     return vehicle.empty_front_share_std_pct * float(rng.standard_normal())
 
 
 def as_stated(vehicle: StatedVehicle, runs: list[KnownRun], off_pct: float) -> tuple[StatedVehicle, list[KnownRun]]:
-    """Vehicle and known loads as a fitter states them who is off by so much: places of loads are measured rightly."""
+    """Vehicle and known loads with this error of the fitter's share; the places of loads are measured correctly."""
     stated = replace(vehicle, empty_front_share_pct=vehicle.empty_front_share_pct + off_pct)
 
     def placed(run: KnownRun) -> KnownRun:

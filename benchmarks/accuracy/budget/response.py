@@ -1,4 +1,4 @@
-"""How far an answer moves when the true springs, tyres and dampers differ from the calibration."""
+"""The shift of an answer when the true springs, tyres and dampers differ from the calibration."""
 
 from collections.abc import Mapping
 
@@ -20,10 +20,11 @@ _OUTWARD = np.diag([1.0, 100.0])  # kg, and percent of 0..1
 
 
 def response_to(found: Weighed, calibration: CrossSpectrumCalibration, day: Mapping[str, float]) -> F64:
-    """(2,) kg and percent, to first order: data move as the truth does, and the fit calls it load.
+    """(2,) shift in kg and percent, to first order: the data follow the truth, and the fit attributes the change to the
+    load.
 
-    What is steady in the fit moves the load by minus its own slope; what drifts is fitted but for the part that its
-    prior holds back.
+    A parameter fixed in the fit shifts the load by minus its slope; a drifting one is fitted except for the part that
+    its prior holds back.
     """
     prior = _prior(found, calibration)
     at = _at(found, calibration, prior)
@@ -34,8 +35,8 @@ def response_to(found: Weighed, calibration: CrossSpectrumCalibration, day: Mapp
 
 
 def day_covariance(found: Weighed, calibration: CrossSpectrumCalibration) -> F64:
-    """(2, 2) that the posterior states of the day: its columns, and what the search itself believed of dampers, which
-    stands in the batch's own covariance.
+    """(2, 2) covariance that the posterior states for the day: its columns, and the search's own prior of dampers,
+    which is a part of the batch's own covariance.
     """
     is_damper = np.array([name.startswith("damper_") for name in DRIFT_STD], dtype=float)
     prior = _prior(found, calibration)
@@ -57,6 +58,6 @@ def _at(found: Weighed, calibration: CrossSpectrumCalibration, prior: Packing) -
 
 
 def _held_back(at: Answer, prior: Packing) -> F64:
-    """(2, k) of the load by the parameters that drift."""
+    """(2, k) derivative of the load by the drifting parameters."""
     held: F64 = at.covariance[-2:, : len(DRIFTING)] @ prior.precision
     return held

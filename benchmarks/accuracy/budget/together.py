@@ -1,9 +1,9 @@
 """All sources at once: vans that differ from their calibration in everything that the estimator allows for.
 
-    together(n_vans, seed) -> one Row for each of: with or without a roll rate, what is carried said or not
+    together(n_vans, seed) -> one Row for each of: with or without a roll rate, goods stated or not
 
-The fitter is wrong about the empty share, springs, tyres and dampers are those of another day, the sensors have another
-temperature, loads have every length and height and stand somewhere across the floor.
+The fitter's empty share is wrong, springs, tyres and dampers are those of another day, the sensors have another
+temperature, loads have every length and height and any place across the floor.
 """
 
 import math
@@ -27,7 +27,8 @@ from benchmarks.accuracy.budget.nature import (
 )
 from benchmarks.accuracy.coverage_drives import EMPTY_SHARE, TRIPS, Scope, known_run, rows_of, without_roll_rate
 from benchmarks.accuracy.loads import SAYS, Shape, shaped_load
-from benchmarks.accuracy.vans import FreshVan, OnVan, fresh_van, of_each_van
+from benchmarks.accuracy.runner import OnDone, run_each
+from benchmarks.accuracy.vans import FreshVan, fresh_van
 from gateway.calibration.judgement import coverage_of
 from gateway.calibration.judgement.coverage import interval_scores
 from gateway.calibration.judgement.learning_curve import calibrated_on
@@ -44,13 +45,13 @@ MIXED: Final = TRIPS["mixed"]
 QUANTITIES: Final = ("payload", "front_share", "cg_left")
 WATCHED: Final = ("misfit", "tension", "sensor_position_score", "sensor_noise_score")
 INSTRUMENTAL: Final = frozenset({Why.MODEL_MISFIT, Why.SENSOR_CHANGED, Why.SENSOR_DISAGREEMENT, Why.WRONG_SIGN})
-PERCENT_OF_M: Final = 100.0  # lateral places are stated in metres: in centimetres on the page
+PERCENT_OF_M: Final = 100.0  # lateral places are in metres, and in centimetres on the page
 
 
 @dataclass(frozen=True, slots=True)
 class Weighing:
-    """One batch: its run, whether a roll rate was read and the shape said, and for each quantity that was answered the
-    error, half-width and interval score (percent of the range; cm of places) and the error squared over its variance.
+    """One batch: its run, whether a roll rate was used and the shape stated, and for each answered quantity the error,
+    half-width and interval score (percent of the range; cm for places) and the error squared over its variance.
     """
 
     van: str
@@ -59,12 +60,12 @@ class Weighing:
     is_shape_said: bool
     rejected: tuple[str, ...]
     judged: dict[str, tuple[float, float, float, float]]
-    watched: dict[str, float]  # what a batch may be refused for, over its limit
+    watched: dict[str, float]  # figures with a limit for refusal, over that limit
 
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """One quantity over many batches; None where too few were answered."""
+    """One quantity over many batches; None if too few were answered."""
 
     n: int
     mean_abs: float | None
@@ -76,15 +77,15 @@ class Figures:
 
 
 def together(
-    n_vans: int, seed: int, *, workers: int = 1, on_van: OnVan = lambda done, of: None
+    n_vans: int, seed: int, *, workers: int = 1, on_van: OnDone = lambda done, of: None
 ) -> list[dict[str, Any]]:
     """Calibrate and drive every van."""
-    vans = of_each_van(partial(of_one_van, Scope(n_vans=n_vans), seed), n_vans, workers, on_van)
+    vans = run_each(partial(of_one_van, Scope(n_vans=n_vans), seed), n_vans, workers, on_van)
     return rows_of_weighings([one for of_van in vans for one in of_van])
 
 
 def rows_of_weighings(weighings: Sequence[Weighing]) -> list[dict[str, Any]]:
-    """A row for each of the four ways."""
+    """A row for each of the four cases."""
     rows = []
     for has_roll_rate, is_said in product((True, False), repeat=2):
         some = [one for one in weighings if (one.has_roll_rate, one.is_shape_said) == (has_roll_rate, is_said)]
@@ -104,7 +105,7 @@ def rows_of_weighings(weighings: Sequence[Weighing]) -> list[dict[str, Any]]:
 
 
 def figures_of(quantity: str, weighings: Iterable[Weighing]) -> Figures:
-    """Over those that answered it."""
+    """The figures over answered batches."""
     answered = [one for one in weighings if quantity in one.judged]
     if not answered:
         return Figures(0, None, None, None, None, None, None)
@@ -122,8 +123,8 @@ def figures_of(quantity: str, weighings: Iterable[Weighing]) -> Figures:
 
 
 def refusals_of(weighings: Sequence[Weighing]) -> dict[str, Any]:
-    """Nothing is wrong with these vans: how near each watched figure comes to its limit (quantiles of the ratio), and
-    the share of batches refused for a reason of the instrument, with its 95 % limits by van.
+    """Quantiles of each watched figure over its limit, and the share of batches refused because of the instrument, with
+    its 95 % limits by van. Nothing is wrong with these vans.
     """
     refused = [any(Why(why) in INSTRUMENTAL for why in one.rejected) for one in weighings]
     rate = coverage_of(refused, [one.van for one in weighings]) if len({one.van for one in weighings}) > 1 else None
@@ -200,7 +201,7 @@ def _weighed(
 
 
 def _watched(found: Estimate, calibrated: CalibratedVehicle) -> dict[str, float]:
-    """Each figure that a batch may be refused for, over its limit; a score of noise below zero is none."""
+    """Each figure with a limit for refusal, over that limit; a noise score below zero counts as zero."""
     limits, seen = calibrated.cross_spectrum, found.diagnostics
     if limits is None or "misfit" not in seen:
         return {}

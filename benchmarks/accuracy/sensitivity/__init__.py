@@ -1,7 +1,7 @@
-"""How much hangs on the constants that no derivation gives: each halved and doubled, on the same fresh vans.
+"""The effect of the chosen constants: each is halved and doubled, on the same fresh vans.
 
-``constants`` lists them and sets them for a while, ``study`` calibrates and weighs with each, ``changes`` says which
-change of load two batches would show, ``page`` makes a page of it.
+``constants`` lists them and sets them temporarily, ``study`` calibrates and weighs with each, ``changes`` finds the
+smallest detectable change of load, ``page`` writes the page.
 """
 
 from benchmarks.accuracy.sensitivity.constants import CONSTANTS

@@ -1,8 +1,8 @@
-"""Which change of load two batches that follow each other would show, and how often they show one that was none.
+"""The smallest change of load that two consecutive batches show, and how often they show one without a change.
 
-The detector (core.change) compares the whole posterior, with what is common to both batches cancelled. Here it is asked
-of every pair of neighbours; the smallest change is the one of the payload alone that it would take for a change without
-a stop. Drives of one van with different loads show what is noticed in fact.
+The detector (core.change) compares the whole posteriors, in which errors common to both batches cancel. It is applied
+to every pair of neighbours; the smallest change is that of the payload alone, without a stop. Drives of one van with
+different loads give the true detection rate.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ from gateway.core import change
 from gateway.core.change import EVEN, Rules, probability
 from gateway.posterior import PAYLOAD, Posterior
 
-STEPS: Final = 20  # halvings of the payload range: to a millionth of it
+STEPS: Final = 20  # chosen: halvings of the payload range, to a millionth of it
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two batches weighed one after the other: the true change, the smallest to notice, whether one was noticed."""
+    """Two consecutive batches: the true change, the smallest detectable one, and whether one was detected."""
 
     change_kg: float
     change_pct: float
@@ -31,12 +31,12 @@ class Pair:
 
     @property
     def is_one_load(self) -> bool:
-        """Whether nothing has changed in truth."""
+        """Whether the load is the same in truth."""
         return self.change_kg == self.change_pct == 0.0
 
 
 def pairs_of(drives: Sequence[Sequence[Judged]], rules: Rules) -> list[Pair]:
-    """Batches that follow each other within a drive, then the last and the first of drives that do."""
+    """Consecutive batches within a drive, then the last and the first of consecutive drives."""
     answered = [[one for one in drive if one.estimate.counted] for drive in drives]
     within = [pair for drive in answered for pair in pairwise(drive)]
     with_answers = [drive for drive in answered if drive]
@@ -53,11 +53,11 @@ def _pair(before: Judged, after: Judged, rules: Rules) -> Pair:
 
 
 def _is_noticed(before: Posterior, after: Posterior, rules: Rules) -> bool:
-    return probability(before, after, change.ROLLING, rules) > EVEN  # asked of its module: a study changes it
+    return probability(before, after, change.ROLLING, rules) > EVEN  # looked up in its module, as a study changes it
 
 
 def _smallest_kg(before: Posterior, after: Posterior, rules: Rules) -> float:
-    """By bisection, of a load that is ``before`` but for its payload, with the errors of both."""
+    """By bisection, for a load equal to ``before`` except for its payload, with the errors of both."""
     low, high = 0.0, rules.range_kg
     for _ in range(STEPS):
         middle = 0.5 * (low + high)

@@ -1,4 +1,4 @@
-"""Constants of the estimator, of fusion and of inspection that were chosen rather than derived."""
+"""Constants of the estimator, of fusion and of inspection that were chosen, not derived."""
 
 import sys
 from collections.abc import Iterator
@@ -8,7 +8,7 @@ from enum import StrEnum
 from importlib import import_module
 from typing import Final
 
-FACTORS: Final = (0.5, 2.0)
+FACTORS: Final = (0.5, 2.0)  # chosen: half and double
 USED_IN: Final = (
     "gateway.core.cross_spectrum",
     "gateway.core.fusion",
@@ -18,11 +18,11 @@ USED_IN: Final = (
     "gateway.calibration.plan",
     "gateway.calibration.inspection",
 )
-"""Rooms in which a constant is set; elsewhere the same name means something else."""
+"""Packages in which a constant is set; elsewhere the same name may be another constant."""
 
 
 class Acts(StrEnum):
-    """Where a constant makes a difference, and so what is done again with another."""
+    """The step that a constant affects, which is repeated with another value."""
 
     IN_CALIBRATION = "calibration"
     IN_WEIGHING = "weighing"
@@ -31,7 +31,7 @@ class Acts(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """``name`` in ``module``, and in a few words what it decides."""
+    """``name`` in ``module``, and its effect in a few words."""
 
     name: str
     module: str
@@ -40,7 +40,7 @@ class Constant:
 
     @property
     def current(self) -> float | tuple[float, ...]:
-        """As the code has it."""
+        """Its value in the code."""
         found: float | tuple[float, ...] = getattr(import_module(self.module), self.name)
         return found
 
@@ -63,8 +63,8 @@ CONSTANTS: Final = (
         "how far apart the amplitudes are at which a vehicle with friction is solved",
     ),
     Constant(
-        "MISFIT_MARGIN", "gateway.calibration.half_car.left_out", Acts.IN_CALIBRATION,
-        "how much worse than in calibration a batch may fit",
+        "MISFIT_ON_OTHER_ROADS", "gateway.core.cross_spectrum.estimator", Acts.IN_CALIBRATION,
+        "how much better or worse than in calibration batches fit on other roads",
     ),
     Constant(
         "SCORE_MARGIN", "gateway.calibration.half_car.left_out", Acts.IN_CALIBRATION,
@@ -135,7 +135,7 @@ CONSTANTS: Final = (
 
 @contextmanager
 def scaled(constant: Constant, factor: float) -> Iterator[None]:
-    """The constant so many times what it is, wherever USED_IN knows it by its name; then as it was."""
+    """Multiply the constant in all modules of USED_IN that hold it, and restore it afterwards."""
     current = constant.current
     if isinstance(current, tuple):
         other: float | tuple[float, ...] = tuple(factor * one for one in current)

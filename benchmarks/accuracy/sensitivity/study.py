@@ -1,4 +1,4 @@
-"""Every constant halved and doubled: calibrate, weigh and inspect the same fresh vans, and see what moves.
+"""Every constant halved and doubled: calibrate, weigh and inspect the same fresh vans, and compare.
 
 sensitivity(Scope(), seed) -> Sensitivity
 """
@@ -14,9 +14,10 @@ import numpy as np
 
 from benchmarks.accuracy.coverage_drives import TRIPS, Scope, driven, unseen_load
 from benchmarks.accuracy.coverage_table import JudgedBatch, Line, coverage_table, judged_batches
+from benchmarks.accuracy.runner import OnDone, run_each
 from benchmarks.accuracy.sensitivity.changes import Pair, pairs_of
 from benchmarks.accuracy.sensitivity.constants import CONSTANTS, FACTORS, Acts, Constant, scaled
-from benchmarks.accuracy.vans import FreshVan, OnVan, fresh_van, of_each_van
+from benchmarks.accuracy.vans import FreshVan, fresh_van
 from gateway.calibration.half_car import known_spectra
 from gateway.calibration.inspection.axes import apart_findings, phase_findings, phases
 from gateway.calibration.inspection.finding import Kind
@@ -29,14 +30,14 @@ from gateway.core.change import Rules
 from gateway.core.cross_spectrum.measured import CrossSpectra
 
 ESTIMATOR: Final = "cross_spectrum"
-SEED: Final = 20_283
-MISLABELLED_SHARE: Final = 1.0 / 3.0  # of the rated payload, put on the label of a laden run
+SEED: Final = 20_283  # arbitrary, of this study alone
+MISLABELLED_SHARE: Final = 1.0 / 3.0  # chosen: of the rated payload, the error of a laden run's label
 AS_IT_IS: Final = "as it is"
 
 
 @dataclass(frozen=True, slots=True)
 class Inspected:
-    """Of one van: drives and labels that are right and were found fault with, and wrong ones that were named."""
+    """One van: right drives and labels and how many were doubted, wrong ones and how many were found."""
 
     n_right: int = 0
     n_doubted: int = 0
@@ -53,8 +54,8 @@ def _counts(one: Inspected) -> tuple[int, int, int, int]:
 
 @dataclass(frozen=True, slots=True)
 class Weighing:
-    """One setting over all vans. ``smallest_change_kg`` is the median over pairs of batches, ``n_false`` counts those
-    of ``n_unchanged`` in which a change was seen that was none, ``n_seen`` those of ``n_changed`` by more than that.
+    """One setting over all vans. ``smallest_change_kg`` is the median over pairs of batches, ``n_false`` of the
+    ``n_unchanged`` pairs showed a change, ``n_seen`` of the ``n_changed`` pairs with a larger true change did.
     """
 
     line: Line
@@ -67,7 +68,9 @@ class Weighing:
 
 @dataclass(frozen=True, slots=True)
 class Sensitivity:
-    """By setting ("NAME x 0.5", or as it is): what was weighed, and what was inspected. ``constants`` as they were."""
+    """By setting ("NAME x 0.5", or as it is): the results of weighing and of inspection. ``constants`` are the original
+    values.
+    """
 
     seed: int
     n_vans: int
@@ -76,7 +79,7 @@ class Sensitivity:
     inspection: dict[str, Inspected]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers for a file or a page."""
+        """The figures for a file or a page."""
         return asdict(self)
 
 
@@ -93,10 +96,10 @@ def sensitivity(
     *,
     constants: Sequence[Constant] = CONSTANTS,
     workers: int = 1,
-    on_van: OnVan = lambda done, of: None,
+    on_van: OnDone = lambda done, of: None,
 ) -> Sensitivity:
-    """Drive every van once, and do the rest once for every setting."""
-    vans = list(of_each_van(partial(of_one_van, scope, seed, constants), scope.n_vans, workers, on_van))
+    """Drive every van once, and repeat the rest for every setting."""
+    vans = list(run_each(partial(of_one_van, scope, seed, constants), scope.n_vans, workers, on_van))
     table = coverage_table([batch for van in vans for batch in van.batches], seed)
     lines = {line.kind: line for line in table.lines}
     pairs = {name: [pair for van in vans for pair in van.pairs[name]] for name in vans[0].pairs}
@@ -138,7 +141,7 @@ def _settings(constants: Sequence[Constant]) -> Iterator[tuple[str, Constant | N
 
 
 def setting(constant: Constant, factor: float) -> str:
-    """What the lines of a constant are called."""
+    """The name of a constant's lines."""
     return f"{constant.name} x {factor:g}"
 
 

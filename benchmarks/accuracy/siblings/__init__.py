@@ -1,7 +1,6 @@
-"""What a line tells of its next vehicle: simulated siblings calibrated in six ways, on the same drives.
+"""The benefit of a line for its next vehicle: simulated siblings calibrated in six ways, on the same drives.
 
-``drives`` draws lines, siblings and what they drive, ``study`` calibrates and judges, ``page`` makes a page
-of it.
+``drives`` draws lines, siblings and their drives, ``study`` calibrates and judges, ``page`` writes the page.
 """
 
 from benchmarks.accuracy.siblings.page import siblings_page

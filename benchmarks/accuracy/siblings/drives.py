@@ -1,4 +1,4 @@
-"""Lines of simulated vans: sisters driven with known loads, and siblings driven empty and put to the test."""
+"""Lines of simulated vans: sisters driven with known loads, and siblings driven empty and then tested."""
 
 from dataclasses import dataclass, replace
 from typing import Final
@@ -26,9 +26,9 @@ OF_A_LINE: Final = Scatter(
     spring=0.03, progression=0.1, damper=0.10, friction=0.3, tyre=0.04, unsprung=0.03,
     sprung=0.015, cog_position=0.015, inertia=0.015,
 )  # fmt: skip
-PLACE_STD_M: Final = 0.02  # where the fitter's hand puts the unit, and how well a tape tells it
-TURN_STD_DEG: Final = 1.0
-SENSOR_OFF_M: Final = 0.3
+PLACE_STD_M: Final = 0.02  # chosen: mounting and tape measure
+TURN_STD_DEG: Final = 1.0  # chosen: of the mounting
+SENSOR_OFF_M: Final = 0.3  # chosen: at most, from the centre line
 MIXED: Final = TRIPS["mixed"]
 TESTED: Final = (MIXED, TRIPS["mixed, another day"], TRIPS["another speed"])
 SCOPE: Final = Scope(n_known_loads=6)
@@ -36,7 +36,7 @@ SCOPE: Final = Scope(n_known_loads=6)
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A van that all others of its line are scattered about, its sensor unit as usually mounted."""
+    """A van about which all others of its line are scattered, and its usual sensor unit."""
 
     van: Vehicle
     sensors: Sensors
@@ -44,7 +44,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Driven:
-    """A van as its fitter states it, with its drives: those that calibrate it, and those that judge it."""
+    """A van as its fitter states it, with its calibration and test drives."""
 
     vehicle: StatedVehicle
     runs: tuple[KnownRun, ...]
@@ -52,14 +52,14 @@ class Driven:
 
 
 def draw_line(number: int, rng: np.random.Generator) -> Line:
-    """The ``number``-th line: about the types of the simulator in turn."""
+    """The ``number``-th line, about the simulator's types in turn."""
     mount = replace(REFERENCE.mount, left_m=float(rng.uniform(-SENSOR_OFF_M, SENSOR_OFF_M)))
     return Line(draw_van(number, rng), replace(REFERENCE, mount=mount))
 
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A van of a line with its sensors, what its fitter states of them, and what to draw its loads and roads with."""
+    """A van of a line with its sensors, its fitter's statements, and the generators of its loads and roads."""
 
     van: Vehicle
     sensors: Sensors
@@ -69,7 +69,7 @@ class Drawn:
 
 
 def drawn_van(line: Line, name: str, seeds: np.random.SeedSequence) -> Drawn:
-    """Scattered about the line; its unit mounted about where the fitter says that it is."""
+    """A van scattered about the line, its unit mounted near the stated place."""
     van_seed, load_seed, road_seeds = seeds.spawn(3)
     rng = np.random.default_rng(van_seed)
     van = replace(scattered(line.van, OF_A_LINE, rng), name=name)
@@ -96,7 +96,7 @@ def sister(line: Line, name: str, seeds: np.random.SeedSequence) -> Driven:
 
 
 def sibling(line: Line, name: str, seeds: np.random.SeedSequence) -> Driven:
-    """A van of the line, driven empty twice, steadily and mixed, and then with loads that nobody told."""
+    """A van of the line, driven empty twice, steadily and mixed, and then with unknown loads."""
     drawn = drawn_van(line, name, seeds)
     empty_seeds, test_seeds = drawn.road_seeds.spawn(2)
     empty = _runs(drawn, [(AS_CALIBRATED, ()), (MIXED, ())], empty_seeds)

@@ -14,8 +14,8 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, coverage_table, judged_batches
+from benchmarks.accuracy.runner import OnDone, run_each
 from benchmarks.accuracy.siblings.drives import Driven, draw_line, sibling, sister
-from benchmarks.accuracy.vans import OnVan, of_each_van
 from gateway.calibration.half_car import CrossSpectrumFit, fit_cross_spectrum
 from gateway.calibration.judgement import judge
 from gateway.calibration.known_run import KnownRun
@@ -26,13 +26,13 @@ from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
 from gateway.posterior import fused
 
-SEED: Final = 20280
-VANS_PER_LINE: Final = 3
-SISTERS: Final = 3
+SEED: Final = 20280  # arbitrary, of this study alone
+VANS_PER_LINE: Final = 3  # chosen
+SISTERS: Final = 3  # the least that give a scatter (line.scatter.LEAST_SIBLINGS)
 ESTIMATOR: Final = "cross_spectrum"
 ID: Final = "in memory"
-EMPTY_STD_KG: Final = 3.0  # of an empty vehicle: driver, fuel, what lies about
-EMPTY_SHARE_STD_PCT: Final = 0.2
+EMPTY_STD_KG: Final = 3.0  # chosen: of an empty vehicle: driver, fuel, loose items
+EMPTY_SHARE_STD_PCT: Final = 0.2  # chosen, likewise
 
 
 class Way(StrEnum):
@@ -56,16 +56,16 @@ class SiblingsTable:
     rows: tuple[dict[str, Any], ...]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers for a file or a page."""
+        """The figures for a file or a page."""
         return {"seed": self.seed, "n_lines": self.n_lines, "n_vans": self.n_vans, "rows": list(self.rows)}
 
 
 def siblings(
-    n_vans: int, seed: int = SEED, *, workers: int = 1, on_van: OnVan = lambda done, of: None
+    n_vans: int, seed: int = SEED, *, workers: int = 1, on_van: OnDone = lambda done, of: None
 ) -> SiblingsTable:
-    """Drive, calibrate and judge ``n_vans`` siblings or a few more, VANS_PER_LINE of each line."""
+    """Drive, calibrate and judge at least ``n_vans`` siblings, VANS_PER_LINE of each line."""
     n_lines = -(-n_vans // VANS_PER_LINE)
-    batches = [one for found in of_each_van(partial(of_one_line, seed), n_lines, workers, on_van) for one in found]
+    batches = [one for found in run_each(partial(of_one_line, seed), n_lines, workers, on_van) for one in found]
     table = coverage_table(batches, seed).to_json()
     rows = tuple(line for line in table["lines"] if line["kind"] == ALL_KINDS)
     return SiblingsTable(seed, n_lines, len(table["vans"]), rows)
@@ -110,7 +110,7 @@ def _ways(van: Driven, first: Sister, of_one: Line, of_three: Line) -> Iterator[
 
 @dataclass(frozen=True, slots=True)
 class _Judging:
-    """A sibling by one calibration, with what a known weight taught where there is one."""
+    """A sibling by one calibration, with the knowledge of a known weight if there is one."""
 
     van: Driven
     calibrated: CalibratedVehicle
@@ -139,7 +139,7 @@ def _known(found: Estimate, knowledge: Knowledge | None) -> Estimate:
 
 
 def known_empty(calibrated: CalibratedVehicle, empty: Sequence[KnownRun], vehicle: Vehicle) -> Knowledge | None:
-    """What an empty drive teaches, once somebody has said that it was; None where no batch of it is answered."""
+    """The knowledge from an empty drive stated as such; None if no batch of it is answered."""
     answered = [one.estimate for one in judge(empty, calibrated, ESTIMATOR) if one.estimate.counted]
     posteriors = [one.posterior for one in answered if one.posterior is not None]
     if not posteriors:

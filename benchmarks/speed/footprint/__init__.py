@@ -1,4 +1,4 @@
-"""What a vehicle costs: bytes of its records and logs, computing to weigh it, messages its broker can take.
+"""The cost of a vehicle: bytes of its records and logs, processing time, and messages that its broker can handle.
 
     python -m benchmarks.speed.footprint --output docs/footprint.json
 

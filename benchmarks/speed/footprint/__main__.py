@@ -13,7 +13,7 @@ from benchmarks.speed.footprint import broker, drives, kept
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.store import Store
-from gateway.uplink.outbox import Letter, Outbox
+from gateway.uplink.outbox import Outbox, OutboxMessage
 
 
 def measure(folder: Path, n_drives: int) -> dict[str, Any]:
@@ -39,14 +39,14 @@ def measure(folder: Path, n_drives: int) -> dict[str, Any]:
     }
 
 
-def letters_of(folder: Path, estimates: Sequence[Estimate]) -> list[Letter]:
+def letters_of(folder: Path, estimates: Sequence[Estimate]) -> list[OutboxMessage]:
     """The records as the uplink sends them: out of a store."""
     store = Store.open(folder)
     try:
         for estimate in estimates:
             store.write_estimate(estimate_to_json(estimate))
         store.flush(kept.TIMEOUT_S)
-        return Outbox(store, "measured").next_letters(len(estimates))
+        return Outbox(store, "measured").next_messages(len(estimates))
     finally:
         store.close()
 

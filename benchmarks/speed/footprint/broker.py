@@ -1,9 +1,9 @@
-"""What a message of the uplink is on the wire, and what it costs a real broker to take it and to pass it on.
+"""The size of an uplink message on the wire, and the cost of a real broker to accept and forward it.
 
-Vehicles deliver as the gateway does: MQTT 5, QoS 1, each its own connection with one message under way. One back-end is
-subscribed to all of them with QoS 1. The broker's own processor time is counted, so that it does not matter how much
-the senders need; it writes nothing to disk. Messages go without TLS, so that their bytes can be counted; what a
-connection costs is measured with TLS.
+Vehicles send as the gateway does: MQTT 5, QoS 1, each with its own connection and one message in flight. One back-end
+subscribes to all of them with QoS 1. The broker's own processor time is counted, so that the senders' does not matter;
+it writes nothing to disk. Messages go without TLS, so that their bytes can be counted; the cost of a connection is
+measured with TLS.
 """
 
 import os
@@ -25,25 +25,25 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from benchmarks.speed.meter import cpu_of_s
 from gateway.uplink.link import MqttLink
-from gateway.uplink.outbox import Letter
+from gateway.uplink.outbox import OutboxMessage
 from gateway.uplink.settings import UplinkSettings
 
 MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin:/usr/bin:/usr/local/bin")
-PATIENCE_S = 30.0
-N_VEHICLES = 20
-N_MESSAGES = 20_000
-N_CONNECTIONS = 300
+PATIENCE_S = 30.0  # chosen: timeout
+N_VEHICLES = 20  # chosen
+N_MESSAGES = 20_000  # chosen: for steady figures
+N_CONNECTIONS = 300  # chosen, likewise
 
 
-def measure(folder: Path, letters: Sequence[Letter]) -> dict[str, Any]:
+def measure(folder: Path, messages: Sequence[OutboxMessage]) -> dict[str, Any]:
     """Bytes on the wire per message, and microseconds of the broker's processor per message taken and passed on."""
     with Broker(folder) as broker:
-        up, down = _bytes_on_the_wire(broker.port, letters)
+        up, down = _bytes_on_the_wire(broker.port, messages)
         back_end = _BackEnd(broker.port)
         links = [MqttLink(_settings(broker.port, f"van-{n}"), {}) for n in range(N_VEHICLES)]
         before_s = broker.cpu_s()
         for n in range(N_MESSAGES // N_VEHICLES):
-            _deliver(links, letters[n % len(letters)])
+            _deliver(links, messages[n % len(messages)])
         back_end.wait_for(N_MESSAGES)
         took_s = broker.cpu_s() - before_s
         for link in links:
@@ -60,7 +60,7 @@ def measure(folder: Path, letters: Sequence[Letter]) -> dict[str, Any]:
 
 
 def _connections(folder: Path) -> dict[str, float]:
-    """What a vehicle's connection costs over TLS: the broker's processor once, its memory as long as it lasts."""
+    """The cost of a vehicle's TLS connection: the broker's processor time once, its memory as long as it lasts."""
     authority = trustme.CA()
     authority.cert_pem.write_to_path(folder / "ca.pem")
     certificate = authority.issue_cert("localhost")
@@ -117,12 +117,12 @@ class Broker:
         return cpu_of_s(self._process.pid)
 
     def memory_bytes(self) -> int:
-        """What it holds in memory now (proc(5), statm)."""
+        """Its current memory (proc(5), statm)."""
         return int(Path(f"/proc/{self._process.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 class _BackEnd:
-    """Subscribed to every vehicle; counts what arrives."""
+    """A subscriber to every vehicle that counts messages."""
 
     def __init__(self, port: int) -> None:
         self._n = 0
@@ -151,7 +151,7 @@ class _BackEnd:
 
 
 class _Relay:
-    """Stands between one vehicle and the broker, and counts bytes up and down."""
+    """A relay between one vehicle and the broker that counts bytes up and down."""
 
     def __init__(self, port: int) -> None:
         self.up = self.down = 0
@@ -174,21 +174,21 @@ class _Relay:
             sink.shutdown(socket.SHUT_WR)
 
 
-def _bytes_on_the_wire(port: int, letters: Sequence[Letter]) -> tuple[float, float]:
+def _bytes_on_the_wire(port: int, messages: Sequence[OutboxMessage]) -> tuple[float, float]:
     relay = _Relay(port)
     link = MqttLink(_settings(relay.port, "van-17"), {})
     up, down = relay.up, relay.down
-    for letter in letters:
-        _deliver([link], letter)
-    per_message = (relay.up - up) / len(letters), (relay.down - down) / len(letters)
+    for message in messages:
+        _deliver([link], message)
+    per_message = (relay.up - up) / len(messages), (relay.down - down) / len(messages)
     link.close()
     return per_message
 
 
-def _deliver(links: Sequence[MqttLink], letter: Letter) -> None:
+def _deliver(links: Sequence[MqttLink], message: OutboxMessage) -> None:
     """One message from each, all answered for."""
     for link in links:
-        link.send(letter)
+        link.send(message)
     for link in links:
         end_s = time.monotonic() + PATIENCE_S
         while not any(answer.is_accepted for answer in link.turn(0.1)):

@@ -1,4 +1,4 @@
-"""Logs of simulated drives, what they weigh on a disk, and what it costs to read and to weigh them."""
+"""Logs of simulated drives, their size on disk, and the cost of reading and weighing them."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -19,20 +19,20 @@ from gateway.workbench import demo_drive, frames_of
 
 CALIBRATION = Path(__file__).parents[3] / "gateway/demo/paper_van.json"
 SIGNALS = "springscale:reference"
-REPEATS = 3
+REPEATS = 3  # chosen: the fastest counts
 APART_NS = 86_400 * NS_PER_S  # a drive a day
 
 
 @dataclass(frozen=True, slots=True)
 class Weighed:
-    """The records of some logs, and the seconds of one processor that reading and weighing took."""
+    """The records of some logs, and the CPU seconds for reading and weighing them."""
 
     estimates: list[Estimate]
     cpu_s: float
 
 
 def write_drives(folder: Path, n_drives: int) -> Iterator[tuple[Path, float]]:
-    """A log of what the signal map wants of each drive -> (path, hours)."""
+    """A log of each drive's mapped frames -> (path, hours)."""
     for seed in range(1, n_drives + 1):
         frames = frames_of(demo_drive(seed, START_NS + seed * APART_NS))
         path = folder / f"drive{seed}.log.gz"
@@ -60,7 +60,7 @@ def bytes_of_the_bus(folder: Path) -> dict[str, float]:
 def weigh(logs: Sequence[Path], vehicle_id: str) -> Weighed:
     """Every log through the pipeline of `springscale estimate`; the fastest of some runs."""
     setup = load_setup(SIGNALS, CALIBRATION, identity=Identity(vehicle_id))
-    list(estimates_of_logs(logs[:1], setup))  # what is computed once for a process is not a batch's
+    list(estimates_of_logs(logs[:1], setup))  # computations once per process are not part of a batch
     runs = [_weighed(logs, setup) for _ in range(REPEATS)]
     return min(runs, key=lambda run: run.cpu_s)
 

@@ -1,4 +1,4 @@
-"""Bytes of a record where it is kept: in the vehicle's SQLite database, in an archive's tables and receipts."""
+"""Bytes of a stored record: in the vehicle's SQLite database, and in an archive's tables and receipts."""
 
 import json
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from gateway.estimate_json import estimate_to_json
 from gateway.records import json_line
 from gateway.store import Store
 
-TIMEOUT_S = 60.0
+TIMEOUT_S = 60.0  # chosen
 VEHICLE = "van-17"
 MANIFEST = """\
 signals = "{signals}"
@@ -27,14 +27,14 @@ id = "{vehicle}"
 
 
 def json_bytes(estimates: Sequence[Estimate]) -> dict[str, float]:
-    """Of the record's text, on average, and how much of it are spectra."""
+    """Mean length of a record's text, and the part of its spectra."""
     whole = [estimate_to_json(estimate) for estimate in estimates]
     bare = [{name: shown for name, shown in record.items() if name != "spectra"} for record in whole]
     return {"with_spectra": _mean_length(whole), "without_spectra": _mean_length(bare)}
 
 
 def sqlite_bytes(folder: Path, estimates: Sequence[Estimate]) -> float:
-    """What one more record adds to the database: the second half of the records against the first."""
+    """Increase of the database per record: the second half of the records against the first."""
     half = len(estimates) // 2
     store = Store.open(folder)
     try:
@@ -54,9 +54,9 @@ def _stored(store: Store, folder: Path, estimates: Sequence[Estimate]) -> int:
 
 
 def archive_bytes(folder: Path, logs: Sequence[Path]) -> dict[str, dict[str, float]]:
-    """What `springscale reprocess` leaves of a vehicle's logs of one month: its table and its receipt.
+    """Size of the table and the receipt that `springscale reprocess` writes for one month of a vehicle's logs.
 
-    Each weighs something without records and logs, and something for each: half of the logs against all of them.
+    Each has a fixed size and a size per record and log: half of the logs are compared with all of them.
     """
     half, whole = (_reprocessed(folder / f"of-{n}", logs[:n]) for n in (len(logs) // 2, len(logs)))
     per_record = (whole.table_bytes - half.table_bytes) / (whole.n_batches - half.n_batches)

@@ -1,4 +1,4 @@
-"""The batches of one vehicle as columns: what the fleet's report asks of a data set, read file by file."""
+"""The batches of one vehicle as columns for the fleet's report, read file by file."""
 
 import io
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from gateway.archive.dataset import SCHEMA_VERSION
-from gateway.archive.places import MISSING, Place, PlaceError
+from gateway.archive.places import MISSING, Location, PlaceError
 from gateway.archive.receipts import Slot
 from gateway.errors import ConfigurationError
 from gateway.records import F64, I64, Bool
@@ -43,8 +43,8 @@ _COLUMNS: Final = ("t_end_ns", "calibration_id", "rejected", "over_limit", *_NUM
 class Batches:
     """Batches of one vehicle, in order of time: arrays (n,), NaN where unknown.
 
-    ``numbers`` are columns of the data set by name; ``rejected`` tells for each reason that was met which batches it
-    refused. A batch is answered where nothing refused it.
+    ``numbers`` are columns of the data set by name; ``rejected`` has for each reason the batches that it refused. A
+    batch is answered if no reason refused it.
     """
 
     t_end_ns: I64
@@ -58,7 +58,7 @@ class Batches:
 
     @property
     def is_answered(self) -> Bool:
-        """Which batches nothing refused."""
+        """Batches without a refusal."""
         answered: Bool = ~np.any([np.zeros(len(self), dtype=bool), *self.rejected.values()], axis=0)
         return answered
 
@@ -79,10 +79,10 @@ def by_vehicle(slots: Sequence[Slot]) -> Iterator[tuple[str, list[Slot]]]:
         yield vehicle, list(jobs)
 
 
-def read_batches(dataset: Place, jobs: Sequence[Slot]) -> Batches:
-    """Every batch of some jobs of one vehicle. Raises PlaceError, or ConfigurationError for what is no table of ours.
+def read_batches(dataset: Location, jobs: Sequence[Slot]) -> Batches:
+    """Every batch of some jobs of one vehicle. Raises PlaceError, or ConfigurationError for an invalid table.
 
-    The memory is that of these columns of these jobs.
+    The memory needed is that of these columns of these jobs.
     """
     parts = [_read(dataset, slot) for slot in jobs]
     t_end_ns = np.concatenate([part.t_end_ns for part in parts])
@@ -100,7 +100,7 @@ def read_batches(dataset: Place, jobs: Sequence[Slot]) -> Batches:
 
 
 def _require_once(t_end_ns: I64, job: I64, jobs: Sequence[Slot]) -> None:
-    """Raises ConfigurationError where two jobs hold one batch, which would then count twice."""
+    """Raises ConfigurationError if two jobs have the same batch, which would count twice."""
     again = np.flatnonzero((np.diff(t_end_ns) == 0) & (np.diff(job) != 0))
     if again.size:
         one, other = (jobs[job[again[0] + k]].receipt for k in (0, 1))
@@ -114,7 +114,7 @@ def _of_reason(part: Batches, reason: str) -> Bool:
     return part.rejected.get(reason, np.zeros(len(part), dtype=bool))
 
 
-def _read(dataset: Place, slot: Slot) -> Batches:
+def _read(dataset: Location, slot: Slot) -> Batches:
     try:
         import pyarrow as pa  # noqa: PLC0415 - an extra
         import pyarrow.parquet as pq  # noqa: PLC0415 - likewise
@@ -168,7 +168,7 @@ def _lengths(lists: Any) -> I64:
 
 
 def _reasons(lists: Any) -> dict[str, Bool]:
-    """Which rows of a column of lists hold each text that stands in any of them."""
+    """For each text in a column of lists, the rows that contain it."""
     row = np.repeat(np.arange(len(lists)), _lengths(lists))
     told = lists.flatten().dictionary_encode()
     code = np.asarray(told.indices)

@@ -1,8 +1,8 @@
-"""A data set of estimates, vehicle by vehicle: what was carried, what was refused, what drifts, which sensors are bad.
+"""A data set of estimates, vehicle by vehicle: loads, refusals, drift, faulty sensors.
 
     fleet = fleet_of(place_of("DATASET"))
 
-One vehicle's batches are in memory at a time; what is kept of it is a few numbers a week.
+Only one vehicle's batches are in memory at a time; a few numbers per week are kept of it.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,7 +16,7 @@ from gateway.archive.fleet.batches import Batches, by_vehicle, read_batches
 from gateway.archive.fleet.drift import Drift, Series, drifts_of, series_of
 from gateway.archive.fleet.sensors import Health, Trouble, troubles_of
 from gateway.archive.fleet.weeks import DAY_NS, Weeks, weeks_of
-from gateway.archive.places import Place
+from gateway.archive.places import Location
 from gateway.archive.receipts import failures, slots_done
 from gateway.errors import ConfigurationError
 from gateway.records import Bool
@@ -26,8 +26,8 @@ EPOCH: Final = date(1970, 1, 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Vehicle:
-    """What a data set tells of one vehicle. ``n_refused`` counts a batch for each of its reasons.
+class FleetVehicle:
+    """One vehicle of a data set. ``n_refused`` counts a batch for each of its reasons.
 
     ``drifts`` are of the weeks from number ``calibrated_week`` on, the first of its last calibration.
     """
@@ -56,7 +56,7 @@ class Vehicle:
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A log, or with ``log`` None a whole job, that gave nothing, and why."""
+    """A failed log, or with ``log`` None a failed job, and the reason."""
 
     vehicle: str
     month: str
@@ -65,10 +65,10 @@ class Failure:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fleet:
-    """Every vehicle of a data set, by name; those of which it holds no batch at all; and what failed."""
+class FleetSummary:
+    """Every vehicle of a data set, by name; vehicles without any batch; and the failures."""
 
-    vehicles: tuple[Vehicle, ...]
+    vehicles: tuple[FleetVehicle, ...]
     without_batches: tuple[str, ...]
     failures: tuple[Failure, ...]
 
@@ -89,17 +89,17 @@ class Fleet:
         return max(vehicle.last for vehicle in self.vehicles)
 
 
-def fleet_of(dataset: Place, on_vehicle: OnVehicle = lambda done, of: None) -> Fleet:
-    """Everything the receipts of a data set vouch for, and nothing else.
+def fleet_of(dataset: Location, on_vehicle: OnVehicle = lambda done, of: None) -> FleetSummary:
+    """The analysis of everything that a data set's receipts cover.
 
-    Raises ConfigurationError where there is nothing, or what cannot be understood; PlaceError where it cannot be read.
+    Raises ConfigurationError if there is nothing, or it is invalid; PlaceError if it cannot be read.
     """
     jobs = list(by_vehicle(slots_done(dataset)))
     if not jobs:
         raise ConfigurationError(
             f"{dataset}: holds no receipt of `springscale reprocess`: name the folder that was its --output"
         )
-    found: list[Vehicle] = []
+    found: list[FleetVehicle] = []
     series: dict[str, Series] = {}
     for done, (name, slots) in enumerate(jobs):
         on_vehicle(done, len(jobs))
@@ -114,14 +114,14 @@ def fleet_of(dataset: Place, on_vehicle: OnVehicle = lambda done, of: None) -> F
     failed = _failures(dataset)
     vehicles = tuple(replace(one, drifts=drifts[one.name]) for one in found)
     named = {name for name, _ in jobs} | {failure.vehicle for failure in failed}
-    return Fleet(vehicles, tuple(sorted(named - series.keys())), failed)
+    return FleetSummary(vehicles, tuple(sorted(named - series.keys())), failed)
 
 
-def _vehicle(name: str, batches: Batches) -> tuple[Vehicle, Series]:
-    """What is kept of a vehicle, its drifts still to be judged, and the series they will be judged by."""
+def _vehicle(name: str, batches: Batches) -> tuple[FleetVehicle, Series]:
+    """The summary of a vehicle with its drifts still to be judged, and the series for that."""
     answered, since = batches.is_answered, weeks_of(batches.rows(_by_last_calibration(batches)))
     first, last = (EPOCH.fromordinal(EPOCH.toordinal() + int(t // DAY_NS)) for t in batches.t_end_ns[[0, -1]])
-    vehicle = Vehicle(
+    vehicle = FleetVehicle(
         name,
         len(batches),
         int(answered.sum()),
@@ -139,12 +139,12 @@ def _vehicle(name: str, batches: Batches) -> tuple[Vehicle, Series]:
 
 
 def _by_last_calibration(batches: Batches) -> Bool:
-    """Parameters are told relative to a calibration: only those of the last one can be compared."""
+    """Batches of the last calibration: parameters are relative to a calibration and comparable only within it."""
     last = batches.calibration_id[-1]
     return np.array([one == last for one in batches.calibration_id], dtype=bool)
 
 
-def _failures(dataset: Place) -> tuple[Failure, ...]:
+def _failures(dataset: Location) -> tuple[Failure, ...]:
     return tuple(_failure(told) for told in failures(dataset))
 
 

@@ -1,4 +1,4 @@
-"""Sensors that went bad: on which days a reason of the sensors refused what was driven, and since when."""
+"""Faulty sensors: the days on which a sensor's reason refused most of the driving, and the start of the fault."""
 
 import math
 from collections.abc import Iterator
@@ -15,17 +15,15 @@ from gateway.estimate import Z95
 from gateway.reasons import Cause
 from gateway.records import F64, I64, Bool
 
-BAD_DAY_SHARE: Final = (
-    0.5  # chosen: of a day's batches that the reason refused; batches of a day are no independent news
-)
+BAD_DAY_SHARE: Final = 0.5  # chosen: of a day's batches that the reason refused; batches of a day are correlated
 RECENT_DAYS: Final = 14  # chosen: the last days on which the vehicle drove
-LEAST_DAYS: Final = 5  # chosen: fewer are an incident, not a state
-BAD_SHARE: Final = 0.2  # chosen: more bad days than that, surely, is a sensor that is bad
-LEAST_LIKELIHOOD_RATIO: Final = 12.0  # chosen: twice the logarithm, from which a day divides good from bad
+LEAST_DAYS: Final = 5  # chosen: fewer are an incident, not a fault
+BAD_SHARE: Final = 0.2  # chosen: with certainly more bad days the sensor is bad
+LEAST_LIKELIHOOD_RATIO: Final = 12.0  # chosen: twice the logarithm, for a day that separates good from bad
 
 
 class Health(StrEnum):
-    """What the days say of one reason."""
+    """The state of a sensor by one reason."""
 
     BAD = "bad"  # now: surely more than BAD_SHARE of the recent days
     WAS_BAD = "was bad"  # had as many bad days in a row as make a sensor bad, but not now
@@ -41,7 +39,7 @@ class Share:
 
     @property
     def interval95(self) -> tuple[float, float]:
-        """(0, 1) where there is nothing to tell from."""
+        """(0, 1) without data."""
         if self.n == 0:
             return 0.0, 1.0
         share, z2 = self.n_bad / self.n, Z95**2
@@ -56,7 +54,7 @@ class Share:
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """One reason of the sensors in one vehicle: batches, days, how it stands, and since when if it is bad."""
+    """One reason of the sensors in one vehicle: batches, days, its state, and its start if it is bad."""
 
     reason: str
     n_batches: int
@@ -91,7 +89,7 @@ def _trouble(reason: str, n_batches: int, days: I64, is_bad: Bool, met: tuple[da
 
 
 def _was_bad(is_bad: Bool) -> bool:
-    """Whether any stretch of RECENT_DAYS would have been called bad then."""
+    """Whether any stretch of RECENT_DAYS would have counted as bad."""
     if len(is_bad) < RECENT_DAYS:
         return False
     most = int(np.convolve(is_bad, np.ones(RECENT_DAYS, dtype=np.int64), "valid").max())
@@ -101,7 +99,7 @@ def _was_bad(is_bad: Bool) -> bool:
 def _first_of_the_bad(is_bad: Bool) -> int:
     """The day that best divides the days into two with a share of bad ones each, by the binomial likelihood.
 
-    The first bad day where no division is much likelier than none, or where there were more before it.
+    The first bad day if no division is much likelier than none, or if there were more bad days before it.
     """
     n, total = len(is_bad), int(is_bad.sum())
     before = np.arange(1, n, dtype=np.int64)
@@ -115,7 +113,7 @@ def _first_of_the_bad(is_bad: Bool) -> int:
 
 
 def _log_likelihood(n_bad: I64, n: I64) -> F64:
-    """Of n_bad among n with the share that makes it likeliest."""
+    """Log likelihood of n_bad among n with its most likely share."""
     share = n_bad / n
     with np.errstate(divide="ignore", invalid="ignore"):
         parts = np.where(n_bad > 0, n_bad * np.log(share), 0.0) + np.where(

@@ -1,10 +1,9 @@
-"""How fast something drifts: a slope that single weeks cannot pull, how sure it is, and which of many to believe.
+"""Trends: a robust slope, its uncertainty, and the selection of real ones among many.
 
-The slope is the median of the slopes between all pairs of points (Theil, 1950); its interval and its test are those of
-Kendall's S (P. K. Sen, J. Am. Stat. Assoc. 63, 1968), whose variance is raised where what is left beside the slope
-follows itself from point to point (K. H. Hamed and A. R. Rao, J. Hydrology 204, 1998). Whoever asks a thousand vehicles
-finds some slopes by chance: how many of those that are flagged may be so is bounded, whatever the questions have in
-common (Y. Benjamini and D. Yekutieli, Ann. Statist. 29, 2001).
+The slope is the median of the slopes between all pairs of points (Theil, 1950). Its interval and its test are those of
+Kendall's S (P. K. Sen, J. Am. Stat. Assoc. 63, 1968), with its variance increased if the residuals are autocorrelated
+(K. H. Hamed and A. R. Rao, J. Hydrology 204, 1998). Among a thousand vehicles some slopes arise by chance: the share of
+those among the flagged ones is bounded under any dependence (Y. Benjamini and D. Yekutieli, Ann. Statist. 29, 2001).
 """
 
 import math
@@ -20,14 +19,14 @@ from gateway.calibration.trend import around_the_median, pair_slopes, variance_o
 from gateway.estimate import Z95
 from gateway.records import F64, Bool
 
-LEAST_POINTS: Final = 8  # chosen: S of fewer is no normal number yet
-MOST_ALIKE: Final = 0.95
-FALSE_SHARE: Final = 0.05  # of the flagged, those that may be there by chance
+LEAST_POINTS: Final = 8  # chosen: with fewer points S is not approximately normal
+MOST_ALIKE: Final = 0.95  # chosen: bound of the autocorrelation, for a finite variance
+FALSE_SHARE: Final = 0.05  # chosen: of the flagged, those that may be there by chance
 
 
 @dataclass(frozen=True, slots=True)
-class Trend:
-    """A slope in units per unit of x, its 95 % interval and the chance of one as steep where there is none."""
+class DriftTrend:
+    """A slope in units per unit of x, its 95 % interval and its p-value."""
 
     slope: float
     low: float
@@ -36,8 +35,8 @@ class Trend:
     n: int
 
 
-def trend_of(x: F64, y: F64) -> Trend | None:
-    """The trend of y over x (n,), both finite, x rising; None where there are too few points to tell."""
+def trend_of(x: F64, y: F64) -> DriftTrend | None:
+    """The trend of y over x (n,), both finite, x rising; None with too few points."""
     n = len(x)
     if n < LEAST_POINTS:
         return None
@@ -45,11 +44,11 @@ def trend_of(x: F64, y: F64) -> Trend | None:
     slope = float(np.median(slopes))
     std = math.sqrt(variance_of_s(x, y) * _repeated(y - slope * x))
     low, high = around_the_median(slopes, Z95 * std)
-    return Trend(slope, low, high, _chance(float(np.sign(slopes).sum()), std), n)
+    return DriftTrend(slope, low, high, _chance(float(np.sign(slopes).sum()), std), n)
 
 
 def believed(p: Sequence[float]) -> Bool:
-    """Which of these chances (n,) are small enough, with at most FALSE_SHARE of them by chance."""
+    """Which of these p-values (n,) are significant, with at most FALSE_SHARE of them by chance."""
     chances = np.asarray(p, dtype=float)
     n = len(chances)
     if n == 0:
@@ -64,11 +63,11 @@ def believed(p: Sequence[float]) -> Bool:
 
 
 def _repeated(left: F64) -> float:
-    """By how much S varies more because a week is like the one before it; 1 where it is not. Never below.
+    """Factor of the variance of S due to autocorrelation of neighbouring weeks; at least 1.
 
-    Ranks are taken to follow one another with one correlation r, with r squared over two weeks and so on. What is
-    found of it in n points is too small by about (1 + 4 r) / n (F. H. C. Marriott and J. A. Pope, Biometrika 41, 1954)
-    for the mean that was taken off, and by 1 / n more for the slope.
+    Ranks are taken to have an autocorrelation r, r squared over two weeks and so on. Its estimate from n points is too
+    small by about (1 + 4 r) / n (F. H. C. Marriott and J. A. Pope, Biometrika 41, 1954) for the removed mean, and by 1
+    / n more for the slope.
     """
     n = len(left)
     ranks = rankdata(left) - (n + 1) / 2.0
@@ -83,5 +82,5 @@ def _repeated(left: F64) -> float:
 
 
 def _chance(s: float, std: float) -> float:
-    """Two-sided, by the normal distribution with its correction for whole steps."""
+    """Two-sided p-value, by the normal distribution with continuity correction."""
     return 1.0 if std == 0.0 else min(1.0, 2.0 * float(ndtr(-max(0.0, abs(s) - 1.0) / std)))

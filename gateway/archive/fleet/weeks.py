@@ -1,4 +1,4 @@
-"""A vehicle week by week: what it carried, how sure that is, what was refused, and what its parameters were."""
+"""A vehicle week by week: its loads with their uncertainty, its refusals, and its parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,20 +13,19 @@ from gateway.reasons import EXPLANATIONS, Cause
 from gateway.records import F64, I64, Bool, Why
 from gateway.units import NS_PER_S
 
-DAY_NS: Final = 86_400 * NS_PER_S
+DAY_NS: Final = 86_400 * NS_PER_S  # nanoseconds
 _MONDAY: Final = date(1969, 12, 29)  # of the week that holds the first of January 1970
-_DAYS_BEFORE: Final = 3
+_DAYS_BEFORE: Final = 3  # from _MONDAY to 1970-01-01
 CAUSES: Final[Mapping[str, Cause]] = {str(why): told.cause for why, told in EXPLANATIONS.items()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Weeks:
-    """Arrays (m,), a week with batches each, UTC, from Monday; NaN where unknown, never 0.
+    """Arrays (m,), one week with batches each, UTC, from Monday; NaN where unknown, never 0.
 
-    ``payload_mean_kg`` is over the batches that tell a payload; its 95 % interval counts in full what the errors of
-    batches have in common, and lets what each has for itself shrink with their number. The quartiles are of what was
-    carried. ``medians`` are of every batch that has the number, refused ones too: what refuses would else hide what
-    drifts.
+    ``payload_mean_kg`` is over the batches with a payload; its 95 % interval includes the errors common to batches in
+    full, and reduces their own errors by their number. The quartiles are those of the payload. ``medians`` include
+    refused batches, because otherwise a refusal would hide the drift that caused it.
     """
 
     number: I64
@@ -48,7 +47,7 @@ class Weeks:
 
 
 def monday_of(number: int) -> date:
-    """The day on which a week begins."""
+    """The first day of a week."""
     return _MONDAY + timedelta(weeks=number)
 
 
@@ -77,19 +76,19 @@ def weeks_of(batches: Batches) -> Weeks:
 
 
 def refused_by(batches: Batches, cause: Cause) -> Bool:
-    """Which batches (n,) one of the cause's reasons refused, perhaps with others."""
+    """Batches (n,) refused by one of the cause's reasons, possibly with others."""
     of_cause = [rows for reason, rows in batches.rejected.items() if CAUSES.get(reason) is cause]
     found: Bool = np.any([np.zeros(len(batches), dtype=bool), *of_cause], axis=0)
     return found
 
 
 def known_reason(reason: str) -> Why | None:
-    """None for one that a newer version wrote."""
+    """None for a reason of a newer version."""
     return Why(reason) if reason in CAUSES else None
 
 
 def _payload(batches: Batches, of_week: slice, answered: Bool) -> tuple[float, float, float, float, float]:
-    """Mean, its interval, and the quartiles; NaN where no batch told a payload."""
+    """Mean, its interval, and the quartiles; NaN without a payload."""
     payload, std, own = (
         batches.numbers[name][of_week][answered] for name in ("payload_kg", "payload_std_kg", "payload_own_std_kg")
     )
@@ -104,9 +103,9 @@ def _payload(batches: Batches, of_week: slice, answered: Bool) -> tuple[float, f
 
 
 def _std_of_mean(std: F64, own: F64) -> float:
-    """Of a mean of numbers whose errors have the standard deviations ``std``, ``own`` of them independent.
+    """Standard deviation of a mean of numbers with errors ``std``, of which ``own`` are independent.
 
-    What is not known to be a batch's own is taken to be common to all, which is never too narrow.
+    An unknown own part counts as common to all, which is never too narrow.
     """
     own = np.minimum(np.where(np.isfinite(own), own, 0.0), std)
     common = np.sqrt(std**2 - own**2)

@@ -1,10 +1,11 @@
-"""Sensors to frames: a thread for each sensor, and one that sends, with a bounded queue between them."""
+"""Feeds sensors onto a CAN bus: one thread reads each sensor, another sends, with a bounded queue between them."""
 
 import queue
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -20,13 +21,13 @@ from gateway.records import F64, I64, Frames
 
 MAP: Final = f"{SHIPPED_PREFIX}reference"
 MODULUS: Final = 256  # of the counters
-QUEUE: Final = 500  # heaps: ten seconds of two sensors
+QUEUE: Final = 500  # bursts: ten seconds of two sensors
 READ_S: Final = 0.5
-HEAP_S: Final = 0.04  # samples are sent in heaps of so long: a fifth of the work, and the counter undoes them
+HEAP_S: Final = 0.04  # samples are sent in bursts of this length: a fifth of the work; the counter restores their times
 RETRY_S: Final = 2.0
-HOLE: Final = 2.5  # periods without a sample: some were lost, and were not merely late
+HOLE: Final = 2.5  # periods without a sample after which samples count as lost, not late
 USUAL_OF: Final = 101
-NO_PLACE_DEG: Final = -214.7483648  # what the database says of a place without a fix
+NO_PLACE_DEG: Final = -214.7483648  # value of the database for a position without a fix
 _DEG: Final = np.pi / 180.0
 _MESSAGES: Final = {
     "accel": ("IMU_ACCEL", ("AccelX", "AccelY", "AccelZ"), "AccelCounter", "AccelValid", 1.0),
@@ -36,7 +37,7 @@ _MESSAGES: Final = {
 
 @dataclass
 class FeedState:
-    """Counts since the start, each written by the one thread that counts it; faults by the sensor they are of."""
+    """Counts since the start, each written by one thread; faults by sensor."""
 
     n_samples: dict[str, int] = field(default_factory=dict)
     n_lost: dict[str, int] = field(default_factory=dict)
@@ -49,7 +50,7 @@ class FeedState:
 
 
 class Numbering:
-    """Counts the samples of one sensor, and those that its time stamps show to be lost."""
+    """Numbers the samples of one sensor, and counts those that are missing by their time stamps."""
 
     def __init__(self, rate_hz: float) -> None:
         self.n_lost = 0
@@ -74,7 +75,7 @@ class Numbering:
 
 
 class Feeder:
-    """Feeds until :meth:`stop`. A bus or a gpsd that fails is tried again; a device that is gone ends it."""
+    """Feeds until :meth:`stop`. A failing bus or gpsd is retried; a device that disappears ends the feeding."""
 
     def __init__(
         self, interface: str, channel: str, devices: Sequence[IioDevice], gps: Gpsd | None,
@@ -91,7 +92,7 @@ class Feeder:
         self._ended: BusError | None = None
 
     def stop(self) -> None:
-        """End soon."""
+        """Request the end."""
         self._stopping.set()
 
     def run(self, on_tick: Callable[[FeedState], None] = lambda state: None) -> None:
@@ -115,29 +116,26 @@ class Feeder:
             raise self._ended
 
     def _send(self, on_tick: Callable[[FeedState], None]) -> None:
-        sink: BusSink | None = None
-        try:
-            while not self._stopping.is_set():
-                on_tick(self.state)
-                try:
-                    sink = sink or BusSink(*self._place)
-                    until_s = time.monotonic() + READ_S
-                    while not self._stopping.is_set() and (left_s := until_s - time.monotonic()) > 0.0:
-                        frames = self._queue.get(timeout=left_s)
-                        sink.send(frames)
-                        self.state.n_sent += len(frames)
-                        self._note("bus", None)
-                except queue.Empty:
-                    continue
-                except BusError as fault:
-                    self._note("bus", str(fault))
-                    if sink is not None:
-                        sink.__exit__(None, None, None)
-                        sink = None
-                    self._stopping.wait(RETRY_S)
-        finally:
-            if sink is not None:
-                sink.__exit__(None, None, None)
+        while not self._stopping.is_set():
+            on_tick(self.state)
+            try:
+                with BusSink(*self._place) as sink:
+                    self._send_until_stopped(sink, on_tick)
+            except BusError as fault:
+                self._note("bus", str(fault))
+                self._stopping.wait(RETRY_S)
+
+    def _send_until_stopped(self, sink: BusSink, on_tick: Callable[[FeedState], None]) -> None:
+        """Send queued frames until stopped; on_tick every READ_S. Raises BusError if the bus fails."""
+        while not self._stopping.is_set():
+            until_s = time.monotonic() + READ_S
+            with suppress(queue.Empty):
+                while not self._stopping.is_set() and (left_s := until_s - time.monotonic()) > 0.0:
+                    frames = self._queue.get(timeout=left_s)
+                    sink.send(frames)
+                    self.state.n_sent += len(frames)
+                    self._note("bus", None)
+            on_tick(self.state)
 
     def _read_imu(self, device: IioDevice) -> None:
         numbering = Numbering(device.rate_hz)
@@ -174,7 +172,7 @@ class Feeder:
         return self._encoder.encode(message, t_ns, {**columns, **more})
 
     def _follow_gravity(self, accel_mps2: F64) -> None:
-        """A slow mean of the axis that should point up."""
+        """Update the slow mean of the axis that should point up."""
         for z in accel_mps2[:, 2].tolist():
             before = self.state.gravity_mps2
             self.state.gravity_mps2 = z if before != before else before + (z - before) / 500.0  # noqa: PLR0124 # NaN
@@ -192,7 +190,7 @@ class Feeder:
         gps.close()
 
     def _fix(self, fix: Fix, now_ns: I64) -> Frames:
-        """Speed with the kind of fix, no frame without a speed; and the position."""
+        """Frames of speed with fix type, and of position."""
         mode = fix.mode if fix.speed_mps is not None else 0
         told = {"Speed": fix.speed_mps or 0.0, "Fix": float(mode), "Satellites": float(fix.n_satellites)}
         place = {"Latitude": fix.latitude_deg, "Longitude": fix.longitude_deg}

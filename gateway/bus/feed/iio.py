@@ -60,7 +60,7 @@ class _Element:
         if not self.unused_bits:
             return raw
         left = self.unused_bits
-        whole: np.ndarray = (raw << left) >> left  # an arithmetic shift where it is signed
+        whole: np.ndarray = (raw << left) >> left  # an arithmetic shift if it is signed
         return whole
 
 

@@ -4,18 +4,18 @@ An interface's name and the wanted identifiers come in; frames go out in order o
 loss counted. After a bus error the thread waits and opens the bus again; it never dies.
 """
 
-from gateway.bus.live.around import Around, around_of
+from gateway.bus.live.bus_survey import BusSurvey, bus_survey_of
 from gateway.bus.live.inbox import Inbox
 from gateway.bus.live.python_can import require_usable_interface, usable_interfaces, what_lacks
 from gateway.bus.live.source import LiveSource, OpenReceiver, SourceState
 
 __all__ = [
-    "Around",
+    "BusSurvey",
     "Inbox",
     "LiveSource",
     "OpenReceiver",
     "SourceState",
-    "around_of",
+    "bus_survey_of",
     "require_usable_interface",
     "usable_interfaces",
     "what_lacks",

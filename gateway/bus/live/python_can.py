@@ -46,7 +46,7 @@ _WINDOWS_ONLY: Final = frozenset({"etas", "ixxat", "nican", "nixnet", "systec", 
 class PythonCanReceiver:
     """Messages of an open python-can bus as bursts of frames."""
 
-    dropped_kernel = 0  # python-can does not tell
+    dropped_kernel = 0  # python-can does not report it
 
     def __init__(self, bus: can.BusABC, width: int) -> None:
         self._bus = bus

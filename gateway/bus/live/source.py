@@ -163,7 +163,7 @@ class LiveSource:
     def _run(self) -> None:
         try:
             self._listen_until_stopped()
-        except BaseException as failure:  # noqa: BLE001 # a dead thread must tell, whatever killed it
+        except BaseException as failure:  # noqa: BLE001 # every failure of the thread must be reported
             self._failure = failure
             self._enter(SourceState.READER_FAULT, f"the receive thread died: {failure!r}")
         else:

@@ -97,7 +97,7 @@ def read_blf(path: Path, selection: Selection, width: int) -> Iterator[Frames]:
     """
     with open_log_file(path) as file:
         header = _header(path, file)
-        reader = _Reader(_start_ns(header), selection, width)
+        reader = _BlfReader(_start_ns(header), selection, width)
         contents = _contents(file, header, selection.report)
         for frames in gathered(map(reader.read, contents), CHUNK_FRAMES, width):
             selection.report.hand_on(frames.t_ns)
@@ -155,7 +155,7 @@ def _inflated(body: bytes, report: LogReport) -> bytes | None:
     return None
 
 
-class _Reader:
+class _BlfReader:
     """Reads content after content; an object may begin in one and end in the next."""
 
     def __init__(self, start_ns: int, selection: Selection, width: int) -> None:

@@ -22,7 +22,7 @@ from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 
 CHUNK_FRAMES: Final = 32_768  # what is handed on at once: large enough that the decoder's own steps cost little
 KEPT_SHAPES: Final = 32
-LONGEST_LINE: Final = 4096  # what an exact read looks at
+LONGEST_LINE: Final = 4096  # bytes examined by an exact read
 _LOWER_CASE: Final = np.uint64(0x2020_2020_2020_2020)
 _ERROR_FRAME_TEXT: Final = "20000???"  # SocketCAN's error flag and the classes that exist
 
@@ -42,7 +42,7 @@ def read_candump(
     Raises LogUnreadableError if the file cannot be opened.
     """
     report = LogReport(Path(path)) if report is None else report
-    reader = _Reader(filters, channel, width, report)
+    reader = _CandumpReader(filters, channel, width, report)
     yield from gathered(map(reader.read, line_blocks(Path(path), report, block_bytes)), CHUNK_FRAMES, width)
 
 
@@ -73,7 +73,7 @@ class IdPattern:
         return is_hit
 
 
-class _Reader:
+class _CandumpReader:
     """Reads block after block; keeps the shapes it has learned and the number of lines read."""
 
     def __init__(self, filters: Sequence[IdFilter], channel: str | None, width: int, report: LogReport) -> None:
@@ -187,7 +187,7 @@ class _Reader:
 
 
 class _Finder:
-    """Looks for a character in a block. Its marks of each byte go into one buffer, used again and again."""
+    """Finds a character in a block, with one reused buffer for the result."""
 
     def __init__(self) -> None:
         self._is_found = np.zeros(0, np.bool_)
@@ -215,7 +215,7 @@ class _Finder:
 
 
 def _apart(hashes: I64) -> I64:
-    """Without those that follow another at once."""
+    """Remove positions that directly follow another."""
     follows_another = hashes[1:] - hashes[:-1] == 1
     return np.delete(hashes, np.flatnonzero(follows_another) + 1) if follows_another.any() else hashes
 

@@ -1,4 +1,4 @@
-"""A text file, packed or not, as blocks of whole lines in one buffer that is used again and again."""
+"""Reads a text file, compressed or not, as blocks of whole lines in one reused buffer."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

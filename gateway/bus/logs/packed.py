@@ -1,4 +1,4 @@
-"""A log file before it was packed: gzip, zstd and xz are inflated during reading, recognised by their first bytes."""
+"""Reads compressed logs: gzip, zstd and xz, recognised by their first bytes, are inflated during reading."""
 
 import io
 import lzma
@@ -36,7 +36,7 @@ class Inflater(Protocol):
 
     @property
     def eof(self) -> bool:
-        """Whether the member is over."""
+        """Whether the end of the member is reached."""
 
     @property
     def needs_input(self) -> bool:
@@ -44,15 +44,15 @@ class Inflater(Protocol):
 
     @property
     def unused_data(self) -> bytes:
-        """What followed the member."""
+        """Bytes read beyond the end of the member."""
 
     def decompress(self, data: bytes, max_length: int = -1) -> bytes:
-        """At most ``max_length`` bytes more."""
+        """Decompress at most ``max_length`` further bytes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Packing:
-    """One way to pack: the first bytes of its members, its inflater, and the inflater's exceptions."""
+    """One compression format: the first bytes of its members, its decompressor, and the exceptions of that."""
 
     name: str
     magics: tuple[bytes, ...]

@@ -40,7 +40,7 @@ class RejectedLines:
 
 @dataclass(slots=True)
 class LogReport:
-    """Filled while its reader goes through the log.
+    """Counts of a log, filled while it is read.
 
     ``frames`` counts everything that looks like a frame, of any identifier; ``wanted`` the frames given out.
     ``other_channel``, ``remote_frames`` and ``out_of_order`` are among the wanted identifiers. ``lines`` stays 0 for

@@ -1,7 +1,7 @@
-"""The ring log: the weighed frames, kept on disk as long as there is room.
+"""The ring log: the mapped frames, recorded on disk as long as there is room.
 
-Frames come in from the pipeline and never wait; gzip-compressed candump segments lie in one directory, bounded in size
-and in bytes written a day, and go out by name. A disk fault loses frames, which are counted, and nothing else.
+The pipeline hands frames over without waiting. They are written as gzip-compressed candump segments into one directory,
+limited in size and in bytes written per day, and can be fetched by name. A disk fault loses frames, which are counted.
 """
 
 from gateway.bus.ring.folder import RingLimits

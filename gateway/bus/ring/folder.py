@@ -1,4 +1,4 @@
-"""The ring on disk: segments in one directory; the oldest are removed when a new block needs room."""
+"""The directory of the ring log: segments, of which the oldest are removed when a new block needs room."""
 
 import errno
 import os
@@ -21,9 +21,9 @@ SECONDS_PER_DAY: Final = 86_400
 
 @dataclass(frozen=True, slots=True)
 class RingLimits:
-    """Limits of the ring: bytes on disk and bytes written a day; ``free_bytes`` stay free for everybody else.
+    """Limits of the ring: bytes on disk and bytes written per day; ``free_bytes`` of the disk stay free.
 
-    ``block_s`` of frames are written at a time, and lost in a power cut.
+    ``block_s`` seconds of frames are written at a time; a power cut loses as much.
     """
 
     max_bytes: int
@@ -68,7 +68,7 @@ class RingFolder:
         with opened_folder(self.directory) as folder:
             try:
                 return open_segment(folder, segment.name), segment.n_bytes
-            except FileNotFoundError:  # let go just now
+            except FileNotFoundError:  # removed just now
                 return None
 
     def read(self) -> None:
@@ -107,7 +107,7 @@ class RingFolder:
         self._segments = (*older, newest.with_block(head))
 
     def close(self) -> None:
-        """Write no further into the segment that grows."""
+        """Close the newest segment."""
         if self._growing is not None:
             with suppress(OSError):
                 self._growing.file.close()
@@ -159,7 +159,7 @@ class RingFolder:
 
 
 def _write_all(file: BinaryIO, block: bytes) -> None:
-    """A raw file may write less than it is given. Raises OSError."""
+    """Write the whole block, since an unbuffered file may write less at a time. Raises OSError."""
     rest = memoryview(block)
     while rest:
         rest = rest[file.write(rest) :]

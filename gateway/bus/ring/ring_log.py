@@ -1,4 +1,4 @@
-"""The thread that owns the ring: gathers frames for minutes and writes them as one block."""
+"""The thread of the ring log: collects frames for minutes and writes them as one block."""
 
 import logging
 import threading
@@ -15,14 +15,14 @@ from gateway.log import Event, log_event
 from gateway.records import Frames
 from gateway.status import RecordStatus
 
-BLOCK_FRAMES: Final = 131_072  # are written though the time of a block is not over
-HELD_FRAMES: Final = 2 * BLOCK_FRAMES  # wait at most while the disk refuses: some MB of memory
+BLOCK_FRAMES: Final = 131_072  # so many frames are written before the time of a block is over
+HELD_FRAMES: Final = 2 * BLOCK_FRAMES  # most frames in memory while the disk fails: some MB
 RETRY_S: Final = 30.0
 STOP_WITHIN_S: Final = 5.0
 
 
 class RingLog:
-    """Frames handed over by one thread, written by its own, listed and opened from any."""
+    """The ring log. One thread hands frames over, its own thread writes them, any thread lists and opens segments."""
 
     def __init__(
         self,
@@ -48,7 +48,7 @@ class RingLog:
         self._thread = threading.Thread(target=self._run, name="ring-log", daemon=True)
 
     def start(self) -> None:
-        """Begin to write."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
@@ -111,11 +111,11 @@ class RingLog:
             while self._wait_for_block():
                 self._write_held()
             self._folder.close()
-        except Exception as failure:  # noqa: BLE001 - whatever ends the recording must not end the weighing
+        except Exception as failure:  # noqa: BLE001 - a failure of the recording must not end the weighing
             self._tell(f"the recorder died: {failure!r}")
 
     def _look(self) -> None:
-        """Segments of earlier runs can be fetched before the first block is due."""
+        """Read the directory, so that segments of earlier runs can be fetched at once."""
         try:
             self._folder.read()
         except OSError as refusal:

@@ -80,9 +80,9 @@ def create_segment(folder: int, name: str) -> BinaryIO:
 
 
 def mended_segment(folder: int, name: str, *, is_newest: bool) -> tuple[Segment, int]:
-    """A segment's content by the heads of its blocks, and the number of bytes cut off behind them.
+    """Read the heads of a segment's blocks and cut off what follows the last complete one -> (segment, bytes removed).
 
-    In the newest segment, where a power cut may have struck, the last block is checked whole. Raises OSError.
+    In the newest segment, which a power cut may have damaged, the last block is checked completely. Raises OSError.
     """
     with open_segment(folder, name) as file:
         heads = list(_heads(file))

@@ -1,6 +1,4 @@
-"""A live channel into one log file, for people without a service there: in whole blocks, so that a cut one is
-readable.
-"""
+"""Records a live channel into one log file, in whole blocks, so that an interrupted file stays readable."""
 
 import threading
 import time

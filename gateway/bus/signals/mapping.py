@@ -114,7 +114,7 @@ class SignalMap:
 
     @cached_property
     def id(self) -> str:
-        """Another identity if any of our signals is read differently."""
+        """Hash of all that decides how our signals are read."""
         read = repr((self.j1939, [(message.id_filter, message.signals) for message in self.messages]))
         return hashlib.sha256(read.encode()).hexdigest()[:16]
 

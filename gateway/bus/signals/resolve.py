@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Mapping
-from typing import Final, Protocol
+from typing import Annotated, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
 
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.signals.database import DatabaseMessage, DatabaseSignal, closest
@@ -37,31 +39,34 @@ MOST_COUNTER_BITS: Final = 32  # and no frames are lost round a longer one
 _EXACT_INTEGERS: Final = 1 << 53  # a double holds every integer up to here
 
 Accepted = int | float | str
+Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
-class Entry(Protocol):
-    """A map's entry for one signal (SignalEntry of the file)."""
+class SignalEntry(BaseModel):
+    """[signals.NAME]: the source of one of our signals."""
 
-    @property
-    def signal(self) -> str: ...
-    @property
-    def sign(self) -> int: ...
-    @property
-    def unit(self) -> str | None: ...
-    @property
-    def latency_s(self) -> float: ...
-    @property
-    def valid_when(self) -> Mapping[str, Accepted | list[Accepted]]: ...
-    @property
-    def counter(self) -> str | None: ...
-    @property
-    def minimum(self) -> float | None: ...
-    @property
-    def maximum(self) -> float | None: ...
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    message: str = Field(description="name of the message in the DBC")
+    signal: str = Field(description="name of the signal in that message")
+    sign: Literal[-1, 1] = Field(1, description="-1 if the device counts against our axis (ISO 8855)")
+    unit: str | None = Field(None, description="unit of the DBC's physical values; overrides the DBC's own")
+    latency_s: float = Field(0.0, ge=0.0, le=10.0, description="delay between measurement and sending")
+    valid_when: dict[str, Accepted | list[Accepted]] = Field(
+        default_factory=dict, description="signals of the same message and the values under which this one counts"
+    )
+    counter: str | None = Field(
+        None,
+        description="signal of the same message that counts its frames: it distinguishes late frames from lost ones",
+    )
+    minimum: Finite | None = Field(None, description="least valid value in SI; overrides the DBC's range")
+    maximum: Finite | None = Field(None, description="greatest valid value in SI; overrides the DBC's range")
 
 
-def resolve_signal(where: str, signal: Signal, entry: Entry, message: DatabaseMessage, j1939: bool) -> MappedSignal:
-    """The signal an entry means. ``where`` begins every SignalMapError."""
+def resolve_signal(
+    where: str, signal: Signal, entry: SignalEntry, message: DatabaseMessage, j1939: bool
+) -> MappedSignal:
+    """Resolve an entry of the map against its message. ``where`` begins every SignalMapError."""
     named = _find(f"{where}.signal", entry.signal, message)
     _require_decodable(f"{where}.signal", named, message)
     to_si = entry.sign * _unit_factor(f"{where}.unit", signal, entry, named)
@@ -131,14 +136,14 @@ def _loses_integers(field: BitField) -> bool:
     return is_integer and max(map(abs, (*field.raw_range, *field.physical_range))) > _EXACT_INTEGERS
 
 
-def _unit_factor(where: str, signal: Signal, entry: Entry, named: DatabaseSignal) -> float:
+def _unit_factor(where: str, signal: Signal, entry: SignalEntry, named: DatabaseSignal) -> float:
     try:
         return si_factor(QUANTITIES[signal], named.unit if entry.unit is None else entry.unit)
     except SignalMapError as fault:
         raise SignalMapError(f"{where}: {fault}") from None
 
 
-def _valid_range(where: str, entry: Entry, named: DatabaseSignal, to_si: float) -> tuple[float, float]:
+def _valid_range(where: str, entry: SignalEntry, named: DatabaseSignal, to_si: float) -> tuple[float, float]:
     """Least and greatest valid SI: of the entry, else of the database, else of the bits."""
     low, high = named.field.physical_range
     if named.minimum is not None and named.maximum is not None and named.minimum < named.maximum:

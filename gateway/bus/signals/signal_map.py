@@ -2,13 +2,13 @@
 
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from gateway.bus.signals.database import DatabaseMessage, closest, load_messages
 from gateway.bus.signals.mapping import MappedMessage, MappedSignal, SignalMap, exact_filter, j1939_filter
-from gateway.bus.signals.resolve import resolve_signal
+from gateway.bus.signals.resolve import SignalEntry, resolve_signal
 from gateway.errors import SignalMapError
 from gateway.files.signed import Read
 from gateway.records import EXTENDED_ID, Signal
@@ -18,33 +18,9 @@ __all__ = ["SignalEntry", "SignalMap", "SignalMapFile", "load_signal_map", "ship
 
 SHIPPED_PREFIX: Final = "springscale:"
 
-Accepted = int | float | str
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-
-
-class SignalEntry(BaseModel):
-    """[signals.NAME]: the source of one of our signals."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    message: str = Field(description="name of the message in the DBC")
-    signal: str = Field(description="name of the signal in that message")
-    sign: Literal[-1, 1] = Field(1, description="-1 if the device counts against our axis (ISO 8855)")
-    unit: str | None = Field(None, description="unit of the DBC's physical values; overrides the DBC's own")
-    latency_s: float = Field(0.0, ge=0.0, le=10.0, description="delay between measurement and sending")
-    valid_when: dict[str, Accepted | list[Accepted]] = Field(
-        default_factory=dict, description="signals of the same message and the values under which this one counts"
-    )
-    counter: str | None = Field(
-        None,
-        description="signal of the same message that counts its frames: it distinguishes late frames from lost ones",
-    )
-    minimum: Finite | None = Field(None, description="least valid value in SI; overrides the DBC's range")
-    maximum: Finite | None = Field(None, description="greatest valid value in SI; overrides the DBC's range")
-
 
 class SignalMapFile(BaseModel):
-    """The whole file."""
+    """The signal map as written in its file."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

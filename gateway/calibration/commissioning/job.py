@@ -10,15 +10,15 @@ from gateway.stated.doubt import Doubt
 
 JOB: Final = "job.json"
 RESULT: Final = "result.json"
-ENOUGH_SHARE: Final = 0.98  # of what is wanted: nobody drives on for a fiftieth of a standard deviation
+ENOUGH_SHARE: Final = 0.98  # chosen: of the goal; a further 2 % are not worth driving
 
 
-class _Table(BaseModel):
+class _JobTable(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-class Drive(_Table):
-    """Kept batches that were driven with one known load."""
+class Drive(_JobTable):
+    """Kept batches of one known load."""
 
     name: str
     payload_kg: float = 0.0
@@ -27,7 +27,7 @@ class Drive(_Table):
     batches: tuple[Path, ...] = Field(min_length=1, description="files of kept batches")
 
 
-class Job(_Table):
+class Job(_JobTable):
     """Inspect the drives, and also fit them if ``is_fit``; ``like`` are files of vehicles of the same model or of their
     line.
     """
@@ -42,7 +42,7 @@ class Job(_Table):
     command: str
 
 
-class Found(_Table):
+class Found(_JobTable):
     """One finding of the inspection, in words."""
 
     kind: str
@@ -51,7 +51,7 @@ class Found(_Table):
     advice: str
 
 
-class Learned(_Table):
+class Learned(_JobTable):
     """The accuracy reached so far: standard deviations over the loads the vehicle may carry."""
 
     payload_std_kg: float
@@ -71,7 +71,7 @@ class Learned(_Table):
         return min(1.0, self.needed_std_kg / self.payload_std_kg)
 
 
-class Result(_Table):
+class Result(_JobTable):
     """The result of a job. ``fault`` says in words why there is no calibration; its text is that of the file."""
 
     findings: tuple[Found, ...] = ()
@@ -92,7 +92,7 @@ def to_file(table: BaseModel, path: Path) -> None:
 
 
 def findings_of(findings: Any) -> tuple[Found, ...]:
-    """The gravest first; each once."""
+    """The findings without duplicates, the gravest first."""
     told = dict.fromkeys((one.kind, one.severity, one.text, one.advice) for one in findings)
     order = ("fault", "warning", "note")
     found = [Found(kind=str(k), severity=str(s), text=t, advice=a) for k, s, t, a in told]

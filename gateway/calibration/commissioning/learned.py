@@ -18,8 +18,8 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.posterior import FRONT_SHARE, PAYLOAD, Source
 
-ANOTHER_DRIVE_S: Final = 3600.0  # after which nobody would go on in any case
-EVERY: Final = 6  # of the loads that it may carry: enough to average over what driving does not narrow
+ANOTHER_DRIVE_S: Final = 3600.0  # chosen: further driving that a fitter might accept
+EVERY: Final = 6  # chosen: every sixth possible load, enough for the mean of errors that driving does not reduce
 
 
 def learned_by(outcome: Outcome, vehicle: Vehicle, goal_std_share: float) -> Learned:

@@ -25,7 +25,7 @@ from gateway.stated.doubt import Doubt, DoubtKind
 WHEELBASE_M: Final = (1.6, 7.5)
 MASS_PER_WHEELBASE2: Final = (110.0, 380.0)  # kg/m2, empty, driver and tank as in service
 FRONT_SHARE_PCT: Final = (36.0, 70.0)  # empty: 38 with the engine behind the rear axle, up to 65 in a van
-TRACK_M: Final = (1.15, 2.2)
+TRACK_M: Final = (1.15, 2.2)  # a microcar's to a truck's
 MOST_AHEAD_M: Final = 1.5  # a sensor ahead of the front axle: a long front overhang
 MOST_BEHIND: Final = 1.75  # wheelbases behind the front axle: a long rear overhang
 PAYLOAD_SHARE: Final = (0.05, 2.0)  # of the empty vehicle; a truck of 18 t carries 1.3 times its own weight
@@ -36,18 +36,18 @@ LEAST_SPRUNG: Final = 0.75  # of the empty vehicle
 
 # Figures that vehicles of a line share; shelves and a tail lift account for a tenth. Chosen.
 MOST_MASS_OFF: Final = 0.12
-MOST_AXLE_OFF: Final = 0.18
-MOST_TRACK_OFF: Final = 0.05
+MOST_AXLE_OFF: Final = 0.18  # chosen: shelves and a tail lift act mostly on one axle
+MOST_TRACK_OFF: Final = 0.05  # chosen: other wheels
 MOST_WHEELBASE_OFF: Final = 0.01  # as a line asks for
 GROSS_ROUNDED: Final = 1.005  # papers round; of the sum of the axles' limits, which is the most
 MOST_LIMIT: Final = 5.0  # times what is there empty: the rear axle of a truck
 
-KG_PER_POUND: Final = 0.45359237
-M_PER_INCH: Final = 0.0254
-M_PER_FOOT: Final = 0.3048
-_DECIMALS: Final = (10.0, 0.1, 1000.0, 100.0, 0.01, 0.001)
+KG_PER_POUND: Final = 0.45359237  # international pound
+M_PER_INCH: Final = 0.0254  # international inch
+M_PER_FOOT: Final = 0.3048  # international foot
+_DECIMALS: Final = (10.0, 0.1, 1000.0, 100.0, 0.01, 0.001)  # slips of the decimal point and of tonnes
 _MASS_SLIPS: Final = (*_DECIMALS, KG_PER_POUND)
-_LENGTH_SLIPS: Final = (10.0, 0.1, 0.01, 0.001, M_PER_INCH, M_PER_FOOT)
+_LENGTH_SLIPS: Final = (10.0, 0.1, 0.01, 0.001, M_PER_INCH, M_PER_FOOT)  # centimetres, millimetres, inches, feet
 AXLES: Final = ("kerb_front_axle_kg", "kerb_rear_axle_kg")
 _SLIPPED: Final[Mapping[tuple[str, ...], tuple[float, ...]]] = MappingProxyType(
     {

@@ -25,8 +25,8 @@ from gateway.calibration.kept.drive import ESTIMATORS
 from gateway.core.settings import BatchSettings
 from gateway.errors import SpringscaleError
 
-LOWEST: Final = 19
-BYTES_PER_MB: Final = 1_000_000
+LOWEST: Final = 19  # of Linux's nice values
+BYTES_PER_MB: Final = 1_000_000  # SI
 
 
 def main(folder: Path) -> None:
@@ -47,7 +47,7 @@ def main(folder: Path) -> None:
 
 
 def done(path: Path, job: Job) -> Result:
-    """What comes of it. Raises SpringscaleError if it cannot write any result."""
+    """The result of the job. Raises SpringscaleError if none can be written."""
     campaign = _campaign(path, job)
     inspection = inspect_kept(campaign, tuple(_drives(job)), BatchSettings(**job.settings))
     looked = Result(findings=findings_of(_findings(inspection)), refusal=inspection.refusal)
@@ -69,7 +69,7 @@ def _made(outcome: Outcome, campaign: Campaign, job: Job) -> dict[str, object]:
 
 
 def _campaign(path: Path, job: Job) -> Campaign:
-    """As from a file of drives: its hash in the calibration is that of the job."""
+    """The campaign of the job's drives; its hash in the calibration is that of the job."""
     runs = tuple(
         RunTable(
             log=Path(drive.name),

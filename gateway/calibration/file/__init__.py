@@ -7,7 +7,7 @@ from.
 
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.calibration.file.check import Check, check_against_campaign
-from gateway.calibration.file.comparison import Difference, Figure, differences, figures_of
+from gateway.calibration.file.comparison import Difference, FittedFigure, differences, figures_of
 from gateway.calibration.file.line_file import LikeFile, LineFile, SiblingPart, load_like
 from gateway.calibration.file.line_part import EvidencePart, LinePart
 from gateway.calibration.file.parts import ExpectedErrorsPart, ProvenancePart, RunPart, SeenPart
@@ -18,7 +18,7 @@ __all__ = [
     "Difference",
     "EvidencePart",
     "ExpectedErrorsPart",
-    "Figure",
+    "FittedFigure",
     "LikeFile",
     "LineFile",
     "LinePart",

@@ -23,11 +23,11 @@ from gateway.toml_file import describe_faults
 
 Content = dict[str, Any]
 FORMAT: Final = "springscale-calibration"
-VERSION: Final = 10
+VERSION: Final = 10  # of the format
 
 
 class CalibrationFile(Part):
-    """The whole file but for its id."""
+    """The whole file except its id."""
 
     format: Literal["springscale-calibration"] = FORMAT
     version: Literal[10] = VERSION

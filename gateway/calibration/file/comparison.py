@@ -22,7 +22,7 @@ _LEFT_OUT: Final = frozenset({"id", "parameters", "covariance", "names", "coeffi
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class FittedFigure:
     """One parameter with its posterior standard deviation.
 
     A positive quantity was fitted by its logarithm, and is compared on that scale.
@@ -33,7 +33,7 @@ class Figure:
     std: float
     is_positive: bool = False
 
-    def distance(self, other: "Figure") -> float:
+    def distance(self, other: "FittedFigure") -> float:
         """Distance of two such figures, in standard deviations of their difference; inf if both are exact."""
         if self.is_positive and other.is_positive:
             apart = math.log(self.centre / other.centre)
@@ -45,7 +45,7 @@ class Figure:
         return abs(apart) / combined if combined > 0.0 else math.inf
 
 
-def figures_of(file: CalibrationFile) -> dict[str, tuple[Figure, ...]]:
+def figures_of(file: CalibrationFile) -> dict[str, tuple[FittedFigure, ...]]:
     """By part of the file: half-car parameters of cross_spectrum, regressions of ratio_index (constant first)."""
     figures = {}
     if file.cross_spectrum is not None:
@@ -58,17 +58,17 @@ def figures_of(file: CalibrationFile) -> dict[str, tuple[Figure, ...]]:
     return figures
 
 
-def _half_car(part: CrossSpectrumCalibration) -> tuple[Figure, ...]:
-    """A parameter stored as a logarithm comes with its standard deviation of first order."""
+def _half_car(part: CrossSpectrumCalibration) -> tuple[FittedFigure, ...]:
+    """Parameter values; a parameter stored as a logarithm has its standard deviation to first order."""
     stds = np.sqrt(np.diag(part.covariance))
     figures = []
     for name, entry, std in zip(part.names, part.parameters.tolist(), stds.tolist(), strict=True):
         scale = math.exp(entry) if is_positive(name) else 1.0
-        figures.append(Figure(name, scale if is_positive(name) else entry, scale * std, is_positive(name)))
+        figures.append(FittedFigure(name, scale if is_positive(name) else entry, scale * std, is_positive(name)))
     return tuple(figures)
 
 
-def _regression(part: RegressionModel) -> tuple[Figure, ...]:
+def _regression(part: RegressionModel) -> tuple[FittedFigure, ...]:
     """Constant and coefficients of the unscaled terms, in the target's unit: comparable whatever the scaling.
 
     The file has them of columns scaled to [-1, 1] by lows l and highs h:
@@ -81,7 +81,7 @@ def _regression(part: RegressionModel) -> tuple[Figure, ...]:
     centres = to_raw @ part.coefficients
     stds = part.residual_std * np.sqrt(np.diag(to_raw @ part.gram_inverse @ to_raw.T))
     rows = zip(("constant", *part.terms), centres.tolist(), stds.tolist(), strict=True)
-    return tuple(Figure(name, centre, std) for name, centre, std in rows)
+    return tuple(FittedFigure(name, centre, std) for name, centre, std in rows)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ class Difference:
 
 
 def differences(one: CalibrationFile, other: CalibrationFile) -> tuple[Difference, ...]:
-    """All of them: plain facts in the order of the file, then fitted figures, the most different first."""
+    """All differences: plain facts in the order of the file, then fitted figures, the most different first."""
     fitted = sorted(_fitted(one, other), key=lambda difference: -(difference.n_std or 0.0))
     return (*_plain(one, other), *fitted)
 
@@ -140,5 +140,5 @@ def _fitted(one: CalibrationFile, other: CalibrationFile) -> Iterator[Difference
             yield Difference(where, a.centre, b.centre, a.distance(b))
 
 
-def _by_place(file: CalibrationFile) -> dict[str, Figure]:
+def _by_place(file: CalibrationFile) -> dict[str, FittedFigure]:
     return {f"{part}.{figure.name}": figure for part, figures in figures_of(file).items() for figure in figures}

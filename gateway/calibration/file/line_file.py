@@ -1,4 +1,6 @@
-"""The line file: what ``springscale line build`` makes of several calibration files, and ``--like`` takes."""
+"""The line file: the output of ``springscale line build`` from several calibration files, and the input of
+``--like``.
+"""
 
 import json
 from pathlib import Path
@@ -20,11 +22,11 @@ from gateway.files.signed import Read
 from gateway.toml_file import describe_faults
 
 LINE_FORMAT: Final = "springscale-line"
-LINE_VERSION: Final = 4
+LINE_VERSION: Final = 4  # of the format
 
 
 class SiblingPart(Part):
-    """One of the vehicles that a line was built of."""
+    """One of the vehicles of a line."""
 
     id: str = Field(description="of its calibration file")
     name: str
@@ -33,7 +35,7 @@ class SiblingPart(Part):
 
 
 class LineFile(Part):
-    """The whole file but for its id."""
+    """The whole file except its id."""
 
     format: Literal["springscale-line"] = LINE_FORMAT
     version: Literal[4] = LINE_VERSION

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from gateway.calibration.file.parts import Part
-from gateway.calibration.inheritance import Limits, Seen, Usual
+from gateway.calibration.inheritance import ModelLimits, Seen, Usual
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, ROLL_PARAMETERS
 from gateway.errors import CalibrationFileError
 from gateway.records import F64
@@ -64,7 +64,7 @@ class LinePart(Part):
     )
     n_siblings: int = Field(ge=0, description="how many vehicles the scatter was estimated from; 0: the defaults")
     seen: Seen
-    limits: Limits
+    limits: ModelLimits
 
     def require_known(self) -> None:
         """Raises CalibrationFileError if today's model has other parameters."""

@@ -18,7 +18,14 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
-from gateway.calibration.half_car.left_out import MISFIT_MARGIN, LeftOut, left_out_errors, limits_shown_by, model_error
+from gateway.calibration.half_car.left_out import (
+    UNTESTED_MISFITS,
+    LeftOut,
+    left_out_errors,
+    limits_shown_by,
+    model_error,
+    most_misfit,
+)
 from gateway.calibration.half_car.most_probable_vehicle import fit_vehicle, seen_by
 from gateway.calibration.half_car.prior import Inherited, Prior, can_roll, prior_of
 from gateway.calibration.known_run import KnownRun
@@ -35,13 +42,15 @@ from gateway.core.vehicle import Load, Vehicle, front_share_pct
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Why
 
-MOST: Final = 8  # they carry 98 % and more of the variance of payload; the rest counts as the model's
-SCALES: Final = np.array([10.0, 0.2, 0.005])  # kg, %, m: what counts as equally much
+MOST: Final = 8  # chosen: they carry 98 % and more of the payload's variance; the rest counts as the model's error
+SCALES: Final = np.array([10.0, 0.2, 0.005])  # chosen: kg, %, m of equal weight
 
 
 def directions_of(moves: Sequence[F64], covariance: F64) -> F64:
-    """(n, k) with independent causes of unit variance as columns, from ``moves``: (d, n) each, by how much payload
-    (kg), front share (%) and lateral place (m) of some load move with each of the n parameters.
+    """(n, k) with independent causes of unit variance as columns.
+
+    ``moves`` has, for each load, the derivatives (d, n) of payload (kg), front share (%) and lateral place (m) by the n
+    parameters.
     """
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -51,13 +60,13 @@ def directions_of(moves: Sequence[F64], covariance: F64) -> F64:
     return found
 
 
-LEAST_RUNS_TO_LEAVE_ONE_OUT: Final = 3
+LEAST_RUNS_TO_LEAVE_ONE_OUT: Final = 3  # two must remain for a scale
 SPRINGS_FROM_PRIORS: Final = "springs_from_priors"
 UNTESTED: Final = "intervals_untested"
 
-IDEAL_S: Final = 300.0
-IDEAL_PARTS: Final = (0.02, 0.5, 1.0)  # of the payload range
-IDEAL_PLACES: Final = (0.25, 0.6, 0.95)  # of the wheelbase
+IDEAL_S: Final = 300.0  # BatchSettings.window_s
+IDEAL_PARTS: Final = (0.02, 0.5, 1.0)  # chosen: of the payload range
+IDEAL_PLACES: Final = (0.25, 0.6, 0.95)  # chosen: of the wheelbase
 
 _STARTS: Final = ((0.0, 0.0), (0.4, 0.3), (-0.4, -0.3))  # log springs, log dampers, off the prior's centre
 
@@ -96,12 +105,12 @@ def fit_cross_spectrum(
     known = known_spectra(runs, vehicle, with_roll=can_roll(vehicle), usual=usual)
     with_roll = known[0].spectra.roll is not None
     prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=with_roll)
-    shifts = _STARTS[:1] if inherited else _STARTS  # sisters tell which peak it is
+    shifts = _STARTS[:1] if inherited else _STARTS  # the line's prior selects the peak
     can_leave_out = len(known) >= LEAST_RUNS_TO_LEAVE_ONE_OUT
     step = _counted(progress, len(shifts) + (2 * len(shifts) + len(known)) * can_leave_out)
 
     def taught(by: Sequence[KnownSpectra], found: Found) -> CrossSpectrumCalibration:
-        untested = half_car_calibration(by, vehicle, found)
+        untested = half_car_calibration(by, vehicle, found, inherits=inherited is not None)
         return inherited.on(untested, is_tested=False) if inherited else untested
 
     calibration = taught(known, _from_priors(known, prior, shifts, step))
@@ -194,7 +203,9 @@ def _left_out_in_turn(
         yield one, [k for k in known if k is not one], starts[i % 2]
 
 
-def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found: Found) -> CrossSpectrumCalibration:
+def half_car_calibration(
+    known: Sequence[KnownSpectra], vehicle: Vehicle, found: Found, *, inherits: bool = False
+) -> CrossSpectrumCalibration:
     """The calibration from the known runs, its intervals not yet tested on any run left out."""
     seen = seen_by(known, found.x)
     reading = seen[0].spectra.reading
@@ -213,7 +224,9 @@ def half_car_calibration(known: Sequence[KnownSpectra], vehicle: Vehicle, found:
         covariance=found.covariance,
         directions=np.zeros((len(found.x), 0)),
         model_std=(0.0, 0.0, 0.0),
-        misfit_limit=MISFIT_MARGIN * max((one for one in misfits if isfinite(one)), default=nan),
+        misfit_limit=most_misfit(misfits)
+        if inherits
+        else UNTESTED_MISFITS * max(filter(isfinite, misfits), default=nan),
         acceleration_rms_mps2=float(np.median([k.spectra.acceleration_rms_mps2 for k in known])),
         pitch_rate_rms_radps=float(np.median([k.spectra.pitch_rate_rms_radps for k in known])),
         payload_seen_kg=(min(payloads), max(payloads)),

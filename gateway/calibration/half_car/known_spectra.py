@@ -19,9 +19,9 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64
 
-BAND_HZ: Final = (1.1, 14.0)
-N_SEGMENT: Final = 256
-LEAST_MOMENT_STD_KGM: Final = 0.5  # about the centre line, of an empty vehicle too: what lies in its pockets; chosen
+BAND_HZ: Final = (1.1, 14.0)  # chosen: body and wheel resonances
+N_SEGMENT: Final = 256  # chosen: 5 s at 50 Hz, short enough for town traffic
+LEAST_MOMENT_STD_KGM: Final = 0.5  # chosen: about the centre line, also of an empty vehicle with its loose items
 
 
 class KnownSpectra:
@@ -96,7 +96,7 @@ class KnownSpectra:
 
     @property
     def total_kg(self) -> float:
-        """Of the whole sprung mass."""
+        """Of the total sprung mass."""
         return self._vehicle.empty_mass_kg + self.run.payload_kg
 
     @property

@@ -6,26 +6,26 @@ from itertools import groupby
 from typing import Final
 
 import numpy as np
-from scipy.special import stdtrit
 
 from gateway.calibration.half_car.known_spectra import KnownSpectra
-from gateway.calibration.inheritance import Limits
+from gateway.calibration.inheritance import ModelLimits
 from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import MOST_TENSION
-from gateway.core.cross_spectrum.estimator import weigh
+from gateway.core.cross_spectrum.estimator import MISFIT_ON_OTHER_ROADS, MISFIT_QUANTILE, weigh
 from gateway.core.cross_spectrum.reach import beyond
+from gateway.core.late import special
 from gateway.posterior import Posterior, Source
 from gateway.quantity import Z95
 from gateway.records import F64, Why
 
-USUAL_PAYLOAD_SHARE: Final = 0.004  # of the empty mass
-USUAL_FRONT_SHARE_PCT: Final = 0.1
+USUAL_PAYLOAD_SHARE: Final = 0.004  # of the empty mass, see below
+USUAL_FRONT_SHARE_PCT: Final = 0.1  # likewise
 USUAL_CG_LEFT_M: Final = 0.002
 """Model errors of simulated vans that serve no other purpose (`benchmarks.accuracy budget`)."""
-USUAL_PER_REACH: Final = 1.0  # how fast the error grows beyond the known loads: it doubles within an empty mass
-USUAL_REACH: Final = 0.1  # of runs at the edge of a campaign, in parts of the empty mass
-PRIOR_RUNS: Final = 6  # so many runs would outweigh what other vans showed
-LEAST_PART: Final = 0.25  # of the usual variance: a campaign of one road and one speed shows less than there is
+USUAL_PER_REACH: Final = 1.0  # chosen: growth of the error beyond the known loads; it doubles within an empty mass
+USUAL_REACH: Final = 0.1  # chosen: of runs at the edge of a campaign, in parts of the empty mass
+PRIOR_RUNS: Final = 6  # chosen: number of runs that the other vans count for
+LEAST_PART: Final = 0.25  # chosen: of the usual variance; a campaign on one road at one speed shows too little of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ def model_error(runs: Sequence[RunError], empty_mass_kg: float) -> ModelError:
         known = [one for one in runs if np.isfinite(one.error[i])]
         within = [one.error[i] ** 2 - one.predicted[i] for one in known if one.reach == 0.0]
         pooled = max((PRIOR_RUNS * variance + sum(within)) / (PRIOR_RUNS + len(within)), LEAST_PART * variance)
-        heavier = float(stdtrit(PRIOR_RUNS + len(within), 0.975)) / Z95
+        heavier = float(special.stdtrit(PRIOR_RUNS + len(within), 0.975)) / Z95
         stds.append(heavier * float(np.sqrt(pooled)))
         excess = [max(0.0, (one.error[i] ** 2 - one.predicted[i]) / pooled - 1.0) for one in known if one.reach > 0.0]
         reach2 = [one.reach**2 for one in known if one.reach > 0.0]
@@ -64,7 +64,12 @@ def model_error(runs: Sequence[RunError], empty_mass_kg: float) -> ModelError:
     return ModelError((stds[0], stds[1], stds[2]), (grown[0], grown[1]))
 
 
-MISFIT_MARGIN: Final = 3.0
+MISFIT_SCATTER: Final = 0.08
+"""Standard deviation of the logarithm of the misfit among batches on one road, before a vehicle has shown its own."""
+UNTESTED_MISFITS: Final = 3.0
+"""Times the worst misfit of the fit itself, where no run was left out and no sister tells: another load may fit so much
+worse. Chosen.
+"""
 SCORE_MARGIN: Final = 1.5
 """For other roads and loads than those of calibration. Chosen; `benchmarks.accuracy sensitivity` shows their effect."""
 
@@ -114,15 +119,33 @@ def left_out_errors(one: KnownSpectra, calibration: CrossSpectrumCalibration) ->
     return errors
 
 
-def limits_shown_by(errors: Sequence[LeftOut], misfit_limit: float, empty_mass_kg: float) -> Limits:
-    """The limits from these; ``misfit_limit`` is the limit from the fit of all."""
+def most_misfit(misfits: Sequence[float]) -> float:
+    """The misfit that one healthy batch in a thousand exceeds, from those that calibration showed; NaN if it showed
+    none.
+
+    The misfit is log-normal: its logarithm has the mean of ``misfits``, their variance (MISFIT_SCATTER counts as
+    PRIOR_RUNS of them) and beside it the variance that other roads add. The limit has six digits: a misfit's last ones
+    depend on the order of sums.
+    """
+    logs = np.log([one for one in misfits if np.isfinite(one)])
+    n = len(logs)
+    if n == 0:
+        return float("nan")
+    scatter = (PRIOR_RUNS * MISFIT_SCATTER**2 + float(np.sum((logs - logs.mean()) ** 2))) / (PRIOR_RUNS + n - 1)
+    std = np.sqrt(scatter * (1.0 + 1.0 / n) + MISFIT_ON_OTHER_ROADS**2)
+    return float(f"{np.exp(logs.mean() + MISFIT_QUANTILE * std):.6g}")
+
+
+def limits_shown_by(errors: Sequence[LeftOut], misfit_limit: float, empty_mass_kg: float) -> ModelLimits:
+    """The limits from these; ``misfit_limit`` is the limit from the fit of all, should no misfit be among them."""
     of_model = model_error(
         [_of_run(list(batches)) for _, batches in groupby(errors, lambda one: one.run)], empty_mass_kg
     )
-    return Limits(
+    shown = most_misfit([one.misfit for one in errors])
+    return ModelLimits(
         model_std=of_model.std,
         model_per_reach=of_model.per_reach,
-        misfit_limit=max(misfit_limit, MISFIT_MARGIN * float(np.nanmax([0.0, *(one.misfit for one in errors)]))),
+        misfit_limit=shown if np.isfinite(shown) else misfit_limit,
         most_position_score=max(SCORE, SCORE_MARGIN * max(one.position_score for one in errors)),
         most_noise_score=max(SCORE, SCORE_MARGIN * max(one.noise_score for one in errors)),
     )

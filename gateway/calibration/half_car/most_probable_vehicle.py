@@ -14,7 +14,7 @@ from gateway.core.cross_spectrum.model.parameters import PARAMETERS, has_roll, u
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.records import F64
 
-TURNS: Final = 3  # the sensor's place is found by the second; how fast axles stroke, and so friction, by the third
+TURNS: Final = 3  # chosen: the second finds the sensor's place, the third the stroke speeds and so friction
 
 
 def fit_vehicle(

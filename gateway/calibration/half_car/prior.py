@@ -11,34 +11,34 @@ from math import log, pi
 from typing import Final, Protocol
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from gateway.calibration.axle_weights import ESTIMATED_UNSPRUNG_STD, UNSPRUNG_SHARE, WEIGHED_STD
 from gateway.calibration.inheritance import Usual
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import BEND_SHARES, INDEX, PARAMETERS, ROLL_PARAMETERS
 from gateway.core.cross_spectrum.model.usual_roll import usual_roll
+from gateway.core.late import linalg
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 
-BOUNCE_HZ: Final = 1.35
-DAMPING_RATIO: Final = 0.3
-TYRE_NPM: Final = 400e3  # both tyres of an axle of a 1250 kg vehicle; scales with mass
-MOUNT_NPM: Final = 500e3
-GYRATION_PER_WHEELBASE: Final = 0.46
-MOST_OFFSET_STD_M: Final = 0.1  # of where the sensor sits sideways; a guess is worse than none
-EMPTY_LEFT_STD_M: Final = 0.02  # driver, tank, sliding door; chosen
-SLACK: Final = 0.03
-SLOPE_STD_PER_KN: Final = 0.05
+BOUNCE_HZ: Final = 1.35  # Gillespie, ch. 5
+DAMPING_RATIO: Final = 0.3  # Gillespie, ch. 5
+TYRE_NPM: Final = 400e3  # chosen: both tyres of an axle of a 1250 kg vehicle; scales with mass
+MOUNT_NPM: Final = 500e3  # chosen: both damper mounts of an axle; scales with mass
+GYRATION_PER_WHEELBASE: Final = 0.46  # Gillespie, ch. 5
+MOST_OFFSET_STD_M: Final = 0.1  # chosen: of the sensor's lateral place; a worse one is not used
+EMPTY_LEFT_STD_M: Final = 0.02  # chosen: driver, tank, sliding door
+SLACK: Final = 0.03  # chosen: share of unmodelled power
+SLOPE_STD_PER_KN: Final = 0.05  # chosen: of the spring rate's logarithm
 BEND_STD_PER_KN: Final = 0.1
-"""Of each bend. The one at no added load repeats the slope except where a load relieves the axle; their priors add
-up.
+"""Chosen: of each bend. The bend at no added load equals the slope except where a load relieves the axle; their priors
+add up.
 """
-DAMPER_FRICTION, DAMPER_FRICTION_STD = 0.1, 0.3  # shares of the rate at the usual amplitude
+DAMPER_FRICTION, DAMPER_FRICTION_STD = 0.1, 0.3  # chosen: shares of the rate at the usual amplitude
 SPRING_FRICTION, SPRING_FRICTION_STD = 0.03, 0.05
-TRACK_OFFSET_M: Final = 0.03
-NOISE_ACCELERATION_M2PS3: Final = 1e-5  # 300 ug per root hertz
-NOISE_PITCH_RATE_RAD2PS: Final = 1e-8  # 0.006 deg/s per root hertz; steps of 0.25 deg/s at 100 Hz make 3e-8
+TRACK_OFFSET_M: Final = 0.03  # chosen: between the tracks of both axles
+NOISE_ACCELERATION_M2PS3: Final = 1e-5  # chosen: 300 ug per root hertz
+NOISE_PITCH_RATE_RAD2PS: Final = 1e-8  # chosen: 0.006 deg/s per root hertz; steps of 0.25 deg/s at 100 Hz make 3e-8
 
 _LOG_STD: Final = {
     "spring": 0.35,
@@ -67,7 +67,7 @@ _ROLL_STD: Final = {
     "twist_level": 0.5,
     "gyro_yaw_rad": 0.05,  # 3 degrees
 }
-"""Of model.usual_roll's figures; chosen, wide enough for cars and vans. Logarithms but for the last."""
+"""Chosen: of model.usual_roll's figures, wide enough for cars and vans. Of logarithms except the last."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ class Prior:
 
     def beside(self, roll: "Prior") -> "Prior":
         """Of all parameters: this prior for heave and pitch, ``roll`` for roll."""
-        return Prior(np.r_[self.mean, roll.mean], block_diag(self.precision, roll.precision))
+        return Prior(np.r_[self.mean, roll.mean], linalg.block_diag(self.precision, roll.precision))
 
     def start(self, log_springs: float, log_dampers: float) -> F64:
         """The centre, with springs and dampers moved by these logarithms."""

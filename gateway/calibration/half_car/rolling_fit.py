@@ -14,13 +14,13 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from gateway.calibration.half_car.known_spectra import KnownSpectra
 from gateway.calibration.half_car.prior import Prior
 from gateway.core.cross_spectrum.likelihood import Curvature, Whittle
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.core.cross_spectrum.search import Found, most_probable
+from gateway.core.late import linalg
 from gateway.records import F64
 
 _N: Final = len(PARAMETERS)
@@ -35,7 +35,7 @@ def fit_roll(known: Sequence[KnownSpectra], upright: Found, prior: Prior, start:
     m, r = len(start), len(known)
     seen = [(one, one.rolling) for one in known]
     mean = np.r_[prior.mean, np.zeros(r)]
-    precision = block_diag(prior.precision, np.diag([one.moment_std_kgm**-2.0 for one in known]))
+    precision = linalg.block_diag(prior.precision, np.diag([one.moment_std_kgm**-2.0 for one in known]))
 
     def cost(x: F64) -> float:
         theta = np.r_[upright.x, x[:m]]

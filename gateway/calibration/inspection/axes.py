@@ -33,21 +33,21 @@ from gateway.core.vehicle import Load, Vehicle
 from gateway.estimate import Z95
 from gateway.records import C128, F64
 
-LEAST_COHERENCE: Final = 0.4  # behind the axles right axes have 0.45 and more, roll or yaw for pitch below 0.35
-LEAST_AGREEMENT: Final = 0.62  # right axes amidships have 0.65 and more however the speed varies
-USUAL_SCALE: Final = (0.5, 1.6)  # right axes are within 0.6 to 1.15, roll above 2.3
-SCALE_RANGE: Final = (0.4, 2.5)  # no road vehicle's pitch rate is further from the usual half-car's
-UNIT_RANGE: Final = (0.5, 2.0)
-DEGREES: Final = 180.0 / np.pi
-REVERSED_BY: Final = 0.1
-BEYOND_AXLES_M: Final = 1.5
-STEP_M: Final = 0.25
-LOOSE_STD_M: Final = 1.0  # how far a place is looked for about the one stated
-POSITION_OFF_M: Final = 0.3
-POSITION_WRONG_M: Final = 1.0
-LEAST_SEGMENTS: Final = 20  # for a place; a sign needs fewer
-BELIEVED_AGREEMENT: Final = 0.92  # then the speed's unit is not asked for
-UNIT_GAIN: Final = 0.04
+LEAST_COHERENCE: Final = 0.4  # chosen: behind the axles right axes have 0.45 and more, roll or yaw for pitch below 0.35
+LEAST_AGREEMENT: Final = 0.62  # chosen: right axes amidships have 0.65 and more at any speed variation
+USUAL_SCALE: Final = (0.5, 1.6)  # chosen: right axes are within 0.6 to 1.15, roll above 2.3
+SCALE_RANGE: Final = (0.4, 2.5)  # chosen: no road vehicle's pitch rate is further from the usual half-car's
+UNIT_RANGE: Final = (0.5, 2.0)  # chosen: of a ratio that a wrong unit explains
+DEGREES: Final = 180.0 / np.pi  # per radian
+REVERSED_BY: Final = 0.1  # chosen: gain of agreement that proves a reversed sign
+BEYOND_AXLES_M: Final = 1.5  # chosen: longest overhang with a sensor
+STEP_M: Final = 0.25  # chosen: grid of sensor positions
+LOOSE_STD_M: Final = 1.0  # chosen: prior of the sensor's place in this fit
+POSITION_OFF_M: Final = 0.3  # chosen: deviation that is reported
+POSITION_WRONG_M: Final = 1.0  # chosen: deviation that excludes the run
+LEAST_SEGMENTS: Final = 20  # chosen: for a place; a sign needs fewer
+BELIEVED_AGREEMENT: Final = 0.92  # chosen: with this agreement the speed's unit is not tested
+UNIT_GAIN: Final = 0.04  # chosen: gain of agreement that proves a wrong unit of speed
 SPEED_MISREAD: Final = {
     "its numbers are km/h, but the signal map says m/s": 3.6,
     "its numbers are m/s, but the signal map says km/h": 1.0 / 3.6,

@@ -68,12 +68,12 @@ def _payloads_kg(runs: Sequence[SplitRun]) -> set[float]:
     return {one.identification.payload_kg for one in runs}
 
 
-SPEED_DIFFERS_BY: Final = 0.2
-BEYOND_RANGE_BY: Final = 0.25  # of the range
-SMOOTHER_BY: Final = 4.0
-ALIKE_SHARE: Final = 0.05  # of the empty mass: what five minutes of the ratio index scatter by
-SHARES_ALIKE_PCT: Final = 1.0
-TOGETHER: Final = 0.97  # correlation of payload and share above which they are one
+SPEED_DIFFERS_BY: Final = 0.2  # chosen: of the median run's speed
+BEYOND_RANGE_BY: Final = 0.25  # chosen: of the range
+SMOOTHER_BY: Final = 4.0  # chosen: factor of the vertical acceleration
+ALIKE_SHARE: Final = 0.05  # of the empty mass: the scatter of the ratio index over five minutes
+SHARES_ALIKE_PCT: Final = 1.0  # chosen: twice the default error of the empty share
+TOGETHER: Final = 0.97  # chosen: correlation above which payload and share cannot be separated
 
 
 def inspect_campaign(

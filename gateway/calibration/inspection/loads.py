@@ -26,19 +26,19 @@ from gateway.core.vehicle import Load, Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64
 
-LEAST_EVIDENCE: Final = 20.0
-PAIRS_TRIED: Final = 4
-PAIRS_OF_FEW: Final = 2
-FEW_RUNS: Final = 4  # so few can bend the fit to their labels: pairs are tried whatever the fit says
-STRAINED_MISFIT: Final = 4.0  # 1 is perfect, true labels have stayed below 3
-LEAST_OTHERS: Final = 3  # to weigh a run by
+LEAST_EVIDENCE: Final = 20.0  # chosen: of a swap, e^20
+PAIRS_TRIED: Final = 4  # chosen: the likeliest pairs; each costs a fit
+PAIRS_OF_FEW: Final = 2  # chosen: likewise with few runs
+FEW_RUNS: Final = 4  # chosen: so few runs can bend the fit to wrong labels, so pairs are always tried
+STRAINED_MISFIT: Final = 4.0  # chosen: 1 is perfect, true labels stayed below 3
+LEAST_OTHERS: Final = 3  # chosen: runs needed to weigh another one
 DOUBT_EVIDENCE: Final = 16.0
 """Of 84 sound runs of 14 simulated vans 3 exceed it (15 exceed 5, by 6.8 on average), and none of these lies beyond
 DOUBT_STDS too, so fewer than one sound run in 28 is doubted (95 %). A label wrong by 60 kg reaches 18.
 """
-DOUBT_STDS: Final = 4.0  # of what the others state: where they extrapolate they may err, and say so
-DOUBT_PAYLOAD_SHARE: Final = 0.02  # of the empty mass: less is no mistake of a label
-DOUBT_FRONT_SHARE: Final = 0.01
+DOUBT_STDS: Final = 4.0  # chosen: standard deviations of the others' estimate, which is wide where they extrapolate
+DOUBT_PAYLOAD_SHARE: Final = 0.02  # chosen: of the empty mass; a smaller difference is not a wrong label
+DOUBT_FRONT_SHARE: Final = 0.01  # chosen: likewise of the front share (0..1)
 
 
 def compare_loads(runs: Sequence[KnownRun], vehicle: Vehicle) -> Iterator[tuple[int, Finding]]:

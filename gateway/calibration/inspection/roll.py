@@ -24,18 +24,18 @@ OVER_PITCH_RANGE: Final = (
     8.0,
 )  # root mean squares: 0.45 to 2.1 where the axes are right, yaw for roll 0.02 to 0.21
 UNIT_RANGE: Final = (0.4, 2.5)  # the same where degrees and radians are put right
-DEGREES: Final = 180.0 / np.pi
+DEGREES: Final = 180.0 / np.pi  # per radian
 ALIKE: Final = (
     0.7  # coherence of roll and pitch rate: at most 0.13 where the axes are right, 1 of the same signal twice
 )
-LOST_SHARE_NOTED: Final = 0.02
-LEAST_SEGMENTS: Final = 6
-HARDLY_KNOWN_M: Final = 0.1  # standard deviation; a tape gives 0.02
+LOST_SHARE_NOTED: Final = 0.02  # chosen: of the usable time
+LEAST_SEGMENTS: Final = 6  # chosen: as core.cross_spectrum.measured
+HARDLY_KNOWN_M: Final = 0.1  # chosen: standard deviation; a tape gives 0.02
 ACCELERATION, PITCH, ROLL = range(3)
 
 
 @dataclass(frozen=True, slots=True)
-class RollSpectra:
+class RollMatrix:
     """Mean spectral matrix (3, 3, m) of acceleration, pitch and roll rate at freq_hz (m,), over n_segments."""
 
     freq_hz: F64
@@ -75,7 +75,7 @@ class RollSpectra:
         return slice(*np.searchsorted(self.freq_hz, [low_hz, high_hz], side="left"))
 
 
-def roll_spectra_of(batches: Sequence[Batch], n_segment: int = N_SEGMENT) -> RollSpectra | None:
+def roll_spectra_of(batches: Sequence[Batch], n_segment: int = N_SEGMENT) -> RollMatrix | None:
     """Over all segments in which the three sensors are known; None if there are fewer than six, or no roll rate."""
     matrix, n_segments, freq_hz = np.zeros((3, 3, n_segment // 2 + 1), np.complex128), 0, np.empty(0)
     for batch in batches:
@@ -88,7 +88,7 @@ def roll_spectra_of(batches: Sequence[Batch], n_segment: int = N_SEGMENT) -> Rol
             x = np.stack([segment_transforms(one, starts, n_segment, batch.rate_hz) for one in sensors])
             matrix += np.einsum("akf,bkf->abf", x, np.conj(x))
             n_segments += len(starts)
-    return RollSpectra(freq_hz, matrix / n_segments, n_segments) if n_segments >= LEAST_SEGMENTS else None
+    return RollMatrix(freq_hz, matrix / n_segments, n_segments) if n_segments >= LEAST_SEGMENTS else None
 
 
 def lost_findings(batches: Sequence[Batch]) -> Iterator[Finding]:
@@ -111,7 +111,7 @@ def exchanged(batches: Sequence[Batch]) -> tuple[Batch, ...]:
     )
 
 
-def roll_findings(spectra: RollSpectra) -> Iterator[Finding]:
+def roll_findings(spectra: RollMatrix) -> Iterator[Finding]:
     """Axis and unit of the roll rate, if the pitch rate is right."""
     if spectra.pitch_coherence > ALIKE:
         text = f"its coherence with pitch_rate is {spectra.pitch_coherence:.2f}"

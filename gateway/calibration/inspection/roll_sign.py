@@ -23,13 +23,13 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.estimate import Z95
 
-BAND_HZ: Final = (6.0, 13.0)
-BY_CG: Final = 1.7
-BY_CG_STD: Final = 1.0
-LEVER_STD_M: Final = 0.05
-LEAST_OFFSET_M: Final = 0.15
-LEAST_SCORE: Final = 4.0  # standard deviations, of the sensor's place and of the sign
-LEAST_RATIO: Final = 0.4  # of the lever arm and the sensor's place
+BAND_HZ: Final = (6.0, 13.0)  # chosen: above the body's resonances
+BY_CG: Final = 1.7  # b, the middle of the measured 0.6 to 2.7 (above)
+BY_CG_STD: Final = 1.0  # chosen: of b, covers the measured range
+LEVER_STD_M: Final = 0.05  # the measured scatter from run to run (above)
+LEAST_OFFSET_M: Final = 0.15  # of the sensor, the least that was measured (above)
+LEAST_SCORE: Final = 4.0  # chosen: standard deviations, of the sensor's place and of the sign
+LEAST_RATIO: Final = 0.4  # chosen: of the lever arm and the sensor's place
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,11 +17,11 @@ from gateway.records import ASIDE, Motion, SensorTraits, Signal
 from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
 
 INERTIAL: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
-JITTER_SHARE_MAX: Final = 0.25  # of a sample's interval, half the width that holds 80 % of them
-BIAS_MAX_RADPS: Final = 3.0 * pi / 180.0  # what an uncalibrated automotive gyroscope may have
-UNIT_TOLERANCE: Final = 0.15
-STEADY_SHARE: Final = 0.2  # scatter over mean below which that mean is gravity and no acceleration
-SHAKING_MPS2: Final = 0.2  # a vehicle at rest with its engine running stays below
+JITTER_SHARE_MAX: Final = 0.25  # chosen: of a sample's interval; half the width of the central 80 %
+BIAS_MAX_RADPS: Final = 3.0 * pi / 180.0  # chosen: largest bias of an uncalibrated automotive gyroscope
+UNIT_TOLERANCE: Final = 0.15  # chosen: relative, of gravity in a wrong unit
+STEADY_SHARE: Final = 0.2  # chosen: scatter over mean below which the mean is gravity
+SHAKING_MPS2: Final = 0.2  # chosen: a vehicle at rest with its engine running stays below
 MISREAD_AS_MPS2: Final = {  # what gravity then reads, over 9.81
     "its numbers are g, but the signal map says m/s2": 1.0 / STANDARD_GRAVITY_MPS2,
     "its numbers are m/s2, but the signal map says g": STANDARD_GRAVITY_MPS2,

@@ -24,7 +24,7 @@ from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Se
 from gateway.calibration.inspection.log import SplitRun, log_findings
 from gateway.calibration.inspection.roll import (
     ROLL,
-    RollSpectra,
+    RollMatrix,
     exchanged,
     lost_findings,
     roll_findings,
@@ -46,9 +46,9 @@ from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.records import Batch, Signal, Why
 
-MASKED_SHARE_NOTED: Final = 0.02
-SMOOTH_MPS2: Final = 0.08  # the quietest ordinary road shakes a vehicle more, in the estimators' band
-STEPS_SHARE_MAX: Final = 0.1  # of a signal's power in that band
+MASKED_SHARE_NOTED: Final = 0.02  # chosen: of the time
+SMOOTH_MPS2: Final = 0.08  # chosen: the quietest ordinary road shakes a vehicle more, in the estimators' band
+STEPS_SHARE_MAX: Final = 0.1  # chosen: of a signal's power in that band
 
 
 def inspect_run(drive: SplitRun, vehicle: Vehicle, settings: BatchSettings) -> RunVerdict:
@@ -86,7 +86,7 @@ def _kinds(findings: Iterable[Finding]) -> set[StrEnum]:
 
 
 def _motion_findings(
-    spectra: CrossSpectra, roll: RollSpectra | None, drive: SplitRun, vehicle: Vehicle, acceleration: Mended
+    spectra: CrossSpectra, roll: RollMatrix | None, drive: SplitRun, vehicle: Vehicle, acceleration: Mended
 ) -> Iterator[Finding]:
     """Axes, signs and units by the cross-spectra; then, if these are right, the roll rate and the sensor's place."""
     spectra = mended(spectra, 1.0 / acceleration.factor)
@@ -146,7 +146,7 @@ def _if_speed_misread(
 
 
 def _excitation_findings(
-    spectra: CrossSpectra, roll: RollSpectra | None, facts: RowFacts, acceleration: Mended
+    spectra: CrossSpectra, roll: RollMatrix | None, facts: RowFacts, acceleration: Mended
 ) -> Iterator[Finding]:
     rms_mps2 = spectra.acceleration_rms_mps2 * abs(acceleration.factor)
     if rms_mps2 < SMOOTH_MPS2:

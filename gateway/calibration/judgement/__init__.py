@@ -10,8 +10,8 @@ from gateway.calibration.judgement.assessment import (
     PART_NAMES,
     PART_TEXT,
     Assessment,
+    BatchSet,
     Judgement,
-    Part,
     assess_calibration,
     assess_evaluation,
     stated_budget,
@@ -29,7 +29,7 @@ from gateway.calibration.judgement.evaluation import (
     errors_of,
     judge,
 )
-from gateway.calibration.judgement.learning_curve import LearningCurve, Rung, Spread, curve_of
+from gateway.calibration.judgement.learning_curve import LearningCurve, Rung, ScoreSpread, curve_of
 from gateway.calibration.judgement.sideways import CgLeftErrors, WheelErrors
 from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
 from gateway.calibration.judgement.width import Width, width_of
@@ -41,6 +41,7 @@ __all__ = [
     "TARGETS",
     "Answers",
     "Assessment",
+    "BatchSet",
     "CgLeftErrors",
     "Comparison",
     "Coverage",
@@ -50,9 +51,8 @@ __all__ = [
     "Judged",
     "Judgement",
     "LearningCurve",
-    "Part",
     "Rung",
-    "Spread",
+    "ScoreSpread",
     "Target",
     "TargetErrors",
     "Verdict",

@@ -27,12 +27,12 @@ class Answers:
 
     @property
     def error(self) -> F64:
-        """Estimated less true."""
+        """Estimated minus true."""
         return self.estimated - self.true
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What each is."""
+        """A label for each."""
         return tuple(f"run {number}" for number in self.run)
 
 

@@ -14,7 +14,7 @@ from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.vehicle import Vehicle
 
 
-class Part(StrEnum):
+class BatchSet(StrEnum):
     """A set of known-load batches by what calibration knew of them."""
 
     LEFT_OUT = "left_one_run_out"
@@ -23,17 +23,17 @@ class Part(StrEnum):
     ALL = "all"
 
 
-PART_NAMES: Mapping[Part, str] = {
-    Part.LEFT_OUT: "runs left out",
-    Part.IDENTIFICATION: "identification part (in-sample)",
-    Part.VALIDATION: "validation part",
-    Part.ALL: "all batches",
+PART_NAMES: Mapping[BatchSet, str] = {
+    BatchSet.LEFT_OUT: "runs left out",
+    BatchSet.IDENTIFICATION: "identification part (in-sample)",
+    BatchSet.VALIDATION: "validation part",
+    BatchSet.ALL: "all batches",
 }
-PART_TEXT: Mapping[Part, str] = {
-    Part.LEFT_OUT: "Runs left out: every run's identification part, weighed by a calibration from the other runs.",
-    Part.IDENTIFICATION: "Identification part: the batches that the calibration was fitted to, so errors look small.",
-    Part.VALIDATION: "Validation part: later batches of the same runs, which no fit has seen; their loads it has.",
-    Part.ALL: "All batches of the campaign, whether the calibration was fitted to them or not.",
+PART_TEXT: Mapping[BatchSet, str] = {
+    BatchSet.LEFT_OUT: "Runs left out: every run's identification part, weighed by a calibration from the other runs.",
+    BatchSet.IDENTIFICATION: "Identification part: the batches of the fit, where errors look small.",
+    BatchSet.VALIDATION: "Validation part: later batches of the same runs, which no fit has seen; their loads it has.",
+    BatchSet.ALL: "All batches of the campaign, whether the calibration was fitted to them or not.",
 }
 
 
@@ -45,13 +45,15 @@ class Judgement:
     """
 
     estimator: str
-    tables: Mapping[Part, ErrorTable]
+    tables: Mapping[BatchSet, ErrorTable]
     dof: Mapping[Target, float] = field(default_factory=dict)
 
     @property
-    def unseen(self) -> Part | None:
+    def unseen(self) -> BatchSet | None:
         """The set that predicts later loads best: runs left out, else validation."""
-        return next((part for part in (Part.LEFT_OUT, Part.VALIDATION, Part.ALL) if part in self.tables), None)
+        return next(
+            (part for part in (BatchSet.LEFT_OUT, BatchSet.VALIDATION, BatchSet.ALL) if part in self.tables), None
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +74,9 @@ def stated_budget(judgement: Judgement, vehicle: Vehicle) -> tuple[BudgetLine, .
 
     Runs left out are not such batches: their shape is known to be that of the other known loads.
     """
-    part = next((one for one in (Part.VALIDATION, Part.ALL, Part.IDENTIFICATION) if one in judgement.tables), None)
+    part = next(
+        (one for one in (BatchSet.VALIDATION, BatchSet.ALL, BatchSet.IDENTIFICATION) if one in judgement.tables), None
+    )
     posteriors = [one.estimate.posterior for one in judgement.tables[part].judged] if part else []
     is_shape_said = is_said(vehicle)
     budgets = [budget_of(one, is_shape_said=is_shape_said) for one in posteriors if one is not None]
@@ -85,16 +89,16 @@ def assess_calibration(campaign: Campaign, outcome: Outcome) -> Assessment:
     judgements = []
     for estimator in file.estimators:
         judged = {
-            Part.LEFT_OUT: judged_left_out(outcome, estimator),
-            Part.VALIDATION: judge([run.validation for run in outcome.split], calibrated, estimator),
-            Part.IDENTIFICATION: judge([run.identification for run in outcome.split], calibrated, estimator),
+            BatchSet.LEFT_OUT: judged_left_out(outcome, estimator),
+            BatchSet.VALIDATION: judge([run.validation for run in outcome.split], calibrated, estimator),
+            BatchSet.IDENTIFICATION: judge([run.identification for run in outcome.split], calibrated, estimator),
         }
         tables = {part: error_table(rows, vehicle, estimator) for part, rows in judged.items() if rows}
         judgements.append(Judgement(estimator, tables, _dof(file, estimator)))
     return Assessment(f"Calibration of {vehicle.name}", file, vehicle, tuple(judgements), outcome)
 
 
-def assess_evaluation(campaign: Campaign, file: CalibrationFile, part: Part, table: ErrorTable) -> Assessment:
+def assess_evaluation(campaign: Campaign, file: CalibrationFile, part: BatchSet, table: ErrorTable) -> Assessment:
     """One estimator of a calibration file judged on one part of a campaign."""
     judgement = Judgement(table.estimator, {part: table}, _dof(file, table.estimator))
     return Assessment(f"Evaluation of {campaign.vehicle.name}", file, campaign.vehicle, (judgement,))

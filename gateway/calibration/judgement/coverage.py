@@ -1,10 +1,9 @@
-"""Whether 95 % intervals contain the truth 95 times in 100. A share with its own interval, batches of one run being
-correlated.
+"""Coverage of 95 % intervals: the share that contains the truth, with its own interval for correlated batches.
 
-Batches of one run share load, road and speed, so they are no independent tries: the interval is that
-of as many independent tries as would scatter like the runs' own shares (E. L. Korn and B. I. Graubard,
-"Confidence intervals for proportions with small expected number of positive counts estimated from
-survey data", Survey Methodology 24, 1998), with C. Clopper's and E. S. Pearson's limits (Biometrika 26, 1934).
+Batches of one run share load, road and speed, so they are not independent trials. The interval is that of as many
+independent trials as would scatter like the runs' own shares (E. L. Korn and B. I. Graubard, "Confidence intervals for
+proportions with small expected number of positive counts estimated from survey data", Survey Methodology 24, 1998),
+with C. Clopper's and E. S. Pearson's limits (Biometrika 26, 1934).
 """
 
 from collections.abc import Hashable, Sequence
@@ -16,11 +15,11 @@ from scipy.special import betaincinv, stdtrit
 
 from gateway.records import F64
 
-CONFIDENCE: Final = 0.95
-PROMISED: Final = (0.90, 0.99)
-MISS_COSTS: Final = 40.0  # 2 / alpha of an interval of 95 %
+CONFIDENCE: Final = 0.95  # of the interval of a coverage
+PROMISED: Final = (0.90, 0.99)  # chosen: accepted coverage of 95 % intervals
+MISS_COSTS: Final = 40.0  # 2 / alpha for 95 % intervals (Gneiting and Raftery 2007, section 6.2)
 IDEAL_SCORE: Final = 5.86
-"""Mean interval score of normal errors with intervals of the right width, over their mean absolute error."""
+"""Mean interval score over mean absolute error, for normal errors with correct intervals."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, NamedTuple, get_args
 import numpy as np
 
 from gateway.calibration.judgement.coverage import interval_scores
-from gateway.calibration.judgement.sideways import Carried, CgLeftErrors, WheelErrors, cg_left_errors, wheel_errors
+from gateway.calibration.judgement.sideways import CgLeftErrors, JudgedLoad, WheelErrors, cg_left_errors, wheel_errors
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
@@ -66,9 +66,9 @@ class Judged:
         return Comparison(self.cg_left_m, self.estimate.cg_left.number, *self.estimate.cg_left.interval95)
 
     @property
-    def carried(self) -> Carried:
+    def carried(self) -> JudgedLoad:
         """The truth of the whole load beside the estimate."""
-        return Carried(self.payload_kg, self.front_share_pct, self.cg_left_m, self.estimate, self.unsprung)
+        return JudgedLoad(self.payload_kg, self.front_share_pct, self.cg_left_m, self.estimate, self.unsprung)
 
 
 @dataclass(frozen=True, slots=True)

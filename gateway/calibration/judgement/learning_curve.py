@@ -25,16 +25,16 @@ from gateway.errors import CalibrationImpossibleError
 IN_MEMORY_ID = "study"
 
 OnTrial = Callable[[int, int], None]  # (trials done, trials in all)
-SIZES: Final = (2, 3, 4, 6, 10)
-MOST_SUBSETS: Final = 6  # of one size: each costs seconds
-SEED: Final = 1
+SIZES: Final = (2, 3, 4, 6, 10)  # chosen: numbers of runs to calibrate with
+MOST_SUBSETS: Final = 6  # chosen: subsets per size; each takes seconds
+SEED: Final = 1  # arbitrary
 
-SAME_POSITION_M: Final = 0.05
+SAME_POSITION_M: Final = 0.05  # chosen: the precision of a stated position
 
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """The error table (12) of some batches in short: percent of the ranges; None where nothing was answered."""
+    """The error table (12) of some batches in short: percent of the ranges; None without an answer."""
 
     n_batches: int
     n_rejected: int
@@ -49,7 +49,7 @@ class Score:
 
     @classmethod
     def of(cls, errors: Errors) -> "Score":
-        """The few figures a curve needs."""
+        """The figures that a curve needs."""
         return cls(
             n_batches=errors.n_batches,
             n_rejected=errors.n_rejected,
@@ -81,7 +81,7 @@ class Trial:
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class ScoreSpread:
     """A score over several trials: mean, standard deviation and worst of their mean errors, in percent (12).
 
     rejected_share is of all their batches. Figures are None if no trial gave one.
@@ -111,8 +111,8 @@ class Rung:
     estimator: str
     n_subsets: int
     n_refused: int
-    left_out: Spread
-    validation: Spread
+    left_out: ScoreSpread
+    validation: ScoreSpread
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,9 +153,9 @@ class LearningCurve:
 
 
 def subsets_to_drive(runs: Sequence[KnownRun], n_runs: int, most: int, seed: int) -> list[tuple[int, ...]]:
-    """Numbers of ``n_runs`` runs that a fitter might have driven: with an empty one where there is one.
+    """Numbers of ``n_runs`` runs that a fitter might have driven, with an empty one if there is one.
 
-    All such subsets where there are at most ``most``, otherwise ``most`` of them drawn by ``seed``.
+    All such subsets if there are at most ``most``, otherwise ``most`` of them drawn by ``seed``.
     """
     empty = sorted(run.number for run in runs if run.payload_kg == 0.0)[:1]
     others = sorted(run.number for run in runs if run.number not in empty)
@@ -172,7 +172,7 @@ def subsets_to_drive(runs: Sequence[KnownRun], n_runs: int, most: int, seed: int
 
 
 def triples_at_different_positions(runs: Sequence[KnownRun], vehicle: Vehicle) -> list[tuple[int, ...]]:
-    """Numbers of every triple of the empty run and two loads whose centres lie apart."""
+    """Numbers of every triple of the empty run and two loads at different positions."""
     empty = [run for run in runs if run.payload_kg == 0.0][:1]
     loaded = [run for run in runs if run.payload_kg > 0.0]
     position_m = {run.number: payload_position_m(vehicle, run.payload_kg, run.front_share_pct) for run in loaded}
@@ -184,12 +184,12 @@ def triples_at_different_positions(runs: Sequence[KnownRun], vehicle: Vehicle) -
     ]
 
 
-def spread_of(scores: Sequence[Score]) -> Spread:
-    """Over trials: each counts once, however many batches it answered."""
+def spread_of(scores: Sequence[Score]) -> ScoreSpread:
+    """Statistics over trials; each trial counts once, however many batches it answered."""
     n_batches = sum(score.n_batches for score in scores)
     payload = _known([score.payload_mean_abs_pct for score in scores])
     share = _known([score.front_share_mean_abs_pct for score in scores])
-    return Spread(
+    return ScoreSpread(
         n_trials=len(scores),
         rejected_share=sum(score.n_rejected for score in scores) / n_batches if n_batches else None,
         payload_mean_pct=_mean(payload),
@@ -236,9 +236,9 @@ def curve_of(
     seed: int = SEED,
     on_trial: OnTrial = lambda done, of: None,
 ) -> LearningCurve:
-    """The same for runs that were read already, as ``Outcome.split`` of a calibration holds them.
+    """The learning curve of runs already read, as ``Outcome.split`` of a calibration has them.
 
-    Sizes are 2, 3, 4, 6 and 10 if there are so many runs, all runs, and all but one: the most that leave a run to judge
+    Sizes are 2, 3, 4, 6 and 10 as far as there are runs, all runs, and all but one, the most that leave a run to judge
     by.
     """
     runs = [one.identification for one in split]

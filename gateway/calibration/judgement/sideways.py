@@ -66,7 +66,7 @@ def cg_left_errors(compared: F64) -> CgLeftErrors | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Carried:
+class JudgedLoad:
     """The stated load of a batch and its estimate; the position is NaN if not stated."""
 
     payload_kg: float
@@ -89,7 +89,7 @@ class Carried:
         return np.array(off_kg) / true.gross.kg * 100.0
 
 
-def wheel_errors(carried: Sequence[Carried], vehicle: Vehicle) -> WheelErrors | None:
+def wheel_errors(carried: Sequence[JudgedLoad], vehicle: Vehicle) -> WheelErrors | None:
     """Over all batches whose wheel loads are known, in truth and by the estimate; None if there is none."""
     off_pct = np.array([one.wheels_off_pct(vehicle) for one in carried]).reshape(-1, len(WHEELS))
     known = np.abs(off_pct[np.isfinite(off_pct).all(axis=1)])

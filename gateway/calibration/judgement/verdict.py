@@ -15,7 +15,7 @@ from scipy.special import gammainc
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection import RunVerdict, Severity
 from gateway.calibration.inspection.finding import Kind
-from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement, Part
+from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, BatchSet, Judgement
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, Target, TargetErrors
 from gateway.calibration.judgement.width import Width, width_of
@@ -26,14 +26,14 @@ from gateway.estimate import Z95
 from gateway.posterior import FRONT_SHARE, PAYLOAD, Source
 from gateway.words import counted
 
-FIT_ERROR_PCT: Final = 10.0  # of the range (12)
-MOST_ERROR_PCT: Final = 20.0  # a guess at mid-range errs by 25 % over evenly spread loads
-LEAST_COVERAGE: Final = 0.7  # intervals of 95 % that surely hold the truth less often mislead
-TOO_WIDE: Final = 1e-3  # so seldom are errors as small by chance, where intervals are right (chi-squared over runs)
-FEW_REJECTED: Final = 0.2
-MOST_REJECTED: Final = 0.5
-VALIDATION_FACTOR: Final = 2.0  # validation errors beyond this many times those of runs left out
-VALIDATION_LEAST_PCT: Final = 2.0  # below this, a factor says nothing
+FIT_ERROR_PCT: Final = 10.0  # chosen: of the range (12)
+MOST_ERROR_PCT: Final = 20.0  # chosen: of the range; a guess at mid-range errs by 25 % over evenly spread loads
+LEAST_COVERAGE: Final = 0.7  # chosen: 95 % intervals with certainly less coverage mislead
+TOO_WIDE: Final = 1e-3  # chosen: probability of so small errors with correct intervals (chi-squared over runs)
+FEW_REJECTED: Final = 0.2  # chosen: of the batches
+MOST_REJECTED: Final = 0.5  # chosen: of the batches
+VALIDATION_FACTOR: Final = 2.0  # chosen: largest ratio of validation errors to those of runs left out
+VALIDATION_LEAST_PCT: Final = 2.0  # chosen: below this error a ratio is meaningless
 
 
 class Grade(StrEnum):
@@ -51,7 +51,7 @@ class Grade(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """What one rule says."""
+    """The result of one rule."""
 
     rule: str
     grade: Grade
@@ -106,8 +106,8 @@ def _errors_and_intervals(judgement: Judgement) -> Iterator[Reason]:
         yield from _half_width(width_of(table.judged, table.errors.of(target), target))
         yield from _width(table.judged, part, target)
     yield _answered(table.errors, part)
-    if part is Part.LEFT_OUT and Part.VALIDATION in judgement.tables:
-        yield from _agreement(table.errors.payload, judgement.tables[Part.VALIDATION].errors.payload)
+    if part is BatchSet.LEFT_OUT and BatchSet.VALIDATION in judgement.tables:
+        yield from _agreement(table.errors.payload, judgement.tables[BatchSet.VALIDATION].errors.payload)
 
 
 def _inherited(assessment: Assessment) -> Iterator[Reason]:
@@ -128,7 +128,7 @@ def _graded(figure: float, fit: float, most: float) -> Grade:
     return Grade.FIT if figure <= fit else Grade.RESERVED if figure <= most else Grade.UNFIT
 
 
-def _error(errors: Errors, part: Part, target: Target) -> Reason:
+def _error(errors: Errors, part: BatchSet, target: Target) -> Reason:
     rule, name, of_target = f"{target}_error", target.replace("_", " "), errors.of(target)
     percent = of_target.mean_abs_pct_with_misses
     if of_target.mean_abs is None or percent is None:
@@ -143,8 +143,10 @@ def _error(errors: Errors, part: Part, target: Target) -> Reason:
     )
 
 
-def _coverage(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[Reason]:
-    """By the limits of the coverage, for a few runs say little; empty if there are fewer than two."""
+def _coverage(judged: Sequence[Judged], part: BatchSet, target: Target) -> Iterator[Reason]:
+    """The verdict by the limits of the coverage, because few runs determine it poorly; empty with fewer than two
+    runs.
+    """
     covered = [(hit, one.run) for one in judged if (hit := one.compared(target).is_covered) is not None]
     if len({run for _, run in covered}) < 2:
         return
@@ -152,8 +154,8 @@ def _coverage(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[
     yield Reason(
         f"{target}_coverage",
         _graded(-coverage.high, -PROMISED[0], -LEAST_COVERAGE),
-        f"95 % intervals of {target.replace('_', ' ')} hold the truth in {100.0 * coverage.share:.0f} % of the batches "
-        f"of {PART_NAMES[part]}; what {coverage.n_clusters} runs can tell of it is {100.0 * coverage.low:.0f} to "
+        f"95 % intervals of {target.replace('_', ' ')} contain the truth in {100.0 * coverage.share:.0f} % of the "
+        f"batches of {PART_NAMES[part]}; {coverage.n_clusters} runs determine it to {100.0 * coverage.low:.0f} to "
         f"{100.0 * coverage.high:.0f} %.",
     )
 
@@ -165,8 +167,8 @@ def _half_width(width: Width | None) -> Iterator[Reason]:
         yield Reason(f"{width.target}_half_width", grade, width.sentence)
 
 
-def _width(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[Reason]:
-    """Coverage from its other side: errors far smaller than stated. Batches of one run count as one.
+def _width(judged: Sequence[Judged], part: BatchSet, target: Target) -> Iterator[Reason]:
+    """Errors far smaller than stated. Batches of one run count as one.
 
     The errors are compared with the variance that a campaign can show: it has one day, one sensor and its own shape of
     load.
@@ -192,7 +194,9 @@ def _width(judged: Sequence[Judged], part: Part, target: Target) -> Iterator[Rea
 
 
 def _stated(expected: Expected, vehicle: Vehicle) -> Reason:
-    """The loads driven may be few and near; this is over all. A normal error is sqrt(2 / pi) sigma on average."""
+    """Accuracy over all possible loads, as those driven may be few and similar. The mean absolute normal error is
+    sqrt(2 / pi) sigma.
+    """
     low_kg, high_kg = vehicle.payload_range_kg
     percent = 100.0 * math.sqrt(2.0 / math.pi) * expected.payload_std_kg / (high_kg - low_kg)
     return Reason(
@@ -203,7 +207,7 @@ def _stated(expected: Expected, vehicle: Vehicle) -> Reason:
     )
 
 
-def _answered(errors: Errors, part: Part) -> Reason:
+def _answered(errors: Errors, part: BatchSet) -> Reason:
     share = errors.n_rejected / errors.n_batches if errors.n_batches else 1.0
     reasons = "".join(f", {why} {n}" for why, n in errors.rejected_by_reason.items())
     return Reason(
@@ -264,7 +268,7 @@ def _runs(verdicts: Sequence[RunVerdict]) -> Iterator[Reason]:
 
 
 def _labels(verdicts: Sequence[RunVerdict]) -> Iterator[Reason]:
-    """A wrong load that took part bends every answer, and the errors it is judged by."""
+    """Runs with a wrong load that took part: they bias every answer and the errors by which it is judged."""
     doubted = [
         one.number
         for one in verdicts

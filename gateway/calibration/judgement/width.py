@@ -1,6 +1,6 @@
-"""Whether intervals are narrow enough to be of use, what makes them wide, and what would narrow them.
+"""Whether intervals are narrow enough to be useful, the main cause of their width, and its remedy.
 
-Coverage says whether intervals are true; an interval over all the vehicle may carry is true as well, and tells nothing.
+Coverage shows whether intervals are valid; an interval over all possible loads is valid too, but useless.
 """
 
 from collections.abc import Sequence
@@ -14,14 +14,16 @@ from gateway.calibration.judgement.evaluation import Judged, Target, TargetError
 from gateway.estimate import Z95
 from gateway.reasons import REMEDIES, SOURCES
 
-FIT_HALF_WIDTH_PCT: Final = 25.0  # of the range: half the 95 % interval of normal errors of FIT_ERROR_PCT in the mean
-MOST_HALF_WIDTH_PCT: Final = 50.0  # the interval is as wide as the range: no use; likewise of MOST_ERROR_PCT
+FIT_HALF_WIDTH_PCT: Final = (
+    25.0  # chosen, of the range: half the 95 % interval for a mean normal error of FIT_ERROR_PCT
+)
+MOST_HALF_WIDTH_PCT: Final = 50.0  # chosen, likewise for MOST_ERROR_PCT: the interval is as wide as the range
 
 
 @dataclass(frozen=True, slots=True)
 class Width:
-    """Mean half-width of 95 % intervals over batches, in ``unit`` and percent of the range; ``cause`` is the source
-    that adds the most, None where the estimates name none.
+    """Mean half-width of 95 % intervals over batches, in ``unit`` and percent of the range; ``cause`` is the largest
+    source of the error, None if the estimates have no budget.
     """
 
     target: Target
@@ -32,31 +34,31 @@ class Width:
 
     @property
     def is_fit(self) -> bool:
-        """Narrow enough to plan with."""
+        """Whether intervals are narrow enough to plan with."""
         return self.percent <= FIT_HALF_WIDTH_PCT
 
     @property
     def is_of_use(self) -> bool:
-        """Narrower than the range itself."""
+        """Whether intervals are narrower than the range itself."""
         return self.percent <= MOST_HALF_WIDTH_PCT
 
     @property
     def judged(self) -> str:
-        """In a word or two."""
+        """The judgement in a word or two."""
         return "fit" if self.is_fit else "wide" if self.is_of_use else "too wide to be of use"
 
     @property
     def sentence(self) -> str:
-        """All of it, with the main cause and its remedy."""
+        """The judgement with the main cause and its remedy."""
         said = (
-            f"95 % intervals of {self.target.replace('_', ' ')} are ± {self.half:.3g} {self.unit} in the mean, "
+            f"95 % intervals of {self.target.replace('_', ' ')} are ± {self.half:.3g} {self.unit} on average, "
             f"{self.percent:.0f} % of the range: {self.judged} (fit to {FIT_HALF_WIDTH_PCT:g} %, no use beyond "
             f"{MOST_HALF_WIDTH_PCT:g} %)."
         )
         if self.cause is None:
             return said
         source = SOURCES.get(self.cause.source, self.cause.source)
-        return f"{said} Mostly by {source}{self._remedy(self.cause)}."
+        return f"{said} Mostly due to {source}{self._remedy(self.cause)}."
 
     def _remedy(self, cause: BudgetLine) -> str:
         if cause.remedy is None or self.target != "payload":
@@ -65,7 +67,7 @@ class Width:
 
 
 def width_of(judged: Sequence[Judged], errors: TargetErrors, target: Target) -> Width | None:
-    """None where nothing was answered with an interval."""
+    """None if no batch was answered with an interval."""
     halves = [
         0.5 * (compared.high - compared.low)
         for compared in (one.compared(target) for one in judged)

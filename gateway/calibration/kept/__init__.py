@@ -1,8 +1,8 @@
-"""Batches as a calibration needs them, kept by the running service: no raw log is asked of anybody.
+"""Batches stored by the running service for calibration, without raw logs.
 
-A batch goes in as it was estimated and comes out bit for bit, with what inspection asks of its rows, so that a fit from
-kept batches is the fit from the logs of the same batches.
-Why whole batches and no grouped spectra: docs/adr/kept-batches.md.
+A batch is stored as it was estimated and is read back bit for bit, with the facts that inspection needs of its rows. So
+a fit from stored batches equals the fit from the logs of the same batches.
+docs/adr/kept-batches.md says why whole batches are stored and not grouped spectra.
 """
 
 from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of, packed, unpacked

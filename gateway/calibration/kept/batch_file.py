@@ -1,7 +1,7 @@
-"""One kept batch as bytes: a line of JSON, then its arrays, then the SHA-256 of both.
+"""One stored batch as bytes: a line of JSON, its arrays, and the SHA-256 of both.
 
-Numbers come back bit for bit. The bytes of an array are sorted by their place in a number before they are compressed:
-signs and exponents are alike from sample to sample, mantissas are noise.
+Numbers are read back bit for bit. The bytes of an array are sorted by their place in a number before compression: signs
+and exponents are similar from sample to sample, mantissas are noise.
 """
 
 import hashlib
@@ -21,16 +21,16 @@ from gateway.errors import KeptBatchError
 from gateway.records import F64, Batch, Motion, Signal, Why
 
 FORMAT: Final = "springscale-batch"
-VERSION: Final = 3
-MOST_SAMPLES: Final = 1_000_000  # an hour at 200 Hz has 720 000
+VERSION: Final = 3  # of the format
+MOST_SAMPLES: Final = 1_000_000  # chosen: an hour at 200 Hz has 720 000
 _FLOATS: Final = ("vertical_acceleration_mps2", "pitch_rate_radps", "speed_mps")
-_DIGEST_BYTES: Final = 32
-_FASTEST: Final = 1  # compression; the best one saves two per cent more at many times the work
+_DIGEST_BYTES: Final = 32  # of SHA-256
+_FASTEST: Final = 1  # zlib level; the best one saves 2 % more at many times the cost
 
 
 @dataclass(frozen=True, slots=True)
 class KeptBatch:
-    """A batch, the id of its estimate, what its rows said, and which signal map they were read with."""
+    """A batch, the id of its estimate, the facts of its rows, and the id of their signal map."""
 
     id: str
     signals_id: str
@@ -39,7 +39,7 @@ class KeptBatch:
 
 
 def kept_batch_of(batch_id: str, signals_id: str, batch: Batch, rows: Motion, traits: Traits) -> KeptBatch:
-    """``rows`` are those of the batch's window, and maybe some before and after it."""
+    """``rows`` are those of the batch's window, possibly with some before and after it."""
     inside = (rows.t_ns >= batch.t_start_ns) & (rows.t_ns < batch.t_end_ns)
     return KeptBatch(batch_id, signals_id, batch, row_facts(rows.rows(inside), traits))
 
@@ -133,7 +133,7 @@ def _facts(told: Mapping[str, Any]) -> RowFacts:
 
 
 def _sorted(x: F64) -> bytes:
-    """First bytes of all numbers, then their second ones, and so on."""
+    """The first bytes of all numbers, then the second bytes, and so on."""
     return np.ascontiguousarray(np.frombuffer(x.astype("<f8").tobytes(), np.uint8).reshape(-1, 8).T).tobytes()
 
 
@@ -143,7 +143,7 @@ def _from_sorted(raw: bytes, n: int) -> F64:
 
 
 def _known(number: float) -> float | None:
-    """JSON has no NaN."""
+    """The number, or None for NaN, which JSON lacks."""
     return number if math.isfinite(number) else None
 
 

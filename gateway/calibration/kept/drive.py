@@ -1,4 +1,4 @@
-"""Kept batches of a known load as a calibration takes them: the same inspection and the same fit as from logs."""
+"""Stored batches of a known load as a run for calibration, with the same inspection and fit as for logs."""
 
 import hashlib
 from collections.abc import Iterator, Sequence
@@ -30,7 +30,7 @@ ESTIMATORS: Final = ("cross_spectrum",)  # the ratio index needs many loads
 
 @dataclass(frozen=True, slots=True)
 class KnownDrive:
-    """Kept batches, at least one, that were driven with one known load: a run of a campaign without a log."""
+    """Stored batches (at least one) driven with one known load: a run of a campaign without a log."""
 
     number: int
     name: str
@@ -41,7 +41,7 @@ class KnownDrive:
 
 
 def split_run_of(drive: KnownDrive) -> SplitRun:
-    """All of it identifies: whether a calibration is true is asked of loads that it has not seen."""
+    """The run, with all of its batches for identification: a calibration is validated on loads that it has not seen."""
     batches = tuple(kept.batch for kept in drive.batches)
     run = KnownRun(
         drive.number, drive.name, drive.payload_kg, drive.front_share_pct, batches, payload_left_m=drive.payload_left_m
@@ -54,7 +54,7 @@ def split_run_of(drive: KnownDrive) -> SplitRun:
 
 
 def inspect_kept(campaign: Campaign, drives: Sequence[KnownDrive], settings: BatchSettings) -> Inspection:
-    """What is wrong with each of the drives, if anything; ``campaign`` says of which vehicle they are."""
+    """Findings about each of the drives; ``campaign`` has their vehicle."""
     split = tuple(map(split_run_of, drives))
     verdicts, findings = inspect_campaign(split, campaign.vehicle, settings)
     return Inspection(split, verdicts, (*findings, *_sideways_findings(campaign, split)))
@@ -69,7 +69,9 @@ def calibrate_kept(
 
 
 def joined_facts(parts: Sequence[RowFacts]) -> RowFacts:
-    """Of several stretches (at least one) as of one drive; a quantile of the whole is taken from those of its parts."""
+    """Facts of several stretches (at least one) as of one drive; quantiles of the whole are taken from those of the
+    parts.
+    """
     signals = dict.fromkeys(signal for part in parts for signal in part.streams)
     streams = {
         signal: _joined_stream([part.streams[signal] for part in parts if signal in part.streams]) for signal in signals
@@ -78,7 +80,7 @@ def joined_facts(parts: Sequence[RowFacts]) -> RowFacts:
 
 
 def _joined_stream(streams: Sequence[Stream]) -> Stream:
-    """The law of total variance for the scatter; the widest range, so that nothing is narrower than it was."""
+    """Scatter by the law of total variance; the widest range of all parts."""
     spoke = [stream for stream in streams if stream.n >= 2]
     if len(spoke) < 2:
         return spoke[0] if spoke else streams[0]
@@ -100,7 +102,7 @@ def _joined_stream(streams: Sequence[Stream]) -> Stream:
 
 
 def _sideways_findings(campaign: Campaign, split: Sequence[SplitRun]) -> Iterator[Finding]:
-    """What would tell where loads lie to the side, and is not there."""
+    """Findings about missing data for lateral places."""
     if not any(Signal.ROLL_RATE in run.facts.streams for run in split):
         yield from unmapped_roll_findings(None)
     yield from offset_findings(campaign.vehicle)

@@ -1,7 +1,7 @@
-"""Where kept batches lie: one file each in a directory of their own, bounded in count and bytes.
+"""The store of kept batches: one file each in a directory, bounded in count and bytes.
 
-A file is there whole or not at all, whenever the power fails. Beyond the bounds the oldest gives way, unless somebody
-holds it: what a weighbridge ticket or a commissioning rests on stays until that is settled.
+A file is either complete or absent, even after a power failure. Beyond the bounds the oldest batch is removed unless an
+owner holds it: batches behind a weighbridge ticket or a commissioning stay until that is settled.
 """
 
 import json
@@ -20,13 +20,13 @@ from gateway.units import NS_PER_S
 
 FOLDER: Final = "batches"
 HOLDS: Final = "holds.json"
-MOST_HELD_SHARE: Final = 0.75  # of the count and the bytes; the rest stays for what comes
+MOST_HELD_SHARE: Final = 0.75  # chosen: of the count and the bytes; the rest is for new batches
 _NAME: Final = re.compile(r"(\d{10})-(\d+)-(\d+-[0-9a-f]{12})\.batch")
 
 
 @dataclass(frozen=True, slots=True)
 class ShelfLimits:
-    """How much is kept at most; no batch at all keeps nothing."""
+    """Limits of the store; ``most_batches`` of 0 keeps nothing."""
 
     most_batches: int = 256
     most_bytes: int = 128_000_000
@@ -34,7 +34,7 @@ class ShelfLimits:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A batch that is kept: which, how big its file is, and its place in the order of arrival."""
+    """A stored batch: its id, the size of its file, and its number in order of arrival."""
 
     id: str
     t_start_ns: int
@@ -43,25 +43,25 @@ class Entry:
 
     @property
     def t_end_ns(self) -> int:
-        """As the id begins."""
+        """The end of its window, from its id."""
         return int(self.id.partition("-")[0])
 
     @property
     def duration_s(self) -> float:
-        """Of its window."""
+        """The length of its window."""
         return (self.t_end_ns - self.t_start_ns) / NS_PER_S
 
     @property
     def file_name(self) -> str:
-        """Its name in the directory."""
+        """The name of its file."""
         return f"{self.number:010d}-{self.t_start_ns}-{self.id}.batch"
 
 
 class Shelf:
-    """The one owner of its directory. Thread-safe; calls wait for the disk and raise OSError where it refuses."""
+    """The only writer of its directory. Thread-safe; calls block on the disk and raise OSError if it fails."""
 
     def __init__(self, directory: Path, limits: ShelfLimits) -> None:
-        """Looks at what lies there; files that are none of ours are left alone."""
+        """Reads the directory; files with other names are ignored."""
         self._files = KeptFiles(directory)
         self._limits = limits
         self._lock = threading.Lock()
@@ -69,12 +69,12 @@ class Shelf:
         self._holds = self._read_holds()
 
     def entries(self) -> tuple[Entry, ...]:
-        """All that is kept, in order of arrival."""
+        """All stored batches, in order of arrival."""
         with self._lock:
             return tuple(self._entries.values())
 
     def read(self, batch_id: str) -> KeptBatch:
-        """Raises KeyError where it is not kept, and KeptBatchError where its file is damaged, which is removed then."""
+        """Raises KeyError if it is not stored, and KeptBatchError if its file is damaged, which is then removed."""
         with self._lock:
             entry = self._entries[batch_id]
             try:
@@ -84,9 +84,10 @@ class Shelf:
                 raise KeptBatchError(f"{self._files.directory / entry.file_name} {fault}; it is removed") from None
 
     def add(self, kept: KeptBatch) -> bool:
-        """Keep it, and let the oldest go; on disk when this returns. False for one that is there, or too big to keep.
+        """Store a batch, removing the oldest if needed; on disk when this returns. False if it is already there or too
+        big.
 
-        Raises OSError where the disk refuses; then nothing has changed but that old ones may be gone.
+        Raises OSError if the disk fails; the batch is then not stored, but old ones may have been removed.
         """
         with self._lock:
             if kept.id in self._entries or self._limits.most_batches < 1:
@@ -103,19 +104,20 @@ class Shelf:
             return True
 
     def path(self, entry: Entry) -> Path:
-        """Its file, for another process to read."""
+        """The file of a batch, for another process to read."""
         return self._files.directory / entry.file_name
 
     def remove(self, batch_id: str) -> None:
-        """Whoever holds it."""
+        """Remove a batch even if an owner holds it."""
         with self._lock:
             if (entry := self._entries.get(batch_id)) is not None:
                 self._remove(entry)
 
     def hold(self, owner: str, batch_ids: Collection[str]) -> bool:
-        """Keep these for ``owner``, in place of what it held before, until it lets go; on disk when this returns.
+        """Keep these batches for ``owner``, in place of those it held before, until it releases them; on disk on
+        return.
 
-        False, and nothing is held, where they are more than may be held at a time. Those that are gone are left out.
+        False, and nothing is held, if they exceed the share that may be held. Missing batches are left out.
         """
         with self._lock:
             held = frozenset(batch_ids) & self._entries.keys()
@@ -129,24 +131,24 @@ class Shelf:
             return True
 
     def let_go(self, owner: str) -> None:
-        """What ``owner`` held may go when its turn comes."""
+        """Release the batches of ``owner``; they may be removed when they are the oldest."""
         with self._lock:
             if owner in self._holds:
                 self._write_holds({name: held for name, held in self._holds.items() if name != owner})
 
     @property
     def owners(self) -> frozenset[str]:
-        """All who hold something."""
+        """All owners with held batches."""
         with self._lock:
             return frozenset(self._holds)
 
     def held_by(self, owner: str) -> frozenset[str]:
-        """Those of its batches that are still there."""
+        """The owner's batches that are still stored."""
         with self._lock:
             return self._holds.get(owner, frozenset()) & self._entries.keys()
 
     def _make_room(self, n_bytes: int) -> bool:
-        """Remove the oldest that nobody holds until one more fits; False where too much is held."""
+        """Remove the oldest batches without an owner until one more fits; False if too much is held."""
         held = frozenset().union(*self._holds.values())
         n, total = len(self._entries), sum(entry.n_bytes for entry in self._entries.values())
         for entry in tuple(self._entries.values()):
@@ -163,7 +165,7 @@ class Shelf:
         self._entries.pop(entry.id, None)
 
     def _read_holds(self) -> dict[str, frozenset[str]]:
-        """Nothing where there is no file or none that can be read: a hold is a courtesy, not a truth."""
+        """Empty without a readable file: a hold is a courtesy and not essential."""
         try:
             told = json.loads(self._files.read(HOLDS))
             return {str(owner): frozenset(map(str, held)) for owner, held in told.items()}
@@ -178,7 +180,7 @@ class Shelf:
 
 
 def _found(directory: Path) -> Iterator[Entry]:
-    with suppress(OSError):  # a disk that refuses says so when something is to be kept
+    with suppress(OSError):  # a failing disk raises when a batch is stored
         for file in directory.iterdir():
             if (name := _NAME.fullmatch(file.name)) is not None and file.is_file() and not file.is_symlink():
                 yield Entry(name[3], int(name[2]), file.stat().st_size, int(name[1]))

@@ -1,19 +1,20 @@
-"""Calibration of a whole line of vehicles: what sisters' drives tell of the next one, so that an empty one is enough.
+"""Calibration of a line of vehicles: sister vehicles' drives give the prior of the next one, so that one empty drive is
+enough.
 
-Each sister's drives are evidence of the line; scatter between vehicles blurs it; the next vehicle starts from there
-(``line_of``, ``Line.prior_of``). From three sisters on the scatter itself is estimated. Siblings left out
-in turn tell how far intervals must be widened (``with_siblings_left_out``).
+Each sister's drives are evidence on the line; the scatter between vehicles widens it; the next vehicle starts from
+there (``line_of``, ``Line.prior_of``). With three sisters or more the scatter itself is estimated. Siblings left out in
+turn show how far intervals must be widened (``with_siblings_left_out``).
 """
 
-from gateway.calibration.inheritance import Limits, Seen, Usual
+from gateway.calibration.inheritance import ModelLimits, Seen, Usual
 from gateway.calibration.line.evidence import Evidence
 from gateway.calibration.line.left_out import Sibling, TestedLine, with_siblings_left_out
 from gateway.calibration.line.line import Line, Sister, line_of
 
 __all__ = [
     "Evidence",
-    "Limits",
     "Line",
+    "ModelLimits",
     "Seen",
     "Sibling",
     "Sister",

@@ -1,12 +1,11 @@
-"""What the drives of one vehicle say of its parameters, apart from what was believed before them.
+"""The likelihood of one vehicle's drives, separated from the prior.
 
-A calibration is a posterior: prior times likelihood. Sisters share the prior, so that it must not be counted once for
-each. Divided out of a Gaussian posterior N(x, C) with the prior N(m, P) it leaves evidence
+A calibration is a posterior: prior times likelihood. Sisters share the prior, so it must not be counted once for each.
+Dividing a Gaussian posterior N(x, C) by the prior N(m, P) leaves the evidence
 
     I = C^-1 - P^-1        h = C^-1 x - P^-1 m
 
-with which any other prior is multiplied by adding. Parameters of which the drives said nothing have no information,
-and no mean is needed for them.
+which multiplies any other prior by addition. Parameters without data have no information, and need no mean.
 """
 
 from dataclasses import dataclass
@@ -22,16 +21,17 @@ from gateway.records import F64, Bool
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Information (n, n), positive semi-definite, and pull (n,): the mean is what the information makes of it."""
+    """Information (n, n), positive semi-definite, and pull (n,), the information times the mean."""
 
     information: F64
     pull: F64
 
     @classmethod
     def of(cls, mean: F64, covariance: F64, prior: Prior, shared: Bool) -> "Evidence":
-        """What led from ``prior`` to the posterior N(mean, covariance), of the parameters that are ``shared`` (n,).
+        """The evidence between ``prior`` and the posterior N(mean, covariance), for the parameters that are ``shared``
+        (n,).
 
-        Of the others, which in the prior these do not depend on, it is silent: what they may be is in the posterior.
+        It is zero for the others, which the prior makes independent of these; the posterior includes their uncertainty.
         """
         at = np.flatnonzero(shared)
         block = np.ix_(at, at)
@@ -43,14 +43,14 @@ class Evidence:
 
     @classmethod
     def none(cls, n: int) -> "Evidence":
-        """Of ``n`` parameters of which nobody knows anything."""
+        """No information on ``n`` parameters."""
         return cls(np.zeros((n, n)), np.zeros(n))
 
     def __add__(self, other: "Evidence") -> "Evidence":
         return Evidence(self.information + other.information, self.pull + other.pull)
 
     def of_another(self, variance: F64) -> "Evidence":
-        """What it says of a vehicle whose parameters differ from this one's by N(0, diag(variance)), variance (n,).
+        """The evidence on a vehicle whose parameters differ from this one's by N(0, diag(variance)), variance (n,).
 
         N(e, I^-1) becomes N(e, I^-1 + S), whose information is (1 + I S)^-1 I: no inverse of I is needed.
         """
@@ -65,7 +65,7 @@ class Evidence:
         return Prior(np.asarray(mean, float), _symmetric(precision))
 
     def at_amplitude(self, about: F64, log_ratios: tuple[float, float]) -> "Evidence":
-        """The same with friction told at other usual amplitudes: of front and rear axle exp(-log_ratio) times the old.
+        """The same with friction at other usual amplitudes: exp(-log_ratio) times the old, for front and rear axle.
 
         A rate c (1 - p + p / a) at the amplitude a is c' (1 - p' + p' / a') at a' = r a (log_ratio = log r) with
 
@@ -93,6 +93,8 @@ def _symmetric(matrix: NDArray[np.floating[Any]]) -> F64:
 
 
 def _semi_definite(information: F64, scale: F64) -> F64:
-    """Without what rounding, or a posterior that is wider than its prior, left below zero; in units of 1 / scale."""
+    """``information`` without negative eigenvalues from rounding or from a posterior wider than its prior; in units of
+    1 / scale.
+    """
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     return _symmetric((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale))

@@ -1,4 +1,4 @@
-"""Siblings left out in turn: each calibrated by one empty drive of its own and what the others tell, then judged."""
+"""Siblings left out in turn: each is calibrated by one empty drive of its own and the others' prior, then judged."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -17,17 +17,17 @@ from gateway.errors import LineError
 
 @dataclass(frozen=True, slots=True)
 class Sibling:
-    """A vehicle of the line with the drives that it was calibrated by."""
+    """A vehicle of the line with its calibration drives."""
 
     sister: Sister
     runs: tuple[KnownRun, ...]
 
     def inheriting_from(self, line: Line) -> CrossSpectrumCalibration:
-        """As one empty drive would calibrate it."""
+        """Its calibration from one empty drive."""
         return fit_cross_spectrum([self._empty], self.sister.vehicle, inherited=line).calibration
 
     def errors_of(self, calibration: CrossSpectrumCalibration) -> list[LeftOut]:
-        """Every batch of its other drives."""
+        """The errors of every batch of its other drives."""
         rest = [run for run in self.runs if run is not self._empty]
         vehicle = self.sister.vehicle
         known = known_spectra(rest, vehicle, with_roll=can_roll(vehicle))
@@ -35,7 +35,7 @@ class Sibling:
 
     @property
     def is_judgeable(self) -> bool:
-        """Driven empty, and at least once more."""
+        """Whether it has an empty drive and at least one more."""
         return len(self.runs) > 1 and any(run.payload_kg == 0.0 for run in self.runs)
 
     @property
@@ -45,7 +45,7 @@ class Sibling:
 
 @dataclass(frozen=True, slots=True)
 class TestedLine:
-    """A line whose limits siblings showed that were left out of it, and their root mean square errors."""
+    """A line with the limits found by leaving siblings out, and their root mean square errors."""
 
     line: Line
     payload_rms_kg: float
@@ -57,13 +57,13 @@ def with_siblings_left_out(
 ) -> TestedLine:
     """``line`` of all vehicles, with the limits that ``siblings`` show, each left out of a line of its own.
 
-    ``step`` is called after each. Raises LineError where none can be left out: one has to be driven empty and once
-    more, and another has to be left.
+    ``step`` is called after each. Raises LineError if none can be left out: one needs an empty drive and another one,
+    and a second vehicle must remain.
     """
     judgeable = [one for one in siblings if one.is_judgeable]
     if len(siblings) < 2 or not judgeable:
         raise LineError(
-            "no sibling can be left out: that takes the drives of two vehicles, one of them driven empty and loaded"
+            "no sibling can be left out: give the drives of two vehicles, at least one of them driven empty and loaded"
         )
     errors: list[LeftOut] = []
     misfits = []

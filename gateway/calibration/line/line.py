@@ -1,14 +1,14 @@
-"""A line of vehicles: what calibrations of some tell of the next one before it is driven.
+"""A line of vehicles: calibrations of several vehicles give the prior of the next one before its first drive.
 
     line = line_of(sisters)
     line.prior_of(vehicle, with_roll=...)
 
 Vehicle i of a line has the parameters N(mu, S / 2), so that two of them differ by N(0, S). A sister's drives are
-evidence of her own parameters; blurred by S / 2 they are evidence of the line's mean mu; all sisters' together, blurred
-by S / 2 once more, of the next vehicle: one sister's covariance grows by S, that of many by S / 2. That evidence
-and the prior that any vehicle has (half_car.prior) are multiplied. Without scatter the drives of all might as well be
-one vehicle's; with scatter beyond all bounds a line says nothing. How vehicles heave and pitch is learned apart from
-how they roll, as in the fit itself (docs/adr/roll-takes-turns.md).
+evidence on her own parameters; widened by S / 2 they are evidence on the line's mean mu; all sisters' together, widened
+by S / 2 again, on the next vehicle. So one sister's covariance grows by S, that of many by S / 2. That evidence and the
+prior of any vehicle (half_car.prior) are multiplied. Without scatter all drives count as one vehicle's; with unlimited
+scatter a line has no information. Heave and pitch are learned separately from roll, as in the fit itself
+(docs/adr/roll-takes-turns.md).
 """
 
 from collections.abc import Iterable, Sequence
@@ -20,7 +20,7 @@ import numpy as np
 
 from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS
 from gateway.calibration.half_car.prior import Prior, prior_of
-from gateway.calibration.inheritance import Limits, Seen, Usual
+from gateway.calibration.inheritance import ModelLimits, Seen, Usual
 from gateway.calibration.line.evidence import Evidence
 from gateway.calibration.line.scatter import (
     LEAST_SIBLINGS,
@@ -35,19 +35,19 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import LineError
 from gateway.records import F64
 
-MOST_WHEELBASE_DIFFERENCE: Final = 0.01  # another one is another model
-MOST_MASS_DIFFERENCE: Final = 0.25  # another body on the same chassis
+MOST_WHEELBASE_DIFFERENCE: Final = 0.01  # chosen: of the wheelbase; a larger difference is another model
+MOST_MASS_DIFFERENCE: Final = 0.25  # chosen: of the sprung mass; a larger difference is another body
 _N: Final = len(PARAMETERS)
 _IS_INHERITED: Final = is_inherited(PARAMETERS + ROLL_PARAMETERS)
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """What several vehicles, ``members`` by the ids of their calibrations, tell of the line's mean.
+    """Evidence on a line's mean from several vehicles; ``members`` are the ids of their calibrations.
 
-    ``half_car`` and ``roll`` are that evidence, roll None where no member read a roll rate. scatter_std (n,) is of
-    the difference between two vehicles, in the order of PARAMETERS and ROLL_PARAMETERS, 0 for what no vehicle tells of
-    another; it was estimated from n_siblings, or is the default where these are 0.
+    ``half_car`` and ``roll`` are that evidence, roll None if no member used a roll rate. scatter_std (n,) is that of
+    the difference between two vehicles, in the order of PARAMETERS and ROLL_PARAMETERS, 0 for a vehicle's own
+    parameters; it was estimated from n_siblings, or is the default if these are 0.
     """
 
     members: tuple[str, ...]
@@ -59,10 +59,12 @@ class Line:
     scatter_std: F64
     n_siblings: int
     seen: Seen
-    limits: Limits
+    limits: ModelLimits
 
     def prior_of(self, vehicle: Vehicle, *, with_roll: bool) -> Prior:
-        """Of the next vehicle, whose own masses and sensor are as stated. Raises LineError where it is no sister."""
+        """The prior of the next vehicle, with its stated masses and sensor. Raises LineError if it does not belong to
+        the line.
+        """
         _require_alike(self, vehicle)
         generic = prior_of(vehicle, with_roll=with_roll)
         variance = _about_mean(self.scatter_std)
@@ -72,7 +74,7 @@ class Line:
         return half_car.beside(self.roll.of_another(variance[_N:]).upon(generic.roll) if self.roll else generic.roll)
 
     def on(self, calibration: CrossSpectrumCalibration, *, is_tested: bool) -> CrossSpectrumCalibration:
-        """See half_car.inherited: valid over what the line saw, with its limits."""
+        """See half_car.inherited: the calibration valid over the line's ranges, with its limits."""
         wider = self.limits.on(self.seen.on(calibration), is_tested=is_tested)
         low_kg, high_kg = wider.payload_seen_kg
         kept = tuple(one for one in wider.warnings if low_kg == high_kg or one != SPRINGS_FROM_PRIORS)
@@ -90,21 +92,21 @@ class Sister:
 
     @property
     def usual(self) -> Usual:
-        """Raises LineError where the calibration does not say: it was made before that was kept."""
+        """Raises LineError if the calibration lacks it."""
         c = self.calibration
         if c.usual_log_amplitude is None:
-            raise LineError(f"{self.vehicle.name} ({self.id}): says not how much it usually moved: calibrate it again")
+            raise LineError(f"{self.vehicle.name} ({self.id}): does not contain its usual movement: calibrate it again")
         return Usual(c.usual_log_amplitude, c.usual_stroke_mps)
 
     @property
     def half_car(self) -> Evidence:
-        """What its own drives said of how it heaves and pitches, less what is its own."""
+        """The evidence of its own drives on heave and pitch, without its own parameters."""
         c, prior = self.calibration, self._prior.upright
         return Evidence.of(upright(c.parameters), c.covariance[:_N, :_N], prior, _IS_INHERITED[:_N])
 
     @property
     def roll(self) -> Evidence | None:
-        """Of how it rolls."""
+        """The same on roll."""
         c = self.calibration
         if not has_roll(c.parameters):
             return None
@@ -117,9 +119,9 @@ class Sister:
 
 
 def line_of(sisters: Sequence[Sister], line: Line | None = None) -> Line:
-    """The line of ``sisters``, with ``line`` where one was built already; in what order they come does not matter.
+    """The line of ``sisters``, with ``line`` if one was built already; their order does not matter.
 
-    A sister that inherited brings her line along. Raises LineError where two lines overlap, or vehicles are not alike.
+    The line that a sister inherited from is included. Raises LineError if lines overlap, or vehicles differ too much.
     """
     sisters = sorted({one.id: one for one in sisters}.values(), key=lambda one: one.id)
     lines = _distinct([*([line] if line else []), *(one.line for one in sisters if one.line)])
@@ -128,7 +130,7 @@ def line_of(sisters: Sequence[Sister], line: Line | None = None) -> Line:
     if len(lines) == 1 and not sisters:
         return lines[0]
     if not lines and not sisters:
-        raise LineError("a line needs the calibration of one vehicle at least")
+        raise LineError("a line needs the calibration of at least one vehicle")
     usual = Usual.mean([*(one.usual for one in sisters), *(each.usual for each in lines)])
     found = [_at(one.half_car, one, usual) for one in sisters]
     rolls = [roll for one in sisters if (roll := one.roll) is not None]
@@ -147,7 +149,9 @@ def line_of(sisters: Sequence[Sister], line: Line | None = None) -> Line:
         scatter_std=scatter_std,
         n_siblings=n_siblings,
         seen=Seen.together([*(each.seen for each in lines), *(Seen.of(one.calibration) for one in sisters)]),
-        limits=Limits.widest([*(each.limits for each in lines), *(Limits.of(one.calibration) for one in sisters)]),
+        limits=ModelLimits.widest(
+            [*(each.limits for each in lines), *(ModelLimits.of(one.calibration) for one in sisters)]
+        ),
     )
     for one in sisters:
         _require_alike(built, one.vehicle)
@@ -155,7 +159,7 @@ def line_of(sisters: Sequence[Sister], line: Line | None = None) -> Line:
 
 
 def _scatter(found: Sequence[Evidence], rolls: Sequence[Evidence], lines: Sequence[Line]) -> tuple[F64, int]:
-    """Estimated from three sisters on, about what their lines know of it, or the defaults."""
+    """The scatter estimated from three sisters on, with their lines' as default, else the defaults."""
     std, n = default_scatter_std(PARAMETERS + ROLL_PARAMETERS), 0
     if lines:
         std, n = np.mean([each.scatter_std for each in lines], axis=0), max(each.n_siblings for each in lines)
@@ -174,18 +178,18 @@ def _about_mean(scatter_std: F64) -> F64:
 
 
 def _at(evidence: Evidence, sister: Sister, usual: Usual) -> Evidence:
-    """Told at the line's usual amplitude."""
+    """The evidence at the line's usual amplitude."""
     return evidence.at_amplitude(upright(sister.calibration.parameters), sister.usual.log_over(usual))
 
 
 def _line_at(line: Line, usual: Usual) -> Evidence:
-    """The same of a line, about the mean that its evidence has."""
+    """The same for a line, about the mean of its evidence."""
     mean = np.linalg.pinv(line.half_car.information, hermitian=True) @ line.half_car.pull
     return line.half_car.at_amplitude(np.asarray(mean, float), line.usual.log_over(usual))
 
 
 def _distinct(lines: Iterable[Line]) -> list[Line]:
-    """Each once. Raises LineError where two share members but not all: their evidence would count twice."""
+    """Each line once. Raises LineError if two share members but not all: their evidence would count twice."""
     once = {each.members: each for each in lines}
     kept: list[Line] = []
     for members in sorted(once):

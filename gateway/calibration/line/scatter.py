@@ -1,7 +1,7 @@
-"""By how much vehicles of one line differ from each other, parameter by parameter, before any two were compared.
+"""The scatter between vehicles of one line, parameter by parameter.
 
-Standard deviations of the difference between two of them: shares of what is positive, else in the unit that ends the
-name. Of vehicles about their mean it is less by the root of two. Tolerances that makers state as limits are read as
+Default standard deviations of the difference between two vehicles: relative for positive parameters, else in the unit
+that ends the name. About their mean it is smaller by the root of two. We read tolerances that makers state as limits as
 three standard deviations about the mean.
 """
 
@@ -15,16 +15,16 @@ from gateway.calibration.line.evidence import Evidence
 from gateway.core.cross_spectrum.model.parameters import BEND_SHARES, PARAMETERS, ROLL_PARAMETERS
 from gateway.records import F64, Bool
 
-LEAST_SIBLINGS: Final = 3
-MOST_STEPS: Final = 500
-SETTLED: Final = 1e-4  # relative change of a variance
-_RIDGE: Final = 1e-9  # of the scatter's own precision: of mu where no vehicle tells anything of it
+LEAST_SIBLINGS: Final = 3  # chosen: from which the scatter is estimated
+MOST_STEPS: Final = 500  # chosen: bound of the iteration
+SETTLED: Final = 1e-4  # chosen: relative change of a variance at which the iteration ends
+_RIDGE: Final = 1e-9  # chosen: of the scatter's precision; keeps mu finite where no vehicle informs it
 
 
 def scatter_found(siblings: Sequence[Evidence], default_variance: F64, dof: float) -> F64:
     """(n,) variances of vehicles about their line's mean; those whose default is 0 stay 0.
 
-    ``dof`` is how many vehicles the default counts for.
+    ``dof`` is the number of vehicles that the default counts for.
     """
     shared = np.flatnonzero(default_variance > 0.0)
     parts = [Evidence(one.information[np.ix_(shared, shared)], one.pull[shared]) for one in siblings]
@@ -70,7 +70,7 @@ _OF_AXLE: Final[Mapping[str, float]] = MappingProxyType(
         # trucks a third had one a quarter too low (NHTSA 2001)
         "tyre_{}_npm": 0.04,
         "unsprung_{}_kg": 0.03,  # wheels and tyres of other makes
-        "damper_friction_{}": 0.05,  # a third of the 0.1 to 0.3 that vans were found to have
+        "damper_friction_{}": 0.05,  # chosen: a third of the 0.1 to 0.3 found in vans
         "spring_friction_{}": 0.02,  # likewise, of 0.03 to 0.09
         "spring_slope_{}_per_kn": 0.01,  # the coil's winding: a third of a usual slope of 0.03
     }
@@ -92,27 +92,29 @@ _OF_BODY: Final[Mapping[str, float]] = MappingProxyType(
         "twist_level": 0.3,
     }
 )
-BEND_STD_PER_KN: Final = 0.01  # of each bend of a spring's rate: bump stops and helper springs are of one part number
+BEND_STD_PER_KN: Final = (
+    0.01  # chosen: of each bend of a spring's rate; bump stops and helper springs have one part number
+)
 
 SCATTER_STD: Final[Mapping[str, float]] = MappingProxyType(
     {name.format(end): std for name, std in _OF_AXLE.items() for end in _ENDS}
     | {f"spring_bend_{end}_{i}_per_kn": BEND_STD_PER_KN for end in _ENDS for i in range(len(BEND_SHARES))}
     | dict(_OF_BODY)
 )
-"""What a vehicle inherits from its line."""
+"""The inherited parameters."""
 
 OWN: Final = frozenset(PARAMETERS + ROLL_PARAMETERS) - SCATTER_STD.keys()
-"""What no sister tells: the sensor unit, its place, noise and lag, tracks, slack, where the empty body's centre is."""
+"""Each vehicle's own parameters: sensor unit, its place, noise and lag, tracks, slack, centre of the empty body."""
 
 SCATTER_DOF: Final = 4.0
-"""The defaults count as if they had been seen on so many vehicles; chosen, so that three siblings can double them."""
+"""Chosen: number of vehicles that the defaults count for, so that three siblings can double them."""
 
 
 def is_inherited(names: Sequence[str]) -> Bool:
-    """(n,) which of these parameters sisters share."""
+    """(n,) whether each parameter is inherited."""
     return np.array([name not in OWN for name in names])
 
 
 def default_scatter_std(names: Sequence[str]) -> F64:
-    """(n,) of the names that are inherited; 0 for those that are not."""
+    """(n,) default scatter of the names; 0 if not inherited."""
     return np.array([SCATTER_STD.get(name, 0.0) for name in names])

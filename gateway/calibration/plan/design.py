@@ -1,15 +1,14 @@
-"""Which known-load run would teach most: optimal design on the half-car's posterior.
+"""The most informative known-load run: optimal design on the half-car's posterior.
 
     design = Design(vehicle, theta, drive, targets)
-    design.spread(covariance)             how well loads would be weighed, given what is known of the vehicle
-    design.after(covariance, load)        what would be known after one more known-load run
+    design.spread(covariance)             accuracy of estimates, given the covariance of the parameters
+    design.after(covariance, load)        that covariance after one more known-load run
 
-One more run adds its expected information I to what is known of the parameters, C' = (C^-1 + I)^-1.
-A batch of load y has the covariance  own + moves C moves'  (core.cross_spectrum): its own noise, and
-what calibration left open. The run to drive next is the one after which the mean of that variance over
-the loads that the vehicle carries is least (I-optimality; G. E. P. Box and N. R. Draper, "A basis for the
-selection of a response surface design", J. Am. Stat. Assoc. 54, 1959). It is a statement of the model
-about itself, to first order: errors of the model are in it only as far as its slack and priors admit.
+One more run adds its expected information I, C' = (C^-1 + I)^-1. A batch of load y has the covariance  own + moves C
+moves'  (core.cross_spectrum): its own noise, and the calibration's uncertainty. The best next run minimises the mean of
+that variance over the loads that the vehicle carries (I-optimality; G. E. P. Box and N. R. Draper, "A basis for the
+selection of a response surface design", J. Am. Stat. Assoc. 54, 1959). It is a prediction of the model to first order:
+errors of the model enter only through its slack and priors.
 """
 
 from collections.abc import Sequence
@@ -27,7 +26,7 @@ from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 
-BATCH_S = 300.0
+BATCH_S = 300.0  # BatchSettings.window_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +38,7 @@ class Spread:
 
 
 class Design:
-    """What runs of a vehicle with parameters ``theta`` (p,) would teach, each driven as ``drive``."""
+    """The expected information of runs of a vehicle with parameters ``theta`` (p,), each driven as ``drive``."""
 
     def __init__(self, vehicle: Vehicle, theta: F64, drive: Drive, targets: Sequence[PlacedLoad]) -> None:
         self._theta = upright(theta)
@@ -63,7 +62,7 @@ class Design:
         return np.asarray(np.linalg.inv(np.linalg.inv(covariance) + self._information[load]), float)
 
     def spread(self, covariance: F64) -> Spread:
-        """How well the targets would be weighed in batches of five minutes, of the batch and the calibration alone."""
+        """Accuracy of the targets in batches of five minutes, from the batch and the calibration alone."""
         payload_var, share_var = self._variances(covariance).mean(axis=0)
         return Spread(float(np.sqrt(payload_var)), 100.0 * float(np.sqrt(share_var)))
 
@@ -72,11 +71,11 @@ class Design:
         return float(np.sum(self._variances(covariance).mean(axis=0) / self._spans**2))
 
     def best(self, covariance: F64, loads: Sequence[PlacedLoad]) -> PlacedLoad:
-        """Which of ``loads`` leaves least loss; the first of equals."""
+        """The one of ``loads`` with the least loss after it; the first of equals."""
         return min(loads, key=lambda load: self.loss(self.after(covariance, load)))
 
     def worst(self, covariance: F64, loads: Sequence[PlacedLoad]) -> PlacedLoad:
-        """Which of ``loads`` leaves most loss; the first of equals."""
+        """The one of ``loads`` with the most loss after it; the first of equals."""
         return max(loads, key=lambda load: self.loss(self.after(covariance, load)))
 
     def _variances(self, covariance: F64) -> F64:
@@ -86,7 +85,7 @@ class Design:
         return variances
 
     def _weighed(self, load: PlacedLoad) -> tuple[F64, F64]:
-        """A batch's own variances (2,), and by how much (payload, share) move with each parameter (2, p)."""
+        """A batch's own variances (2,), and the derivative (2, p) of payload and share by each parameter."""
         whittle, point = self._seen(load, Drive(BATCH_S, self._drive.speed_mps), 1.0)
         own, moves = raw_moves(whittle, point)
         return np.diag(own), moves

@@ -1,4 +1,4 @@
-"""Which loads a vehicle may carry: those that could be driven next, and those it will be asked to weigh."""
+"""The loads that a vehicle may carry: those to drive next, and those it will weigh."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,17 +11,18 @@ from gateway.core.vehicle import Load, Vehicle, front_share_pct
 from gateway.core.weights import weights_of
 from gateway.posterior import exactly
 
-DRIVEN_PARTS: Final = (0.25, 0.5, 0.75, 1.0)  # of the largest payload
-DRIVEN_PLACES: Final = (0.15, 0.35, 0.55, 0.75, 1.0)  # of the wheelbase, behind the front axle
+DRIVEN_PARTS: Final = (0.25, 0.5, 0.75, 1.0)  # chosen: of the largest payload
+DRIVEN_PLACES: Final = (0.15, 0.35, 0.55, 0.75, 1.0)  # chosen: of the wheelbase, behind the front axle
+# chosen: an even grid of loads and places over the vehicle's range
 WEIGHED_PARTS: Final = tuple(np.linspace(0.05, 1.0, 6).tolist())
 WEIGHED_PLACES: Final = tuple(np.linspace(0.1, 1.0, 7).tolist())
-PAYLOAD_STEP_KG: Final = 10.0
-POSITION_STEP_M: Final = 0.1
+PAYLOAD_STEP_KG: Final = 10.0  # chosen: round numbers for people
+POSITION_STEP_M: Final = 0.1  # chosen: round numbers for people
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedLoad:
-    """A payload with its centre position_m behind the front axle; nothing aboard has no position."""
+    """A payload with its centre position_m behind the front axle; None for the empty vehicle."""
 
     payload_kg: float
     position_m: float | None
@@ -29,17 +30,17 @@ class PlacedLoad:
 
     @property
     def load(self) -> Load:
-        """Without its place."""
+        """The load without its place."""
         return Load(self.payload_kg, self.front_share_pct)
 
 
 def empty(vehicle: Vehicle) -> PlacedLoad:
-    """Nothing aboard."""
+    """The empty vehicle."""
     return PlacedLoad(0.0, None, vehicle.empty_front_share_pct)
 
 
 def drivable_loads(vehicle: Vehicle) -> tuple[PlacedLoad, ...]:
-    """The empty vehicle, then loads a fitter could prepare, in round numbers, within the vehicle's limits."""
+    """The empty vehicle, then loads that a fitter can prepare, in round numbers, within the vehicle's limits."""
     most_kg = vehicle.payload_range_kg[1]
     return _within_limits(
         vehicle,
@@ -52,7 +53,7 @@ def drivable_loads(vehicle: Vehicle) -> tuple[PlacedLoad, ...]:
 
 
 def weighed_loads(vehicle: Vehicle) -> tuple[PlacedLoad, ...]:
-    """A grid over what the vehicle will carry: payload_range_kg over the wheelbase, within its limits."""
+    """A grid of the loads that the vehicle will carry: payload_range_kg over the wheelbase, within its limits."""
     most_kg = vehicle.payload_range_kg[1]
     return _within_limits(
         vehicle,
@@ -61,9 +62,9 @@ def weighed_loads(vehicle: Vehicle) -> tuple[PlacedLoad, ...]:
 
 
 def share_within_reach(targets: Sequence[PlacedLoad], driven: Sequence[PlacedLoad]) -> float | None:
-    """Share (0..1) of ``targets`` that lie in the loads and shares of ``driven``, plus the margin of ``out_of_range``.
+    """Share (0..1) of ``targets`` within the loads and shares of ``driven``, plus the margin of ``out_of_range``.
 
-    A calibration answers ``out_of_range`` beyond it. None where ``driven`` spans nothing: then no limit is known.
+    A calibration answers ``out_of_range`` beyond it. None if ``driven`` has no span and so sets no limit.
     """
     payloads_kg = [load.payload_kg for load in driven]
     shares_pct = [load.front_share_pct for load in driven]
@@ -86,7 +87,7 @@ def _within_limits(vehicle: Vehicle, loads: Iterable[tuple[float, float]]) -> tu
 
 
 def _is_allowed(vehicle: Vehicle, load: PlacedLoad) -> bool:
-    """Limits are of the whole vehicle; one whose weight is not known is not checked."""
+    """Whether the load is within the limits; unknown weights are not checked."""
     weights = weights_of(vehicle, exactly(load.payload_kg, load.front_share_pct))
     return not any(weight.is_over_limit for _, weight in weights.items())
 

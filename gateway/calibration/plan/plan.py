@@ -1,10 +1,10 @@
-"""Which known load to drive next, and how much that would help.
+"""The next known load to drive, and its expected benefit.
 
-    plan_first(vehicle)                   nothing driven yet: a first campaign, from priors alone
-    plan_next(outcome, vehicle)           after a calibration: the runs that would teach most, one after the other
+    plan_first(vehicle)                   before the first drive: a first campaign, from priors alone
+    plan_next(outcome, vehicle)           after a calibration: the most informative runs, in order
 
-Runs are chosen by gateway.calibration.plan.design. What it expects is what the service will state: standard deviations
-of five-minute batches over the loads the vehicle carries, with every source of error.
+Runs are chosen by gateway.calibration.plan.design. The expected figures are those that the service will state: standard
+deviations of five-minute batches over the loads that the vehicle carries, with every source of error.
 """
 
 import math
@@ -35,30 +35,30 @@ from gateway.posterior import Source, exactly
 from gateway.records import F64
 from gateway.units import NS_PER_S
 
-LEAST_CG_LEFT_M: Final = 0.03  # of the sprung mass: what a load somewhere near the middle may do by chance
-TRACK_PART: Final = 0.25  # of the track width: as far to one side as a heavy load mostly goes between wheel arches
-USUAL_TRACK_M: Final = 1.5
-PLACE_STEP_M: Final = 0.05
-EVEN: Final = 0.5  # part of a sideways moment that the front axle takes, where nobody knows it
+LEAST_CG_LEFT_M: Final = 0.03  # chosen: of the sprung mass; a load near the middle shifts it less
+TRACK_PART: Final = 0.25  # chosen: of the track width; a heavy load between wheel arches can be this far off
+USUAL_TRACK_M: Final = 1.5  # chosen: of cars and vans
+PLACE_STEP_M: Final = 0.05  # chosen: round numbers for people
+EVEN: Final = 0.5  # chosen: front axle's part of a roll moment, if unknown
 
 
 @dataclass(frozen=True, slots=True)
-class SidewaysLoad:
+class OffCentreLoad:
     """A load with its centre payload_left_m left of the centre line."""
 
     load: PlacedLoad
     payload_left_m: float
 
 
-def sideways_load(runs: Sequence[KnownRun], vehicle: Vehicle) -> SidewaysLoad | None:
-    """The heaviest load that may be driven well to one side, near the middle lengthwise.
+def sideways_load(runs: Sequence[KnownRun], vehicle: Vehicle) -> OffCentreLoad | None:
+    """The heaviest load that may be driven well off the centre line, near the middle lengthwise.
 
-    None without a roll rate, where a run has carried such a load, or where limits allow none.
+    None without a roll rate, after a run with such a load, or if the limits allow none.
     """
     if all(batch.roll_rate_radps is None for run in runs for batch in run.batches) or _has_sideways(runs, vehicle):
         return None
     left_m = round(round(TRACK_PART * (vehicle.track_width_m or USUAL_TRACK_M) / PLACE_STEP_M) * PLACE_STEP_M, 6)
-    placed = [SidewaysLoad(load, left_m) for load in drivable_loads(vehicle) if load.payload_kg > 0.0]
+    placed = [OffCentreLoad(load, left_m) for load in drivable_loads(vehicle) if load.payload_kg > 0.0]
     allowed = [one for one in placed if _is_allowed(vehicle, one)]
     middle_pct = vehicle.empty_front_share_pct
     return max(
@@ -71,28 +71,28 @@ def _has_sideways(runs: Sequence[KnownRun], vehicle: Vehicle) -> bool:
     return any(abs(left_m - vehicle.empty_cg_left_m) >= LEAST_CG_LEFT_M for left_m in noted_m)
 
 
-def _is_allowed(vehicle: Vehicle, placed: SidewaysLoad) -> bool:
-    """Limits of single wheels; those of axles and gross weight hold already."""
+def _is_allowed(vehicle: Vehicle, placed: OffCentreLoad) -> bool:
+    """Whether it is within the limits of single wheels; those of axles and gross weight are already met."""
     at_m = cg_left_m(vehicle, placed.load.payload_kg, placed.payload_left_m)
     load = exactly(placed.load.payload_kg, placed.load.front_share_pct, at_m)
     weights = weights_of(vehicle, load, Quantity(EVEN, 0.0))
     return not any(weight.is_over_limit for _, weight in weights.items())
 
 
-FIRST_DRIVE: Final = Drive(600.0, 50.0 / 3.6)
-N_FIRST: Final = 4
-N_NEXT: Final = 3
-WORTH_DRIVING: Final = 0.1  # by how much a run should narrow the spread to be worth a quarter of an hour
+FIRST_DRIVE: Final = Drive(600.0, 50.0 / 3.6)  # chosen: ten minutes in town traffic
+N_FIRST: Final = 4  # chosen: runs of a first campaign
+N_NEXT: Final = 3  # chosen: runs advised at a time
+WORTH_DRIVING: Final = 0.1  # chosen: relative gain that is worth a quarter of an hour
 
 Loads = tuple[PlacedLoad, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """How well the vehicle would be weighed: standard deviations over the loads it carries.
+    """Expected accuracy: standard deviations over the loads that the vehicle carries.
 
-    ``reach_share`` (0..1) of those loads lie within what was driven, so that an answer is not refused
-    as ``out_of_range``; None while one load alone was driven.
+    ``reach_share`` (0..1) of those loads are within the driven range, so that they are not refused as ``out_of_range``;
+    None after a single load.
     """
 
     payload_std_kg: float
@@ -102,7 +102,7 @@ class Expected:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """One run to drive, and what is expected once it and those advised before it are driven."""
+    """One run to drive, and the accuracy expected after it and those advised before it."""
 
     load: PlacedLoad
     expected: Expected
@@ -110,11 +110,11 @@ class Advice:
 
 @dataclass(frozen=True, slots=True)
 class LoadPlan:
-    """Runs to drive, in order. ``now`` is None where nothing was driven yet.
+    """Runs to drive, in order. ``now`` is None before the first drive.
 
-    ``least`` is the run that would help least, for comparison with the first of ``advice``. ``sideways`` is the load
-    to put to one side on one more run: what a load off the centre line does then shows, as do the signs of the roll
-    rate and of the sensor's place. None where one was driven, or no roll rate is mapped.
+    ``least`` is the least useful run, for comparison with the first of ``advice``. ``sideways`` is a load to drive off
+    the centre line: such a run shows its effect, and the signs of the roll rate and of the sensor's place. None if one
+    was driven, or no roll rate is mapped.
     """
 
     vehicle: str
@@ -123,11 +123,11 @@ class LoadPlan:
     now: Expected | None
     advice: tuple[Advice, ...]
     least: Advice | None
-    sideways: SidewaysLoad | None = None
+    sideways: OffCentreLoad | None = None
 
     @property
     def is_enough_driven(self) -> bool:
-        """True where not even the first of ``advice`` would narrow answers, or widen the reach, by a tenth."""
+        """True if even the first of ``advice`` would improve accuracy and reach by less than a tenth."""
         if self.now is None or not self.advice or self.now.reach_share is None:
             return False
         now, then = self.now, self.advice[0].expected
@@ -144,7 +144,7 @@ class LoadPlan:
 
 
 def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST, inherited: Inherited | None = None) -> LoadPlan:
-    """A first campaign: empty, then what the priors of any vehicle, or of its line, let expect the most of."""
+    """A first campaign: empty, then the most informative loads by the prior of any vehicle, or of its line."""
     prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=False)
     planner = _Planner(
         vehicle, prior.mean, FIRST_DRIVE, _beside_calibration(_of_prior(prior, vehicle), vehicle, FIRST_DRIVE)
@@ -165,7 +165,7 @@ def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST, inherited: Inherited | N
 def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> LoadPlan:
     """The next runs after a calibration.
 
-    Raises CalibrationImpossibleError where it holds no cross-spectral part: the advice is of the half-car.
+    Raises CalibrationImpossibleError without a cross-spectral part, on which the advice rests.
     """
     known = outcome.cross_spectrum.calibration if outcome.cross_spectrum else None
     if known is None:
@@ -175,7 +175,7 @@ def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> LoadP
     runs = [one.identification for one in outcome.split]
     drive = usual_drive(runs)
     planner = _Planner(vehicle, known.parameters, drive, _beside_calibration(known, vehicle, drive))
-    of_half_car = known.covariance[: len(PARAMETERS), : len(PARAMETERS)]  # what was learned of roll weighs no load
+    of_half_car = known.covariance[: len(PARAMETERS), : len(PARAMETERS)]  # roll parameters do not affect the load
     driven = tuple(PlacedLoad(load.payload_kg, None, load.front_share_pct) for load in known.known_loads)
     return LoadPlan(
         vehicle=vehicle.name,
@@ -189,7 +189,7 @@ def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> LoadP
 
 
 def usual_drive(runs: list[KnownRun]) -> Drive:
-    """How these runs were driven on the whole: usable seconds a run, mean speed of a batch (medians)."""
+    """The typical drive of these runs: median usable seconds per run and median speed per batch."""
     counted = [[batch for batch in run.batches if not batch.rejected] for run in runs]
     durations_s = [
         sum(batch.usable_share * (batch.t_end_ns - batch.t_start_ns) / NS_PER_S for batch in batches)
@@ -203,7 +203,7 @@ def usual_drive(runs: list[KnownRun]) -> Drive:
 
 
 def _beside_calibration(known: CrossSpectrumCalibration, vehicle: Vehicle, drive: Drive) -> F64:
-    """(2,) mean variances of payload (kg) and front share (%) beside a batch's own and the calibration's."""
+    """(2,) mean variances of payload (kg) and front share (%) other than the batch's own and the calibration's."""
     prior = shape_prior(vehicle, *known.known_shape)
     most_kg = vehicle.payload_range_kg[1]
     loads = [empty(vehicle).load]
@@ -216,7 +216,7 @@ def _beside_calibration(known: CrossSpectrumCalibration, vehicle: Vehicle, drive
 
 
 def _of_prior(prior: Prior, vehicle: Vehicle) -> CrossSpectrumCalibration:
-    """A calibration that knows nothing but what is usual: its model error is that of other vans."""
+    """The prior as a calibration; its model error is that of other vans."""
     theta = upright(prior.mean)
     usual = model_error((), vehicle.empty_mass_kg)
     return CrossSpectrumCalibration(
@@ -241,10 +241,10 @@ def _of_prior(prior: Prior, vehicle: Vehicle) -> CrossSpectrumCalibration:
 
 
 class _Planner:
-    """A design together with how its spread is stated."""
+    """A design together with the figures stated beside its advice."""
 
     def __init__(self, vehicle: Vehicle, theta: F64, drive: Drive, beside: F64) -> None:
-        """``beside`` (2,) are the variances of payload (kg) and front share (%) that no known load narrows."""
+        """``beside`` (2,) are the variances of payload (kg) and front share (%) that no known load reduces."""
         self._loads = drivable_loads(vehicle)
         self._targets = weighed_loads(vehicle)
         self._design = Design(vehicle, theta, drive, self._targets)
@@ -266,11 +266,11 @@ class _Planner:
         return Advice(load, self.expected(self._design.after(covariance, load), driven, (load,)))
 
     def after(self, covariance: F64, load: PlacedLoad) -> F64:
-        """What is known once ``load`` is driven too."""
+        """The covariance of the parameters after a run with ``load``."""
         return self._design.after(covariance, load)
 
     def expected(self, covariance: F64, driven: Loads, new: Loads = ()) -> Expected:
-        """As the service would state it."""
+        """The accuracy that the service would state."""
         spread = self._design.spread(covariance)
         return Expected(
             payload_std_kg=math.sqrt(spread.payload_std_kg**2 + float(self._beside[0])),

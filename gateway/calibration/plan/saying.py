@@ -1,4 +1,4 @@
-"""What it costs that nobody said what the vehicle carries: what one batch would state now, and once it is said.
+"""The effect of stating the vehicle's usual goods: intervals of one batch now, and after the answer.
 
 stated_widths(calibration, vehicle, speed_mps) -> payload and half-width in kg, by kind of goods
 """
@@ -14,8 +14,8 @@ from gateway.core.cross_spectrum.predicted import predicted
 from gateway.core.vehicle import Carries, Load, Vehicle, front_share_pct
 from gateway.posterior import PAYLOAD
 
-TYPICAL_PART: Final = 0.5  # of the most payload
-TYPICAL_PLACE: Final = 0.5  # of the wheelbase, behind the front axle
+TYPICAL_PART: Final = 0.5  # chosen: of the largest payload
+TYPICAL_PLACE: Final = 0.5  # chosen: of the wheelbase, behind the front axle
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Stated:
 
 @dataclass(frozen=True, slots=True)
 class StatedOf:
-    """What it states under goods of one kind: while nothing is said of them, and once it is said."""
+    """The estimate of goods of one kind: before and after they are stated."""
 
     unsaid: Stated
     said: Stated
@@ -36,19 +36,19 @@ class StatedOf:
 
 @dataclass(frozen=True, slots=True)
 class StatedWidths:
-    """What it states under ``payload_kg`` amid the wheelbase, by each kind of goods that ``carries`` may name."""
+    """The estimates of ``payload_kg`` in the middle of the wheelbase, for each kind of goods in ``carries``."""
 
     payload_kg: float
     carries: dict[Carries, StatedOf]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers."""
+        """The figures as JSON."""
         return asdict(self)
 
 
 def stated_widths(known: CrossSpectrumCalibration, vehicle: Vehicle, speed_mps: float) -> StatedWidths | None:
-    """Of a load of each kind's median shape. None where the fitter said what the vehicle carries, or where one load
-    alone was driven.
+    """Estimates for a load with each kind's median shape. None if the fitter stated the goods, or a single load was
+    driven.
     """
     if is_said(vehicle) or known.payload_seen_kg[0] == known.payload_seen_kg[1]:
         return None

@@ -1,7 +1,7 @@
-"""Which frequency bands tell load from road: chosen on the vehicle's own known-load drives, or the paper's.
+"""The frequency bands of the ratio index: chosen on the vehicle's own known-load drives, or the paper's.
 
-A mean spectrum scatters about its expectation, and so does anything integrated from it. Transforms of half-overlapping
-Hann segments repeat each other: neighbouring bins by their common main lobe, neighbouring segments by their common
+A mean spectrum scatters about its expectation, and so does any integral of it. Transforms of half-overlapping Hann
+segments are correlated: neighbouring bins through their common main lobe, neighbouring segments through their common
 half. For a Gaussian signal the complex correlation of two transforms follows from the taper alone (Welch 1967; Percival
 and Walden, Spectral Analysis for Physical Applications, section 6.17), and that of their powers or magnitudes from it.
 """
@@ -12,18 +12,19 @@ from itertools import product
 from typing import Final, Literal
 
 import numpy as np
-from scipy.special import hyp2f1
 
 from gateway.calibration.ratio_index.table import N_SEGMENT, SPECTRUM, SpectrumTable
+from gateway.core.late import special, stats
 from gateway.core.ratio_index.index import PAPER_BANDS, UPPER_LIMIT_HZ, Band, SpectrumKind, band_pass_gain
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, I64
 
 BandChoice = Literal["campaign", "table2"]
 
-WIDTHS_HZ: Final = (0.25, 0.5, 1.0)  # narrower ones scatter too much to be told from luck in a few runs
+WIDTHS_HZ: Final = (0.25, 0.5, 1.0)  # chosen: narrower bands scatter too much to be selected on a few runs
+# chosen: an even grid over the band of the integrals
 CENTRES_HZ: Final = np.arange(1.0, UPPER_LIMIT_HZ - 0.4, 0.25)
-N_CANDIDATES: Final = 12  # pairs of each sensor and width
+N_CANDIDATES: Final = 12  # chosen: pairs per sensor and width
 
 
 # (standard deviation / mean)^2 of one transform's power (exponential law) or magnitude (Rayleigh's)
@@ -34,9 +35,8 @@ RELATIVE_VARIANCE: Final[dict[SpectrumKind, float]] = {"power": 1.0, "amplitude"
 class BandPair:
     """Numerator and denominator, and how their log ratio follows its target over the runs of a campaign.
 
-    ``significance`` is the squared partial correlation, the other target taken out, with a residual no
-    smaller than the spectra's own scatter; ``monotonicity`` is the rank correlation of the same
-    residuals. Both are NaN for bands that were given, not searched.
+    ``significance`` is the squared partial correlation without the other target, with a residual no smaller than the
+    spectra's own scatter; ``monotonicity`` is the rank correlation of the same residuals. Both are NaN for given bands.
     """
 
     bands: tuple[Band, Band]
@@ -62,9 +62,9 @@ def ratios(table: SpectrumTable, sensor: int, pair: BandPair | None) -> F64:
 
 
 def candidates(table: SpectrumTable, bands: BandChoice) -> list[Pairs]:
-    """Band pairs worth a regression: of each width the most significant of the campaign, or the paper's alone.
+    """Band pairs worth a regression: the most significant of the campaign for each width, or the paper's alone.
 
-    Raises CalibrationImpossibleError where no pair follows the load.
+    Raises CalibrationImpossibleError if no pair follows the load.
     """
     if bands == "table2":
         paper = (BandPair(PAPER_BANDS["acceleration"]), BandPair(PAPER_BANDS["pitch_rate"]))
@@ -85,13 +85,12 @@ def candidates(table: SpectrumTable, bands: BandChoice) -> list[Pairs]:
 
 
 def candidate_pairs(table: SpectrumTable, sensor: int, width_hz: float, n_best: int) -> list[BandPair]:
-    """The ``n_best`` pairs of one width whose log ratio follows the sensor's target best, neighbours left out.
+    """The ``n_best`` pairs of one width whose log ratio follows the sensor's target best, without neighbours.
 
-    Runs are the independent observations, so the batches of a run are averaged first; what goes with the
-    other of payload and share linearly is taken out of both sides, because a campaign's loads and shares
-    are correlated. The numerator rises with the target against the denominator, as J > 0 over J < 0 in (4)
-    and (5); the measure is significance times monotonicity, not the raw difference, which would be largest
-    where the bands are narrowest and scatter most.
+    Runs are the independent observations, so the batches of a run are averaged first. The linear effect of the other of
+    payload and share is removed from both sides, because a campaign's loads and shares are correlated. The numerator
+    rises with the target against the denominator, as J > 0 over J < 0 in (4) and (5). The measure is significance times
+    monotonicity, not the raw difference, which is largest for the narrowest bands with the most scatter.
     """
     spectra = table.spectra[sensor]
     if spectra is None:
@@ -127,10 +126,8 @@ def run_means(run: I64, columns: F64) -> F64:
 
 
 def rank_correlations(columns: F64, target: F64) -> F64:
-    """Spearman's, of each column (r, b) with target (r,): 1 where it rises whenever the target does. 0 if constant."""
-    from scipy.stats import rankdata  # noqa: PLC0415 # a second of every start, for what only calibration needs
-
-    ranks, aim = rankdata(columns.round(12), axis=0), rankdata(target.round(12))
+    """Spearman's rank correlation of each column (r, b) with target (r,); 0 for a constant column."""
+    ranks, aim = stats.rankdata(columns.round(12), axis=0), stats.rankdata(target.round(12))
     ranks, aim = ranks - ranks.mean(axis=0), aim - aim.mean()
     with np.errstate(divide="ignore", invalid="ignore"):
         rho: F64 = np.nan_to_num(aim @ ranks / (np.linalg.norm(ranks, axis=0) * np.linalg.norm(aim)))
@@ -138,12 +135,12 @@ def rank_correlations(columns: F64, target: F64) -> F64:
 
 
 def _band_weights(freq_hz: F64, bands: Sequence[Band]) -> F64:
-    """Gains (b, m) of the band-passes (6), by which they weigh an amplitude spectrum."""
+    """Gains (b, m) of the band-passes (6) for an amplitude spectrum."""
     return np.array([band_pass_gain(freq_hz, band) for band in bands])
 
 
 def _log_scatter(table: SpectrumTable, spectra: F64, weights: F64) -> F64:
-    """Sum over runs of the covariance (b, b) that log band levels have by the scatter of spectra alone."""
+    """Sum over runs of the covariance (b, b) of log band levels due to the scatter of spectra alone."""
     mean = spectra.mean(axis=0)
     level = weights @ mean
     covariance = bin_covariance(N_SEGMENT, len(table.freq_hz), SPECTRUM)
@@ -173,7 +170,7 @@ def _of_differences(covariance: F64) -> F64:
 
 
 def _peaks(strength: F64, n_best: int) -> list[tuple[int, int]]:
-    """Places of the greatest strengths (b, b), each apart from those before it."""
+    """Places of the greatest strengths (b, b), each separate from those before it."""
     strength = strength.copy()
     peaks: list[tuple[int, int]] = []
     while len(peaks) < n_best:
@@ -188,7 +185,7 @@ def _peaks(strength: F64, n_best: int) -> list[tuple[int, int]]:
 def bin_covariance(n_segment: int, n_bins: int, kind: SpectrumKind) -> F64:
     """Covariance (n_bins, n_bins) of relative errors of a mean spectrum, times the number of its segments.
 
-    Segments overlap by half, as in core.ratio_index.mean_spectrum; many of them, in one unbroken stretch.
+    For many segments in one unbroken stretch, overlapping by half as in core.ratio_index.mean_spectrum.
     """
     taper = np.hanning(n_segment + 1)[:-1]
     half = n_segment // 2
@@ -203,17 +200,19 @@ def bin_covariance(n_segment: int, n_bins: int, kind: SpectrumKind) -> F64:
 
 
 def _correlation(coherence2: F64, kind: SpectrumKind) -> F64:
-    """Of powers or magnitudes of two jointly Gaussian transforms whose squared complex correlation is given."""
+    """Correlation of powers or magnitudes of two jointly Gaussian transforms, from their squared complex
+    correlation.
+    """
     if kind == "power":
         return coherence2
-    products: F64 = np.asarray(hyp2f1(-0.5, -0.5, 1.0, np.minimum(coherence2, 1.0)), dtype=float)
+    products: F64 = np.asarray(special.hyp2f1(-0.5, -0.5, 1.0, np.minimum(coherence2, 1.0)), dtype=float)
     return (products - 1.0) / RELATIVE_VARIANCE["amplitude"]
 
 
 def integral_covariance(weights: F64, spectrum: F64, n_segments: float, covariance: F64) -> F64:
     """Covariance (b, b) of the integrals ``weights @ spectrum`` of a mean over n_segments; weights (b, m).
 
-    Twice the squared integral over its variance is the effective number of degrees of freedom of one.
+    The effective degrees of freedom of one are twice the squared integral over its variance.
     """
     through = weights * spectrum
     spread: F64 = through @ covariance @ through.T / n_segments

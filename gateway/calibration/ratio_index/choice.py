@@ -1,4 +1,4 @@
-"""The choice of bands, and of a structure where none is named, by errors on runs left out."""
+"""The choice of bands, and of a structure if none is named, by errors on runs left out."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,14 +33,14 @@ TERMS_OF: Final[dict[Family, tuple[tuple[str, ...], tuple[str, ...]]]] = {  # of
     "log": (("log_ra", "log_rg"), ("log_ra", "log_rg")),  # ours: linear in both logarithms
     "joint": (MODEL_11_PAYLOAD, MODEL_11_FRONT_SHARE),
 }
-"""The structures, in the order in which they are tried: of equals the earlier is taken."""
+"""The structures in the order of trial; of equals the first is taken."""
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Bands, and one family's regressions of payload and of front share on them, None where there is none.
+    """Bands, and one family's regressions of payload and of front share on them, None if there is none.
 
-    ``score`` is the sum of mean square errors on runs left out of the regressions, the bands given, as shares of the
+    ``score`` is the sum of mean square errors on runs left out of the regressions, with these bands, as shares of the
     ranges of (12).
     """
 
@@ -71,9 +71,9 @@ class Choice:
 
 
 def choose(table: SpectrumTable, candidates: Sequence[Pairs], family: Family, vehicle: Vehicle) -> Choice | None:
-    """The bands among the candidates with which ``family`` errs least on runs left out.
+    """The bands among the candidates with the least error of ``family`` on runs left out.
 
-    None where these runs cannot carry a regression of this family.
+    None if these runs do not allow a regression of this family.
     """
     scores = _scores(table, candidates, family, vehicle)
     best = int(np.argmin(scores))
@@ -81,9 +81,9 @@ def choose(table: SpectrumTable, candidates: Sequence[Pairs], family: Family, ve
 
 
 def terms_of(family: Family, target: int, table: SpectrumTable) -> tuple[str, ...]:
-    """The terms of payload (target 0) or front share (1); none where the campaign is too small for them.
+    """The terms of payload (target 0) or front share (1); none if the campaign is too small for them.
 
-    A regression needs its sensors, two runs more than terms, and three different front shares where the share is the
+    A regression needs its sensors, two runs more than terms, and three different front shares if the share is the
     target or both indexes take part.
     """
     absent = {index for index, spectra in zip(("ra", "rg"), table.spectra, strict=True) if spectra is None}
@@ -101,7 +101,7 @@ def spans_of(vehicle: Vehicle) -> tuple[float, float]:
 
 
 def _choice_on(table: SpectrumTable, pairs: Pairs, family: Family, vehicle: Vehicle) -> Choice | None:
-    """One family's regressions with given bands; None where there is none."""
+    """One family's regressions with given bands; None if there is none."""
     ra, rg = indexes(table, pairs)
     regressions: list[FittedRegression | None] = []
     score = 0.0
@@ -116,7 +116,7 @@ def _choice_on(table: SpectrumTable, pairs: Pairs, family: Family, vehicle: Vehi
 
 
 def _scores(table: SpectrumTable, candidates: Sequence[Pairs], family: Family, vehicle: Vehicle) -> F64:
-    """Score (c,) of a fixed family on each of the candidate bands, all at once; infinite where it cannot be fitted."""
+    """Score (c,) of a fixed family on each of the candidate bands; infinite if it cannot be fitted."""
     ra, rg = (_ratios_of_all(table, candidates, sensor) for sensor in (0, 1))
     parts = []
     for target, (known, span) in enumerate(zip(table.targets, spans_of(vehicle), strict=True)):
@@ -129,6 +129,6 @@ def _scores(table: SpectrumTable, candidates: Sequence[Pairs], family: Family, v
 
 
 def _ratios_of_all(table: SpectrumTable, candidates: Sequence[Pairs], sensor: int) -> F64:
-    """Indexes (c, n) of one sensor; a pair that comes again is not worked out again."""
+    """Indexes (c, n) of one sensor; each pair is computed once."""
     by_pair = {pair: ratios(table, sensor, pair) for pair in {pairs[sensor] for pairs in candidates}}
     return np.array([by_pair[pairs[sensor]] for pairs in candidates])

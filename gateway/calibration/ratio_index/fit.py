@@ -1,9 +1,8 @@
-"""Calibrates the ratio index: bands chosen on the campaign, then the static regression (9), (10), (11).
+"""Calibration of the ratio index: bands chosen on the campaign, then the static regression (9), (10), (11).
 
-Bands and terms are chosen by errors on runs left out. The least of many such errors flatters, for the runs
-left out took part in the choice. The nested error does not: there the whole choice is made anew without
-the run that is then judged. By it the families of structures are compared, and the spread of an answer
-is widened where it demands so.
+Bands and terms are chosen by errors on runs left out. The least of many such errors is biased low, because the runs
+left out took part in the choice. The nested error is not: it repeats the whole choice without the run that is then
+judged. It ranks the families of structures, and widens the interval of an answer if necessary.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,32 +11,32 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.special import stdtrit
 
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import BandChoice, Pairs, candidates
 from gateway.calibration.ratio_index.choice import TERMS_OF, Choice, Family, StructureChoice, choose, spans_of
 from gateway.calibration.ratio_index.table import N_SEGMENT, SPECTRUM, SpectrumTable, spectrum_table
+from gateway.core.late import special
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Bool
 
-SPEED_STD_FACTOR: Final = 2.0  # a batch's speed may spread this many times as much as the widest calibrated
-MOST: Final = 0.8  # quantile of nested errors that a spread must allow for; the rest may lie far outside the loads seen
+SPEED_STD_FACTOR: Final = 2.0  # chosen: largest speed spread of a batch, over the largest calibrated
+MOST: Final = 0.8  # chosen: quantile of nested errors within the interval; the rest may be far outside the known loads
 
 Models = Sequence[RegressionModel | None]  # of payload and of front share
-Fold = tuple[Bool, SpectrumTable, list[Pairs]]  # batches left out (n,), the others, and bands worth a try on these
+Fold = tuple[Bool, SpectrumTable, list[Pairs]]  # batches left out (n,), the others, and candidate bands for these
 
 
 @dataclass(frozen=True, slots=True)
 class FamilyTrial:
-    """The best bands for one family of structures, and how such a choice fares on runs unseen.
+    """The best bands for one family of structures, and the errors of such a choice on unseen runs.
 
-    ``without`` holds the choice made anew without each run, by the run's number. Its error (estimate less truth,
-    kg and percentage points) and the standard deviation it states are of the batches of that run: nested_error
-    and nested_std (2, n), payload and front share; NaN where none is told.
+    ``without`` has the choice repeated without each run, by the run's number. Its error (estimate minus truth, kg and
+    percentage points) and stated standard deviation on the batches of that run: nested_error and nested_std (2, n),
+    payload and front share; NaN without an answer.
     """
 
     choice: Choice
@@ -47,19 +46,19 @@ class FamilyTrial:
 
     @property
     def nested_rms(self) -> tuple[float, float]:
-        """Root mean square of either target's nested error; NaN where one batch or more got no answer."""
+        """Root mean square of either target's nested error; NaN if a batch got no answer."""
         payload_kg, share_pct = np.sqrt(np.mean(self.nested_error**2, axis=1)).tolist()
         return payload_kg, share_pct
 
 
 @dataclass(frozen=True, slots=True)
 class RatioIndexFit:
-    """The calibration and what stands behind it.
+    """The calibration and its evidence.
 
-    ``without`` holds, by run number, what the other runs teach without that run: bands and terms chosen anew, or
-    where so few runs allow no such choice the same ones fitted anew. payload_errors_kg and
-    front_share_errors_pct (n,) are its errors, batches in the order of ``table``. Its intervals are widened as
-    much as all runs demand. ``trials`` are all families, the chosen one first.
+    ``without`` has, by run number, the calibration without that run: bands and terms chosen again, or if too few runs
+    allow that, the same ones fitted again. payload_errors_kg and front_share_errors_pct (n,) are its errors, batches in
+    the order of ``table``. Its intervals are widened as all runs require. ``trials`` are all families, the chosen one
+    first.
     """
 
     calibration: RatioIndexCalibration
@@ -71,7 +70,7 @@ class RatioIndexFit:
 
     @property
     def chosen(self) -> FamilyTrial:
-        """The family whose choice errs least on runs unseen."""
+        """The family with the least error on unseen runs."""
         return self.trials[0]
 
 
@@ -83,7 +82,7 @@ def fit_ratio_index(
     structure: StructureChoice = "auto",
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> RatioIndexFit:
-    """Identification runs -> calibration. Raises CalibrationImpossibleError where they cannot carry one.
+    """The calibration from identification runs. Raises CalibrationImpossibleError if they do not allow one.
 
     ``progress`` is called with (steps done, steps in all).
     """
@@ -127,7 +126,7 @@ def _family_trials(
     families: Sequence[Family],
     progress: Callable[[int, int], None],
 ) -> tuple[FamilyTrial, ...]:
-    """Every family these runs can carry, the best first: most targets told, then least nested error."""
+    """Every family that these runs allow, the best first: most targets answered, then least nested error."""
     _check(table)
     pairs = candidates(table, bands)
     choices = [choice for family in families if (choice := choose(table, pairs, family, vehicle)) is not None]
@@ -161,7 +160,7 @@ def _check(table: SpectrumTable) -> None:
 
 
 def _folds(table: SpectrumTable, bands: BandChoice) -> Iterator[list[Fold]]:
-    """For each run the fold without it, or none where no bands can be chosen then."""
+    """For each run the fold without it; empty if no bands can be chosen then."""
     for number in np.unique(table.run):
         folds: list[Fold] = []
         is_out = table.run == number
@@ -173,7 +172,7 @@ def _folds(table: SpectrumTable, bands: BandChoice) -> Iterator[list[Fold]]:
 
 
 def _trial(table: SpectrumTable, folds: Sequence[Fold], choice: Choice, vehicle: Vehicle) -> FamilyTrial:
-    """For each run, bands and terms of the family chosen and fitted on the others, then held against it."""
+    """For each run, bands and terms of the family chosen and fitted on the others, then compared with it."""
     error, std = np.full((2, 2, len(table.run)), np.nan)
     without: dict[int, Choice] = {}
     for is_out, rest, pairs in folds:
@@ -195,17 +194,17 @@ def _rank(trial: FamilyTrial, vehicle: Vehicle) -> tuple[int, bool, float]:
 
 
 def _widening(model: RegressionModel | None, trial: FamilyTrial, target: int) -> float | None:
-    """By how much to widen a spread so that four fifths of the nested errors bear it out; None where none is told."""
+    """Factor of the spread so that it covers four fifths of the nested errors; None without a model."""
     if model is None:
         return None
     z = np.abs(trial.nested_error[target] / trial.nested_std[target])
     if not np.all(np.isfinite(z)):
         return 1.0
-    return max(1.0, float(np.quantile(z, MOST)) / float(stdtrit(model.dof, 0.5 + MOST / 2.0)))
+    return max(1.0, float(np.quantile(z, MOST)) / float(special.stdtrit(model.dof, 0.5 + MOST / 2.0)))
 
 
 def _models_without(trial: FamilyTrial, table: SpectrumTable) -> dict[int, tuple[Pairs, Models]]:
-    """By run number, bands and regressions that did not see that run."""
+    """By run number, bands and regressions without that run."""
     choice = trial.choice
     if np.isfinite(trial.nested_error[list(choice.answers)]).all():
         return {number: (again.pairs, again.models) for number, again in trial.without.items()}

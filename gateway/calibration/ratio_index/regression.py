@@ -1,4 +1,4 @@
-"""Least squares over the batches of known runs, judged by whole runs left out."""
+"""Least squares over the batches of known runs, validated on whole runs left out."""
 
 from dataclasses import dataclass, replace
 from typing import Final
@@ -8,12 +8,12 @@ import numpy as np
 from gateway.core.ratio_index.regression import RegressionModel, scaled_columns, term_columns
 from gateway.records import F64, I64
 
-RIDGE: Final = 1e-12  # of the Gram matrix's mean diagonal: solves what a left-out run leaves without a solution
+RIDGE: Final = 1e-12  # chosen: of the Gram matrix's mean diagonal; keeps it invertible without one run
 
 
 @dataclass(frozen=True, slots=True)
 class FittedRegression:
-    """A regression, those of the same terms without each run by rising number, and their errors (n,) on these runs."""
+    """A regression, the regressions without each run by rising number, and their errors (n,) on these runs."""
 
     model: RegressionModel
     without: tuple[RegressionModel, ...]
@@ -21,7 +21,8 @@ class FittedRegression:
 
     @property
     def covariance(self) -> F64:
-        """Of the coefficients (p + 1, p + 1), by jackknife over runs: batches of a run may share any error they like.
+        """Covariance of the coefficients (p + 1, p + 1), by jackknife over runs, so that batches of a run may be
+        correlated.
 
         B. Efron and R. J. Tibshirani, An Introduction to the Bootstrap, ch. 11.
         """
@@ -33,9 +34,9 @@ class FittedRegression:
 def fit_regression(terms: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I64) -> FittedRegression:
     """target (n,) on the named terms of ra, rg (n,); run (n,) numbers.
 
-    Batches of one run share road and load and so are not independent: the residual spread is the root
-    mean square over runs held out, less what the held-out rows' own leverage adds, and its degrees of
-    freedom are the runs' less one.
+    Batches of one run share road and load and are not independent. So the residual spread is the root mean square over
+    runs held out, minus the contribution of the held-out rows' own leverage, and its degrees of freedom are the runs'
+    minus one.
     """
     columns, lows, highs = scaled_design(terms, ra, rg)
     gram_inverse: F64 = np.linalg.pinv(columns.T @ columns).astype(float)
@@ -57,7 +58,7 @@ def fit_regression(terms: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I
 
 
 def scaled_design(terms: tuple[str, ...], ra: F64, rg: F64) -> tuple[F64, F64, F64]:
-    """Columns (..., n, p + 1) for indexes (..., n), scaled by what these span: lows and highs (..., 1, p)."""
+    """Columns (..., n, p + 1) for indexes (..., n), scaled by their span: lows and highs (..., 1, p)."""
     raw = term_columns(terms, ra, rg)
     lows, highs = raw.min(axis=-2, keepdims=True), raw.max(axis=-2, keepdims=True)
     return scaled_columns(terms, ra, rg, lows, highs), lows, highs
@@ -80,7 +81,7 @@ def without_each_run(columns: F64, target: F64, run: I64) -> tuple[F64, F64]:
 
 
 def held_out_errors(columns: F64, without: F64, target: F64, run: I64) -> F64:
-    """Errors (..., n) of every batch by the fit that never saw its run; shapes as in :func:`without_each_run`."""
+    """Errors (..., n) of every batch by the fit without its run; shapes as in :func:`without_each_run`."""
     place = np.unique(run, return_inverse=True)[1]
     errors: F64 = np.einsum("...ni,...ni->...n", columns, without[..., place, :]) - target
     return errors

@@ -1,4 +1,4 @@
-"""Spectra of all identification batches in one table, in an order that does not depend on the campaign's."""
+"""Spectra of all identification batches in one table, in an order independent of the campaign's."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,11 +26,11 @@ N_SEGMENT: Final = 1024  # 20.5 s at 50 Hz: resolves 0.05 Hz and still fits betw
 
 @dataclass(frozen=True, slots=True)
 class SpectrumTable:
-    """Spectra of identification batches with what was weighed. Pairs: acceleration and payload, pitch rate and share.
+    """Spectra of identification batches with their true loads. Pairs: acceleration and payload, pitch rate and share.
 
-    run (n,) tells drives apart, 0 for the first in the table, number (n,) is the campaign's; targets (n,) in kg
-    and percent; spectra (n, m) at freq_hz (m,), absent (None) where the sensor is not mapped; n_segments (n,)
-    averaged in each. The acceleration's are moved to the centre line from roll_lever_m left of it; 0: as measured.
+    run (n,) is the drive, 0 for the first in the table, number (n,) the campaign's number; targets (n,) in kg and
+    percent; spectra (n, m) at freq_hz (m,), None if the sensor is not mapped; n_segments (n,) averaged in each. The
+    acceleration's are moved to the centre line from roll_lever_m left of it; 0: as measured.
     """
 
     run: I64
@@ -57,7 +57,7 @@ class SpectrumTable:
         return len(np.unique(self.targets[1].round(2)))
 
     def rows(self, chosen: Bool) -> "SpectrumTable":
-        """The chosen batches only; chosen (n,)."""
+        """The table with the chosen (n,) batches only."""
         (payload_kg, share_pct), (of_a, of_g) = self.targets, self.spectra
         return replace(
             self,
@@ -70,10 +70,10 @@ class SpectrumTable:
 
 
 def spectrum_table(runs: Sequence[KnownRun], sensor_offset_left_m: float = 0.0) -> SpectrumTable:
-    """Every counted batch of which both mapped sensors give a spectrum; runs sorted by name, then by time.
+    """Every counted batch with a spectrum of each mapped sensor; runs sorted by name, then by time.
 
     With a roll rate in every batch the acceleration is that of the centre line, sensor_offset_left_m to the right of
-    the sensor; else all are taken as measured. Raises CalibrationImpossibleError where there is no spectrum.
+    the sensor; else all are taken as measured. Raises CalibrationImpossibleError without any spectrum.
     """
     batches = [(run, batch) for run in runs for batch in run.batches if not batch.rejected]
     batches.sort(key=lambda one: (one[0].name, one[1].t_start_ns, one[0].payload_kg, one[0].number))
@@ -115,7 +115,7 @@ def _spectra(batch: Batch, roll_lever_m: float) -> tuple[tuple[F64, F64] | None,
 
 
 def _n_segments(batch: Batch, roll_lever_m: float) -> float:
-    """The fewer of the two sensors' segments, a silent one left out."""
+    """The smaller number of segments of both sensors, without a silent one."""
     of_a = acceleration_segments(batch, N_SEGMENT, roll_lever_m)
     of_g = segment_starts(batch.usable & np.isfinite(batch.pitch_rate_radps), N_SEGMENT, N_SEGMENT // 2)
     return float(min(len(starts) for starts in (of_a, of_g) if len(starts)))
@@ -123,7 +123,7 @@ def _n_segments(batch: Batch, roll_lever_m: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class IndexRows:
-    """Run number, payload, front share, R_a and R_g (n,) of every batch that has the indexes its vehicle wants."""
+    """Run number, payload, front share, R_a and R_g (n,) of every batch with the calibrated indexes."""
 
     run: I64
     payload_kg: F64

@@ -1,31 +1,31 @@
-"""Who must know now: alarms, each from the first sign to its end, and who has seen it.
+"""Alarms: each from its first sign to its end, with its acknowledgement.
 
-    watch = AlarmWatch(rules, vehicle_id, known, recent)      # as they stood when the service stopped
-    for alarm in watch.weigh(estimate, vehicle, unsprung): ...      # what one more batch changed
-    for alarm in watch.note(says, t_ns): ...                        # likewise of what is no batch's to say
+    watch = AlarmWatch(rules, vehicle_id, known, recent)      # the state when the service stopped
+    for alarm in watch.weigh(estimate, vehicle, unsprung): ...      # alarms that one more batch changed
+    for alarm in watch.note(says, t_ns): ...                        # alarms that the service itself changed
 
-Purely from estimates and from what the service tells of itself. docs/alarms.md says when what is told.
+Alarms follow from estimates and from what the service reports about itself. docs/alarms.md lists the rules.
 """
 
 from gateway.core.alarms.alarm import (
     CAUSE_NAMES,
     Acknowledged,
     Alarm,
+    AlarmCause,
+    AlarmFigure,
     AlarmKind,
     AlarmState,
-    Cause,
-    Figure,
     alarm_from_json,
     alarm_to_json,
 )
-from gateway.core.alarms.drives import NO_DRIVES, Drives
-from gateway.core.alarms.rules import AlarmRules, Says, Verdict
+from gateway.core.alarms.drives import NO_DRIVES, DriveTally
+from gateway.core.alarms.rules import AlarmRules, AlarmVerdict, Says
 from gateway.core.alarms.watch import AlarmWatch
 from gateway.core.alarms.weighing import verdicts_of
 from gateway.core.alarms.words import sentence
 
 ENTRY_KIND = "alarm"
-"""How the store and the stream name an alarm."""
+"""The kind of an alarm's row in the store and in the event stream."""
 
 __all__ = [
     "CAUSE_NAMES",
@@ -33,15 +33,15 @@ __all__ = [
     "NO_DRIVES",
     "Acknowledged",
     "Alarm",
+    "AlarmCause",
+    "AlarmFigure",
     "AlarmKind",
     "AlarmRules",
     "AlarmState",
+    "AlarmVerdict",
     "AlarmWatch",
-    "Cause",
-    "Drives",
-    "Figure",
+    "DriveTally",
     "Says",
-    "Verdict",
     "alarm_from_json",
     "alarm_to_json",
     "sentence",

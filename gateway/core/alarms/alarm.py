@@ -1,4 +1,4 @@
-"""One alarm: what it is about, the steps it went through, who has seen it, and its JSON object."""
+"""One alarm: its cause, its steps, its acknowledgement, and its JSON object."""
 
 import hashlib
 import math
@@ -12,7 +12,7 @@ from gateway.records import iso_utc, ns_of
 
 
 class AlarmKind(StrEnum):
-    """What is the matter."""
+    """What the alarm is about."""
 
     OVERLOAD = "overload"
     IMBALANCE = "imbalance"
@@ -22,7 +22,7 @@ class AlarmKind(StrEnum):
 
 
 class AlarmState(StrEnum):
-    """How far an alarm has come. It only goes forward, and may leave out ``EARLY``."""
+    """The state of an alarm. It only moves forward, and may skip ``EARLY``."""
 
     EARLY = "early"
     FINAL = "final"
@@ -30,39 +30,39 @@ class AlarmState(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Cause:
-    """What an alarm is about: a kind, and where on the vehicle or in what. One alarm of a cause stands at a time."""
+class AlarmCause:
+    """What an alarm is about: its kind, and the place or the part concerned. At most one alarm of a cause is active."""
 
     kind: AlarmKind
     where: str | None = None
 
     @property
     def name(self) -> str:
-        """As settings and topics have it: ``overload.gross``, ``no_estimate``."""
+        """The name in settings and topics: ``overload.gross``, ``no_estimate``."""
         return self.kind.value if self.where is None else f"{self.kind}.{self.where}"
 
     def is_named_in(self, names: tuple[str, ...]) -> bool:
-        """By its own name, or by its kind's for all of that kind."""
+        """Whether ``names`` has this cause's name, or the kind's name, which means all causes of the kind."""
         return self.name in names or self.kind.value in names
 
 
-SIDES: Final = Cause(AlarmKind.IMBALANCE, "left_right")
-AXLES: Final = Cause(AlarmKind.IMBALANCE, "front_rear")
-SILENT: Final = Cause(AlarmKind.SENSOR_FAULT, "silent")
-REFUSED: Final = Cause(AlarmKind.SENSOR_FAULT, "refused")
-NO_ESTIMATE: Final = Cause(AlarmKind.NO_ESTIMATE)
+SIDES: Final = AlarmCause(AlarmKind.IMBALANCE, "left_right")
+AXLES: Final = AlarmCause(AlarmKind.IMBALANCE, "front_rear")
+SILENT: Final = AlarmCause(AlarmKind.SENSOR_FAULT, "silent")
+REFUSED: Final = AlarmCause(AlarmKind.SENSOR_FAULT, "refused")
+NO_ESTIMATE: Final = AlarmCause(AlarmKind.NO_ESTIMATE)
 DRIFTING: Final = tuple(
-    Cause(AlarmKind.DRIFT, what) for what in ("damper_front", "damper_rear", "delay", "gyro_gain", "zero")
+    AlarmCause(AlarmKind.DRIFT, what) for what in ("damper_front", "damper_rear", "delay", "gyro_gain", "zero")
 )
-OVERLOADS: Final = tuple(Cause(AlarmKind.OVERLOAD, place) for place in PLACES)
+OVERLOADS: Final = tuple(AlarmCause(AlarmKind.OVERLOAD, place) for place in PLACES)
 CAUSES: Final = (*OVERLOADS, SIDES, AXLES, SILENT, REFUSED, *DRIFTING, NO_ESTIMATE)
 CAUSE_NAMES: Final = tuple(dict.fromkeys([*map(str, AlarmKind), *(cause.name for cause in CAUSES)]))
-"""All that can be switched off."""
+"""Every name that the setting ``off`` accepts."""
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
-    """What was found, what it may be, and how probable it is that it is beyond; NaN where nothing of the kind is."""
+class AlarmFigure:
+    """The number that was found, its limit, and the probability that it exceeds the limit; NaN where there is none."""
 
     found: float = math.nan
     std: float = math.nan
@@ -72,21 +72,21 @@ class Figure:
     detail: str | None = None
 
 
-NOTHING_FOUND: Final = Figure()
+NOTHING_FOUND: Final = AlarmFigure()
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
-    """When an alarm came to a state, and on what."""
+class AlarmStep:
+    """The time at which an alarm entered a state, and the number that caused it."""
 
     state: AlarmState
     t_ns: int
-    figure: Figure
+    figure: AlarmFigure
 
 
 @dataclass(frozen=True, slots=True)
 class Acknowledged:
-    """Who has seen it, when, and what was said to it."""
+    """Who acknowledged the alarm, when, and with which note."""
 
     by: str
     t_ns: int
@@ -95,21 +95,21 @@ class Acknowledged:
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """In one revision; each step and an acknowledgement make another one."""
+    """An alarm in one revision; each step and the acknowledgement make a new revision."""
 
-    cause: Cause
+    cause: AlarmCause
     vehicle_id: str | None
-    steps: tuple[Step, ...]
+    steps: tuple[AlarmStep, ...]
     acknowledged: Acknowledged | None = None
     revision: int = 1
 
     @classmethod
-    def begun(cls, cause: Cause, vehicle_id: str | None, step: Step) -> "Alarm":
+    def begun(cls, cause: AlarmCause, vehicle_id: str | None, step: AlarmStep) -> "Alarm":
         return cls(cause, vehicle_id, (step,))
 
     @property
     def id(self) -> str:
-        """The same in every revision."""
+        """The id, the same in every revision."""
         t_ns = self.steps[0].t_ns // 1000 * 1000  # as its JSON has it
         digest = hashlib.sha256(f"alarm|{self.vehicle_id}|{self.cause.name}|{t_ns}".encode()).hexdigest()
         return f"alarm-{t_ns}-{digest[:12]}"
@@ -123,16 +123,16 @@ class Alarm:
         return self.state is not AlarmState.CLEARED
 
     @property
-    def told_by(self) -> Step:
-        """The step that says what is the matter: the last before it was cleared."""
+    def last_active_step(self) -> AlarmStep:
+        """The last step in which the alarm was active; its figure is the one that the sentence states."""
         return [step for step in self.steps if step.state is not AlarmState.CLEARED][-1]
 
     @property
     def t_last_ns(self) -> int:
-        """When anything last became of it."""
+        """The time of the last change."""
         return max(self.steps[-1].t_ns, self.acknowledged.t_ns if self.acknowledged else self.steps[-1].t_ns)
 
-    def stepped(self, step: Step) -> "Alarm":
+    def stepped(self, step: AlarmStep) -> "Alarm":
         return replace(self, steps=(*self.steps, step), revision=self.revision + 1)
 
     def seen(self, acknowledged: Acknowledged) -> "Alarm":
@@ -161,20 +161,22 @@ def alarm_to_json(alarm: Alarm, words: str) -> dict[str, Any]:
 
 
 def alarm_from_json(told: Mapping[str, Any]) -> Alarm:
-    """The inverse. Raises ValueError, KeyError or TypeError for what is none."""
+    """The inverse of alarm_to_json. Raises ValueError, KeyError or TypeError for an object that is not an alarm."""
     shown = told["acknowledged"]
     if not any(step["state"] != AlarmState.CLEARED for step in told["steps"]):
-        raise ValueError("an alarm that never stood")
+        raise ValueError("an alarm without an early or final step")
     return Alarm(
-        Cause(AlarmKind(told["kind"]), told["where"]),
+        AlarmCause(AlarmKind(told["kind"]), told["where"]),
         told["vehicle_id"],
-        tuple(Step(AlarmState(step["state"]), ns_of(step["t"]), _figure_from_json(step)) for step in told["steps"]),
+        tuple(
+            AlarmStep(AlarmState(step["state"]), ns_of(step["t"]), _figure_from_json(step)) for step in told["steps"]
+        ),
         shown and Acknowledged(shown["by"], ns_of(shown["at"]), shown["note"]),
         int(told["revision"]),
     )
 
 
-def _figure_to_json(figure: Figure) -> dict[str, Any]:
+def _figure_to_json(figure: AlarmFigure) -> dict[str, Any]:
     return {
         "probability": _known(figure.probability, 4),
         "found": _known(figure.found, 1),
@@ -185,10 +187,10 @@ def _figure_to_json(figure: Figure) -> dict[str, Any]:
     }
 
 
-def _figure_from_json(told: Mapping[str, Any]) -> Figure:
+def _figure_from_json(told: Mapping[str, Any]) -> AlarmFigure:
     names = ("found", "std", "limit", "probability")
     numbers = {name: math.nan if told[name] is None else float(told[name]) for name in names}
-    return Figure(**numbers, unit=told["unit"] or "", detail=told["detail"])
+    return AlarmFigure(**numbers, unit=told["unit"] or "", detail=told["detail"])
 
 
 def _known(x: float, digits: int) -> float | None:

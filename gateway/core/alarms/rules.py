@@ -1,46 +1,48 @@
-"""When an alarm is told, confirmed and ended: probabilities with a gap between them, and times."""
+"""When an alarm is reported, confirmed and ended: probabilities with a hysteresis between them, and times."""
 
 import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from gateway.core.alarms.alarm import NOTHING_FOUND, AlarmState, Cause, Figure
+from gateway.core.alarms.alarm import NOTHING_FOUND, AlarmCause, AlarmFigure, AlarmState
 
 
-class Verdict(StrEnum):
-    """What was just found says of an alarm, whatever state it is in."""
+class AlarmVerdict(StrEnum):
+    """What the newest evidence says about an alarm, whatever its state."""
 
     EARLY = "early"
     FINAL = "final"
     CLEAR = "clear"
-    HOLD = "hold"  # nothing new, or nothing certain
+    HOLD = "hold"  # no change: no evidence, or not enough
 
     def state_after(self, before: AlarmState | None) -> AlarmState | None:
-        """Forward only; None before there was an alarm, and after one that has ended there may be another."""
+        """The state after this verdict. States only move forward; None means no alarm yet, and a cleared alarm may be
+        followed by a new one.
+        """
         stands = before in {AlarmState.EARLY, AlarmState.FINAL}
-        if self is Verdict.FINAL:
+        if self is AlarmVerdict.FINAL:
             return AlarmState.FINAL
-        if self is Verdict.EARLY:
+        if self is AlarmVerdict.EARLY:
             return before if stands else AlarmState.EARLY
-        if self is Verdict.CLEAR and stands:
+        if self is AlarmVerdict.CLEAR and stands:
             return AlarmState.CLEARED
         return before
 
 
 @dataclass(frozen=True, slots=True)
 class Says:
-    """A verdict on one cause, and on what it rests."""
+    """A verdict on one cause, and the number it rests on."""
 
-    cause: Cause
-    verdict: Verdict
-    figure: Figure = NOTHING_FOUND
+    cause: AlarmCause
+    verdict: AlarmVerdict
+    figure: AlarmFigure = NOTHING_FOUND
 
 
 @dataclass(frozen=True, slots=True)
 class AlarmRules:
     """The settings of ``[alarms]``; probabilities are 0 to 1.
 
-    ``off`` names causes, or kinds for all of one kind.
+    ``off`` holds names of causes, or of kinds, which switch off every cause of the kind.
     """
 
     early_probability: float = 0.9
@@ -54,20 +56,20 @@ class AlarmRules:
     no_estimate_s: float = 7200.0
     off: tuple[str, ...] = ()
 
-    def is_on(self, cause: Cause) -> bool:
+    def is_on(self, cause: AlarmCause) -> bool:
         return not cause.is_named_in(self.off)
 
-    def of_probability(self, probability: float, n_batches: int) -> Verdict:
-        """``probability`` is what all ``n_batches`` of a load together give; NaN where nothing is known.
+    def of_probability(self, probability: float, n_batches: int) -> AlarmVerdict:
+        """The verdict for ``probability``, computed from all ``n_batches`` of a load together; NaN: unknown.
 
-        Final: enough batches are sure together. Early: they are nearly so, or a single one is. Ended: they say rather
-        no than yes, by as much as is between the two probabilities, so that a weight about its limit does not make
-        the alarm come and go.
+        Final: enough batches, and their joint probability is high. Early: the probability is nearly as high, or it
+        rests on a single batch. Clear: the probability is low. The gap between the early and the clear probability
+        keeps an alarm from switching on and off at a weight near its limit.
         """
         if math.isnan(probability):
-            return Verdict.HOLD
+            return AlarmVerdict.HOLD
         if n_batches >= self.final_batches and probability >= self.final_probability:
-            return Verdict.FINAL
+            return AlarmVerdict.FINAL
         if probability <= self.clear_probability:
-            return Verdict.CLEAR
-        return Verdict.EARLY if probability >= self.early_probability else Verdict.HOLD
+            return AlarmVerdict.CLEAR
+        return AlarmVerdict.EARLY if probability >= self.early_probability else AlarmVerdict.HOLD

@@ -1,10 +1,10 @@
-"""What the batches of a load together say of overload and imbalance."""
+"""Verdicts on overload and imbalance from all batches of a load."""
 
 import math
 from collections.abc import Iterator
 
-from gateway.core.alarms.alarm import AXLES, OVERLOADS, SIDES, Figure
-from gateway.core.alarms.rules import AlarmRules, Says, Verdict
+from gateway.core.alarms.alarm import AXLES, OVERLOADS, SIDES, AlarmFigure
+from gateway.core.alarms.rules import AlarmRules, AlarmVerdict, Says
 from gateway.core.vehicle import Vehicle, left_share_pct
 from gateway.core.weights import NOT_CALIBRATED, Unsprung, over_limit_probability, weighed
 from gateway.estimate import UNKNOWN, Estimate, Quantity
@@ -13,18 +13,18 @@ from gateway.estimate import UNKNOWN, Estimate, Quantity
 def verdicts_of(
     rules: AlarmRules, estimate: Estimate, vehicle: Vehicle | None, unsprung: Unsprung = NOT_CALIBRATED
 ) -> Iterator[Says]:
-    """Of a whole batch that counted, and of the load epoch it belongs to (core.fusion).
+    """Verdicts of a whole batch that counted, and of its load epoch (core.fusion).
 
-    The load's weights follow from the posterior of its batches as the batch's own follow from its posterior.
+    The load's weights follow from the posterior of all its batches, just as the batch's weights follow from its own.
     """
     load, n_batches = as_of_load(estimate), 1 if estimate.epoch is None else estimate.epoch.n_batches
     weights = weighed(load, vehicle, unsprung).weights if vehicle else estimate.weights
     for cause, (_, weight) in zip(OVERLOADS, weights.items(), strict=True):
         if weight.limit_kg is None:
-            yield Says(cause, Verdict.CLEAR, Figure(detail="no limit is given"))
+            yield Says(cause, AlarmVerdict.CLEAR, AlarmFigure(detail="no limit is given"))
             continue
         probability = over_limit_probability(weight.kg, weight.std_kg, weight.limit_kg)
-        figure = Figure(weight.kg, weight.std_kg, weight.limit_kg, "kg", probability)
+        figure = AlarmFigure(weight.kg, weight.std_kg, weight.limit_kg, "kg", probability)
         yield Says(cause, rules.of_probability(probability, n_batches), figure)
     shares = (
         (SIDES, _left_share(load, vehicle), rules.side_share_max_pct),
@@ -32,12 +32,12 @@ def verdicts_of(
     )
     for cause, share, most_pct in shares:
         probability = beyond_probability(share, most_pct)
-        figure = Figure(_larger(share.number), share.std, most_pct, "%", probability)
+        figure = AlarmFigure(_larger(share.number), share.std, most_pct, "%", probability)
         yield Says(cause, rules.of_probability(probability, n_batches), figure)
 
 
 def as_of_load(estimate: Estimate) -> Estimate:
-    """The estimate with what all batches of its load found together, where that is known."""
+    """The estimate with the posterior of all batches of its load, where that is known."""
     epoch = estimate.epoch
     if epoch is None or epoch.posterior is None:
         return estimate
@@ -45,9 +45,9 @@ def as_of_load(estimate: Estimate) -> Estimate:
 
 
 def beyond_probability(share: Quantity, most_pct: float) -> float:
-    """P(one of two sides bears more than ``most_pct``), 0 to 1, of a share with a normal error; NaN where unknown.
+    """P(one of two sides carries more than ``most_pct``), 0 to 1, for a share with a normal error; NaN where unknown.
 
-    With the one side's share X, P(X > m) + P(100 - X > m), the two being exclusive for m of 50 and more.
+    With X the share of one side it is P(X > m) + P(100 - X > m); both events exclude each other for m >= 50.
     """
     one = over_limit_probability(share.number, share.std, most_pct)
     return one + over_limit_probability(100.0 - share.number, share.std, most_pct)

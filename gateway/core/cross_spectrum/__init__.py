@@ -1,9 +1,9 @@
-"""The default estimator: both sensors' spectra together, phase included, held against a half-car.
+"""The default estimator: fits a half-car to the cross-spectra of both sensors, phase included.
 
-A batch and what known-load drives taught (``calibration``) come in; payload, front share and diagnostics go out
-(``estimator``). ``measured`` takes the spectra, ``model`` says what the half-car would show, ``likelihood`` compares
-them, ``located`` finds the most probable load, firm or soft (``packing``), and ``lateral``, with a roll rate, where it
-lies sideways. Calibration fits the same model, and ``displayed`` draws it. docs/method.md derives it.
+A batch and its calibration (``calibration``) go in; payload, front share and diagnostics come out (``estimator``).
+``measured`` computes the spectra, ``model`` predicts them from the half-car, ``likelihood`` compares both, ``located``
+searches the most probable load, firmly or softly packed (``packing``), and ``lateral`` its lateral place, given a roll
+rate. Calibration fits the same model, and ``displayed`` draws it. docs/method.md has the derivation.
 """
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration

@@ -1,4 +1,4 @@
-"""What the cross-spectral estimator knows of a vehicle: the half-car that its known-load drives taught."""
+"""The calibration of the cross-spectral estimator: the half-car fitted to drives with known loads."""
 
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Final
@@ -14,7 +14,9 @@ from gateway.estimate import Quantity
 from gateway.records import F64
 from gateway.schema import STRICT
 
-SCORE: Final = 6.0  # six standard deviations are no chance; a calibration that shows more of its own allows more
+SCORE: Final = (
+    6.0  # chosen: standard deviations, beyond chance; a calibration with larger scores of its own allows more
+)
 
 Positive = Annotated[float, Gt(0.0)]
 NonNegative = Annotated[float, Ge(0.0)]
@@ -23,21 +25,20 @@ _POSITIVE: Final = {"gt": 0.0}
 
 @dataclass(frozen=True, slots=True)
 class CrossSpectrumCalibration:
-    """What known-load drives taught, as plain numbers and arrays.
+    """The fitted half-car and its uncertainty, as plain numbers and arrays.
 
-    parameters (n,) and covariance (n, n) follow ``names`` (parameters.PARAMETERS, then ROLL_PARAMETERS where a roll
-    rate was read; logarithms where these are positive quantities). directions (n, k) is the part of a root of the
-    covariance that moves loads: independent causes of unit variance. model_std is the error of the model itself, of
-    payload (kg), front share (%) and lateral place (m), as runs left out of the fit showed it; the first two grow by
-    model_per_reach as a load lies beyond ``known_loads`` (reach.beyond). misfit_limit is the largest likelihood ratio
-    per degree of freedom that is still believed; the two amplitudes are root mean squares within the band.
-    usual_log_amplitude: see model.reading. gravity_mps2 is what the accelerometer read on average; None where the file
-    does not say. The two scores are the largest that are believed of a sensor that nobody touched (sensor_change). As
-    stated, the sensor sits sensor_left_m left of the centre line. least_slack: see parameters.Ground.
-    usual_stroke_mps: see model.reading; None too where no roll rate was read. floor is how loud each sensor was in
-    the quietest and in the loudest batch, above what is weighed (cross_spectrum.floor), in the square of its unit per
-    hertz; None: not known. gyro_gain is the gyro's gain over the accelerometer's as the drives' bends told it, and its
-    standard deviation; None where nothing did.
+    parameters (n,) and covariance (n, n) follow ``names`` (parameters.PARAMETERS, then ROLL_PARAMETERS if a roll rate
+    was used); positive quantities are logarithms. directions (n, k) is the part of a root of the covariance that moves
+    loads: independent causes of unit variance. model_std is the model's own error in payload (kg), front share (%) and
+    lateral place (m), from runs left out of the fit; the first two grow by model_per_reach as a load is beyond
+    ``known_loads`` (reach.beyond). misfit_limit is the largest accepted likelihood ratio per degree of freedom; the two
+    amplitudes are root mean squares within the band. usual_log_amplitude: see model.reading. gravity_mps2 is the mean
+    reading of the accelerometer; None if the file does not have it. The two scores are the largest accepted of an
+    untouched sensor (sensor_change). sensor_left_m is the stated place left of the centre line. least_slack: see
+    parameters.Ground. usual_stroke_mps: see model.reading; None also if no roll rate was used. floor has each sensor's
+    noise level in the quietest and in the loudest batch, above the analysed band (cross_spectrum.floor), in the square
+    of its unit per hertz; None: unknown. gyro_gain is the gyro's gain relative to the accelerometer's, measured in
+    bends, and its standard deviation; None if no drive gave one.
     """
 
     __pydantic_config__ = STRICT
@@ -75,13 +76,13 @@ class CrossSpectrumCalibration:
 
     @property
     def ground(self) -> Ground:
-        """The vehicle as stated, in the core's terms."""
+        """The vehicle as stated, in the model's terms."""
         share = self.empty_front_share_pct / 100.0
         return Ground(self.empty_mass_kg, share, self.wheelbase_m, self.track_width_m, self.least_slack)
 
     @property
     def upright(self) -> "CrossSpectrumCalibration":
-        """What it says of a vehicle that only heaves and pitches."""
+        """The calibration without the roll parameters."""
         n = len(PARAMETERS)
         return replace(
             self,
@@ -99,7 +100,7 @@ class CrossSpectrumCalibration:
 
     @property
     def unsprung(self) -> Unsprung:
-        """Masses below the springs, and how sure they are. Their logarithms were fitted: of first order in these."""
+        """Unsprung masses with errors, to first order in their fitted logarithms."""
         entries = [INDEX["unsprung_front_kg"], INDEX["unsprung_rear_kg"]]
         front_kg, rear_kg = (float(kg) for kg in np.exp(self.parameters[entries]))
         covariance = self.covariance[np.ix_(entries, entries)]
@@ -112,7 +113,7 @@ class CrossSpectrumCalibration:
 
     @property
     def reading(self) -> Reading:
-        """How spectra of this vehicle are taken."""
+        """How spectra of this vehicle are computed."""
         mount = mount_of(self.parameters)
         return Reading(
             self.wheelbase_m,

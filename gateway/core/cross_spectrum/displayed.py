@@ -1,10 +1,10 @@
-"""The fitted half-car's spectra beside those a batch showed, for people to compare.
+"""The fitted half-car's spectra beside the measured ones of a batch, for people to compare.
 
     modelled_spectra(estimate.spectra, calibration, Fitted(...)) -> Spectra
 
-Nothing is estimated here: payload, front share and drift are the answer of the cross-spectral
-estimator. Only the road's level, on which that answer does not depend, is taken from the spectra
-themselves, as a straight line in logarithms of level and frequency (ISO 8608).
+Nothing is estimated here: payload, front share and drift come from the cross-spectral estimator. Only the road's level,
+on which they do not depend, is fitted to the spectra, as a straight line in logarithms of level and frequency (ISO
+8608).
 """
 
 from dataclasses import dataclass
@@ -24,10 +24,10 @@ from gateway.records import F64, Bool, Spectra
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """What the estimator found for one batch.
+    """The estimator's result for one batch.
 
-    Damper ratios are to the calibrated ones, amplitude_ratio to the calibrated drives'. delay_s is the mean
-    time from axle to axle over the batch, delay_std_s how much it varied.
+    Damper ratios are relative to the calibrated ones, amplitude_ratio to the calibrated drives'. delay_s is the mean
+    delay from axle to axle over the batch, delay_std_s its standard deviation.
     """
 
     payload_kg: float
@@ -44,7 +44,7 @@ class Fitted:
 
 
 def modelled_spectra(seen: Spectra, calibration: CrossSpectrumCalibration, fitted: Fitted) -> Spectra:
-    """Spectra (k,) of the fitted vehicle at those k of the m seen frequencies that calibration has used."""
+    """Spectra (k,) of the fitted vehicle at the k of m measured frequencies that are within the calibrated band."""
     is_used = (seen.freq_hz >= calibration.band_hz[0]) & (seen.freq_hz <= calibration.band_hz[1])
     load = Load(fitted.payload_kg, fitted.front_share_pct)
     measured = _as_one_group(seen, is_used, fitted, calibration)
@@ -77,7 +77,7 @@ def _parameters(calibration: CrossSpectrumCalibration, fitted: Fitted) -> F64:
 
 
 def _as_one_group(seen: Spectra, is_used: Bool, fitted: Fitted, calibration: CrossSpectrumCalibration) -> CrossSpectra:
-    """The spectra as if all segments had been one group, with delays normally distributed about their mean."""
+    """The spectra as one group of segments, with delays normally distributed about their mean."""
     step_hz = float(seen.freq_hz[1] - seen.freq_hz[0])
     freq_hz = seen.freq_hz[is_used]
     guarded_hz = np.r_[freq_hz[0] - step_hz, freq_hz, freq_hz[-1] + step_hz]
@@ -101,7 +101,7 @@ def _as_one_group(seen: Spectra, is_used: Bool, fitted: Fitted, calibration: Cro
 
 
 def _road_level(measured: CrossSpectra, auto_a: F64, auto_g: F64) -> F64:
-    """Level (k,) of the road: the line in logarithms that leaves both sensors' logarithms nearest to the model's."""
+    """Level (k,) of the road: the line in logarithms that brings the model closest to both sensors' logarithms."""
     log_level = 0.5 * (np.log(measured.acceleration[0] / auto_a) + np.log(measured.pitch_rate[0] / auto_g))
     log_f = np.log(measured.freq_hz[1:-1])
     level: F64 = np.exp(np.polyval(np.polyfit(log_f, log_level, 1), log_f))

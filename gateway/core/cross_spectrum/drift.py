@@ -1,7 +1,7 @@
-"""What of a vehicle is not as it was when it was calibrated: from day to day, and from load to load.
+"""Differences of a vehicle from its calibration, from day to day and from load to load.
 
-The search for a load leaves a few of these free, near the calibration. The others, and what of these lies
-further off than the search believes, cannot be told from the load in one batch: they widen the interval.
+The search for a load leaves a few parameters free, near the calibration. One batch cannot distinguish the others, or
+larger changes of the free ones, from a change of load: they widen the interval.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,16 +9,15 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from scipy.special import gammaincinv
 
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.records import F64
 
-HELD_STD: Final = 1e-3  # of a parameter that the search holds fixed
+HELD_STD: Final = 1e-3  # chosen: of a parameter that the search holds fixed
 NOISE_STD: Final = 1.0
-"""Of the logarithm of each sensor's own noise, where it is free: known loads are driven on roads too alike to tell it
-from slack, and on a smoother road the one stays while the other falls with the road (benchmarks/accuracy/trials.md).
-Chosen.
+"""Chosen: of the logarithm of each sensor's own noise, where it is free. The roads of known loads are too similar to
+separate noise from slack; on a smoother road slack falls with the road and noise does not
+(benchmarks/accuracy/trials.md).
 """
 
 DRIFT_STD: Final[Mapping[str, float]] = MappingProxyType(
@@ -33,10 +32,10 @@ DRIFT_STD: Final[Mapping[str, float]] = MappingProxyType(
         "noise_pitch_rate_rad2ps": HELD_STD,
     }
 )
-"""What the search leaves free, and how far off, each by itself: standard deviations, of logarithms of what is positive.
+"""Chosen: the free parameters of the search and the standard deviation of each (of the logarithm if it is positive).
 
-Narrower than nature, for the minutes of a batch repeat one error of the model: less evidence than they seem. The
-sensors' noise is held here; where it is free, NOISE_STD stands in its place.
+Narrower than real drift, because the minutes of a batch repeat one error of the model and so count for less. The
+sensors' noise is fixed here; where it is free, NOISE_STD replaces the value.
 """
 
 NATURE_STD: Final[Mapping[str, float]] = MappingProxyType(
@@ -50,7 +49,7 @@ NATURE_STD: Final[Mapping[str, float]] = MappingProxyType(
         "payload_mode_hz": 0.6,  # on the floor, on pallets, in a rack
     }
 )
-"""How far vehicle and packing really lie from their calibration, each axle by itself; chosen."""
+"""Chosen: real deviations of vehicle and packing from their calibration, for each axle separately."""
 
 NATURE_TOGETHER_STD: Final[Mapping[str, float]] = MappingProxyType(
     {
@@ -59,20 +58,20 @@ NATURE_TOGETHER_STD: Final[Mapping[str, float]] = MappingProxyType(
         "damper": 0.05,  # the oil's viscosity, as far as valves let it through
     }
 )
-"""What both axles have in common beside it: one day's temperature."""
+"""Chosen: the deviation common to both axles, in addition: the temperature of the day."""
 
 DAMPERS_TOGETHER_STD: Final = 0.03
-"""What both axles' dampers have in common beside it: their oil is as warm or cold in front as at the rear."""
+"""Chosen: the deviation common to both axles' dampers, in addition: their oil has the same temperature."""
 
 WORN_STD: Final = 0.3
-"""Of the logarithm of each axle's dampers where they may have worn, or been replaced; chosen."""
+"""Chosen: of the logarithm of each axle's dampers, if they may have worn or been replaced."""
 
 DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
 STEADY: Final = [i for i in range(len(PARAMETERS)) if i not in DRIFTING]
 
 
 def _covariance(by_itself: Mapping[str, float], together: Mapping[str, float], names: Sequence[str]) -> F64:
-    """(k, k) of ``names``, from standard deviations of each by itself and of what both axles have in common."""
+    """(k, k) covariance of ``names``, from the standard deviation of each and the part common to both axles."""
     covariance = np.diag([by_itself.get(name, 0.0) ** 2 for name in names])
     for kind, std in together.items():
         is_of_kind = np.array([name.startswith(f"{kind}_") and name in by_itself for name in names], dtype=float)
@@ -88,7 +87,7 @@ _PRECISION: Final = np.asarray(np.linalg.inv(_BELIEVED), float)
 
 
 def drift_precision(*, is_noise_free: bool = False) -> F64:
-    """(k, k) of the DRIFTING parameters: the inverse of what the search believes."""
+    """(k, k) prior precision of the DRIFTING parameters in the search."""
     return np.where(np.diag(_OF_NOISE), NOISE_STD**-2, _PRECISION) if is_noise_free else _PRECISION
 
 
@@ -97,7 +96,9 @@ _DAMPERS_BELIEVED: Final = np.linalg.inv(_BELIEVED[np.ix_(_DAMPERS, _DAMPERS)])
 
 
 def with_worn_dampers(precision: F64) -> F64:
-    """(k, k) what is believed of drifting parameters where dampers may have worn, ``precision`` where they have not."""
+    """(k, k) precision of the drifting parameters if dampers may have worn; ``precision`` is that of healthy
+    dampers.
+    """
     covariance = np.linalg.inv(precision)
     covariance[np.ix_(_DAMPERS, _DAMPERS)] = np.eye(len(_DAMPERS)) * WORN_STD**2
     return np.asarray(np.linalg.inv(covariance), float)
@@ -109,32 +110,42 @@ def dampers_of(drifting: F64) -> F64:
 
 
 def strain_of(off: F64) -> float:
-    """Chi-squared of two: by how much the search's belief is strained by dampers among what lies ``off`` (k,)."""
+    """Chi-squared (2 degrees of freedom) of the dampers in the deviations ``off`` (k,) under the search's prior."""
     dampers = dampers_of(off)
     return float(dampers @ _DAMPERS_BELIEVED @ dampers)
 
 
+def wear_of(freed: F64) -> float:
+    """How far the dampers of both axles lie off their calibration (2,), beyond what is natural, in natural standard
+    deviations of one: the root of their mean square less one, or 0.
+    """
+    return float(np.sqrt(max(float(np.mean(freed**2)) / _DAMPER_STD**2 - 1.0, 0.0)))
+
+
 _OF_THE_VEHICLE: Final = np.array([not name.startswith(("gyro_lag", "noise")) for name in DRIFT_STD], dtype=float)
+_DAMPER_STD: Final = float(np.hypot(NATURE_STD["damper_front_nspm"], NATURE_TOGETHER_STD["damper"]))
 _NATURAL_PRECISION: Final = np.asarray(np.linalg.inv(_NATURE_OF_DRIFTING), float)
 _WORN_PRECISION: Final = with_worn_dampers(_NATURAL_PRECISION)
-MOST_TENSION: Final = float(2.0 * gammaincinv(int(_OF_THE_VEHICLE.sum()) / 2.0, 1.0 - 1e-4))  # chi-squared quantile
-"""A vehicle that drifts as vehicles do exceeds this once in ten thousand batches."""
+MOST_TENSION: Final = 25.74483195905612
+"""The 99.99 % point of chi-squared of five, the vehicle's drifting parameters: a vehicle that drifts as vehicles do
+exceeds it once in ten thousand batches.
+"""
 
 
 def tension_of(off: F64, *, is_worn: bool = False) -> float:
-    """How far the drifting parameters lie ``off`` (k,) their calibration: those of the vehicle, squared, chi-squared.
+    """Chi-squared of the vehicle's drifting parameters, from their deviations ``off`` (k,) from the calibration.
 
-    A load unlike any that calibration saw, or a vehicle that is no longer the same, is fitted at the price of
-    parameters that no drift explains. The measure is what is natural (NATURE_STD), not what the search believes:
-    dampers that another day changed by 5 % are no reason to refuse. The search holds them near the calibration, so that
-    they lie nearer by right. ``is_worn``: of dampers that may have worn.
+    An unusual load or a changed vehicle is fitted with parameters that no drift explains. The measure is real drift
+    (NATURE_STD), not the prior of the search: dampers that change by 5 % with temperature are no reason to refuse. As
+    the search keeps them near the calibration, the measure is conservative. ``is_worn``: for dampers that may have
+    worn.
     """
     off = off * _OF_THE_VEHICLE
     return float(off @ (_WORN_PRECISION if is_worn else _NATURAL_PRECISION) @ off)
 
 
 def _factor(covariance: F64) -> F64:
-    """(k, r) whose columns are independent causes of unit variance, of a positive semi-definite (k, k)."""
+    """(k, r) factor of a positive semi-definite (k, k); its columns are independent causes of unit variance."""
     values, vectors = np.linalg.eigh(covariance)
     kept = values > 1e-12 * values.max()
     factor: F64 = vectors[:, kept] * np.sqrt(values[kept])
@@ -149,18 +160,18 @@ _PACKING_OF_DRIFTING: Final = _factor(np.where(np.outer(_IS_PACKING, _IS_PACKING
 
 
 def day_columns(found: F64, moves: F64, precision: F64) -> F64:
-    """(6, k) by how much one day's springs, tyres and dampers move the drifting parameters and the load.
+    """(6, k) change of drifting parameters and load by the day's springs, tyres and dampers.
 
-    ``found`` (k, k) is the covariance of these in the search, ``precision`` that of its prior, ``moves`` (k, s) by how
-    much they move with each of the STEADY parameters. A parameter that drifts further than the search believed pulls
-    the answer by the share that the prior holds of it: found times precision (S. F. Schmidt's consider covariance, Adv.
-    Control Syst. 3, 1966).
+    ``found`` (k, k) is their covariance in the search, ``precision`` that of its prior, ``moves`` (k, s) their change
+    with each of the STEADY parameters. A parameter that drifts further than the prior allows shifts the answer by the
+    part that the prior determines: found times precision (S. F. Schmidt's consider covariance, Adv. Control Syst. 3,
+    1966).
     """
     return np.concatenate([(moves @ _DAY_OF_STEADY).T, (_pulls(found, precision) @ _DAY_OF_DRIFTING).T])
 
 
 def packing_columns(found: F64, precision: F64) -> F64:
-    """(1, k) likewise of how firmly this load stands on its floor."""
+    """(1, k) the same for the stiffness of the load's packing."""
     columns: F64 = (_pulls(found, precision) @ _PACKING_OF_DRIFTING).T
     return columns
 

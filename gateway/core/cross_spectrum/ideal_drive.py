@@ -1,4 +1,4 @@
-"""What a steady drive would show on average: the spectra that a load not driven yet can be expected to give."""
+"""The expected spectra of a steady drive with a load that was not driven yet."""
 
 from dataclasses import dataclass
 
@@ -13,25 +13,25 @@ from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.spectrum import frequencies_hz
 from gateway.records import F64
 
-RATE_HZ = 50.0
+RATE_HZ = 50.0  # of the grid, BatchSettings.rate_hz
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Steady driving: how long and how fast."""
+    """Steady driving: its duration and speed."""
 
     duration_s: float
     speed_mps: float
 
 
 def expected_of(spectra: CrossSpectra, point: Point, ground: Ground) -> CrossSpectra:
-    """The spectra such a drive would show on average: ``spectra`` with what the model says at ``point``."""
+    """``spectra`` with the model's values at ``point``: the average of such a drive."""
     model = spectral_model(point.theta, point.loaded, ground, spectra.freq_hz, spectra.n_sensors)
     return spectra.showing(expected_spectra(model, spectra))
 
 
 def steady_spectra(reading: Reading, drive: Drive) -> CrossSpectra:
-    """As many half-overlapping segments as the drive holds, all at one speed; spectra still to be filled in."""
+    """The frame of spectra for a steady drive: as many half-overlapping segments as it holds, at one speed."""
     n_segment, (low_hz, high_hz) = reading.n_segment, reading.band_hz
     every_hz = frequencies_hz(n_segment, RATE_HZ)
     step_hz = every_hz[1]

@@ -1,14 +1,13 @@
-"""Whittle's likelihood of averaged cross-spectra when the road's level is not known.
+"""Whittle's likelihood of averaged cross-spectra with an unknown level of the road.
 
-An average of n tapered transforms X X^H follows a complex Wishart law about Sigma = s M, with M the
-model's p x p matrix (p sensors: two, or three with a roll rate) and s the road's density. For unknown s the likelihood
-is greatest at s = tr(M^-1 S) / p and leaves, per group and frequency,
+An average of n tapered transforms X X^H follows a complex Wishart distribution about Sigma = s M, with M the model's p
+x p matrix (p sensors: two, or three with a roll rate) and s the road's density. For unknown s the likelihood has its
+maximum at s = tr(M^-1 S) / p; its value there is, per group and frequency,
 
     n ( p log tr(M^-1 S) + log det M ),
 
-which does not depend on the road at all. What the level itself may say is admitted only as far as a
-road is smooth: log s is a line in log f, known to within ROAD_RIPPLE, and nothing more.
-
+which does not depend on the road. The level itself is used only as far as a road is smooth: log s is a line in log f,
+within ROAD_RIPPLE.
 (P. Whittle, "The analysis of multiple stationary time series", J. R. Stat. Soc. B 15, 1953.)
 """
 
@@ -19,6 +18,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectrum.measured import CrossSpectra
+from gateway.core.cross_spectrum.model.driven import are_in_motion
 from gateway.core.cross_spectrum.model.expected import expected_of_driven, with_noise
 from gateway.core.cross_spectrum.model.matrix import SpectralMatrix, Whitener
 from gateway.core.cross_spectrum.model.parameters import Ground, has_roll
@@ -26,17 +26,17 @@ from gateway.core.cross_spectrum.model.slopes import Solved, solved_at, spectral
 from gateway.core.vehicle import Load
 from gateway.records import F64
 
-EFFECTIVE_SHARE: Final = 0.5  # neighbouring Hann bins and half-overlapping segments repeat each other
+EFFECTIVE_SHARE: Final = 0.5  # chosen: neighbouring Hann bins and half-overlapping segments are correlated
 ROAD_RIPPLE: Final = 0.3  # standard deviation of log s about its line; chosen (`benchmarks.accuracy sensitivity`)
-ROAD_SLOPE_STD: Final = 0.3
-MOST_KEPT: Final = 48  # curvatures: a load under eight shapes has about thirty
-EVIDENCE_WEIGHT: Final = 0.2  # minutes of driving repeat the same model error; chosen likewise
+ROAD_SLOPE_STD: Final = 0.3  # chosen: of the line's slope
+MOST_KEPT: Final = 48  # chosen: curvatures kept; a load under eight shapes needs about thirty
+EVIDENCE_WEIGHT: Final = 0.2  # chosen likewise: minutes of driving repeat the same model error
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """Where the likelihood is looked at: parameters theta (n,), payload, front share (0..1), and for a vehicle that
-    rolls how far left of the centre line the sprung mass has its centre of gravity.
+    """A point of the likelihood: parameters theta (n,), payload, front share (0..1), and for a vehicle with roll the
+    centre of gravity of the sprung mass left of the centre line.
     """
 
     theta: F64
@@ -55,12 +55,12 @@ class Point:
         return Load(self.payload_kg, 100.0 * self.front_share)
 
     def is_at(self, other: "Point") -> bool:
-        """Whether the two are one place."""
+        """Whether both points are equal."""
         return self.loaded == other.loaded and np.array_equal(self.theta, other.theta)
 
     @property
     def loaded(self) -> tuple[float, ...]:
-        """The load as the model takes it: two numbers, three for a vehicle that rolls."""
+        """The load as the model takes it: two numbers, three for a vehicle with roll."""
         both = (self.payload_kg, self.front_share)
         return (*both, self.cg_left_m) if has_roll(self.theta) else both
 
@@ -73,9 +73,10 @@ class Curvature:
     information: F64
 
     def towards(self, entry: int, free: list[int], covariance: F64, pull: F64) -> tuple[float, float]:
-        """Slope and information of one ``entry``, what is ``free`` moving along; ``pull`` is the slope of that.
+        """Slope and information of one ``entry`` with the ``free`` parameters following; ``pull`` is the slope of
+        those.
 
-        ``covariance`` is of what is free, prior included (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948).
+        ``covariance`` is that of the free parameters, prior included (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948).
         """
         along = self.information[entry, free] @ covariance
         information = self.information[entry, entry] - along @ self.information[free, entry]
@@ -104,7 +105,7 @@ class _Whitened:
 
 
 class Whittle:
-    """The likelihood of one set of spectra. ``weight`` scales all its evidence (1: as counted)."""
+    """The likelihood of one set of spectra. ``weight`` scales all evidence (1: full weight)."""
 
     def __init__(self, spectra: CrossSpectra, ground: Ground, weight: float = 1.0) -> None:
         self.spectra = spectra
@@ -119,6 +120,7 @@ class Whittle:
         self._slope = _centred(np.log(freq_hz))
         self._level_stiffness = float(np.sum(self._level_weight * self._slope**2)) + ROAD_SLOPE_STD**-2
         self._last: _Whitened | None = None
+        self._sought: tuple[int, ...] = ()  # a search's few entries: those for which slopes will be asked again
         self._curvatures: dict[tuple[bytes, tuple[float, ...], tuple[int, ...]], Curvature] = {}
 
     def cost(self, point: Point) -> float:
@@ -127,7 +129,7 @@ class Whittle:
         return float(self._cost(whitened.by, whitened.trace))
 
     def costs(self, points: Sequence[Point]) -> F64:
-        """(k,) of several points, solved at once."""
+        """(k,) costs of several points, solved at once."""
         theta = np.stack([point.theta for point in points])
         loads = np.array([point.loaded for point in points]).T
         model, driven = solved_at(theta, tuple(loads), self.ground, self.spectra)
@@ -135,10 +137,10 @@ class Whittle:
         return self._cost(by, _sum(by(self._seen).auto))
 
     def misfit(self, point: Point) -> float:
-        """Likelihood ratio per degree of freedom against matrices free at every group and frequency.
+        """Likelihood ratio per degree of freedom against free matrices at every group and frequency.
 
-        About 1 if all is right, whatever the weight. Groups of no more segments than sensors are left
-        out: their matrices are near-singular by chance.
+        About 1 for a correct model, whatever the weight. Groups with no more segments than sensors are left out: their
+        matrices are near-singular by chance.
         """
         whitened = self._whitened(point)
         many = self.spectra.n_segments[:, 0] > self._p
@@ -150,10 +152,12 @@ class Whittle:
         return float(evidence / ((self._p**2 - 1.0) * excess[many].size))
 
     def curvature(self, point: Point, free: Sequence[int]) -> Curvature:
-        """Derivatives for the ``free`` entries of theta (n,) and, numbered on from n, of ``Point.loaded``.
+        """Derivatives by the ``free`` entries of theta (n,) and, numbered from n on, of ``Point.loaded``.
 
-        The last few are kept: an answer asks again for what it has found under its likeliest shape.
+        The last few are cached: an answer asks again for those of its likeliest shape.
         """
+        if not self._sought or len(free) < len(self._sought):
+            self._sought = tuple(free)
         key = point.theta.tobytes(), point.loaded, tuple(free)
         if key not in self._curvatures:
             if len(self._curvatures) == MOST_KEPT:
@@ -175,10 +179,13 @@ class Whittle:
         return Curvature((residual.ravel() @ rows)[asked], information[np.ix_(asked, asked)])
 
     def _rows(self, z: _Whitened, free: Sequence[int]) -> F64:
-        """(b m p^2, k) of all that is known at a point, with those of ``free``: an answer asks for every parameter
-        where its search asked for some.
+        """(b m p^2, k) the residuals' slopes at a point, extended by those of ``free``.
+
+        An answer asks for every parameter after its search asked for some.
         """
-        missing = sorted(set(free).difference(z.known), key=lambda entry: (entry not in z.solved.moving, entry))
+        missing = sorted(set(free).difference(z.known))
+        in_motion = are_in_motion(missing, len(z.point.theta))
+        missing = [*in_motion, *(entry for entry in missing if entry not in in_motion)]
         if missing:
             z.by_part = self._by_part(z) if z.by_part is None else z.by_part
             d = z.by_part @ spectral_slopes(z.solved, self.spectra, missing)
@@ -191,8 +198,9 @@ class Whittle:
         return z.rows
 
     def _by_part(self, z: _Whitened) -> F64:
-        """(b, m, p^2, p^2) by how much the whitened matrix, its shape first and then minus the logarithm of its level,
-        changes with each part of the matrix; the shape by the root of what it counts.
+        """(b, m, p^2, p^2) derivative of the whitened matrix by each part of the matrix.
+
+        First its shape, weighted by the root of the number of segments, then minus the logarithm of its level.
         """
         units = z.by(SpectralMatrix.units(self._p))
         together = _sum(units.auto * z.seen.auto[:, None])
@@ -201,15 +209,17 @@ class Whittle:
         return np.ascontiguousarray(rows.transpose(2, 3, 0, 1))
 
     def _whitened(self, point: Point) -> _Whitened:
-        """Solved once for a point: a search asks for the cost and then for the slopes."""
+        """The solution at a point, cached: a search asks for the cost and then for the slopes."""
         if self._last is None or not self._last.point.is_at(point):
-            solved = Solved.at(point.theta, point.loaded, self.ground, self.spectra)
+            solved = Solved.at(point.theta, point.loaded, self.ground, self.spectra, self._sought)
             by = Whitener.of(with_noise(solved.noiseless, solved.model, self.spectra))
             self._last = _Whitened(point, solved, by, by(self._seen))
         return self._last
 
     def _cost(self, by: Whitener, trace: F64) -> F64:
-        """(...) of whitened spectra of that trace (..., b, m): of their shape, and of the road's level."""
+        """(...) cost of whitened spectra with this trace (..., b, m): that of their shape plus that of the road's
+        level.
+        """
         shape = self._p * np.log(trace) + 2.0 * _sum(np.log(by.roots))
         level = _centred(np.log(trace / self._p))
         w = self._level_weight
@@ -231,7 +241,7 @@ def _over_all(x: F64) -> F64:
 
 
 def _traceless(matrix: SpectralMatrix) -> F64:
-    """(p^2 - 1, ...) what of Hermitian matrices (p, ...) is no multiple of the unit matrix, in an orthonormal basis."""
+    """(p^2 - 1, ...) traceless part of Hermitian matrices (p, ...), in an orthonormal basis."""
     auto, cross = matrix.auto, matrix.cross
     parts = [(auto[0] - auto[1]) / np.sqrt(2)]
     if len(auto) > 2:
@@ -252,6 +262,6 @@ def _determinant(matrix: SpectralMatrix) -> F64:
 
 
 def _centred(level: F64) -> F64:
-    """Less its mean over frequency: every group of segments has its own road level."""
+    """``level`` minus its mean over frequency, because every group of segments has its own road level."""
     centred: F64 = level - level.mean(axis=-1, keepdims=True)
     return centred

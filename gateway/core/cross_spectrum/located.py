@@ -1,4 +1,4 @@
-"""The load that a batch's spectra show: the best point of the posterior, and by how much each cause moves it."""
+"""The most probable load of a batch's spectra: the maximum of the posterior and its derivatives by every cause."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -33,35 +33,35 @@ from gateway.core.vehicle import Load
 from gateway.posterior import NORMAL_TAILS, Source
 from gateway.records import F64
 
-START_PAYLOADS_N: Final = 6  # from nothing to the most seen in calibration, or a third of the empty mass
-LEAST_START_SHARE: Final = 0.33
-STARTS_TRIED: Final = 2  # the posterior may have two peaks where a spring's rate bends
-COARSE: Final = 0.5  # of evidence, which tells peaks apart
-FINE: Final = 1e-3
-MOST_LOAD_SHARE: Final = 4.0  # of the empty mass: no search goes beyond, wherever noise may lead it
+START_PAYLOADS_N: Final = 6  # chosen: from 0 to the largest calibrated payload, or a third of the empty mass
+LEAST_START_SHARE: Final = 0.33  # chosen: of the empty mass
+STARTS_TRIED: Final = 2  # chosen: a bend of a spring's rate can cause two peaks
+COARSE: Final = 0.5  # chosen: tolerance in log-likelihood, enough to distinguish peaks
+FINE: Final = 1e-3  # chosen: tolerance of the final search
+MOST_LOAD_SHARE: Final = 4.0  # chosen: of the empty mass; bound of the search
 FIRM_HZ: Final = 25.0
-"""A load that rings on its mount below this turns there too, which no model here knows: the evidence of its shape
-counts less, as the square of the ratio. Chosen.
+"""Chosen: a load with a lower resonance on its mount also rotates there, which the model lacks; the evidence on its
+shape is reduced by the square of the ratio.
 """
-OF_SHAPES: Final = 0.02  # of evidence, likewise of shapes
+OF_SHAPES: Final = 0.02  # chosen: tolerance in log-likelihood for the shapes
 MOST_RIVALRY: Final = 1.0
-"""Of all other variance: where peaks that compete are most of what is uncertain, that is why."""
-START_POSITION_SHARES: Final = (0.25, 0.5, 0.9)  # of the wheelbase
+"""Chosen: of all other variance; above it competing peaks are the reason of the uncertainty."""
+START_POSITION_SHARES: Final = (0.25, 0.5, 0.9)  # chosen: of the wheelbase
 
 _GYRATION: Final = INDEX["payload_gyration_m2"]
 
 
 @dataclass(frozen=True, slots=True)
 class Located:
-    """The most probable load of a batch, and what is uncertain about it; a load is payload (kg) and front share (0..1).
+    """The most probable load of a batch and its uncertainty; a load is payload (kg) and front share (0..1).
 
-    own (2, 2) is the covariance that no other batch shares: what its length and road leave. moves (2, p) is by how much
-    the load moves with each of the half-car's parameters, columns (k, 2) by how much with a standard deviation of the
-    causes of each source, gain_moves (2,) with the logarithm of the accelerometer's gain. rival_covariance is what
-    peaks add that compete. tails are those of the error from the load's shape. tension is how far what drifts lies off
-    its calibration (drift.tension_of). is_converged is false where a search that the answer rests on did not settle.
-    freed (2,) is by how much the dampers of front and rear axle lie off their calibration, as logarithms; without what
-    the search believes of them where it strained at that. sideways is None without a roll rate.
+    own (2, 2) is the covariance specific to this batch, from its length and road. moves (2, p) is the load's derivative
+    by each of the half-car's parameters, columns (k, 2) its change by one standard deviation of each source's causes,
+    gain_moves (2,) its derivative by the logarithm of the accelerometer's gain. rival_covariance comes from competing
+    peaks. tails are those of the error from the load's shape. tension is the distance of the drifting parameters from
+    their calibration (drift.tension_of). is_converged is false if a search behind the answer did not converge. freed
+    (2,) is the deviation of front and rear dampers from their calibration, in logarithms; without the search's prior
+    where it strained at that. sideways is None without a roll rate.
     """
 
     point: Point
@@ -78,13 +78,13 @@ class Located:
     is_ambiguous: bool
     is_converged: bool
     freed: F64
-    as_known: Load  # what it would be, had it the shape of the known loads
+    as_known: Load  # the load under the assumption of the known loads' shape
     sideways: Sideways | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class _Peak:
-    """A peak of the posterior, with the packing under which it was sought."""
+    """A peak of the posterior, with the packing assumed in its search."""
 
     found: Found
     packing: Packing
@@ -100,12 +100,11 @@ def locate(
 ) -> Located:
     """The most probable load of ``spectra`` under a flat prior on payload and share.
 
-    ``prior`` is what is believed of its shape and ``evidence`` how much the batch counts against it (None: as usual);
-    without a prior the load has the shape of the known ones. How much each axle moves depends on the load: we
-    recompute the stroke speeds at each solution and continue the search from it. With a roll rate the load is first
-    sought as if it lay on the centre line; then roll shows where it lies, and the search continues from there. Where
-    the roll rate is lost, the sensor still reads roll: it is taken to sit where calibration has it, with the load on
-    the centre line.
+    ``prior`` is that of its shape and ``evidence`` the weight of the batch against it (None: the default); without a
+    prior the load has the shape of the known ones. Each axle's movement depends on the load: we recompute the stroke
+    speeds at each solution and continue the search from it. With a roll rate the load is first sought on the centre
+    line; then roll gives its lateral place, and the search continues from there. If the roll rate is lost, the sensor
+    still reads roll: we assume its calibrated place, and the load on the centre line.
     """
     is_rolling = spectra.roll is not None and has_roll(calibration.parameters)
     if evidence is None:
@@ -139,23 +138,23 @@ def locate(
 
 
 def precision_of(spectra: CrossSpectra, calibration: CrossSpectrumCalibration) -> F64:
-    """(k, k) how precisely the drifting parameters are known before a batch is weighed.
+    """(k, k) prior precision of the drifting parameters for a batch.
 
-    Where roll is read, each batch tells its sensors' noise. Without, what they feel of roll looks like noise, and noise
-    stays as calibrated.
+    With a roll rate each batch determines its sensors' noise. Without, roll leaks into the sensors and looks like
+    noise, so the noise stays as calibrated.
     """
     return drift_precision(is_noise_free=spectra.roll is not None and has_roll(calibration.parameters))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """What holds at the peak of a search, with the STEADY parameters t that it held fixed taken into account.
+    """The result at the peak of a search, including the STEADY parameters t that the search held fixed.
 
-    whole is the curvature of all parameters and the load, covariance that of what was sought (FITTED: drifting
-    parameters and load). cost is minus the logarithm of the evidence by Laplace's approximation, t integrated out over
-    what calibration and nature leave open of it. One Gauss-Newton step moves t as far as the batch and one day's nature
-    let it: shift (k,) is how far what was sought moves along, steady (k, s) by how much it moves with an error of each
-    t after that step, own (k, k) what the batch's noise adds by it.
+    whole is the curvature for all parameters and the load, covariance that of the fitted ones (FITTED: drifting
+    parameters and load). cost is minus the log evidence by Laplace's approximation, with t integrated out over its
+    covariance by calibration and nature. One Gauss-Newton step moves t as far as the batch and the day's drift allow:
+    shift (k,) is the resulting change of the fitted parameters, steady (k, s) their derivative by an error of each t
+    after that step, own (k, k) the covariance that the batch's noise adds by it.
     """
 
     whole: Curvature
@@ -167,7 +166,7 @@ class Answer:
 
     @property
     def moves(self) -> F64:
-        """(2, p) by how much the load moves with each of the half-car's parameters."""
+        """(2, p) derivative of the load by each of the half-car's parameters."""
         moves = np.zeros((2, len(PARAMETERS)))
         moves[:, STEADY] = self.steady[-2:]
         return moves
@@ -182,11 +181,11 @@ def answer_at(
     *,
     is_shape_known: bool = True,
 ) -> Answer:
-    """``prior`` is what was believed of the drifting parameters; a shape that is sought is no error of t.
+    """The answer at ``point``; ``prior`` is that of the drifting parameters; a shape that is searched is no error of t.
 
-    With g and I the gradient and information of t at the peak and N its covariance by nature, the step is
-    -w (w I + N^-1)^-1 g, w being how much the batch's evidence counts. What calibration left open is not moved: its
-    drives were many, and a batch is one.
+    With g and I the gradient and information of t at the peak and N its covariance by nature, the step is -w (w I +
+    N^-1)^-1 g, w being the weight of the batch's evidence. The calibration's own uncertainty takes no step: it rests on
+    many drives, and a batch is one.
     """
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
@@ -196,7 +195,7 @@ def answer_at(
     pull[: len(DRIFTING)] += prior.precision @ off
     free = [i for i in range(len(STEADY)) if is_shape_known or STEADY[i] != _GYRATION]
     t = [STEADY[i] for i in free]
-    along = -covariance @ whole.information[np.ix_(FITTED, t)]  # what was sought moves by -C I_xt with each t
+    along = -covariance @ whole.information[np.ix_(FITTED, t)]  # the fitted parameters move by -C I_xt with each t
     gradient = whole.gradient[t] + along.T @ pull
     information = whole.information[np.ix_(t, t)] + along.T @ whole.information[np.ix_(FITTED, t)]
     nature = NATURE_OF_STEADY[np.ix_(free, free)]
@@ -223,14 +222,14 @@ def answer_at(
 
 
 def _of_sought(whole: Curvature, precision: F64) -> F64:
-    """Information on what is sought, its prior included."""
+    """Information on the fitted parameters, prior included."""
     information: F64 = whole.information[np.ix_(FITTED, FITTED)] + np.pad(precision, (0, 2))
     return information
 
 
 def raw_moves(whittle: Whittle, point: Point) -> tuple[F64, F64]:
-    """(2, 2) covariance of a load that is sought with all STEADY parameters held, and (2, p) by how much it then moves
-    with each of the half-car's parameters.
+    """(2, 2) covariance of a load with all STEADY parameters fixed, and (2, p) its derivative by each of the half-car's
+    parameters.
     """
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
@@ -248,7 +247,7 @@ def _shaped(
     prior: ShapePrior | None,
     evidence: float,
 ) -> Shaped | None:
-    """The load under every shape that it may have; None where that is known."""
+    """The load under every possible shape; None if the shape is known."""
     if prior is None:
         return None
 
@@ -334,10 +333,10 @@ def _located(
 
 
 def _of_shape(shape: Shaped, packing: F64) -> dict[Source, F64]:
-    """Columns of what the load's shape leaves open: what this vehicle's loads have in common, and this load's own.
+    """Columns of the shape's uncertainty: the part common to this vehicle's loads, and this load's own part.
 
-    Errors of a Gaussian posterior are (1 - K) times those of its prior, K being its gain, and what the evidence adds;
-    of the former alone the part of a habit is common.
+    Errors of a Gaussian posterior are (1 - K) times those of its prior, K being its gain, plus those of the evidence;
+    only of the former the habit's part is common.
     """
     goods = shape.column * np.sqrt(shape.goods_part)
     own = shape.column * np.sqrt(1.0 - shape.goods_part)
@@ -345,9 +344,9 @@ def _of_shape(shape: Shaped, packing: F64) -> dict[Source, F64]:
 
 
 def _is_reversed(whittle: Whittle, point: Point, misfit: float, calibration: CrossSpectrumCalibration) -> bool:
-    """True where the pitch rate fits better with the other sign: at this load or, if this fits badly, at any start.
+    """True if the pitch rate fits better with the other sign: at this load or, if this fits badly, at any start.
 
-    Spectra with the wrong sign may drive the search to where neither sign fits.
+    Spectra with the wrong sign may lead the search to a load where neither sign fits.
     """
     reverse = Whittle(whittle.spectra.with_pitch_reversed(), calibration.ground)
     tried = [point]
@@ -358,21 +357,21 @@ def _is_reversed(whittle: Whittle, point: Point, misfit: float, calibration: Cro
 
 
 def _point(x: F64, calibration: CrossSpectrumCalibration, cg_left_m: float) -> Point:
-    """Of drifting parameters, payload and front share."""
+    """The point of drifting parameters, payload and front share."""
     theta = calibration.parameters.copy()
     theta[DRIFTING] = x[:-2]
     return Point(theta, float(x[-2]), float(x[-1]), cg_left_m)
 
 
 def _moving(spectra: CrossSpectra, x: F64, calibration: CrossSpectrumCalibration) -> CrossSpectra:
-    """The same with how much each axle of the calibrated vehicle moves under the load at x."""
+    """The spectra with the stroke speeds of the calibrated vehicle under the load at x."""
     load = _point(x, calibration, 0.0).load
     return with_strokes(spectra, calibration.parameters, load, calibration.ground)
 
 
 def _best(spectra: CrossSpectra, calibration: CrossSpectrumCalibration, precision: F64) -> tuple[Whittle, _Peak]:
-    """The best of the peaks that a few starting loads, firm and soft, lead to, and how far the others compete; before
-    it the likelihood under which it was sought.
+    """The likelihood and the best of the peaks reached from a few starting loads, firm and soft, with the covariance of
+    its competitors.
     """
     whittle = Whittle(spectra, calibration.ground)
     peaks = []
@@ -394,14 +393,14 @@ def _best(spectra: CrossSpectra, calibration: CrossSpectrumCalibration, precisio
 
 
 def _rank(peak: _Peak) -> float:
-    """Its cost as it competes to be the answer."""
+    """The cost by which a peak competes to be the answer."""
     return peak.found.cost + peak.packing.decisive
 
 
 def _rivalry(found: Found, peaks: Sequence[_Peak]) -> F64:
-    """(2, 2) what peaks elsewhere add to the covariance about the best, each by how probable it is.
+    """(2, 2) covariance about the best peak from other peaks, weighted by their probability.
 
-    A batch repeats one error of the model: its evidence counts as little as it does in calibration.
+    A batch repeats one error of the model, so its evidence counts as little as in calibration.
     """
     away = np.array([peak.found.x[-2:] - found.x[-2:] for peak in peaks])
     costs = np.array([peak.found.cost + peak.packing.cost for peak in peaks])
@@ -418,7 +417,7 @@ def _sought(
     cg_left_m: float,
     tolerance: float = FINE,
 ) -> Found:
-    """Drift parameters, then payload (kg) and front share (0..1), of the peak that ``start`` leads to."""
+    """Drift parameters, then payload (kg) and front share (0..1), of the peak reached from ``start``."""
     prior_mean = np.r_[packing.drifting, 0.0, 0.0]
     prior_precision = np.pad(packing.precision, (0, 2))  # flat in payload and share
 

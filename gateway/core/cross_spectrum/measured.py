@@ -1,9 +1,9 @@
-"""What the likelihood needs of a drive: cross-spectra of the sensors, grouped by speed and amplitude.
+"""The data of the likelihood: cross-spectra of the sensors, grouped by speed and amplitude.
 
-Segments are short, tapered, detrended, and never cross a masked sample. Each is divided by its own
-power, so that a rough stretch does not drown the others. The road reaches the rear axle later than
-the front by the wheelbase over the speed; the phase of that delay is averaged over the speeds driven
-inside each segment, because averaged spectra hold averaged phases.
+Segments are short, tapered, detrended, and never cross a masked sample. Each is divided by its own power, so that a
+rough stretch does not dominate. The road reaches the rear axle later than the front by the wheelbase over the speed;
+the phase of that delay is averaged over the speeds within each segment, because averaged spectra contain averaged
+phases.
 """
 
 from collections.abc import Iterable, Sequence
@@ -16,24 +16,26 @@ from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
 from gateway.records import C128, F64, I64, Batch, Bool, Why
 
-SPEED_BIN = 0.03  # width of a group of segments in the logarithm of speed
-AMPLITUDE_BIN = 0.5  # and in the logarithm of how much it moves: friction and noise count for more where that is little
-SPEED_CHANGE_MAX_MPS2 = 0.3  # braking and pulling away pitch the body without any road
-SPEED_SAMPLE_STEP = 8
-LEAST_SEGMENTS = 6
-LEAST_SHARE_WITH_ROLL = 0.7  # of the segments; with fewer, what the roll rate tells is not worth what it costs
+SPEED_BIN = 0.03  # chosen: width of a group of segments in the logarithm of speed
+AMPLITUDE_BIN = 0.5  # chosen: and in the logarithm of amplitude; friction and noise matter more at small ones
+SPEED_CHANGE_MAX_MPS2 = 0.3  # chosen: braking and accelerating pitch the body without any road
+SPEED_SAMPLE_STEP = 8  # chosen: the speed varies little within 0.16 s
+LEAST_SEGMENTS = 6  # chosen: a mean of fewer segments scatters too much
+LEAST_SHARE_WITH_ROLL = 0.7  # chosen: of the segments; with fewer, using the roll rate loses more than it gains
 
 
 @dataclass(frozen=True, slots=True)
 class RollSpectra:
-    """What the roll rate adds to cross-spectra (b, m): its auto-spectrum, and it times the conjugate of the others."""
+    """The roll rate's part of cross-spectra (b, m): its auto-spectrum, and its product with the conjugates of the
+    others.
+    """
 
     roll_rate: F64
     with_acceleration: C128
     with_pitch_rate: C128
 
     def times(self, acceleration: float, pitch_rate: float) -> "RollSpectra":
-        """As if these sensors had so many times their gain."""
+        """The spectra with the gains of the two other sensors multiplied by these factors."""
         return RollSpectra(self.roll_rate, acceleration * self.with_acceleration, pitch_rate * self.with_pitch_rate)
 
 
@@ -41,15 +43,14 @@ class RollSpectra:
 class CrossSpectra:
     """Mean spectral matrices of b groups of segments at m frequencies, each segment divided by its power.
 
-    freq_hz (m + 2,) has one guard frequency at either end; acceleration, pitch_rate (b, m) are
-    auto-spectra, cross (b, m) is pitch rate times the conjugate of acceleration; delay_phase
-    (b, m + 2) is the mean of exp(-j 2 pi f l / v), delay_s (b, 1) the mean of l / v and n_segments
-    (b, 1) the number of segments in each group. inverse_power (b, 1) is the mean of what segments were
-    multiplied by, log_amplitude (b, 1) how much they moved over the usual. The two root mean squares are of
-    the segments before division, in m/s2 and rad/s within the band; reading is how they were taken, the usual
-    amplitude filled in. roll is None where no roll rate was read. log_strokes (b, 2) is how much faster than usual the
-    springs of front and rear axle move (model.strokes); None where nobody worked it out. noise (p, m) is the power
-    density that the sensors add by themselves beyond what calibration found (cross_spectrum.floor); None: nothing.
+    freq_hz (m + 2,) has one guard frequency at either end; acceleration, pitch_rate (b, m) are auto-spectra, cross (b,
+    m) is pitch rate times the conjugate of acceleration; delay_phase (b, m + 2) is the mean of exp(-j 2 pi f l / v),
+    delay_s (b, 1) the mean of l / v and n_segments (b, 1) the number of segments in each group. inverse_power (b, 1) is
+    the mean factor of the segments, log_amplitude (b, 1) the amplitude relative to the usual one. The two root mean
+    squares are of the segments before division, in m/s2 and rad/s within the band; reading is how they were computed,
+    with the usual amplitude filled in. roll is None without a roll rate. log_strokes (b, 2) is the stroke speed of
+    front and rear springs relative to the usual one (model.strokes); None if not computed. noise (p, m) is the power
+    density of the sensors' own noise in excess of calibration (cross_spectrum.floor); None: none.
     """
 
     freq_hz: F64
@@ -70,7 +71,9 @@ class CrossSpectra:
 
     @property
     def log_movement(self) -> F64:
-        """(b, 2) logarithm of how much front and rear axle move over the usual: as the body, if no more is known."""
+        """(b, 2) logarithm of front and rear axle's movement relative to the usual; that of the body if the strokes are
+        unknown.
+        """
         return np.repeat(self.log_amplitude, 2, axis=1) if self.log_strokes is None else self.log_strokes
 
     @property
@@ -80,7 +83,7 @@ class CrossSpectra:
 
     @property
     def matrix(self) -> SpectralMatrix:
-        """Of all sensors, (p, b, m)."""
+        """The spectral matrix of all sensors, (p, b, m)."""
         if self.roll is None:
             return SpectralMatrix(np.stack([self.acceleration, self.pitch_rate]), self.cross[None])
         return SpectralMatrix(
@@ -94,7 +97,7 @@ class CrossSpectra:
         return replace(self, roll=None, noise=None if self.noise is None else self.noise[:2])
 
     def within(self, band_hz: tuple[float, float]) -> "CrossSpectra":
-        """The same at fewer frequencies; the guard frequencies lie outside the band."""
+        """The same at fewer frequencies; the guard frequencies are just outside the band."""
         kept = np.flatnonzero((self.freq_hz[1:-1] >= band_hz[0]) & (self.freq_hz[1:-1] <= band_hz[1]))
         inner, guarded = slice(kept[0], kept[-1] + 1), slice(kept[0], kept[-1] + 3)
         matrix = SpectralMatrix(self.matrix.auto[..., inner], self.matrix.cross[..., inner])
@@ -110,12 +113,12 @@ class CrossSpectra:
 
     @property
     def log_amplitude_mean(self) -> float:
-        """How much the vehicle moved over the usual, over all segments."""
+        """Mean amplitude relative to the usual, over all segments (logarithm)."""
         return float(np.sum(self.log_amplitude * self.n_segments) / self.n_segments.sum())
 
     @property
     def n_total(self) -> int:
-        """Segments in all."""
+        """Number of all segments."""
         return int(self.n_segments.sum())
 
     @property
@@ -128,21 +131,21 @@ class CrossSpectra:
 
     @property
     def delay_mean_s(self) -> float:
-        """Mean time from axle to axle over all segments."""
+        """Mean delay from axle to axle over all segments."""
         return float(np.average(self.delay_s, weights=self.n_segments))
 
     @property
     def delay_std_s(self) -> float:
-        """How much that time varied."""
+        """Standard deviation of that delay."""
         return float(np.sqrt(np.average((self.delay_s - self.delay_mean_s) ** 2, weights=self.n_segments)))
 
     def with_acceleration_times(self, gain: float) -> "CrossSpectra":
-        """As if the accelerometer had so many times its gain; the division of segments stays."""
+        """The spectra with the accelerometer's gain multiplied; the division of segments stays."""
         roll = self.roll and self.roll.times(gain, 1.0)
         return replace(self, acceleration=gain**2 * self.acceleration, cross=gain * self.cross, roll=roll)
 
     def with_pitch_reversed(self) -> "CrossSpectra":
-        """As if the pitch rate had the other sign."""
+        """The spectra with the other sign of the pitch rate."""
         return replace(self, cross=-self.cross, roll=self.roll and self.roll.times(1.0, -1.0))
 
 
@@ -157,7 +160,7 @@ class _Segments:
 def cross_spectra_of(batches: Iterable[Batch], reading: Reading) -> CrossSpectra | None:
     """Cross-spectra of all usable segments of ``batches``, which share one rate; None if fewer than six.
 
-    Where the roll rate is to be read and most segments lack it, they are read without.
+    If the roll rate is requested and most segments lack it, it is left out.
     """
     batches = tuple(batches)
     chosen = [_steady_starts(batch, reading, with_roll=False) for batch in batches]
@@ -182,9 +185,10 @@ def _n(starts: Sequence[I64]) -> int:
 
 
 def why_no_spectra(batch: Batch, reading: Reading) -> Why:
-    """What a batch lacks of which :func:`cross_spectra_of` makes nothing: time, unbroken stretches, a sensor, or rest.
+    """Why :func:`cross_spectra_of` returns None for a batch: too little time, unbroken stretches, sensor data or steady
+    speed.
 
-    Stretches are broken by whatever masked most of the batch.
+    Unbroken stretches are missing because of the cause that masked most of the batch.
     """
 
     def is_enough(mask: Bool) -> bool:
@@ -202,10 +206,10 @@ def why_no_spectra(batch: Batch, reading: Reading) -> Why:
 
 
 def log_amplitude_of(acceleration: F64, pitch_rate: F64) -> F64:
-    """How much a vehicle moves (...), from the power of both sensors at each frequency (..., m).
+    """Amplitude of a vehicle's movement (...), from the power of both sensors at each frequency (..., m).
 
-    The natural logarithm of an amplitude, averaged over frequencies and sensors. Averaged powers would not do: by
-    chance a segment's peak is higher, and would look like a peak that is higher wherever more moves.
+    The natural logarithm of an amplitude, averaged over frequencies and sensors. Averaged powers would be biased: a
+    segment whose peak is higher by chance would look like one with more movement.
     """
     tiny = np.finfo(float).tiny
     found: F64 = 0.25 * np.mean(np.log(np.maximum(acceleration, tiny)) + np.log(np.maximum(pitch_rate, tiny)), axis=-1)
@@ -230,7 +234,7 @@ def _steady_starts(batch: Batch, reading: Reading, *, with_roll: bool) -> I64:
 
 
 def _segments(batch: Batch, starts: I64, reading: Reading, kept: I64, *, with_roll: bool) -> _Segments:
-    """The segments that begin at ``starts`` (k,), at the ``kept`` of their frequencies."""
+    """The segments that begin at ``starts`` (k,), at the frequencies ``kept``."""
     n_segment = reading.n_segment
     sampled = starts[:, None] + np.arange(0, n_segment, SPEED_SAMPLE_STEP)
     sensed = [

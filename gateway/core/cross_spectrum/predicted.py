@@ -1,4 +1,4 @@
-"""What the service will state of a load before it is driven: the posterior of an ideal drive with it."""
+"""The expected estimate of a load before it is driven: the posterior of an ideal drive with it."""
 
 from gateway.core.cargo import ShapePrior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
@@ -20,13 +20,13 @@ def predicted(
     drive: Drive,
     log_s: float | None = None,
 ) -> Posterior:
-    """Payload and front share as one batch would state them, if the road showed just what the model expects.
+    """Payload and front share as one batch would state them on a road that shows exactly the model's spectra.
 
-    ``prior`` is what the service believes of shapes, ``log_s`` the logarithm of the load's squared radius of gyration
-    (m2); None: that of the known loads.
+    ``prior`` is the service's prior of shapes, ``log_s`` the logarithm of the load's squared radius of gyration (m2);
+    None: that of the known loads.
     """
     is_rolling = has_roll(calibration.parameters)
-    upright = calibration.upright  # on the centre line: a roll rate takes out the rest
+    upright = calibration.upright  # on the centre line: with a roll rate the signals are moved there
     theta = upright.parameters.copy()
     if log_s is not None:
         theta[INDEX["payload_gyration_m2"]] = log_s

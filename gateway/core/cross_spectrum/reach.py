@@ -1,9 +1,9 @@
-"""How far a load lies beyond those that calibration has seen.
+"""The distance of a load beyond the calibrated ones.
 
     beyond(load, seen, empty_mass_kg)   0 among the known loads, else the distance to the nearest mixture of them
 
-A load is where it presses: front and rear axle load. What lies among known loads is interpolated, and
-there a model that errs is held by its neighbours; beyond them its error grows with the distance.
+A load is a point of front and rear axle load. Among known loads the model interpolates and its neighbours limit its
+error; beyond them the error grows with the distance.
 """
 
 from collections.abc import Sequence
@@ -14,13 +14,13 @@ import numpy as np
 from gateway.core.vehicle import Load
 from gateway.records import F64
 
-_TOUCHING: Final = 1e-3  # nearer than this is inside: a kilogram or two
+_TOUCHING: Final = 1e-3  # chosen: a smaller distance counts as inside; a kilogram or two
 
 
 def beyond(load: Load, seen: Sequence[Load], empty_mass_kg: float) -> float:
     """Distance of ``load`` from the convex hull of ``seen`` in the plane of axle loads.
 
-    In parts of the empty sprung mass; 0 inside, and where nothing was seen to be compared with.
+    In parts of the empty sprung mass; 0 inside, or if no load is known.
     """
     if not seen:
         return 0.0
@@ -31,13 +31,15 @@ def beyond(load: Load, seen: Sequence[Load], empty_mass_kg: float) -> float:
 
 
 def _is_surrounded(corners: F64) -> bool:
-    """Whether corners (n, 2) stand round the origin: seen from it, no gap between them is as wide as half the view."""
+    """Whether the origin is inside corners (n, 2): seen from it, no gap between directions is as wide as half a
+    turn.
+    """
     seen_at = np.sort(np.arctan2(corners[:, 1], corners[:, 0]))
     return bool(np.max(np.diff(seen_at, append=seen_at[0] + 2.0 * np.pi)) < np.pi)
 
 
 def _nearest(corners: F64) -> float:
-    """How near the lines between any two corners (n, 2), or the corners, come to the origin."""
+    """Least distance from the origin to the lines between any two corners (n, 2), or to the corners."""
     start, along = corners[:, None], corners[None] - corners[:, None]
     length2 = np.sum(along**2, axis=-1)
     part = np.clip(-np.sum(start * along, axis=-1) / np.where(length2 > 0.0, length2, 1.0), 0.0, 1.0)

@@ -8,16 +8,16 @@ import numpy as np
 from gateway.core.cross_spectrum.likelihood import Curvature
 from gateway.records import F64
 
-MOST_STEPS = 60
-MOST_HALVINGS = 10
+MOST_STEPS = 60  # chosen: a search takes about ten
+MOST_HALVINGS = 10  # chosen: attempts with more damping per step
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
     """Solution x (k,), its cost and its posterior covariance (k, k) by Laplace's approximation.
 
-    near (k,) is where the last curvature was taken, from where one small step led to x. ``is_converged`` is false where
-    the steps ran out, or none lowered a cost that was still falling.
+    near (k,) is the point of the last curvature, one small step before x. ``is_converged`` is false if the steps ran
+    out, or none lowered a cost that was still falling.
     """
 
     x: F64
@@ -37,8 +37,8 @@ def most_probable(
 ) -> Found:
     """Minimise cost(x) + (x - mean)' precision (x - mean) / 2 from ``start`` (k,).
 
-    Where ``prior_precision`` (k, k) is zero the prior is flat. Steps are damped (Levenberg 1944) until they help; the
-    search ends with a step that gains less than ``tolerance``, which is nothing against one unit of evidence.
+    Where ``prior_precision`` (k, k) is zero the prior is flat. Steps are damped (Levenberg 1944) until the cost falls;
+    the search ends with a step that gains less than ``tolerance``, in units of log-likelihood.
     """
 
     def total(x: F64) -> float:
@@ -70,7 +70,7 @@ def most_probable(
 def _damped_step(
     x: F64, gradient: F64, information: F64, damping: float, total: Callable[[F64], float], best: float
 ) -> tuple[F64, float, float] | None:
-    """The first damped step that lowers the cost, with that cost and damping; None where none does."""
+    """The first damped step that lowers the cost, with that cost and damping; None if none does."""
     for _ in range(MOST_HALVINGS):
         step = np.linalg.solve(information + damping * np.diag(np.diag(information)), -gradient)
         reached = total(x + step)

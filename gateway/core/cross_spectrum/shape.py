@@ -1,8 +1,8 @@
-"""The shape of a load as a hypothesis: a batch is weighed under several, and each counts by how well it explains it.
+"""Hypotheses on the shape of a load: a batch is weighed under several shapes, weighted by their evidence.
 
-A long or high load is harder to pitch than a compact one (core.cargo). The spectra tell the two apart, though less well
-than their own statistics say, for the half-car errs too: the evidence is tempered. What is left is a distribution of
-the payload that is skewed, because a load can be much longer than a compact one and hardly shorter.
+A long or high load is harder to pitch than a compact one (core.cargo). The spectra distinguish them, though less well
+than their statistics suggest, because the half-car has errors too: the evidence is tempered. The result is a skewed
+distribution of the payload, because a load can be much longer than a compact one but hardly shorter.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,34 +10,34 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.special import log_ndtr
 
 from gateway.core.cargo import ShapePrior
+from gateway.core.late import special
 from gateway.core.spline import between, monotone_slopes
 from gateway.posterior import NORMAL_TAILS
 from gateway.records import F64
 
 NODES_PER_WHEELBASE2: Final = (0.004, 0.013, 0.032, 0.06, 0.095, 0.14, 0.2, 0.3)
-"""Squared radii of gyration at which a load is weighed, over the squared wheelbase: 0.03 to 2.4 m2 in a van of 2.8
-m.
+"""Chosen: squared radii of gyration over the squared wheelbase at which a load is weighed: 0.03 to 2.4 m2 in a van with
+a wheelbase of 2.8 m.
 """
 EVIDENCE: Final = 0.5
-"""How much a batch's evidence counts against calibration and nature, 1 being what its own statistics say.
+"""Weight of a batch's evidence against calibration and nature, 1 being its statistical weight.
 Chosen on simulated vans that serve no other purpose (`benchmarks.accuracy budget`).
 """
-EVIDENCE_WITHOUT_ROLL: Final = 0.2  # of a sensor that takes roll for heave and nobody can tell; as in calibration
-SHAPE_EVIDENCE: Final = 2.0  # against shapes it counts so many times as much, with Student's tail; chosen likewise
+EVIDENCE_WITHOUT_ROLL: Final = 0.2  # chosen: the same for a sensor that reads roll as heave; as in calibration
+SHAPE_EVIDENCE: Final = 2.0  # chosen likewise: its factor for shapes, with Student's tail
 EVIDENCE_DOF: Final = 4.0
-"""Degrees of freedom of that tail: a batch is one witness of how much the half-car errs, so a shape that it speaks
-against stays possible (K. L. Lange, R. J. A. Little and J. M. G. Taylor, J. Am. Stat. Assoc. 84 (1989) 881-896).
+"""Chosen: degrees of freedom of that tail. A batch is one sample of the half-car's error, so a shape that it
+contradicts stays possible (K. L. Lange, R. J. A. Little and J. M. G. Taylor, J. Am. Stat. Assoc. 84 (1989) 881-896).
 """
-LEAST_PROBABILITY: Final = 1e-3  # of a shape that is worth weighing, before and after
-POINTS: Final = (0.025, 0.5, 0.975)
+LEAST_PROBABILITY: Final = 1e-3  # chosen: of a shape worth weighing, in prior and posterior
+POINTS: Final = (0.025, 0.5, 0.975)  # a 95 % interval and the median
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Waypoint:
-    """Where a search ended under one log s: x (k,), and by how much x moves with log s (moves (k,))."""
+    """The end of a search under one log s: x (k,), and its derivative by log s (moves (k,))."""
 
     log_s: float
     x: F64
@@ -46,8 +46,8 @@ class Waypoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Node:
-    """A load weighed under one shape: where its search ended (at), minus the logarithm of its evidence (cost), the
-    answer x (k,), payload in kg and front share (0..1) being its last, and the payload's own error.
+    """A load weighed under one shape: the end of its search (at), minus its log evidence (cost), the answer x (k,) with
+    payload in kg and front share (0..1) last, and the payload's own error.
     """
 
     at: Waypoint
@@ -59,16 +59,16 @@ class Node:
     @property
     def improbable(self) -> float:
         """Minus the logarithm of how probable a load of this mass is: one that is less than nothing has no shape."""
-        return -float(log_ndtr(self.x[-2] / self.own_std_kg + 2.0))
+        return -float(special.log_ndtr(self.x[-2] / self.own_std_kg + 2.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shaped:
     """The posterior over shapes: x (k,) at its mean log_s; the median load (2,), payload in kg and front share 0..1.
 
-    column (2,) is one standard deviation of what the shape leaves open, tails its 2.5 and 97.5 % points in these;
-    goods_part (0 to 1) is the part of its variance that is the same for all loads of the vehicle. likeliest is the log
-    s and the peak of the shape that explains the batch best; is_converged says whether the search settled there.
+    column (2,) is one standard deviation from the shape's uncertainty, tails its 2.5 and 97.5 % points in these units;
+    goods_part (0 to 1) is the part of its variance common to all loads of the vehicle. likeliest is the log s and the
+    peak of the shape with the highest evidence; is_converged says whether the search converged there.
     """
 
     log_s: float
@@ -88,7 +88,9 @@ def shaped(
     weighed_as: Callable[[float, F64], Node],
     evidence: float,
 ) -> Shaped:
-    """``start`` is where a search ended already; ``weighed_as`` weighs under another log s, beginning at an x (k,)."""
+    """The posterior over shapes; ``start`` is the end of an earlier search; ``weighed_as`` weighs under another log s,
+    starting from x (k,).
+    """
     nodes, founds = _profile(prior, wheelbase_m, start, weighed_as, evidence)
     if len(nodes) == 1:
         x = founds[0].x
@@ -128,7 +130,7 @@ def _profile(
     weighed_as: Callable[[float, F64], Node],
     evidence: float,
 ) -> tuple[F64, list[Node]]:
-    """Nodes in order and what was found at each, from the start outwards until a shape is out of the question."""
+    """The nodes in order and their results, from the start outwards until a shape is improbable."""
     cumulated = np.cumsum(prior.probability)
     lowest, highest = np.interp([LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY], cumulated, prior.log_s)
     nodes = np.log(np.array(NODES_PER_WHEELBASE2) * wheelbase_m**2)
@@ -151,8 +153,8 @@ def _profile(
 
 
 def _ahead(log_s: float, passed: Sequence[Waypoint]) -> F64:
-    """Where the next search will end: on a parabola through the last waypoint, along its slope, and through an earlier
-    one far enough off to tell how the path bends.
+    """The predicted end of the next search: on a parabola through the last waypoint, along its slope, and through an
+    earlier one at a sufficient distance.
     """
     last = passed[-1]
     further = log_s - last.log_s
@@ -165,7 +167,7 @@ def _ahead(log_s: float, passed: Sequence[Waypoint]) -> F64:
 
 
 def _against(excess: float, evidence: float) -> float:
-    """Minus the logarithm of how probable the batch makes a shape whose cost is so much above the best one's."""
+    """Minus the log probability of a shape whose cost exceeds the best one's by ``excess``."""
     return 0.5 * (EVIDENCE_DOF + 1.0) * float(np.log1p(2.0 * SHAPE_EVIDENCE * evidence * excess / EVIDENCE_DOF))
 
 

@@ -1,7 +1,7 @@
-"""Load events and trips: what was loaded or unloaded where and when, and what was carried how far.
+"""Load events (what was loaded or unloaded, where and when) and trips (what was carried how far).
 
-Made of estimates alone (their numbers, their times, the way they went), purely: the service, a log and a restart give
-the same.
+They are a pure function of the estimates (numbers, times, ways), so that the live service, a log and a restarted
+service give the same events.
 """
 
 from gateway.core.change import Rules

@@ -1,4 +1,4 @@
-"""A stretch of estimates as load events and trips: a pure function of the batches, whenever it is asked."""
+"""A stretch of estimates as load events and trips: a pure function of the batches."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ from typing import Any
 from gateway.core.change import Rules, change_of
 from gateway.core.events.entry import Entry, EntryKind, entry_id, quantity_json, rounded
 from gateway.core.loads import (
+    FusedLoad,
     Halt,
-    Link,
-    Load,
+    LoadLink,
     Loads,
     Weighing,
     clocks_of,
@@ -27,7 +27,7 @@ from gateway.records import iso_utc
 
 @dataclass(frozen=True)
 class Day:
-    """Batches in the order in which they came, and what follows from them."""
+    """Batches in order of arrival, and the weighings, halts and loads that follow from them."""
 
     estimates: tuple[Estimate, ...]
     rules: Rules
@@ -45,7 +45,7 @@ class Day:
         return halts_of(self.estimates)
 
     @cached_property
-    def links(self) -> list[Link]:
+    def links(self) -> list[LoadLink]:
         return links_of(self.estimates, self.weighings, self.halts)
 
     @cached_property
@@ -53,8 +53,8 @@ class Day:
         return loads_of(self.weighings, self.links, self.rules)
 
     def events(self, since: tuple[int, int] = (0, 0)) -> Iterator[Entry]:
-        """One entry for each link, however unlikely a change there is; without a revision. ``since`` is the clock and
-        the time (ns) at which the first of them ends at the earliest.
+        """One record per link between weighings, however unlikely a change is; without a revision. ``since`` is the
+        clock and the time (ns) of the earliest end.
         """
         for at, link in enumerate(self.links):
             is_one_scale = self.weighings[at].by == self.weighings[at + 1].by
@@ -68,7 +68,7 @@ class Day:
         begin_ns, end_ns = link.span_ns
         place = halts[0].place if len(halts) == 1 else NOWHERE
         newest = self.estimates[-1]
-        first = self.estimates[self.weighings[at + 1].at]  # never moves: the id hangs on it
+        first = self.estimates[self.weighings[at + 1].at]  # never changes: the id is derived from it
         record = {
             "id": entry_id(EntryKind.EVENT, newest.vehicle_id, first.t_start_ns),
             "revision": 0,
@@ -85,7 +85,7 @@ class Day:
         }
         return Entry(EntryKind.EVENT, str(record["id"]), end_ns, record, link.clock)
 
-    def _load_json(self, load: Load) -> dict[str, Any]:
+    def _load_json(self, load: FusedLoad) -> dict[str, Any]:
         payload, share, cg_left = (load.shown.quantity(i) for i in (PAYLOAD, FRONT_SHARE, CG_LEFT))
         record: dict[str, Any] = quantity_json(payload, "payload", "kg", 1)
         record |= {"front_share_pct": rounded(share.number, 2), "front_share_std_pct": rounded(share.std, 2)}

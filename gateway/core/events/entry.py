@@ -1,4 +1,4 @@
-"""A load event or a trip as it is told: one JSON object with an id that stays and a revision that grows."""
+"""A load event or a trip as reported: a JSON object with a fixed id and a growing revision."""
 
 import hashlib
 import math
@@ -8,13 +8,13 @@ from typing import Any, Final
 
 from gateway.estimate import Quantity
 
-NEWS_STD_SHARE: Final = 0.25  # a number that moves by less of its standard deviation is no news
-NEWS_PROBABILITY: Final = 0.05
-NEWS_SHRINK: Final = 0.1
+NEWS_STD_SHARE: Final = 0.25  # chosen: of its standard deviation; a smaller change is not reported
+NEWS_PROBABILITY: Final = 0.05  # chosen: a smaller change of a probability is not reported
+NEWS_SHRINK: Final = 0.1  # chosen: a smaller relative change of a standard deviation is not reported
 
 
 class EntryKind(StrEnum):
-    """What an entry tells of."""
+    """The kind of a record."""
 
     EVENT = "event"
     TRIP = "trip"
@@ -22,8 +22,9 @@ class EntryKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One event or trip in one revision. ``record`` is its JSON object; ``t_end_ns`` dates it, by the ``clock`` of the
-    batches that it was made of (see halts)."""
+    """One event or trip in one revision. ``record`` is its JSON object; ``t_end_ns`` is its time by the ``clock`` of
+    its batches (see halts).
+    """
 
     kind: EntryKind
     id: str
@@ -41,19 +42,20 @@ class Entry:
 
 
 def entry_id(kind: EntryKind, vehicle_id: str | None, t_ns: int) -> str:
-    """The same for the same vehicle and moment, whenever it is computed."""
+    """The id, the same for the same vehicle and time whenever it is computed."""
     digest = hashlib.sha256(f"{kind}|{vehicle_id}|{t_ns}".encode()).hexdigest()
     return f"{kind}-{t_ns}-{digest[:12]}"
 
 
 def is_news(before: Entry, after: Entry) -> bool:
-    """Whether the second says something that the first did not: a quarter of a standard deviation, a twentieth of
-    certainty, a tenth more exactness, or anything that is no number."""
+    """Whether ``after`` says something new: a change by a quarter of a standard deviation, by 0.05 in probability, by a
+    tenth in a standard deviation, or in anything that is not a number.
+    """
     return _differs(before.record, after.record)
 
 
 def quantity_json(quantity: Quantity, name: str, unit: str, digits: int) -> dict[str, Any]:
-    """name_unit, its standard deviation and 95 % interval; None where unknown."""
+    """The keys of a quantity: name_unit, its standard deviation and 95 % interval; None where unknown."""
     low, high = quantity.interval95
     interval = None if not math.isfinite(low) else [round(low, digits), round(high, digits)]
     return {

@@ -1,11 +1,11 @@
-"""Load events and trips as they become known: each batch may bring new ones and sharpen those of the hours before.
+"""Load events and trips as they become known: each batch may add new ones and refine recent ones.
 
     ledger = Ledger(rules)
     for estimate in estimates:
         for entry in ledger.add(estimate): ...      # new, or the same id with a higher revision
 
-What comes out follows from the estimates in their order alone. A restarted service goes on from the estimates and the
-entries that it stored; a log read from its beginning gives the same.
+The output depends on the estimates and their order alone. A restarted service resumes from its stored estimates and
+records; reading a log from its beginning gives the same.
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,23 +19,25 @@ from gateway.core.events.trips import trips_of
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json, estimate_to_json
 
-TOLD_FROM: Final = 0.9  # a change less likely than this is not told; one that was is withdrawn below one half
-PLAIN_STDS: Final = 3.0  # so far beyond its doubt, a change at a stop is told whatever its probability
-HORIZON: Final = 300  # batches that are looked at, a day of driving however long the vehicle rested between
-SETTLED: Final = 150  # what ended before the last so many stays as it was told
+TOLD_FROM: Final = 0.9  # chosen: a less likely change is not reported; a reported one is withdrawn below 0.5
+PLAIN_STDS: Final = (
+    3.0  # chosen: a change at a stop that is this many stds from 0 is reported regardless of its probability
+)
+HORIZON: Final = 300  # chosen: batches considered, about a day of driving without its rests
+SETTLED: Final = 150  # chosen: a record that ended before the last 150 batches no longer changes
 
 
 class Ledger:
-    """One vehicle's events and trips of its last batches."""
+    """The events and trips of one vehicle's last batches."""
 
     def __init__(self, rules: Rules, estimates: Iterable[Estimate] = (), known: Iterable[Entry] = ()) -> None:
-        """Go on from what was: the last estimates, and the last revision of each entry that was told of them."""
+        """Resume from the last estimates and from the last revision of each reported record."""
         self._rules = rules
         self._estimates = tuple(estimates)
         self._known = {entry.id: entry for entry in known}
 
     def add(self, estimate: Estimate) -> list[Entry]:
-        """What one more batch, answered or not, tells that was not told before. Early looks tell nothing."""
+        """The records that one more batch, counted or refused, adds or changes. Provisional estimates change none."""
         if estimate.is_provisional:
             return []
         self._estimates = (*self._estimates, as_stored(estimate))[-HORIZON:]
@@ -70,12 +72,12 @@ class Ledger:
 
 
 def _is_plain(entry: Entry) -> bool:
-    """A stop at which the door did not stay shut, and a change far beyond its own doubt."""
+    """Whether the change was at a stop where the door may have opened, and is far beyond its standard deviation."""
     record = entry.record
     could_load = any(stop["door_opened"] is not False for stop in record["stops"])
     return could_load and bool(abs(record["change_kg"]) >= PLAIN_STDS * record["change_std_kg"])
 
 
 def as_stored(estimate: Estimate) -> Estimate:
-    """As it comes back from its JSON object: what is told must not hang on whether it was ever stored."""
+    """The estimate as read back from its JSON object, so that the result does not depend on whether it was stored."""
     return estimate_from_json(estimate_to_json(replace(estimate, spectra=None)))

@@ -1,4 +1,4 @@
-"""Load events and trips as lines of a table."""
+"""Load events and trips as rows of a table."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -34,7 +34,7 @@ COLUMNS: Final[Mapping[EntryKind, tuple[str, ...]]] = MappingProxyType(
 
 
 def cells_of(kind: EntryKind, record: Mapping[str, Any]) -> dict[str, Any]:
-    """One line: a cell for each column that is known."""
+    """One row: a cell for each known column."""
     cells: dict[str, Any] = {name: record[name] for name in COLUMNS[kind] if record.get(name) is not None}
     for name, x in record.items():
         if "_interval95_" in name and x is not None:

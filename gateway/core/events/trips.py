@@ -1,8 +1,8 @@
-"""Trips: each drive as one line, with what was aboard along its way.
+"""Trips: one row per drive, with the load carried along its way.
 
     tonne-kilometres = sum over loads of payload x distance,    std = sum of std x distance
 
-Standard deviations of different loads are added as if their errors were one and the same: most of it is.
+We add the standard deviations of different loads as if their errors were fully correlated: most of the error is.
 """
 
 import math
@@ -13,32 +13,32 @@ from typing import Any, Final
 
 from gateway.core.events.day import Day
 from gateway.core.events.entry import Entry, EntryKind, entry_id, quantity_json, rounded
-from gateway.core.loads import SLACK_NS, Load, follows
+from gateway.core.loads import SLACK_NS, FusedLoad, follows
 from gateway.estimate import NOWHERE, Estimate, Quantity, Way
 from gateway.estimate_json.way import place_to_json
 from gateway.posterior import PAYLOAD
 from gateway.records import iso_utc
 from gateway.units import NS_PER_S
 
-EMPTY_SHARE: Final = 0.03  # of the loaded vehicle's mass: less than this aboard is empty
-ODOMETER_WITHIN: Final = 0.2  # of the distance by speed; further off, one of them is not what it seems
-ODOMETER_SLACK_M: Final = 200.0
-LEAST_TRIP_M: Final = 50.0  # less is moving the vehicle in the yard, or noise of a receiver
-KG_M_PER_TONNE_KM: Final = 1e6
+EMPTY_SHARE: Final = 0.03  # chosen: of the loaded vehicle's mass; a smaller payload counts as empty
+ODOMETER_WITHIN: Final = 0.2  # chosen: of the distance by speed; a larger difference means that one of the two is wrong
+ODOMETER_SLACK_M: Final = 200.0  # chosen: two steps of the coarsest odometer in use (100 m)
+LEAST_TRIP_M: Final = 50.0  # chosen: a shorter drive is manoeuvring, or receiver noise
+KG_M_PER_TONNE_KM: Final = 1e6  # 1000 kg x 1000 m
 
 
 @dataclass(frozen=True, slots=True)
 class _Piece:
-    """A batch of a trip: how far, and with which load (None: unknown), and what was over the limit."""
+    """One batch of a trip: its distance, its load (None: unknown), and whether it was overloaded."""
 
     distance_m: float
-    load: Load | None
+    load: FusedLoad | None
     is_overloaded: bool | None
     is_weighed: bool
 
 
 def trips_of(day: Day, *, is_cut: bool = False) -> list[Entry]:
-    """Every drive that went anywhere, in order; without a revision. ``is_cut``: the first may lack its beginning."""
+    """Every drive with a distance, in order; without a revision. ``is_cut``: the first drive may lack its beginning."""
     loads = _load_of_each(day)
     trips = (_trip(day, first, last, loads) for first, last in _drives(day.estimates) if first or not is_cut)
     return [trip for trip in trips if trip is not None]
@@ -53,30 +53,30 @@ def _drives(estimates: Sequence[Estimate]) -> Iterator[tuple[int, int]]:
             first = i + 1
 
 
-def _load_of_each(day: Day) -> list[Load | None]:
-    """What was aboard during each batch: as weighed, or as the weighings around it agree without a long stop."""
+def _load_of_each(day: Day) -> list[FusedLoad | None]:
+    """The load during each batch: as weighed, or as the nearest weighings agree without a long stop between."""
     whole = day.estimates
-    of_weighing: dict[int, Load] = {}
+    of_weighing: dict[int, FusedLoad] = {}
     for weighing, load in zip(day.weighings, day.found.of_weighing, strict=True):
         at, one = weighing.at, whole[weighing.at]
         while at >= 0 and at not in of_weighing and one.t_start_ns <= whole[at].way_start_ns < one.t_end_ns:
             of_weighing[at] = load
             at -= 1
-    ahead: list[Load | None] = []
+    ahead: list[FusedLoad | None] = []
     for i in range(len(whole)):
         goes_on = i > 0 and follows(whole[i - 1], whole[i])
         ahead.append(of_weighing.get(i, ahead[i - 1] if goes_on else None))
-    back: list[Load | None] = [None] * len(whole)
+    back: list[FusedLoad | None] = [None] * len(whole)
     for i in reversed(range(len(whole))):
         goes_on = i + 1 < len(whole) and follows(whole[i], whole[i + 1])
         back[i] = of_weighing.get(i, back[i + 1] if goes_on else None)
-    around = _around(len(whole), of_weighing)
-    return [one or other or both for one, other, both in zip(ahead, back, around, strict=True)]
+    between = _between_weighings(len(whole), of_weighing)
+    return [one or other or both for one, other, both in zip(ahead, back, between, strict=True)]
 
 
-def _around(n: int, of_weighing: dict[int, Load]) -> list[Load | None]:
-    """The load on both sides, where it is the same one."""
-    found: list[Load | None] = [None] * n
+def _between_weighings(n: int, of_weighing: dict[int, FusedLoad]) -> list[FusedLoad | None]:
+    """The load of the batches between two weighings of the same load."""
+    found: list[FusedLoad | None] = [None] * n
     known = sorted(of_weighing)
     for one, other in pairwise(known):
         if of_weighing[one] is of_weighing[other]:
@@ -84,7 +84,7 @@ def _around(n: int, of_weighing: dict[int, Load]) -> list[Load | None]:
     return found
 
 
-def _trip(day: Day, first: int, last: int, loads: Sequence[Load | None]) -> Entry | None:
+def _trip(day: Day, first: int, last: int, loads: Sequence[FusedLoad | None]) -> Entry | None:
     batches = day.estimates[first : last + 1]
     ways = [one.way for one in batches if one.way is not None]
     by_speed_m = sum(way.distance_m for way in ways if math.isfinite(way.distance_m))
@@ -121,7 +121,9 @@ def _trip(day: Day, first: int, last: int, loads: Sequence[Load | None]) -> Entr
 
 
 def _distance(ways: Sequence[Way], by_speed_m: float, duration_s: float) -> tuple[float, str]:
-    """By the odometer where it agrees with the speed, or where the speed was not known all along; and by which."""
+    """The distance in metres and its source: the odometer where it agrees with the speed or the speed has gaps, else
+    the speed.
+    """
     readings = [(way.odometer_start_m, way.odometer_end_m) for way in ways if math.isfinite(way.odometer_start_m)]
     if len(readings) == len(ways):
         odometer_m = readings[-1][1] - readings[0][0]
@@ -133,7 +135,7 @@ def _distance(ways: Sequence[Way], by_speed_m: float, duration_s: float) -> tupl
 
 
 def _carried(day: Day, pieces: Sequence[_Piece]) -> dict[str, Any]:
-    """What was carried how far, over the weighed part of the way."""
+    """Tonne-kilometres and payload over the weighed part of the way."""
     weighed = [(piece.distance_m, piece.load) for piece in pieces if piece.load is not None]
     weighed_m = sum(distance_m for distance_m, _ in weighed)
     whole_m = sum(piece.distance_m for piece in pieces)
@@ -161,8 +163,8 @@ def _carried(day: Day, pieces: Sequence[_Piece]) -> dict[str, Any]:
     }
 
 
-def _is_overloaded(day: Day, batch: Estimate, load: Load | None) -> bool | None:
-    """Whether the load's own mean is above what the vehicle may weigh; None where nobody said a limit."""
+def _is_overloaded(day: Day, batch: Estimate, load: FusedLoad | None) -> bool | None:
+    """Whether the load's mean exceeds the gross limit; None without a limit."""
     gross = batch.weights.gross
     if load is None or gross.limit_kg is None or not gross.is_known:
         return None
@@ -170,7 +172,7 @@ def _is_overloaded(day: Day, batch: Estimate, load: Load | None) -> bool | None:
 
 
 def _arrival_ns(batches: Sequence[Estimate]) -> int:
-    """When it came to its last stand, where that reaches to the end of the drive."""
+    """The time at which the vehicle came to its last standstill, if that lasts to the end of the drive."""
     end_ns = arrival_ns = batches[-1].t_end_ns
     for batch in reversed(batches):
         stops = batch.way.stops if batch.way else ()

@@ -1,7 +1,7 @@
-"""Where the load can have changed: stops between drives and within, and how likely that was before weighing.
+"""Halts: stops between and within drives at which the load can have changed, with their prior probability.
 
-Batches count in the order in which they came. Where the clock was put back, what comes after is by another ``clock``
-(the first of them 0, then 1, ...): two moments are compared by their clocks first, by their stamps where those are one.
+Batches count in order of arrival. If the clock was set back, the batches after it have the next ``clock`` number (0, 1,
+...). Two times are compared by clock first, then by time stamp.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,7 +14,7 @@ from gateway.core.loads.load import Weighing
 from gateway.estimate import NOWHERE, UNWATCHED, Estimate, Place, Watched
 from gateway.units import NS_PER_S
 
-LONG_S: Final = 60.0
+LONG_S: Final = 60.0  # chosen: time enough to load or unload, as in core.fusion
 PRIORS: Final[dict[tuple[bool, bool | None], float]] = {
     # (at least LONG_S, door opened): how likely a change of load is
     (True, True): 0.7,
@@ -24,14 +24,14 @@ PRIORS: Final[dict[tuple[bool, bool | None], float]] = {
     (False, None): 0.01,
     (False, False): 0.001,
 }
-"""Judgement, not measurement: a delivery vehicle stops to load or to rest about as often, and does it by its doors."""
-SLACK_NS: Final = NS_PER_S // 10  # batches and stops that touch do so within this
-_CANDIDATE_SHARE: Final = 0.3  # of the most likely stop's prior
+"""Chosen, not measured: a delivery vehicle stops about as often to load as to rest, and loads through its doors."""
+SLACK_NS: Final = NS_PER_S // 10  # chosen: batches and stops closer than this touch
+_CANDIDATE_SHARE: Final = 0.3  # chosen: of the most likely stop's prior; less likely stops are not named
 
 
 @dataclass(frozen=True, slots=True)
 class Halt:
-    """The vehicle stood, or nobody heard of it, from and to."""
+    """A stretch of time in which the vehicle stood or was silent."""
 
     t_start_ns: int
     t_end_ns: int
@@ -46,7 +46,7 @@ class Halt:
         return PRIORS[is_long, self.watched.door_opened]
 
     def joined(self, later: "Halt") -> "Halt":
-        """One halt with what follows at once."""
+        """One halt of this and the next, which touches it."""
         return Halt(
             self.t_start_ns,
             later.t_end_ns,
@@ -62,8 +62,8 @@ class Halt:
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
-    """What lies between two weighings that follow one another: the halts in which the load can have changed."""
+class LoadLink:
+    """The halts between two consecutive weighings, in which the load can have changed."""
 
     halts: tuple[Halt, ...]
     t_start_ns: int  # of the time between them, where there is no halt
@@ -79,18 +79,18 @@ class Link:
 
     @property
     def likely(self) -> tuple[Halt, ...]:
-        """The halts where it can well have been."""
+        """The halts with a relevant probability of the change."""
         most = max((halt.prior for halt in self.halts), default=0.0)
         return tuple(halt for halt in self.halts if halt.prior >= max(_CANDIDATE_SHARE * most, PRIORS[False, None]))
 
     @property
     def clock(self) -> int:
-        """By which the span's end is stamped."""
+        """The clock of the span's end."""
         return self.likely[-1].clock if self.likely else self.clocks[1]
 
     @property
     def span_ns(self) -> tuple[int, int]:
-        """From and to when it can well have changed; within what both clocks allow, where two stamped it."""
+        """Begin and end (ns) of the time in which the change is likely, limited by both clocks if they differ."""
         halts = self.likely
         begin_ns = halts[0].t_start_ns if halts else self.t_start_ns
         end_ns = halts[-1].t_end_ns if halts else self.t_end_ns
@@ -98,18 +98,18 @@ class Link:
 
 
 def follows(before: Estimate, after: Estimate) -> bool:
-    """Whether two batches are of one drive, one right behind the other."""
+    """Whether two batches are consecutive and of one drive."""
     return abs(after.way_start_ns - before.t_end_ns) <= 1_000
 
 
 def clocks_of(estimates: Sequence[Estimate]) -> list[int]:
-    """By which clock each batch is stamped: how many times it was put back among those before."""
+    """The clock number of each batch: how often the clock was set back before it."""
     put_back = (after.way_start_ns < before.t_end_ns - SLACK_NS for before, after in pairwise(estimates))
     return list(accumulate(put_back, initial=0))[: len(estimates)]
 
 
 def halts_of(estimates: Sequence[Estimate]) -> list[Halt]:
-    """All halts in the order in which they came; what touches is one halt."""
+    """All halts in order of arrival; touching halts are merged."""
     halts: list[Halt] = []
     for halt in _halts(estimates):
         touches = halts and -SLACK_NS <= halt.t_start_ns - halts[-1].t_end_ns <= SLACK_NS
@@ -120,8 +120,8 @@ def halts_of(estimates: Sequence[Estimate]) -> list[Halt]:
     return halts
 
 
-def links_of(estimates: Sequence[Estimate], weighings: Sequence[Weighing], halts: Sequence[Halt]) -> list[Link]:
-    """What lies between each weighing and the next, by the middles of their batches and of the halts."""
+def links_of(estimates: Sequence[Estimate], weighings: Sequence[Weighing], halts: Sequence[Halt]) -> list[LoadLink]:
+    """The link between each weighing and the next, by the middles of batches and halts."""
     links, after, clocks = [], 0, clocks_of(estimates)
     for one, other in pairwise(weighings):
         before, behind = estimates[one.at], estimates[other.at]
@@ -133,7 +133,7 @@ def links_of(estimates: Sequence[Estimate], weighings: Sequence[Weighing], halts
         while last < len(halts) and halts[last].middle < end:
             last += 1
         later_ns = behind.t_start_ns if end[0] > begin[0] else max(before.t_end_ns, behind.t_start_ns)
-        links.append(Link(tuple(halts[after:last]), before.t_end_ns, later_ns, (begin[0], end[0])))
+        links.append(LoadLink(tuple(halts[after:last]), before.t_end_ns, later_ns, (begin[0], end[0])))
         after = last
     return links
 

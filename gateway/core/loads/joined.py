@@ -1,8 +1,8 @@
-"""From weighings to loads: neighbours that are more likely one load than two are taken together, the likeliest first.
+"""From weighings to loads: neighbours that are more likely one load than two are merged, the likeliest first.
 
-Agglomeration of neighbours by posterior odds, one join at a time, as in Ward's method with a Bayes factor for its
-distance (Ward, J. Am. Stat. Assoc. 58 (1963) 236-244). What was joined is weighed anew with all its batches, so each
-further batch sharpens both sides of a change, and what looked like one may turn out to be none.
+This is agglomerative clustering of neighbours by posterior odds, one merge at a time, like Ward's method with a Bayes
+factor as its distance (Ward, J. Am. Stat. Assoc. 58 (1963) 236-244). Each merged load is weighed again with all its
+batches, so further batches sharpen both sides of a change, and an apparent change may disappear.
 """
 
 from collections.abc import Sequence
@@ -10,35 +10,37 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from gateway.core.change import EVEN, Rules, probability
-from gateway.core.loads.halts import Link
-from gateway.core.loads.load import Load, Weighing, Weighings
+from gateway.core.loads.halts import LoadLink
+from gateway.core.loads.load import FusedLoad, Weighing, Weighings
 
 
 @dataclass(frozen=True, slots=True)
 class Loads:
-    """The loads in order, the load of each weighing, and the links between weighings by which they were told apart."""
+    """The loads in order, the load of each weighing, and the links between weighings."""
 
-    loads: tuple[Load, ...]
-    of_weighing: tuple[Load, ...]
-    links: Sequence[Link]
+    loads: tuple[FusedLoad, ...]
+    of_weighing: tuple[FusedLoad, ...]
+    links: Sequence[LoadLink]
     rules: Rules
 
-    def sides(self, link: int) -> tuple[Load, Load]:
-        """What lies before and after a link: the loads on its two sides, or the two parts of the load around it."""
+    def sides(self, link: int) -> tuple[FusedLoad, FusedLoad]:
+        """The loads before and after a link, or the two parts of the load that spans it."""
         before, after = self.of_weighing[link], self.of_weighing[link + 1]
         if before is not after:
             return before, after
         return before.weighings.load(before.first, link), before.weighings.load(link + 1, before.last)
 
     def probability(self, link: int) -> float:
-        """That the load changed there."""
+        """The probability that the load changed at this link."""
         return _between(*self.sides(link), self.links, self.rules)
 
 
-def loads_of(weighings: Sequence[Weighing], links: Sequence[Link], rules: Rules, parted_from: float = EVEN) -> Loads:
-    """Loads of weighings with ``links`` between them; a change less likely than ``parted_from`` is none.
+def loads_of(
+    weighings: Sequence[Weighing], links: Sequence[LoadLink], rules: Rules, parted_from: float = EVEN
+) -> Loads:
+    """The loads of weighings with ``links`` between them; changes less likely than ``parted_from`` are ignored.
 
-    Other calibrations cannot be compared: there a load ends.
+    Weighings of different calibrations cannot be compared: a load always ends there.
     """
     whole = Weighings(weighings)
     loads = [whole.load(i, i) for i in range(len(whole))]
@@ -53,7 +55,7 @@ def loads_of(weighings: Sequence[Weighing], links: Sequence[Link], rules: Rules,
     return Loads(tuple(loads), tuple(load for load in loads for _ in range(load.n_batches)), links, rules)
 
 
-def _between(before: Load, after: Load, links: Sequence[Link], rules: Rules) -> float:
+def _between(before: FusedLoad, after: FusedLoad, links: Sequence[LoadLink], rules: Rules) -> float:
     each = before.weighings.each
     if each[before.last].by != each[after.first].by:
         return 1.0

@@ -1,4 +1,4 @@
-"""What was weighed, batch by batch, and batches of one load together."""
+"""Weighings of single batches, and loads made of several."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,9 +11,8 @@ from gateway.posterior import Fusible, Posterior
 
 @dataclass(frozen=True, slots=True)
 class Weighing:
-    """One batch that counted: as measured, for known weights come and go and no load changes with them, and as shown.
-
-    ``at`` is its place among all batches, ``by`` the calibration and the estimator.
+    """One counted batch: ``measured`` without known weights (they come and go without a change of load), ``shown`` with
+    them. ``at`` is its index among all batches, ``by`` its calibration and estimator.
     """
 
     at: int
@@ -23,7 +22,7 @@ class Weighing:
 
 
 class Weighings:
-    """Weighings in their order, and any that follow one another taken as of one load."""
+    """Weighings in order; any consecutive ones can be fused as one load."""
 
     def __init__(self, each: Sequence[Weighing]) -> None:
         self.each = each
@@ -39,14 +38,14 @@ class Weighings:
     def __len__(self) -> int:
         return len(self.each)
 
-    def load(self, first: int, last: int) -> "Load":
-        """Weighings first to last (inclusive, by their number) together."""
-        return Load(first, last, self)
+    def load(self, first: int, last: int) -> "FusedLoad":
+        """Weighings first to last (inclusive indexes) as one load."""
+        return FusedLoad(first, last, self)
 
 
 @dataclass(frozen=True)
-class Load:
-    """Weighings first to last (inclusive, by their number), taken as of one load."""
+class FusedLoad:
+    """Weighings first to last (inclusive indexes), fused as one load."""
 
     first: int
     last: int
@@ -58,7 +57,7 @@ class Load:
 
     @cached_property
     def measured(self) -> Posterior:
-        """Without what known weights teach."""
+        """The fused posterior without known weights."""
         return self.weighings.measured.fused(self.first, self.last + 1)
 
     @cached_property
@@ -67,7 +66,7 @@ class Load:
 
 
 def weighings_of(estimates: Sequence[Estimate]) -> list[Weighing]:
-    """Those of the batches that tell a load."""
+    """The weighings of the batches that give a payload."""
     return [
         Weighing(at, (one.calibration_id, one.estimator), one.as_measured, one.posterior)
         for at, one in enumerate(estimates)

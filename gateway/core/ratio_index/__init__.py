@@ -1,8 +1,8 @@
 """The paper's estimator, kept for comparison: the ratio of two narrow bands of a sensor's spectrum, and a regression.
 
-A batch and a RatioIndexCalibration come in; the indexes R_a and R_g, and what they tell of payload and front share, go
-out (``estimator``). ``index`` has equations (6) to (8), ``regression`` the structures (9) to (11).
-docs/ratio-index.md tells how it is calibrated.
+A batch and a RatioIndexCalibration go in; the indexes R_a and R_g, payload and front share come out (``estimator``).
+``index`` has equations (6) to (8), ``regression`` the structures (9) to (11). docs/ratio-index.md describes its
+calibration.
 """
 
 from gateway.core.ratio_index.estimator import by_ratio_index

@@ -1,8 +1,8 @@
 """The paper's estimator: R_a and R_g by (7), (8), then the static regression (9), (10) or (11).
 
-Its gates are narrow, because the index moves with speed: the speed's spread within the batch and its
-distance from the calibrated speeds are bounded. Beyond the indexes that calibration saw the regression is a guess,
-and its interval the wider the worse the guess is, so that it would hold any load: the indexes are bounded too.
+Its gates are narrow, because the index varies with speed: they bound the speed's spread within the batch and its
+distance from the calibrated speeds. They also bound the indexes: outside the calibrated range the regression
+extrapolates, and its interval grows so wide that it would contain any load.
 """
 
 import math
@@ -17,12 +17,12 @@ from gateway.estimate import UNKNOWN, Z95, Estimate, Quantity
 from gateway.posterior import Posterior, Source
 from gateway.records import Batch, Why
 
-SPEED_MARGIN: Final = 0.15  # how far a batch's mean speed may lie outside those calibrated, as a share
-INDEX_MARGIN: Final = 0.25  # likewise every term of the indexes, as a share of its span; that of payloads is the same
+SPEED_MARGIN: Final = 0.15  # chosen: share by which a batch's mean speed may exceed the calibrated range
+INDEX_MARGIN: Final = 0.25  # chosen: likewise for each term of the indexes, of its span; the same as for payloads
 
 
 def by_ratio_index(batch: Batch, calibration: RatioIndexCalibration, blank: Estimate) -> Estimate:
-    """``blank`` with the indexes and what they tell of payload and front share, or with the reason why not."""
+    """``blank`` with the indexes, payload and front share, or with the reason for a refusal."""
     if float(np.std(batch.speed_mps[batch.usable])) > calibration.speed_std_max_mps:
         return replace(blank, rejected=(Why.SPEED_SPREAD,))
     slowest, fastest = calibration.speed_range_mps
@@ -49,10 +49,10 @@ def _predicted(model: RegressionModel | None, ra: float, rg: float) -> Quantity:
 
 
 def _posterior(payload: Quantity, front_share: Quantity) -> Posterior | None:
-    """Half of each variance is taken to be the batch's own, half the regression's, whose coefficients err alike in
-    every batch; None without a payload.
+    """The posterior of both quantities; None without a payload.
 
-    Standard deviations are those of the normal error whose 95 % interval is as wide as Student's.
+    Half of each variance counts as the batch's own, half as the regression's, whose coefficients are wrong alike in
+    every batch. Standard deviations are those of a normal error whose 95 % interval is as wide as Student's.
     """
     known = [one for one in (payload, front_share) if math.isfinite(one.number)]
     if not math.isfinite(payload.number):

@@ -1,9 +1,8 @@
 """The ratio index of Bottelli, Tanelli, Boniolo and Savaresi: the paper's estimator, faithful.
 
-Two narrow bands are cut from the spectrum of vertical acceleration (and two from that of pitch
-rate); the ratio of what passes through them moves with the load because the body's resonances do.
-
-A sensor beside the centre line takes roll for heave: with a roll rate its acceleration is moved to that line first.
+Two narrow bands are cut from the spectrum of vertical acceleration, and two from that of pitch rate. The ratio of the
+signal in the two bands varies with the load because the body's resonances do. A sensor beside the centre line also
+measures roll; with a roll rate its acceleration is first moved to the centre line.
 """
 
 from dataclasses import dataclass, field
@@ -16,8 +15,8 @@ from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transf
 from gateway.records import C128, F64, I64, Batch, Bool
 from gateway.schema import STRICT, described
 
-UPPER_LIMIT_HZ = 10.0  # of the integrals (7) and (8)
-MIN_SEGMENTS = 6
+UPPER_LIMIT_HZ = 10.0  # of the integrals (7) and (8), as in the paper
+MIN_SEGMENTS = 6  # chosen: a mean of fewer segments scatters too much
 
 SpectrumKind = Literal["amplitude", "power"]
 
@@ -37,11 +36,11 @@ PAPER_BANDS = {  # Table 2
 
 @dataclass(frozen=True, slots=True)
 class RatioIndexCalibration:
-    """What the ratio index needs to know of a vehicle; bands belong to it and come from its calibration.
+    """The calibration of the ratio index for one vehicle.
 
-    Each pair of bands is (numerator, denominator). A model is absent where its sensor or the other
-    is; speeds are the batch means seen in calibration. The acceleration was moved to the centre line from
-    roll_lever_m left of it; 0: taken as measured.
+    Each pair of bands is (numerator, denominator). A model is absent if its sensor or the other is; speeds are the
+    batch means seen in calibration. The acceleration is moved to the centre line from roll_lever_m left of it; 0: taken
+    as measured.
     """
 
     __pydantic_config__ = STRICT
@@ -97,12 +96,12 @@ def _mean(transforms: C128, n_segment: int, rate_hz: float, kind: SpectrumKind) 
 def acceleration_spectrum(
     batch: Batch, n_segment: int, kind: SpectrumKind, roll_lever_m: float
 ) -> tuple[F64, F64] | None:
-    """The vertical acceleration's mean spectrum, on the centre line where the roll rate brings it there.
+    """The vertical acceleration's mean spectrum, moved to the centre line where the roll rate allows it.
 
-    A point y metres left of the centre line of a rigid body moves up by heave + y roll (ISO 8855), so that there
-    a = a_y - y d(roll rate)/dt, and a derivative is a factor j 2 pi f. The taper's own slope is left out: of the roll
-    acceleration about 1 / (2 T f) for segments of T seconds, 0.015 at 1.7 Hz. As measured where there is no lever, and
-    where the roll rate is known in too few segments (:func:`is_moved`).
+    A point y metres left of the centre line of a rigid body moves up by heave + y roll (ISO 8855), so that on the line
+    a = a_y - y d(roll rate)/dt, and a derivative is a factor j 2 pi f. We neglect the taper's own slope: about 1 / (2 T
+    f) of the roll acceleration for segments of T seconds, 0.015 at 1.7 Hz. The spectrum is as measured if there is no
+    lever, or if too few segments have a roll rate (:func:`is_moved`).
     """
     x, usable = batch.vertical_acceleration_mps2, batch.usable
     if not is_moved(batch, n_segment, roll_lever_m) or batch.roll_rate_radps is None:
@@ -114,12 +113,12 @@ def acceleration_spectrum(
 
 
 def is_moved(batch: Batch, n_segment: int, roll_lever_m: float) -> bool:
-    """Whether there is a lever, and the roll rate is known in enough segments to do without the others."""
+    """Whether the lever arm is known and enough segments have a roll rate."""
     return roll_lever_m != 0.0 and len(_rolling(batch, n_segment)) >= MIN_SEGMENTS
 
 
 def acceleration_segments(batch: Batch, n_segment: int, roll_lever_m: float) -> I64:
-    """First samples (k,) of the segments that :func:`acceleration_spectrum` is a mean of."""
+    """First samples (k,) of the segments that :func:`acceleration_spectrum` averages."""
     if is_moved(batch, n_segment, roll_lever_m):
         return _rolling(batch, n_segment)
     return segment_starts(batch.usable & np.isfinite(batch.vertical_acceleration_mps2), n_segment, n_segment // 2)

@@ -5,15 +5,15 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
-from scipy.special import stdtrit
 
+from gateway.core.late import special
 from gateway.records import F64
 from gateway.schema import STRICT, check_shapes
 
 Term = Callable[[F64, F64], F64]
 
-# Raw R > 0 goes in; the columns are scaled to [-1, 1] afterwards. A calibration file names its terms by
-# these names: one may be added, none may change its meaning.
+# The arguments are raw R > 0; columns are scaled to [-1, 1] afterwards. Calibration files use these names:
+# terms may be added, but none may change its meaning.
 TERMS: Mapping[str, Term] = MappingProxyType(
     {
         "cbrt_ra": lambda ra, rg: np.cbrt(ra),
@@ -29,7 +29,7 @@ TERMS: Mapping[str, Term] = MappingProxyType(
     }
 )
 
-# the structures of the paper, each with a constant term besides
+# the paper's structures, each with a constant term in addition
 MODEL_9_PAYLOAD = ("cbrt_ra",)
 MODEL_10_FRONT_SHARE = ("cbrt_rg", "sqrt_rg")
 MODEL_11_PAYLOAD = ("cbrt_ra", "cbrt_rg", "sqrt_ra", "ra_rg")
@@ -38,11 +38,10 @@ MODEL_11_FRONT_SHARE = ("cbrt_rg", "rg", "ra2")
 
 @dataclass(frozen=True, slots=True)
 class RegressionModel:
-    """target = coefficients . [1, scaled terms]; everything that prediction and its spread need.
+    """target = coefficients . [1, scaled terms], with all that prediction and its standard deviation need.
 
-    lows and highs (p,) scale each term to [-1, 1]; coefficients (p + 1,), constant first;
-    gram_inverse (p + 1, p + 1) is (X'X)^-1 of the scaled columns; residual_std in the target's unit;
-    dof are the degrees of freedom behind it.
+    lows and highs (p,) scale each term to [-1, 1]; coefficients (p + 1,), constant first; gram_inverse (p + 1, p + 1)
+    is (X'X)^-1 of the scaled columns; residual_std is in the target's unit; dof are its degrees of freedom.
     """
 
     __pydantic_config__ = STRICT
@@ -69,11 +68,11 @@ class RegressionModel:
         row = scaled_columns(self.terms, np.array([ra]), np.array([rg]), self.lows, self.highs)[0]
         centre = float(row @ self.coefficients)
         std = self.residual_std * float(np.sqrt(1.0 + row @ self.gram_inverse @ row))
-        half = float(stdtrit(self.dof, 0.975)) * std
+        half = float(special.stdtrit(self.dof, 0.975)) * std
         return centre, std, (centre - half, centre + half)
 
     def extrapolates(self, ra: float, rg: float, margin: float) -> bool:
-        """True where a term lies outside what calibration saw of it by more than ``margin``, a share of its span."""
+        """True if a term is outside its calibrated range by more than ``margin``, a share of its span."""
         scaled = scaled_columns(self.terms, np.array([ra]), np.array([rg]), self.lows, self.highs)[0, 1:]
         return not bool(np.all(np.abs(scaled) <= 1.0 + 2.0 * margin))
 

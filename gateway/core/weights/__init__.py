@@ -1,10 +1,18 @@
-"""What a vehicle weighs on the road, as a whole and on each axle and wheel, and where its payload lies.
+"""The weights of a vehicle on the road: gross, per axle and per wheel, and the place of its payload.
 
-weighed(estimate, vehicle, unsprung)    # as it leaves; ``unsprung`` is what calibration found
+weighed(estimate, vehicle, unsprung)    # the estimate as published; ``unsprung`` comes from calibration
 """
 
 from gateway.core.weights.limits import RELEASE_SHARE, Limits, is_over_limit, over_limit_probability
-from gateway.core.weights.on_the_road import NOT_CALIBRATED, Place, Unsprung, place_of, unsprung_kg, weighed, weights_of
+from gateway.core.weights.on_the_road import (
+    NOT_CALIBRATED,
+    PayloadPlace,
+    Unsprung,
+    place_of,
+    unsprung_kg,
+    weighed,
+    weights_of,
+)
 from gateway.core.weights.room import Light, Nearness, Room, nearness, rooms_of
 
 __all__ = [
@@ -13,7 +21,7 @@ __all__ = [
     "Light",
     "Limits",
     "Nearness",
-    "Place",
+    "PayloadPlace",
     "Room",
     "Unsprung",
     "is_over_limit",

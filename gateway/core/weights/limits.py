@@ -1,4 +1,4 @@
-"""What a vehicle may weigh, how probable it is that it weighs more, and when a weight counts as over its limit."""
+"""Permitted weights, the probability of exceeding them, and when a weight counts as over its limit."""
 
 import math
 from collections.abc import Iterable
@@ -7,12 +7,12 @@ from typing import Any, Final, Self
 
 from gateway.core.vehicle import Vehicle
 
-RELEASE_SHARE: Final = 0.03  # of the limit: how far a load must fall below it before a warning ends
+RELEASE_SHARE: Final = 0.03  # chosen: of the limit; a warning ends below this margin
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Permitted weights, by the names that Vehicle has for them; None where nobody said."""
+    """Permitted weights, with Vehicle's names; None if not stated."""
 
     gross_limit_kg: float | None = None
     front_axle_limit_kg: float | None = None
@@ -22,29 +22,28 @@ class Limits:
 
     @classmethod
     def of(cls, told: Any) -> Self:
-        """As ``told`` has them, by the same names."""
+        """The limits that are attributes of ``told``."""
         return cls(**{one.name: getattr(told, one.name) for one in fields(cls)})
 
     def overridden_by(self, nearer: Self) -> Self:
-        """With those that ``nearer`` states in place of these."""
+        """These limits, replaced by those that ``nearer`` states."""
         return replace(self, **nearer.stated())
 
     def stated(self) -> dict[str, Any]:
-        """Those that somebody said, by name."""
+        """The stated limits by name."""
         numbers = {one.name: getattr(self, one.name) for one in fields(self)}
         return {name: kg for name, kg in numbers.items() if kg is not None}
 
     def on(self, vehicle: Vehicle) -> Vehicle:
-        """``vehicle`` with these limits; where there is none here it keeps its own."""
+        """``vehicle`` with these limits; where none is stated it keeps its own."""
         return replace(vehicle, **self.stated())
 
 
 def over_limit_probability(kg: float, std_kg: float, limit_kg: float | None) -> float:
-    """P(weight > limit), 0 to 1, of a weight with a normal error; NaN without a limit or a known weight.
+    """P(weight > limit), 0 to 1, for a weight with a normal error; NaN without a limit or a known weight.
 
     With Phi the standard normal distribution, P = 1 - Phi((limit - kg) / std) = erfc((limit - kg) / (std sqrt 2)) / 2
-    (Abramowitz and Stegun, Handbook of Mathematical Functions, 26.2.29). A weight without any error is over its limit
-    or is not.
+    (Abramowitz and Stegun, Handbook of Mathematical Functions, 26.2.29). Without an error P is 0 or 1.
     """
     if limit_kg is None or math.isnan(kg) or math.isnan(std_kg):
         return math.nan
@@ -56,8 +55,8 @@ def over_limit_probability(kg: float, std_kg: float, limit_kg: float | None) -> 
 def is_over_limit(weights_kg: Iterable[float], limit_kg: float | None) -> bool:
     """Whether the last of a series of weights counts as over the limit, with hysteresis.
 
-    A warning begins above the limit and ends 3 % below it, so that an estimate that wavers about the
-    limit does not make it flicker. No limit, or no known weight: no warning.
+    A warning begins above the limit and ends 3 % below it, so that it does not flicker near the limit. No limit, or no
+    known weight: no warning.
     """
     is_over = False
     for weight_kg in weights_kg:

@@ -1,4 +1,4 @@
-"""What a vehicle weighs as a whole, on each axle and on each wheel, and where its payload lies."""
+"""The weights of a vehicle: gross, per axle and per wheel, and the place of its payload."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, Source
 
 @dataclass(frozen=True, slots=True)
 class Unsprung:
-    """Unsprung masses of both axles in kg; ``correlation`` is of their errors. One that was stated has no error."""
+    """Unsprung masses of both axles in kg; ``correlation`` is that of their errors. A stated mass has no error."""
 
     front: Quantity = UNKNOWN
     rear: Quantity = UNKNOWN
@@ -29,11 +29,11 @@ class Unsprung:
 
     @property
     def is_estimated(self) -> bool:
-        """True where either axle's was not stated."""
+        """True if either mass was not stated."""
         return self.front.std > 0.0 or self.rear.std > 0.0
 
     def unless_stated(self, vehicle: Vehicle) -> "Unsprung":
-        """What the fitter of ``vehicle`` stated, and these where nothing was."""
+        """The masses that the fitter of ``vehicle`` stated, and these where none was."""
         front_kg, rear_kg = unsprung_kg(vehicle)
         return Unsprung(
             self.front if math.isnan(front_kg) else Quantity(front_kg, 0.0),
@@ -46,7 +46,7 @@ NOT_CALIBRATED: Final = Unsprung()
 
 
 def unsprung_kg(vehicle: Vehicle) -> tuple[float, float]:
-    """Unsprung mass at the front and the rear axle; NaN where neither it nor the kerb weight is stated."""
+    """Unsprung mass at the front and the rear axle; NaN if neither it nor the kerb weight is stated."""
     share = vehicle.empty_front_share
     return (
         _unsprung(vehicle.unsprung_front_kg, vehicle.kerb_front_axle_kg, share * vehicle.empty_mass_kg),
@@ -64,7 +64,7 @@ ROLL_UNKNOWN: Final = Quantity()
 
 
 def weighed(estimate: Estimate, vehicle: Vehicle | None, unsprung: Unsprung = NOT_CALIBRATED) -> Estimate:
-    """``estimate`` with the weights on the road that follow from it; without a vehicle none is known."""
+    """``estimate`` with the weights that follow from it; without a vehicle all are unknown."""
     if vehicle is None:
         return replace(estimate, weights=Weights(), left_share=UNKNOWN)
     roll_share = Quantity(estimate.roll_share_front, estimate.roll_share_front_std)
@@ -85,23 +85,23 @@ def weights_of(
     roll_share: Quantity = ROLL_UNKNOWN,
     unsprung: Unsprung = NOT_CALIBRATED,
 ) -> Weights:
-    """Gross weight, axle loads and wheel loads of ``vehicle`` with a payload aboard, standing on level ground.
+    """Gross weight, axle loads and wheel loads of a loaded ``vehicle`` on level ground.
 
-    On an axle rests its share D of the sprung mass m = M + L and its unsprung mass u, half of each on either wheel:
+    An axle carries its share D of the sprung mass m = M + L and its unsprung mass u, half of each on either wheel:
 
         F_front = D m + u_front,    F_rear = (1 - D) m + u_rear,    G = F_front + F_rear
 
     A centre of gravity y left of the centre line adds the moment m g y, of which the front axle takes phi, the
-    ``roll_share``, as its springs and anti-roll bar resist roll (Gillespie, Fundamentals of Vehicle Dynamics, ch. 6:
-    roll moment distribution). With w the track width, left wheels bear more by, and right ones less by
+    ``roll_share``, according to its springs and anti-roll bar (Gillespie, Fundamentals of Vehicle Dynamics, ch. 6: roll
+    moment distribution). With w the track width, left wheels carry more, and right ones less, by
 
         front: phi m y / w,    rear: (1 - phi) m y / w
 
-    How far the body leans under it is left out. Each weight is J (L, D, y) to first order, and its variance J S J' of
-    the posterior's covariance S; phi's error counts as independent. Empty figures count as exact. An unsprung mass that
-    was not stated follows from the kerb weight of its axle, and without this is the one that calibration found,
-    ``unsprung``, with its error, which counts as independent of all others: it moves an axle by kilograms, and payload
-    and share hardly. What lacks something is unknown and says what (``Weight.lacks``).
+    The body's lean is neglected. Each weight is J (L, D, y) to first order, with variance J S J' of the posterior's
+    covariance S; phi's error counts as independent. Empty figures count as exact. An unsprung mass that was not stated
+    follows from the kerb weight of its axle, else from calibration (``unsprung``) with its error. That error counts as
+    independent of all others: it moves an axle load by kilograms, and hardly moves payload and share. A weight with a
+    missing input is unknown and says which (``Weight.lacks``).
     """
     below = unsprung.unless_stated(vehicle)
     known = _Known.of(vehicle, posterior, roll_share)
@@ -122,7 +122,7 @@ def weights_of(
 
 @dataclass(frozen=True, slots=True)
 class _Known:
-    """What an estimate and a vehicle say together; NaN where unknown. ``share`` is 0..1."""
+    """The inputs from an estimate and a vehicle; NaN where unknown. ``share`` is 0..1."""
 
     posterior: Posterior | None
     sprung_kg: float
@@ -149,9 +149,10 @@ class _Known:
         *,
         is_estimated: bool,
     ) -> Weight:
-        """``slopes`` by payload (kg), front share (0..1) and lateral place (m), as many as this weight follows from.
+        """A weight; ``slopes`` are by payload (kg), front share (0..1) and lateral place (m), as many as it depends on.
 
-        ``is_estimated`` is of the unsprung mass: errors of two axles may cancel in it, and yet it was not stated.
+        ``is_estimated`` is of the unsprung mass: errors of both axles may cancel in the weight, and yet it was not
+        stated.
         """
         if math.isnan(kg) or self.posterior is None:
             return Weight(limit_kg=limit_kg, lacks=self._lack(len(slopes)))
@@ -160,7 +161,7 @@ class _Known:
         return Weight(kg, found.std, limit_kg, None, is_estimated, found.interval95)
 
     def _lack(self, n_slopes: int) -> Lack:
-        """Why a weight is unknown that follows from the first so many quantities, the first cause first."""
+        """The first missing input of a weight that depends on the first ``n_slopes`` quantities."""
         is_wheel = n_slopes > CG_LEFT
         if not math.isfinite(self.sprung_kg) or (n_slopes > FRONT_SHARE and not math.isfinite(self.share)):
             return Lack.ESTIMATE
@@ -172,9 +173,9 @@ class _Known:
 
 @dataclass(frozen=True, slots=True)
 class _Axle:
-    """Has ``share`` of the sprung mass and ``roll_share`` of its sideways moment.
+    """An axle with ``share`` of the sprung mass and ``roll_share`` of its roll moment.
 
-    ``sign`` is the slope of both by what was estimated, the front's: 1 in front, -1 at the rear.
+    ``sign`` is the slope of both by the front's estimated values: 1 for the front axle, -1 for the rear.
     """
 
     known: _Known
@@ -184,14 +185,14 @@ class _Axle:
     unsprung: Quantity
 
     def whole(self, limit_kg: float | None) -> Weight:
-        """Both wheels."""
+        """The load of both wheels."""
         sprung_kg = self.known.sprung_kg
         kg = self.share * sprung_kg + self.unsprung.number
         slopes = [self.share, self.sign * sprung_kg]
         return self.known.weight(kg, slopes, self.unsprung.std, limit_kg, is_estimated=self.unsprung.std > 0.0)
 
     def wheel(self, side: float, limit_kg: float | None) -> Weight:
-        """``side`` is 1 to the left, -1 to the right."""
+        """The load of one wheel; ``side`` is 1 for the left, -1 for the right."""
         sprung_kg, per_track = self.known.sprung_kg, side / self.known.track_m
         moment = per_track * self.known.cg_left_m  # in sprung masses
         by_roll_share_kg = sprung_kg * moment * self.known.roll_share.std
@@ -209,10 +210,10 @@ class _Axle:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """Where the payload's centre of gravity is, behind the front axle, and its standard deviation.
+class PayloadPlace:
+    """The payload's centre of gravity behind the front axle, and its standard deviation.
 
-    Left of the centre line likewise, NaN where nothing tells; ``correlation`` is of both errors.
+    The same left of the centre line, NaN if unknown; ``correlation`` is that of both errors.
     """
 
     position_m: float
@@ -222,16 +223,16 @@ class Place:
     correlation: float = math.nan
 
 
-def place_of(vehicle: Vehicle, posterior: Posterior) -> Place | None:
-    """Where the payload lies; None where there may be none, and so no place to tell.
+def place_of(vehicle: Vehicle, posterior: Posterior) -> PayloadPlace | None:
+    """The place of the payload; None if there may be no payload, and so no place.
 
     With s the share, s0 the empty share, M the empty mass and l the wheelbase, moments about the front axle give
 
-        d = l (1 - F / L),    F = s (M + L) - s0 M,    the part of L that rests on the front axle,
+        d = l (1 - F / L),    F = s (M + L) - s0 M,    the part of L on the front axle,
 
-    the inverse of equation (3) of Bottelli et al. With y and y0 the centres of gravity left of the centre line of
-    the whole and of the empty vehicle, moments about that line give y_L = ((M + L) y - M y0) / L. Errors are of
-    first order. What the empty share adds to the error of s is in s0 too, and drops out.
+    the inverse of equation (3) of Bottelli et al. With y and y0 the centres of gravity of the loaded and of the empty
+    vehicle left of the centre line, moments about that line give y_L = ((M + L) y - M y0) / L. Errors are to first
+    order. The error of the empty share is the same in s and in s0, and cancels.
     """
     payload = posterior.quantity(PAYLOAD)
     if posterior.size <= FRONT_SHARE or not payload.interval95[0] > 0.0:
@@ -246,11 +247,11 @@ def place_of(vehicle: Vehicle, posterior: Posterior) -> Place | None:
     position_m = vehicle.wheelbase_m * (1.0 - front_share_of_load)
     std_m = posterior.linear(position_m, along).std
     if posterior.size <= CG_LEFT:
-        return Place(position_m, std_m)
+        return PayloadPlace(position_m, std_m)
     cg_left_m = float(posterior.mean[CG_LEFT])
     left_m = (total_kg * cg_left_m - vehicle.empty_mass_kg * vehicle.empty_cg_left_m) / load_kg
     across = [(cg_left_m - left_m) / load_kg, 0.0, total_kg / load_kg]
     left_std_m = posterior.linear(left_m, across).std
     is_both = std_m * left_std_m > 0.0
     correlation = posterior.covariance_of(along, across) / (std_m * left_std_m) if is_both else math.nan
-    return Place(position_m, std_m, left_m, left_std_m, correlation)
+    return PayloadPlace(position_m, std_m, left_m, left_std_m, correlation)

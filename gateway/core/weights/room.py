@@ -1,4 +1,4 @@
-"""How much more a vehicle may carry, and how near it is to too much."""
+"""How much more a vehicle may carry, and how close it is to its limits."""
 
 import math
 from collections.abc import Iterator
@@ -9,13 +9,13 @@ from typing import Final
 from gateway.core.weights.limits import over_limit_probability
 from gateway.estimate import Quantity, Weights
 
-LOADED_PLACES: Final = ("gross", "front_axle", "rear_axle")  # what a load wherever it is put comes to rest on
-NEAR_PROBABILITY: Final = 0.025  # of too much: the limit lies within the weight's 95 % interval
-OVER_PROBABILITY: Final = 0.5  # rather too much than not
+LOADED_PLACES: Final = ("gross", "front_axle", "rear_axle")  # the places that any additional load affects
+NEAR_PROBABILITY: Final = 0.025  # of overload: the limit is within the weight's 95 % interval
+OVER_PROBABILITY: Final = 0.5  # overload is more likely than not
 
 
 class Light(StrEnum):
-    """What a driver has to know at a glance."""
+    """The traffic light for the driver."""
 
     GO = "go"
     NEAR = "near"
@@ -25,7 +25,7 @@ class Light(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """What may still go aboard before ``place`` bears its limit, in kg; negative where it bears more already."""
+    """The payload (kg) that may still be added before ``place`` reaches its limit; negative if it is above already."""
 
     place: str
     limit_kg: float
@@ -33,18 +33,17 @@ class Room:
 
     @property
     def surely_kg(self) -> float:
-        """The lower end of the 95 % interval; the number itself where nobody knows how sure it is."""
+        """The lower end of the 95 % interval; the number itself if its error is unknown."""
         low_kg = self.left.interval95[0]
         return self.left.number if math.isnan(low_kg) else low_kg
 
 
 def rooms_of(weights: Weights) -> tuple[Room, ...]:
-    """Of the whole and of each axle that has a limit and is known, the tightest first.
+    """The room of the vehicle and of each axle with a limit and a known weight, the tightest first.
 
-    With F what a place bears and F_max its limit, it takes F_max - F, with F's standard deviation. An axle takes as
-    much where all of it comes to rest on this axle; put between the axles it may be more. So the least of them is what
-    may go in wherever between the axles it is put. Limits of wheels say how a load lies, more than how much there may
-    be of it: they are no part of this.
+    With F the weight of a place and F_max its limit, the room is F_max - F, with F's standard deviation. An axle's room
+    holds if all of the added load acts on it; between the axles more is possible. So the least room holds for any place
+    between the axles. Limits of wheels concern the place of a load more than its size, and are left out.
     """
     return tuple(sorted(_rooms(weights), key=lambda room: room.surely_kg))
 
@@ -59,13 +58,13 @@ def _rooms(weights: Weights) -> Iterator[Room]:
 
 @dataclass(frozen=True, slots=True)
 class Nearness:
-    """How probable too much is, of every place that has a limit and is known, wheels too."""
+    """The probability of overload of every place with a limit and a known weight, wheels included."""
 
     probabilities: dict[str, float]
 
     @property
     def light(self) -> Light:
-        """By the place where too much is most probable."""
+        """The light for the most probable overload."""
         most = max(self.probabilities.values(), default=math.nan)
         if math.isnan(most):
             return Light.UNKNOWN
@@ -74,14 +73,14 @@ class Nearness:
         return Light.NEAR if most > NEAR_PROBABILITY else Light.GO
 
     def places(self) -> tuple[str, ...]:
-        """Those that the light is about, the worst first."""
+        """The places that cause the light, the worst first."""
         least = {Light.OVER: OVER_PROBABILITY, Light.NEAR: NEAR_PROBABILITY}.get(self.light, math.inf)
         told = [place for place, probability in self.probabilities.items() if probability >= least]
         return tuple(sorted(told, key=lambda place: -self.probabilities[place]))
 
 
 def nearness(weights: Weights) -> Nearness:
-    """Of these weights."""
+    """The nearness of these weights."""
     found = {
         place: over_limit_probability(weight.kg, weight.std_kg, weight.limit_kg) for place, weight in weights.items()
     }

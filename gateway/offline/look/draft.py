@@ -1,4 +1,4 @@
-"""A first signal map: what was found, written down with how it is known, to be checked by a person."""
+"""A draft of a signal map from the findings, with the evidence for each, for a person to check."""
 
 import os
 from collections.abc import Iterator
@@ -12,21 +12,20 @@ from gateway.errors import ConfigurationError, SpringscaleError
 from gateway.files.whole import refusal_told, write_whole, written_whole
 from gateway.offline.look.look import Look
 from gateway.offline.look.readings import Described
-from gateway.offline.look.roles import Found
+from gateway.offline.look.roles import FoundRole
 from gateway.records import I64, JOURNEY, Signal
 
-MOSTLY: Final = 0.5
+MOSTLY: Final = 0.5  # more often than not
 COUNTED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE)  # timed by the message counter
 COUNTER_BITS: Final = range(2, 33)
-FIX_3D: Final = 3
+FIX_3D: Final = 3  # usual code of a three-dimensional GNSS fix
 _COUNTER_WORDS: Final = ("counter", "count", "alive", "sequence", "seq")
 
 
 def write_draft(seen: Look, output: Path) -> tuple[Path, ...]:
-    """Write the map and, beside it, the databases it needs that come with the package; what was written, the map first.
+    """Write the map and, beside it, the shipped databases it needs; returns the paths, the map first.
 
-    Raises ConfigurationError where that would write over a file or the disk refuses it, SpringscaleError where nothing
-    was found to write.
+    Raises ConfigurationError if a file exists or the disk fails, SpringscaleError if nothing was found.
     """
     shipped = seen.shipped
     if shipped is None and not any(found.role is Signal.VERTICAL_ACCELERATION for found in seen.found):
@@ -49,7 +48,7 @@ def write_draft(seen: Look, output: Path) -> tuple[Path, ...]:
 
 
 def _own_text(seen: Look, output: Path) -> str:
-    """The map of what was found."""
+    """The map of the findings."""
     roles = {found.role: found for found in seen.found}
     sources = dict.fromkeys(found.reading.described.message.source for found in seen.found)
     up = roles[Signal.VERTICAL_ACCELERATION].reading.described
@@ -70,12 +69,12 @@ def _own_text(seen: Look, output: Path) -> str:
 
 
 def _as_named(path: Path, output: Path) -> str:
-    """A database as the map names it, from where the map lies: those of the package are copied beside it."""
+    """A database's path relative to the map; shipped databases are copied beside it."""
     beside = path in shipped_databases() or path.resolve().parent == output.resolve().parent
     return path.name if beside else Path(os.path.relpath(path.resolve(), output.resolve().parent)).as_posix()
 
 
-def _entry(found: Found) -> Iterator[str]:
+def _entry(found: FoundRole) -> Iterator[str]:
     signal = found.reading.signal
     yield f"[signals.{found.role}] # {'' if found.is_sure else 'CHECK: '}{found.why}"
     yield f"message = {_toml(found.reading.described.message.name)}"
@@ -93,7 +92,7 @@ def _entry(found: Found) -> Iterator[str]:
 
 
 def _valid_when(described: Described, signal: DatabaseSignal) -> tuple[str, int] | None:
-    """The one flag of the message that says "valid" and mostly holds, or a GNSS fix that mostly is a full one."""
+    """The only flag of the message that says "valid" and is mostly set, or a GNSS fix that is mostly complete."""
     raw = {other.name: _raw(described, other) for other in described.message.signals.values() if other is not signal}
     fields = {name: described.message.signals[name].field for name in raw}
     valid = [
@@ -110,7 +109,7 @@ def _valid_when(described: Described, signal: DatabaseSignal) -> tuple[str, int]
 
 
 def _counter(described: Described) -> str | None:
-    """The signal of the message that goes on by one from most frames to the next."""
+    """The signal of the message that usually advances by one from frame to frame."""
     for signal in described.message.signals.values():
         is_named = any(word in signal.name.lower() for word in _COUNTER_WORDS)
         if not is_named or signal.field.length not in COUNTER_BITS or signal.field.coding is Coding.FLOAT:
@@ -122,7 +121,7 @@ def _counter(described: Described) -> str | None:
 
 
 def _raw(described: Described, signal: DatabaseSignal) -> I64:
-    """Raw numbers (n,) of one signal in the frames of the right length."""
+    """Raw integers (n,) of one signal in the frames of the right length."""
     frames = described.heard.frames
     return signal.field.bits(frames.payload[frames.length == described.message.length]).astype(np.int64)
 

@@ -1,4 +1,4 @@
-"""One look at a log: who speaks, what it may be, what carries gravity, and whether that can work."""
+"""Inspects a log: its senders, their probable meaning, the axis with gravity, and whether it suffices."""
 
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from gateway.bus.frames import merge_frames
-from gateway.bus.heard import Heard, counted, heard_on
+from gateway.bus.heard import Heard, counted, heard_on, similar_to
 from gateway.bus.logs import LogReport, motion_of_log, open_whole_log
 from gateway.bus.signals import (
     Decoder,
@@ -21,12 +21,11 @@ from gateway.bus.signals import (
     shipped_map,
     shipped_maps,
 )
-from gateway.bus.similar import similar_to
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE
 from gateway.core.settings import BatchSettings
 from gateway.errors import SignalMapError
-from gateway.offline.look.readings import Described, Reading, databases_of, described, readings_of
-from gateway.offline.look.roles import Found, roles_of, tilt_deg
+from gateway.offline.look.readings import Described, SignalReading, databases_of, described, readings_of
+from gateway.offline.look.roles import FoundRole, roles_of, tilt_deg
 from gateway.records import ASIDE, F64, Signal
 from gateway.units import STANDARD_GRAVITY_MPS2
 
@@ -34,8 +33,8 @@ NEEDED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
-    """A shipped map on one channel: which signals come, which that weigh do not, what its vertical axis reads."""
+class MapFit:
+    """A shipped map on one channel: the signals found, the missing ones, and the mean of its vertical axis."""
 
     name: str
     device: str
@@ -46,18 +45,18 @@ class Fit:
 
     @property
     def is_whole(self) -> bool:
-        """Whether both inertial signals come, and gravity is where the map says."""
+        """Whether both inertial signals come, and gravity is on the mapped axis."""
         has_gravity = abs(self.gravity_mps2 - STANDARD_GRAVITY_MPS2) < GRAVITY_TOLERANCE_MPS2
         return has_gravity and all(signal in self.found for signal in NEEDED)
 
 
-def fits_of(heard: Sequence[Heard]) -> tuple[Fit, ...]:
-    """The maps of which at least one signal comes, the best first."""
+def fits_of(heard: Sequence[Heard]) -> tuple[MapFit, ...]:
+    """The maps with at least one signal found, the best first."""
     fits = [fit for name in shipped_maps() for fit in _fits(name, heard)]
     return tuple(sorted(fits, key=lambda fit: (not fit.is_whole, len(fit.missing), fit.name)))
 
 
-def _fits(name: str, heard: Sequence[Heard]) -> Iterator[Fit]:
+def _fits(name: str, heard: Sequence[Heard]) -> Iterator[MapFit]:
     signal_map = load_signal_map(f"springscale:{name}")
     device = shipped_map(name).read_text(encoding="utf-8").splitlines()[0].removeprefix("# ").rstrip(".")
     for channel in sorted({one.channel for one in heard}, key=str):
@@ -69,7 +68,7 @@ def _fits(name: str, heard: Sequence[Heard]) -> Iterator[Fit]:
         missing = tuple(signal for signal in motion.signals if signal not in found and signal not in ASIDE)
         vertical = motion.of(Signal.VERTICAL_ACCELERATION)[1]
         if found:
-            yield Fit(name, device, channel, found, missing, float(np.median(vertical)) if len(vertical) else np.nan)
+            yield MapFit(name, device, channel, found, missing, float(np.median(vertical)) if len(vertical) else np.nan)
 
 
 def _is_mapped(one: Heard, signal_map: SignalMap) -> bool:
@@ -81,7 +80,7 @@ NO_CHANNEL: Final = "None"  # how python-can's readers name the channel of a log
 
 
 def heard_in(log: Path) -> tuple[tuple[Heard, ...], LogReport]:
-    """Every identifier in order of channel and number. Raises LogUnreadableError where nothing can be read."""
+    """Every identifier in order of channel and number. Raises LogUnreadableError if nothing can be read."""
     chunks, report = open_whole_log(log)
     of_all = counted(chunks)
     report.require_frames()
@@ -93,7 +92,7 @@ def heard_in(log: Path) -> tuple[tuple[Heard, ...], LogReport]:
 
 
 _NO_POSITION: Final = re.compile(r"accura|error|std|dev|valid|ref|dest", re.IGNORECASE)
-_STEP_M: Final = 2000.0  # between two frames; an odometer that leaps further counts something else
+_STEP_M: Final = 2000.0  # chosen: between two frames; a larger step is not an odometer's
 
 _LOOKED_FOR: Final[tuple[tuple[Signal, str, re.Pattern[str], Callable[[F64], bool]], ...]] = (
     (Signal.LATITUDE, "angle", re.compile(r"latitude|(?:^|_)lat(?:_|$)", re.IGNORECASE), lambda x: _is_angle(x, 90.0)),
@@ -112,8 +111,8 @@ _LOOKED_FOR: Final[tuple[tuple[Signal, str, re.Pattern[str], Callable[[F64], boo
 )
 
 
-def journey_of(readings: Sequence[Reading]) -> tuple[Found, ...]:
-    """Latitude, longitude and odometer where a signal has the name and reads like one; the finest of them."""
+def journey_of(readings: Sequence[SignalReading]) -> tuple[FoundRole, ...]:
+    """Latitude, longitude and odometer, by a signal's name and values; the finest of each."""
     found = []
     for role, quantity, name, fits in _LOOKED_FOR:
         named = [
@@ -123,17 +122,17 @@ def journey_of(readings: Sequence[Reading]) -> tuple[Found, ...]:
         good = [r for r in named if len(r.x) > 1 and fits(r.x)]
         if good:
             finest = min(good, key=lambda r: (abs(r.signal.field.scale), -r.rate_hz))
-            found.append(Found(role, finest, 1, "its name says so, and it reads like one"))
+            found.append(FoundRole(role, finest, 1, "its name says so, and it reads like one"))
     return tuple(found)
 
 
 def _is_angle(x: F64, most_deg: float) -> bool:
-    """A receiver without a fix mostly sends 0, or what lies outside."""
+    """Whether these are angles; a receiver without a fix mostly sends 0 or a value out of range."""
     return bool(np.all(np.abs(x) <= most_deg) and np.any(x != 0.0))
 
 
 def why_silent(log: Path, signal_map: SignalMap, signal: Signal) -> str:
-    """In words. Reads the log once or twice more; raises LogUnreadableError as every reader does."""
+    """The reason in words. Reads the log once or twice more; raises LogUnreadableError as every reader does."""
     message = next(m for m in signal_map.messages if any(mapped.signal is signal for mapped in m.signals))
     motions, _, decoder = motion_of_log(log, signal_map)
     for _ in motions:
@@ -155,49 +154,49 @@ def _named(message: MappedMessage) -> str:
 
 
 LEAST_RATE_HZ = RATE_MIN_SHARE * BatchSettings().rate_hz
-MOST_TILT_DEG = 15.0  # 3 % of gravity; what lies along and across then mixes in as well
+MOST_TILT_DEG = 15.0  # chosen: 3 % of gravity; beyond it the horizontal axes mix in noticeably
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What a log holds. ``lacking`` says what stands in the way; empty where this can work."""
+    """The findings about a log. ``lacking`` lists the obstacles; empty if it suffices."""
 
     log: Path
     report: LogReport
     duration_s: float
     heard: tuple[Heard, ...]
     described: tuple[Described, ...]
-    fits: tuple[Fit, ...]
-    readings: tuple[Reading, ...]
-    found: tuple[Found, ...]
+    fits: tuple[MapFit, ...]
+    readings: tuple[SignalReading, ...]
+    found: tuple[FoundRole, ...]
     tilt_deg: float
     lacking: tuple[str, ...]
     faults: tuple[str, ...]
 
     @property
-    def accelerations(self) -> tuple[Reading, ...]:
-        """Every acceleration of which there is a sample."""
+    def accelerations(self) -> tuple[SignalReading, ...]:
+        """Every acceleration with a sample."""
         return tuple(r for r in self.readings if r.quantity == "acceleration" and len(r.x))
 
     @property
     def unsure_databases(self) -> tuple[str, ...]:
-        """Shipped databases that what was found is read by, where no shipped map fits as it is."""
+        """Shipped databases used by the findings, if no shipped map fits as it is."""
         if any(fit.is_whole for fit in self.fits):
             return ()
         sources = dict.fromkeys(found.reading.described.message.source for found in self.found)
         return tuple(path.name for path in sources if path in shipped_databases())
 
     @property
-    def shipped(self) -> Fit | None:
-        """The one shipped map that fits as it is; None where none does, or several do."""
+    def shipped(self) -> MapFit | None:
+        """The only shipped map that fits as it is; None if none or several do."""
         whole = [fit for fit in self.fits if fit.is_whole]
         return whole[0] if len(whole) == 1 else None
 
 
 def look(log: Path, databases: Sequence[Path] = ()) -> Look:
-    """Look at a log with these databases (none: those beside it or one folder above) and those of the package.
+    """Inspect a log with these databases (default: those beside it or in the parent folder) and the shipped ones.
 
-    Raises LogUnreadableError where there is no frame in it, SignalMapError for a given database that cannot be read.
+    Raises LogUnreadableError if there is no frame in it, SignalMapError for a given database that cannot be read.
     """
     heard, report = heard_in(log)
     own, faults = databases_of(databases or _near(log))
@@ -221,15 +220,17 @@ def look(log: Path, databases: Sequence[Path] = ()) -> Look:
 
 
 def _near(log: Path) -> list[Path]:
-    """Databases beside a log, or where there are none, one folder above: campaigns have a folder a drive."""
+    """Databases beside a log or else in the parent folder, as campaigns have a folder per drive."""
     folder = log.resolve().parent
     places = [(place, kinds) for kinds in (("dbc",), ("kcd", "arxml", "sym")) for place in (folder, folder.parent)]
     each = (sorted(path for kind in kinds for path in place.glob(f"*.{kind}")) for place, kinds in places)
     return next((found for found in each if found), [])
 
 
-def _lacking(found: Sequence[Found], fits: Sequence[Fit], readings: Sequence[Reading], tilt: float) -> Iterator[str]:
-    """What keeps a vehicle from being weighed by this, and how to mend it."""
+def _lacking(
+    found: Sequence[FoundRole], fits: Sequence[MapFit], readings: Sequence[SignalReading], tilt: float
+) -> Iterator[str]:
+    """The obstacles to weighing with this log, and their remedies."""
     if any(fit.is_whole for fit in fits):
         whole = next(fit for fit in fits if fit.is_whole)
         if not {Signal.SPEED, Signal.WHEEL_SPEED} & set(whole.found):

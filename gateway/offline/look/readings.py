@@ -1,4 +1,4 @@
-"""What databases make of the frames that were heard: every signal with a unit of ours, in SI."""
+"""Signals of the frames by their databases: every signal with a known unit, in SI."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ QUANTITIES: Final = ("acceleration", "angular_rate", "speed", "angle", "distance
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """An identifier and the message that a database says it is; ``by_group`` where only the J1939 group is the same."""
+    """An identifier and its message by a database; ``by_group`` if only the J1939 group is the same."""
 
     heard: Heard
     message: DatabaseMessage
@@ -28,13 +28,13 @@ class Described:
 
     @property
     def has_length(self) -> bool:
-        """Whether frames are as long as the database says."""
+        """Whether frames have the length in the database."""
         return self.message.length in self.heard.lengths
 
 
 @dataclass(frozen=True)
-class Reading:
-    """One signal of one identifier: times (n,) from the log's own origin and valid samples (n,) in SI."""
+class SignalReading:
+    """One signal of one identifier: times (n,) from the log's origin and valid samples (n,) in SI."""
 
     described: Described
     signal: DatabaseSignal
@@ -49,7 +49,7 @@ class Reading:
 
     @property
     def rate_hz(self) -> float:
-        """How often its frames come."""
+        """The rate of its frames."""
         return self.described.heard.rate_hz
 
     @cached_property
@@ -59,7 +59,7 @@ class Reading:
 
 
 def databases_of(paths: Sequence[Path]) -> tuple[tuple[DatabaseMessage, ...], tuple[str, ...]]:
-    """Every message of the databases, and what is wrong with those that cannot be read."""
+    """Every message of the databases, and the faults of unreadable ones."""
     messages: list[DatabaseMessage] = []
     faults: list[str] = []
     for path in paths:
@@ -71,7 +71,7 @@ def databases_of(paths: Sequence[Path]) -> tuple[tuple[DatabaseMessage, ...], tu
 
 
 def described(heard: Sequence[Heard], messages: Sequence[DatabaseMessage]) -> tuple[Described, ...]:
-    """The identifiers that a message describes: first a message of their length, then the first of all."""
+    """The identifiers with a message: first a message of their length, then the first of all."""
     found = []
     for one in heard:
         same = [Described(one, message, False) for message in messages if message.frame_id == one.can_id]
@@ -88,8 +88,8 @@ def _is_same_group(message: DatabaseMessage, heard: Heard) -> bool:
     return heard.can_id & group.mask == group.can_id
 
 
-def readings_of(found: Described, origin_ns: int) -> Iterator[Reading]:
-    """What its units say is a quantity of ours, from frames of its length."""
+def readings_of(found: Described, origin_ns: int) -> Iterator[SignalReading]:
+    """The signals with a known unit, from frames of the right length."""
     frames = found.heard.frames
     frames = take(frames, frames.length == found.message.length)
     t_s = (frames.t_ns - origin_ns) / NS_PER_S
@@ -102,7 +102,7 @@ def readings_of(found: Described, origin_ns: int) -> Iterator[Reading]:
         is_valid = np.isfinite(x)
         if found.by_group and signal.field.coding is Coding.UNSIGNED:
             is_valid &= ~is_j1939_code(signal.field, bits)
-        yield Reading(found, signal, quantity, t_s[is_valid], x[is_valid])
+        yield SignalReading(found, signal, quantity, t_s[is_valid], x[is_valid])
 
 
 def _quantity(signal: DatabaseSignal) -> str | None:

@@ -1,8 +1,8 @@
-"""Which signal is which of ours: the axis that carries gravity, the one that braking shows, the one they leave.
+"""Assigns roles to signals: the axis with gravity, the one that shows braking, and the remaining one.
 
-Gravity shows the axis that is up, and the horizontal acceleration that goes with the change of speed the one that lies
-along the vehicle. Left is up x forward (ISO 8855). The rate about left is the pitch rate and the one about forward the
-roll rate, by the right-hand rule that gyroscopes follow. A name that says "pitch" or "roll" is believed before that.
+Gravity shows the vertical axis; the horizontal acceleration that correlates with the change of speed is longitudinal.
+Left is up x forward (ISO 8855). The rate about left is the pitch rate and the one about forward the roll rate, by the
+right-hand rule of gyroscopes. A name with "pitch" or "roll" takes precedence.
 """
 
 import math
@@ -14,20 +14,20 @@ from typing import Final
 import numpy as np
 
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2
-from gateway.offline.look.readings import Reading
+from gateway.offline.look.readings import SignalReading
 from gateway.records import F64, Signal
 from gateway.units import STANDARD_GRAVITY_MPS2
 
-LEAST_CORRELATION: Final = 0.4
-LEAST_MOVING_S: Final = 60
-MOVING_MPS: Final = 3.0
-FASTEST_MPS: Final = 100.0  # what reads more is no road vehicle's speed
+LEAST_CORRELATION: Final = 0.4  # chosen: of acceleration and change of speed
+LEAST_MOVING_S: Final = 60  # chosen: of driving for that
+MOVING_MPS: Final = 3.0  # chosen: above a receiver's noise
+FASTEST_MPS: Final = 100.0  # chosen: a higher reading is not a road vehicle's speed
 _NO_SPEED: Final = re.compile(r"accura|error|std|dev|limit|vert|max|min|set|_[xyz]$", re.IGNORECASE)
 _SPEED: Final = re.compile(r"speed|vel|sog|spd", re.IGNORECASE)
 _WORDS: Final = {"vertical": "z", "longitudinal": "x", "forward": "x", "lateral": "y", "transverse": "y"}
 _AXES: Final = "xyz"
 _PITCH: Final = re.compile(r"pitch", re.IGNORECASE)
-ROLL: Final = re.compile(r"(?<!nt)roll", re.IGNORECASE)  # no controller
+ROLL: Final = re.compile(r"(?<!nt)roll", re.IGNORECASE)  # but not "controller"
 _CHECK: Final = {
     Signal.PITCH_RATE: "it must go up as braking begins, else sign = -1",
     Signal.ROLL_RATE: "it must go up as a bend to the left begins, else sign = -1",
@@ -35,18 +35,18 @@ _CHECK: Final = {
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """A reading that carries one of our signals, its sign, and how that is known."""
+class FoundRole:
+    """A reading with its role and sign, and the evidence for it."""
 
     role: Signal
-    reading: Reading
+    reading: SignalReading
     sign: int
     why: str
     is_sure: bool = True
 
 
-def roles_of(readings: Sequence[Reading]) -> tuple[Found, ...]:
-    """What could be told apart, in the order of Signal."""
+def roles_of(readings: Sequence[SignalReading]) -> tuple[FoundRole, ...]:
+    """The roles that could be determined, in the order of Signal."""
     speed = _speed(readings)
     up = upright(readings)
     found = [each for each in (up, speed) if each]
@@ -57,32 +57,32 @@ def roles_of(readings: Sequence[Reading]) -> tuple[Found, ...]:
     return tuple(sorted(found, key=lambda each: list(Signal).index(each.role)))
 
 
-def upright(readings: Iterable[Reading]) -> Found | None:
-    """The acceleration that reads gravity, the fastest of them."""
+def upright(readings: Iterable[SignalReading]) -> FoundRole | None:
+    """The fastest acceleration that reads gravity."""
     candidates = [r for r in readings if r.quantity == "acceleration" and _reads_gravity(r)]
     if not candidates:
         return None
     best = max(candidates, key=lambda r: (round(r.rate_hz), -abs(abs(r.usual) - STANDARD_GRAVITY_MPS2)))
     sign = 1 if best.usual > 0.0 else -1
-    return Found(Signal.VERTICAL_ACCELERATION, best, sign, f"reads {best.usual:+.2f} m/s2: this axis is vertical")
+    return FoundRole(Signal.VERTICAL_ACCELERATION, best, sign, f"reads {best.usual:+.2f} m/s2: this axis is vertical")
 
 
-def _reads_gravity(reading: Reading) -> bool:
+def _reads_gravity(reading: SignalReading) -> bool:
     return abs(abs(reading.usual) - STANDARD_GRAVITY_MPS2) < GRAVITY_TOLERANCE_MPS2
 
 
-def tilt_deg(readings: Iterable[Reading], up: Found) -> float:
-    """How far the axis that is up leans, by what its message's other axes read; 0 where they are not told."""
+def tilt_deg(readings: Iterable[SignalReading], up: FoundRole) -> float:
+    """Tilt of the vertical axis in degrees, by the other axes of its message; 0 without them."""
     beside = [r.usual for r in readings if _is_beside(r, up.reading) and math.isfinite(r.usual)]
     return math.degrees(math.atan2(math.hypot(*beside), abs(up.reading.usual)))
 
 
-def _is_beside(reading: Reading, other: Reading) -> bool:
+def _is_beside(reading: SignalReading, other: SignalReading) -> bool:
     return reading is not other and reading.described is other.described and reading.quantity == other.quantity
 
 
 def axis_of(name: str) -> str:
-    """x, y or z as the last letter of a name says, or a word in it; empty where nothing says it."""
+    """x, y or z by the last letter of a name or a word in it; empty if it has none."""
     bare = name.rstrip("_0123456789")
     if len(bare) > 1 and bare[-1] in "XYZ" and not bare[-2:].isupper():
         return bare[-1].lower()
@@ -91,8 +91,8 @@ def axis_of(name: str) -> str:
     return next((axis for word, axis in _WORDS.items() if word in name.lower()), "")
 
 
-def _forward(readings: Sequence[Reading], up: Found, speed: Found | None) -> Found | None:
-    """The horizontal acceleration that goes with the change of speed."""
+def _forward(readings: Sequence[SignalReading], up: FoundRole, speed: FoundRole | None) -> FoundRole | None:
+    """The horizontal acceleration that correlates with the change of speed."""
     beside = [r for r in readings if _is_beside(r, up.reading)]
     if speed is None or not beside:
         return None
@@ -104,11 +104,11 @@ def _forward(readings: Sequence[Reading], up: Found, speed: Found | None) -> Fou
         return None
     where = "forward" if correlation > 0.0 else "rearward"
     why = f"points {where}: goes with the change of speed (correlation {correlation:+.2f})"
-    return Found(Signal.LONGITUDINAL_ACCELERATION, best, 1 if correlation > 0.0 else -1, why)
+    return FoundRole(Signal.LONGITUDINAL_ACCELERATION, best, 1 if correlation > 0.0 else -1, why)
 
 
-def _with_braking(acceleration: Reading, speed: Reading) -> float:
-    """Correlation with the slope of the speed, second by second while the vehicle moves; NaN where it hardly does."""
+def _with_braking(acceleration: SignalReading, speed: SignalReading) -> float:
+    """Correlation with the slope of the speed, second by second while the vehicle moves; NaN if it hardly does."""
     if len(speed.t_s) < LEAST_MOVING_S or len(acceleration.t_s) < LEAST_MOVING_S:
         return math.nan
     begin_s, end_s = max(speed.t_s[0], acceleration.t_s[0]), min(speed.t_s[-1], acceleration.t_s[-1])
@@ -126,7 +126,7 @@ def _with_braking(acceleration: Reading, speed: Reading) -> float:
 
 
 def _second_by_second(t_s: F64, x: F64, n: int) -> F64:
-    """(n,) mean of the samples of each second; NaN where there are none."""
+    """(n,) mean of the samples of each second; NaN without any."""
     second = np.floor(t_s).astype(int)
     inside = (second >= 0) & (second < n)
     n_samples = np.bincount(second[inside], minlength=n)
@@ -134,43 +134,47 @@ def _second_by_second(t_s: F64, x: F64, n: int) -> F64:
     return np.where(n_samples > 0, total / np.maximum(n_samples, 1), np.nan)
 
 
-def _pitch(readings: Sequence[Reading], up: Found, forward: Found | None) -> Found | None:
+def _pitch(readings: Sequence[SignalReading], up: FoundRole, forward: FoundRole | None) -> FoundRole | None:
     """The rate about the axis that points left."""
     named = _named(readings, up, Signal.PITCH_RATE, _PITCH)
     return named or _about(readings, up, Signal.PITCH_RATE, _left(up, forward), "the rate about left = up x forward")
 
 
-def _roll(readings: Sequence[Reading], up: Found, forward: Found | None) -> Found | None:
+def _roll(readings: Sequence[SignalReading], up: FoundRole, forward: FoundRole | None) -> FoundRole | None:
     """The rate about the axis that points forward."""
     named = _named(readings, up, Signal.ROLL_RATE, ROLL)
     return named or _about(readings, up, Signal.ROLL_RATE, _ahead(up, forward), "the rate about forward")
 
 
-def _named(readings: Sequence[Reading], up: Found, role: Signal, word: re.Pattern[str]) -> Found | None:
-    """The rate whose name has the word in it; a name says no sign."""
+def _named(readings: Sequence[SignalReading], up: FoundRole, role: Signal, word: re.Pattern[str]) -> FoundRole | None:
+    """The rate with the word in its name; the name gives no sign."""
     fit = [r for r in _rates(readings, up) if word.search(r.signal.name) and "accel" not in r.signal.name.lower()]
-    return Found(role, fit[0], 1, f"its name says so; its sign is not: {_CHECK[role]}", is_sure=False) if fit else None
+    return (
+        FoundRole(role, fit[0], 1, f"its name says so; its sign is not: {_CHECK[role]}", is_sure=False) if fit else None
+    )
 
 
-def _about(readings: Sequence[Reading], up: Found, role: Signal, axis: tuple[str, int, bool], why: str) -> Found | None:
-    """The rate about an axis, by its name, its sign, and whether it was measured."""
+def _about(
+    readings: Sequence[SignalReading], up: FoundRole, role: Signal, axis: tuple[str, int, bool], why: str
+) -> FoundRole | None:
+    """The rate about an axis, given by its name, its sign, and whether it was measured."""
     name, sign, is_sure = axis
     about = next((r for r in _rates(readings, up) if name and axis_of(r.signal.name) == name), None)
     unsure = "" if is_sure else "; that x points forward is a guess: no braking shows it"
-    return None if about is None else Found(role, about, sign, why + unsure, is_sure)
+    return None if about is None else FoundRole(role, about, sign, why + unsure, is_sure)
 
 
-def _rates(readings: Sequence[Reading], up: Found) -> list[Reading]:
+def _rates(readings: Sequence[SignalReading], up: FoundRole) -> list[SignalReading]:
     """The angular rates of the same channel, those of the same message first, then the fastest."""
     rates = [r for r in readings if r.quantity == "angular_rate" and r.described.heard.channel == _channel(up)]
     return sorted(rates, key=lambda r: (r.described is not up.reading.described, -round(r.rate_hz)))
 
 
-def _channel(found: Found) -> str | None:
+def _channel(found: FoundRole) -> str | None:
     return found.reading.described.heard.channel
 
 
-def _left(up: Found, forward: Found | None) -> tuple[str, int, bool]:
+def _left(up: FoundRole, forward: FoundRole | None) -> tuple[str, int, bool]:
     """The axis along left, its sign, and whether it was measured."""
     ahead, ahead_sign, is_sure = _ahead(up, forward)
     if not ahead:
@@ -181,23 +185,23 @@ def _left(up: Found, forward: Found | None) -> tuple[str, int, bool]:
     return _AXES[left], int(np.sign(turns[left])), is_sure
 
 
-def _ahead(up: Found, forward: Found | None) -> tuple[str, int, bool]:
+def _ahead(up: FoundRole, forward: FoundRole | None) -> tuple[str, int, bool]:
     """The axis along forward, its sign, and whether it was measured; with z up and nothing else known, x is forward."""
     ahead, sign = ("x", 1) if forward is None else (axis_of(forward.reading.signal.name), forward.sign)
     up_axis = axis_of(up.reading.signal.name)
     return (ahead, sign, forward is not None) if up_axis and ahead and up_axis != ahead else ("", 1, False)
 
 
-def _speed(readings: Iterable[Reading]) -> Found | None:
-    """Speed over ground where there is one, else of the wheels."""
+def _speed(readings: Iterable[SignalReading]) -> FoundRole | None:
+    """Speed over ground if there is one, else of the wheels."""
     named = [r for r in readings if r.quantity == "speed" and _is_speed(r)]
     if not named:
         return None
     best = min(named, key=lambda r: ("wheel" in r.name.lower(), "navig" not in r.name.lower(), -r.rate_hz))
     role = Signal.WHEEL_SPEED if "wheel" in best.name.lower() else Signal.SPEED
-    return Found(role, best, 1, f"up to {np.max(best.x) * 3.6:.0f} km/h")
+    return FoundRole(role, best, 1, f"up to {np.max(best.x) * 3.6:.0f} km/h")
 
 
-def _is_speed(reading: Reading) -> bool:
+def _is_speed(reading: SignalReading) -> bool:
     is_named = _SPEED.search(reading.name) and not _NO_SPEED.search(reading.signal.name)
     return bool(is_named and len(reading.x) and np.min(reading.x) > -1.0 and np.max(reading.x) < FASTEST_MPS)

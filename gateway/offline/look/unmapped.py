@@ -1,4 +1,4 @@
-"""The roll rate that a signal map leaves out although the pitch rate's message has it."""
+"""The roll rate that a signal map lacks although the pitch rate's message has it."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -16,10 +16,10 @@ _BY_AXES: Final = "its sign by the right-hand rule from the two axes that are ma
 
 
 def unmapped_roll_rate(signal_map: SignalMap) -> str | None:
-    """The entry as it would stand in the map; None where there is a roll rate, or the message has none by its names.
+    """The entry for the map; None if the map has a roll rate, or no name in the message suggests one.
 
-    A name that says "roll" is taken first. Else it is the axis besides those of the vertical acceleration and of the
-    pitch rate: forward = left x up, with left and up as these two are mapped.
+    A name with "roll" takes precedence. Otherwise it is the third axis beside those of the vertical acceleration and of
+    the pitch rate: forward = left x up, with left and up as these two are mapped.
     """
     pitch = next(_mapped(signal_map, Signal.PITCH_RATE), None)
     if pitch is None or Signal.ROLL_RATE in signal_map.signals:
@@ -45,7 +45,7 @@ def _entry(message: MappedMessage, name: str, sign: str) -> str:
 
 
 def _forward(up: MappedSignal, pitch_rate: MappedSignal) -> tuple[str, int]:
-    """The axis that lies along the vehicle and its sign; empty where the names of the two others do not say theirs."""
+    """The longitudinal axis and its sign; empty if the names of the two others do not give their axes."""
     up_axis, left_axis = axis_of(up.dbc_signal), axis_of(pitch_rate.dbc_signal)
     if not up_axis or not left_axis or up_axis == left_axis:
         return "", 1
@@ -59,6 +59,6 @@ def _forward(up: MappedSignal, pitch_rate: MappedSignal) -> tuple[str, int]:
 
 
 def _with_axis(name: str, axis: str) -> str:
-    """The name of the same quantity about another axis: AngularRateZ and y are AngularRateY."""
+    """The name of the same quantity about another axis: AngularRateZ and y give AngularRateY."""
     at = max(name.lower().rfind(each) for each in _AXES)
     return name[:at] + (axis.upper() if name[at].isupper() else axis) + name[at + 1 :]

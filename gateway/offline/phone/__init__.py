@@ -1,7 +1,8 @@
-"""Phones as sensors: what an app recorded becomes a log that every other command takes.
+"""Phones as sensors: a recording of an app becomes a log for every other command.
 
-A zip of Sensor Logger or phyphox comes in (``recording``); where nobody moved the phone and how well it felt the road
-is found (``quality``), then how it lay (``axes``); a candump log with the signal map springscale:phone goes out.
+A zip of Sensor Logger or phyphox goes in (``recording``). ``quality`` finds the stretch in which the phone lay still
+and whether it recorded the road, ``axes`` its orientation; a candump log with the signal map springscale:phone comes
+out.
 """
 
 from gateway.offline.phone.imported import PHONE_AXES, Imported, import_recording, imported

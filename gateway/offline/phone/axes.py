@@ -1,18 +1,17 @@
-"""The vehicle's axes in a phone that lies anyhow: up by gravity, forward by braking and bends, the sign by the compass.
+"""The vehicle's axes in a phone of any orientation: up by gravity, forward by braking and bends, the sign by the
+course.
 
-With the specific force f and the turn rate w in the phone's axes, up is the mean of f. Of the horizontal part h of f,
-taken as a complex number in any two axes at right angles to up, a vehicle says
+With the specific force f and the turn rate w in the phone's axes, up is the mean of f. For the horizontal part h of f,
+as a complex number in two axes perpendicular to up, a vehicle has
 
     h(t) = exp(j angle) (dv/dt + j v w_up)
 
-that is, it speeds up along its forward axis and is pushed towards the inside of a bend. The angle of forward is the
-argument of sum(h conj(b)), b the bracket: one answer from braking and bends together (orthogonal Procrustes in the
-plane; P. H. Schoenemann, Psychometrika 31, 1966). The speed comes late from a receiver; the delay that fits best is
-found as well.
+because it accelerates along its forward axis and towards the inside of a bend. The angle of forward is the argument of
+sum(h conj(b)), b being the bracket: one answer from braking and bends together (orthogonal Procrustes in the plane; P.
+H. Schoenemann, Psychometrika 31, 1966). A receiver's speed is delayed; the delay with the best fit is estimated too.
 
-A recording that has all three accelerations the other way round gives the same vertical acceleration and pitch rate,
-and the opposite roll and yaw rate: only the compass course of the satellite receiver tells the two apart, which falls
-in a turn to the left.
+A recording with all three accelerations inverted gives the same vertical acceleration and pitch rate, but the opposite
+roll and yaw rate. Only the receiver's course, which falls in a turn to the left, distinguishes the two.
 """
 
 from dataclasses import dataclass
@@ -25,22 +24,22 @@ from gateway.offline.phone.tables import Fixes, Vectors
 from gateway.records import C128, F64, Bool
 from gateway.units import NS_PER_S
 
-MOVING_MPS: Final = 3.0
-LEAST_INTERVALS: Final = 40  # between fixes, while the vehicle moves
-LEAST_BENDS: Final = 10
-LATEST_S: Final = 3.0  # no receiver tells its speed later
-DELAY_STEP_S: Final = 0.1
-LONGEST_S: Final = 5.0  # from a fix to the next but one
-LEAST_TURN_RADPS: Final = 0.02  # of the course: a bend, and not the receiver's noise
+MOVING_MPS: Final = 3.0  # chosen: above a receiver's noise
+LEAST_INTERVALS: Final = 40  # chosen: between fixes, while the vehicle moves
+LEAST_BENDS: Final = 10  # chosen: intervals in bends
+LATEST_S: Final = 3.0  # chosen: largest delay of a receiver
+DELAY_STEP_S: Final = 0.1  # chosen: grid of delays
+LONGEST_S: Final = 5.0  # chosen: from a fix to the next but one
+LEAST_TURN_RADPS: Final = 0.02  # chosen: of the course; above a receiver's noise
 
 
 @dataclass(frozen=True, slots=True)
 class Axes:
-    """Where the vehicle's axes lie in the phone.
+    """The vehicle's axes in the phone.
 
-    to_vehicle (3, 3): its rows are forward, left and up in the phone's axes. gravity_mps2 as the phone reads it.
-    fit 0..1: how much of the horizontal acceleration braking and bends explain; NaN where forward was named.
-    compass -1..1: correlation of the turn rate about up with the course to the left; NaN without enough bends.
+    to_vehicle (3, 3): its rows are forward, left and up in the phone's axes. gravity_mps2 as the phone reads it. fit
+    0..1: share of the horizontal acceleration that braking and bends explain; NaN if forward was given. compass -1..1:
+    correlation of the turn rate about up with the course to the left; NaN without enough bends.
     """
 
     to_vehicle: F64
@@ -51,15 +50,15 @@ class Axes:
 
 
 def axes_of(accel: Vectors, gyro: Vectors, fixes: Fixes, forward: F64 | None = None) -> Axes | None:
-    """Axes of a phone that lay still; ``forward`` (3,) is the phone's axis that points ahead, where a person said it.
+    """Axes of a phone that lay still; ``forward`` (3,) is the phone's axis that points ahead, if given.
 
-    None where neither a person nor the drive says where forward is.
+    None if neither a person nor the drive gives it.
     """
     down_to_up = accel.xyz.mean(axis=0)
     gravity = float(np.linalg.norm(down_to_up))
     up = down_to_up / gravity
     basis = _horizontal(up)
-    felt = Driven.of(accel, gyro, fixes, up, basis)
+    felt = FixIntervals.of(accel, gyro, fixes, up, basis)
     compass = felt.compass() if felt is not None else np.nan
     if forward is not None:
         ahead = forward - up * (forward @ up)
@@ -80,7 +79,7 @@ def _rows(forward: F64, up: F64) -> F64:
 
 
 def _horizontal(up: F64) -> F64:
-    """(2, 3) two axes at right angles to up and to one another, right-handed with it."""
+    """(2, 3) two axes perpendicular to up and to each other, right-handed with it."""
     least = np.eye(3)[int(np.argmin(np.abs(up)))]
     first = np.cross(least, up)
     first /= np.linalg.norm(first)
@@ -89,11 +88,11 @@ def _horizontal(up: F64) -> F64:
 
 
 @dataclass(frozen=True, slots=True)
-class Driven:
-    """Between each fix with a speed and the next but one: what the phone felt beside what the receiver says.
+class FixIntervals:
+    """The phone's readings and the receiver's, between each fix with a speed and the next but one.
 
     felt_s (n,) and its running integrals: horizontal [m/s] complex, turned [rad] about up; fix_s (m,), speed_mps (m,),
-    course_rad (m,) to the left, unwrapped, NaN where it is not known. Seconds from the phone's first sample.
+    course_rad (m,) to the left, unwrapped, NaN if unknown. Seconds from the phone's first sample.
     """
 
     felt_s: F64
@@ -105,8 +104,8 @@ class Driven:
     course_rad: F64
 
     @staticmethod
-    def of(accel: Vectors, gyro: Vectors, fixes: Fixes, up: F64, basis: F64) -> "Driven | None":
-        """None where there is too little of a drive to tell anything."""
+    def of(accel: Vectors, gyro: Vectors, fixes: Fixes, up: F64, basis: F64) -> "FixIntervals | None":
+        """None if the drive is too short."""
         has_speed = np.isfinite(fixes.speed_mps)
         if np.count_nonzero(has_speed) < LEAST_INTERVALS or len(accel.t_ns) < 2 or len(gyro.t_ns) < 2:
             return None
@@ -117,7 +116,7 @@ class Driven:
         told = np.isfinite(fixes.bearing_deg) & (fixes.speed_mps > MOVING_MPS)
         course[told] = -np.unwrap(np.radians(fixes.bearing_deg[told]))
         felt_s, turned_s = (accel.t_ns - origin_ns) / NS_PER_S, (gyro.t_ns - origin_ns) / NS_PER_S
-        return Driven(
+        return FixIntervals(
             felt_s,
             _integral(felt_s, plane[:, 0] + 1j * plane[:, 1]),
             turned_s,
@@ -128,13 +127,13 @@ class Driven:
         )
 
     def forward(self) -> tuple[float, float, float]:
-        """Angle of forward in the basis, its fit 0..1 (0 where nothing tells), and the delay of the speed."""
+        """Angle of forward in the basis, its fit 0..1 (0 without evidence), and the delay of the speed."""
         tried = [(delay_s, self._correlation(delay_s)) for delay_s in np.arange(0.0, LATEST_S, DELAY_STEP_S)]
         delay_s, best = max(tried, key=lambda each: abs(each[1]))
         return float(np.angle(best)), abs(best), float(delay_s)
 
     def compass(self) -> float:
-        """Correlation of the turn about up with that of the course, in bends; NaN where there are too few."""
+        """Correlation of the turn about up with that of the course, in bends; NaN if there are too few."""
         begin_s, end_s = self.fix_s[:-2], self.fix_s[2:]
         turn = np.interp(end_s, self.turned_s, self.turned) - np.interp(begin_s, self.turned_s, self.turned)
         course = self.course_rad[2:] - self.course_rad[:-2]
@@ -144,7 +143,9 @@ class Driven:
         return float(np.corrcoef(course[chosen], turn[chosen])[0, 1])
 
     def _correlation(self, delay_s: float) -> complex:
-        """Of the horizontal acceleration with what the speed, told ``delay_s`` late, and the bends ask."""
+        """Correlation of the horizontal acceleration with the expected one, from bends and the speed delayed by
+        ``delay_s``.
+        """
         begin_s, end_s = self.fix_s[:-2] - delay_s, self.fix_s[2:] - delay_s
         span_s = end_s - begin_s
         h = (np.interp(end_s, self.felt_s, self.horizontal) - np.interp(begin_s, self.felt_s, self.horizontal)) / span_s
@@ -159,7 +160,7 @@ class Driven:
         return complex(np.sum(h * np.conj(asked)) / scale) if scale > 0.0 else 0j
 
     def _is_whole(self, delay_s: float) -> Bool:
-        """(m - 2,) intervals without a missing fix, in which the phone recorded."""
+        """(m - 2,) intervals without a missing fix, covered by the phone's recording."""
         begin_s, end_s = self.fix_s[:-2] - delay_s, self.fix_s[2:] - delay_s
         inside = (begin_s >= max(self.felt_s[0], self.turned_s[0])) & (end_s <= min(self.felt_s[-1], self.turned_s[-1]))
         n_samples = np.searchsorted(self.felt_s, end_s) - np.searchsorted(self.felt_s, begin_s)
@@ -169,5 +170,5 @@ class Driven:
 
 
 def _integral(t_s: F64, x: Any) -> Any:
-    """(n,) by trapezoids, 0 at the first."""
+    """(n,) integral by the trapezoidal rule, 0 at the first sample."""
     return np.concatenate(([0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * np.diff(t_s))))

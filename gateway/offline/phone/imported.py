@@ -1,4 +1,4 @@
-"""A phone's recording as a candump log in the vehicle's axes, which every other command takes like any vehicle's."""
+"""A phone's recording as a candump log in the vehicle's axes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -22,17 +22,17 @@ from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
 
 MAP_NAME: Final = "phone"
 CHANNEL: Final = "phone0"
-SHORTEST_S: Final = 60.0
-SURE_COMPASS: Final = 0.5
+SHORTEST_S: Final = 60.0  # chosen: least stretch without a movement of the phone
+SURE_COMPASS: Final = 0.5  # chosen: correlation that decides the sign
 PHONE_AXES: Final = {
     f"{sign}{axis}": (-1.0 if sign else 1.0) * np.eye(3)[i] for sign in ("", "-") for i, axis in enumerate("xyz")
 }
-_DEG: Final = np.pi / 180.0
+_DEG: Final = np.pi / 180.0  # radians
 
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """What became of a recording: the stretch that was taken [ns], how the phone lay, and what a person should know."""
+    """The result of an import: the stretch used [ns], the phone's orientation, and remarks for the user."""
 
     recording: PhoneRecording
     stretch: tuple[int, int]
@@ -46,7 +46,7 @@ class Imported:
         return (self.stretch[1] - self.stretch[0]) / NS_PER_S
 
     def to_json(self) -> dict[str, Any]:
-        """For programs; what is not known is null."""
+        """The result as JSON; unknown is null."""
         axes, recording = self.axes, self.recording
         return {
             "app": recording.app,
@@ -69,11 +69,11 @@ class Imported:
 def import_recording(
     path: Path, output: Path, forward: str | None = None, *, with_position: bool = True
 ) -> tuple[Imported, tuple[Path, ...]]:
-    """Write the log and, beside it, phone.toml and phone.dbc; what was found, and what was written, the log first.
+    """Write the log and, beside it, phone.toml and phone.dbc; returns the result and the paths, the log first.
 
-    ``forward`` names the phone's axis that points ahead (y is its top edge) where driving does not tell. Raises
-    LogUnreadableError for the recording, ConfigurationError where a file is there already or cannot be written,
-    SpringscaleError where nothing in it can weigh.
+    ``forward`` names the phone's axis that points ahead (y is its top edge) if the drive does not show it. Raises
+    LogUnreadableError for the recording, ConfigurationError if a file exists or cannot be written, SpringscaleError if
+    the recording does not suffice.
     """
     if output.exists():
         raise ConfigurationError(f"{output}: is there already, and is not written over; name another")
@@ -96,7 +96,7 @@ def _shipped(copy: Path) -> Path:
 
 
 def imported(recording: PhoneRecording, forward: str | None = None) -> Imported:
-    """Find the stretch, the sign and the axes. Raises SpringscaleError where one of them cannot be told."""
+    """Find the stretch, the sign and the axes. Raises SpringscaleError if one of them cannot be determined."""
     stretch, moved = still_stretch(recording.accel, recording.gyro)
     seconds = (stretch[1] - stretch[0]) / NS_PER_S
     if seconds < SHORTEST_S:
@@ -132,7 +132,7 @@ def _part(recording: PhoneRecording, stretch: tuple[int, int]) -> PhoneRecording
 
 
 def _signed(part: PhoneRecording, forward: F64 | None) -> tuple[PhoneRecording, Axes | None, str, tuple[Remark, ...]]:
-    """The recording with accelerations as a vehicle feels them, its axes, and how their sign is known."""
+    """The recording with the vehicle's sign of acceleration, its axes, and the evidence for the sign."""
     told = part.accel_sign
     part = _times(part, told or 1)
     axes = axes_of(part.accel, part.gyro, part.fixes, forward)
@@ -160,7 +160,7 @@ def _times(part: PhoneRecording, sign: int) -> PhoneRecording:
 
 
 def _moves(moved: tuple[int, ...], stretch: tuple[int, int]) -> Iterator[Remark]:
-    """Hands at the beginning and the end of a recording are usual; they are told all the same."""
+    """Remarks on movements of the phone, also the usual ones at the beginning and the end."""
     for t_ns in moved:
         yield Remark("phone_moved", f"the phone moved at {iso_utc(t_ns)[11:19]} UTC")
     if moved:

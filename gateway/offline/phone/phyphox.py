@@ -1,8 +1,8 @@
 """Recordings of phyphox (DataExport.java of https://github.com/phyphox/phyphox-android).
 
-One CSV a sensor with quoted headers that end in the unit, "Time (s)" from the start of the experiment, NaN where a
+One CSV per sensor with quoted headers that end in the unit, "Time (s)" from the start of the experiment, NaN where a
 column is shorter, and meta/time.csv with the system time of each START and PAUSE. Column and decimal separators are the
-user's choice. Nothing says how the platform counts accelerations.
+user's choice. The platform's sign of acceleration is not recorded.
 """
 
 import re
@@ -14,9 +14,9 @@ import numpy as np
 
 from gateway.errors import LogUnreadableError
 from gateway.offline.phone.tables import (
+    CsvTable,
     Fixes,
     PhoneRecording,
-    Table,
     head_of,
     not_negative,
     number_of,
@@ -37,7 +37,7 @@ def read_phyphox(path: Path, members: Mapping[str, str]) -> PhoneRecording:
         if '"Time (s)"' in head_of(text)
     ]
     clock = next((text for name, text in members.items() if name.lower().endswith("meta/time.csv")), None)
-    tables = [Table(t.name, _since_1970(clock, t.t_ns), t.columns, t.n_unusable) for t in tables]
+    tables = [CsvTable(t.name, _since_1970(clock, t.t_ns), t.columns, t.n_unusable) for t in tables]
     accel = [(t, axes) for t in tables if "linear" not in t.name.lower() and (axes := _axes(t, "(m/s^2)", "linear"))]
     gyro = [(t, axes) for t in tables if (axes := _axes(t, "(rad/s)"))]
     place = next((t for t in tables if any(name.startswith(("Velocity (", "Speed (")) for name in t.columns)), None)
@@ -69,8 +69,8 @@ def read_phyphox(path: Path, members: Mapping[str, str]) -> PhoneRecording:
     )
 
 
-def _axes(table: Table, unit: str, without: str = "\0") -> tuple[str, ...]:
-    """Headers of the columns x, y and z with this unit; empty where one of them is missing."""
+def _axes(table: CsvTable, unit: str, without: str = "\0") -> tuple[str, ...]:
+    """Headers of the columns x, y and z with this unit; empty if one is missing."""
     named = {
         found[1].lower(): name
         for name in table.columns
@@ -79,13 +79,13 @@ def _axes(table: Table, unit: str, without: str = "\0") -> tuple[str, ...]:
     return tuple(named[axis] for axis in "xyz") if len(named) == 3 else ()
 
 
-def _column(table: Table, *starts: str) -> F64:
+def _column(table: CsvTable, *starts: str) -> F64:
     found = [column for name, column in table.columns.items() if name.startswith(starts)]
     return found[0] if found else np.full(len(table.t_ns), np.nan)
 
 
 def _since_1970(clock: str | None, t_ns: I64) -> I64:
-    """Experiment times (n,) by the last START before each; as they are where the export has no meta/time.csv."""
+    """Experiment times (n,) relative to the last START before each; unchanged if the export has no meta/time.csv."""
     if clock is None:
         return t_ns
     rows = [row for row in text_rows(clock, separator_of(clock)) if row.get("event", "").upper() == "START"]

@@ -1,4 +1,4 @@
-"""How well a phone recorded a drive: where it lay still, what it lost, and whether the road reached it."""
+"""The quality of a phone's recording: its still stretch, its losses, and whether the road reached it."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,33 +15,37 @@ from gateway.offline.phone.tables import Fixes, PhoneRecording, Vectors
 from gateway.records import F64, I64, iso_utc
 from gateway.units import NS_PER_S
 
-HANDLED_RADPS: Final = 1.5  # about a level axis: no vehicle on its wheels pitches or rolls so fast, a hand does
-TILTED_DEG: Final = 10.0  # of the mean direction of gravity over a minute; bends all to one side do as much
-TURNED_SHARE: Final = 0.5  # of that angle, which the gyroscope must have seen within SEEN_S: it feels no bend
-SEEN_S: Final = 15.0
-BLOCK_S: Final = 5
-BLOCKS_ASIDE: Final = 12  # to each side of a possible move
-MARGIN_NS: Final = 10 * NS_PER_S  # around a hand
+HANDLED_RADPS: Final = 1.5  # chosen: about a level axis; a hand turns it so fast, a vehicle does not
+TILTED_DEG: Final = 10.0  # chosen: of the mean direction of gravity over a minute; bends to one side cause less
+TURNED_SHARE: Final = 0.5  # chosen: of that angle; the gyroscope must show it within SEEN_S, as bends do not turn it
+SEEN_S: Final = 15.0  # chosen: on either side
+BLOCK_S: Final = 5  # chosen: of a mean direction
+BLOCKS_ASIDE: Final = 12  # chosen: on each side of a possible move
+MARGIN_NS: Final = 10 * NS_PER_S  # chosen: around a movement by hand
 LEAST_RATE_HZ: Final = RATE_MIN_SHARE * BatchSettings().rate_hz
-PAUSED_NS: Final = NS_PER_S // 2
-LOST_NS: Final = 5 * NS_PER_S
-MOST_NAMED: Final = 3
-RIDE_HZ: Final = (0.5, 8.0)
-SHAKEN_HZ: Final = 20.0
-LEAST_RIDE_MPS2: Final = 0.1  # of the vertical acceleration; a van on a smooth road (ISO 8608, A) at 50 km/h has 0.3
-LEAST_RIDE_SHARE: Final = 0.25  # of the power up to SHAKEN_HZ
+PAUSED_NS: Final = NS_PER_S // 2  # chosen: gap of the inertial sensors that is reported
+LOST_NS: Final = 5 * NS_PER_S  # chosen: gap of the speed that is reported
+MOST_NAMED: Final = 3  # chosen: gaps listed in a remark
+RIDE_HZ: Final = (0.5, 8.0)  # chosen: movement of the body on its springs
+SHAKEN_HZ: Final = 20.0  # chosen: upper end of the compared power
+LEAST_RIDE_MPS2: Final = (
+    0.1  # chosen: of the vertical acceleration; a van on a smooth road (ISO 8608, A) at 50 km/h has 0.3
+)
+LEAST_RIDE_SHARE: Final = 0.25  # chosen: of the power up to SHAKEN_HZ
 
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """Something a person should know of a recording; ``code`` is for programs."""
+    """A remark on a recording for its user; ``code`` is for programs."""
 
     code: str
     text: str
 
 
 def still_stretch(accel: Vectors, gyro: Vectors) -> tuple[tuple[int, int], tuple[int, ...]]:
-    """The longest stretch in which nobody moved the phone, in ns, and when it was moved before, within and after."""
+    """The longest stretch [ns] in which the phone was not moved, and the times of movements before, within and
+    after.
+    """
     begin_ns, end_ns = int(max(accel.t_ns[0], gyro.t_ns[0])), int(min(accel.t_ns[-1], gyro.t_ns[-1]))
     moved = sorted((*_tilts(accel, gyro, begin_ns), *_hands(accel, gyro)))
     pauses = [begin_ns - MARGIN_NS, *moved, end_ns + MARGIN_NS]
@@ -50,13 +54,15 @@ def still_stretch(accel: Vectors, gyro: Vectors) -> tuple[tuple[int, int], tuple
 
 
 def _hands(accel: Vectors, gyro: Vectors) -> Iterator[int]:
-    """When the phone turned about a level axis as no vehicle does. A turn about the vertical may be a bend."""
+    """Times at which the phone turned about a level axis faster than a vehicle can. A turn about the vertical may be a
+    bend.
+    """
     level = _about_level_axes(accel, gyro)
     yield from gyro.t_ns[np.linalg.norm(level, axis=1) > HANDLED_RADPS].tolist()
 
 
 def _about_level_axes(accel: Vectors, gyro: Vectors) -> F64:
-    """Turn rates (n, 3) without what goes about the vertical."""
+    """Turn rates (n, 3) without their part about the vertical."""
     up = np.median(accel.xyz, axis=0)
     up /= np.linalg.norm(up)
     level: F64 = gyro.xyz - np.outer(gyro.xyz @ up, up)
@@ -64,7 +70,9 @@ def _about_level_axes(accel: Vectors, gyro: Vectors) -> F64:
 
 
 def _turned(accel: Vectors, gyro: Vectors, near_ns: int) -> tuple[float, int]:
-    """Degrees turned about level axes near a time, by the gyroscope without its bias, and when it turned fastest."""
+    """Degrees turned about level axes near a time, by the gyroscope without its bias, and the time of the fastest
+    turn.
+    """
     level = _about_level_axes(accel, gyro)
     near = np.abs(gyro.t_ns - near_ns) < SEEN_S * NS_PER_S
     t_ns, level = gyro.t_ns[near], (level - np.median(level, axis=0))[near]
@@ -79,7 +87,9 @@ def _turned(accel: Vectors, gyro: Vectors, near_ns: int) -> tuple[float, int]:
 
 
 def _tilts(accel: Vectors, gyro: Vectors, begin_ns: int) -> Iterator[int]:
-    """When gravity came to lie elsewhere in the phone and stayed there: where medians of a minute differ the most."""
+    """Times at which the direction of gravity in the phone changed for good: where medians of a minute differ the
+    most.
+    """
     block = (accel.t_ns - begin_ns) // (BLOCK_S * NS_PER_S)
     edges = np.searchsorted(block, np.arange(block[-1] + 2))
     pieces = [accel.xyz[a:b] for a, b in pairwise(edges)]
@@ -107,7 +117,7 @@ def _angle_deg(a: F64, b: F64) -> float:
 
 
 def _apart(times_ns: Sequence[int]) -> Iterator[int]:
-    """The first of each group that lies within a minute."""
+    """The first of each group within a minute."""
     last = None
     for t_ns in times_ns:
         if last is None or t_ns - last > 60 * NS_PER_S:
@@ -116,7 +126,7 @@ def _apart(times_ns: Sequence[int]) -> Iterator[int]:
 
 
 def remarks_on(recording: PhoneRecording, vertical_mps2: F64, stretch: tuple[int, int]) -> Iterator[Remark]:
-    """What keeps this stretch from weighing well, and how to mend it. vertical_mps2 (n,) at the times of accel."""
+    """Obstacles to a good estimate from this stretch, and their remedies. vertical_mps2 (n,) at the times of accel."""
     accel, gyro = _within(recording.accel, stretch), _within(recording.gyro, stretch)
     for what, vectors in (("accelerometer", accel), ("gyroscope", gyro)):
         rate_hz = sample_rate_hz(vectors.t_ns)
@@ -150,7 +160,7 @@ def _pauses(t_ns: I64) -> Iterator[Remark]:
 
 
 def _lost(fixes: Fixes, stretch: tuple[int, int]) -> Iterator[Remark]:
-    """Where no speed came."""
+    """Gaps of the speed."""
     inside = np.isfinite(fixes.speed_mps) & (fixes.t_ns >= stretch[0]) & (fixes.t_ns < stretch[1])
     known = fixes.t_ns[inside]
     if not len(known):
@@ -170,7 +180,7 @@ def _lost(fixes: Fixes, stretch: tuple[int, int]) -> Iterator[Remark]:
 
 
 def _too_little_ride(accel: Vectors, vertical_mps2: F64, fixes: Fixes) -> Iterator[Remark]:
-    """Whether what springs answer to reaches the phone: below 8 Hz, while the vehicle moves."""
+    """Whether the movement on the springs reaches the phone: below 8 Hz, while the vehicle moves."""
     level_mps2, share = ride_of(accel, vertical_mps2, fixes)
     if level_mps2 < LEAST_RIDE_MPS2 or share < LEAST_RIDE_SHARE:
         yield Remark(
@@ -184,7 +194,7 @@ def _too_little_ride(accel: Vectors, vertical_mps2: F64, fixes: Fixes) -> Iterat
 def ride_of(accel: Vectors, vertical_mps2: F64, fixes: Fixes) -> tuple[float, float]:
     """Root mean square [m/s2] of the vertical acceleration in RIDE_HZ, and its share of the power up to SHAKEN_HZ.
 
-    Both NaN where the vehicle did not move for a minute.
+    Both NaN if the vehicle moved for less than a minute.
     """
     rate_hz = 50.0
     n = int((accel.t_ns[-1] - accel.t_ns[0]) * rate_hz / NS_PER_S)

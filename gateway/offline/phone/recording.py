@@ -1,4 +1,4 @@
-"""A phone's recording as its app exported it: a zip, or the folder it was unpacked to."""
+"""A phone's recording as its app exported it: a zip, or its unpacked folder."""
 
 import zipfile
 from pathlib import Path
@@ -9,11 +9,11 @@ from gateway.offline.phone.phyphox import read_phyphox
 from gateway.offline.phone.sensor_logger import read_sensor_logger
 from gateway.offline.phone.tables import PhoneRecording, head_of, is_named
 
-LARGEST_BYTES: Final = 1 << 31  # of one unpacked CSV: a day at 200 Hz
+LARGEST_BYTES: Final = 1 << 31  # chosen: of one unpacked CSV, a day at 200 Hz
 
 
 def read_recording(path: Path) -> PhoneRecording:
-    """Read what an app exported. Raises LogUnreadableError naming the file, what it lacks, and how to record it."""
+    """Read an app's export. Raises LogUnreadableError naming the file, what it lacks, and how to record it."""
     members = _members(path)
     if any(is_named(name, "metadata") for name in members) or any(
         "seconds_elapsed" in head_of(t) for t in members.values()

@@ -3,8 +3,8 @@
 UNITS.md, COORDINATES.md and CROSSPLATFORM.md there: one CSV a sensor with the columns time, seconds_elapsed, z, y, x:
 nanoseconds since 1970, m/s2 and rad/s. Android has gravity in TotalAcceleration; on iOS it is Accelerometer plus
 Gravity. iOS counts all three axes of acceleration the other way, unless "Standardise Units & Frames" is on, which
-Metadata.csv tells as ``standardisation``. Both platforms turn the gyroscope alike. A speed, bearing or accuracy below 0
-in Location is invalid.
+Metadata.csv states as ``standardisation``. Both platforms rotate the gyroscope alike. A speed, bearing or accuracy
+below 0 in Location is invalid.
 """
 
 import csv
@@ -17,9 +17,9 @@ import numpy as np
 
 from gateway.errors import LogUnreadableError
 from gateway.offline.phone.tables import (
+    CsvTable,
     Fixes,
     PhoneRecording,
-    Table,
     Vectors,
     head_of,
     is_named,
@@ -28,7 +28,7 @@ from gateway.offline.phone.tables import (
 )
 from gateway.units import STANDARD_GRAVITY_MPS2
 
-GRAVITY_WITHIN: Final = 0.1  # of gravity: a calibrated sensor on the road reads it so well
+GRAVITY_WITHIN: Final = 0.1  # chosen: of gravity; a calibrated sensor on the road is this accurate
 
 
 def read_sensor_logger(path: Path, members: Mapping[str, str]) -> PhoneRecording:
@@ -69,7 +69,7 @@ def read_sensor_logger(path: Path, members: Mapping[str, str]) -> PhoneRecording
 
 
 def _metadata(text: str) -> dict[str, str]:
-    """The one row by its headers. A model such as iPhone14,5 may stand there unquoted: what is too much is its."""
+    """The single row by its headers. A model such as iPhone14,5 may be unquoted: surplus cells belong to it."""
     header, row = (*csv.reader(io.StringIO(text)), [], [])[:2]
     more = len(row) - len(header)
     if more > 0 and "device name" in header:
@@ -78,8 +78,8 @@ def _metadata(text: str) -> dict[str, str]:
     return dict(zip(header, row, strict=False))
 
 
-def _sensor_logger_acceleration(path: Path, tables: Mapping[str, Table]) -> Vectors:
-    """The acceleration with gravity, from the first of its places that has it."""
+def _sensor_logger_acceleration(path: Path, tables: Mapping[str, CsvTable]) -> Vectors:
+    """The acceleration including gravity, from the first source that has it."""
     if total := tables.get("totalacceleration"):
         return total.vectors("xyz")
     accel, gravity = tables.get("accelerometer"), tables.get("gravity")
@@ -100,16 +100,16 @@ def _sensor_logger_acceleration(path: Path, tables: Mapping[str, Table]) -> Vect
 
 
 def _sensor_logger_sign(told: Mapping[str, str]) -> int | None:
-    """By the metadata: standardised recordings follow Android, and only iOS differs."""
+    """The sign by the metadata: standardised recordings follow Android, and only iOS differs."""
     platform = told.get("platform", "").lower()
     if told.get("standardisation", "").lower() == "true" or platform == "android":
         return 1
     return -1 if platform == "ios" else None
 
 
-def usual_of(table: Table) -> float:
+def usual_of(table: CsvTable) -> float:
     return float(np.nanmedian(np.linalg.norm(table.vectors("xyz").xyz, axis=1)))
 
 
-def has_gravity(table: Table) -> bool:
+def has_gravity(table: CsvTable) -> bool:
     return abs(usual_of(table) / STANDARD_GRAVITY_MPS2 - 1.0) < GRAVITY_WITHIN

@@ -1,4 +1,4 @@
-"""What a phone recorded, and the CSV tables of an app's export that hold it."""
+"""A phone's recording, and the CSV tables of an app's export."""
 
 import csv
 import io
@@ -35,10 +35,10 @@ class Fixes:
 
 @dataclass(frozen=True, slots=True)
 class PhoneRecording:
-    """What a phone recorded. ``accel`` has gravity in it.
+    """A phone's recording. ``accel`` includes gravity.
 
-    ``accel_sign`` is 1 where accel is the specific force (+9.81 m/s2 upwards at rest), -1 where it is its opposite, and
-    None where the export does not say. ``n_unusable`` counts rows that are no numbers or came twice.
+    ``accel_sign`` is 1 if accel is the specific force (+9.81 m/s2 upwards at rest), -1 if it is its opposite, and None
+    if the export does not say. ``n_unusable`` counts rows that are not numbers or came twice.
     """
 
     path: Path
@@ -52,8 +52,8 @@ class PhoneRecording:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
-    """One CSV: its name, and columns (n,) by their headers; times apart, in ns."""
+class CsvTable:
+    """One CSV: its name, and columns (n,) by their headers; times separately, in ns."""
 
     name: str
     t_ns: I64
@@ -61,7 +61,7 @@ class Table:
     n_unusable: int
 
     def vectors(self, names: Sequence[str]) -> Vectors:
-        """These three columns, where all of them are numbers. Raises KeyError for one that is not there."""
+        """These three columns where all are numbers. Raises KeyError for a missing one."""
         xyz = np.column_stack([self.columns[name] for name in names])
         known = np.isfinite(xyz).all(axis=1)
         return Vectors(self.t_ns[known], xyz[known])
@@ -72,12 +72,14 @@ def head_of(text: str) -> str:
 
 
 def is_named(member: str, name: str) -> bool:
-    """Whether a member is the sensor of this name; folders, case and spaces do not matter."""
+    """Whether a member is the sensor of this name, ignoring folders, case and spaces."""
     return PurePosixPath(member).stem.lower().replace(" ", "") == name
 
 
-def read_table(path: Path, name: str, text: str, separator: str, time: str, unit_ns: int) -> Table:
-    """Every column as numbers, in order of time, each time once; rows without a time or of another length left out."""
+def read_table(path: Path, name: str, text: str, separator: str, time: str, unit_ns: int) -> CsvTable:
+    """Every column as numbers, in order of time, each time once; rows without a time or of another length are
+    left out.
+    """
     lines = csv.reader(io.StringIO(text), delimiter=separator)
     header = next(lines, [])
     if time not in header:
@@ -95,11 +97,11 @@ def read_table(path: Path, name: str, text: str, separator: str, time: str, unit
         raise LogUnreadableError(f"{path}: {name}: has no row of numbers")
     t_ns, first = np.unique(np.array(stamps, np.int64), return_index=True)
     columns = np.array(values)[first]
-    return Table(name, t_ns, {each: columns[:, i] for i, each in enumerate(header) if i != at}, n_rows - len(t_ns))
+    return CsvTable(name, t_ns, {each: columns[:, i] for i, each in enumerate(header) if i != at}, n_rows - len(t_ns))
 
 
 def _stamp(cell: str, unit_ns: int) -> int | None:
-    """Whole nanoseconds since 1970 have more digits than a double; everything else is read as one."""
+    """A time in ns; whole nanoseconds since 1970 have more digits than a double, so they are read as integers."""
     if unit_ns == 1 and cell.isdigit() and len(cell) < 20:
         return int(cell)
     number = number_of(cell) * unit_ns
@@ -107,7 +109,7 @@ def _stamp(cell: str, unit_ns: int) -> int | None:
 
 
 def number_of(cell: str) -> float:
-    """NaN for what is none; a decimal comma is a point."""
+    """The number, NaN if it is none; a decimal comma is accepted."""
     try:
         return float(cell)
     except ValueError:
@@ -118,7 +120,7 @@ def number_of(cell: str) -> float:
 
 
 def separator_of(text: str) -> str:
-    """What stands behind the first quoted header."""
+    """The character after the first quoted header."""
     found = re.match(r'"[^"]*"([,;\t])', text)
     return found[1] if found else ","
 

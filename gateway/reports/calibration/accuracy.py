@@ -1,4 +1,4 @@
-"""Estimates against the truth: charts of errors, of residuals and of how often intervals hold."""
+"""Estimates against the truth: charts of errors, of residuals and of the coverage of intervals."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
@@ -13,8 +13,8 @@ from gateway.calibration.judgement import (
     PART_TEXT,
     TARGETS,
     Answers,
+    BatchSet,
     Judgement,
-    Part,
     Target,
     answers_of,
     observed_coverage,
@@ -23,15 +23,20 @@ from gateway.calibration.judgement import (
 from gateway.records import F64
 from gateway.reports.calibration.error_tables import batches_table, budget_table, runs_table, summary_table
 from gateway.reports.calibration.text import decimal, estimator_name, percent
-from gateway.reports.charts import GREY, Axis, Chart, Line, Marker, Panel, Points, Rule, Section
+from gateway.reports.charts import GREY, Axis, Chart, LineMark, Marker, Panel, Points, Rule, Section
 from gateway.words import counted
 
-_MARKERS: Final[Mapping[Part, Marker]] = {Part.LEFT_OUT: "circle", Part.VALIDATION: "diamond"}
-_COLOURS: Final[Mapping[Part, int]] = {Part.LEFT_OUT: 0, Part.VALIDATION: 1, Part.IDENTIFICATION: 3, Part.ALL: 0}
+_MARKERS: Final[Mapping[BatchSet, Marker]] = {BatchSet.LEFT_OUT: "circle", BatchSet.VALIDATION: "diamond"}
+_COLOURS: Final[Mapping[BatchSet, int]] = {
+    BatchSet.LEFT_OUT: 0,
+    BatchSet.VALIDATION: 1,
+    BatchSet.IDENTIFICATION: 3,
+    BatchSet.ALL: 0,
+}
 
 
 def accuracy_section(judgement: Judgement, budget: Sequence[BudgetLine] = ()) -> Section:
-    """Everything about one estimator's errors; ``budget`` is where those that it states come from."""
+    """The errors of one estimator; ``budget`` has the sources of its stated errors."""
     name = estimator_name(judgement.estimator)
     targets = [target for target in TARGETS if _has_answers(judgement, target)]
     charts = (
@@ -52,7 +57,7 @@ def accuracy_section(judgement: Judgement, budget: Sequence[BudgetLine] = ()) ->
 
 
 def _sideways(judgement: Judgement) -> Iterator[str]:
-    """A sentence for every set in which places beside the centre line were noted and answered."""
+    """A sentence for every set with known and answered lateral places."""
     for part, table in judgement.tables.items():
         found = table.errors.cg_left
         if found is None or found.mean_abs_m is None:
@@ -76,14 +81,14 @@ _TRUE: Final = {"payload": "payload [kg]", "front_share": "front share [%]"}
 _ERROR: Final = {"payload": "error of payload [kg]", "front_share": "error of front share [pp]"}
 
 
-def _sets(judgement: Judgement, target: Target) -> list[tuple[Part, Answers]]:
-    """What was not fitted to, or else what there is."""
-    unfitted = [part for part in judgement.tables if part is not Part.IDENTIFICATION]
+def _sets(judgement: Judgement, target: Target) -> list[tuple[BatchSet, Answers]]:
+    """The sets that were not fitted, or all if there are none."""
+    unfitted = [part for part in judgement.tables if part is not BatchSet.IDENTIFICATION]
     sets = [(part, answers_of(judgement.tables[part].judged, target)) for part in unfitted or judgement.tables]
     return [(part, answers) for part, answers in sets if len(answers.run)]
 
 
-def _points(part: Part, answers: Answers, x: F64, y: F64, half: F64 | None = None) -> Points:
+def _points(part: BatchSet, answers: Answers, x: F64, y: F64, half: F64 | None = None) -> Points:
     low, high = (None, None) if half is None else (y - half, y + half)
     return Points(x, y, PART_NAMES[part], _COLOURS[part], _MARKERS.get(part, "square"), low, high, answers.notes)
 
@@ -96,7 +101,7 @@ def _estimated_over_true(judgement: Judgement, targets: Sequence[Target]) -> Cha
         sets = _sets(judgement, target)
         ends = np.array([f([f(a.true) for _, a in sets]) for f in (min, max)])
         marks = [_points(part, a, a.true, a.estimated, a.half95) for part, a in sets]
-        exact = Line(ends, ends, "exact", GREY, "dash")
+        exact = LineMark(ends, ends, "exact", GREY, "dash")
         panels.append(Panel(Axis(f"true {_TRUE[target]}"), Axis(f"estimated {_TRUE[target]}"), (exact, *marks)))
     name = estimator_name(judgement.estimator)
     return Chart(
@@ -120,7 +125,7 @@ def _summary(judgement: Judgement) -> str:
 
 
 def _residuals(judgement: Judgement, targets: Sequence[Target]) -> Chart | None:
-    """Errors over the truth, over speed and over what a normal law would have."""
+    """Errors over the truth, over speed, and against a normal distribution."""
     if not targets:
         return None
     panels = [panel for target in targets for panel in _residual_panels(judgement, target)]
@@ -150,12 +155,12 @@ def _residual_panels(judgement: Judgement, target: Target) -> list[Panel]:
         Panel(
             Axis("normal quantile"),
             Axis(f"{_PLAIN[target]}: error / standard deviation"),
-            (Line(ends, ends, "exact", GREY, "dash"), *in_order),
+            (LineMark(ends, ends, "exact", GREY, "dash"), *in_order),
         ),
     ]
 
 
-def _in_order(part: Part, answers: Answers, dof: float | None) -> Points:
+def _in_order(part: BatchSet, answers: Answers, dof: float | None) -> Points:
     z = standardised(answers, dof)
     order = np.argsort(z, kind="stable")
     expected = ndtri((np.arange(len(z)) + 0.5) / len(z))
@@ -192,5 +197,5 @@ def _coverage_panel(judgement: Judgement, target: Target) -> Panel | None:
             marks.append(Points(x, share, PART_NAMES[part], _COLOURS[part], marker, low, high))
     if not marks:
         return None
-    nominal = Line(ends, ends, "exact", GREY, "dash")
+    nominal = LineMark(ends, ends, "exact", GREY, "dash")
     return Panel(Axis("nominal [%]"), Axis("observed [%]"), (nominal, *marks), _PLAIN[target])

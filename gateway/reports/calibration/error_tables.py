@@ -7,12 +7,12 @@ from typing import Final
 from gateway.budget import BudgetLine
 from gateway.calibration.judgement import (
     PART_NAMES,
+    BatchSet,
     CgLeftErrors,
     Comparison,
     Errors,
     Judged,
     Judgement,
-    Part,
     TargetErrors,
 )
 from gateway.calibration.judgement.coverage import IDEAL_SCORE
@@ -56,7 +56,7 @@ def summary_table(judgement: Judgement) -> Table:
 
 
 def budget_table(budget: Sequence[BudgetLine]) -> Table:
-    """Where the stated error comes from."""
+    """The sources of the stated error."""
     rows = [
         (
             SOURCES[line.source].capitalize(),
@@ -76,7 +76,7 @@ def budget_table(budget: Sequence[BudgetLine]) -> Table:
 
 
 def _labelled(errors: Errors) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """A line a quantity; sideways places and the wheels' loads only where they are known."""
+    """A line per quantity; lateral places and wheel loads only if known."""
     yield "payload", _cells(errors.payload)
     yield "share", _cells(errors.front_share)
     if errors.cg_left is not None and errors.cg_left.mean_abs_m is not None:
@@ -106,7 +106,7 @@ def _cells(errors: TargetErrors) -> tuple[str, ...]:
     )
 
 
-def runs_table(judgement: Judgement, part: Part) -> Table:
+def runs_table(judgement: Judgement, part: BatchSet) -> Table:
     """A line for every run of one set."""
     rows = tuple(
         (
@@ -137,7 +137,7 @@ def _run_cells(errors: TargetErrors) -> tuple[str, ...]:
     return (*(decimal(figure, f" {errors.unit}") for figure in figures), percent(errors.coverage95), *widths)
 
 
-def batches_table(judgement: Judgement, part: Part) -> Table:
+def batches_table(judgement: Judgement, part: BatchSet) -> Table:
     """A line for every batch of one set."""
     rows = tuple(_batch_row(one) for one in judgement.tables[part].judged)
     columns = (

@@ -18,12 +18,12 @@ from gateway.core.spectrum import spectra_of
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64, Spectra
 from gateway.reports.calibration.knowledge import knowledge_chart, knowledge_of, knowledge_table, told
-from gateway.reports.charts import Axis, Chart, Line, Panel, Section, Table
+from gateway.reports.charts import Axis, Chart, LineMark, Panel, Section, Table
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fit:
-    """One run: what was measured, what the model makes of its true load, and how well they agree."""
+class RunFit:
+    """One run: its measurement, the model's prediction at its true load, and their agreement."""
 
     run: KnownRun
     measured: Spectra
@@ -32,11 +32,11 @@ class Fit:
 
     @property
     def title(self) -> str:
-        """What the run was."""
+        """The run in words."""
         return f"Run {self.run.number}: {self.run.payload_kg:g} kg at {self.run.front_share_pct:.1f} % front"
 
 
-def fits_of(runs: Sequence[KnownRun], calibration: CrossSpectrumCalibration) -> list[Fit]:
+def fits_of(runs: Sequence[KnownRun], calibration: CrossSpectrumCalibration) -> list[RunFit]:
     """Every run with enough steady driving, at its true load, with the parameters of all runs together."""
     fits = []
     for run in runs:
@@ -55,7 +55,7 @@ def fits_of(runs: Sequence[KnownRun], calibration: CrossSpectrumCalibration) -> 
         point = Point.of(upright(calibration.parameters), run.load)
         moving = with_strokes(cross.without_roll, point.theta, run.load, calibration.ground)
         misfit = Whittle(moving, calibration.ground).misfit(point)
-        fits.append(Fit(run, measured, modelled_spectra(measured, calibration, at_truth), misfit))
+        fits.append(RunFit(run, measured, modelled_spectra(measured, calibration, at_truth), misfit))
     return fits
 
 
@@ -103,12 +103,15 @@ def half_car_section(
     )
 
 
-def _fit_chart(fit: Fit) -> Chart:
+def _fit_chart(fit: RunFit) -> Chart:
     m, s = fit.measured, fit.modelled
     band = (m.freq_hz >= s.freq_hz[0]) & (m.freq_hz <= s.freq_hz[-1])
 
     def panel(title: str, measured: F64, modelled: F64, *, is_log: bool = False) -> Panel:
-        marks = (Line(m.freq_hz[band], measured[band], "measured", 0), Line(s.freq_hz, modelled, "half-car", 2, "dash"))
+        marks = (
+            LineMark(m.freq_hz[band], measured[band], "measured", 0),
+            LineMark(s.freq_hz, modelled, "half-car", 2, "dash"),
+        )
         return Panel(Axis("frequency [Hz]"), Axis(title, is_log=is_log), marks)
 
     return Chart(
@@ -126,13 +129,13 @@ def _fit_chart(fit: Fit) -> Chart:
 
 
 def _unbroken_deg(phase_rad: F64) -> F64:
-    """In degrees, with a gap where it leaps from one end of the circle to the other."""
+    """In degrees, with a gap where it wraps around."""
     degrees = np.degrees(phase_rad)
     leaps = np.abs(np.diff(degrees, append=degrees[-1])) > 180.0
     return np.where(leaps, np.nan, degrees)
 
 
-def _misfit_table(fits: Sequence[Fit], calibration: CrossSpectrumCalibration) -> Table:
+def _misfit_table(fits: Sequence[RunFit], calibration: CrossSpectrumCalibration) -> Table:
     rows = tuple(
         (str(fit.run.number), f"{fit.run.payload_kg:g} kg", f"{fit.run.front_share_pct:.1f} %", f"{fit.misfit:.2f}")
         for fit in sorted(fits, key=lambda fit: fit.run.number)

@@ -1,4 +1,4 @@
-"""What the data could tell of each parameter of the half-car and of how it rolls, and what they could not."""
+"""The information of the data about each parameter of the half-car and of roll."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,12 +12,14 @@ from gateway.core.cross_spectrum.model.parameters import ROLL_PARAMETERS, has_ro
 from gateway.core.vehicle import Vehicle
 from gateway.reports.charts import Axis, Chart, Panel, Points, Rule, Table
 
-UNTOLD_SHARE: Final = 0.9  # of a prior's standard deviation left over: the data said next to nothing
+UNTOLD_SHARE: Final = (
+    0.9  # chosen: of the prior's standard deviation; with more remaining the data had little information
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """One parameter before and after: in its unit, and the share of the prior's standard deviation left over."""
+    """One parameter before and after: in its unit, and the remaining share of the prior's standard deviation."""
 
     name: str
     prior: float
@@ -30,7 +32,9 @@ class Known:
 def knowledge_of(
     calibration: CrossSpectrumCalibration, vehicle: Vehicle, inherited: Inherited | None = None
 ) -> list[Known]:
-    """What calibration made of the prior, or of what was ``inherited``, in the order of the parameters."""
+    """The posterior of each parameter against its prior, or against the ``inherited`` one, in the order of the
+    parameters.
+    """
     theta = calibration.parameters
     prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=has_roll(theta))
     stds, before_stds = np.sqrt(np.diag(calibration.covariance)), prior.std
@@ -46,7 +50,7 @@ def knowledge_of(
 
 
 def told(known: Sequence[Known], beforehand: str = "vehicles usually have") -> str:
-    """Which parameters the data said next to nothing of, and so stay at what was known ``beforehand``."""
+    """The parameters with little information in the data, which stay as known ``beforehand``, in words."""
     untold = [one.name for one in known if one.left_over > UNTOLD_SHARE and not one.is_slack]
     if not untold:
         return "The data told something of every parameter of the vehicle."
@@ -58,7 +62,7 @@ def told(known: Sequence[Known], beforehand: str = "vehicles usually have") -> s
 
 
 def knowledge_chart(known: Sequence[Known]) -> Chart:
-    """Standard deviations left over, parameter by parameter."""
+    """Remaining standard deviations, parameter by parameter."""
     plain = [one for one in known if not one.is_slack and "_bend_" not in one.name]
     groups = (
         ("vehicle", [one for one in plain if one.name not in ROLL_PARAMETERS]),

@@ -1,10 +1,10 @@
-"""How accurate the vehicle would be with fewer runs: errors over their number, found by leaving runs out."""
+"""The accuracy with fewer runs: errors over their number, found by leaving runs out."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from gateway.calibration.judgement import LearningCurve, Rung, Spread
+from gateway.calibration.judgement import LearningCurve, Rung, ScoreSpread
 from gateway.reports.calibration.text import NONE, decimal, estimator_name, percent
 from gateway.reports.charts import Axis, Chart, Marker, Panel, Points, Rule, Section, Table
 
@@ -12,7 +12,7 @@ _MARKERS: tuple[Marker, ...] = ("circle", "diamond", "square", "x")
 
 
 def learning_section(curve: LearningCurve) -> Section:
-    """Errors on runs that were not among those calibrated on, and on the later part of all runs."""
+    """Errors on runs left out of the calibration, and on the later part of all runs."""
     names = sorted({rung.estimator for rung in curve.rungs})
     sizes = sorted({rung.n_runs for rung in curve.rungs})
     runs = Axis("known-load runs", places=tuple(map(str, sizes)))
@@ -50,7 +50,7 @@ def _points(curve: LearningCurve, names: Sequence[str], sizes: Sequence[int], qu
     return points
 
 
-def _mean_and_std(spread: Spread, quantity: str) -> tuple[float | None, float | None]:
+def _mean_and_std(spread: ScoreSpread, quantity: str) -> tuple[float | None, float | None]:
     if quantity == "payload":
         return spread.payload_mean_pct, spread.payload_std_pct
     return spread.front_share_mean_pct, spread.front_share_std_pct
@@ -85,7 +85,7 @@ def _tried(rung: Rung) -> str:
     return f"{rung.n_subsets - rung.n_refused} of {rung.n_subsets}" if rung.n_refused else str(rung.n_subsets)
 
 
-def _cells(spread: Spread) -> tuple[str, ...]:
+def _cells(spread: ScoreSpread) -> tuple[str, ...]:
     payload, share = (
         NONE if mean is None or std is None else f"{mean:.1f} ± {std:.1f} %"
         for mean, std in (_mean_and_std(spread, quantity) for quantity in ("payload", "front_share"))

@@ -19,8 +19,8 @@ _GRADE_MARK: Final = {Grade.FIT: "✓", Grade.RESERVED: "!", Grade.UNFIT: "✗"}
 
 
 @dataclass(frozen=True, slots=True)
-class Page:
-    """All that stands on the page; ``live`` holds plotly's JSON by the chart's name."""
+class ReportPage:
+    """The content of the page; ``live`` has plotly's JSON by the chart's name."""
 
     title: str
     subtitle: str
@@ -31,8 +31,8 @@ class Page:
     live: dict[str, str]
 
 
-def page_html(page: Page) -> str:
-    """The whole document; figures lie in figures/, plotly.min.js beside it."""
+def page_html(page: ReportPage) -> str:
+    """The whole document; figures are in figures/, plotly.min.js is beside it."""
     sections = "".join(section_html(one, page.live) for one in page.sections)
     return html.document(
         html.Page(
@@ -45,7 +45,7 @@ def page_html(page: Page) -> str:
     )
 
 
-def _verdict(page: Page) -> str:
+def _verdict(page: ReportPage) -> str:
     running = page.verdicts[0]
     several = ", which the service runs unless it is told otherwise" if len(page.verdicts) > 1 else ""
     next_run = f"<h3>What to drive next</h3><p>{prose(page.next_run)}</p>" if page.next_run else ""

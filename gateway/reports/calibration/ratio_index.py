@@ -17,9 +17,9 @@ from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.records import F64
 from gateway.reports.calibration.text import NONE, decimal
-from gateway.reports.charts import Axis, Chart, Line, Mark, Marker, Panel, Points, Ribbon, Section, Table
+from gateway.reports.charts import Axis, Chart, LineMark, Mark, Marker, Panel, Points, Ribbon, Section, Table
 
-N_ALONG: Final = 60
+N_ALONG: Final = 60  # chosen: points of a curve
 INTERVAL: Final = "95 % interval of a new batch"
 MIDDLE: Final = "model, the other index at its median"
 QUARTILES: Final = "model, the other index at its quartiles"
@@ -28,7 +28,7 @@ QUARTILES: Final = "model, the other index at its quartiles"
 def ratio_index_section(
     fit: RatioIndexFit, identification: Sequence[KnownRun], validation: Sequence[KnownRun]
 ) -> Section:
-    """R_a and R_g of every batch, the bands and the regression through them, and how both were chosen."""
+    """R_a and R_g of every batch, the bands and the regression through them, and the selection of both."""
     calibration = fit.calibration
     fitted, later = index_rows(identification, calibration), index_rows(validation, calibration)
     panels = []
@@ -54,7 +54,7 @@ def ratio_index_section(
 
 
 def _panels(name: str, fitted: IndexRows, later: IndexRows, model: RegressionModel | None) -> list[Panel]:
-    """The index over payload and over share; the model where its own target is."""
+    """The index over payload and over share, with the model of its own target."""
     is_a = name == "R_a"
     curves = _curves(name, fitted, model) if model is not None else []
     over_payload = (*(curves if is_a else ()), *_points(name, fitted, later, of_payload=True))
@@ -90,15 +90,18 @@ def _notes(rows: IndexRows) -> tuple[str, ...]:
 
 
 def _curves(name: str, rows: IndexRows, model: RegressionModel) -> list[Mark]:
-    """The model along one index, with the other held at its median and, where that matters, at its quartiles."""
+    """The model along one index, with the other at its median and, if that matters, at its quartiles."""
     own, other = (rows.ra, rows.rg) if name == "R_a" else (rows.rg, rows.ra)
     along = np.linspace(own.min(), own.max(), N_ALONG)
     lower, middle, upper = (
         _predicted(name, model, along, held) for held in np.quantile(other, (0.25, 0.5, 0.75)).tolist()
     )
-    marks: list[Mark] = [Ribbon(along, middle[:, 1], middle[:, 2], INTERVAL, 2), Line(along, middle[:, 0], MIDDLE, 2)]
+    marks: list[Mark] = [
+        Ribbon(along, middle[:, 1], middle[:, 2], INTERVAL, 2),
+        LineMark(along, middle[:, 0], MIDDLE, 2),
+    ]
     if np.isfinite(lower).all() and not np.allclose(lower, upper):
-        marks += [Line(along, each[:, 0], QUARTILES, 2, "dot") for each in (lower, upper)]
+        marks += [LineMark(along, each[:, 0], QUARTILES, 2, "dot") for each in (lower, upper)]
     return marks
 
 
@@ -130,7 +133,7 @@ def _model_tables(fit: RatioIndexFit) -> Iterator[Table]:
 
 
 def _trials_table(fit: RatioIndexFit) -> Table:
-    """Every family of regressions with its errors on runs that took no part in any choice."""
+    """Every family of regressions with its errors on runs that took no part in the selection."""
     rows = tuple(
         (
             trial.choice.family + (" (chosen)" if trial is fit.chosen else ""),

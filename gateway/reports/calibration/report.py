@@ -3,7 +3,7 @@
     write_calibration_report(DIR, campaign, outcome)      springscale calibrate ... --report DIR
     write_evaluation_report(DIR, assessment)                springscale evaluate ... --report DIR
 
-Where the directory cannot be made they raise ConfigurationError. It is whole: the page fetches nothing
+They raise ConfigurationError if the directory cannot be created. The page is self-contained: it loads nothing
 from elsewhere, and reads without scripts.
 """
 
@@ -29,7 +29,7 @@ from gateway.estimate_json.errors import budget_to_json
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.half_car import half_car_section
 from gateway.reports.calibration.learning import learning_section
-from gateway.reports.calibration.page import Page, page_html
+from gateway.reports.calibration.page import ReportPage, page_html
 from gateway.reports.calibration.ratio_index import ratio_index_section
 from gateway.reports.calibration.runs import best_next, plan_section, provenance_section, runs_section
 from gateway.reports.calibration.spectra import spectra_section
@@ -99,7 +99,7 @@ def _write(
         save_still(chart, directory / "figures")
         on_chart(done, len(charts))
     verdicts = verdicts_of(assessment, plan.now if plan else None)
-    page = Page(
+    page = ReportPage(
         assessment.title,
         _subtitle(assessment),
         verdicts,
@@ -136,7 +136,7 @@ def _subtitle(assessment: Assessment) -> str:
 
 
 def _in_short(assessment: Assessment, running: Verdict) -> str:
-    """What a fitter wants to know in a sentence."""
+    """The result for a fitter in a sentence."""
     judgement = next(one for one in assessment.judgements if one.estimator == running.estimator)
     if judgement.unseen is None:
         return "How well it weighs is not known: nothing was held back to judge by."

@@ -1,9 +1,9 @@
-"""What was driven and whether it was sound, what to drive next, and where every number comes from."""
+"""The runs and their findings, the plan of further runs, and the provenance of every number."""
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection import Finding, RunVerdict, SplitRun
 from gateway.calibration.judgement import Assessment
-from gateway.calibration.plan import Advice, Expected, LoadPlan, SidewaysLoad
+from gateway.calibration.plan import Advice, Expected, LoadPlan, OffCentreLoad
 from gateway.estimate import Z95
 from gateway.records import Why
 from gateway.reports.calibration.text import NONE, decimal, percent, span
@@ -72,7 +72,7 @@ def plan_section(plan: LoadPlan) -> Section:
     return Section("next", "What to drive next", paragraphs, (), (Table(caption, columns, tuple(rows)),))
 
 
-def _sideways(sideways: SidewaysLoad) -> str:
+def _sideways(sideways: OffCentreLoad) -> str:
     load, left_m = sideways.load, sideways.payload_left_m
     return (
         f"One run with a load to one side, such as {load.payload_kg:g} kg {left_m:g} m left of the centre line "
@@ -110,7 +110,7 @@ def _expected(expected: Expected) -> tuple[str, str, str]:
 
 
 def provenance_section(assessment: Assessment) -> Section:
-    """What to know to make the same again, and the ranges it holds in."""
+    """The facts for reproducing the calibration, and its valid ranges."""
     file, provenance = assessment.file, assessment.file.provenance
     seen = file.seen
     roughness = "not known" if seen.roughness_mps2 is None else span(*seen.roughness_mps2, "m/s²", 2)

@@ -1,4 +1,4 @@
-"""Spectra of both sensors for every load driven, with the scatter that so much driving leaves."""
+"""Spectra of both sensors for every load, with the scatter expected for the driven time."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
 from gateway.records import F64, Batch
-from gateway.reports.charts import Axis, Chart, Line, Mark, Panel, Ribbon, Section, Span
+from gateway.reports.charts import Axis, Chart, LineMark, Mark, Panel, Ribbon, Section, Span
 
-N_SEGMENT: Final = 512
-SHOWN_HZ: Final = (0.7, 15.0)
-MOST_CURVES: Final = 6
+N_SEGMENT: Final = 512  # chosen: 0.1 Hz at 50 Hz
+SHOWN_HZ: Final = (0.7, 15.0)  # chosen: around the bands of the estimators
+MOST_CURVES: Final = 6  # chosen: more are not readable
 OVERLAP_LOSS: Final = 1.0 + 2.0 / 36.0  # of independence between Hann segments that overlap by half (Welch 1967)
 ACCELERATION: Final = "acceleration"
 PITCH_RATE: Final = "pitch_rate"
@@ -103,7 +103,7 @@ def _panel(
         density = density_of((b for run in alike for b in run.batches if not b.rejected), sensor)
         if density is not None:
             marks.append(Ribbon(density.freq_hz, density.low, density.high, "", colour))
-            marks.append(Line(density.freq_hz, density.amplitude, label, colour))
+            marks.append(LineMark(density.freq_hz, density.amplitude, label, colour))
     if not marks:
         return None
     return Panel(Axis("frequency [Hz]"), Axis(_AXIS[sensor], is_log=True), (*_spans(bands), *marks))

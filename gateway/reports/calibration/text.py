@@ -3,7 +3,7 @@
 from typing import Final
 
 NONE: Final = "–"
-_DIGITS: Final = 2
+_DIGITS: Final = 2  # chosen
 
 
 def decimal(number: float | None, unit: str = "", digits: int = _DIGITS) -> str:

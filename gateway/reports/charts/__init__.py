@@ -1,7 +1,7 @@
 """Charts as plain records, and two ways to draw them: ``still`` by matplotlib, ``live`` by plotly.
 
-A page's sections with their charts and tables are described here (``chart``) by whoever knows the numbers, and drawn
-without knowing them: the same record gives the SVG file and the chart that answers to the mouse.
+Reports describe their sections, charts and tables with the records of ``chart``; the renderers know nothing about the
+numbers. The same record gives the SVG file and the interactive chart.
 """
 
 from gateway.reports.charts.chart import (
@@ -9,8 +9,8 @@ from gateway.reports.charts.chart import (
     Axis,
     Cell,
     Chart,
-    Line,
-    Link,
+    ChartLink,
+    LineMark,
     Mark,
     Marker,
     Panel,
@@ -27,8 +27,8 @@ __all__ = [
     "Axis",
     "Cell",
     "Chart",
-    "Line",
-    "Link",
+    "ChartLink",
+    "LineMark",
     "Mark",
     "Marker",
     "Panel",

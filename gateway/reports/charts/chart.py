@@ -1,4 +1,4 @@
-"""A chart as plain numbers: what it shows, not how. Drawn twice, live by plotly and still by matplotlib."""
+"""Charts as plain records of numbers, independent of the renderer (``live`` by plotly, ``still`` by matplotlib)."""
 
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -10,14 +10,14 @@ Marker = Literal["circle", "square", "diamond", "x"]
 
 # each at least 3:1 against the light and the dark ground of the page (WCAG 2.2, 1.4.11)
 COLOURS: Final = ("#2a7fc1", "#d9503f", "#2c9960", "#9467bd", "#b57f1c", "#1f96a5", "#d0609e", "#7d8785")
-GREY: Final = 7
+GREY: Final = 7  # index in the palette
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """``places`` names the positions 0, 1, 2 ... of an axis of kinds instead of numbers.
+    """An axis. ``places`` names the positions 0, 1, 2 ... if the axis is categorical.
 
-    ``ticks`` names positions of an axis of numbers that people do not read as such, as instants: (position, name).
+    ``ticks`` labels positions of a numeric axis, for example instants: (position, name).
     """
 
     title: str
@@ -28,12 +28,12 @@ class Axis:
 
     @property
     def named(self) -> tuple[tuple[float, str], ...]:
-        """Positions that have names, with these; empty where the numbers stand for themselves."""
+        """Labelled positions with their labels; empty if the axis shows plain numbers."""
         return self.ticks or tuple((float(n), place) for n, place in enumerate(self.places))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Line:
+class LineMark:
     """A curve through x, y (n,)."""
 
     x: F64
@@ -45,7 +45,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """Marks at x, y (n,); low and high (n,) are the ends of an interval about y; notes say what each is."""
+    """Markers at x, y (n,); low and high (n,) are the ends of an interval around y; ``notes`` describe each marker."""
 
     x: F64
     y: F64
@@ -81,7 +81,7 @@ class Rule:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """The stretch low to high of x, shaded over the panel's height."""
+    """The range of x from low to high, shaded over the full height of the panel."""
 
     low: float
     high: float
@@ -89,12 +89,12 @@ class Span:
     colour: int = GREY
 
 
-Mark = Line | Points | Ribbon | Rule | Span
+Mark = LineMark | Points | Ribbon | Rule | Span
 
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One pair of axes and what is drawn in it, the first lowest."""
+    """One pair of axes and its marks, drawn in this order (the first is at the back)."""
 
     x: Axis
     y: Axis
@@ -104,9 +104,9 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """Panels side by side, ``most_columns`` in a row. ``name`` is a file's; ``alt`` tells in words what is seen.
+    """Panels, at most ``most_columns`` in a row. ``name`` is the file name; ``alt`` describes the chart in words.
 
-    ``has_still`` is false where no picture is drawn, for tables beside it hold the same numbers.
+    ``has_still`` is false if no picture is drawn because a table beside the chart has the same numbers.
     """
 
     name: str
@@ -119,29 +119,29 @@ class Chart:
 
     @property
     def n_columns(self) -> int:
-        """Panels in a row."""
+        """Number of panels in a row."""
         return min(self.most_columns, len(self.panels))
 
     @property
     def n_rows(self) -> int:
-        """Rows of panels."""
+        """Number of rows of panels."""
         return -(-len(self.panels) // self.n_columns)
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class ChartLink:
     """A cell that leads to another page; ``to`` is a relative URL."""
 
     text: str
     to: str
 
 
-Cell = str | Link
+Cell = str | ChartLink
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Numbers as text, the first ``n_heads`` cells of a row naming it. A row may be as wide as ``columns`` only."""
+    """Numbers as text; the first ``n_heads`` cells of a row are its headings. No row is longer than ``columns``."""
 
     caption: str
     columns: tuple[str, ...]
@@ -151,7 +151,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A chapter of the report: paragraphs, then charts and tables; what is lengthy is ``folded`` away at first."""
+    """A chapter of the report: paragraphs, then charts and tables. ``folded`` parts are collapsed at first."""
 
     anchor: str
     heading: str

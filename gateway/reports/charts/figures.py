@@ -1,4 +1,4 @@
-"""Figures without global state: drawn by matplotlib, saved as SVG and PNG, the same bytes for the same numbers."""
+"""Matplotlib figures without global state, saved reproducibly (the same numbers give the same bytes) as SVG and PNG."""
 
 import io
 from pathlib import Path
@@ -21,7 +21,7 @@ COLOURS: Final = ("#0b6fa4", "#d1495b", "#2e8b57", "#8e6c8a", "#edae49")
 
 
 def panels(n_rows: int = 1, n_columns: int = 1, height_in: float = 3.2) -> tuple[Figure, list[Axes]]:
-    """A figure 9 inches wide and its panels, row by row."""
+    """Create a figure 9 inches wide; return it and its panels, row by row."""
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(9.0, height_in * n_rows), layout="constrained")
         grid = figure.subplots(n_rows, n_columns, squeeze=False)
@@ -29,7 +29,7 @@ def panels(n_rows: int = 1, n_columns: int = 1, height_in: float = 3.2) -> tuple
 
 
 def save(figure: Figure, directory: Path, name: str) -> str:
-    """Write NAME.svg and NAME.png; the SVG element, ready to stand in a page."""
+    """Write NAME.svg and NAME.png; return the SVG element for use in a page."""
     directory.mkdir(parents=True, exist_ok=True)
     text = io.StringIO()
     style: Any = {**_STYLE, "svg.hashsalt": name}

@@ -1,4 +1,4 @@
-"""Sections, charts and tables as HTML: they read without scripts; where plotly.min.js is there it draws the charts."""
+"""Sections, charts and tables as HTML, readable without scripts; plotly.min.js, if present, draws the charts."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -7,16 +7,16 @@ from html import escape
 from importlib.resources import files
 from typing import Final
 
-from gateway.reports.charts.chart import Cell, Chart, Link, Section, Table
+from gateway.reports.charts.chart import Cell, Chart, ChartLink, Section, Table
 
 PLOTLY_FILE: Final = "plotly.min.js"
 
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A document: its head, and all that stands in ``main`` (HTML). ``skip_to`` is the anchor of what matters.
+    """A document: its head and the contents of ``main`` (HTML). ``skip_to`` is the anchor of the main content.
 
-    ``plotly`` is where plotly's script lies beside it; None: the page has no chart for it.
+    ``plotly`` is the relative URL of plotly's script; None if the page has no interactive chart.
     """
 
     title: str
@@ -27,7 +27,7 @@ class Page:
 
 
 def document(page: Page) -> str:
-    """The whole document; it fetches nothing from elsewhere."""
+    """The complete document; it loads nothing from other hosts."""
     script = f'<script src="{page.plotly}"></script><script>{_asset("report.js")}</script>' if page.plotly else ""
     anchor, words = page.skip_to
     return (
@@ -42,13 +42,13 @@ def document(page: Page) -> str:
 
 
 def contents_html(sections: Sequence[Section]) -> str:
-    """Links to the sections."""
+    """Table of contents: links to the sections."""
     links = "".join(f'<li><a href="#{one.anchor}">{escape(one.heading)}</a></li>' for one in sections)
     return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
 
 
 def prose(text: str) -> str:
-    """Escaped, with a number and its unit kept on one line."""
+    """Escape text, with a non-breaking space between a number and its unit."""
     return re.sub(r"(?<=\d) (?=(?:%|kg|pp|Hz|m|km/h|m/s²)(?:\W|$))", "\u00a0", escape(text)).replace("± ", "±\u00a0")
 
 
@@ -57,7 +57,7 @@ def _asset(name: str) -> str:
 
 
 def section_html(section: Section, live: Mapping[str, str]) -> str:
-    """A chapter; ``live`` holds plotly's JSON by the chart's name."""
+    """One section as HTML; ``live`` maps chart names to plotly's JSON."""
     paragraphs = "".join(f"<p>{prose(text)}</p>" for text in section.paragraphs)
     items: list[Chart | Table] = [*section.charts, *section.tables]
     body = "".join(_item(item, live) for item in items)
@@ -74,7 +74,7 @@ def _item(item: Chart | Table, live: Mapping[str, str]) -> str:
 
 
 def _figure(chart: Chart, live: Mapping[str, str]) -> str:
-    """The still picture, where there is one, and what plotly needs to draw the chart on screen."""
+    """The static picture, if there is one, and the JSON from which plotly draws the chart on screen."""
     spec = live[chart.name].replace("<", "\\u003c")  # so that no text can end the element
     alt, picture = escape(chart.alt), f"figures/{chart.name}"
     still = f'<div class="wide"><img src="{picture}.svg" alt="{alt}"></div>' if chart.has_still else ""
@@ -88,7 +88,7 @@ def _figure(chart: Chart, live: Mapping[str, str]) -> str:
 
 
 def table_html(table: Table) -> str:
-    """A table that scrolls by itself where the page is narrow."""
+    """A table that scrolls horizontally on narrow pages."""
     head = "".join(f'<th scope="col">{escape(column)}</th>' for column in table.columns)
     body = "".join(_row(row, table.n_heads) for row in table.rows)
     caption = escape(table.caption)
@@ -104,4 +104,4 @@ def _row(cells: Sequence[Cell], n_heads: int) -> str:
 
 
 def _cell(cell: Cell) -> str:
-    return f'<a href="{escape(cell.to)}">{prose(cell.text)}</a>' if isinstance(cell, Link) else prose(cell)
+    return f'<a href="{escape(cell.to)}">{prose(cell.text)}</a>' if isinstance(cell, ChartLink) else prose(cell)

@@ -1,4 +1,4 @@
-"""Charts for plotly: the JSON that plotly.js draws in the page, and the script itself."""
+"""Interactive charts: the JSON that plotly.js draws in the page, and the script itself."""
 
 import math
 from dataclasses import replace
@@ -10,12 +10,12 @@ from plotly.io.json import to_json_plotly
 from plotly.offline import get_plotlyjs
 from plotly.subplots import make_subplots
 
-from gateway.reports.charts.chart import COLOURS, Axis, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts.chart import COLOURS, Axis, Chart, LineMark, Mark, Panel, Points, Ribbon, Rule, Span
 
-_LEGEND_PX: Final = 90
-_NAME_PX: Final = 20
-_GAP_PX: Final = 95
-_OPACITY: Final = 0.18
+_LEGEND_PX: Final = 90  # chosen: by eye, like the next three
+_NAME_PX: Final = 20  # chosen: height of a name
+_GAP_PX: Final = 95  # chosen: between panels
+_OPACITY: Final = 0.18  # chosen: of bands
 _TICKS: Final = [digit * 10.0**decade for decade in range(-5, 4) for digit in (1, 2, 5)]
 _LOG_TICKS: Final = {"tickmode": "array", "tickvals": _TICKS, "ticktext": [f"{tick:g}" for tick in _TICKS]}
 
@@ -29,7 +29,7 @@ def plotly_script() -> str:
 def plotly_json(chart: Chart) -> str:
     """{"data": [...], "layout": {...}, "narrow": {...}}: validated by plotly, without a theme (the page sets colours).
 
-    ``narrow`` is the layout on a phone, where panels stand below one another.
+    ``narrow`` is the layout for phones, with all panels in one column.
     """
     narrow = live(replace(chart, most_columns=1), has_room=False).layout
     text: str = to_json_plotly(live(chart).to_plotly_json() | {"narrow": narrow})
@@ -37,7 +37,7 @@ def plotly_json(chart: Chart) -> str:
 
 
 def live(chart: Chart, *, has_room: bool = True) -> go.Figure:
-    """The chart as a plotly figure; its legend in lines below, or one name a line where there is no room."""
+    """The chart as a plotly figure; its legend is in rows below, or one entry per row if the page is narrow."""
     height_px = chart.n_rows * chart.row_height_px
     figure = make_subplots(
         rows=chart.n_rows,
@@ -73,7 +73,7 @@ def _add_panel(figure: go.Figure, chart: Chart, panel: Panel, number: int, seen:
 
 
 def _named(mark: Mark, seen: set[str]) -> dict[str, Any]:
-    """A label stands in the legend once and switches what bears it in every panel."""
+    """Show each label once in the legend and let it toggle all its marks in every panel."""
     label = mark.label
     is_new = bool(label) and label not in seen
     seen.add(label)
@@ -119,7 +119,7 @@ def _traces(mark: object) -> list[dict[str, Any]]:
 
 
 @_traces.register
-def _(mark: Line) -> list[dict[str, Any]]:
+def _(mark: LineMark) -> list[dict[str, Any]]:
     style = {"color": COLOURS[mark.colour], "dash": mark.dash, "width": 1.6}
     return [{"type": "scatter", "mode": "lines", "x": mark.x, "y": mark.y, "line": style}]
 
@@ -142,7 +142,7 @@ def _(mark: Points) -> list[dict[str, Any]]:
 
 @_traces.register
 def _(mark: Ribbon) -> list[dict[str, Any]]:
-    """Once along the upper end and back along the lower."""
+    """A closed polygon: along the upper bound and back along the lower."""
     style = {"fill": "toself", "fillcolor": COLOURS[mark.colour], "opacity": _OPACITY, "line": {"width": 0}}
     around_x, around_y = [*mark.x, *mark.x[::-1]], [*mark.high, *mark.low[::-1]]
     return [{"type": "scatter", "mode": "lines", "x": around_x, "y": around_y, "hoverinfo": "skip", **style}]

@@ -1,4 +1,4 @@
-"""Charts drawn by matplotlib: SVG and PNG for print, for a page without scripts and for slides."""
+"""Static charts by matplotlib: SVG and PNG for print, slides and pages without scripts."""
 
 from functools import singledispatch
 from pathlib import Path
@@ -9,13 +9,13 @@ from matplotlib.axis import XAxis, YAxis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from gateway.reports.charts.chart import COLOURS, Axis, Chart, Line, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts.chart import COLOURS, Axis, Chart, LineMark, Panel, Points, Ribbon, Rule, Span
 from gateway.reports.charts.figures import panels, save
 
-_INCHES_PER_PX: Final = 1.0 / 105.0
+_INCHES_PER_PX: Final = 1.0 / 105.0  # chosen: size of letters in print
 _DASHES: Final = {"solid": "-", "dash": "--", "dot": ":"}
 _MARKERS: Final = {"circle": "o", "square": "s", "diamond": "D", "x": "x"}
-_LEGEND_COLUMNS: Final = 5
+_LEGEND_COLUMNS: Final = 5  # chosen
 
 
 def save_still(chart: Chart, directory: Path) -> None:
@@ -24,7 +24,7 @@ def save_still(chart: Chart, directory: Path) -> None:
 
 
 def draw(chart: Chart) -> Figure:
-    """The chart with one legend for all its panels below them."""
+    """Draw the chart with one common legend below all panels."""
     figure, axes_of = panels(chart.n_rows, chart.n_columns, chart.row_height_px * _INCHES_PER_PX)
     n_drawn = len(chart.panels)
     for panel, axes in zip(chart.panels, axes_of[:n_drawn], strict=True):
@@ -61,7 +61,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
 
 
 def _set_axis(drawn: XAxis | YAxis, axis: Axis, **of_places: Any) -> None:
-    """Scale, limits and places; ``of_places`` is how the names of places are set."""
+    """Set scale, limits and ticks; ``of_places`` formats the labels of a categorical axis."""
     name = drawn.axis_name
     if axis.is_log:
         drawn.axes.set(**{f"{name}scale": "log"})
@@ -73,7 +73,7 @@ def _set_axis(drawn: XAxis | YAxis, axis: Axis, **of_places: Any) -> None:
 
 
 def _with_plain_ticks(axis: XAxis | YAxis) -> None:
-    """0.001, 0.002, 0.005 rather than powers of ten, which matplotlib typesets at half a second a figure."""
+    """Ticks as 0.001, 0.002, 0.005; matplotlib needs half a second per figure to typeset powers of ten."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     axis.set_minor_formatter(NullFormatter())
@@ -89,7 +89,7 @@ def _draw_mark(mark: object, axes: Axes, order: int) -> None:
 
 
 @_draw_mark.register
-def _(mark: Line, axes: Axes, order: int) -> None:
+def _(mark: LineMark, axes: Axes, order: int) -> None:
     axes.plot(mark.x, mark.y, color=COLOURS[mark.colour], linestyle=_DASHES[mark.dash], linewidth=1.2,
               label=_legend(mark.label), zorder=order)  # fmt: skip
 

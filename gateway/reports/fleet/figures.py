@@ -1,16 +1,16 @@
-"""The report's numbers for machines: report.json, unknown is null."""
+"""The numbers of the report as JSON (report.json); unknown values are null."""
 
 import math
 from collections.abc import Sequence
 from typing import Any
 
-from gateway.archive.fleet import Drift, Fleet, Share, Trend, Trouble, Vehicle
+from gateway.archive.fleet import Drift, DriftTrend, FleetSummary, FleetVehicle, Share, Trouble
 from gateway.reports.fleet.overview import Look
 from gateway.reports.fleet.text import page_of
 
 
-def fleet_json(fleet: Fleet, looks: Sequence[Look], source: str) -> dict[str, Any]:
-    """Everything that the pages say, by vehicle."""
+def fleet_json(fleet: FleetSummary, looks: Sequence[Look], source: str) -> dict[str, Any]:
+    """All numbers of the pages, by vehicle."""
     return {
         "dataset": source,
         "from": str(fleet.first),
@@ -28,7 +28,7 @@ def fleet_json(fleet: Fleet, looks: Sequence[Look], source: str) -> dict[str, An
     }
 
 
-def _vehicle(vehicle: Vehicle) -> dict[str, Any]:
+def _vehicle(vehicle: FleetVehicle) -> dict[str, Any]:
     return {
         "vehicle": vehicle.name,
         "page": f"vehicles/{page_of(vehicle.name)}",
@@ -45,7 +45,7 @@ def _vehicle(vehicle: Vehicle) -> dict[str, Any]:
     }
 
 
-def _weeks(vehicle: Vehicle) -> list[dict[str, Any]]:
+def _weeks(vehicle: FleetVehicle) -> list[dict[str, Any]]:
     weeks = vehicle.weeks
     return [
         {
@@ -70,7 +70,7 @@ def _drift(drift: Drift) -> dict[str, Any]:
     }
 
 
-def _trend(trend: Trend) -> dict[str, Any]:
+def _trend(trend: DriftTrend) -> dict[str, Any]:
     interval = [_known(trend.low), _known(trend.high)]
     return {"per_year": _known(trend.slope), "interval95": interval, "p": _known(trend.p), "n_weeks": trend.n}
 

@@ -1,4 +1,4 @@
-"""The fleet's page: what needs attention, every vehicle in a line, and the fleet week by week."""
+"""The overview page of the fleet: what needs attention, a row per vehicle, and the fleet by week."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from gateway.archive.fleet import DRIFTING, OF_VEHICLE, Drift, Fleet, Vehicle
+from gateway.archive.fleet import DRIFTING, OF_VEHICLE, Drift, FleetSummary, FleetVehicle
 from gateway.archive.fleet.trend import FALSE_SHARE
 from gateway.reasons import Cause
-from gateway.reports.charts import Axis, Chart, Line, Link, Mark, Panel, Points, Ribbon, Section, Table
+from gateway.reports.charts import Axis, Chart, ChartLink, LineMark, Mark, Panel, Points, Ribbon, Section, Table
 from gateway.reports.fleet.text import (
     NAMES,
     NONE,
@@ -35,7 +35,7 @@ MOST_FAILURES: Final = 200  # in the table; all are in report.json
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Something of one vehicle that a person should look at."""
+    """A finding about one vehicle that a person should check."""
 
     vehicle: str
     what: str
@@ -44,8 +44,8 @@ class Look:
     has_page: bool = True
 
 
-def looks_of(fleet: Fleet) -> list[Look]:
-    """Needs attention: sensors that are bad first, then drift, silence, few answers and logs that failed."""
+def looks_of(fleet: FleetSummary) -> list[Look]:
+    """The findings in order of urgency: bad sensors, drift, no data, few estimates, failed logs."""
     return [
         *(_bad(vehicle, n) for vehicle in fleet.vehicles for n in range(len(vehicle.bad_sensors))),
         *sorted(_drifts(fleet), key=lambda look: look.what),
@@ -57,24 +57,24 @@ def looks_of(fleet: Fleet) -> list[Look]:
     ]  # fmt: skip
 
 
-def fleet_sections(fleet: Fleet, looks: Sequence[Look]) -> list[Section]:
-    """The whole page."""
+def fleet_sections(fleet: FleetSummary, looks: Sequence[Look]) -> list[Section]:
+    """All sections of the overview page."""
     failed = [_failed(fleet)] if fleet.failures else []
     return [_look_section(looks), _vehicles(fleet), _loads(fleet), _refusals(fleet), _drift(fleet), *failed, _how()]
 
 
-def _bad(vehicle: Vehicle, n: int) -> Look:
+def _bad(vehicle: FleetVehicle, n: int) -> Look:
     trouble = vehicle.bad_sensors[n]
     return Look(vehicle.name, f"sensor: {trouble.reason}", trouble_told(trouble), reason_told(trouble.reason)[1])
 
 
-def _drifts(fleet: Fleet) -> Iterator[Look]:
+def _drifts(fleet: FleetSummary) -> Iterator[Look]:
     for vehicle in fleet.vehicles:
         for name, drift in vehicle.believed_drifts.items():
             yield _drifting(vehicle, name, drift)
 
 
-def _drifting(vehicle: Vehicle, name: str, drift: Drift) -> Look:
+def _drifting(vehicle: FleetVehicle, name: str, drift: Drift) -> Look:
     advice = (
         "look for wear; calibrate again where it is repaired"
         if name in OF_VEHICLE
@@ -83,7 +83,7 @@ def _drifting(vehicle: Vehicle, name: str, drift: Drift) -> Look:
     return Look(vehicle.name, f"drift: {NAMES[name]}", drift_told(drift), advice)
 
 
-def _silent(fleet: Fleet) -> Iterator[Look]:
+def _silent(fleet: FleetSummary) -> Iterator[Look]:
     since = fleet.last - timedelta(days=SILENT_DAYS)
     for vehicle in fleet.vehicles:
         if vehicle.last < since:
@@ -92,7 +92,7 @@ def _silent(fleet: Fleet) -> Iterator[Look]:
             )
 
 
-def _little_answered(fleet: Fleet) -> Iterator[Look]:
+def _little_answered(fleet: FleetSummary) -> Iterator[Look]:
     for vehicle in fleet.vehicles:
         if vehicle.n_answered < LITTLE_ANSWERED * vehicle.n:
             reason, n = max(vehicle.n_refused.items(), key=lambda one: one[1])
@@ -100,7 +100,7 @@ def _little_answered(fleet: Fleet) -> Iterator[Look]:
             yield Look(vehicle.name, "few answers", told, reason_told(reason)[1])
 
 
-def _failing(fleet: Fleet) -> Iterator[Look]:
+def _failing(fleet: FleetSummary) -> Iterator[Look]:
     with_page = {vehicle.name for vehicle in fleet.vehicles}
     for name, n in sorted(Counter(failure.vehicle for failure in fleet.failures).items()):
         yield Look(name, "logs failed", f"{whole(n)}, told below", "mend or remove them", name in with_page)
@@ -113,11 +113,11 @@ def _look_section(looks: Sequence[Look]) -> Section:
     return Section("look", "Needs attention", words, (), (table,) if rows else ())
 
 
-def _name(vehicle: str, has_page: bool = True) -> Link | str:
-    return Link(vehicle, f"vehicles/{page_of(vehicle)}") if has_page else vehicle
+def _name(vehicle: str, has_page: bool = True) -> ChartLink | str:
+    return ChartLink(vehicle, f"vehicles/{page_of(vehicle)}") if has_page else vehicle
 
 
-def _vehicles(fleet: Fleet) -> Section:
+def _vehicles(fleet: FleetSummary) -> Section:
     rows = tuple(_vehicle_row(vehicle) for vehicle in fleet.vehicles)
     columns = ("Vehicle", "batches", "answered", "last answered week: mean load (95 %)", "over a limit",
                "refused most for", "drifts", "bad sensors", "from", "to")  # fmt: skip
@@ -128,7 +128,7 @@ def _vehicles(fleet: Fleet) -> Section:
     return Section("vehicles", "Vehicles", (text,), (), (Table("Every vehicle", columns, rows),))
 
 
-def _vehicle_row(vehicle: Vehicle) -> tuple[Link | str, ...]:
+def _vehicle_row(vehicle: FleetVehicle) -> tuple[ChartLink | str, ...]:
     weeks, known = vehicle.weeks, np.flatnonzero(vehicle.weeks.n_answered)
     most = max(vehicle.n_refused.items(), key=lambda one: one[1], default=None)
     last = NONE
@@ -150,7 +150,7 @@ def _vehicle_row(vehicle: Vehicle) -> tuple[Link | str, ...]:
     )
 
 
-def _loads(fleet: Fleet) -> Section:
+def _loads(fleet: FleetSummary) -> Section:
     means: dict[int, list[float]] = {}
     for vehicle in fleet.vehicles:
         answered = vehicle.weeks.n_answered > 0
@@ -165,7 +165,7 @@ def _loads(fleet: Fleet) -> Section:
     runs = list(runs_of(np.isfinite(middle), number))
     marks: tuple[Mark, ...] = (
         *(Ribbon(x[run], low[run], high[run], "middle half of the vehicles") for run in runs),
-        *(Line(x[run], middle[run], "median of the vehicles") for run in runs),
+        *(LineMark(x[run], middle[run], "median of the vehicles") for run in runs),
     )
     chart = Chart(
         "loads",
@@ -174,13 +174,15 @@ def _loads(fleet: Fleet) -> Section:
         "Median and middle half over the vehicles of each one's weekly mean load, and the number of vehicles by week.",
         (
             Panel(axis, Axis("load [kg]"), marks, "Weekly mean loads"),
-            Panel(axis, Axis("vehicles"), (Line(x, np.array(counts, dtype=float), "vehicles", 7),), "With an answer"),
+            Panel(
+                axis, Axis("vehicles"), (LineMark(x, np.array(counts, dtype=float), "vehicles", 7),), "With an answer"
+            ),
         ),
     )
     return Section("loads", "Loads over time", (), (chart,))
 
 
-def _refusals(fleet: Fleet) -> Section:
+def _refusals(fleet: FleetSummary) -> Section:
     by_week: dict[int, Counter[str]] = {}
     for vehicle in fleet.vehicles:
         weeks = vehicle.weeks
@@ -221,7 +223,7 @@ def _refusals(fleet: Fleet) -> Section:
     return Section("refused", "Refusals", (text,), (chart,) if lines else (), table)
 
 
-def _drift(fleet: Fleet) -> Section:
+def _drift(fleet: FleetSummary) -> Section:
     panels = tuple(panel for name in DRIFTING if (panel := _drift_panel(fleet, name)) is not None)
     n = sum(len(vehicle.drifts) for vehicle in fleet.vehicles)
     n_believed = sum(len(vehicle.believed_drifts) for vehicle in fleet.vehicles)
@@ -243,7 +245,7 @@ def _drift(fleet: Fleet) -> Section:
     return Section("drift", "Drift", (text,), (chart,))
 
 
-def _drift_panel(fleet: Fleet, name: str) -> Panel | None:
+def _drift_panel(fleet: FleetSummary, name: str) -> Panel | None:
     told = sorted(
         ((vehicle.drifts[name], vehicle.name) for vehicle in fleet.vehicles if name in vehicle.drifts),
         key=lambda one: one[0].judged.slope,
@@ -263,7 +265,7 @@ def _drift_panel(fleet: Fleet, name: str) -> Panel | None:
     return Panel(Axis("vehicles"), Axis("a year"), tuple(marks), NAMES[name])
 
 
-def _failed(fleet: Fleet) -> Section:
+def _failed(fleet: FleetSummary) -> Section:
     rows = tuple((one.vehicle, one.month, one.log or "every log", one.reason) for one in fleet.failures[:MOST_FAILURES])
     more = len(fleet.failures) - len(rows)
     text = f"{whole(len(fleet.failures))} logs or months gave nothing. No figure of this report holds them."

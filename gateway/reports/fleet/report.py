@@ -2,14 +2,14 @@
 
     write_fleet_report(DIR, fleet, "DATASET")               springscale fleet-report DATASET --output DIR
 
-It is whole: the pages fetch nothing from elsewhere, and read without scripts.
+The pages are self-contained: they load nothing from other hosts and can be read without scripts.
 """
 
 import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from gateway.archive.fleet import Fleet, Vehicle
+from gateway.archive.fleet import FleetSummary, FleetVehicle
 from gateway.reports.charts import Chart, Section
 from gateway.reports.charts.html import PLOTLY_FILE, Page, contents_html, document, prose, section_html
 from gateway.reports.charts.live import plotly_json, plotly_script
@@ -24,8 +24,10 @@ from gateway.words import counted
 OnPage = Callable[[int, int], None]  # (pages written, pages in all)
 
 
-def write_fleet_report(directory: Path, fleet: Fleet, source: str, on_page: OnPage = lambda done, of: None) -> Path:
-    """Every page and the numbers; the path of report.html. Raises ConfigurationError where it cannot be written."""
+def write_fleet_report(
+    directory: Path, fleet: FleetSummary, source: str, on_page: OnPage = lambda done, of: None
+) -> Path:
+    """Write every page and report.json; return the path of report.html. Raises ConfigurationError if writing fails."""
     made_folder(directory / "vehicles")
     (directory / PLOTLY_FILE).write_text(plotly_script(), encoding="utf-8")
     for done, vehicle in enumerate(fleet.vehicles):
@@ -47,14 +49,14 @@ def write_fleet_report(directory: Path, fleet: Fleet, source: str, on_page: OnPa
     return report
 
 
-def _in_short(fleet: Fleet, source: str, n_looks: int) -> str:
+def _in_short(fleet: FleetSummary, source: str, n_looks: int) -> str:
     return (
         f"{fleet.first} to {fleet.last}: {whole(fleet.n)} batches, {percent(fleet.n_answered, fleet.n)} of them "
         f"answered. {counted(n_looks, 'thing') if n_looks else 'Nothing'} to look at. From {source}."
     )
 
 
-def _vehicle_page(vehicle: Vehicle) -> str:
+def _vehicle_page(vehicle: FleetVehicle) -> str:
     calibrated = ", ".join(vehicle.calibrations) or "without a calibration"
     text = (
         f"{vehicle.first} to {vehicle.last}: {whole(vehicle.n)} batches, {percent(vehicle.n_answered, vehicle.n)} of "

@@ -1,4 +1,4 @@
-"""How the fleet's report writes numbers, weeks and what is to be looked at."""
+"""Text formatting of the fleet report: numbers, weeks and findings."""
 
 import hashlib
 import math
@@ -7,74 +7,74 @@ from collections.abc import Sequence
 from datetime import date
 from typing import Final
 
-from gateway.archive.fleet import OF_SENSOR, OF_VEHICLE, Drift, Share, Trend, Trouble, monday_of
+from gateway.archive.fleet import OF_SENSOR, OF_VEHICLE, Drift, DriftTrend, Share, Trouble, monday_of
 from gateway.reports.charts import Axis
 
 NONE: Final = "–"
-MOST_TICKS: Final = 8
+MOST_TICKS: Final = 8  # chosen: more labels overlap
 LEAST_WEEKS_APART: Final = 3  # names that would else lie on one another
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
 NAMES: Final = {**OF_VEHICLE, **OF_SENSOR}
 
 
 def page_of(vehicle: str) -> str:
-    """The name of a vehicle's page: its own where that can be a file's anywhere, else a hash."""
+    """The file name of a vehicle's page: its id if that is a valid file name on every system, else a hash."""
     plain = vehicle if _PLAIN.fullmatch(vehicle) else hashlib.sha256(vehicle.encode()).hexdigest()[:16]
     return f"{plain}.html"
 
 
 def whole(n: int) -> str:
-    """Thousands apart."""
+    """An integer with its thousands separated."""
     return f"{n:,}".replace(",", "\u202f")
 
 
 def percent(part: float, of: float) -> str:
-    """With what it is of told elsewhere; a dash where that is nothing."""
+    """``part`` of ``of`` in percent; a dash if ``of`` is 0."""
     return NONE if of == 0 else f"{100.0 * part / of:.{0 if 10 * part >= of else 1}f} %"
 
 
 def kg(mean: float, low: float, high: float) -> str:
-    """A load and its 95 % interval; a dash where unknown."""
+    """A load [kg] with its 95 % interval; a dash if unknown."""
     if not math.isfinite(mean):
         return NONE
     return f"{mean:.0f} kg" + (f" ({low:.0f} to {high:.0f})" if math.isfinite(low) and math.isfinite(high) else "")
 
 
-def slope(trend: Trend) -> str:
-    """Per year, with its 95 % interval."""
+def slope(trend: DriftTrend) -> str:
+    """A slope per year with its 95 % interval."""
     return f"{trend.slope:+.2g} a year ({trend.low:+.2g} to {trend.high:+.2g})"
 
 
 def day(told: date) -> str:
-    """A date that no line breaks."""
+    """A date with non-breaking hyphens."""
     return f"{told}".replace("-", "\u2011")
 
 
 def over_limit(n_over: int, n_answered: int) -> str:
-    """A dash for none: it may be that no limit is known."""
+    """The share of overloaded batches; a dash for none, since possibly no limit is known."""
     return percent(n_over, n_answered) if n_over else NONE
 
 
 def share(told: Share) -> str:
-    """So many of so many days, and what that may mean."""
+    """A number of days out of all days, with the interval of the share."""
     low, high = told.interval95
     return f"{told.n_bad} of {told.n} days ({100 * low:.0f} to {100 * high:.0f} %)"
 
 
 def trouble_told(trouble: Trouble) -> str:
-    """What a sensor's reason did lately."""
+    """A sentence about a sensor's recent rejections for one reason."""
     since = f", since {trouble.since}" if trouble.since else ""
     return f"refused most of the driving on {share(trouble.recent)} of the last days driven{since}"
 
 
 def drift_told(drift: Drift) -> str:
-    """A slope that is believed, and against what."""
+    """A sentence about a significant drift and its reference."""
     against = "beyond what the fleet does" if drift.beyond else "the season not taken off: the fleet is small"
     return f"{slope(drift.judged)}, {against}; {drift.judged.n} weeks"
 
 
 def time_axis(weeks: Sequence[int]) -> Axis:
-    """Weeks by number, with the names of months where they begin."""
+    """An axis of week numbers, labelled with the months."""
     first, last = min(weeks), max(weeks)
     months = [(number, f"{monday_of(number):%Y-%m}") for number in range(first, last + 1)]
     begun = [one for k, one in enumerate(months) if k == 0 or one[1] != months[k - 1][1]]

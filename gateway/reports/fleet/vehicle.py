@@ -1,15 +1,15 @@
-"""The page of one vehicle: its loads, refusals, parameters and sensors week by week."""
+"""The page of one vehicle: its loads, rejections, parameters and sensors by week."""
 
 from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 
-from gateway.archive.fleet import DRIFTING, Vehicle
+from gateway.archive.fleet import DRIFTING, FleetVehicle
 from gateway.archive.fleet.weeks import known_reason
 from gateway.reasons import EXPLANATIONS, Cause
 from gateway.records import I64, Bool
-from gateway.reports.charts import Axis, Chart, Line, Mark, Panel, Points, Ribbon, Rule, Section, Table
+from gateway.reports.charts import Axis, Chart, LineMark, Mark, Panel, Points, Ribbon, Rule, Section, Table
 from gateway.reports.fleet.text import (
     NAMES,
     NONE,
@@ -25,16 +25,16 @@ from gateway.reports.fleet.text import (
     whole,
 )
 
-WEEKS_PER_YEAR: Final = 365.25 / 7.0
+WEEKS_PER_YEAR: Final = 365.25 / 7.0  # Julian year
 _SHOWN: Final = 250  # px a row of panels
 
 
-def vehicle_sections(vehicle: Vehicle) -> list[Section]:
-    """The whole page; every figure has its number of batches beside it."""
+def vehicle_sections(vehicle: FleetVehicle) -> list[Section]:
+    """All sections of the page; every figure states its number of batches."""
     return [_loads(vehicle), _refusals(vehicle), _parameters(vehicle), _sensors(vehicle)]
 
 
-def _loads(vehicle: Vehicle) -> Section:
+def _loads(vehicle: FleetVehicle) -> Section:
     weeks = vehicle.weeks
     x = weeks.number.astype(float)
     known = np.isfinite(weeks.payload_mean_kg)
@@ -86,7 +86,7 @@ def _loads(vehicle: Vehicle) -> Section:
     return Section("loads", "Loads over time", (text,), (chart,), (), (("The numbers", (table,)),))
 
 
-def _refusals(vehicle: Vehicle) -> Section:
+def _refusals(vehicle: FleetVehicle) -> Section:
     weeks = vehicle.weeks
     x, causes = weeks.number.astype(float), [cause for cause in Cause if weeks.n_refused_by[cause].any()]
     lines = tuple(
@@ -114,7 +114,7 @@ def _refusals(vehicle: Vehicle) -> Section:
     return Section("refused", "Refusals", (text,), (chart,) if causes else (), (table,) if rows else ())
 
 
-def _parameters(vehicle: Vehicle) -> Section:
+def _parameters(vehicle: FleetVehicle) -> Section:
     weeks = vehicle.weeks
     shown = [name for name in DRIFTING if np.isfinite(weeks.medians[name]).any()]
     panels = tuple(_parameter_panel(vehicle, name) for name in shown)
@@ -149,7 +149,7 @@ def _parameters(vehicle: Vehicle) -> Section:
     return Section("drift", "Drift", (*text, *unknown), (chart,) if panels else (), (table,) if rows else ())
 
 
-def _parameter_panel(vehicle: Vehicle, name: str) -> Panel:
+def _parameter_panel(vehicle: FleetVehicle, name: str) -> Panel:
     weeks = vehicle.weeks
     medians, known = weeks.medians[name], np.isfinite(weeks.medians[name])
     x = weeks.number.astype(float)
@@ -164,13 +164,13 @@ def _parameter_panel(vehicle: Vehicle, name: str) -> Panel:
         ends = x[judged][[0, -1]]
         line = np.median(medians[judged]) + drift.found.slope * (ends - np.median(x[judged])) / WEEKS_PER_YEAR
         label, colour = ("slope, believed", 1) if drift.is_believed else ("slope", 7)
-        marks.append(Line(ends, line, label, colour, "solid" if drift.is_believed else "dash"))
+        marks.append(LineMark(ends, line, label, colour, "solid" if drift.is_believed else "dash"))
     if vehicle.calibrated_week > weeks.number[0]:
         marks.append(Rule(float(vehicle.calibrated_week), is_vertical=True, label="last calibration", dash="dot"))
     return Panel(time_axis(weeks.number.tolist()), Axis(""), tuple(marks), NAMES[name])
 
 
-def _sensors(vehicle: Vehicle) -> Section:
+def _sensors(vehicle: FleetVehicle) -> Section:
     rows = tuple(
         (
             trouble.reason,
@@ -189,12 +189,12 @@ def _sensors(vehicle: Vehicle) -> Section:
     )
     columns = ("Reason", "state", "batches", "bad days", "lately", "met", "what to do")
     table = Table("What the sensors were refused for", columns, rows)
-    none = () if rows else ("No batch was refused for a sensor's sake.",)
+    none = () if rows else ("No batch was refused because of a sensor.",)
     return Section("sensors", "Sensors", (text, *none), (), (table,) if rows else ())
 
 
 def reason_told(reason: str) -> tuple[str, str]:
-    """What happened and what to do, in words; dashes for a reason that this version does not know."""
+    """The cause and the remedy in words; dashes for a reason unknown to this version."""
     why = known_reason(reason)
     if why is None:
         return NONE, NONE
@@ -202,7 +202,7 @@ def reason_told(reason: str) -> tuple[str, str]:
 
 
 def runs_of(known: Bool, number: I64) -> Iterator[slice]:
-    """Stretches of weeks that follow one another and are known: a band must not span what is not."""
+    """Runs of consecutive weeks with known values, so that a band does not span gaps."""
     begin = None
     for k in range(len(known) + 1):
         goes_on = k < len(known) and known[k] and (begin is None or number[k] == number[k - 1] + 1)

@@ -1,5 +1,5 @@
-"""Section 4 of the paper, driven again with our simulator: its numbers beside ours, on one page with its figures.
+"""Reproduction of the paper's section 4 with our simulator: its numbers beside ours, on one page with figures.
 
-A directory and a extent come in (``reproduce``); campaigns, calibrations, figures, report.html, results.json and the
-text of accuracy.md go out. ``experiments`` drives and calibrates, ``figures`` and ``table`` show.
+Input of ``reproduce``: a directory and an extent. Output: campaigns, calibrations, figures, report.html, results.json
+and the text of accuracy.md. ``experiments`` simulates and calibrates; ``figures`` and ``table`` show the results.
 """

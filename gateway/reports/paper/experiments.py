@@ -1,4 +1,4 @@
-"""Everything section 4 of the paper needs: campaigns driven, calibrations made, batches judged."""
+"""The experiments of the paper's section 4: simulated campaigns, calibrations and judged batches."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -30,7 +30,7 @@ N_STEPS: Final = 2 * len(CAMPAIGNS) + 3  # drive and read each, calibrate twice,
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """How much is driven. The defaults are the paper's; less is for trying it out."""
+    """How much is simulated. The defaults are the paper's; smaller values are for trials."""
 
     seed: int = 1
     window_s: float = 300.0
@@ -39,7 +39,7 @@ class Extent:
 
     @property
     def is_whole(self) -> bool:
-        """False where less is driven, or in shorter batches, than in the paper."""
+        """False if drives or batches are shorter than the paper's."""
         return self == Extent(self.seed, workers=self.workers)
 
     @property
@@ -48,7 +48,7 @@ class Extent:
 
 
 @dataclass(frozen=True, slots=True)
-class Driven:
+class DrivenCampaign:
     """One campaign with its batches."""
 
     campaign: Campaign
@@ -73,7 +73,7 @@ class Driven:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """One way to estimate: a name for people, the estimator and what it knows of the vehicle."""
+    """One method: its display name, the estimator and the calibrated vehicle."""
 
     label: str
     estimator: str
@@ -88,24 +88,24 @@ class Experiments:
     """Campaigns by kind; the methods calibrated on the paper's simulated grid, and those on the experiment."""
 
     extent: Extent
-    driven: Mapping[str, Driven]
+    driven: Mapping[str, DrivenCampaign]
     simulated: tuple[Method, ...]
     experimental: tuple[Method, ...]
 
     @property
     def ratio_index(self) -> RatioIndexCalibration:
-        """The one calibrated on the simulated grid."""
+        """The ratio index calibrated on the simulated grid."""
         return ratio_index_of(self.simulated[0])
 
     def errors(self, kind: str, split: str, method: Method) -> Errors:
-        """(12) over one part of a campaign."""
+        """The errors (12) of one method over one split of a campaign."""
         driven = self.driven[kind]
         runs = driven.identification if split == "identification" else driven.validation
         return errors_of(method.judge(runs), driven.campaign.vehicle)
 
 
 def ratio_index_of(method: Method) -> RatioIndexCalibration:
-    """The method's ratio index calibration, which every campaign here carries."""
+    """The method's ratio index calibration, which every campaign here has."""
     calibration = method.calibrated.ratio_index
     if calibration is None:
         raise ValueError(f"{method.label}: holds no ratio index")
@@ -113,7 +113,7 @@ def ratio_index_of(method: Method) -> RatioIndexCalibration:
 
 
 def gather(output: Path, extent: Extent, on_step: OnStep = lambda what, done, of: None) -> Experiments:
-    """Simulate every campaign into output/campaigns, calibrate, and cut all drives into batches."""
+    """Simulate every campaign into output/campaigns, calibrate, and split all drives into batches."""
     driven = {}
     for number, kind in enumerate(CAMPAIGNS):
         on_step(f"driving {kind}", 2 * number, N_STEPS)
@@ -121,7 +121,7 @@ def gather(output: Path, extent: Extent, on_step: OnStep = lambda what, done, of
         path = write_campaign(bench, output / "campaigns" / kind, workers=extent.workers)
         on_step(f"reading {kind}", 2 * number + 1, N_STEPS)
         campaign = load_campaign(path)
-        driven[kind] = Driven(campaign, tuple(split_runs(campaign, extent.settings)))
+        driven[kind] = DrivenCampaign(campaign, tuple(split_runs(campaign, extent.settings)))
     on_step("calibrating on the simulated grid", N_STEPS - 3, N_STEPS)
     simulated = _methods(driven["ident"], extent, output / "vehicle_simulated.json")
     on_step("calibrating on the experiment", N_STEPS - 2, N_STEPS)
@@ -129,7 +129,7 @@ def gather(output: Path, extent: Extent, on_step: OnStep = lambda what, done, of
     return Experiments(extent, driven, simulated, experimental)
 
 
-def _methods(driven: Driven, extent: Extent, path: Path) -> tuple[Method, ...]:
+def _methods(driven: DrivenCampaign, extent: Extent, path: Path) -> tuple[Method, ...]:
     """Every estimator calibrated on the identification part, and the ratio index with the bands of Table 2."""
     outcome = calibrate(driven.campaign, extent.settings, estimators=ESTIMATOR_NAMES, command="springscale reproduce")
     held = outcome.file
@@ -143,7 +143,7 @@ def _methods(driven: Driven, extent: Extent, path: Path) -> tuple[Method, ...]:
     )
 
 
-def with_paper_bands(calibrated: CalibratedVehicle, driven: Driven) -> CalibratedVehicle:
+def with_paper_bands(calibrated: CalibratedVehicle, driven: DrivenCampaign) -> CalibratedVehicle:
     """The same vehicle with the bands of Table 2 and regressions (11) fitted to them."""
     own = calibrated.ratio_index
     if own is None:

@@ -24,7 +24,7 @@ LOAD, SHARE = "payload [kg]", "front share [%]"
 
 
 def spectrum_of(run: KnownRun, sensor: str) -> tuple[F64, F64]:
-    """Mean amplitude spectrum over a run's batches: frequencies (m,) and amplitudes (m,). NaN where none fits."""
+    """Mean amplitude spectrum over a run's batches: frequencies (m,) and amplitudes (m,), NaN if no batch is usable."""
     freq_hz, total, n = np.arange(1.0, 205.0) * (50.0 / N_SEGMENT), np.zeros(204), 0
     for batch in run.batches:
         x = batch.vertical_acceleration_mps2 if sensor == ACCELERATION else batch.pitch_rate_radps
@@ -47,7 +47,7 @@ def figure_1(experiments: Experiments) -> Figure:
 
 
 def band_differences(experiments: Experiments, sensor: str, width_hz: float) -> tuple[F64, F64]:
-    """(4) or (5): frequencies (m,), J (m,) between the extremes of the sweep that concerns the sensor."""
+    """(4) or (5): frequencies (m,) and J (m,) between the extremes of the sensor's sweep."""
     runs = experiments.driven["load-sweep" if sensor == ACCELERATION else "share-sweep"].runs
     (freq_hz, low), (_, high) = spectrum_of(runs[0], sensor), spectrum_of(runs[-1], sensor)
     n = max(round(width_hz / (freq_hz[1] - freq_hz[0])), 1)
@@ -55,7 +55,7 @@ def band_differences(experiments: Experiments, sensor: str, width_hz: float) -> 
 
 
 def figure_bands(experiments: Experiments) -> Figure:
-    """J_L and J_D over frequency with the bands that calibration chose, and the paper's."""
+    """J_L and J_D over frequency, with the bands of our calibration and of the paper."""
     figure, axes_of = panels(1, 2)
     own = experiments.ratio_index
     chosen = {ACCELERATION: own.acceleration_bands, PITCH_RATE: own.pitch_rate_bands}
@@ -73,7 +73,7 @@ def figure_bands(experiments: Experiments) -> Figure:
 
 
 def figure_2(experiments: Experiments) -> Figure:
-    """Empty and full, whole and through the two band-passes (6)."""
+    """Signals empty and full, unfiltered and through the two band-passes (6)."""
     figure, axes_of = panels(1, 2)
     runs = experiments.driven["load-sweep"].runs
     bands = experiments.ratio_index.acceleration_bands or PAPER_BANDS[ACCELERATION]
@@ -107,7 +107,7 @@ def _index_and_fit(axes: Axes, rows: IndexRows, index: F64, target: F64, terms: 
 
 
 def figure_5_6(experiments: Experiments) -> Figure:
-    """The conditions explored, and the two indexes over them."""
+    """The explored conditions and both indexes over them."""
     figure, (left, middle, right) = panels(1, 3)
     rows = index_rows(experiments.driven["ident"].runs, experiments.ratio_index)
     left.plot(rows.payload_kg, rows.front_share_pct, "o", color=COLOURS[0])
@@ -128,7 +128,7 @@ def figure_7(experiments: Experiments) -> Figure:
 
 
 def figure_8_9(experiments: Experiments) -> Figure:
-    """Spectra for two roughnesses; the road's low-pass (1) for several speeds, without and with the wheelbase."""
+    """Spectra for two roughnesses; the road's low-pass (1) at several speeds, with and without the wheelbase filter."""
     figure, (left, right) = panels(1, 2)
     for iri in ("iri2", "iri8"):
         run = experiments.driven["sensitivity"].run_named(iri)
@@ -148,7 +148,7 @@ def figure_8_9(experiments: Experiments) -> Figure:
 
 
 def figure_sensitivity(experiments: Experiments) -> Figure:
-    """What each method answers for one load at other speeds and on other roads; the ratio index's gate lifted."""
+    """Each method's estimates of one load at other speeds and roads, with the ratio index's gate disabled."""
     figure, (top, bottom) = panels(2, 1, height_in=2.6)
     runs = experiments.driven["sensitivity"].runs
     places = np.arange(len(runs))
@@ -170,7 +170,7 @@ def condition_of(run: KnownRun) -> str:
 
 
 def mean_errors(run: KnownRun, method: Method) -> tuple[float, float]:
-    """Mean error of payload [kg] and share [points] over a run's batches, the ratio index's own gates lifted."""
+    """Mean error of payload [kg] and share [points] over a run's batches, with the ratio index's gates disabled."""
     if method.estimator == "ratio_index" and method.calibrated.ratio_index is not None:
         calibration = method.calibrated.ratio_index
         rows = index_rows([run], calibration)
@@ -191,7 +191,7 @@ def mean_errors(run: KnownRun, method: Method) -> tuple[float, float]:
 
 
 def figure_test(experiments: Experiments, kind: str) -> Figure:
-    """Payload and share over time: the truth as a line, each method's batches with their 95 % intervals."""
+    """Payload and share over time: the truth as a line, and each method's batches with 95 % intervals."""
     figure, (top, bottom) = panels(2, 1, height_in=2.4)
     runs = experiments.driven[kind].runs
     start_ns = runs[0].batches[0].t_start_ns
@@ -210,7 +210,7 @@ def figure_test(experiments: Experiments, kind: str) -> Figure:
 
 
 def figure_drive(experiments: Experiments, kind: str, method: Method) -> Figure:
-    """One method's answer over a drive with changing loads: truth behind the 95 % band."""
+    """One method's estimates over a drive with changing loads: its 95 % band and the truth."""
     figure, (top, bottom) = panels(2, 1, height_in=2.2)
     runs = experiments.driven[kind].runs
     start_ns = runs[0].batches[0].t_start_ns
@@ -242,7 +242,7 @@ def figure_13(experiments: Experiments) -> Figure:
 
 
 def figure_14(experiments: Experiments) -> Figure:
-    """The experiment: estimates over truth, identification hollow, validation filled."""
+    """The experiment: estimates over truth; identification with hollow, validation with filled markers."""
     experiment = experiments.driven["experiment"]
     series = []
     for method in experiments.experimental:

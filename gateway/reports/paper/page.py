@@ -1,4 +1,4 @@
-"""The page of `springscale reproduce`: the paper's numbers beside ours, then every figure with what to see in it."""
+"""The page of `springscale reproduce`: the paper's numbers beside ours, then every figure with an explanation."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from gateway.core.ratio_index.index import PAPER_BANDS, Band
 from gateway.reports.paper import figures as draw
 from gateway.reports.paper.experiments import Experiments, Method
-from gateway.reports.paper.table import COLUMNS, QUICK, Row
+from gateway.reports.paper.table import COLUMNS, QUICK, PaperRow
 
 
 @dataclass(frozen=True, slots=True)
 class Plate:
-    """One figure of the page: its file's name, its heading, what to see in it, and how it is drawn."""
+    """One figure of the page: its file name, heading, explanation and drawing function."""
 
     name: str
     heading: str
@@ -93,8 +93,8 @@ OTHER_CONDITIONS: Final = {
 }
 
 
-def page(experiments: Experiments, rows: Sequence[Row], drawings: Sequence[tuple[Plate, str]]) -> str:
-    """The whole page; each drawing is an SVG element."""
+def page(experiments: Experiments, rows: Sequence[PaperRow], drawings: Sequence[tuple[Plate, str]]) -> str:
+    """The complete page; each drawing is an SVG element."""
     head = "".join(f"<th>{escape(column)}</th>" for column in COLUMNS)
     body = "".join(
         f'<tr class="{"paper" if row.is_paper else ""}">'
@@ -121,7 +121,7 @@ def page(experiments: Experiments, rows: Sequence[Row], drawings: Sequence[tuple
 
 
 def _findings(experiments: Experiments) -> str:
-    """Where our physics contradicts the paper's section 3.3: what leaving 50 km/h and IRI 4 does to each method."""
+    """Where our results contradict the paper's section 3.3: each method's errors away from 50 km/h and IRI 4."""
     lines = "".join(
         f"<tr><td>{escape(method.label)}</td><td>{what}</td><td>{payload_kg:.0f} kg</td><td>{share_pp:.1f}</td></tr>"
         for method in experiments.simulated
@@ -145,7 +145,7 @@ def worst_errors(experiments: Experiments, method: Method, part: str) -> tuple[f
 
 
 def _bands_table(experiments: Experiments) -> str:
-    """Table 2: the paper's bands and those ours for our van."""
+    """Table 2: the paper's bands, and our bands for our van."""
     own = experiments.ratio_index
     lines = "".join(
         f"<tr><td>{name}</td><td>{_bands(PAPER_BANDS[key])}</td><td>{_bands(ours)}</td></tr>"

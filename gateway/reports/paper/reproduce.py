@@ -1,4 +1,4 @@
-"""`springscale reproduce`: the paper's section 4 with our simulator, as one page with its figures and tables."""
+"""`springscale reproduce`: the paper's section 4 with our simulator, as one page with figures and tables."""
 
 import json
 import math
@@ -14,9 +14,9 @@ from gateway.reports.paper.table import accuracy_page, rows_of, tables_of
 
 
 def reproduce(output: Path, extent: Extent, on_step: OnStep = lambda what, done, of: None) -> Path:
-    """Write report.html, figures/, accuracy.md, results.json, the calibrations and campaigns; the report's path.
+    """Write report.html, figures/, accuracy.md, results.json, calibrations and campaigns; return the report's path.
 
-    Raises ConfigurationError where the directory holds a reproduction already.
+    Raises ConfigurationError if the directory already contains a reproduction.
     """
     report = output / "report.html"
     if report.exists() or (output / "campaigns").exists():
@@ -35,7 +35,7 @@ def reproduce(output: Path, extent: Extent, on_step: OnStep = lambda what, done,
 
 
 def best_method(experiments: Experiments) -> Method:
-    """The method with the least payload error over test 3, misses counted."""
+    """The method with the smallest payload error over test 3, missing estimates included."""
 
     def error(method: Method) -> float:
         error_pct = experiments.errors("test3", "validation", method).payload.mean_abs_pct_with_misses
@@ -45,7 +45,7 @@ def best_method(experiments: Experiments) -> Method:
 
 
 def results_of(experiments: Experiments) -> dict[str, Any]:
-    """Everything as numbers: what results.json holds."""
+    """All results as numbers: the contents of results.json."""
     return {
         "seed": experiments.extent.seed,
         "window_s": experiments.extent.window_s,

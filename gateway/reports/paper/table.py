@@ -1,4 +1,4 @@
-"""The paper's numbers beside ours: rows for the report, for accuracy.md and for machines."""
+"""The paper's numbers beside ours: rows for the report, accuracy.md and results.json."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ COLUMNS: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class PaperRow:
     """One line of the table; ``is_paper`` marks the paper's own."""
 
     cells: tuple[str, ...]
@@ -41,7 +41,7 @@ class Row:
 
 
 def tables_of(experiments: Experiments) -> list[dict[str, Any]]:
-    """(12) over every drive by every method."""
+    """The errors (12) of every method over every drive."""
     tables = []
     for kind, split in TITLES:
         methods = experiments.simulated if kind.startswith("test") else experiments.experimental
@@ -51,8 +51,8 @@ def tables_of(experiments: Experiments) -> list[dict[str, Any]]:
     return tables
 
 
-def rows_of(tables: Sequence[Mapping[str, Any]]) -> list[Row]:
-    """For every drive the paper's line, where it has one, then one for each method."""
+def rows_of(tables: Sequence[Mapping[str, Any]]) -> list[PaperRow]:
+    """For every drive: the paper's row, if it has one, then a row for each method."""
     rows = []
     for key, title in TITLES.items():
         if key in PAPER_PCT:
@@ -84,7 +84,7 @@ def accuracy_page(results: Mapping[str, Any]) -> str:
     )
 
 
-def _paper_row(title: str, mean_pct: tuple[float, float], std_pct: tuple[float, float] | None) -> Row:
+def _paper_row(title: str, mean_pct: tuple[float, float], std_pct: tuple[float, float] | None) -> PaperRow:
     payload, share = mean_pct
     payload_std, share_std = (f"{std:.2f}" for std in std_pct) if std_pct else ("", "")
     cells = (
@@ -92,10 +92,10 @@ def _paper_row(title: str, mean_pct: tuple[float, float], std_pct: tuple[float, 
         f"{payload:.2f}", payload_std, f"{4.5 * payload:.1f}", "", "", "",
         f"{share:.2f}", share_std, f"{0.2 * share:.2f}", "", "", "",
     )  # fmt: skip
-    return Row(cells, is_paper=True)
+    return PaperRow(cells, is_paper=True)
 
 
-def _row(title: str, table: Mapping[str, Any]) -> Row:
+def _row(title: str, table: Mapping[str, Any]) -> PaperRow:
     payload, share = table["payload"], table["front_share"]
     cells = (
         title, table["method"], str(table["n_batches"]), str(table["n_rejected"]),
@@ -104,7 +104,7 @@ def _row(title: str, table: Mapping[str, Any]) -> Row:
         _decimal(share["mean_abs_pct"], 2), _decimal(share["std_pct"], 2), _decimal(share["mean_abs_pp"], 2),
         _percent(share["coverage95"]), *_widths(share),
     )  # fmt: skip
-    return Row(cells)
+    return PaperRow(cells)
 
 
 def _widths(errors: Mapping[str, Any]) -> tuple[str, str]:

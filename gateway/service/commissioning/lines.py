@@ -36,9 +36,7 @@ class LineFound:
 
 
 class Lines:
-    """All that can be chosen. A file of the package needs no signature, every other one does if signatures are
-    required.
-    """
+    """All available lines. Files of the package need no signature; all others do if signatures are required."""
 
     def __init__(self, directory: Path, administrator: Path | None, trust: Trust) -> None:
         """``directory`` is the service's folder; uploaded files lie in a folder below it."""
@@ -149,7 +147,7 @@ def require_alike(directory: Path, line: LineChoice, vehicle: Vehicle) -> None:
 
 
 def _figures(held: LikeFile) -> dict[str, object]:
-    """Its figures that can prefill a form."""
+    """Figures of a line that can prefill a form."""
     if isinstance(held, CalibrationFile):
         return asdict(held.vehicle)
     most_kg = held.line.seen.payload_seen_kg[1]
@@ -161,13 +159,13 @@ def _figures(held: LikeFile) -> dict[str, object]:
 
 
 def _form(held: LikeFile) -> dict[str, object]:
-    """Those of ``_figures`` that the vehicles of the line share."""
+    """Those figures that the vehicles of the line share."""
     common = ("wheelbase_m", "track_width_m", "payload_range_kg", "kerb_front_axle_kg", "kerb_rear_axle_kg")
     return {name: figure for name, figure in _figures(held).items() if name in common and figure is not None}
 
 
 def _facts(held: LikeFile) -> LineFacts:
-    """Those of its figures that typed answers are compared with."""
+    """Figures with which typed answers are compared."""
     if not isinstance(held, CalibrationFile):
         line = held.line
         return LineFacts(sprung_kg=line.empty_mass_kg, wheelbase_m=line.wheelbase_m)

@@ -1,4 +1,4 @@
-"""commissioning.json: the commissioning under way, and every calibration that one made. Replaced in one step."""
+"""commissioning.json: the commissioning under way, and the calibrations made. Replaced atomically."""
 
 import json
 from pathlib import Path
@@ -23,10 +23,10 @@ Source = Literal["package", "administrator", "uploaded"]
 
 
 class LineChoice(Part):
-    """The line that was chosen. ``copy_name`` is its copy in the service's folder, None without a line.
+    """The chosen line. ``copy_name`` is its copy in the service's folder, None without a line.
 
-    ``shared`` are its values for figures that were not typed, ``facts`` its values to compare typed answers with,
-    ``figures`` its values to prefill a form.
+    ``shared`` gives figures that were not typed, ``facts`` figures to compare typed answers with, ``figures`` those
+    that prefill a form.
     """
 
     name: str
@@ -39,7 +39,7 @@ class LineChoice(Part):
 
 
 class EmptyClaim(Part):
-    """Who said that the vehicle is empty, and the position of the bus then: a window that had begun does not count."""
+    """Who stated that the vehicle is empty, and the position in the drive then: an open window does not count."""
 
     at: str
     by: str
@@ -54,7 +54,7 @@ class EmptyClaim(Part):
 
 
 class Confirmed(Part):
-    """Doubts that somebody has answered: it is so all the same."""
+    """Doubts that somebody confirmed: the facts are right."""
 
     at: str
     by: str
@@ -103,8 +103,8 @@ class Ended(Part):
     why: Literal["undone", "back_to_factory"]
 
 
-class Made(Part):
-    """A calibration that was made here, and all it was made of."""
+class MadeCalibration(Part):
+    """A calibration that was made here, and what it was made from."""
 
     id: str = Field(description="of the calibration file")
     file_name: str
@@ -119,43 +119,43 @@ class Made(Part):
     ended: Ended | None = None
 
 
-class Record(Part):
-    """Calibrations that have not ended form a stack: the last is in use."""
+class CommissioningRecord(Part):
+    """The commissioning under way and the calibrations made. Those not ended form a stack; the last is in use."""
 
     format: Literal["springscale-commissioning"] = "springscale-commissioning"
     version: Literal[1] = 1
     underway: Underway | None = None
-    made: tuple[Made, ...] = ()
+    made: tuple[MadeCalibration, ...] = ()
 
     @property
-    def active(self) -> Made | None:
+    def active(self) -> MadeCalibration | None:
         """The calibration to use; None: the one that the settings name."""
         return next((one for one in reversed(self.made) if one.ended is None), None)
 
-    def with_made(self, one: Made) -> "Record":
-        """The commissioning has ended with this result."""
+    def with_made(self, one: MadeCalibration) -> "CommissioningRecord":
+        """The record after a commissioning ended with this calibration."""
         return self.model_copy(update={"underway": None, "made": (*self.made, one)[-MOST_MADE:]})
 
-    def ended(self, chosen: tuple[Made, ...], end: Ended) -> "Record":
-        """With these out of use."""
+    def ended(self, chosen: tuple[MadeCalibration, ...], end: Ended) -> "CommissioningRecord":
+        """The record with these calibrations ended."""
         made = tuple(one.model_copy(update={"ended": end}) if one in chosen else one for one in self.made)
         return self.model_copy(update={"made": made})
 
 
-def load_record(directory: Path) -> Record:
+def load_record(directory: Path) -> CommissioningRecord:
     """Empty if there is none yet. Raises ConfigurationError for an invalid file."""
     path = directory / FILE_NAME
     try:
-        return Record.model_validate_json(KeptFiles(directory).read(FILE_NAME))
+        return CommissioningRecord.model_validate_json(KeptFiles(directory).read(FILE_NAME))
     except FileNotFoundError:
-        return Record()
+        return CommissioningRecord()
     except OSError as fault:
         raise ConfigurationError(f"{path}: cannot be read: {fault.strerror or fault}") from None
     except ValidationError as fault:
-        raise ConfigurationError(describe_faults(path, fault, Record)) from None
+        raise ConfigurationError(describe_faults(path, fault, CommissioningRecord)) from None
 
 
-def save_record(directory: Path, record: Record) -> None:
-    """On disk when this returns. Raises OSError, and then the old one stays."""
+def save_record(directory: Path, record: CommissioningRecord) -> None:
+    """Write the record; on disk when this returns. Raises OSError, and then the old file stays."""
     text = json.dumps(record.model_dump(mode="json"), indent=1, allow_nan=False, ensure_ascii=False)
     KeptFiles(directory).write(FILE_NAME, (text + "\n").encode())

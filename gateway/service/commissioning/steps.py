@@ -8,12 +8,12 @@ from typing import Any
 from gateway.calibration.commissioning import Learned
 from gateway.calibration.commissioning.job import Found
 from gateway.service.commissioning.lines import LineFound
-from gateway.service.commissioning.record import Made, Record, Underway
+from gateway.service.commissioning.record import CommissioningRecord, MadeCalibration, Underway
 from gateway.stated.doubt import OF_THE_DRIVE, Doubt
 
 
-class Step(StrEnum):
-    """What is wanted next."""
+class CommissioningStep(StrEnum):
+    """The next step of a commissioning."""
 
     LINE = "line"
     VEHICLE = "vehicle"
@@ -22,19 +22,19 @@ class Step(StrEnum):
     FIT = "fit"
 
 
-def step_of(underway: Underway) -> Step:
-    """The first that is not answered yet."""
+def step_of(underway: Underway) -> CommissioningStep:
+    """The first step that is not answered yet."""
     if underway.line is None:
-        return Step.LINE
+        return CommissioningStep.LINE
     if underway.vehicle is None or underway.is_vehicle_doubted:
-        return Step.VEHICLE
+        return CommissioningStep.VEHICLE
     if underway.empty is None:
-        return Step.EMPTY
-    return Step.FIT if underway.is_fit_asked else Step.DRIVE
+        return CommissioningStep.EMPTY
+    return CommissioningStep.FIT if underway.is_fit_asked else CommissioningStep.DRIVE
 
 
 @dataclass(frozen=True, slots=True)
-class Looked:
+class LastInspection:
     """The last findings of inspection, and the seconds of driving they cover."""
 
     findings: tuple[Found, ...]
@@ -42,7 +42,7 @@ class Looked:
 
     @property
     def has_fault(self) -> bool:
-        """Whether something must be mended first."""
+        """Whether a finding must be mended first."""
         return any(one.severity == "fault" for one in self.findings)
 
 
@@ -56,18 +56,18 @@ class OpenWindow:
 
 @dataclass(frozen=True, slots=True)
 class Present:
-    """State that is not on disk: the present moment."""
+    """The part of the state that is not on disk."""
 
     why_not_allowed: str | None
     is_calibrated: bool
     is_busy: bool
     driven_s: float
-    looked: Looked | None
+    looked: LastInspection | None
     window: OpenWindow | None  # None between drives, and before the vehicle is called empty
-    started_with: str | None  # the calibration of ``Record.active`` at the service's start
+    started_with: str | None  # the calibration of ``CommissioningRecord.active`` at the service's start
 
 
-def told(record: Record, present: Present) -> dict[str, Any]:
+def state_json(record: CommissioningRecord, present: Present) -> dict[str, Any]:
     """A CommissioningState of the web."""
     underway, active = record.underway, record.active
     is_pending = (active.id if active else None) != present.started_with
@@ -83,7 +83,7 @@ def told(record: Record, present: Present) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def lines_told(found: Sequence[LineFound]) -> dict[str, Any]:
+def lines_json(found: Sequence[LineFound]) -> dict[str, Any]:
     """The LinesFound of the web."""
     return {"items": [asdict(one) for one in found]}
 
@@ -127,7 +127,7 @@ def _learned(learned: Learned | None) -> dict[str, Any] | None:
     return None if learned is None else {**learned.model_dump(), "share": learned.share, "is_enough": learned.is_enough}
 
 
-def _made(made: Made) -> dict[str, Any]:
+def _made(made: MadeCalibration) -> dict[str, Any]:
     return {
         "id": made.id,
         "at": made.at,

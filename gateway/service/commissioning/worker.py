@@ -109,6 +109,6 @@ class Worker:
 
 
 def _environment() -> dict[str, str]:
-    """As ours, one thread, and with the packages that we have."""
+    """Our environment, with one thread for linear algebra and our import path."""
     threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     return {**os.environ, **threads, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}

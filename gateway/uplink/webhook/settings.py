@@ -1,4 +1,4 @@
-"""Where the receiver is, what it wants, and what we sign with."""
+"""Settings of the webhook: the receiver, the record types it gets, and the signing secrets."""
 
 import hashlib
 import ssl
@@ -17,7 +17,7 @@ HOW_TO_MAKE_ONE = 'echo "whsec_$(openssl rand -base64 32)" > FILE'
 
 @dataclass(frozen=True, slots=True)
 class WebhookSettings:
-    """An address in its parts; ``path`` has the query with it. ``kinds`` are those of outbox letters."""
+    """The address in its parts; ``path`` includes the query. ``kinds`` are the webhook types to send."""
 
     is_tls: bool
     host: str
@@ -32,19 +32,19 @@ class WebhookSettings:
 
     @property
     def receiver(self) -> str:
-        """For people: without the path, which may hold a secret."""
+        """The address for people, without the path, which may contain a secret."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{'https' if self.is_tls else 'http'}://{host}:{self.port}"
 
     @property
     def queue(self) -> str:
-        """The place in the queue belongs to the address: another one begins from the first row."""
+        """Name of the queue position. It belongs to the address: a new address starts at the first record."""
         return f"{self.receiver}#{hashlib.sha256(self.path.encode()).hexdigest()[:12]}"
 
     def secrets(self) -> tuple[bytes, ...]:
-        """Read anew for every attempt, so that they can be changed while the service runs.
+        """The secrets, read for every attempt, so that they can be changed while the service runs.
 
-        Raises ConfigurationError where the file cannot be used.
+        Raises ConfigurationError if the file cannot be used.
         """
         try:
             return secrets_of(self.secret_file.read_text(encoding="utf-8"))
@@ -64,7 +64,7 @@ class WebhookSettings:
 
 
 def webhook_settings(section: WebhookSection, vehicle: VehicleSection) -> WebhookSettings | None:
-    """What [webhook] says; None without a url. Raises ConfigurationError for files that cannot be used."""
+    """The settings of [webhook]; None without a url. Raises ConfigurationError for files that cannot be used."""
     if section.url is None or section.secret_file is None:  # the section asks for both
         return None
     url = urlsplit(section.url)

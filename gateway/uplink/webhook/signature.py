@@ -1,4 +1,4 @@
-"""Who sent it and that nobody changed it: HMAC-SHA256 over id, time of the attempt and body.
+"""Signature of a webhook request: HMAC-SHA256 over id, time of the attempt and body.
 
 Standard Webhooks 1.0.0 (standard-webhooks/spec), "Signature scheme" and "Webhook headers".
 """
@@ -20,7 +20,7 @@ class SecretError(ValueError):
 
 
 def secrets_of(text: str) -> tuple[bytes, ...]:
-    """A secret a line, the one in use first; older ones sign too, while receivers change over. Raises SecretError."""
+    """One secret per line, the current one first; older ones sign too during a change-over. Raises SecretError."""
     found = tuple(_secret(line.strip()) for line in text.splitlines() if line.strip())
     if not found:
         raise SecretError("is empty")
@@ -28,7 +28,7 @@ def secrets_of(text: str) -> tuple[bytes, ...]:
 
 
 def signed(secrets: Sequence[bytes], letter_id: str, t_s: int, body: bytes) -> dict[str, str]:
-    """The headers of one attempt at ``t_s`` (Unix seconds); another attempt has another time, and the same id."""
+    """The headers of one attempt at ``t_s`` (Unix seconds); a retry has the same id and another time."""
     content = f"{letter_id}.{t_s}.".encode() + body
     marks = (base64.b64encode(hmac.digest(secret, content, hashlib.sha256)).decode() for secret in secrets)
     return {

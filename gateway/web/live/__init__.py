@@ -5,7 +5,7 @@ each new one as an event to every stream, after the events that a client missed.
 """
 
 from gateway.web.live.board import Board, Shown, boot_clock_s
-from gateway.web.live.latest import LatestFirst, LatestResponse
+from gateway.web.live.latest import LatestResponse, LatestShortcut
 from gateway.web.live.stream import EVENT_SCHEMA, EventStream
 
-__all__ = ["EVENT_SCHEMA", "Board", "EventStream", "LatestFirst", "LatestResponse", "Shown", "boot_clock_s"]
+__all__ = ["EVENT_SCHEMA", "Board", "EventStream", "LatestResponse", "LatestShortcut", "Shown", "boot_clock_s"]

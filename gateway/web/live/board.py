@@ -1,4 +1,4 @@
-"""The service's current state, ready to be sent: the pipeline writes it, the web reads it."""
+"""The board: the latest estimates, ready to be sent. The pipeline writes it, the web reads it."""
 
 import json
 import threading
@@ -26,7 +26,7 @@ def _nothing_yet(weights: Weights) -> dict[str, Any]:
 
 
 def boot_clock_s() -> float:
-    """Seconds that also count while the machine sleeps: an estimate from before a suspend is old afterwards."""
+    """Monotonic seconds that include suspend, so that an estimate ages while the machine sleeps."""
     return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
@@ -39,7 +39,7 @@ def kind_of(estimate: Estimate) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What ``latest`` shows at one moment: the estimate (None before the first) and its reported age."""
+    """The estimate that ``latest`` shows (None before the first), and its reported age."""
 
     estimate: Estimate | None
     age_s: float | None
@@ -64,7 +64,7 @@ class Shown:
 
 @dataclass(frozen=True, slots=True)
 class _Answer:
-    """One version of ``latest``: made once per estimate, sent many times with its age filled in."""
+    """One version of ``latest``: encoded once per estimate, sent many times with the present age."""
 
     tag: str
     rest: bytes = field(repr=False)  # all but the age and what depends on it
@@ -158,7 +158,7 @@ class Board:
         return (f"{answer.tag}.stale" if is_stale else answer.tag), head + answer.rest
 
     def shown(self) -> Shown:
-        """The same as a record."""
+        """The estimate shown now, with its age."""
         answer = self._answer
         age_s = self._age_s(answer)
         return Shown(answer.estimate, None if age_s is None else round(age_s, 1), self._is_stale(answer))
@@ -176,7 +176,7 @@ class Board:
         return None if answer.received_s is None else max(0.0, self._clock() - answer.received_s)
 
     def _is_stale(self, answer: _Answer) -> bool:
-        """An unknown age may be any age. Before the first estimate nothing can mislead."""
+        """Whether the shown estimate is stale. An unknown age counts as stale; before the first estimate nothing is."""
         age_s = self._age_s(answer)
         return answer.estimate is not None and (age_s is None or age_s > self._stale_after_s)
 

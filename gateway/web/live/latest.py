@@ -26,7 +26,7 @@ class LatestResponse(Response):
         super().__init__(None if is_known else body, 304 if is_known else 200, headers)
 
 
-class LatestFirst:
+class LatestShortcut:
     """ASGI middleware that answers GET latest before any other layer sees it.
 
     The route of the same path stays declared for the API's description and gives the same answer; without FastAPI's

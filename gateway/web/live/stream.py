@@ -8,7 +8,7 @@ from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
 from gateway.errors import StoreError
-from gateway.history import KINDS, Record
+from gateway.history import KINDS, JournalRecord
 from gateway.store import Follower, StoreReader
 from gateway.web.live.fanout import Fanout, StreamEvent, Subscription
 
@@ -98,7 +98,7 @@ class EventStream(Response):
                 yield b": keep-alive\n\n"
 
 
-def _read(follower: Follower) -> list[Record]:
+def _read(follower: Follower) -> list[JournalRecord]:
     """Some records; none while the disk cannot be read: the next record or the keep-alive tries again."""
     try:
         return follower.read(_PAGE)

@@ -1,5 +1,5 @@
-"""The routes: one module a subject, each with its addresses and the shapes of its answers.
+"""The routes: one module per subject, with its addresses and the models of its answers.
 
-The live board, the store's reader and the service's status come in; a router a subject goes out, and the application
-combines them. Here an estimate becomes weights, metrics, and the words of VSS and J1939.
+Each module makes a router from the live board, the store's reader, the service's status or one of its backends. The
+routes also convert estimates to weights, metrics, VSS and J1939.
 """

@@ -1,4 +1,4 @@
-"""Stand-ins for parts of the service that are absent: a page without a service, a test."""
+"""Stand-ins for backends of the service that are absent, as in tests and benchmarks of the web alone."""
 
 from typing import Any, Final
 
@@ -48,7 +48,7 @@ NO_KNOWN_WEIGHTS: Final[Any] = _Absent(
 NO_VERIFICATION: Final[Any] = _Absent(
     WeightRefusedError("no_calibration", "there is no calibration, and so nothing to verify"),
     record=None,
-    told=json_line(
+    state=json_line(
         {
             "rule": {"permitted_error_pct": 5.0, "permitted_axle_error_pct": None, "loads": 1},
             "due": _DUE,
@@ -57,7 +57,7 @@ NO_VERIFICATION: Final[Any] = _Absent(
         }
     ),
 )
-NO_TREND: Final[Any] = _Absent(_NOT_CALIBRATED, told=json_line({"calibration_id": None, "parameters": []}))
+NO_TREND: Final[Any] = _Absent(_NOT_CALIBRATED, state=json_line({"calibration_id": None, "parameters": []}))
 NO_ALARMS: Final[Any] = _Absent(
     AlarmRefusedError("no_such_alarm", "it is not an alarm that can be acknowledged"), standing="[]"
 )
@@ -65,7 +65,7 @@ NO_RECORD: Final[Any] = _Absent(_NOT_HERE, segments=(), open=None)
 NO_COMMISSIONING: Final[Any] = _Absent(
     _NOT_HERE,
     lines=json_line({"items": []}),
-    told=json_line(
+    state=json_line(
         {
             "is_allowed": False,
             "why_not": str(_NOT_HERE),

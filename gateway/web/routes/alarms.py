@@ -9,14 +9,14 @@ from starlette.responses import Response
 
 from gateway.history import ALARM
 from gateway.store import StoreReader
-from gateway.web.routes.calibration.asking import answered, who
 from gateway.web.routes.estimates import HistoryQuery
 from gateway.web.routes.events import entries_of
+from gateway.web.routes.service_calls import call_service, token_name
 from gateway.web.schemas import Body, problem_responses
 
 
-class AlarmDesk(Protocol):
-    """Who keeps the alarms. Blocking calls, each from a thread of its own; answers are JSON as described below."""
+class AlarmBackend(Protocol):
+    """The service's alarms. Blocking calls, made in threads; answers are JSON as described below."""
 
     def standing(self) -> str:
         """An array of Alarm, the worst first."""
@@ -84,7 +84,7 @@ AlarmId = Annotated[str, Path(max_length=100, examples=["alarm-17900003000000000
 _REFUSALS: Final = problem_responses(400, 404, 409, 422, 503)
 
 
-def alarms_router(reader: StoreReader, desk: AlarmDesk) -> APIRouter:
+def alarms_router(reader: StoreReader, backend: AlarmBackend) -> APIRouter:
     """The routes of the alarms."""
     router = APIRouter(prefix="/api/v1", tags=["alarms"])
 
@@ -92,7 +92,7 @@ def alarms_router(reader: StoreReader, desk: AlarmDesk) -> APIRouter:
     async def alarms(query: Annotated[HistoryQuery, Query()]) -> Response:
         """Active and past alarms. A changed alarm comes again, behind all earlier ones: follow next_cursor."""
         history = await entries_of(reader, ALARM, query)
-        standing = await asyncio.to_thread(desk.standing)
+        standing = await asyncio.to_thread(backend.standing)
         return Response(f'{{"active":{standing},{history}', media_type="application/json")
 
     @router.post("/alarms/{alarm_id}/acknowledgement", response_model=Alarm, responses=_REFUSALS)
@@ -100,6 +100,8 @@ def alarms_router(reader: StoreReader, desk: AlarmDesk) -> APIRouter:
         """Acknowledge an alarm: the service keeps your token's name and the time, and sends them to everybody who gets
         the alarm.
         """
-        return await answered(request, lambda: desk.acknowledge(alarm_id, who(request), said.note or None))
+        return await call_service(
+            request, lambda: backend.acknowledge(alarm_id, token_name(request), said.note or None)
+        )
 
     return router

@@ -12,19 +12,18 @@ from pydantic.json_schema import SkipJsonSchema
 from starlette.exceptions import HTTPException
 from starlette.responses import Response, StreamingResponse
 
-from gateway.history import BATCHES, Page
+from gateway.history import BATCHES, HistoryPage
 from gateway.records import json_line
 from gateway.status import Status
 from gateway.store import StoreReader
-from gateway.web.instant import Instant
 from gateway.web.live.board import Board
 from gateway.web.live.latest import LatestResponse
 from gateway.web.live.stream import EVENT_SCHEMA, EventStream
-from gateway.web.schemas import EstimatesPage, Latest, problem_responses
-from gateway.web.settings import PAGE_LIMIT, WebSettings
+from gateway.web.schemas import EstimatesPage, Instant, Latest, problem_responses
 
 PREFIX: Final = "/api/v1"
 JSON: Final = "application/json"
+PAGE_LIMIT: Final = 1000  # records in one answer; part of the described API, therefore no setting
 _AT_A_TIME: Final = 10  # records in memory for each answer that is being sent
 _CURSOR: Final = r"^[0-9a-z]{1,32}-[0-9]{1,18}$"
 
@@ -42,7 +41,7 @@ Cursor = Annotated[
 ]
 
 
-class Span(BaseModel):
+class TimeSpan(BaseModel):
     """Which part of the history."""
 
     model_config = ConfigDict(extra="forbid")
@@ -51,7 +50,7 @@ class Span(BaseModel):
     until: Instant | SkipJsonSchema[None] = Field(None, description="those that end before this")
 
 
-class HistoryQuery(Span):
+class HistoryQuery(TimeSpan):
     """Which part of the history, how much of it, and in which order."""
 
     limit: int = Field(100, ge=1, le=PAGE_LIMIT)
@@ -67,7 +66,9 @@ class EstimatesQuery(HistoryQuery):
     spectra: bool = Field(True, description="false leaves the spectra out")
 
 
-def api_router(board: Board, reader: StoreReader, status: Callable[[], Status], settings: WebSettings) -> APIRouter:
+def api_router(
+    board: Board, reader: StoreReader, status: Callable[[], Status], keep_alive_s: float, n_streams_max: int
+) -> APIRouter:
     """The routes under /api/v1."""
     router = APIRouter(prefix=PREFIX, tags=["api"])
 
@@ -81,7 +82,7 @@ def api_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
     @router.get("/estimates", response_model=EstimatesPage, responses=problem_responses(422, 503))
     async def estimates(query: Annotated[EstimatesQuery, Query()]) -> Response:
         """Estimates and rejections in the order they were made. Follow next_cursor: nothing is missed or repeated."""
-        first = await asked(reader, BATCHES, **_question(query, query.limit, query.cursor))
+        first = await history_page(reader, BATCHES, **_question(query, query.limit, query.cursor))
         if len(first.items) == query.limit or first.next_cursor is None:
             return Response(_page_json(first), media_type=JSON)
         return StreamingResponse(_page_by_page(reader, query, first), media_type=JSON)
@@ -104,14 +105,14 @@ def api_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
 
         With Last-Event-ID, missed events come first.
         """
-        if board.fanout.n_subscribers >= settings.n_streams_max:
-            raise HTTPException(503, f"{settings.n_streams_max} streams are open already: close one")
-        return EventStream(board.fanout, reader, last_event_id, settings.keep_alive_s)
+        if board.fanout.n_subscribers >= n_streams_max:
+            raise HTTPException(503, f"{n_streams_max} streams are open already: close one")
+        return EventStream(board.fanout, reader, last_event_id, keep_alive_s)
 
     return router
 
 
-async def asked(reader: StoreReader, kinds: Sequence[str], **question: Any) -> Page:
+async def history_page(reader: StoreReader, kinds: Sequence[str], **question: Any) -> HistoryPage:
     """A page of the history; an invalid cursor is the client's fault."""
     try:
         return await asyncio.to_thread(reader.page, kinds, **question)
@@ -131,13 +132,13 @@ def _question(query: EstimatesQuery, n_left: int, cursor: str | None) -> dict[st
     }
 
 
-async def _page_by_page(reader: StoreReader, query: EstimatesQuery, first: Page) -> AsyncIterator[bytes]:
+async def _page_by_page(reader: StoreReader, query: EstimatesQuery, first: HistoryPage) -> AsyncIterator[bytes]:
     """A long answer, read from the store as fast as the client reads it."""
     page, n_left = first, query.limit - len(first.items)
     newest = first.last_cursor
     yield b'{"items":[' + ",".join(first.items).encode()
     while n_left > 0 and page.next_cursor is not None:
-        page = await asked(reader, BATCHES, **_question(query, n_left, page.next_cursor))
+        page = await history_page(reader, BATCHES, **_question(query, n_left, page.next_cursor))
         n_left -= len(page.items)
         if page.items:
             yield ("," + ",".join(page.items)).encode()
@@ -145,7 +146,7 @@ async def _page_by_page(reader: StoreReader, query: EstimatesQuery, first: Page)
     yield _tail(page.next_cursor, newest)
 
 
-def _page_json(page: Page) -> bytes:
+def _page_json(page: HistoryPage) -> bytes:
     return b'{"items":[' + ",".join(page.items).encode() + _tail(page.next_cursor, page.last_cursor)
 
 

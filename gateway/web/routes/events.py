@@ -10,12 +10,12 @@ from starlette.responses import Response
 
 from gateway.core.events import EntryKind
 from gateway.core.events.table import COLUMNS, cells_of
-from gateway.history import Page
+from gateway.history import HistoryPage
 from gateway.records import json_line
 from gateway.store import StoreReader
-from gateway.web.as_file import CSV, JSON_LINES, csv_lines, file_responses, json_lines, sent_as_file
-from gateway.web.as_parquet import PARQUET, ParquetFile
-from gateway.web.routes.estimates import HistoryQuery, Span, asked
+from gateway.web.file_response import CSV, JSON_LINES, csv_lines, file_responses, json_lines, sent_as_file
+from gateway.web.parquet import PARQUET, ParquetFile
+from gateway.web.routes.estimates import HistoryQuery, TimeSpan, history_page
 from gateway.web.schemas import problem_responses
 
 _PAGE: Final = 100  # entries in memory at a time, for each file that is being sent
@@ -119,7 +119,7 @@ class TripsPage(_EntriesPage):
 
 
 def events_router(reader: StoreReader) -> APIRouter:
-    """The routes of both."""
+    """The routes of load events and trips."""
     router = APIRouter(prefix="/api/v1", tags=["events"])
 
     @router.get("/events", response_model=EventsPage, responses=problem_responses(422, 503))
@@ -147,7 +147,7 @@ async def _page(reader: StoreReader, kind: EntryKind, query: HistoryQuery) -> Re
 
 async def entries_of(reader: StoreReader, kind: str, query: HistoryQuery) -> str:
     """One page of entries as the rest of a JSON object. Raises RequestValidationError for an invalid cursor."""
-    page = await asked(
+    page = await history_page(
         reader,
         (kind,),
         since_ns=query.since,
@@ -161,9 +161,11 @@ async def entries_of(reader: StoreReader, kind: str, query: HistoryQuery) -> str
 
 
 def _file_of(reader: StoreReader, kind: EntryKind, ending: str) -> Callable[..., Any]:
-    async def whole(span: Annotated[Span, Query()]) -> Response:
-        async def page_behind(cursor: str | None) -> Page:
-            return await asked(reader, (kind,), since_ns=span.since, until_ns=span.until, limit=_PAGE, cursor=cursor)
+    async def whole(span: Annotated[TimeSpan, Query()]) -> Response:
+        async def page_behind(cursor: str | None) -> HistoryPage:
+            return await history_page(
+                reader, (kind,), since_ns=span.since, until_ns=span.until, limit=_PAGE, cursor=cursor
+            )
 
         name = f"springscale-{_PATHS[kind]}.{ending}"
         if ending == "parquet":

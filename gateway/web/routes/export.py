@@ -7,15 +7,15 @@ from pydantic import Field
 from starlette.responses import Response
 
 from gateway.estimate_json import COLUMNS, csv_cells
-from gateway.history import BATCHES, Page
+from gateway.history import BATCHES, HistoryPage
 from gateway.store import StoreReader
-from gateway.web.as_file import CSV, JSON_LINES, Encoder, csv_lines, file_responses, json_lines, sent_as_file
-from gateway.web.routes.estimates import Span, asked
+from gateway.web.file_response import CSV, JSON_LINES, Encoder, csv_lines, file_responses, json_lines, sent_as_file
+from gateway.web.routes.estimates import TimeSpan, history_page
 
 _PAGE: Final = 10  # records in memory at a time, for each file that is being sent
 
 
-class SpanWithSpectra(Span):
+class SpanWithSpectra(TimeSpan):
     """Which part of the history, and whether with spectra."""
 
     spectra: bool = Field(False, description="true sends the spectra too")
@@ -26,7 +26,7 @@ def export_router(reader: StoreReader) -> APIRouter:
     router = APIRouter(prefix="/api/v1", tags=["export"])
 
     @router.get("/export.csv", response_class=Response, responses=file_responses("text/csv", "the file"))
-    async def export_csv(span: Annotated[Span, Query()]) -> Response:
+    async def export_csv(span: Annotated[TimeSpan, Query()]) -> Response:
         """Comma-separated values (RFC 4180), one batch a line, several reasons of rejection joined by a space."""
         return await _sent(reader, span, CSV, "csv", csv_lines(COLUMNS, csv_cells), with_spectra=False)
 
@@ -39,10 +39,10 @@ def export_router(reader: StoreReader) -> APIRouter:
 
 
 async def _sent(
-    reader: StoreReader, span: Span, media_type: str, ending: str, encode: Encoder, *, with_spectra: bool
+    reader: StoreReader, span: TimeSpan, media_type: str, ending: str, encode: Encoder, *, with_spectra: bool
 ) -> Response:
-    async def page_behind(cursor: str | None) -> Page:
-        return await asked(
+    async def page_behind(cursor: str | None) -> HistoryPage:
+        return await history_page(
             reader,
             BATCHES,
             since_ns=span.since,

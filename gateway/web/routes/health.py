@@ -7,7 +7,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_l
 from starlette.responses import JSONResponse, Response
 
 from gateway.status import Status
-from gateway.web.door.problems import problem_response
+from gateway.web.access.problems import problem_response
 from gateway.web.schemas import Alive, Ready, problem_responses
 
 

@@ -32,7 +32,7 @@ Labelled = Iterable[tuple[Sequence[str], float | None]]
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class MetricRow:
     """A metric: its name, its help, its present samples (None: there is no such part), the names of its labels."""
 
     name: str
@@ -41,29 +41,29 @@ class Row:
     labels: tuple[str, ...] = ()
 
 
-def one(name: str, text: str, path: str, of_unit: float = 1.0) -> Row:
+def one(name: str, text: str, path: str, of_unit: float = 1.0) -> MetricRow:
     """A metric without labels: the value at a path of the status, left out if unknown."""
 
     def samples(moment: Moment) -> Labelled | None:
         reading = _at(moment, path)
         return None if reading is None or math.isnan(reading) else [((), reading * of_unit)]
 
-    return Row(name, text, samples)
+    return MetricRow(name, text, samples)
 
 
-def by(name: str, text: str, label: str, read: Callable[[Moment], Mapping[str, float | None]]) -> Row:
+def by(name: str, text: str, label: str, read: Callable[[Moment], Mapping[str, float | None]]) -> MetricRow:
     """A metric with one label, a sample for each of its values."""
-    return Row(name, text, lambda moment: [((key,), reading) for key, reading in read(moment).items()], (label,))
+    return MetricRow(name, text, lambda moment: [((key,), reading) for key, reading in read(moment).items()], (label,))
 
 
-def counts(name: str, text: str, label: str, path: str, **fields: str) -> Row:
+def counts(name: str, text: str, label: str, path: str, **fields: str) -> MetricRow:
     """Some numbers of one part of the status, by the values of a label."""
 
     def samples(moment: Moment) -> Labelled | None:
         part = _at(moment, path)
         return None if part is None else [((key,), getattr(part, field)) for key, field in fields.items()]
 
-    return Row(name, text, samples, (label,))
+    return MetricRow(name, text, samples, (label,))
 
 
 def _at(moment: Moment, path: str) -> Any:
@@ -96,7 +96,7 @@ def _passed(moment: Moment) -> Labelled | None:
     return None if known.last_at is None else [((), float(known.last_verdict == "passed"))]
 
 
-def _found(quantity: Outward) -> tuple[Row, Row]:
+def _found(quantity: Outward) -> tuple[MetricRow, MetricRow]:
     """The latest estimate of a quantity, and its standard deviation."""
     name, std_name, factor = quantity.metric
     text = f"{quantity.words[0].upper()}{quantity.words[1:]}, by the latest estimate."
@@ -109,7 +109,7 @@ def _found(quantity: Outward) -> tuple[Row, Row]:
 _ROWS: Final = "Rows by outcome."
 _STD: Final = "Its standard deviation."
 TABLE: Final = (
-    Row(
+    MetricRow(
         "springscale_info",
         "Always 1; the labels identify this service.",
         _info,
@@ -135,7 +135,7 @@ TABLE: Final = (
         kernel="n_kernel_dropped",
     ),
     one("springscale_bus_last_frame_age_seconds", "Since the last frame.", "now.bus.last_frame_age_s"),
-    Row(
+    MetricRow(
         "springscale_decoded_frames_total",
         "Frames of mapped signals by outcome.",
         lambda m: [((count.signal, count.reason), count.n) for count in m.now.decode],
@@ -165,7 +165,7 @@ TABLE: Final = (
         "reason",
         lambda m: dict.fromkeys(map(str, Why), 0) | m.now.batches.rejected_by_reason,  # rates see the first one too
     ),
-    Row(
+    MetricRow(
         "springscale_store_degraded",
         "1 while estimates are kept in memory only.",
         lambda m: [((), float(m.now.store.state != "ok"))],
@@ -184,11 +184,11 @@ TABLE: Final = (
         pruned="n_pruned",
     ),
     one("springscale_verification_due", "1 while one with known loads is due.", "now.verification.is_due"),
-    Row("springscale_verification_passed", "1 if the last of this calibration passed.", _passed),
+    MetricRow("springscale_verification_passed", "1 if the last of this calibration passed.", _passed),
     by("springscale_alarm", "0 without an alarm, 1 provisional, 2 confirmed.", "alarm", _levels),
     one("springscale_alarms_unacknowledged", "Alarms that nobody has acknowledged.", "now.alarms.n_unacknowledged"),
     one("springscale_alarms_told_total", "Alarms sent since the start, provisional and final.", "now.alarms.n_told"),
-    Row(
+    MetricRow(
         "springscale_record_refused",
         "1 while frames cannot be recorded.",
         lambda m: None if m.now.record is None else [((), float(bool(m.now.record.last_fault)))],
@@ -249,7 +249,7 @@ TABLE: Final = (
 
 
 class StatusCollector:
-    """Turns the present status into metrics at each request."""
+    """ConcurrencyLimit the present status into metrics at each request."""
 
     def __init__(self, board: Board, scales: Scales, status: Callable[[], Status], responses: Counter[int]) -> None:
         self._board = board
@@ -279,7 +279,7 @@ class StatusCollector:
 def metrics_registry(
     board: Board, scales: Scales, status: Callable[[], Status], responses: Counter[int]
 ) -> CollectorRegistry:
-    """A registry of our own: no process-wide state, two apps do not meet."""
+    """A registry of its own, so that two applications in one process do not interfere."""
     registry = CollectorRegistry(auto_describe=False)
     registry.register(StatusCollector(board, scales, status, responses))
     ProcessCollector(namespace="springscale", registry=registry)

@@ -11,8 +11,8 @@ from starlette.responses import Response, StreamingResponse
 from starlette.types import Receive, Scope, Send
 
 from gateway.records import iso_utc
-from gateway.web.door.guard import RECORD_PATH
-from gateway.web.door.problems import problem_response
+from gateway.web.access.guard import RECORD_PATH
+from gateway.web.access.problems import problem_response
 from gateway.web.schemas import problem_responses
 
 PIECE_BYTES: Final = 65_536
@@ -36,7 +36,7 @@ class KeptSegment(Protocol):
 
 
 class FrameLog(Protocol):
-    """Who keeps the frames. ``open`` blocks, and raises OSError if the disk fails."""
+    """The ring log. ``open`` blocks, and raises OSError if the disk fails."""
 
     def segments(self) -> Sequence[KeptSegment]:
         """Oldest first."""

@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import NOT_CALIBRATED, Place, is_over_limit, place_of, weighed
+from gateway.core.weights import NOT_CALIBRATED, PayloadPlace, is_over_limit, place_of, weighed
 from gateway.estimate import Estimate, Weight, Weights
 from gateway.records import iso_utc
 from gateway.web.live.board import Board
@@ -68,7 +68,7 @@ class Scales:
         self._known = found
         return [found[id(one)][1] for one in estimates]
 
-    def place(self, estimate: Estimate | None) -> Place | None:
+    def place(self, estimate: Estimate | None) -> PayloadPlace | None:
         """The position of its payload; None if unknown."""
         if self.vehicle is None or estimate is None or estimate.posterior is None:
             return None
@@ -115,7 +115,7 @@ def _figure(now: Weight, history_kg: Sequence[float]) -> WeightFigure:
     )
 
 
-def _place(place: Place | None) -> LoadPlace | None:
+def _place(place: PayloadPlace | None) -> LoadPlace | None:
     return None if place is None else LoadPlace(**{name: _or_none(x) for name, x in asdict(place).items()})
 
 

@@ -1,3 +1,3 @@
-"""Where a load lies across the vehicle: sought in what roll tells (``sought``), told beside payload and front share
-(``told``), and where no roll rate tells, carried by the interval (``unseen``).
+"""The lateral place of a load: estimated from roll (``sought``), with the roll share of the axles (``told``), or
+without a roll rate as a part of the interval (``unseen``).
 """

@@ -1,9 +1,9 @@
-"""Where the load lies to the side: what roll tells once payload and front share are known.
+"""The lateral place of the load, estimated from roll once payload and front share are known.
 
-A load off the centre line makes the body roll as it heaves, and heave as it rolls. Held against the likelihood of all
-three sensors with all else as the two others have it, this has one answer. What of roll has other causes is left free:
-the tracks' own difference, how the payload is spread, how fast the body rolls today. The half-car's parameters are not:
-where the model of roll errs, it must not move the weight.
+A load off the centre line makes the body roll as it heaves, and heave as it rolls. The likelihood of all three sensors,
+with everything else as found from the two others, has one maximum. Parameters that also affect roll are free: the
+difference of the tracks, the spread of the payload, the day's roll inertia. The half-car's parameters are fixed: errors
+of the roll model must not change the weight.
 """
 
 from dataclasses import dataclass
@@ -18,22 +18,22 @@ from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.records import F64
 
 ROLL_BAND_HZ: Final = (1.1, 5.0)
-"""Where the body rolls on its springs; above it wheels, axles and seats do things that no model here knows. Chosen."""
+"""Chosen: the band in which the body rolls on its springs; above it wheels, axles and seats are not modelled."""
 
-CG_LEFT_STD_M: Final = 0.1  # of all that is sprung: a third of an empty mass 0.3 m off the centre line is 0.075
+CG_LEFT_STD_M: Final = (
+    0.1  # chosen: of the whole sprung mass; a payload of a third of the empty mass, 0.3 m off the line, gives 0.075
+)
 FREE_STD: Final = {
     "twist_level": 0.3,
     "tracks_apart_m": 0.2,
     "payload_roll_gyration_m2": 0.5,
     "roll_inertia_kgm2": 0.06,  # over the rate against roll: a day's springs and tyres, who sits where, the tank
 }
-"""What another road, another load and another day have of their own, and what calibration leaves open of it: standard
-deviations of logarithms. Chosen.
-"""
+"""Chosen: standard deviations of logarithms, from changes of road, load and day and from calibration."""
 
 MOST_MOUNT_CHANGE: Final = {"sensor_left_m": 0.1, "gyro_yaw_rad": 0.09}
-"""A sensor that sits elsewhere, or is turned by five degrees more, than when it was calibrated; roll tells to a few
-millimetres and tenths of a degree, but a load far to one side, on another road, may pass for a part of it.
+"""Chosen: a sensor that was moved, or turned by five degrees, since calibration. Roll shows this to a few millimetres
+and tenths of a degree, but a load far to one side on another road can look like a part of it.
 """
 
 FREE: Final = [INDEX[name] for name in FREE_STD]
@@ -41,12 +41,11 @@ FREE: Final = [INDEX[name] for name in FREE_STD]
 
 @dataclass(frozen=True, slots=True)
 class Sideways:
-    """The place (m) of the centre of gravity of all that is sprung, left of the centre line, under a load that is
-    known.
+    """Centre of gravity (m) of the sprung mass, left of the centre line, given the load.
 
-    own_variance (m2) is the error from the batch's length and road. moves (n,) is by how much the place moves with each
-    parameter of the vehicle, moves_with_load (2,) with payload (m/kg) and front share (m per 0..1). is_mount_changed:
-    the sensor is not where, or not turned as, it was calibrated.
+    own_variance (m2) is the error from the batch's length and road. moves (n,) is its derivative by each parameter of
+    the vehicle, moves_with_load (2,) by payload (m/kg) and front share (m per 0..1). is_mount_changed: the sensor is
+    not where, or not turned as, it was at calibration.
     """
 
     cg_left_m: float
@@ -58,7 +57,7 @@ class Sideways:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """What a search found of FREE and the place, with the covariance; the place is its last."""
+    """The result of the search over FREE and the place, with its covariance; the place is the last entry."""
 
     found: Found
 
@@ -69,7 +68,7 @@ class Place:
 
 
 def sought_sideways(rolling: Whittle, point: Point) -> Place:
-    """The most probable place under the payload and front share of ``point``; its own place is where to begin.
+    """The most probable place given the payload and front share of ``point``, starting from its place.
 
     ``rolling`` is the likelihood of all three sensors.
     """
@@ -89,7 +88,7 @@ def sought_sideways(rolling: Whittle, point: Point) -> Place:
 
 
 def told_sideways(rolling: Whittle, place: Place, point: Point) -> Sideways:
-    """How sure the place is, and what it moves with."""
+    """The place with its variance and derivatives."""
     there, n, found = _at(point, place.found.x), len(point.theta), place.found
     whole = rolling.curvature(there, range(n + 3))
     moves = -found.covariance[-1] @ whole.information[_free(there)]
@@ -106,7 +105,9 @@ def told_sideways(rolling: Whittle, place: Place, point: Point) -> Sideways:
 
 
 def _off(entry: int, whole: Curvature, found: Found, free: list[int]) -> float:
-    """How far off a parameter of the mount is, by one Newton step, all that was free moving along; 0 where untold."""
+    """Deviation of a parameter of the mount by one Newton step, with the free parameters following; 0 without
+    information.
+    """
     slope, information = whole.towards(entry, free, found.covariance, whole.gradient[free])
     return -slope / information if information > 0.0 else 0.0
 

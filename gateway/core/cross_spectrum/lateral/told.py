@@ -1,4 +1,4 @@
-"""Where the load lies to the side: what an estimate tells of it beside payload and front share."""
+"""The front axle's share of a roll moment, as an estimate states it."""
 
 import math
 from dataclasses import replace
@@ -16,17 +16,17 @@ from gateway.records import F64
 _STIFFNESSES: Final = tuple(
     INDEX[f"{kind}_{end}_npm"] for kind in ("spring", "anti_roll", "tyre") for end in ("front", "rear")
 )
-_STEP: Final = 1e-3
+_STEP: Final = 1e-3  # chosen: of a logarithm, for a difference quotient
 
 
 def with_place(answer: Estimate, point: Point, calibration: CrossSpectrumCalibration) -> Estimate:
-    """``answer`` with how the axles share a sideways moment under the load of ``point``."""
+    """``answer`` with the axles' shares of a roll moment at the load of ``point``."""
     stiffness = _roll_share_front(point, calibration)
     return replace(answer, roll_share_front=stiffness.number, roll_share_front_std=stiffness.std)
 
 
 def _roll_share_front(point: Point, calibration: CrossSpectrumCalibration) -> Quantity:
-    """Which part of a sideways moment the front axle takes, from springs, bars and tyres as calibrated."""
+    """The part of a roll moment that the front axle takes, from springs, bars and tyres as calibrated."""
     load = SidewaysLoad(point.payload_kg, point.front_share, point.cg_left_m)
 
     def share(theta: F64) -> float:

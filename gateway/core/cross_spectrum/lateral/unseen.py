@@ -1,7 +1,7 @@
-"""What a load that lies sideways does to an answer that nobody can see it in: without a roll rate.
+"""The effect of an unknown lateral place on the estimate, without a roll rate.
 
-A sensor off the centre line takes the roll of such a load for heave. Where no roll rate tells, the answer carries it:
-the load may lie anywhere across the floor, and the sensor where it was said to sit, or somewhere, if nobody said.
+A sensor off the centre line reads the roll of such a load as heave. Without a roll rate the interval includes this: the
+load may be anywhere across the floor, and the sensor where it was stated, or anywhere plausible.
 """
 
 from collections.abc import Callable
@@ -27,23 +27,23 @@ from gateway.core.cross_spectrum.model.usual_roll import TRACK_PER_WHEELBASE, us
 from gateway.records import F64
 
 PAYLOAD_LEFT_PER_TRACK: Final = 0.95 / 3.0 / 1.96
-"""Over the track's width: loads whose middle is evenly spread over its middle two thirds. A Gaussian of this standard
-deviation has the same 95 % interval; the even spread's own, 1 / (3 sqrt 3), would make it wider by a fifth.
+"""Chosen, over the track's width: load centres uniform over its middle two thirds. A Gaussian of this standard
+deviation has the same 95 % interval; the uniform's own, 1 / (3 sqrt 3), would make it wider by a fifth.
 """
 
 
-MOST_FEEDBACK: Final = 0.5  # beyond, proportion no longer holds; chosen, it doubles the standard deviation
+MOST_FEEDBACK: Final = 0.5  # chosen: limit of the linear correction, where it doubles the standard deviation
 
 
 def sideways_columns(
     spectra: CrossSpectra, point: Point, calibration: CrossSpectrumCalibration, weigh: Callable[[CrossSpectra], F64]
 ) -> F64:
-    """(k, 2) by how much payload (kg) and front share (0..1) move with a place across the vehicle that is not seen.
+    """(k, 2) change of payload (kg) and front share (0..1) with the unknown lateral place, one standard deviation.
 
-    ``point`` is the answer to ``spectra``, and ``weigh`` finds payload and share (2,) in others not far from it. It is
-    handed what the sensors would read with the load a standard deviation to either side: half of what the two answers
-    differ by is what such a load does. By symmetry that is nothing for a sensor on the centre line. Where calibration
-    knows how the vehicle rolls, what both have in common counts too: a load to either side couples roll with the rest.
+    ``point`` is the answer to ``spectra``, and ``weigh`` finds payload and share (2,) in similar spectra. It gets the
+    model's spectra with the load a standard deviation to either side; half of the difference of both answers is the
+    column. By symmetry it is zero for a sensor on the centre line. If calibration knows the vehicle's roll, the part
+    common to both sides counts too: a load on either side couples roll with heave and pitch.
     """
     width_m = calibration.track_width_m or TRACK_PER_WHEELBASE * calibration.wheelbase_m
     theta = _rolling(point.theta, calibration, width_m)
@@ -65,13 +65,13 @@ def sideways_columns(
 
 
 def _of_true_load(moved: F64, payload_kg: float) -> F64:
-    """``moved`` (2,) under the load that truly lies so: where the answer fell short of it, it moves by more."""
+    """``moved`` (2,) relative to the true load: where the answer is too small, the change is larger."""
     feedback = min(abs(float(moved[0])) / payload_kg, MOST_FEEDBACK)
     return moved / (1.0 - feedback)
 
 
 def _rolling(theta: F64, calibration: CrossSpectrumCalibration, width_m: float) -> F64:
-    """theta (n,) with how the vehicle rolls: as calibrated, else as vehicles do; the sensor as far off as it may be."""
+    """theta (n,) with roll parameters: as calibrated, else usual ones; the sensor as far off the line as it may be."""
     left_m = float(np.hypot(calibration.sensor_left_m, calibration.sensor_left_std_m))
     if has_roll(calibration.parameters):
         roll = calibration.parameters[len(PARAMETERS) :]
@@ -83,4 +83,4 @@ def _rolling(theta: F64, calibration: CrossSpectrumCalibration, width_m: float) 
     return np.asarray(whole, np.float64)
 
 
-_SILENT: Final = -30.0  # the logarithm of the slack and noise of a sensor that is not there
+_SILENT: Final = -30.0  # logarithm of slack and noise for an absent sensor: practically zero

@@ -1,7 +1,7 @@
-"""The vehicle as a model: from its parameters and its load to the spectra that its sensors should show.
+"""The vehicle model: from its parameters and its load to the expected spectra of its sensors.
 
-parameters: the vector theta and what it stands for; half_car: heave and pitch on two axles; rolling_car: the same with
-roll; usual_roll: how vehicles roll that nobody measured; friction: how rates go with amplitude; mount: where the
-sensor sits; driven: responses at a group's speed and amplitude; expected: the spectral matrix of every group of
-segments; slopes: how it changes with each parameter; matrix: such matrices, and how they are whitened.
+parameters: the vector theta and its meaning; half_car: heave and pitch on two axles; rolling_car: the same with roll;
+usual_roll: default roll parameters; friction: rates as functions of amplitude; mount: the sensor's place; driven:
+responses at a group's speed and amplitude; expected: the spectral matrix of every group of segments; slopes: its
+derivatives by each parameter; matrix: such matrices, and their whitening.
 """

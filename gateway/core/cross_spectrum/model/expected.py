@@ -1,7 +1,7 @@
-"""The spectral matrix that the sensors should show of a vehicle, for every group of segments.
+"""The expected spectral matrix of a vehicle's sensors, for every group of segments.
 
-Both axles meet one road, so the matrix is that of two coherent paths (with roll: twice two, for the tracks' mean and
-for half their difference); what is not coherent is added to it.
+Both axles meet one road, so the matrix is that of two coherent paths (with roll: four, for the mean and half the
+difference of the tracks); the incoherent part is added.
 """
 
 from typing import Final, TypeVar
@@ -19,20 +19,20 @@ ROAD_EXPONENT: Final = -2.0  # displacement density of a road falls about as fre
 
 
 def expected_spectra(model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
-    """What the groups of ``spectra`` should show, (p, ..., b, m), up to the road's level.
+    """Expected spectra of the groups of ``spectra``, (p, ..., b, m), up to the road's level.
 
-    A Hann taper mixes neighbouring frequencies, weighing them 1:4:1; the road's slope is in.
+    A Hann taper mixes neighbouring frequencies with weights 1:4:1; the road's slope is included.
     """
     return expected_of_driven(driven(model, spectra), model, spectra)
 
 
 def expected_of_driven(by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
-    """The same of a model that drives already as the groups of ``spectra`` do."""
+    """The same for a model already evaluated for the groups of ``spectra``."""
     return with_noise(tapered(without_noise(by, model), spectra), model, spectra)
 
 
 def with_noise(matrix: SpectralMatrix, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
-    """What the sensors show in place of ``matrix``, which sensors without noise would show."""
+    """``matrix``, expected of sensors without noise, with their noise added."""
     return SpectralMatrix(matrix.auto + noise(model, matrix, spectra), matrix.cross)
 
 
@@ -47,7 +47,7 @@ def without_noise(by: Driven, model: SpectralModel) -> SpectralMatrix:
 
 
 def _of_two_paths(front: C128, rear: C128, phase: C128, slack: F64) -> SpectralMatrix:
-    """|front|^2 + |rear|^2 + phase rear conj(front) + its conjugate, the squares with their slack."""
+    """|front|^2 + |rear|^2 + phase rear conj(front) + its conjugate; slack multiplies the squares."""
     auto = slack * (power(front) + power(rear)) + 2.0 * np.real(phase * rear * np.conj(front))
     late = phase * rear
     cross = [
@@ -64,13 +64,13 @@ def power(x: C128) -> F64:
 
 
 def tapered(matrix: SpectralMatrix, spectra: CrossSpectra) -> SpectralMatrix:
-    """With the road's slope, and mixed as a Hann taper does; one frequency fewer at either end."""
+    """The matrix with the road's slope, mixed by a Hann taper; one frequency fewer at either end."""
     road = _road(spectra)
     return SpectralMatrix(_mixed(matrix.auto * road), _mixed(matrix.cross * road))
 
 
 def tapered_parts(slopes: F64, spectra: CrossSpectra) -> F64:
-    """The same of changes (b, m, p^2, k) of a matrix's parts, frequencies before these."""
+    """The same for changes (b, m, p^2, k) of a matrix's parts; the frequency axis comes before these."""
     rough = slopes * _road(spectra)[:, None, None]
     mixed: F64 = 4.0 * rough[:, 1:-1]
     mixed += rough[:, :-2]
@@ -84,7 +84,7 @@ def _road(spectra: CrossSpectra) -> F64:
 
 
 def _mixed(x: _Spectra) -> _Spectra:
-    """Each with its neighbours (..., m), weighed 1:4:1."""
+    """Each value (..., m) mixed with its neighbours by weights 1:4:1."""
     mixed: _Spectra = 4.0 * x[..., 1:-1]
     mixed += x[..., :-2]
     mixed += x[..., 2:]
@@ -92,7 +92,9 @@ def _mixed(x: _Spectra) -> _Spectra:
 
 
 def noise(model: SpectralModel, matrix: SpectralMatrix, spectra: CrossSpectra) -> F64:
-    """Sensor noise (p, ..., b, 1) beside ``matrix``, or (p, ..., b, m) where the spectra hold more than the model's."""
+    """Sensor noise (p, ..., b, 1) for ``matrix``, or (p, ..., b, m) if the spectra have noise in excess of the
+    model's.
+    """
     density = model.noise[..., None, :]
     if spectra.noise is not None:
         p, m = spectra.noise.shape
@@ -102,11 +104,9 @@ def noise(model: SpectralModel, matrix: SpectralMatrix, spectra: CrossSpectra) -
 
 
 def noise_scale(matrix: SpectralMatrix, spectra: CrossSpectra) -> F64:
-    """(..., b, 1) what a noise density becomes beside ``matrix``: segments were divided by their power, and so their
-    noise.
+    """(..., b, 1) factor of a noise density in spectra whose segments were divided by their power.
 
-    That power is the mean of acceleration's and of pitch rate's: what these would have been divided by, had they been
-    ``matrix``.
+    That power is the geometric mean of acceleration's and pitch rate's; it is estimated as if they were ``matrix``.
     """
     size = np.sqrt(matrix.auto[0].mean(axis=-1, keepdims=True) * matrix.auto[1].mean(axis=-1, keepdims=True))
     per_density: F64 = spectra.inverse_power * size

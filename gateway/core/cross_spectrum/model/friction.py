@@ -1,10 +1,10 @@
-"""What makes an axle stiffer and more damped where it moves less: friction, and rubber.
+"""Friction and rubber: an axle is stiffer and more damped where it moves less.
 
 A friction force F acts on a movement of standard deviation s as a damper sqrt(2/pi) F/s does (statistical
-linearisation; J. B. Roberts, P. D. Spanos, Random Vibration and Statistical Linearization, 1990). Where it sticks,
-the bushes beside it are the spring, and rubber itself is softer in large movements than in small ones (A. R. Payne,
-J. Appl. Polym. Sci. 6, 1962). Of the rate of each damper and of each spring a share p is of this kind where the axle
-moves as much as it usually does; where it moves s times as much, the rate is 1 - p + p/s times as large.
+linearisation; J. B. Roberts, P. D. Spanos, Random Vibration and Statistical Linearization, 1990). Where it sticks, the
+bushes act as the spring, and rubber itself is softer in large movements (A. R. Payne, J. Appl. Polym. Sci. 6, 1962). A
+share p of the rate of each damper and spring is of this kind at the usual amplitude; at s times that amplitude the rate
+is 1 - p + p/s times as large.
 """
 
 from dataclasses import replace
@@ -14,29 +14,30 @@ import numpy as np
 
 from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar
 from gateway.core.cross_spectrum.model.parameters import INDEX
+from gateway.core.memoized import memoized
 from gateway.records import F64
 
 LEVEL_STEPS: Final = (0.8, 0.4)
-"""How far apart the levels are at which a vehicle is solved, in logarithms of amplitude over the usual one: of u, the
-mean of front and rear axle, and of d, half their difference.
+"""Chosen: distances between the levels at which a vehicle is solved, in logarithms of amplitude over the usual one: of
+u, the mean of front and rear axle, and of d, half their difference.
 
 Of a rate 1 - p + p exp(-x) quadratic interpolation along u misses at most p |u (u^2 - 0.8^2)| exp(0.8) / 6, which is
 0.07 p between the outer levels; p is 0.1 or so. What u and d do together to both axles is left out.
 """
-MOST: Final = 1.2  # a mean u further from the usual one counts as this far
-MOST_APART: Final = 0.8  # and d likewise
-LEAST_LEFT: Final = 0.05  # of a rate, however large its friction is thought to be
+MOST: Final = 1.2  # chosen: limit of the mean u
+MOST_APART: Final = 0.8  # chosen: limit of d
+LEAST_LEFT: Final = 0.05  # chosen: least part of a rate, for any friction share
 
 RATES: Final = tuple(
     (axle, INDEX[f"{kind}_friction_{end}"], INDEX[f"{kind}_{end}_{unit}"])
     for kind, unit in (("damper", "nspm"), ("spring", "npm"))
     for axle, end in enumerate(("front", "rear"))
 )
-"""Of which axle (0: front) each friction share is, where the vector has it, and the rate that it is a share of."""
+"""For each friction share: its axle (0: front), its entry in the vector, and the entry of its rate."""
 
 
 def levels() -> tuple[tuple[float, float], ...]:
-    """The five of front and rear axle at which a vehicle is solved."""
+    """The five levels of front and rear axle at which a vehicle is solved."""
     u, d = LEVEL_STEPS
     return (-u, -u), (0.0, 0.0), (u, u), (d, -d), (-d, d)
 
@@ -46,8 +47,10 @@ _LESS: Final = np.expm1(-np.array(levels()))[:, _AXLES]  # (5, 4) of the axle of
 
 
 def at_levels(car: HalfCar, theta: F64) -> HalfCar:
-    """``car`` with the spring and damper rates that friction gives it at each of :func:`levels`. theta (..., p) are the
-    parameters of ``car``, whose numbers are (..., 1, 1); the rates of the result are (..., 5, 1).
+    """``car`` with the spring and damper rates at each of :func:`levels`, by friction.
+
+    theta (..., p) are the parameters of ``car``, whose numbers are (..., 1, 1); the rates of the result are (..., 5,
+    1).
     """
     left = np.maximum(1.0 + theta[..., None, _SHARES] * _LESS, LEAST_LEFT)[..., None]
     dampers, springs = left[..., :2, :], left[..., 2:, :]
@@ -59,8 +62,9 @@ def at_levels(car: HalfCar, theta: F64) -> HalfCar:
     return replace(car, front=acting(car.front, 0), rear=acting(car.rear, 1))
 
 
+@memoized
 def level_weights(log_amplitudes: F64) -> F64:
-    """(b, 5) what of :func:`levels` makes up amplitudes (b, 2) of front and rear axle, by quadratic interpolation."""
+    """(b, 5) weights of :func:`levels` for amplitudes (b, 2) of front and rear axle, by quadratic interpolation."""
     front, rear = log_amplitudes[:, :1], log_amplitudes[:, 1:]
     u = np.clip(0.5 * (front + rear), -MOST, MOST) / LEVEL_STEPS[0]
     d = np.clip(0.5 * (front - rear), -MOST_APART, MOST_APART) / LEVEL_STEPS[1]

@@ -1,10 +1,9 @@
-"""A linear half-car that meets one road twice: first with the front axle, one wheelbase later with the rear.
+"""A linear half-car that meets one road twice: with the front axle, and one wheelbase later with the rear.
 
-Heave and pitch of a rigid body on two axles, each a spring, a damper in series with its elastic
-mount, an unsprung mass and a tyre. The payload is a point mass on a floor that gives a little; its own inertia turns
-with the body. The body is described by the vertical positions of its points over the two
-axles, in which coordinates the suspension is diagonal and the payload enters without dividing by it.
-
+Heave and pitch of a rigid body on two axles, each a spring, a damper in series with its elastic mount, an unsprung mass
+and a tyre. The payload is a point mass on a slightly elastic floor; its own inertia turns with the body. The
+coordinates are the vertical positions of the body over the two axles: in these the suspension is diagonal, and the
+payload enters without a division by it.
 Fields may be numbers or arrays that broadcast against frequency, so that many vehicles are solved at once.
 """
 
@@ -19,16 +18,16 @@ from gateway.units import STANDARD_GRAVITY_MPS2
 Real = float | F64
 Rate = Real | C128
 
-INVERSE_PAYLOAD_KG = 30.0  # 1/L becomes L / (L^2 + this^2): an empty vehicle has no payload position
+INVERSE_PAYLOAD_KG = 30.0  # chosen: 1/L becomes L / (L^2 + this^2), as an empty vehicle has no payload position
 
 
 @dataclass(frozen=True, slots=True)
 class Axle:
     """Both wheels of one axle together.
 
-    The spring stiffens with the static load W (kN) that the payload adds: the logarithm of its rate
-    has a slope at W = 0, which changes by spring_bends_per_kn (..., n) at each of bend_loads_kn (n,). Helper springs
-    and bump stops bend it sharply, progressive coils gently.
+    The spring stiffens with the static load W (kN) that the payload adds: the logarithm of its rate has a slope at W =
+    0, which changes by spring_bends_per_kn (..., n) at each of bend_loads_kn (n,). Helper springs and bump stops cause
+    sharp bends, progressive coils gentle ones.
     """
 
     spring_npm: Real
@@ -45,9 +44,8 @@ class Axle:
 class HalfCar:
     """A vehicle on a straight road, without its payload. Masses are of the sprung mass, share 0..1.
 
-    payload_gyration_m2 is the payload's squared radius of gyration in pitch; payload_mode_hz and
-    payload_damping_ratio say how it moves against the floor; gyro_lag_s is by how much the pitch
-    rate comes later than the acceleration.
+    payload_gyration_m2 is the payload's squared radius of gyration in pitch; payload_mode_hz and payload_damping_ratio
+    describe its movement on the floor; gyro_lag_s is the delay of the pitch rate against the acceleration.
     """
 
     empty_mass_kg: float
@@ -65,9 +63,9 @@ class HalfCar:
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """What the sensors read for a unit road displacement under one axle, in the frequency domain.
+    """Sensor readings for a unit road displacement under one axle, in the frequency domain.
 
-    Arrays (..., m): acceleration in (m/s2)/m, pitch rate in (rad/s)/m, by the front and the rear axle.
+    Arrays (..., m): acceleration in (m/s2)/m, pitch rate in (rad/s)/m, for the front and the rear axle.
     """
 
     acceleration_front: C128
@@ -77,10 +75,10 @@ class Response:
 
 
 def frequency_response(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) -> Response:
-    """Sensor readings per road displacement at freq_hz (m,) > 0, with the payload aboard.
+    """Sensor readings per road displacement at freq_hz (m,) > 0, with the payload on board.
 
-    ``front_share`` (0..1) is of the sprung mass with payload. At frequency zero the body follows the
-    road: over each axle the displacement is that of the road there.
+    ``front_share`` (0..1) is of the sprung mass with payload. At frequency zero the body follows the road: its
+    displacement over each axle is that of the road there.
     """
     numbers = half_car_numbers(car, payload_kg, front_share)
     r = Motion(numbers, Frame(car.wheelbase_m), freq_hz, n_sensors=2).paths
@@ -88,7 +86,7 @@ def frequency_response(car: HalfCar, payload_kg: Real, front_share: Real, freq_h
 
 
 def half_car_numbers(car: HalfCar, payload_kg: Real, front_share: Real) -> Numbers:
-    """Those of its equations of motion."""
+    """The numbers in its equations of motion."""
     rigid_kg, carried_kg = body_masses_kg(car, payload_kg, front_share)
     added_front_kg, added_rear_kg = added_axle_masses_kg(car, payload_kg, front_share)
     return Numbers.of(
@@ -102,10 +100,9 @@ def half_car_numbers(car: HalfCar, payload_kg: Real, front_share: Real) -> Numbe
 
 
 def strokes(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) -> tuple[C128, C128]:
-    """By how much the springs of front and rear axle (2, ..., m) stretch, for a unit of road under the front axle, and
-    under the rear one.
+    """Stretch of front and rear springs (2, ..., m), per unit of road under the front axle, and under the rear one.
 
-    With K the suspension and T the wheel held by its tyre the wheel moves by (K body + k_t road) / (K + T).
+    With K the suspension and T the wheel on its tyre the wheel moves by (K body + k_t road) / (K + T).
     """
     omega = 2.0 * np.pi * freq_hz
     added = added_axle_masses_kg(car, payload_kg, front_share)
@@ -123,12 +120,12 @@ def strokes(car: HalfCar, payload_kg: Real, front_share: Real, freq_hz: F64) -> 
 
 
 def axle_numbers(axle: Axle, spring_npm: Real) -> tuple[Real, ...]:
-    """As motion.Numbers has them without roll, under a load that makes the springs so stiff."""
+    """The axle's part of motion.Numbers without roll, for springs of this rate."""
     return spring_npm, axle.damper_nspm, axle.damper_mount_npm, axle.tyre_npm, axle.unsprung_kg
 
 
 def suspension_npm(axle: Axle, added_kg: Real, omega: F64) -> Rate:
-    """Springs, and beside them dampers on their elastic mounts, under ``added_kg`` on the axle."""
+    """Springs in parallel with dampers on their elastic mounts, under ``added_kg`` on the axle."""
     damper = 1j * omega * axle.damper_nspm
     return spring_npm(axle, added_kg) + damper / (1.0 + damper / axle.damper_mount_npm)
 
@@ -144,7 +141,7 @@ def spring_npm(axle: Axle, added_kg: Real) -> Real:
 
 
 def added_axle_masses_kg(car: HalfCar, payload_kg: Real, front_share: Real) -> tuple[Real, Real]:
-    """What the payload adds on the front and on the rear axle."""
+    """Payload on the front and on the rear axle."""
     front_kg = front_share * (car.empty_mass_kg + payload_kg) - car.empty_front_share * car.empty_mass_kg
     return front_kg, payload_kg - front_kg
 
@@ -152,12 +149,12 @@ def added_axle_masses_kg(car: HalfCar, payload_kg: Real, front_share: Real) -> t
 def body_masses_kg(
     car: HalfCar, payload_kg: Real, front_share: Real
 ) -> tuple[tuple[Real, Real, Real], tuple[Real, Real, Real]]:
-    """Mass matrix (front-front, rear-rear, front-rear) of what turns with the body for the displacements over the
-    axles, then of the payload's mass, which moves on its floor.
+    """Mass matrix (front-front, rear-rear, front-rear) of the body for the displacements over the axles, then that of
+    the payload, which moves on its floor.
 
-    A point mass L at d adds L (1 - d/l)^2, L (d/l)^2 and L (1 - d/l)(d/l); written with the masses
-    F and R it puts on the axles, the last is q = L/4 - (R - F)^2 / (4 L) and the others F - q and R - q. The payload's
-    own inertia turns with the body: a load rests on its edges, so that it rocks on its floor faster than it bounces.
+    A point mass L at d adds L (1 - d/l)^2, L (d/l)^2 and L (1 - d/l)(d/l). With its masses F and R on the axles the
+    last is q = L/4 - (R - F)^2 / (4 L) and the others F - q and R - q. The payload's own inertia turns with the body: a
+    load rests on its edges, so that it rocks on its floor at a higher frequency than it bounces.
     """
     share, length = car.empty_front_share, car.wheelbase_m
     front_kg, rear_kg = added_axle_masses_kg(car, payload_kg, front_share)

@@ -1,6 +1,7 @@
-"""Spectral matrices of p sensors: Hermitian, as their diagonals and what is below these."""
+"""Spectral matrices of p sensors: Hermitian, stored as their diagonals and lower triangles."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -8,35 +9,36 @@ import numpy as np
 from gateway.records import C128, F64
 
 PAIRS: Final = ((1, 0), (2, 0), (2, 1))
-"""Which sensor against the conjugate of which: pitch rate and acceleration; roll rate and each of these."""
+"""Pairs (row, column) of sensors: pitch rate and acceleration; roll rate and each of these."""
 
 
 @dataclass(frozen=True, slots=True)
 class SpectralMatrix:
-    """auto (p, ..., m) and cross (p (p - 1) / 2, ..., m), the latter of as many of PAIRS."""
+    """auto (p, ..., m) and cross (p (p - 1) / 2, ..., m), the latter for as many of PAIRS."""
 
     auto: F64
     cross: C128
 
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:
-        """Of the sensors, those that ``cross`` holds."""
+        """The pairs of sensors in ``cross``."""
         return PAIRS[: len(self.cross)]
 
     @property
     def parts(self) -> F64:
-        """(..., m, p^2) its real numbers: the diagonal, then real and imaginary part of each of the pairs."""
+        """(..., m, p^2) its real numbers: the diagonal, then real and imaginary part of each pair."""
         return np.stack([*self.auto, *(part for one in self.cross for part in (one.real, one.imag))], axis=-1)
 
     @classmethod
+    @cache
     def units(cls, n_sensors: int) -> "SpectralMatrix":
-        """The p^2 matrices (p, p^2, 1, 1) that have a one among their parts, and else zeros."""
+        """The p^2 matrices (p, p^2, 1, 1) with a one in one of their parts and zeros elsewhere."""
         units = np.eye(n_sensors**2)[:, :, None, None]
         return cls(units[:n_sensors], units[n_sensors::2] + 1j * units[n_sensors + 1 :: 2])
 
     @classmethod
     def zeros(cls, n_sensors: int, shape: tuple[int, ...]) -> "SpectralMatrix":
-        """Nothing, to be filled in."""
+        """Zeros, to be filled in."""
         n_pairs = n_sensors * (n_sensors - 1) // 2
         return cls(np.zeros((n_sensors, *shape)), np.zeros((n_pairs, *shape), np.complex128))
 
@@ -45,7 +47,7 @@ class SpectralMatrix:
 class Whitener:
     """M = L L^H by its pivots: L is unit lower triangular times diag(roots).
 
-    roots (p, ..., m); below (p (p - 1) / 2, ..., m) holds what of earlier rows is in later ones, by PAIRS.
+    roots (p, ..., m); below (p (p - 1) / 2, ..., m) are the entries of L below the diagonal, by PAIRS.
     """
 
     roots: F64
@@ -53,7 +55,7 @@ class Whitener:
 
     @classmethod
     def of(cls, matrix: SpectralMatrix) -> "Whitener":
-        """Of a positive definite matrix; pivots that vanish by rounding are kept off zero."""
+        """The whitener of a positive definite matrix; pivots that vanish by rounding are kept off zero."""
         auto, cross = matrix.auto, matrix.cross
         below = np.empty_like(cross)
         pivots = [auto[0]]
@@ -67,7 +69,7 @@ class Whitener:
         return cls(np.sqrt(np.stack(pivots)), below)
 
     def __call__(self, matrix: SpectralMatrix) -> SpectralMatrix:
-        """L^-1 X L^-H of matrices X whose arrays are (p, ..., m) as the whitener's or (p, k, ..., m)."""
+        """L^-1 X L^-H of matrices X with arrays (p, ..., m) like the whitener's, or (p, k, ..., m)."""
         auto, cross = matrix.auto, matrix.cross
         below, root = self.below, self.roots
         lower = cross[0] - below[0] * auto[0]

@@ -1,13 +1,13 @@
-"""The equations of motion of a body on two axles, solved, and how the solution changes with each number in them.
+"""The equations of motion of a body on two axles, their solution, and its derivatives by each number in them.
 
-The body has a coordinate over the front axle and one over the rear one, and where it rolls a third: how far its left
-side lies over the wheels' mean. In these the suspension is nearly diagonal. With stiffness D(omega), forces F of the
-road and sensors C the sensors read C D^-1 F for a unit of road, and because D is symmetric a change of any number in it
-changes what they read by
+The body has a coordinate over the front axle and one over the rear, and with roll a third: the height of its left side
+over the wheels' mean. In these the suspension is nearly diagonal. With stiffness D(omega), forces F of the road and
+sensors C, the sensors read C D^-1 F per unit of road. Because D is symmetric, a change of any number in it changes the
+reading by
 
     dC u + A (dF - dD u),    u = D^-1 F,  A = C D^-1,
 
-which needs no second solution. half_car and rolling_car say which numbers a vehicle with its load has.
+which needs no second solution. half_car and rolling_car give the numbers of a vehicle with its load.
 """
 
 from collections.abc import Sequence
@@ -19,12 +19,12 @@ import numpy as np
 from gateway.records import C128, F64
 
 PAIRS: Final = ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2), (2, 2))
-"""Of coordinates: where masses stand in ``rigid_kg`` and ``carried_kg``. Without roll the first three."""
+"""Pairs of coordinates, in the order of ``rigid_kg`` and ``carried_kg``. Without roll the first three."""
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Where the coordinates are apart; half_track_m is None for a body that does not roll."""
+    """Distances between the coordinates; half_track_m is None for a body without roll."""
 
     wheelbase_m: float
     half_track_m: float | None = None
@@ -32,14 +32,14 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """What a vehicle with its load has in its equations of motion, (q, ..., 1).
+    """The numbers in the equations of motion of a vehicle with its load, (q, ..., 1).
 
-    By axle: the rates of springs, dampers, damper mounts and tyres, and the unsprung mass; with roll beside these by
-    how much the left spring is stiffer than the right one and, where the wheels move against each other, the factor of
-    the dampers and the rate of the bar. rigid_kg, by PAIRS, are masses of the body and carried_kg of a payload, which
-    moves on its floor with a frequency (Hz) and a damping ratio (payload). The sensor is so many metres behind the
-    front axle and its gyro so many seconds late; with roll it is so many metres left of the centre line and turned to
-    the left by so many radians.
+    For each axle: the rates of springs, dampers, damper mounts and tyres, and the unsprung mass; with roll also the
+    difference of left and right spring rates and, for the wheels moving against each other, the factor of the dampers
+    and the rate of the bar. rigid_kg, by PAIRS, are masses of the body and carried_kg those of the payload, which moves
+    on its floor with a frequency (Hz) and a damping ratio (payload). The sensor has its position behind the front axle
+    (m) and the lag of its gyro (s); with roll also its place left of the centre line (m) and the gyro's yaw (rad, to
+    the left).
     """
 
     all: F64
@@ -59,11 +59,11 @@ class Numbers:
 
     @property
     def groups(self) -> tuple[slice, ...]:
-        """Where each of them stands."""
+        """The slices of these groups."""
         return _UPRIGHT if len(self.all) == _UPRIGHT[-1].stop else _ROLLING
 
     def group(self, i: int) -> F64:
-        """(n, ..., 1) one of them."""
+        """(n, ..., 1) one of the groups."""
         return self.all[self.groups[i]]
 
     @property
@@ -86,7 +86,7 @@ _ROLLING: Final = _slices(8, 8, 6, 6, 2, 4)
 
 
 class _Suspension:
-    """Springs, and beside them dampers on their elastic mounts: ``rate``, and its slopes by damper and mount."""
+    """Springs in parallel with dampers on their elastic mounts: ``rate``, and its slopes by damper and mount."""
 
     def __init__(self, spring: F64, damper: F64, mount: F64, omega: F64) -> None:
         self._mount = mount
@@ -107,13 +107,13 @@ class _Suspension:
 
 
 class _Axles:
-    """How stiff front and rear axle hold the body, and by what force the road moves them.
+    """Stiffness of front and rear axle on the body, and the force of the road on it.
 
-    ``stiffness`` and ``force`` are (1, 2, ..., m), with roll (3, 2, ..., m): of both wheels together, of one against
-    the other, and of what either adds to the other. With K, K' the suspension together and against, D the left spring's
-    rate less the right one's, T the wheels held by their tyres k, and the wheels' own movement eliminated, the
-    stiffness is K T / (K + T), K' T / (K' + T) and, to first order in D, D / 2 T / (K + T) T / (K' + T); the force has
-    k in place of one T.
+    ``stiffness`` and ``force`` are (1, 2, ..., m), with roll (3, 2, ..., m): for both wheels together, for one against
+    the other, and for the coupling of both. With K, K' the suspension together and against, D the left spring's rate
+    minus the right one's, T the wheels on their tyres k, and the wheels' own movement eliminated, the stiffness is K T
+    / (K + T), K' T / (K' + T) and, to first order in D, D / 2 T / (K + T) T / (K' + T); the force has k in place of one
+    T.
     """
 
     def __init__(self, numbers: F64, omega: F64) -> None:
@@ -134,7 +134,7 @@ class _Axles:
         self.force = self._per_tyre * self._tyre
 
     def slopes(self, rows: Sequence[int]) -> tuple[C128, C128]:
-        """(k, 1 or 3, 2, ..., m) of stiffness and force, by those of an axle's numbers."""
+        """(k, 1 or 3, 2, ..., m) derivatives of stiffness and force by an axle's numbers."""
         per_tyre = np.zeros((len(rows), *self._per_tyre.shape), np.complex128)
         by_rate = [self._by_rate(i) for i in range(len(self._ways))]
         by_wheel = self._by_wheel()
@@ -163,7 +163,7 @@ class _Axles:
         return stiffness, force
 
     def _by_rate(self, i: int) -> C128:
-        """What is per tyre, by the rate of one suspension."""
+        """Derivative of the stiffness per wheel by the rate of one suspension."""
         found = np.zeros_like(self._per_tyre)
         found[i] = self._wheel * self._softs[i] ** 2
         if self._rolls:
@@ -171,7 +171,7 @@ class _Axles:
         return found
 
     def _by_wheel(self) -> C128:
-        """And by T."""
+        """Derivative of the stiffness per wheel by T."""
         found = np.empty_like(self._per_tyre)
         for i, (way, soft) in enumerate(zip(self._ways, self._softs, strict=True)):
             found[i] = -way.rate * soft**2
@@ -196,23 +196,23 @@ class Motion:
         self._ratio = freq_hz / self._mode_hz
         self._damping = 2j * damping_ratio * self._ratio
         self._below = 1.0 / (1.0 - self._ratio**2 + self._damping)
-        self._felt = (1.0 + self._damping) * self._below  # by which factor the payload feels heavier than it is
+        self._felt = (1.0 + self._damping) * self._below  # factor of the payload's apparent mass
         self._carried_kg = numbers.group(CARRIED)
         self._pairs = PAIRS[: len(self._carried_kg)]
         compliance = self._compliance()
         self.body = self._body(compliance)
-        """(c, s, ..., m) how far the body moves at each coordinate, for a unit of road."""
+        """(c, s, ..., m) displacement of the body at each coordinate per unit of road."""
         sensors = self._rows(n_sensors)
         self.paths: C128 = _product(sensors, self.body)
-        """(p, s, ..., m) what the sensors read for a unit of road."""
+        """(p, s, ..., m) sensor readings per unit of road."""
         self._by_force = _product(sensors, compliance)
 
     def slopes(self, wanted: Sequence[int]) -> C128:
-        """(..., k, p, s, m) how the paths change with the ``wanted`` of ``Numbers.all``, in rising order."""
+        """(..., k, p, s, m) derivatives of the paths by the ``wanted`` entries of ``Numbers.all``, in rising order."""
         p, s, *several, m = self.paths.shape
         found = np.empty((*several, len(wanted), p, s, m), np.complex128)
         by_number = np.moveaxis(found, range(len(several)), range(3, 3 + len(several)))
-        moved = {pair: self._moved(*pair) for pair in self._pairs}
+        moved, omega2 = self._moved(), self._omega**2
         groups = [[i - one.start for i in wanted if one.start <= i < one.stop] for one in self._numbers.groups]
         of_axles = sorted({*groups[FRONT], *groups[REAR]})
         stiffness, force = self._axles.slopes(of_axles)
@@ -223,9 +223,7 @@ class Motion:
                 at = [of_axles.index(row) for row in rows]
                 self._by_axle(into, group, stiffness[at, :, None, None, group], force[at, :, None, group], moved)
             elif group in (RIGID, CARRIED):
-                for row, i in enumerate(rows):
-                    inertia = self._omega**2 if group == RIGID else self._omega**2 * self._felt
-                    np.multiply(moved[self._pairs[i]], inertia, out=into[row])
+                np.multiply(moved[rows], omega2 if group == RIGID else omega2 * self._felt, out=into)
             elif group == PAYLOAD and rows:
                 into[:] = self._by_felt(moved)[rows]
             elif group == SENSOR:
@@ -264,13 +262,13 @@ class Motion:
         return both
 
     def _late(self) -> C128:
-        """A gyro's rate by the angle that it measures."""
+        """The gyro's reading per angle, with its lag."""
         turn: C128 = np.multiply(1j, self._omega)
         late: C128 = turn * np.exp(-turn * self._numbers.group(SENSOR)[1])
         return late
 
     def _rows(self, n_sensors: int) -> C128:
-        """(p, c, ..., m) what the sensors read of each coordinate."""
+        """(p, c, ..., m) sensor readings per coordinate."""
         position_m, _, *mounted = self._numbers.group(SENSOR)
         heave, late = -(self._omega**2), self._late()
         behind = position_m / self._frame.wheelbase_m
@@ -282,27 +280,34 @@ class Motion:
             rows[0].append(heave * left_m / self._frame.half_track_m)
             rows[1].append(-yaw_rad * roll)
             rows.append([-yaw_rad * pitch, yaw_rad * pitch, roll])
-        every = np.broadcast_arrays(*(one for row in rows[:n_sensors] for one in row))
-        return np.stack(every).reshape(n_sensors, len(rows[0]), *every[0].shape)
+        found = np.empty((n_sensors, len(rows[0]), *self._felt.shape), np.complex128)
+        for into, row in zip(found, rows, strict=False):
+            for coordinate, one in zip(into, row, strict=True):
+                coordinate[...] = one
+        return found
 
-    def _moved(self, a: int, b: int) -> C128:
-        """(p, s, ..., m) what less stiffness between coordinates a and b does to the paths."""
-        moved: C128 = self._by_force[:, a, None] * self.body[b]
-        return moved if a == b else moved + self._by_force[:, b, None] * self.body[a]
+    def _moved(self) -> C128:
+        """(q, p, s, ..., m) what less stiffness between each of PAIRS does to the paths."""
+        one, other = (list(each) for each in zip(*self._pairs, strict=True))
+        by_force = self._by_force.swapaxes(0, 1)[:, :, None]
+        moved: C128 = by_force[one] * self.body[other][:, None]
+        apart = [pair for pair, (a, b) in enumerate(self._pairs) if a != b]
+        moved[apart] += by_force[[other[pair] for pair in apart]] * self.body[[one[pair] for pair in apart]][:, None]
+        return moved
 
-    def _by_axle(self, into: C128, i: int, stiffness: C128, force: C128, moved: dict[tuple[int, int], C128]) -> None:
+    def _by_axle(self, into: C128, i: int, stiffness: C128, force: C128, moved: C128) -> None:
         """Slopes by some numbers of an axle, from those of its stiffness and force."""
-        np.multiply(stiffness[:, 0], -moved[i, i], out=into)
+        np.multiply(stiffness[:, 0], -moved[PAIRS.index((i, i))], out=into)
         into[:, :, i] += force[:, 0] * self._by_force[:, i]
         if stiffness.shape[1] > 1:
-            into -= stiffness[:, 1] * moved[2, 2]
-            into -= stiffness[:, 2] * moved[i, 2]
+            into -= stiffness[:, 1] * moved[PAIRS.index((2, 2))]
+            into -= stiffness[:, 2] * moved[PAIRS.index((i, 2))]
             into[:, :, i] += force[:, 2] * self._by_force[:, 2]
             into[:, :, i + 2] += force[:, 2] * self._by_force[:, i] + force[:, 1] * self._by_force[:, 2]
 
-    def _by_felt(self, moved: dict[tuple[int, int], C128]) -> C128:
+    def _by_felt(self, moved: C128) -> C128:
         """By frequency and damping ratio of the payload on its floor."""
-        carried = sum(kg * moved[pair] for kg, pair in zip(self._carried_kg, self._pairs, strict=True))
+        carried = sum(kg * one for kg, one in zip(self._carried_kg, moved, strict=True))
         felt = -(self._ratio**2) * self._below**2 * self._omega**2
         return np.stack([carried * (felt * (2.0 + self._damping) / self._mode_hz), carried * (felt * 2j * self._ratio)])
 

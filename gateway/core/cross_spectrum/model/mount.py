@@ -1,12 +1,11 @@
-"""Where the sensor sits, and what it would have read on the centre line, square to it.
+"""The place of the sensor, and its signals as on the centre line and square to it.
 
-A sensor y metres left of the centre line reads y times the roll acceleration beside the heave, and a gyro that is
-turned takes a little of the roll rate for pitch rate. Both are linear in what the three signals read, so that they are
-taken out of each transform, frequency by frequency. Roll that is seen for what it is moves no load.
-
-That follows from a rigid body's rotation (axes and signs of ISO 8855), to first order in the turn. The map of the three
-transforms has the determinant 1 + yaw^2, which neither frequency nor lever arm changes: the likelihood of all three is
-the same whether the spectra are brought to the centre line or the model's sensor is put off it.
+A sensor y metres left of the centre line reads y times the roll acceleration in addition to heave, and a gyro turned
+about the vertical mixes some roll rate into the pitch rate. Both are linear in the three signals, so that they are
+removed from each transform, frequency by frequency. Roll that is recognised as such does not change the load.
+This follows from a rigid body's rotation (axes and signs of ISO 8855), to first order in the turn. The map of the three
+transforms has the determinant 1 + yaw^2, independent of frequency and lever arm: the likelihood of all three is the
+same whether the spectra are moved to the centre line or the model's sensor is moved off it.
 """
 
 from dataclasses import dataclass
@@ -18,8 +17,8 @@ from gateway.records import C128, F64
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """A sensor left_m left of the centre line, its gyro turned about the vertical, to the left, by yaw_rad, and behind
-    the accelerometer by gyro_lag_s.
+    """A sensor left_m left of the centre line, its gyro turned to the left about the vertical by yaw_rad, and delayed
+    against the accelerometer by gyro_lag_s.
     """
 
     left_m: float
@@ -29,8 +28,8 @@ class Mount:
     def levelled(self, sensed: tuple[C128, C128, C128], freq_hz: F64) -> tuple[C128, C128, C128]:
         """Transforms (k, m) of acceleration, pitch rate and roll rate, at freq_hz (m,), as on the centre line.
 
-        The acceleration less left_m times the derivative of the roll rate, with which the gyro was not late. The rates
-        come back square to the vehicle, but as late as they were: the half-car has that lag as a parameter.
+        The acceleration minus left_m times the derivative of the roll rate without the gyro's lag. The rates are square
+        to the vehicle but keep their lag: the half-car has it as a parameter.
         """
         acceleration, pitch_rate, roll_rate = sensed
         turn = 2j * np.pi * freq_hz

@@ -1,10 +1,9 @@
-"""The parameters of a vehicle as a vector, and the half-car they stand for, or the car that rolls.
+"""The parameters of a vehicle as a vector, and the half-car, or the car with roll, that they describe.
 
-Springs, dampers, masses and the like enter as logarithms, so that they stay positive and a prior's
-standard deviation is a share; the rest enters as it is. The vector also holds the slack: the share
-of each sensor's power, as a function of frequency, that does not come through the modelled path; the
-sensors' own noise as spectral densities; and which share of each spring's and damper's rate is friction
-(core.cross_spectrum.model.friction).
+Springs, dampers, masses and other positive quantities enter as logarithms, so that they stay positive and a prior's
+standard deviation is a share; the rest enters as it is. The vector also holds the slack (the share of each sensor's
+power, by frequency, that does not come through the modelled path), the sensors' own noise as spectral densities, and
+the share of friction in each spring's and damper's rate (core.cross_spectrum.model.friction).
 """
 
 from dataclasses import dataclass
@@ -15,12 +14,14 @@ import numpy as np
 from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar
 from gateway.core.cross_spectrum.model.mount import Mount
 from gateway.core.cross_spectrum.model.rolling_car import Against, RollingCar
+from gateway.core.memoized import memoized
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 SLACK_KNOTS_HZ: Final = np.array([1.0, 1.5, 2.2, 3.3, 5.0, 7.0, 9.0, 11.0, 13.0, 15.0])
-BEND_SHARES: Final = (0.0, 0.2, 0.4, 0.6, 0.9, 1.2)  # added axle load over half the empty weight where rates may bend
+BEND_SHARES: Final = (0.0, 0.2, 0.4, 0.6, 0.9, 1.2)
+"""Chosen: the added axle load over half the empty weight at which rates may bend."""
 
 _SLACK_ACCELERATION: Final = tuple(f"slack_acceleration_{hz:g}hz" for hz in SLACK_KNOTS_HZ)
 _SLACK_PITCH_RATE: Final = tuple(f"slack_pitch_rate_{hz:g}hz" for hz in SLACK_KNOTS_HZ)
@@ -60,7 +61,7 @@ _SIGNED: Final = (
     "rear_lag_s",
 )
 PARAMETERS: Final = _POSITIVE + _SIGNED
-"""Of every calibration."""
+"""The parameters of every calibration."""
 
 _SLACK_ROLL_RATE: Final = tuple(f"slack_roll_rate_{hz:g}hz" for hz in SLACK_KNOTS_HZ)
 _ROLL_POSITIVE: Final = (
@@ -77,30 +78,31 @@ _ROLL_POSITIVE: Final = (
 )
 _ROLL_SIGNED: Final = ("sensor_left_m", "gyro_yaw_rad", "empty_left_m")
 ROLL_PARAMETERS: Final = _ROLL_POSITIVE + _ROLL_SIGNED
-"""What follows them in the vector of a vehicle that was calibrated with a roll rate."""
+"""The further entries of the vector if the vehicle was calibrated with a roll rate."""
 
 INDEX: Final = {name: i for i, name in enumerate(PARAMETERS + ROLL_PARAMETERS)}
 SLACK_KNOTS: Final = tuple(
     range(INDEX[names[0]], INDEX[names[-1]] + 1) for names in (_SLACK_ACCELERATION, _SLACK_PITCH_RATE, _SLACK_ROLL_RATE)
 )
-"""By sensor: where its slack's knots stand in the vector."""
+"""For each sensor: the entries of its slack's knots in the vector."""
 NOISES: Final = ("noise_acceleration_m2ps3", "noise_pitch_rate_rad2ps", "noise_roll_rate_rad2ps")
-"""By sensor: what its own noise is called."""
+"""For each sensor: the parameter of its own noise."""
 _OF_ROAD_AND_SENSORS: Final = ("slack_", "noise_", "track", "twist_", "delay_scale", "rear_lag_s")
 VEHICLE_PARAMETERS: Final = frozenset(i for name, i in INDEX.items() if not name.startswith(_OF_ROAD_AND_SENSORS))
 
 
 LEAST_SLACK: Final = 0.01
-"""Of each sensor's power, what comes by no modelled path at least: roll and loose parts. Chosen."""
+"""Chosen: least share of each sensor's power that comes by no modelled path, such as roll and loose parts."""
 
 LEAST_SLACK_ON_CENTRE_LINE: Final = 0.002
-"""The same once roll is taken out: known loads cohere by more than LEAST_SLACK allows (benchmarks/accuracy/trials.md).
+"""The same with roll removed: the coherence of known loads is higher than LEAST_SLACK allows
+(benchmarks/accuracy/trials.md).
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """What is known of the vehicle without calibration, and least_slack, how well it is believed to be modelled."""
+    """The vehicle as known without calibration, and least_slack, the least share of unmodelled power."""
 
     empty_mass_kg: float
     empty_front_share: float
@@ -110,7 +112,7 @@ class Ground:
 
     @classmethod
     def of(cls, vehicle: Vehicle, *, with_roll: bool = False) -> "Ground":
-        """Of a vehicle as its fitter states it; ``with_roll`` where its sensors are read as on the centre line."""
+        """A vehicle as its fitter states it; ``with_roll`` if its sensors are read as on the centre line."""
         return cls(
             vehicle.empty_mass_kg,
             vehicle.empty_front_share,
@@ -121,7 +123,7 @@ class Ground:
 
     @property
     def half_track_m(self) -> float:
-        """Half the track's width. Raises ValueError where nobody stated it."""
+        """Half the track's width. Raises ValueError if nobody stated it."""
         if self.track_width_m is None:
             raise ValueError("a vehicle that rolls needs the width of its track")
         return 0.5 * self.track_width_m
@@ -143,31 +145,31 @@ def is_positive(name: str) -> bool:
 
 
 def has_roll(theta: F64) -> bool:
-    """True where the vector theta (..., p) knows how the vehicle rolls."""
+    """True if the vector theta (..., p) has roll parameters."""
     return bool(theta.shape[-1] > len(PARAMETERS))
 
 
 def names_of(theta: F64) -> tuple[str, ...]:
-    """What the entries of theta (..., p) are."""
+    """The names of the entries of theta (..., p)."""
     return PARAMETERS + ROLL_PARAMETERS if has_roll(theta) else PARAMETERS
 
 
 def mount_of(theta: F64) -> Mount | None:
-    """Where theta (n,) has the sensor; None where it knows of no roll."""
+    """The sensor's mount by theta (n,); None without roll parameters."""
     if not has_roll(theta):
         return None
     return Mount(*(float(theta[INDEX[name]]) for name in ("sensor_left_m", "gyro_yaw_rad", "gyro_lag_s")))
 
 
 def level(theta: F64) -> F64:
-    """theta (n,) of the same vehicle that rolls, its sensor on the centre line and square to it."""
+    """theta (n,) of the same vehicle with roll, its sensor on the centre line and square to it."""
     placed = theta.copy()
     placed[[INDEX["sensor_left_m"], INDEX["gyro_yaw_rad"]]] = 0.0
     return placed
 
 
 def upright(theta: F64) -> F64:
-    """What of theta (..., n) says how the vehicle heaves and pitches."""
+    """The part of theta (..., n) for heave and pitch."""
     return theta[..., : len(PARAMETERS)]
 
 
@@ -187,9 +189,10 @@ def _natural(theta: F64) -> F64:
 
 def half_car(theta: F64, ground: Ground) -> HalfCar:
     """The vehicles of the parameter vectors theta (..., p), broadcasting against frequency."""
+    return _half_car(theta, _natural(theta), ground)
 
-    natural = _natural(theta)
 
+def _half_car(theta: F64, natural: F64, ground: Ground) -> HalfCar:
     def of(name: str) -> F64:
         return natural[..., INDEX[name], None]
 
@@ -221,29 +224,32 @@ def half_car(theta: F64, ground: Ground) -> HalfCar:
 
 
 def rolling_car(theta: F64, ground: Ground) -> RollingCar:
-    """The same with roll. Raises ValueError where the ground does not say how wide the track is."""
+    """The same with roll. Raises ValueError if the track's width is unknown."""
+
+    natural = _natural(theta)
+
+    def of(name: str) -> F64:
+        return natural[..., INDEX[name], None]
 
     def against(end: str) -> Against:
-        return Against(
-            anti_roll_npm=value_of(theta, f"anti_roll_{end}_npm"),
-            damper=value_of(theta, f"damper_against_{end}"),
-        )
+        return Against(anti_roll_npm=of(f"anti_roll_{end}_npm"), damper=of(f"damper_against_{end}"))
 
     return RollingCar(
-        half_car=half_car(theta, ground),
+        half_car=_half_car(theta, natural, ground),
         half_track_m=ground.half_track_m,
-        roll_inertia_kgm2=value_of(theta, "roll_inertia_kgm2"),
-        payload_roll_gyration_m2=value_of(theta, "payload_roll_gyration_m2"),
+        roll_inertia_kgm2=of("roll_inertia_kgm2"),
+        payload_roll_gyration_m2=of("payload_roll_gyration_m2"),
         front=against("front"),
         rear=against("rear"),
-        sensor_left_m=value_of(theta, "sensor_left_m"),
-        gyro_yaw_rad=value_of(theta, "gyro_yaw_rad"),
-        empty_left_m=value_of(theta, "empty_left_m"),
+        sensor_left_m=of("sensor_left_m"),
+        gyro_yaw_rad=of("gyro_yaw_rad"),
+        empty_left_m=of("empty_left_m"),
     )
 
 
+@memoized
 def slack_weights(freq_hz: F64) -> F64:
-    """(knots, m): how much each knot of the logarithm of slack counts at freq_hz (m,)."""
+    """(knots, m): the weight of each knot of the logarithm of slack at freq_hz (m,)."""
     knots = np.arange(len(SLACK_KNOTS_HZ))
     between = np.interp(np.log(freq_hz), np.log(SLACK_KNOTS_HZ), knots)
     weights: F64 = np.maximum(0.0, 1.0 - np.abs(between - knots[:, None]))

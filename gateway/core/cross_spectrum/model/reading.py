@@ -1,4 +1,4 @@
-"""How spectra are taken of a vehicle, so that calibration and weighing take them alike."""
+"""How spectra of a vehicle are computed, the same for calibration and for estimates."""
 
 from dataclasses import dataclass, replace
 
@@ -7,12 +7,12 @@ from gateway.core.cross_spectrum.model.mount import Mount
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """How spectra are taken of a vehicle: band_hz is inclusive, n_segment in samples.
+    """How spectra of a vehicle are computed: band_hz is inclusive, n_segment in samples.
 
-    usual_log_amplitude is how much the vehicle moved in calibration (measured.log_amplitude_of); None for as much as in
-    the drive that is read. usual_stroke_mps is how fast the springs of front and rear axle moved there (model.strokes);
-    None where friction goes by how much the body moves. with_roll: the roll rate is read too, where a drive has enough
-    of it; then all is read as on the centre line, if mount says where the sensor sits.
+    usual_log_amplitude is the vehicle's amplitude in calibration (measured.log_amplitude_of); None: that of the drive
+    itself. usual_stroke_mps is the stroke speed of front and rear springs there (model.strokes); None if friction
+    follows the body's amplitude. with_roll: the roll rate is used too, if a drive has enough of it; then all signals
+    are moved to the centre line, if mount has the sensor's place.
     """
 
     wheelbase_m: float
@@ -24,5 +24,5 @@ class Reading:
     usual_stroke_mps: tuple[float, float] | None = None
 
     def with_gyro_late_by(self, lag_s: float) -> "Reading":
-        """The same with another lag of the gyro, where a mount is told."""
+        """The same with another lag of the gyro, if it has a mount."""
         return replace(self, mount=replace(self.mount, gyro_lag_s=lag_s)) if self.mount else self

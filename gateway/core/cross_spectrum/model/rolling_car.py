@@ -1,11 +1,10 @@
-"""The half-car with roll: the same body on two axles that meets two tracks, with a load that may lie sideways.
+"""The half-car with roll: the same body on two axles and two tracks, with a load that may be off the centre line.
 
-Wheels of an axle are alike, so that it moves in two ways that do not disturb each other: both wheels together, as the
-half-car has it, and one against the other, where the anti-roll bar is a further spring. A payload off the centre line
-couples them through its inertia. Left is positive, roll is positive with the left side up (ISO 8855).
-
-Newton's law for a rigid body on four wheels, written out in docs/method.md. Sideways movement of body and tyres, and
-roll centres, are left out: what they do to roll is in the free rates against roll, at frequencies where the body moves.
+The wheels of an axle are alike, so it moves in two independent ways: both wheels together, as in the half-car, and one
+against the other, where the anti-roll bar is a further spring. A payload off the centre line couples them through its
+inertia. Left is positive, roll is positive with the left side up (ISO 8855).
+Newton's law for a rigid body on four wheels, written out in docs/method.md. Lateral movement of body and tyres, and
+roll centres, are neglected: the free rates against roll absorb their effect at the frequencies of the body.
 """
 
 from dataclasses import dataclass
@@ -28,10 +27,10 @@ from gateway.records import C128, F64
 
 @dataclass(frozen=True, slots=True)
 class Against:
-    """What is different of an axle where its wheels move against each other.
+    """The differences of an axle when its wheels move against each other.
 
-    The anti-roll bar's rate as one wheel feels it, and by how much dampers count for more or less: they stand further
-    in, wheels slip sideways as the body rolls.
+    The anti-roll bar's rate at one wheel, and the factor of the dampers: they are mounted further inside, and wheels
+    slip sideways as the body rolls.
     """
 
     anti_roll_npm: Real
@@ -40,11 +39,11 @@ class Against:
 
 @dataclass(frozen=True, slots=True)
 class RollingCar:
-    """A half-car with a width. Inertia is about the roll axis, the rates of anti-roll bars are as one wheel feels them
-    of both, sensor and empty body are so far left of the centre line.
+    """A half-car with a width. Inertia is about the roll axis, rates of anti-roll bars are at one of both wheels,
+    sensor and empty body have a place left of the centre line.
 
-    payload_roll_gyration_m2 is the payload's squared radius of gyration in roll about its own place; gyro_yaw_rad is
-    by how much the gyro is turned to the left.
+    payload_roll_gyration_m2 is the payload's squared radius of gyration in roll about its own centre; gyro_yaw_rad is
+    the gyro's turn to the left.
     """
 
     half_car: HalfCar
@@ -60,7 +59,9 @@ class RollingCar:
 
 @dataclass(frozen=True, slots=True)
 class SidewaysLoad:
-    """A payload, and with it the front share (0..1) and the centre of gravity's lateral place of all that is sprung."""
+    """A payload, the resulting front share (0..1), and the centre of gravity of the whole sprung mass left of the
+    centre line.
+    """
 
     payload_kg: Real
     front_share: Real
@@ -69,7 +70,7 @@ class SidewaysLoad:
 
 @dataclass(frozen=True, slots=True)
 class RollingResponse:
-    """What vertical acceleration, pitch rate and roll rate (3, ..., m) read for a unit of road under one axle.
+    """Readings of vertical acceleration, pitch rate and roll rate (3, ..., m) per unit of road under one axle.
 
     together: both tracks alike; against: the left as much up as the right is down.
     """
@@ -88,7 +89,7 @@ def rolling_response(car: RollingCar, load: SidewaysLoad, freq_hz: F64) -> Rolli
 
 
 def rolling_numbers(car: RollingCar, load: SidewaysLoad) -> Numbers:
-    """Those of its equations of motion."""
+    """The numbers in its equations of motion."""
     body = car.half_car
     rigid_kg, carried_kg = body_masses_kg(body, load.payload_kg, load.front_share)
     rigid_roll, carried_roll = _roll_masses(car, load)
@@ -104,7 +105,7 @@ def rolling_numbers(car: RollingCar, load: SidewaysLoad) -> Numbers:
 
 
 def _axle_numbers(car: RollingCar, load: SidewaysLoad) -> list[tuple[Real, ...]]:
-    """Of front and rear axle: each wheel's spring is as stiff as under an axle that carries twice the wheel's load."""
+    """Numbers of front and rear axle: each wheel's spring is as stiff as under an axle with twice the wheel's load."""
     body = car.half_car
     found = []
     for axle, against, added_kg, moved_kg in zip(
@@ -121,7 +122,7 @@ def _axle_numbers(car: RollingCar, load: SidewaysLoad) -> list[tuple[Real, ...]]
 
 
 def _moved_kg(car: RollingCar, load: SidewaysLoad) -> tuple[Real, Real]:
-    """What the left wheel of the front and of the rear axle carries more than half their axle's load."""
+    """Load on the left wheel of the front and of the rear axle in excess of half the axle's load."""
     moment_kgm = (car.half_car.empty_mass_kg + load.payload_kg) * load.cg_left_m
     share = roll_share_front(car, load)
     moved_kg = moment_kgm / (2.0 * car.half_track_m)
@@ -129,7 +130,7 @@ def _moved_kg(car: RollingCar, load: SidewaysLoad) -> tuple[Real, Real]:
 
 
 def roll_share_front(car: RollingCar, load: SidewaysLoad) -> Real:
-    """Which part of a steady moment about the roll axis the front axle takes, 0..1, by springs, bars and tyres."""
+    """The front axle's part of a steady roll moment, 0..1, from springs, bars and tyres."""
     body = car.half_car
     added_front_kg, added_rear_kg = added_axle_masses_kg(body, load.payload_kg, load.front_share)
     front = _still_npm(body.front, added_front_kg, car.front)
@@ -143,11 +144,11 @@ def _still_npm(axle: Axle, added_kg: Real, against: Against) -> Real:
 
 
 def _roll_masses(car: RollingCar, load: SidewaysLoad) -> tuple[tuple[Real, Real, Real], tuple[Real, Real, Real]]:
-    """Mass that couples the front and the rear with roll (kg m), and roll inertia (kg m2): of what turns with the body,
-    of the payload's mass on its floor.
+    """Coupling mass of front and rear with roll (kg m), and roll inertia (kg m2): of the body, then of the payload on
+    its floor.
 
-    A point mass L at (d, y) adds L y (1 - d/l), L y d/l and L y^2. An empty vehicle has no payload to divide by: what
-    moment it is told to have lies as its own mass does.
+    A point mass L at (d, y) adds L y (1 - d/l), L y d/l and L y^2. An empty vehicle has no payload to divide by: its
+    moment, if any, is distributed like its own mass.
     """
     body = car.half_car
     payload_kg, own_kgm = load.payload_kg, body.empty_mass_kg * car.empty_left_m

@@ -1,19 +1,20 @@
-"""How the expected spectral matrix changes with each parameter of the vehicle and with its load."""
+"""Derivatives of the expected spectral matrix by each parameter of the vehicle and by its load."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.special import k0, k1
 
 from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.driven import (
     Driven,
     SpectralModel,
     along,
+    are_in_motion,
+    coherence_of,
+    coherence_slope_of,
     driven,
-    entries_in_motion,
     numbers_about,
     spectral_model,
 )
@@ -37,12 +38,17 @@ _OF_ROAD: Final = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """A vehicle with its load, theta (n,): its model, how spectra's groups drive it, and what sensors without noise
-    would show of it.
+    """A vehicle with its load, theta (n,): its model, its evaluation for the spectra's groups, and the matrix without
+    noise.
 
-    by_entry (5, q, k) is by how much the numbers in its equations of motion move with each of the ``moving`` entries.
+    The load is payload in kg, front share (0..1) and, for a vehicle that rolls, the lateral place: entries n, n + 1 and
+    n + 2. by_entry (5, q, k) is by how much the numbers in its equations of motion move with each of the ``moving``
+    entries.
     """
 
+    theta: F64
+    load: tuple[float, ...]
+    ground: Ground
     model: SpectralModel
     driven: Driven
     noiseless: SpectralMatrix
@@ -50,28 +56,37 @@ class Solved:
     moving: list[int]
 
     @classmethod
-    def at(cls, theta: F64, load: tuple[float, ...], ground: Ground, spectra: CrossSpectra) -> "Solved":
-        """``load`` is payload in kg, front share (0..1) and, for a vehicle that rolls, the lateral place: entries n,
-        n + 1 and n + 2.
-        """
-        numbers, by_entry = numbers_about(theta, load, ground)
+    def at(
+        cls, theta: F64, load: tuple[float, ...], ground: Ground, spectra: CrossSpectra, expected: Sequence[int]
+    ) -> "Solved":
+        """``expected`` are entries for which slopes are likely to be asked."""
+        moving = are_in_motion(expected, len(theta))
+        numbers, by_entry = numbers_about(theta, load, ground, moving)
         model = spectral_model(theta, load, ground, spectra.freq_hz, spectra.n_sensors, numbers)
         by = driven(model, spectra)
-        return cls(model, by, tapered(without_noise(by, model), spectra), by_entry, entries_in_motion(len(theta)))
+        noiseless = tapered(without_noise(by, model), spectra)
+        return cls(theta, load, ground, model, by, noiseless, by_entry, moving)
+
+    def numbers_by(self, entries: list[int]) -> F64:
+        """(5, q, k) by how much the numbers move with ``entries``, which are in the equations of motion."""
+        if set(entries) <= set(self.moving):
+            return self.by_entry[..., [self.moving.index(entry) for entry in entries]]
+        return numbers_about(self.theta, self.load, self.ground, entries)[1]
 
 
 def spectral_slopes(solved: Solved, spectra: CrossSpectra, free: Sequence[int]) -> F64:
-    """Derivatives (b, m, p^2, k) of the expected spectra, as SpectralMatrix.parts has them, for the ``free`` entries of
-    theta (n,) and of the load: first those that are in the equations of motion, then rising.
+    """Derivatives (b, m, p^2, k) of the expected spectra, in the order of SpectralMatrix.parts, by the ``free`` entries
+    of theta (n,) and of the load.
 
-    The chain rule goes from parameters to the numbers in the equations of motion, on to the responses and to the
-    spectra, by closed forms. All of it is real matrix products.
+    The entries in the equations of motion come first, then the others in rising order. The chain rule leads from
+    parameters to the numbers in the equations of motion, to the responses and to the spectra, in closed forms and real
+    matrix products.
     """
     model, by = solved.model, solved.driven
     slopes = np.zeros((*by.phase.shape, spectra.n_sensors**2, len(free)))
-    of_vehicle = [solved.moving.index(entry) for entry in free if entry in solved.moving]
+    of_vehicle = are_in_motion(free, len(solved.theta))
     if of_vehicle:
-        by_level = _by_level(solved.by_entry[..., of_vehicle], model.motion)
+        by_level = _by_level(solved.numbers_by(of_vehicle), model.motion)
         moved = level_weights(spectra.log_movement) @ by_level
         moved = moved.reshape(*by.phase.shape, -1, len(of_vehicle))
         np.matmul(_by_response(by, model), moved, out=slopes[..., : len(of_vehicle)])
@@ -86,28 +101,32 @@ def spectral_slopes(solved: Solved, spectra: CrossSpectra, free: Sequence[int]) 
 def solved_at(
     theta: F64, load: tuple[float, ...], ground: Ground, spectra: CrossSpectra
 ) -> tuple[SpectralModel, Driven]:
-    """The model, and how the groups of ``spectra`` drive it."""
+    """The model, and its evaluation for the groups of ``spectra``."""
     model = spectral_model(theta, load, ground, spectra.freq_hz, spectra.n_sensors)
     return model, driven(model, spectra)
 
 
 def _by_level(by_entry: F64, motion: Motion) -> F64:
     """Changes (5, m 2 p s k) of the responses at each of friction.levels(): by frequency, sensor, way, real or
-    imaginary part, entry. ``by_entry`` (5, q, k) is by how much entries move the numbers in the equations of motion.
+    imaginary part, entry.
+
+    ``by_entry`` (5, q, k) is the derivative of the numbers in the equations of motion by the entries.
     """
     moving = np.flatnonzero(by_entry.any(axis=(0, 2)))
-    slopes = np.ascontiguousarray(motion.slopes(moving.tolist()).transpose(0, 1, 4, 2, 3))
-    by_number = slopes.view(float).reshape(len(slopes), len(moving), -1)
-    by_level: F64 = by_number.transpose(0, 2, 1) @ by_entry[:, moving]
-    return by_level.reshape(len(slopes), -1)
+    slopes = motion.slopes(moving.tolist())
+    n_levels, _, p, s, m = slopes.shape
+    by_number = slopes.view(float).reshape(n_levels, len(moving), -1)
+    by_level = by_number.transpose(0, 2, 1) @ by_entry[:, moving]
+    by_frequency = by_level.reshape(n_levels, p, s, m, -1).swapaxes(2, 3).swapaxes(1, 2)
+    return by_frequency.reshape(n_levels, -1)
 
 
 def _by_response(by: Driven, model: SpectralModel) -> F64:
-    """(b, m, p^2, 2 p s) by how much the matrix changes with the responses, both in real and imaginary parts.
+    """(b, m, p^2, 2 p s) derivative of the matrix by the responses, both in real and imaginary parts.
 
-    An auto-spectrum is F^* (slack F + phase R) and the rest of it, so that a change d of the response F moves it by
-    2 Re(conj(slack F + phase R) d), and likewise the others: each is the real part of a product with conj(z), or
-    Re(z) Re(d) + Im(z) Im(d).
+    An auto-spectrum is F^* (slack F + phase R) plus terms without F, so a change d of the response F moves it by 2
+    Re(conj(slack F + phase R) d), and likewise the others: each is the real part of a product with conj(z), or Re(z)
+    Re(d) + Im(z) Im(d).
     """
     p, s = len(model.slack), len(by.paths)
     slack = 1.0 + model.slack[:, None]
@@ -127,7 +146,7 @@ def _by_response(by: Driven, model: SpectralModel) -> F64:
 
 
 def _fill_in_slack(slopes: F64, free: Sequence[int], by: Driven, model: SpectralModel, spectra: CrossSpectra) -> None:
-    """By the knots of each sensor's slack, which has a part in that sensor's own power alone."""
+    """Derivatives by the knots of each sensor's slack, which affects only that sensor's own power."""
     for sensor, knots in enumerate(SLACK_KNOTS[: len(model.slack)]):
         rows = [row for row, entry in enumerate(free) if entry in knots]
         if not rows:
@@ -141,9 +160,9 @@ def _fill_in_slack(slopes: F64, free: Sequence[int], by: Driven, model: Spectral
 
 
 def _fill_in_road(slopes: F64, free: Sequence[int], by: Driven, model: SpectralModel, spectra: CrossSpectra) -> None:
-    """By how axles and tracks meet the road.
+    """Derivatives by the parameters of axles, tracks and road.
 
-    Delays turn the rear axle's phase and tracks that lie apart shrink it, each entry by a real factor of its own.
+    Delays turn the rear axle's phase, and the distance of tracks reduces it, each entry by a real factor.
     """
     rows = {entry: row for row, entry in enumerate(free) if entry in _OF_ROAD}
     late = _late(by)
@@ -155,13 +174,14 @@ def _fill_in_road(slopes: F64, free: Sequence[int], by: Driven, model: SpectralM
                 slopes[..., rows[entry]] = turned * delay_s[..., None]
     if INDEX["track_offset_m"] in rows:
         x = along(model.track_offset_m, model, spectra)
-        slopes[..., rows[INDEX["track_offset_m"]]] = _with_conjugate((-x * k0(x) / k1(x)) * late).parts
+        shrunk = coherence_slope_of(x) / coherence_of(x)
+        slopes[..., rows[INDEX["track_offset_m"]]] = _with_conjugate(shrunk * late).parts
     for entry in rows.keys() & {INDEX["tracks_apart_m"], INDEX["twist_level"]}:
         slopes[..., rows[entry]] = _by_twist(entry, by, model, spectra).parts
 
 
 def _late(by: Driven) -> C128:
-    """(p, p, b, m) what the rear axle makes one sensor read, times the conjugate of what the front makes another."""
+    """(p, p, b, m) rear axle's reading of one sensor times the conjugate of the front's reading of another."""
     late: C128 = by.paths[1][:, None] * np.conj(by.paths[0])
     if by.twist is not None:
         late = late + by.twist * (by.paths[3][:, None] * np.conj(by.paths[2]))
@@ -176,7 +196,7 @@ def _with_conjugate(x: C128) -> SpectralMatrix:
 
 
 def _by_twist(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
-    """With c = x K1(x), dc/dlog x = -x^2 K0(x) and d((1 - c)/(1 + c))/dc = -2 / (1 + c)^2."""
+    """With c = x K1(x), d((1 - c)/(1 + c))/dc = -2 / (1 + c)^2."""
     assert by.twist is not None
     assert model.tracks_apart_m is not None
     assert model.twist_level is not None
@@ -185,14 +205,16 @@ def _by_twist(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectr
     d_twist = by.twist
     if entry == INDEX["tracks_apart_m"]:
         x = along(model.tracks_apart_m, model, spectra)
-        d_twist = model.twist_level[..., None, :] * 2.0 * x**2 * k0(x) / (1.0 + x * k1(x)) ** 2
+        d_twist = model.twist_level[..., None, :] * -2.0 * coherence_slope_of(x) / (1.0 + coherence_of(x)) ** 2
     return SpectralMatrix(d_twist * against.auto, d_twist * against.cross)
 
 
 def _add_noise(
     slopes: F64, matrix: SpectralMatrix, model: SpectralModel, spectra: CrossSpectra, free: Sequence[int]
 ) -> None:
-    """That of ``matrix`` (expected.noise) grows with the power of acceleration and of pitch rate."""
+    """Derivatives of the noise (expected.noise) of ``matrix``, which grows with the power of acceleration and pitch
+    rate.
+    """
     sensed, scale = noise(model, matrix, spectra), noise_scale(matrix, spectra)
     levels = matrix.auto[:2].mean(axis=-1).T
     grown = 0.5 * (slopes[:, :, :2].mean(axis=1) / levels[..., None]).sum(axis=1)

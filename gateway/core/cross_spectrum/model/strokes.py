@@ -1,8 +1,8 @@
-"""How fast the springs of each axle move in a drive: what its friction goes by.
+"""Stroke speed of each axle's springs in a drive, on which its friction depends.
 
-The sensors tell how much the body moves. How fast each axle strokes meanwhile depends on the load, on the speed and on
-the vehicle, and its model says it: the road's level is what makes the model's sensors move as the measured ones did.
-A heavy load that calms the body does not look like a smooth road then, nor one end like the other.
+The sensors show the movement of the body. The stroke of each axle depends in addition on load, speed and vehicle, and
+follows from the model: the road's level is the one that makes the model's sensors move as measured. So a heavy load
+that calms the body does not look like a smooth road, and the axles may differ.
 """
 
 from dataclasses import replace
@@ -19,11 +19,11 @@ from gateway.records import F64
 
 
 def log_stroke_speeds(spectra: CrossSpectra, theta: F64, load: Load, ground: Ground) -> F64:
-    """(b, 2) logarithm of the root mean square speed (m/s, within the band) of front and rear axle's springs.
+    """(b, 2) logarithm of the root mean square speed (m/s, within the band) of front and rear springs.
 
-    Of a vehicle theta (n,) with that load, on the centre line as far as it rolls, whose friction acts as it usually
-    does. A mean logarithm of periodograms, as the amplitude of ``spectra`` is one, lies half of Euler's constant below
-    that of the density.
+    For a vehicle theta (n,) with that load, on the centre line if it has roll, with its usual friction. The mean
+    logarithm of periodograms, as in the amplitude of ``spectra``, is half of Euler's constant below that of the
+    density.
     """
     reading = spectra.reading
     if reading.usual_log_amplitude is None:
@@ -43,7 +43,7 @@ def log_stroke_speeds(spectra: CrossSpectra, theta: F64, load: Load, ground: Gro
 
 
 def with_strokes(spectra: CrossSpectra, theta: F64, load: Load, ground: Ground) -> CrossSpectra:
-    """The same with how much faster each axle strokes than it usually does; as they are if that is not asked."""
+    """The spectra with each axle's stroke speed relative to the usual one; unchanged if the reading has none."""
     usual_mps = spectra.reading.usual_stroke_mps
     if usual_mps is None:
         return spectra

@@ -1,25 +1,25 @@
-"""How road vehicles roll, before one has been driven: what a model of roll begins with, and falls back on.
+"""Default roll parameters of road vehicles: the start of a calibration, and the fallback without a roll rate.
 
-Chosen, all of them, as round figures of ordinary cars and vans: no table of measured vehicles stands behind them.
-Calibration holds them by no more than calibration.half_car.prior says; without a roll rate they are what the interval
-of a load to one side is reckoned with.
+All are chosen as round figures of ordinary cars and vans, not from a table of measured vehicles. In calibration they
+are weak priors (calibration.half_car.prior); without a roll rate they determine the interval for a load off the centre
+line.
 """
 
 from math import log
 from typing import Final
 
-EMPTY_MASS_KG: Final = 1250.0  # of the vehicle that the rates are of; they scale with mass
-GYRATION_PER_TRACK: Final = 0.42  # radius of gyration in roll
-ANTI_ROLL_NPM: Final = 15e3  # as one wheel feels it, in front; half of it behind
-PAYLOAD_GYRATION_M2: Final = 0.15  # a box one metre wide and high
-TRACK_PER_WHEELBASE: Final = 0.54  # of vans and cars where nobody stated it
+EMPTY_MASS_KG: Final = 1250.0  # chosen: reference of the rates, which scale with mass
+GYRATION_PER_TRACK: Final = 0.42  # chosen: radius of gyration in roll
+ANTI_ROLL_NPM: Final = 15e3  # chosen: at one front wheel; half of it at the rear
+PAYLOAD_GYRATION_M2: Final = 0.15  # chosen: a box one metre wide and high
+TRACK_PER_WHEELBASE: Final = 0.54  # chosen: for vans and cars, if not stated
 
 
 def usual_roll(empty_mass_kg: float, track_width_m: float) -> dict[str, float]:
-    """Roll parameters by name, as the parameter vector holds them: logarithms where these are positive.
+    """Roll parameters by name, as the parameter vector holds them: logarithms of positive quantities.
 
-    Factors of dampers and the level of twist are 1, and the tracks are as far apart as the wheels. Where the sensor and
-    the empty body's centre of gravity are, no vehicle tells of another.
+    Factors of dampers and the level of twist are 1, and the tracks are as far apart as the wheels. Places of the sensor
+    and of the empty body's centre of gravity are not among them, as they are specific to a vehicle.
     """
     scale = empty_mass_kg / EMPTY_MASS_KG
     return {

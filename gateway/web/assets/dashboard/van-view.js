@@ -1,7 +1,7 @@
 // The load's position: the van from above, and its weights in words.
 
 import { show } from "/assets/dashboard/known.js";
-import { element, pair, say, write } from "/assets/dashboard/page.js";
+import { element, pair, say } from "/assets/dashboard/page.js";
 import { aside, drawVan } from "/assets/dashboard/van-drawing.js";
 import { phrase } from "/assets/dashboard/phrases.js";
 import { UNKNOWN, capital, figure, withStd } from "/assets/dashboard/words.js";
@@ -40,10 +40,9 @@ show(({ vehicle, weights, latest, isReachable }) => {
   element("van").classList.toggle("stale", Boolean(latest?.is_stale) || isReachable === false);
   if (!weights) return;
   element("weights").replaceChildren(
+    pair(phrase("gross"), weightInWords(weights.gross), weights.gross.is_over_limit ? "over" : ""),
     pair(phrase("centre"), centreInWords(weights)),
     ...wheelPairs(weights),
   );
-  write("gross", weightInWords(weights.gross));
-  element("gross").classList.toggle("over", weights.gross.is_over_limit);
   say("overload", overloads(weights));
 }, "vehicle", "weights", "latest", "isReachable");

@@ -1,0 +1,152 @@
+"""Weights on another CAN bus as SAE J1939 frames, if the settings ask for it: VW for each axle, and CVW.
+
+The frames are laid out and scaled by dbc/j1939_weights.dbc and sent at a steady pace on an interface of their own. The
+interface that is listened to is opened elsewhere (``bus.live``) and never sent on.
+"""
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any, ClassVar, Final
+
+import cantools
+import numpy as np
+
+from gateway.bus.sink import BusSink
+from gateway.errors import BusError
+from gateway.estimate import Estimate, Weights
+from gateway.j1939 import AXLE_WEIGHT, NOT_AVAILABLE, counts_of
+from gateway.log import Event, log_event
+from gateway.records import EXTENDED_ID, Frames
+
+DATABASE: Final = "j1939_weights.dbc"
+WHOLE_AXLE: Final = 0xF  # where four bits would name a tyre
+UNWEIGHED: Final = Weights()
+_PRIORITY_SHIFT: Final = 26
+_GROUP: Final = 0x3FFFF00  # the bits of an identifier that name the parameter group
+
+
+@dataclass(frozen=True, slots=True)
+class Sender:
+    """Source address and priority (SAE J1939-21, 5.2). The front axle has the number ``first_axle``.
+
+    The springs do not measure a trailer: with ``draws_trailers`` the combination's weight stays unknown.
+    """
+
+    source_address: int
+    priority: int = 6
+    first_axle: int = 1
+    draws_trailers: bool = False
+
+
+class WeightFrames:
+    """Encodes the weights of one moment: VW of the front axle, VW of the rear axle, CVW."""
+
+    def __init__(self, sender: Sender) -> None:
+        self._database: Any = cantools.database.load_string(files("gateway.dbc").joinpath(DATABASE).read_text(), "dbc")
+        self._sender = sender
+
+    def of(self, shown: Estimate | None, t_ns: int) -> Frames:
+        """Frames (3,) stamped ``t_ns``. Unknown numbers, or all if ``shown`` is None, are "not available"."""
+        weights = UNWEIGHED if shown is None else shown.weights
+        counts = counts_of(shown, weights, draws_trailers=self._sender.draws_trailers)
+        first = self._sender.first_axle
+        of_axle = {count.axle: count.raw for count in counts if count.axle is not None}
+        whole = {count.parameter.signal: count.raw for count in counts if count.axle is None}
+        messages = [
+            ("VW", {"TireLocation": WHOLE_AXLE, "AxleLocation": first, AXLE_WEIGHT.signal: of_axle[1]} | whole),
+            ("VW", {"TireLocation": WHOLE_AXLE, "AxleLocation": first + 1, AXLE_WEIGHT.signal: of_axle[2]} | whole),
+            ("CVW", whole),
+        ]
+        payload = np.frombuffer(b"".join(self._encoded(*message) for message in messages), np.uint8).reshape(-1, 8)
+        can_id = [self._identifier(name) for name, _ in messages]
+        n = len(messages)
+        return Frames(np.full(n, t_ns, np.int64), np.array(can_id, np.uint32), np.full(n, 8, np.uint8), payload)
+
+    def _identifier(self, name: str) -> int:
+        group: int = self._database.get_message_by_name(name).frame_id & _GROUP
+        return self._sender.priority << _PRIORITY_SHIFT | group | self._sender.source_address | EXTENDED_ID
+
+    def _encoded(self, name: str, known: Mapping[str, int]) -> bytes:
+        """The eight bytes; unused bits are set, as J1939 requires."""
+        message = self._database.get_message_by_name(name)
+        raw = {signal.name: known.get(signal.name, NOT_AVAILABLE) for signal in message.signals}
+        return bytes(message.encode(raw, scaling=False, padding=True, strict=False))
+
+
+RETRY_S: Final = 5.0
+STOP_WITHIN_S: Final = 1.0
+
+
+class Broadcaster:
+    """Sends the weights of ``weighed_now`` every ``every_s`` seconds until :meth:`stop`.
+
+    ``weighed_now`` returns None if the estimate is too old to be sent. ``fault`` says why nothing is sent, for people.
+    """
+
+    NAME: ClassVar = "sender of weights"
+
+    def __init__(
+        self,
+        interface: str,
+        channel: str,
+        options: Mapping[str, Any],
+        sender: Sender,
+        every_s: float,
+        weighed_now: Callable[[], Estimate | None],
+    ) -> None:
+        self._fault: str | None = None
+        self.n_sent = 0  # frames
+        self._place = (interface, channel, options)
+        self._frames = WeightFrames(sender)
+        self._every_s = every_s
+        self._weighed_now = weighed_now
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="broadcast", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self, within_s: float = STOP_WITHIN_S) -> None:
+        """Stop sending; a blocked bus may keep the thread a little longer."""
+        self._stopping.set()
+        self._thread.join(within_s)
+
+    @property
+    def fault(self) -> str | None:
+        """Why nothing is sent, for people."""
+        return self._fault
+
+    def is_alive(self) -> bool:
+        """True while the thread runs."""
+        return self._thread.is_alive()
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                self._send_until_stopped()
+            except Exception as fault:  # noqa: BLE001 - no bus may end the thread
+                self._note(f"[broadcast] weights are not sent: {fault if isinstance(fault, BusError) else repr(fault)}")
+                self._stopping.wait(RETRY_S)
+
+    def _send_until_stopped(self) -> None:
+        interface, channel, options = self._place
+        with BusSink(interface, channel, **options) as sink:
+            while not self._stopping.is_set():
+                frames = self._frames.of(self._weighed_now(), time.time_ns())
+                sink.send(frames)
+                self.n_sent += len(frames)
+                self._note(None)
+                self._stopping.wait(self._every_s)
+
+    def _note(self, fault: str | None) -> None:
+        """Log a fault, and its end, once."""
+        if fault != self._fault:
+            level = logging.INFO if fault is None else logging.WARNING
+            event = Event.BROADCASTING if fault is None else Event.NOT_BROADCASTING
+            log_event(event, level=level, interface=self._place[0], channel=self._place[1], fault=fault)
+        self._fault = fault

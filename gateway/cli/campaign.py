@@ -1,0 +1,37 @@
+"""springscale campaign: known-load drives as one archive to pass on."""
+
+from pathlib import Path
+
+import click
+
+from gateway.cli.options import FILE, as_json
+from gateway.cli.progress import counted
+from gateway.offline.bundle import pack as pack_into
+from gateway.records import json_line
+
+
+@click.group("campaign")
+def campaign() -> None:
+    """Known-load drives as one archive, to pass on or to contribute."""
+
+
+@campaign.command("pack")
+@click.argument("folder", type=FILE)
+@click.option("--output", type=FILE, required=True, help="archive to write (.zip)")
+@click.option("--with-position", is_flag=True, help="keep latitude and longitude [default: left out]")
+@as_json
+def pack(folder: Path, output: Path, with_position: bool, as_json: bool) -> None:
+    """Pack FOLDER's campaign.toml, signal map, logs and contribution.toml into one archive.
+
+    Only the frames that the signal map names are packed, nothing else of the bus. `calibrate` and `evaluate` take the
+    archive in place of campaign.toml.
+    """
+    with counted("reading drives") as on_run:
+        packed = pack_into(folder, output, with_position=with_position, on_run=on_run)
+    if as_json:
+        click.echo(json_line(packed.to_json()))
+        return
+    for run in packed.runs:
+        click.echo(f"{run.log}: {run.payload_kg:g} kg, {run.duration_s:.0f} s, {run.n_frames} frames")
+    permission = packed.contribution.permission
+    click.echo(f"Written: {output}, {permission.licence} by {permission.given_by}")

@@ -1,0 +1,255 @@
+"""springscale commission: calibrate a running service's vehicle from an empty drive. The service does the work."""
+
+import sys
+import time
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from gateway.cli.commission_text import doubts_text, lines_text, progress_text, state_text, underway_text
+from gateway.cli.options import FILE, NUMBER, as_json
+from gateway.cli.progress import StatusLine
+from gateway.cli.service import Service, asks_service
+from gateway.core.vehicle import Carries
+from gateway.errors import ConfigurationError, SpringscaleError
+from gateway.files.signed import signature_path
+from gateway.records import json_line
+
+PATH: Final = "/api/v1/calibration/commissioning"
+LOOK_EVERY_S: Final = 5.0
+MOST_UNANSWERED: Final = 6
+NO_LINE: Final = "none"
+MOST_PAYLOAD: Final = "payload_range_kg"
+SAID: Final = {  # option: key of the vehicle, question, whether it must be answered
+    "front_axle_kg": ("kerb_front_axle_kg", "Under the front axle, empty [kg]", True),
+    "rear_axle_kg": ("kerb_rear_axle_kg", "Under the rear axle, empty [kg]", True),
+    "wheelbase_m": ("wheelbase_m", "Wheelbase [m]", True),
+    "sensor_m": ("sensor_position_m", "Sensor behind the front axle [m]", True),
+    "sensor_left_m": ("sensor_offset_left_m", "", False),
+    "track_m": ("track_width_m", "", False),
+    "payload_kg": (MOST_PAYLOAD, "", False),
+    "carries": ("carries", "", False),
+    "payload_length_m": ("payload_length_m", "", False),
+    "payload_height_m": ("payload_height_m", "", False),
+    "roof_rack": ("roof_rack", "", False),
+    "tow_bar": ("tow_bar", "", False),
+    "name": ("name", "", False),
+}
+
+
+@click.group("commission")
+def commission() -> None:
+    """Calibrate the vehicle of a running service from its axle weights and an empty drive, of a line or without."""
+
+
+@commission.command("start")
+@click.option("--line", default=None, help="name of a line (`commission lines`), a file to upload, or `none`")
+@click.option("--name", default=None, help="name of the vehicle [default: its id]")
+@click.option("--front-axle-kg", type=NUMBER, default=None, help="under the front axle of the empty vehicle")
+@click.option("--rear-axle-kg", type=NUMBER, default=None, help="the same at the rear")
+@click.option("--wheelbase-m", type=NUMBER, default=None, help="from axle to axle")
+@click.option("--sensor-m", type=NUMBER, default=None, help="sensor behind the front axle; negative: ahead of it")
+@click.option(
+    "--sensor-left-m", type=NUMBER, default=None, help="sensor left of the centre line; negative: right of it"
+)
+@click.option("--track-m", type=NUMBER, default=None, help="between the middles of left and right tyres")
+@click.option("--payload-kg", type=NUMBER, default=None, help="maximum payload [default: as its line, else 450]")
+@click.option(
+    "--carries", type=click.Choice([str(one) for one in Carries]), default=None, help="what it usually carries"
+)
+@click.option("--payload-length-m", type=NUMBER, default=None, help="usual length of the load along the floor")
+@click.option("--payload-height-m", type=NUMBER, default=None, help="usual height of the load above the floor")
+@click.option("--roof-rack", is_flag=True, default=None, help="part of the load may be on the roof")
+@click.option("--tow-bar", is_flag=True, default=None, help="part of the load may be on a tow bar")
+@click.option(
+    "--empty", is_flag=True, help="you know that the vehicle is empty, and will be until the calibration is made"
+)
+@click.option("--sure", is_flag=True, help="confirm the answers in question")
+@click.option("--note", default=None, help="kept in the history")
+@click.option("--follow/--no-follow", default=None, help="show progress until it is made [default: at a terminal]")
+@asks_service
+@as_json
+def start(
+    service: Service,
+    line: str | None,
+    empty: bool,
+    sure: bool,
+    note: str | None,
+    follow: bool | None,
+    as_json: bool,
+    **said: Any,
+) -> None:
+    """Begin, or continue a commissioning under way. On a terminal the command asks for answers that no option gives."""
+    state = service.ask(PATH)
+    if state["underway"] is None:
+        state = service.ask(PATH, "POST", {} if note is None else {"note": note})
+    if line is not None or state["underway"]["step"] == "line":
+        state = service.ask(f"{PATH}/line", "POST", {"line": _line(service, line)})
+    if any(answer is not None for answer in said.values()) or state["underway"]["vehicle"] is None:
+        state = service.ask(f"{PATH}/vehicle", "POST", _vehicle(said))
+    if doubts := state["underway"]["doubts"]:
+        if not (sure or (_is_at_terminal() and click.confirm(f"{doubts_text(doubts)}\nIs it right all the same?"))):
+            raise SpringscaleError(f"{doubts_text(doubts)}\ncorrect the answers, or say --sure; all answers are kept")
+        state = service.ask(f"{PATH}/confirm", "POST", {})
+    if state["underway"]["step"] == "empty":
+        if not (empty or (_is_at_terminal() and click.confirm("Is the vehicle empty, driver and tank as in service?"))):
+            raise SpringscaleError("say --empty once the vehicle is empty; all answers are kept")
+        state = service.ask(f"{PATH}/empty", "POST", {"is_empty": True})
+    if as_json:
+        click.echo(json_line(state))
+        return
+    click.echo(state_text(state))
+    if _is_at_terminal() if follow is None else follow:
+        _follow(service)
+
+
+@commission.command("show")
+@asks_service
+@as_json
+def show(service: Service, as_json: bool) -> None:
+    """The commissioning under way, the findings of inspection, the progress, and earlier calibrations."""
+    _print_state(service.ask(PATH), as_json=as_json)
+
+
+@commission.command("lines")
+@asks_service
+@as_json
+def lines(service: Service, as_json: bool) -> None:
+    """The available lines."""
+    told = service.ask(f"{PATH}/lines")
+    click.echo(json_line(told) if as_json else lines_text(told["items"]))
+
+
+@commission.command("upload")
+@click.argument("file", type=FILE)
+@asks_service
+@as_json
+def upload(service: Service, file: Path, as_json: bool) -> None:
+    """Upload the calibration of a vehicle of the same model or a line file to the service, and FILE.sig if there is
+    one.
+    """
+    told = _upload(service, file)
+    click.echo(json_line(told) if as_json else lines_text(told["items"]))
+
+
+def _add_step(name: str, words: str, method: str, step: str = "", body: dict[str, Any] | None = None) -> None:
+    """A command without options of its own: one request, which answers with the new state."""
+
+    @commission.command(name, help=words)
+    @asks_service
+    @as_json
+    def request(service: Service, as_json: bool) -> None:
+        _print_state(service.ask(PATH + step, method, body), as_json=as_json)
+
+
+_add_step("fit", "Calibrate with the data so far, whether sufficient or not.", "POST", "/fit", {})
+_add_step(
+    "confirm",
+    "Confirm the answers in question; if the drive contradicted them, its calibration is used.",
+    "POST",
+    "/confirm",
+    {},
+)
+_add_step(
+    "again",
+    "The vehicle was not empty, but is now: discard the drive, and begin the empty drive again.",
+    "POST",
+    "/empty",
+    {"is_empty": True, "again": True},
+)
+_add_step("cancel", "Discard the commissioning under way; earlier calibrations stay.", "DELETE")
+
+
+@commission.command("undo")
+@click.option("--factory", is_flag=True, help="all that were made here: back to the calibration of the settings")
+@asks_service
+@as_json
+def undo(service: Service, factory: bool, as_json: bool) -> None:
+    """Take the last calibration made here out of use; the one before it counts from the next drive on."""
+    _print_state(service.ask(f"{PATH}/undo" + ("?to=factory" if factory else ""), "POST", {}), as_json=as_json)
+
+
+def _print_state(state: dict[str, Any], *, as_json: bool) -> None:
+    click.echo(json_line(state) if as_json else state_text(state))
+
+
+def _is_at_terminal() -> bool:
+    return sys.stdin.isatty()
+
+
+def _line(service: Service, said: str | None) -> dict[str, str] | None:
+    """The line that was named, uploaded, or chosen at the terminal."""
+    if said == NO_LINE:
+        return None
+    items = service.ask(f"{PATH}/lines")["items"]
+    if said is None:
+        items = [item for item in items if item["fault"] is None]
+        if not items:
+            click.echo(lines_text(items), err=True)
+            return None
+        if not _is_at_terminal():
+            raise click.UsageError(f"say --line NAME, or --line {NO_LINE}; there are:\n{lines_text(items)}")
+        click.echo(f"0: none, as any vehicle\n{lines_text(items)}")
+        number = click.prompt("Which line is it of", type=click.IntRange(0, len(items)))
+        return None if number == 0 else _named(items[number - 1])
+    known = [item for item in items if item["name"] == said]
+    if not known and Path(said).is_file():
+        known = [one for one in _upload(service, Path(said))["items"] if one["name"] == Path(said).name]
+    if not known:
+        raise ConfigurationError(f"--line {said}: no such line, and no such file; there are:\n{lines_text(items)}")
+    return _named(known[-1])
+
+
+def _named(item: dict[str, Any]) -> dict[str, str]:
+    return {"name": item["name"], "source": item["source"]}
+
+
+def _upload(service: Service, file: Path) -> dict[str, Any]:
+    try:
+        body = {"name": file.name, "content": file.read_text(encoding="utf-8")}
+        signature = signature_path(file)
+        if signature.is_file():
+            body["signature"] = signature.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as fault:
+        raise ConfigurationError(f"{file}: cannot be read: {fault}") from None
+    return service.ask(f"{PATH}/lines", "POST", body)
+
+
+def _vehicle(said: dict[str, Any]) -> dict[str, Any]:
+    """The answers; missing ones that are needed are asked for."""
+    vehicle = {}
+    for option, (key, question, is_needed) in SAID.items():
+        answer = said[option]
+        if answer is None and is_needed:
+            if not _is_at_terminal():
+                raise click.UsageError(f"say --{option.replace('_', '-')}: the vehicle needs it")
+            answer = click.prompt(question, type=NUMBER)
+        if answer is not None:
+            vehicle[key] = [0.0, answer] if key == MOST_PAYLOAD else answer
+    return vehicle
+
+
+def _follow(service: Service) -> None:
+    """Show progress until the calibration is made; Ctrl-C only ends the display."""
+    with StatusLine() as status:
+        n_unanswered = 0
+        while True:
+            try:
+                state = service.ask(PATH)
+                n_unanswered = 0
+            except SpringscaleError:  # between two drives the service restarts
+                n_unanswered += 1
+                if n_unanswered > MOST_UNANSWERED:
+                    raise
+                time.sleep(LOOK_EVERY_S)
+                continue
+            if state["underway"] is None:
+                break
+            status.show(progress_text(state["underway"]))
+            if any(one["is_of_drive"] for one in state["underway"]["doubts"]):
+                raise SpringscaleError(underway_text(state["underway"]))
+            if state["underway"]["fault"] or (state["underway"]["inspection"] or {}).get("has_fault"):
+                raise SpringscaleError(underway_text(state["underway"]))
+            time.sleep(LOOK_EVERY_S)
+    click.echo(state_text(state))

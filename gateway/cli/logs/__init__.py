@@ -1,1 +1,0 @@
-"""Commands that make, pack or read recordings without a service, and the one that feeds sensors onto a bus."""

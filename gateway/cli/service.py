@@ -1,0 +1,149 @@
+"""Requests of commands to a running service: address, token, certificates, and its error messages."""
+
+import functools
+import json
+import ssl
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from http.client import HTTPException, HTTPResponse
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import click
+
+from gateway.cli.options import FILE, config
+from gateway.config import load_settings
+from gateway.errors import ConfigurationError, SpringscaleError
+from gateway.records import json_line
+
+TIMEOUT_S: Final = 15.0
+EVERYWHERE: Final = frozenset({"0.0.0.0", "::"})
+
+Command = Callable[..., None]
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """Which service to use, and how."""
+
+    config_path: Path | None
+    url: str | None
+    token: str | None
+    ca: Path | None
+    certificate: Path | None
+    key: Path | None
+
+    def address(self, path: str) -> str:
+        """Where ``path`` is. Raises a usage error if the options name no service, or two."""
+        if (self.config_path is None) == (self.url is None):
+            raise click.UsageError("give --config FILE of the service, or its --url")
+        if self.config_path is not None:
+            return _configured_address(self.config_path) + path
+        url = self.url or ""
+        if not url.startswith(("http://", "https://")):
+            raise click.UsageError(f"{url!r} is not an address such as http://127.0.0.1:8000")
+        return url.rstrip("/") + path
+
+    def ask(self, path: str, method: str = "GET", body: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """The service's answer as JSON. Raises SpringscaleError with its message if it refuses or cannot be reached."""
+        content = None if body is None else json_line(body).encode()
+        with self.opened(path, method, content) as answer:
+            record: dict[str, Any] = json.load(answer)
+            return record
+
+    @contextmanager
+    def opened(
+        self,
+        path: str,
+        method: str = "GET",
+        content: bytes | None = None,
+        more: Mapping[str, str] = MappingProxyType({}),
+    ) -> Iterator[HTTPResponse]:
+        """The answer as a stream; ``more`` are headers. Raises as ``ask`` does, also during reading."""
+        address = self.address(path)
+        headers = {"Accept": "application/json, */*;q=0.5", "Content-Type": "application/json", **more}
+        if self.token:
+            headers["Authorization"] = f"Bearer {self.token}"
+        request = urllib.request.Request(address, content, headers, method=method)
+        try:
+            with self._opener().open(request, timeout=TIMEOUT_S) as answer:
+                yield answer
+        except urllib.error.HTTPError as refusal:
+            raise SpringscaleError(f"{address}: {_said(refusal)}") from None
+        except (OSError, ValueError, HTTPException) as fault:  # not reachable, not trusted, or not HTTP
+            raise SpringscaleError(f"{address}: cannot reach the service: {_why(fault)}") from None
+
+    def _opener(self) -> urllib.request.OpenerDirector:
+        """An opener without a proxy that checks certificates and sends the client certificate if there is one."""
+        try:
+            context = ssl.create_default_context(cafile=self.ca)
+        except OSError as fault:
+            raise ConfigurationError(f"{self.ca}: no certificate of an authority: {fault}") from None
+        if self.certificate is None and self.key is not None:
+            raise click.UsageError("--key is the key of a --certificate: give both, or neither")
+        if self.certificate is not None:
+            try:
+                context.load_cert_chain(self.certificate, self.key)
+            except OSError as fault:  # ssl.SSLError is one
+                raise ConfigurationError(f"{self.certificate}: no certificate with its key: {fault}") from None
+        return urllib.request.build_opener(
+            urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=context)
+        )
+
+
+def asks_service(command: Command) -> Command:
+    """The options that name the service; passed to ``command`` as one argument, first."""
+
+    @functools.wraps(command)
+    def asking(**options: Any) -> None:
+        service = Service(**{each.name: options.pop(each.name) for each in fields(Service)})
+        command(service, **options)
+
+    decorated: Command = asking
+    for option in (
+        click.option("--key", type=FILE, default=None, help="PEM file of its key, if that is a separate file"),
+        click.option(
+            "--certificate",
+            type=FILE,
+            default=None,
+            help="PEM file of our certificate, for a service that requires one",
+        ),
+        click.option("--ca", type=FILE, default=None, help="PEM file of the authority that signed its certificate"),
+        click.option("--token", envvar="SPRINGSCALE_TOKEN", default=None, help="token, if the service requires one"),
+        click.option("--url", default=None, help="address of the service, such as http://127.0.0.1:8000"),
+        config,
+    ):
+        decorated = option(decorated)
+    return decorated
+
+
+def _configured_address(config_path: Path) -> str:
+    web = load_settings(config_path).web
+    if web.port == 0:
+        raise ConfigurationError(f"{config_path}: [web] port = 0 names no port: give --url of the running service")
+    host = "127.0.0.1" if web.host in EVERYWHERE else web.host
+    scheme = "http" if web.tls_certificate is None else "https"
+    return f"{scheme}://{f'[{host}]' if ':' in host else host}:{web.port}"
+
+
+def _said(refusal: urllib.error.HTTPError) -> str:
+    """Detail and reason of a problem; the status if something else answered."""
+    try:
+        problem = json.load(refusal)
+        return f"{problem['detail']}" + (f" ({problem['reason']})" if problem.get("reason") else "")
+    except (ValueError, KeyError, TypeError):
+        return f"answered {refusal.code} {refusal.reason}"
+
+
+def _why(fault: Exception) -> str:
+    reason = getattr(fault, "reason", fault)
+    if isinstance(reason, ConnectionRefusedError):
+        return (
+            "nothing is listening there: is the service running? "
+            "With a new calibration it restarts, which takes a few seconds"
+        )
+    return str(reason)

@@ -1,0 +1,279 @@
+"""The empty drive: batches are counted, inspected and fitted, until the accuracy is sufficient."""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.calibration.commissioning import Drive, Job, Result, vehicle_table
+from gateway.calibration.kept import KeptBatch, Shelf, packed
+from gateway.config.sections import CommissioningSection
+from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Vehicle, front_share_pct
+from gateway.errors import CalibrationFileError, CommissioningRefusedError
+from gateway.log import Event
+from gateway.records import Why
+from gateway.service.commissioning.record import MADE, LineChoice, MadeCalibration, Underway
+from gateway.service.commissioning.record_store import RecordStore
+from gateway.service.commissioning.steps import LastInspection
+from gateway.service.commissioning.worker import Worker
+from gateway.stated import VehicleAnswers
+from gateway.units import NS_PER_S
+
+COMMAND: Final = "commissioned on the vehicle"
+EMPTY: Final = "empty drive"
+
+
+@dataclass(frozen=True, slots=True)
+class BatchFile:
+    """The file of a kept batch, and its time span."""
+
+    path: Path
+    t_start_ns: int
+    t_end_ns: int
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the window."""
+        return (self.t_end_ns - self.t_start_ns) / NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
+class Jobs:
+    """Creates the jobs of one service."""
+
+    directory: Path
+    settings: CommissioningSection
+    batch: BatchSettings
+
+    def job(self, vehicle: Vehicle, line: LineChoice, batches: Sequence[BatchFile], *, is_fit: bool) -> Job:
+        """The job for an empty drive. Its window length is at most that of the longest batch."""
+        window_s = min(self.batch.window_s, max(one.duration_s for one in batches))
+        return Job(
+            vehicle=vehicle,
+            drives=(
+                Drive(
+                    name=EMPTY,
+                    front_share_pct=front_share_pct(vehicle, 0.0, None),
+                    batches=tuple(one.path for one in batches),
+                ),
+            ),
+            settings=asdict(self.batch) | {"window_s": window_s},
+            like=() if line.copy_name is None else (self.directory / line.copy_name,),
+            is_fit=is_fit,
+            goal_std_share=self.settings.goal_pct / 100.0,
+            most_memory_mb=self.settings.memory_mb,
+            command=COMMAND,
+        )
+
+
+OWNER: Final = "commissioning"  # of the batches that the shelf must not give away
+LEAST_BATCHES: Final = 2  # a single batch may be an outlier; a requested fit may use one
+LOOKED_AT: Final = "looked-at.batch"
+
+MakeWorker = Callable[[Callable[[Job, Result], None]], Worker]
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceVehicle:
+    """The vehicle as the service knows it, and whether the service may make a calibration."""
+
+    name: str
+    signals_id: str
+    is_calibrated: bool
+    why_not_allowed: str | None = None
+    is_name_fixed: bool = False
+
+
+class EmptyDrive:
+    """Receives every batch, and the results of the process that fits. Thread-safe by the store's lock."""
+
+    def __init__(
+        self, book: RecordStore, jobs: Jobs, shelf: Shelf, vehicle: ServiceVehicle, make_worker: MakeWorker
+    ) -> None:
+        """Resumes a commissioning under way."""
+        self.looked: LastInspection | None = None
+        self._book, self._jobs, self._shelf, self._vehicle = book, jobs, shelf, vehicle
+        self._worker = make_worker(self._on_result)
+        self._job: Job | None = None
+        self.is_over = False
+        self._resume()
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a fit or an inspection is under way."""
+        return self._worker.is_busy
+
+    @property
+    def driven_s(self) -> float:
+        """Seconds of the complete windows that count."""
+        underway = self._book.record.underway
+        if underway is None:
+            return 0.0
+        mine = set(underway.batches)
+        return sum(entry.duration_s for entry in self._shelf.entries() if entry.id in mine)
+
+    def stop(self) -> None:
+        """Ignore later batches and end the process that fits."""
+        self.is_over = True
+        self._worker.end()
+
+    def forget(self) -> None:
+        """Drop the drive at the end of a commissioning."""
+        self._worker.end()
+        self._job = self.looked = None
+        with suppress(OSError):
+            self._shelf.let_go(OWNER)
+
+    def hear(self, kept: KeptBatch) -> None:
+        """Called with every batch, provisional and rejected ones too; those that count are already on the shelf."""
+        with self._book.lock:
+            underway = self._book.record.underway
+            if self.is_over or underway is None or underway.vehicle is None:
+                return
+            batch = kept.batch
+            is_of_drive = underway.empty is not None and underway.empty.covers(batch.drive_start_ns, batch.t_start_ns)
+            try:
+                has_grown = is_of_drive and self._remember(underway, kept)
+            except (OSError, CommissioningRefusedError) as refusal:
+                self._book.cannot_store(refusal)
+                return
+            if has_grown:
+                self.fit()
+            elif (
+                not self._worker.is_busy and Why.TOO_SHORT not in batch.rejected
+            ):  # where a drive ended: no fault of it
+                self._look(kept)
+
+    def _resume(self) -> None:
+        """Resume after a start: close the open window; drop batches that are gone or have another signal map."""
+        underway = self._book.record.underway
+        if underway is None:
+            return
+        there = {entry.id for entry in self._shelf.entries()}
+        found = [*underway.batches, *([underway.open_batch] if underway.open_batch else [])]
+        change: dict[str, Any] = {"batches": tuple(one for one in found if one in there), "open_batch": None}
+        if underway.signals_id != self._vehicle.signals_id:
+            change |= {"batches": (), "empty": None, "learned": None, "is_fit_asked": False}
+            change |= {"signals_id": self._vehicle.signals_id, "fault": "the signal map was changed: drive again"}
+        elif underway.empty is not None:  # whatever drive was under way is over
+            change["empty"] = underway.empty.model_copy(update={"drive_start_ns": None, "newest_ns": None})
+        try:
+            self._book.keep(underway.model_copy(update=change))
+        except CommissioningRefusedError as refusal:
+            self._book.cannot_store(refusal)
+
+    def _remember(self, underway: Underway, kept: KeptBatch) -> bool:
+        """Add a batch to the drive; True if one counted. Raises OSError, CommissioningRefusedError."""
+        batch, before = kept.batch, underway.open_batch
+        change: dict[str, Any] = {"open_batch": None}
+        if batch.is_provisional and not batch.rejected:
+            self._shelf.add(kept)
+            change["open_batch"] = kept.id
+        elif batch.is_provisional:
+            return False
+        elif not batch.rejected and kept.id not in underway.batches:
+            change["batches"] = (*underway.batches, kept.id)
+        now = underway.model_copy(update=change)
+        if now != underway:
+            self._book.keep(now)
+            self._shelf.hold(OWNER, [*now.batches, *([now.open_batch] if now.open_batch else [])])
+        if before is not None and before != now.open_batch:
+            self._shelf.remove(before)
+        return "batches" in change
+
+    def fit(self) -> None:
+        """Start the fit of the whole drive, if there are batches."""
+        underway = self._book.record.underway
+        if underway is None or underway.vehicle is None or underway.line is None or not underway.batches:
+            return
+        if underway.is_vehicle_doubted:
+            return
+        there = {entry.id: entry for entry in self._shelf.entries()}
+        files = [
+            BatchFile(self._shelf.path(there[one]), there[one].t_start_ns, there[one].t_end_ns)
+            for one in underway.batches
+            if one in there
+        ]
+        if files:
+            vehicle = self._table(underway.vehicle, underway.line)
+            self._start(self._jobs.job(vehicle, underway.line, files, is_fit=True))
+
+    def _look(self, kept: KeptBatch) -> None:
+        """Start the inspection of one window."""
+        underway = self._book.record.underway
+        if underway is None or underway.vehicle is None or underway.line is None:
+            return
+        file = BatchFile(self._worker.folder / LOOKED_AT, kept.batch.t_start_ns, kept.batch.t_end_ns)
+        vehicle = self._table(underway.vehicle, underway.line)
+        job = self._jobs.job(vehicle, underway.line, [file], is_fit=False)
+        self._start(job, {LOOKED_AT: packed(kept)})
+
+    def _start(self, job: Job, files: Mapping[str, bytes] | None = None) -> None:
+        if self.is_over:
+            return
+        self._job = job
+        try:
+            self._worker.start(job, files or {})
+        except OSError as refusal:
+            self._book.cannot_store(refusal)
+
+    def _on_result(self, job: Job, result: Result) -> None:
+        """Process the result of a job, in the worker's thread."""
+        with self._book.lock:
+            underway = self._book.record.underway
+            if self.is_over or underway is None or underway.vehicle is None or job is not self._job:
+                return
+            if result.fault is None:
+                self.looked = LastInspection(result.findings, _seconds(job))
+            if not job.is_fit:
+                return
+            try:
+                self._take(underway, underway.vehicle, result)
+            except (CommissioningRefusedError, CalibrationFileError) as refusal:
+                self._book.cannot_store(refusal)
+
+    def _take(self, underway: Underway, vehicle: VehicleAnswers, result: Result) -> None:
+        """Use a fit if it is accurate enough or was requested; else the drive continues."""
+        has_enough = result.learned is not None and result.learned.is_enough
+        is_wanted = underway.is_fit_asked or (has_enough and len(underway.batches) >= LEAST_BATCHES)
+        doubts = underway.with_doubts_of_drive(result.doubts)
+        doubted = underway.model_copy(update={"doubts": doubts})
+        if result.calibration is None or result.calibration_id is None or not is_wanted or doubted.open_doubts:
+            fault = result.fault or result.refusal
+            change = {"learned": result.learned, "fault": fault, "is_fit_asked": False}
+            self._book.keep(doubted.model_copy(update=change))
+            return
+        name = self._book.write_calibration(result.calibration, result.calibration_id)
+        line = underway.line or LineChoice(name="")
+        made = MadeCalibration(
+            id=result.calibration_id,
+            file_name=name,
+            at=self._book.now(),
+            by=underway.by,
+            note=underway.note,
+            line=line,
+            vehicle=self._table(vehicle, line),
+            batches=underway.batches,
+            learned=result.learned,
+            warnings=(*result.warnings, *(one.sentence for one in doubts if one not in result.doubts)),
+        )
+        self._book.save(self._book.record.with_made(made))
+        with suppress(OSError):
+            self._shelf.hold(made.file_name, made.batches)
+            self._shelf.let_go(OWNER)
+            for owner in self._shelf.owners - {one.file_name for one in self._book.record.made}:
+                if owner.startswith(MADE):  # others hold batches too
+                    self._shelf.let_go(owner)
+            self._book.forget_others()
+        self._book.tell(Event.COMMISSIONED, {"calibration_id": made.id, "by": made.by, "n_batches": len(made.batches)})
+
+    def _table(self, answers: VehicleAnswers, line: LineChoice) -> Vehicle:
+        table = vehicle_table(answers, self._vehicle.name, line.shared)
+        return replace(table, name=self._vehicle.name) if self._vehicle.is_name_fixed else table
+
+
+def _seconds(job: Job) -> float:
+    """Seconds of driving that a job covers."""
+    return float(job.settings["window_s"]) * len(job.drives[0].batches)

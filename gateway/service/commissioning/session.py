@@ -1,0 +1,298 @@
+"""The steps of commissioning a vehicle; each is on disk before the answer."""
+
+import time
+from collections.abc import Callable
+from typing import Any, Final, Protocol
+
+from gateway.calibration.commissioning import doubts_of, vehicle_table
+from gateway.calibration.kept import KeptBatch, Shelf
+from gateway.core.vehicle import Vehicle
+from gateway.errors import CampaignError, CommissioningRefusedError
+from gateway.log import Event, OnEvent
+from gateway.records import json_line
+from gateway.service.commissioning.empty_drive import EmptyDrive, Jobs, MakeWorker, ServiceVehicle
+from gateway.service.commissioning.lines import Lines, require_alike
+from gateway.service.commissioning.record import Confirmed, EmptyClaim, Ended, LineChoice, Source, Underway
+from gateway.service.commissioning.record_store import RecordStore
+from gateway.service.commissioning.steps import CommissioningStep, OpenWindow, Present, lines_json, state_json, step_of
+from gateway.service.commissioning.worker import Worker
+from gateway.stated import VehicleAnswers
+from gateway.stated.doubt import OF_THE_DRIVE, meant_by
+from gateway.units import NS_PER_S
+
+UPLOADED: Final = "uploaded"
+
+
+class DrivePosition(Protocol):
+    """The part of the scheduler that an empty drive needs: the present position in time. Safe from any thread."""
+
+    @property
+    def drive_start_ns(self) -> int | None:
+        """Start of the drive under way; None between drives."""
+        ...
+
+    @property
+    def newest_ns(self) -> int | None:
+        """The newest stamp of that drive."""
+        ...
+
+    @property
+    def open_window_ns(self) -> tuple[int, int] | None:
+        """Start of the open window of that drive, and the newest stamp in it."""
+        ...
+
+
+class Commissioning:
+    """Thread-safe; a call may wait for the disk. A power cut does not undo an answered step."""
+
+    def __init__(
+        self,
+        jobs: Jobs,
+        lines: Lines,
+        shelf: Shelf,
+        drives: DrivePosition,
+        vehicle: ServiceVehicle,
+        *,
+        on_event: OnEvent,
+        clock_ns: Callable[[], int] = time.time_ns,
+        make_worker: MakeWorker | None = None,
+    ) -> None:
+        """Resumes a commissioning under way. ``make_worker`` replaces the process that fits (tests)."""
+        self._lines, self._drives, self._vehicle = lines, drives, vehicle
+        self._window_s = jobs.batch.window_s
+        self._book = RecordStore(jobs.directory, on_event, clock_ns)
+        active = self._book.record.active
+        self._started_with = active.id if active else None
+        self._drive = EmptyDrive(
+            self._book, jobs, shelf, vehicle, make_worker or (lambda on_result: Worker(jobs.directory, on_result))
+        )
+
+    @property
+    def book(self) -> RecordStore:
+        """The store of the calibrations made here."""
+        return self._book
+
+    @property
+    def fault(self) -> str | None:
+        """A fault of the record, for people."""
+        return self._book.fault
+
+    @property
+    def is_due(self) -> bool:
+        """Whether another calibration than at the start waits for the next drive."""
+        active = self._book.record.active
+        return (active.id if active else None) != self._started_with
+
+    @property
+    def wants_all(self) -> bool:
+        """Whether batches that do not count are reported, too."""
+        return self._book.record.underway is not None
+
+    def start(self) -> None:
+        """Resume the fit that a stop or a power cut interrupted."""
+        with self._book.lock:
+            self._drive.fit()
+
+    def ignore_batches(self) -> None:
+        """Ignore batches from now on. Never waits."""
+        self._drive.is_over = True
+
+    def stop(self, _within_s: float = 0.0) -> None:
+        """Stop; the next start resumes from the disk. May wait for a hanging disk."""
+        self._drive.stop()
+
+    def hear(self, kept: KeptBatch) -> None:
+        """Called with every batch, provisional and rejected ones too; those that count are already on the shelf."""
+        self._drive.hear(kept)
+
+    def state(self) -> str:
+        """JSON: a CommissioningState."""
+        with self._book.lock:
+            return json_line(state_json(self._book.record, self._present()))
+
+    def lines(self) -> str:
+        """JSON: the LinesFound."""
+        return json_line(lines_json(tuple(self._lines.found())))
+
+    def upload(self, name: str, content: str, signature: str | None) -> str:
+        """Keep a line's file -> the LinesFound with it. Raises CommissioningRefusedError."""
+        self._require_allowed()
+        with self._book.lock:
+            self._lines.upload(name, content, signature)
+        return self.lines()
+
+    def begin(self, by: str, note: str | None) -> str:
+        """Begin a commissioning. Raises CommissioningRefusedError, as all later steps."""
+        self._require_allowed()
+        with self._book.lock:
+            if self._book.record.underway is not None:
+                raise CommissioningRefusedError(
+                    "already_begun", "a commissioning is under way: cancel it to start another"
+                )
+            begun = Underway(begun_at=self._book.now(), by=by, note=note, signals_id=self._vehicle.signals_id)
+            self._drive.forget()
+            self._book.keep(begun)
+            self._book.tell(Event.COMMISSIONING, {"step": CommissioningStep.LINE, "by": by})
+            return self.state()
+
+    def choose_line(self, name: str | None, source: Source | None) -> str:
+        """Choose one of ``lines``; None for no line, with the prior of any vehicle."""
+        with self._book.lock:
+            underway = self._underway()
+            choice = LineChoice(name="")
+            if name is not None:
+                choice, content = self._lines.choose(name, source or UPLOADED)
+                self._book.write(str(choice.copy_name), content)
+            self._require_usable(choice, underway.vehicle)
+            self._book.keep(underway.model_copy(update={"line": choice} | _anew(underway.vehicle, choice)))
+            self._drive.fit()
+            return self.state()
+
+    def state_vehicle(self, answers: VehicleAnswers) -> str:
+        """State the vehicle's figures. Unlikely answers raise doubts, which must be confirmed before the next step."""
+        with self._book.lock:
+            underway = self._underway(CommissioningStep.VEHICLE)
+            line = underway.line or LineChoice(name="")
+            self._require_usable(line, answers)
+            self._book.keep(underway.model_copy(update={"vehicle": answers} | _anew(answers, line)))
+            self._drive.fit()
+            return self.state()
+
+    def confirm(self, by: str) -> str:
+        """Confirm all open doubts: the stated facts are right. If a fit raised the doubt, its calibration is used."""
+        with self._book.lock:
+            underway = self._underway(CommissioningStep.VEHICLE)
+            doubts = underway.open_doubts
+            if not doubts:
+                raise CommissioningRefusedError("nothing_doubted", "there is no doubt to confirm")
+            if underway.line is not None and underway.vehicle is not None:
+                require_alike(self._book.directory, underway.line, self._table(underway.vehicle, underway.line))
+            kinds = tuple(dict.fromkeys(one.kind for one in doubts))
+            confirmed = Confirmed(at=self._book.now(), by=by, kinds=kinds)
+            is_of_drive = any(kind in OF_THE_DRIVE for kind in kinds)
+            change = {"confirmed": (*underway.confirmed, confirmed), "is_fit_asked": is_of_drive}
+            self._book.keep(underway.model_copy(update=change))
+            self._book.tell(Event.COMMISSIONING_CONFIRMED, {"doubts": list(kinds), "by": by})
+            self._drive.fit()
+            return self.state()
+
+    def is_empty(self, by: str, *, again: bool = False) -> str:
+        """State that the vehicle is empty from now on; ``again`` discards the drive so far."""
+        with self._book.lock:
+            underway = self._underway(CommissioningStep.EMPTY)
+            if self._drive.looked is not None and self._drive.looked.has_fault:
+                raise CommissioningRefusedError(
+                    "inspection_fault",
+                    "the first minutes show a fault: " + "; ".join(
+                        f"{one.text}: {one.advice}" for one in self._drive.looked.findings if one.severity == "fault"
+                    ),
+                )  # fmt: skip
+            claim = EmptyClaim(
+                at=self._book.now(), by=by, drive_start_ns=self._drives.drive_start_ns, newest_ns=self._drives.newest_ns
+            )
+            if underway.empty is None or again:
+                if underway.empty is not None:
+                    self._drive.forget()
+                self._book.keep(underway.model_copy(update={"empty": claim} | _not_driven(underway)))
+                self._book.tell(Event.COMMISSIONING, {"step": CommissioningStep.DRIVE, "by": by})
+            return self.state()
+
+    def fit_now(self, by: str) -> str:
+        """Calibrate with the data so far, whether sufficient or not."""
+        with self._book.lock:
+            underway = self._underway(CommissioningStep.DRIVE)
+            if not underway.batches:
+                raise CommissioningRefusedError(
+                    "no_batch",
+                    "no batch of the empty drive has counted yet: drive on until one has",
+                )
+            self._book.keep(underway.model_copy(update={"is_fit_asked": True, "fault": None}))
+            self._book.tell(Event.COMMISSIONING, {"step": CommissioningStep.FIT, "by": by})
+            self._drive.fit()
+            return self.state()
+
+    def cancel(self, by: str) -> str:
+        """Discard the commissioning under way; earlier calibrations stay."""
+        with self._book.lock:
+            self._underway()
+            self._book.keep(None)
+            self._drive.forget()
+            self._book.tell(Event.COMMISSIONING_CANCELLED, {"by": by})
+            return self.state()
+
+    def undo(self, by: str, *, to_factory: bool) -> str:
+        """Withdraw the last calibration made here, or all; the one before it is used from the next drive on."""
+        with self._book.lock:
+            standing = tuple(one for one in self._book.record.made if one.ended is None)
+            if not standing:
+                raise CommissioningRefusedError("nothing_made", "no calibration made on the vehicle is in use")
+            chosen = standing if to_factory else standing[-1:]
+            end = Ended(at=self._book.now(), by=by, why="back_to_factory" if to_factory else "undone")
+            self._book.save(self._book.record.ended(chosen, end))
+            self._book.tell(Event.COMMISSIONING_UNDONE, {"calibration_ids": [one.id for one in chosen], "by": by})
+            return self.state()
+
+    def _window(self) -> OpenWindow | None:
+        """The open window of the empty drive. A window that began before the statement does not count."""
+        underway, window_ns, window_s = self._book.record.underway, self._drives.open_window_ns, self._window_s
+        drive_start_ns = self._drives.drive_start_ns
+        if underway is None or underway.empty is None or window_ns is None or drive_start_ns is None:
+            return None
+        open_s = (window_ns[1] - window_ns[0]) / NS_PER_S
+        if underway.empty.covers(drive_start_ns, window_ns[0]):
+            return OpenWindow(open_s, max(0.0, window_s - open_s))
+        return OpenWindow(0.0, max(0.0, 2.0 * window_s - open_s))
+
+    def _present(self) -> Present:
+        return Present(
+            window=self._window(),
+            why_not_allowed=self._vehicle.why_not_allowed,
+            is_calibrated=self._vehicle.is_calibrated,
+            is_busy=self._drive.is_busy,
+            driven_s=self._drive.driven_s,
+            looked=self._drive.looked,
+            started_with=self._started_with,
+        )
+
+    def _underway(self, least: CommissioningStep = CommissioningStep.LINE) -> Underway:
+        """The commissioning under way. Raises CommissioningRefusedError unless it has reached ``least``."""
+        self._require_allowed()
+        underway = self._book.record.underway
+        if underway is None:
+            raise CommissioningRefusedError("not_begun", "no commissioning is under way: begin one")
+        step, order = step_of(underway), list(CommissioningStep)
+        if order.index(step) < order.index(least):
+            raise CommissioningRefusedError("wrong_step", f"{step} is still to be answered before {least}")
+        if step is CommissioningStep.FIT:
+            raise CommissioningRefusedError("fitting", "the calibration is being made: wait for it, or cancel")
+        return underway
+
+    def _require_usable(self, line: LineChoice, answers: VehicleAnswers | None) -> None:
+        """Raises CommissioningRefusedError if the answers describe no vehicle, or surely not one of the line."""
+        if answers is not None:
+            table = self._table(answers, line)
+            if not doubts_of(answers, line.facts):
+                require_alike(self._book.directory, line, table)
+
+    def _table(self, answers: VehicleAnswers, line: LineChoice) -> Vehicle:
+        try:
+            return vehicle_table(answers, self._vehicle.name)
+        except CampaignError as fault:
+            meant = meant_by(doubts_of(answers, line.facts))
+            raise CommissioningRefusedError("vehicle_unusable", f"{fault}{meant}") from None
+
+    def _require_allowed(self) -> None:
+        if self._vehicle.why_not_allowed is not None:
+            raise CommissioningRefusedError("not_allowed", self._vehicle.why_not_allowed)
+
+
+def _anew(answers: VehicleAnswers | None, line: LineChoice) -> dict[str, Any]:
+    """Fields that a changed answer resets: its doubts, and the result of the drive so far."""
+    doubts = () if answers is None else doubts_of(answers, line.facts)
+    return {"doubts": doubts, "confirmed": (), "learned": None, "fault": None}
+
+
+def _not_driven(underway: Underway) -> dict[str, Any]:
+    """Fields that restart the drive, as before its first window."""
+    doubts = underway.with_doubts_of_drive(())
+    return {"batches": (), "open_batch": None, "learned": None, "fault": None, "doubts": doubts}

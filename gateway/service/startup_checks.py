@@ -1,0 +1,61 @@
+"""Checks before the start: whether a service with these settings can work, as far as known without the bus."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from gateway.bus.live import what_lacks
+from gateway.bus.signals import SignalMap
+from gateway.config import Settings
+from gateway.errors import ConfigurationError
+from gateway.records import Signal
+from gateway.web import TokenFile, refuse_open_address
+
+
+def startable_faults(settings: Settings, signal_map: SignalMap) -> Iterator[str]:
+    """Faults that would prevent the start or a fresh estimate, each with its remedy."""
+    yield from _signals_that_lack(signal_map)
+    yield from _store_that_cannot_be_written(settings.store.directory)
+    lacking = what_lacks(settings.bus.interface)
+    if lacking is not None:
+        yield lacking
+    if settings.broadcast.interface is not None and (lacking := what_lacks(settings.broadcast.interface)) is not None:
+        yield lacking.replace("[bus]", "[broadcast]")
+    try:
+        refuse_open_address(settings.web.host, has_tokens=_has_tokens(settings))
+    except ConfigurationError as fault:
+        yield str(fault)
+    if settings.web.stale_after_s < settings.batch.window_s:
+        yield (
+            f"[web] stale_after_s = {settings.web.stale_after_s:g} is below [batch] window_s = "
+            f"{settings.batch.window_s:g}: every estimate would be stale before the next; set it to three windows"
+        )
+
+
+def _signals_that_lack(signal_map: SignalMap) -> Iterator[str]:
+    """Missing signals: weighing needs two inertial signals and a speed."""
+    mapped = set(signal_map.signals)
+    for signal in (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE):
+        if signal not in mapped:
+            yield f"{signal_map.name} maps no {signal}, which every estimate needs: add [signals.{signal}]"
+    if not mapped & {Signal.SPEED, Signal.WHEEL_SPEED}:
+        yield f"{signal_map.name} maps no speed, which every estimate needs: add [signals.speed]"
+
+
+def _store_that_cannot_be_written(directory: Path) -> Iterator[str]:
+    """Faults of the store's directory; a directory of another user is not checked for write permission."""
+    there = next(path for path in (directory, *directory.absolute().parents) if path.exists())
+    if not there.is_dir():
+        yield f"[store] directory = {directory}: {there} is a file; name a folder"
+    elif os.statvfs(there).f_flag & os.ST_RDONLY:
+        yield f"[store] directory = {directory}: is on a read-only file system; name a folder elsewhere"
+    elif not os.access(there, os.W_OK | os.X_OK) and (there != directory or there.stat().st_uid == os.geteuid()):
+        yield f"[store] directory = {directory}: {there} cannot be written; chmod u+w it, or name another folder"
+
+
+def _has_tokens(settings: Settings) -> bool:
+    """Whether the service has tokens; also true if this user may not read the file."""
+    try:
+        return bool(TokenFile(settings.store.directory / "tokens.json").tokens())
+    except ConfigurationError:
+        return True

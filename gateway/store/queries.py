@@ -1,0 +1,153 @@
+"""Queries to the journal on disk: pages of records, the newest of a kind, the position of an uplink."""
+
+import json
+import sqlite3
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from gateway.history import BATCHES, ENTRIES, Delivery
+from gateway.records import json_line
+from gateway.store.rows import JOURNAL_COLUMNS, JournalRow, checksum
+
+LAST: Final = (1 << 63) - 1  # SQLite's largest integer
+# Read texts as bytes: a flipped bit may break UTF-8, and the checksum covers the bytes on disk.
+_STORED: Final = (
+    "seq, CAST(kind AS BLOB), CAST(id AS BLOB), revision, t_end_ns, previous, received_ns, CAST(text AS BLOB), crc"
+)
+# SQLite would abort the whole query at a text that is not JSON.
+_WITHOUT_SPECTRA: Final = "CASE WHEN json_valid(text) THEN CAST(json_remove(text, '$.spectra') AS BLOB) END"
+
+OnBad = Callable[[Sequence[int]], None]
+Stored = tuple[Any, ...]  # a row of the journal as SQLite gives it
+
+
+@dataclass(frozen=True, slots=True)
+class JournalQuery:
+    """Selection of records; ``after_seq`` None: from the first, or from the last if ``newest_first``."""
+
+    kinds: tuple[str, ...]
+    after_seq: int | None = None
+    since_ns: int | None = None
+    until_ns: int | None = None
+    newest_first: bool = False
+
+    def holds(self, row: JournalRow) -> bool:
+        if row.kind not in self.kinds:
+            return False
+        if not (self.since_ns or -LAST) <= row.t_end_ns < (LAST if self.until_ns is None else self.until_ns):
+            return False
+        if self.after_seq is None:
+            return True
+        return row.seq < self.after_seq if self.newest_first else row.seq > self.after_seq
+
+
+def is_good(row: Stored) -> bool:
+    """Whether a row matches its checksum."""
+    *columns, crc = row
+    return bool(checksum(columns) == crc)
+
+
+def page(
+    connection: sqlite3.Connection, window: JournalQuery, limit: int, on_bad: OnBad, *, with_spectra: bool = True
+) -> list[JournalRow]:
+    """Up to ``limit`` records with a valid checksum; the numbers of the others are passed to ``on_bad``."""
+    shown = "NULL" if with_spectra else _WITHOUT_SPECTRA
+    good: list[JournalRow] = []
+    bad: list[int] = []
+    after = window.after_seq
+    while len(good) < limit:
+        wanted = limit - len(good)
+        found = _rows_behind(connection, window, after, wanted, shown)
+        for *stored, bare in found:
+            row = tuple(stored)
+            if is_good(row):
+                good.append(_decoded(row if bare is None else (*row[:-2], bare, row[-1])))
+            else:
+                bad.append(row[0])
+        if len(found) < wanted:
+            break
+        after = found[-1][0]
+    if bad:
+        on_bad(bad)
+    return good
+
+
+def stored_row(connection: sqlite3.Connection, seq: int) -> Stored | None:
+    """One row as stored in the file."""
+    found: Stored | None = connection.execute(f"SELECT {_STORED} FROM journal WHERE seq = ?", (seq,)).fetchone()
+    return found
+
+
+def delivery(connection: sqlite3.Connection, uplink: str, kinds: Sequence[str]) -> Delivery:
+    """The position of an uplink on disk, with the number of waiting records of these kinds."""
+    epoch = connection.execute("SELECT id FROM epochs").fetchone()
+    sql = "SELECT seq, n_pruned, n_pruned_entries FROM uplinks WHERE name = ?"
+    found = connection.execute(sql, (uplink,)).fetchone()
+    seq, n_pruned, n_pruned_entries = found or (-1, 0, 0)
+    marks = ", ".join("?" * len(kinds))
+    n, first = connection.execute(
+        f"SELECT count(*), min(seq) FROM journal WHERE kind IN ({marks}) AND seq > ?", (*kinds, seq)
+    ).fetchone()
+    oldest = connection.execute("SELECT CAST(received_ns AS INTEGER) FROM journal WHERE seq = ?", (first,)).fetchone()
+    return Delivery(
+        cursor=f"{epoch[0]}-{seq}" if found and epoch else None,
+        n_pruned=n_pruned,
+        n_waiting=n,
+        oldest_ns=None if oldest is None else oldest[0],
+        n_pruned_entries=n_pruned_entries,
+    )
+
+
+def count_pruned(connection: sqlite3.Connection, condition: str, asked: tuple[object, ...]) -> None:
+    """Before rows are removed under ``condition``: add the undelivered ones to the counts of each uplink."""
+    for column, kinds in (("n_pruned", BATCHES), ("n_pruned_entries", ENTRIES)):
+        marks = ", ".join(f"'{kind}'" for kind in kinds)
+        connection.execute(
+            f"UPDATE uplinks SET {column} = {column} + (SELECT count(*) FROM journal"
+            f" WHERE {condition} AND kind IN ({marks}) AND journal.seq > uplinks.seq)"
+            f" WHERE EXISTS (SELECT 1 FROM journal WHERE {condition} AND journal.seq > uplinks.seq)",
+            (*asked, *asked),
+        )
+
+
+def without_spectra(text: str) -> str:
+    record = json.loads(text)
+    record.pop("spectra", None)
+    return json_line(record)
+
+
+def _rows_behind(
+    connection: sqlite3.Connection, window: JournalQuery, after: int | None, limit: int, shown: str
+) -> list[Stored]:
+    """Find the next numbers of each kind in an index, then read only the rows of the result."""
+    beyond, order = ("<", "DESC") if window.newest_first else (">", "ASC")
+    start = after if after is not None else (LAST if window.newest_first else -LAST)
+    is_timed = window.since_ns is not None or window.until_ns is not None
+    index, within = "journal_by_kind", ""
+    times: tuple[int, ...] = ()
+    if is_timed:
+        index, within = "journal_by_time", "AND t_end_ns >= ? AND t_end_ns < ?"
+        times = (
+            -LAST if window.since_ns is None else window.since_ns,
+            LAST if window.until_ns is None else window.until_ns,
+        )
+    of_kind = (
+        f"SELECT seq FROM (SELECT seq FROM journal INDEXED BY {index}"
+        f" WHERE kind = ? AND seq {beyond} ? {within} ORDER BY seq {order} LIMIT ?)"
+    )
+    sql = f"""
+        SELECT {_STORED}, {shown} FROM journal WHERE seq IN (
+            SELECT seq FROM ({" UNION ALL ".join([of_kind] * len(window.kinds))}) ORDER BY seq {order} LIMIT ?
+        ) ORDER BY seq {order}
+        """
+    asked = [value for kind in window.kinds for value in (kind, start, *times, limit)]
+    return connection.execute(sql, (*asked, limit)).fetchall()
+
+
+def _decoded(row: Stored) -> JournalRow:
+    seq, kind, record_id, revision, t_end_ns, previous, received_ns, text, _ = row
+    return JournalRow(seq, kind.decode(), record_id.decode(), revision, t_end_ns, previous, received_ns, text.decode())
+
+
+INSERT: Final = f"INSERT INTO journal ({JOURNAL_COLUMNS}, crc) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)"

@@ -1,0 +1,207 @@
+"""/api/v1/known-weights: a known weight conditions every later estimate, until it is taken back.
+
+``/calibration/tare`` and ``/calibration/tickets`` are the same list, of one kind each.
+"""
+
+from collections.abc import Sequence
+from typing import Annotated, Final, Literal, Protocol
+
+from fastapi import APIRouter, Path, Query, Request
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from starlette.responses import Response
+
+from gateway.core.known_weights import KnownWeightKind
+from gateway.stated import KnownWeightFields
+from gateway.stated_weight import StatedWeight
+from gateway.web.routes.service_calls import REFUSALS, call_service, token_name
+from gateway.web.routes.stated_weights import Stated
+from gateway.web.schemas import Body, problem_responses
+
+KNOWN_WEIGHTS_PATH: Final = "/known-weights"
+TARE_PATH: Final = "/calibration/tare"
+TICKETS_PATH: Final = "/calibration/tickets"
+EMPTY: Final = (KnownWeightKind.EMPTY,)
+WEIGHED: Final = tuple(kind for kind in KnownWeightKind if kind is not KnownWeightKind.EMPTY)
+
+
+class KnownWeightBackend(Protocol):
+    """The service's known weights. Blocking calls, made in threads; answers are JSON as described below."""
+
+    def state(self, kinds: Sequence[KnownWeightKind] = ...) -> str:
+        """A KnownWeightState."""
+        ...
+
+    def add(self, kind: KnownWeightKind, by: str, note: str | None, stated: StatedWeight | None = None) -> str:
+        """The new KnownWeightEntry; without a stated load, the vehicle is empty now. Raises WeightRefusedError."""
+        ...
+
+    def confirm(self, by: str, entry_id: str) -> str:
+        """The KnownWeightState after it. Raises WeightRefusedError."""
+        ...
+
+    def take_back(self, by: str, entry_id: str, kinds: Sequence[KnownWeightKind] = ...) -> str:
+        """The KnownWeightState after it. Raises WeightRefusedError."""
+        ...
+
+    def take_back_empty(self, by: str, *, to_factory: bool) -> str:
+        """The KnownWeightState after it, of this kind. Raises WeightRefusedError."""
+        ...
+
+
+Note = Annotated[
+    str, Field(max_length=200, description="kept in the history: number of the ticket, scales used, place")
+]
+
+
+class KnownWeightRequest(Body):
+    """What is known, and of what kind."""
+
+    note: Note = ""
+    kind: KnownWeightKind = Field(description="`empty`: it is empty now, and was so while it was last weighed")
+    weight: Stated | None = Field(None, description="not for `empty`; of both axles for `axle_pads`")
+
+    @model_validator(mode="after")
+    def _fits(self) -> "KnownWeightRequest":
+        if (self.kind is KnownWeightKind.EMPTY) != (self.weight is None):
+            raise ValueError("`empty` has no weight, and every other kind has one")
+        if self.kind is KnownWeightKind.AXLE_PADS and self.weight is not None and self.weight.by != "axles":
+            raise ValueError("axle_pads weigh both axles: give front_axle_kg and rear_axle_kg")
+        return self
+
+
+class TareRequest(Body):
+    """The statement that makes a tare."""
+
+    note: Note = ""
+    is_empty: Literal[True] = Field(
+        description="you know that the vehicle is empty, and was during the last weighing (`offer` says when)"
+    )
+
+
+class TicketRequest(Body):
+    """The weight on the ticket."""
+
+    note: Note = ""
+    weight: Stated
+
+
+class KnownWeightEntry(KnownWeightFields):
+    """One known weight: the true load, and its estimate without this entry."""
+
+    state: Literal["in_use", "held", "ended", "other_calibration"] = Field(
+        description="held: it contradicts its estimate by more than three standard deviations; it counts once confirmed"
+    )
+
+
+class OfferedLoad(BaseModel):
+    """The load that was weighed last, with its present estimate."""
+
+    payload_kg: float
+    payload_std_kg: float
+    front_share_pct: float
+    front_share_std_pct: float
+    n_batches: int
+    t_start: str
+    t_end: str
+
+
+class Offer(BaseModel):
+    """Whether "it is empty now" is possible, and for which load; else why not."""
+
+    is_possible: bool
+    reason: str | None = Field(examples=["no_counted_batch"])
+    detail: str | None
+    load: OfferedLoad | None
+
+
+class KnownWeightState(BaseModel):
+    """Every known weight, newest first, and their combined effect."""
+
+    known_weights_id: str | None = Field(description="hash of those in use, as estimates name it; null: there are none")
+    n_teaching: int
+    mean_error_kg: float | None = Field(description="estimate without it minus known weight: mean over those in use")
+    error_std_kg: float | None = Field(description="scatter of these errors; null with fewer than two")
+    offer: Offer
+    fault: str | None = Field(description="what is wrong with the file")
+    history: list[KnownWeightEntry]
+
+
+class UndoQuery(BaseModel):
+    """How many to take back."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    to: Literal["previous", "factory"] = Field("previous", description="the last one, or all of them")
+
+
+EntryId = Annotated[str, Path(max_length=80, description="as the history has it")]
+_ADDED: Final = {**REFUSALS, **problem_responses(400, 422)}
+_CHANGED: Final = {**REFUSALS, **problem_responses(404, 422)}
+
+
+def known_weights_router(service: KnownWeightBackend) -> APIRouter:
+    """The routes of known weights, and those of tare and tickets, which are kinds of them."""
+    router = APIRouter(prefix="/api/v1", tags=["calibration"])
+
+    @router.get(KNOWN_WEIGHTS_PATH, response_model=KnownWeightState)
+    async def known_weights(request: Request) -> Response:
+        """Every known weight, their combined effect, and the load at which "it is empty now" would be taken."""
+        return await call_service(request, service.state)
+
+    @router.post(KNOWN_WEIGHTS_PATH, status_code=201, response_model=KnownWeightEntry, responses=_ADDED)
+    async def add_known_weight(request: Request, claim: KnownWeightRequest) -> Response:
+        """State a known load: it counts from the next batch on. On disk when answered.
+
+        A known weight that contradicts its estimate is kept as `held` and counts once somebody confirms it.
+        """
+        stated = None if claim.weight is None else claim.weight.stated()
+        return await call_service(
+            request, lambda: service.add(claim.kind, token_name(request), claim.note or None, stated), 201
+        )
+
+    @router.post(KNOWN_WEIGHTS_PATH + "/{entry_id}/confirm", response_model=KnownWeightState, responses=_CHANGED)
+    async def confirm_known_weight(request: Request, entry_id: EntryId) -> Response:
+        """Confirm a held known weight: you have seen both numbers, and the known one is right."""
+        return await call_service(request, lambda: service.confirm(token_name(request), entry_id))
+
+    @router.delete(KNOWN_WEIGHTS_PATH + "/{entry_id}", response_model=KnownWeightState, responses=_CHANGED)
+    async def take_back_known_weight(request: Request, entry_id: EntryId) -> Response:
+        """Take one back: from the next batch on all numbers are as if it had never been stated."""
+        return await call_service(request, lambda: service.take_back(token_name(request), entry_id))
+
+    @router.get(TARE_PATH, response_model=KnownWeightState)
+    async def tare_state(request: Request) -> Response:
+        """The known weights of kind `empty`."""
+        return await call_service(request, lambda: service.state(EMPTY))
+
+    @router.post(TARE_PATH, status_code=201, response_model=KnownWeightEntry, responses=_ADDED)
+    async def set_tare(request: Request, claim: TareRequest) -> Response:
+        """State that the vehicle is empty now: the same as a known weight of kind `empty`."""
+        return await call_service(request, lambda: service.add(EMPTY[0], token_name(request), claim.note or None), 201)
+
+    @router.delete(TARE_PATH, response_model=KnownWeightState, responses=_CHANGED)
+    async def undo_tare(request: Request, query: Annotated[UndoQuery, Query()]) -> Response:
+        """Take the last known weight of kind `empty` back, or all of them."""
+        return await call_service(
+            request, lambda: service.take_back_empty(token_name(request), to_factory=query.to == "factory")
+        )
+
+    @router.get(TICKETS_PATH, response_model=KnownWeightState)
+    async def ticket_state(request: Request) -> Response:
+        """The known weights of loads: tickets, axle pads and delivery notes."""
+        return await call_service(request, lambda: service.state(WEIGHED))
+
+    @router.post(TICKETS_PATH, status_code=201, response_model=KnownWeightEntry, responses=_ADDED)
+    async def add_ticket(request: Request, claim: TicketRequest) -> Response:
+        """State a weighbridge's ticket: the same as a known weight of kind `ticket`."""
+        stated = claim.weight.stated()
+        return await call_service(
+            request, lambda: service.add(KnownWeightKind.TICKET, token_name(request), claim.note or None, stated), 201
+        )
+
+    @router.delete(TICKETS_PATH + "/{entry_id}", response_model=KnownWeightState, responses=_CHANGED)
+    async def withdraw_ticket(request: Request, entry_id: EntryId) -> Response:
+        """Take a ticket back."""
+        return await call_service(request, lambda: service.take_back(token_name(request), entry_id, WEIGHED))
+
+    return router
