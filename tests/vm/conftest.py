@@ -1,4 +1,4 @@
-"""One machine for the whole run: booted once, the package under test installed in it. Files run in their order."""
+"""One machine for the whole run: booted once, the package under test installed in it. Files run in any order."""
 
 import fcntl
 import json
@@ -55,12 +55,18 @@ def machine(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReq
 
 
 @pytest.fixture(scope="session")
-def installed(machine: Machine, package: Path) -> Vehicle:
-    """The machine with the package, vcan0 and a running service."""
-    vehicle = Vehicle(machine)
-    vehicle.install(package)
-    vehicle.wait_until(lambda status: True)
-    return vehicle
+def box(machine: Machine) -> Vehicle:
+    """The machine as a vehicle's box, perhaps without the package."""
+    return Vehicle(machine)
+
+
+@pytest.fixture(scope="module")
+def installed(box: Vehicle, package: Path) -> Vehicle:
+    """The box with the package, vcan0 and a running service; a test that removed the package ran in any order."""
+    if not box.is_installed():
+        box.install(package)
+        box.wait_until(lambda status: True)
+    return box
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""The package's own life: upgraded with everything kept, removed, purged without a trace. Runs last."""
+"""The package's own life: upgraded with everything kept, removed, purged without a trace."""
 
 import subprocess
 from collections.abc import Callable
@@ -20,7 +20,7 @@ def newer(package: Path, folder: Path) -> Path:
 def test_upgrade_remove_and_purge(
     installed: Vehicle, package: Path, tmp_path: Path, recovered: Callable[[float], None]
 ) -> None:
-    vehicle = installed  # as it is: after the purge there is nothing to restore
+    vehicle = installed  # as it is: after the purge there is nothing to restore, and the next test installs it again
     kept = f"sha256sum {CONFIG} /etc/springscale/vehicle.json {STATE}/tokens.json"
     before, sums, pid = vehicle.stored(), vehicle.run(kept), vehicle.pid()
     vehicle.machine.write("/root/newer.deb", newer(package, tmp_path).read_bytes())

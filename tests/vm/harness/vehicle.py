@@ -46,6 +46,10 @@ class Vehicle:
         self._token = ""
         self._is_changed = False
 
+    def is_installed(self) -> bool:
+        """Whether the package is there."""
+        return self.machine.succeeds("dpkg-query --show --showformat '${Status}' springscale | grep -q 'ok installed'")
+
     def install(self, package: Path) -> None:
         """As docs/deployment.md tells: package, virtual bus, configuration, token, start."""
         self.machine.write(f"/root/{package.name}", package.read_bytes())
