@@ -28,7 +28,7 @@ from gateway.calibration.axle_weights import (
 )
 from gateway.calibration.campaign import CampaignTable, RunTable
 from gateway.calibration.file import CalibrationFile
-from gateway.calibration.inspection.explained import EXPLAINED, Topic
+from gateway.calibration.inspection.finding import Kind, Topic
 from gateway.cli.calibration import vehicle_block
 from gateway.config import Settings
 from gateway.core.vehicle import Vehicle
@@ -357,9 +357,9 @@ def findings_tables() -> str:
         + table(
             "finding | weight | what it means | what to do",
             (
-                (f"`{kind}`", " or ".join(one.severities), one.means, one.advice)
-                for kind, one in EXPLAINED.items()
-                if one.topic is topic
+                (f"`{kind}`", " or ".join(kind.severities), kind.means, kind.advice)
+                for kind in Kind
+                if kind.topic is topic
             ),
         )
         for topic in Topic

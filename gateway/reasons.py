@@ -36,21 +36,19 @@ class Explanation:
 def _missing(sensor: str) -> Explanation:
     return Explanation(
         Cause.SENSORS,
-        f"the {sensor} sensor was silent, or what it sent was marked not available",
+        f"the {sensor} sensor was silent, or marked its samples as not available",
         "check the signal map and the device",
     )
 
 
 def _stuck(sensor: str) -> Explanation:
     return Explanation(
-        Cause.SENSORS, f"the {sensor} repeated one number for `stuck_s`", "power-cycle or replace the device"
+        Cause.SENSORS, f"the {sensor} repeated the same number for `stuck_s`", "power-cycle or replace the device"
     )
 
 
 def _saturated(sensor: str) -> Explanation:
-    return Explanation(
-        Cause.SENSORS, f"the {sensor} sat at the end of its range", "choose a larger range in the device"
-    )
+    return Explanation(Cause.SENSORS, f"the {sensor} reached the end of its range", "set a larger range in the device")
 
 
 EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
@@ -73,37 +71,37 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         Why.GAP: Explanation(
             Cause.DRIVE,
             "frames of both sensors are missing (`gap_s`, `gap_share_max`), or silence ended the drive (`silence_s`)",
-            "look at drops and bus state in `/api/v1/status`; check wiring and gateway load",
+            "look at dropped frames and the bus state in `/api/v1/status`; check the wiring and the gateway's load",
         ),
         Why.CLOCK_STEP: Explanation(
             Cause.DRIVE,
             "time stamps stepped back by more than `clock_step_s`",
-            "let the clock be set before the service starts",
+            "set the computer's clock before the service starts",
         ),
         Why.TRAILER: Explanation(
             Cause.DRIVE,
-            "a trailer was drawn for too much of the window (the signal `trailer`): it pushes and pulls at the "
-            "vehicle, and its drawbar is no load in it",
+            "the vehicle pulled a trailer for too much of the window (the signal `trailer`): it pushes and pulls at "
+            "the vehicle, and the weight on its drawbar is no load in the vehicle",
             "nothing; the vehicle is weighed again without the trailer",
         ),
         Why.TOO_SLOW: Explanation(
             Cause.DRIVE,
-            "too much of the window below `speed_min_mps`: town, queue, yard",
+            "the speed was below `speed_min_mps` for too much of the window: town traffic, a queue, a yard",
             "nothing; an open road is enough",
         ),
         Why.TOO_FAST: Explanation(
             Cause.DRIVE,
-            "too much of the window above `speed_max_mps`",
+            "the speed was above `speed_max_mps` for too much of the window",
             "check the speed's unit in the signal map",
         ),
         Why.SPEED_SPREAD: Explanation(
             Cause.DRIVE,
-            "speed varied more than the ratio index tolerates, or changed too fast throughout to find even stretches",
-            "steady driving; `cross_spectrum` tolerates more than `ratio_index`",
+            "the speed varied more than the ratio index tolerates, or no stretch was driven at an even speed",
+            "drive more steadily; `cross_spectrum` tolerates more than `ratio_index`",
         ),
         Why.SPEED_UNCALIBRATED: Explanation(
             Cause.DRIVE,
-            "the mean speed is outside those the calibration has seen",
+            "the mean speed is outside the range of the calibration drives",
             "calibrate with drives at this speed too",
         ),
         Why.NOT_ENOUGH_EXCITATION: Explanation(
@@ -111,12 +109,12 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         ),
         Why.SPEED_MISSING: Explanation(
             Cause.SENSORS,
-            "no valid speed for too much of the window (`speed_hold_s`)",
+            "there was no valid speed for too much of the window (`speed_hold_s`)",
             "check the antenna and `valid_when` in the signal map; map `wheel_speed` too",
         ),
         Why.SPEED_FROZEN: Explanation(
             Cause.SENSORS,
-            "the speed repeated one number for `speed_frozen_s` while frames came",
+            "the speed repeated the same number for `speed_frozen_s` although frames arrived",
             "restart the receiver; check its antenna",
         ),
         Why.ACCELERATION_MISSING: _missing("acceleration"),
@@ -128,20 +126,22 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         Why.GRAVITY_MISSING: Explanation(
             Cause.SENSORS,
             "the mean vertical acceleration is far from 9.81 m/s2",
-            "wrong axis, sign, unit or scaling in the signal map, or the device has removed gravity",
+            "check axis, sign, unit and scaling in the signal map, and whether the device removes gravity",
         ),
         Why.TIME_STAMPS: Explanation(
             Cause.SENSORS,
             "time stamps are so uneven, or so many frames are lost, that the sampling times are unknown",
-            "stamp frames in the kernel (socketcan), lighten the computer's load, or name the message `counter` in the "
+            "stamp frames in the kernel (socketcan), reduce the computer's load, or name the message `counter` in the "
             "signal map",
         ),
-        Why.SENSOR_RATE_LOW: Explanation(Cause.SENSORS, "the sensor sends too seldom for `rate_hz`", "raise its rate"),
+        Why.SENSOR_RATE_LOW: Explanation(
+            Cause.SENSORS, "the sensor sends too rarely for `rate_hz`", "increase its rate"
+        ),
         Why.SAMPLE_RATE: Explanation(
             Cause.SENSORS,
-            "the sensors' sampling rate differs from that in calibration by more than a quarter: other vibration "
-            "aliases into their signals",
-            "set the device to the rate that it was calibrated at, or calibrate again at this one",
+            "the sensors' sampling rate differs from that in calibration by more than a quarter, so other vibrations "
+            "alias into their signals",
+            "set the device to its rate in calibration, or calibrate again at this rate",
         ),
         Why.SENSOR_CHANGED: Explanation(
             Cause.SENSORS,
@@ -150,29 +150,29 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         ),
         Why.SENSOR_NOISY: Explanation(
             Cause.SENSORS,
-            "a sensor is more than twice as loud as in calibration, too loud to weigh by",
-            "look for a loose mount, a bad supply or a changed filter or range in the device; or replace it",
+            "a sensor's noise is more than twice that in calibration, too much to weigh",
+            "look for a loose mount, a bad power supply, or a changed filter or range in the device; or replace it",
         ),
         Why.LOAD_CHANGED: Explanation(
             Cause.DRIVE,
-            "the load changed at a stop, and too little was driven with the load before it to weigh that (a minute)",
+            "the load changed at a stop, and the drive with the load before it was too short to weigh (a minute)",
             "nothing; the load after the stop is weighed",
         ),
         Why.SENSOR_DISAGREEMENT: Explanation(
             Cause.SENSORS,
-            "acceleration and pitch rate do not move together as one body does",
-            "check that both sensors sit in the same rigid place and have consistent time stamps",
+            "acceleration and pitch rate do not move like those of one rigid body",
+            "check that both sensors are mounted at one rigid place and have consistent time stamps",
         ),
         Why.WRONG_SIGN: Explanation(
             Cause.SENSORS,
-            "the pitch rate fits the vehicle only when turned over",
-            "turn `sign` of `pitch_rate` in the signal map (positive nose down)",
+            "the pitch rate fits the vehicle only with the opposite sign",
+            "change `sign` of `pitch_rate` in the signal map (positive: nose down)",
         ),
         Why.OUT_OF_RANGE: Explanation(
             Cause.ANSWER,
-            "the 95 % interval lies wholly outside the loads or shares of the calibration plus a margin; for the "
-            "ratio index, R itself does: its intervals grow as fast as its errors",
-            "calibrate with such loads, or check vehicle and sensor",
+            "the 95 % interval lies entirely outside the loads or shares of the calibration plus a margin; for the "
+            "ratio index this holds of R itself, whose intervals grow as fast as its errors",
+            "calibrate with such loads, or check the vehicle and the sensor",
         ),
         Why.TOO_UNCERTAIN: Explanation(
             Cause.ANSWER,
@@ -187,14 +187,14 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         ),
         Why.MODEL_MISFIT: Explanation(
             Cause.ANSWER,
-            "no payload and share explain these spectra as well as calibration leads to expect",
+            "no payload and front share explain these spectra as well as in calibration",
             "make sure that the calibration is this vehicle's; look for a changed tyre, spring or sensor mount; "
             "calibrate again",
         ),
         Why.NO_SOLUTION: Explanation(
             Cause.ANSWER,
             "the search for the load did not settle, or its numbers broke down",
-            "nothing, if it is rare; else check the sensors' signals, and calibrate again",
+            "nothing, if it is rare; otherwise check the sensors' signals, and calibrate again",
         ),
     }
 )

@@ -75,7 +75,9 @@ def test_it_says_in_words_why_a_batch_was_not_weighed(site: str, watched: Watche
     page.goto(site)
     item = page.locator("#rejected li")
     expect(item).to_have_count(1)
-    expect(item).to_contain_text("Too slow: too much of the window below speed_min_mps: town, queue, yard.")
+    expect(item).to_contain_text(
+        "Too slow: the speed was below speed_min_mps for too much of the window: town traffic, a queue, a yard."
+    )
     expect(item).to_contain_text("What to do: nothing; an open road is enough.")
     expect(item).to_contain_text("Gap: frames of both sensors are missing")
 

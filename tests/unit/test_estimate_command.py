@@ -44,7 +44,7 @@ def test_another_vehicles_calibration_is_named_as_the_likely_cause(monkeypatch: 
     fault = said(monkeypatch, log, *unlike)
     assert fault is not None
     assert fault.exit_code == 1
-    assert "model_misfit (1 batch): no payload and share explain these spectra" in str(fault)
+    assert "model_misfit (1 batch): no payload and front share explain these spectra" in str(fault)
     assert "What to do: make sure that the calibration is this vehicle's" in str(fault)
     likely = (
         "The likely cause: this is not the log of the vehicle that was calibrated, paper_van (wheelbase 2.8 m, 1240 kg"

@@ -16,7 +16,6 @@ from gateway.calibration.inspection import (
     inspect_campaign,
 )
 from gateway.calibration.inspection.campaign import load_findings
-from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.inspection.loads import _Labelled, compare_loads
 from gateway.calibration.known_run import KnownRun
@@ -128,8 +127,8 @@ def test_a_run_sampled_at_another_rate_calibrates_nothing(runs: list[KnownRun]) 
     assert Kind.RATE_DIFFERS in [finding.kind for finding in verdicts[-1].findings]
 
 
-FAULT = finding_of(Kind.PITCH_RATE_SIGN, Severity.FAULT, "it is turned")
-WARNING = finding_of(Kind.SMOOTH_ROAD, Severity.WARNING, "it is smooth")
+FAULT = Finding.of(Kind.PITCH_RATE_SIGN, "it is turned")
+WARNING = Finding.of(Kind.SMOOTH_ROAD, "it is smooth")
 
 
 def inspection(*findings: tuple[Finding, ...]) -> Inspection:

@@ -30,7 +30,7 @@ def test_how_a_log_was_read_is_told(facts: LogFacts, kinds: list[Kind]) -> None:
 
 def test_a_piece_beyond_the_end_says_where_the_log_ends() -> None:
     (finding,) = log_findings(replace(SOUND, start_s=2000.0, span_ns=None))
-    assert finding.text == "the log lasts 900 s, the run begins at 2000 s"
+    assert finding.text == "the log lasts 900 s, and the run begins at 2000 s"
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,10 @@ def test_a_piece_beyond_the_end_says_where_the_log_ends() -> None:
     ],
 )
 def test_two_runs_on_one_drive_are_found(other: LogFacts, load: tuple[float, float], numbers: list[int]) -> None:
-    told = list(same_drive_findings({1: SOUND, 2: other}, {1: EMPTY, 2: load}))
+    runs = [KnownRun(1, "a.log", *EMPTY, ()), KnownRun(2, "b.log", *load, ())]
+    told = list(
+        same_drive_findings([SplitRun(run, run, log=log) for run, log in zip(runs, (SOUND, other), strict=True)])
+    )
     assert [number for number, _ in told] == numbers
     assert all("runs 1 and 2" in finding.text for _, finding in told)
 

@@ -3,7 +3,7 @@
 Drives cut in two come in (``SplitRun``: batches, facts of the rows and of the log); an ``Inspection`` goes out: a
 verdict with findings for every run, findings about all runs together, and the reason if no calibration is possible.
 Logs, rows, axes and signs, and loads are checked in this order; a fault excludes its run from the calibration.
-``explained`` contains the words and the advice for every kind of finding; docs/findings.md is made from it.
+The table of kinds (``finding``) has the words and the advice for each; docs/findings.md is made from it.
 """
 
 from gateway.calibration.inspection.campaign import Inspection, inspect_campaign

@@ -19,7 +19,6 @@ import numpy as np
 
 from gateway.calibration.half_car import KnownSpectra, fit_half_car, prior_of
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
-from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.estimator import COHERENCE_BAND_HZ
@@ -179,31 +178,29 @@ def apart_findings(spectra: CrossSpectra, seen: Phases) -> Iterator[Finding]:
     coherence, likely = mean_coherence(spectra), seen.likely
     is_vehicle = likely.best >= LEAST_AGREEMENT and USUAL_SCALE[0] <= likely.scale <= USUAL_SCALE[1]
     if coherence < LEAST_COHERENCE and not is_vehicle:
-        text = f"coherence of pitch_rate and vertical_acceleration is {coherence:.2f}, their phases agree with a "
-        yield finding_of(Kind.PITCH_RATE_AXIS, Severity.FAULT, f"{text}vehicle's by {likely.best:.2f}")
+        text = f"coherence of pitch_rate and vertical_acceleration is {coherence:.2f}, and their phases agree with a "
+        yield Finding.of(Kind.PITCH_RATE_AXIS, f"{text}vehicle's by {likely.best:.2f}")
 
 
 def phase_findings(seen: Phases, speed_misread: str | None) -> Iterator[Finding]:
     """Unit of the speed, unit and sign of the pitch rate, if the vertical acceleration is right."""
     if speed_misread is not None:
-        text = f"phases agree with the vehicle's by {seen.best:.2f} if {speed_misread}, by far less as it is"
-        yield finding_of(Kind.SPEED_UNIT, Severity.FAULT, text)
-    yield from _scale_findings(seen.likely)
+        text = f"the phases agree with the vehicle's by {seen.best:.2f} if {speed_misread}, and by far less otherwise"
+        yield Finding.of(Kind.SPEED_UNIT, text)
+    scale = seen.likely.scale
+    if not SCALE_RANGE[0] <= scale <= SCALE_RANGE[1]:
+        text = f"pitch_rate is {scale:.3g} times that of a vehicle with this vertical acceleration"
+        yield Finding.of(Kind.PITCH_RATE_UNIT, text + unit_slip(scale, UNIT_RANGE))
     if seen.is_turned:
-        text = f"phases agree with the vehicle's by {seen.turned.best:.2f} turned over, "
-        yield finding_of(Kind.PITCH_RATE_SIGN, Severity.FAULT, f"{text}by {seen.upright.best:.2f} as they are")
+        text = f"the phases agree with the vehicle's by {seen.turned.best:.2f} with the opposite sign, "
+        yield Finding.of(Kind.PITCH_RATE_SIGN, f"{text}by {seen.upright.best:.2f} with this one")
 
 
-def _scale_findings(seen: Agreement) -> Iterator[Finding]:
-    if SCALE_RANGE[0] <= seen.scale <= SCALE_RANGE[1]:
-        return
-    text = f"pitch_rate is {seen.scale:.3g} times what a vehicle has beside this vertical acceleration"
-    if UNIT_RANGE[0] <= seen.scale / DEGREES <= UNIT_RANGE[1]:
-        yield finding_of(Kind.PITCH_RATE_UNIT, Severity.FAULT, f"{text}: deg/s taken for rad/s")
-    elif UNIT_RANGE[0] <= seen.scale * DEGREES <= UNIT_RANGE[1]:
-        yield finding_of(Kind.PITCH_RATE_UNIT, Severity.FAULT, f"{text}: rad/s taken for deg/s")
-    else:
-        yield finding_of(Kind.PITCH_RATE_UNIT, Severity.FAULT, text)
+def unit_slip(ratio: float, within: tuple[float, float]) -> str:
+    """The mistake of a rate's unit that leaves a ratio to the expected ``within`` this range; empty if none does."""
+    if within[0] <= ratio / DEGREES <= within[1]:
+        return ": deg/s read as rad/s"
+    return ": rad/s read as deg/s" if within[0] <= ratio * DEGREES <= within[1] else ""
 
 
 def position_findings(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> Iterator[Finding]:
@@ -217,7 +214,7 @@ def position_findings(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) ->
         is_wrong = off_m > max(POSITION_WRONG_M, doubt_m)
         by_spectra = f"{position_m:.2f} ± {Z95 * std_m:.2f} m (95 %)"
         text = f"sensor_position_m is {vehicle.sensor_position_m:g}, the spectra say {by_spectra}"
-        yield finding_of(Kind.SENSOR_POSITION, Severity.FAULT if is_wrong else Severity.WARNING, text)
+        yield Finding.of(Kind.SENSOR_POSITION, text, Severity.FAULT if is_wrong else Severity.WARNING)
 
 
 def fitted_position_m(spectra: CrossSpectra, run: KnownRun, vehicle: Vehicle) -> tuple[float, float]:

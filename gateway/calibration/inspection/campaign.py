@@ -6,16 +6,22 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.loads import compare_loads
 from gateway.calibration.inspection.log import SplitRun, same_drive_findings
-from gateway.calibration.inspection.roll_sign import RollSign, roll_sign_of
+from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import is_other_rate
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
+
+SPEED_DIFFERS_BY: Final = 0.2  # chosen: of the median run's speed
+BEYOND_RANGE_BY: Final = 0.25  # chosen: of the range
+SMOOTHER_BY: Final = 4.0  # chosen: factor of the vertical acceleration
+ALIKE_SHARE: Final = 0.05  # of the empty mass: the scatter of the ratio index over five minutes
+SHARES_ALIKE_PCT: Final = 1.0  # chosen: twice the default error of the empty share
+TOGETHER: Final = 0.97  # chosen: correlation above which payload and share cannot be separated
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +48,8 @@ class Inspection:
         left = [one for one in self.usable if one.has_identification]
         if not stated:
             return (
-                "no run is meant for identification: identification_fraction or the runs' split leave nothing to "
-                "calibrate from"
+                "no run is meant for identification: identification_fraction or the runs' split leaves nothing to "
+                "calibrate with"
             )
         if not left:
             return "no run can be used"
@@ -54,26 +60,16 @@ class Inspection:
     @property
     def warnings(self) -> tuple[str, ...]:
         """The warnings that a calibration file records."""
-        return tuple(self._warnings())
-
-    def _warnings(self) -> Iterator[str]:
-        yield from (f"{one.kind}: {one.text}" for one in self.findings if one.severity is not Severity.NOTE)
+        warnings = [f"{one.kind}: {one.text}" for one in self.findings if one.severity is not Severity.NOTE]
         for verdict in self.verdicts:
             kept = Severity.WARNING if verdict.is_usable else Severity.FAULT
             what = f"run {verdict.number}" if verdict.is_usable else f"run {verdict.number} left out"
-            yield from (f"{what}: {one.kind}: {one.text}" for one in verdict.findings if one.severity is kept)
+            warnings += [f"{what}: {one.kind}: {one.text}" for one in verdict.findings if one.severity is kept]
+        return tuple(warnings)
 
 
 def _payloads_kg(runs: Sequence[SplitRun]) -> set[float]:
     return {one.identification.payload_kg for one in runs}
-
-
-SPEED_DIFFERS_BY: Final = 0.2  # chosen: of the median run's speed
-BEYOND_RANGE_BY: Final = 0.25  # chosen: of the range
-SMOOTHER_BY: Final = 4.0  # chosen: factor of the vertical acceleration
-ALIKE_SHARE: Final = 0.05  # of the empty mass: the scatter of the ratio index over five minutes
-SHARES_ALIKE_PCT: Final = 1.0  # chosen: twice the default error of the empty share
-TOGETHER: Final = 0.97  # chosen: correlation above which payload and share cannot be separated
 
 
 def inspect_campaign(
@@ -81,11 +77,7 @@ def inspect_campaign(
 ) -> tuple[tuple[RunVerdict, ...], tuple[Finding, ...]]:
     """A verdict for every run in the order given, and the findings about the campaign as a whole."""
     verdicts = {one.identification.number: inspect_run(one, vehicle, settings) for one in drives}
-    for number, finding in (
-        *_same_drives(drives),
-        *_beyond_range(drives, vehicle),
-        *_beside_the_others(drives),
-    ):
+    for number, finding in (*same_drive_findings(drives), *_beyond_range(drives, vehicle), *_beside_the_others(drives)):
         verdicts[number] = _with(verdicts[number], finding)
     sound = [
         one.identification for one in drives if one.has_identification and verdicts[one.identification.number].is_usable
@@ -96,27 +88,15 @@ def inspect_campaign(
     roll_sign = roll_sign_of(usable, vehicle)
     if roll_sign is not None and roll_sign.sign < 0:
         for run in usable:
-            verdicts[run.number] = _with(verdicts[run.number], _turned_over(roll_sign))
-    untold = [_untold(roll_sign)] if roll_sign is not None and roll_sign.sign == 0 else []
-    return tuple(verdicts.values()), (*load_findings(usable, vehicle), *untold)
-
-
-def _turned_over(roll_sign: RollSign) -> Finding:
-    return finding_of(Kind.ROLL_RATE_SIGN, Severity.FAULT, roll_sign.why)
-
-
-def _untold(roll_sign: RollSign) -> Finding:
-    return finding_of(Kind.ROLL_RATE_SIGN_UNTOLD, Severity.NOTE, roll_sign.why)
+            verdicts[run.number] = _with(verdicts[run.number], Finding.of(Kind.ROLL_RATE_SIGN, roll_sign.why))
+    findings = list(load_findings(usable, vehicle))
+    if roll_sign is not None and roll_sign.sign == 0:
+        findings.append(Finding.of(Kind.ROLL_RATE_SIGN_UNTOLD, roll_sign.why))
+    return tuple(verdicts.values()), tuple(findings)
 
 
 def _with(verdict: RunVerdict, finding: Finding) -> RunVerdict:
     return replace(verdict, findings=(*verdict.findings, finding))
-
-
-def _same_drives(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Finding]]:
-    runs = {one.identification.number: one for one in drives}
-    loads = {number: (one.run.payload_kg, one.run.front_share_pct) for number, one in runs.items()}
-    return same_drive_findings({number: one.log for number, one in runs.items()}, loads)
 
 
 def _beyond_range(drives: Sequence[SplitRun], vehicle: Vehicle) -> Iterator[tuple[int, Finding]]:
@@ -125,7 +105,7 @@ def _beyond_range(drives: Sequence[SplitRun], vehicle: Vehicle) -> Iterator[tupl
         payload_kg = one.identification.payload_kg
         if payload_kg > high_kg + BEYOND_RANGE_BY * (high_kg - low_kg):
             text = f"{payload_kg:g} kg, payload_range_kg ends at {high_kg:g} kg"
-            yield one.identification.number, finding_of(Kind.LOAD_BEYOND_RANGE, Severity.WARNING, text)
+            yield one.identification.number, Finding.of(Kind.LOAD_BEYOND_RANGE, text)
 
 
 def _beside_the_others(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Finding]]:
@@ -142,14 +122,14 @@ def _beside_the_others(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Findin
     usual_mps, usual_mps2, usual_hz = (float(np.median(of_runs)) for of_runs in (speeds_mps, shaking_mps2, rates_hz))
     for (number, _), speed_mps, shakes_mps2, rate_hz in zip(runs, speeds_mps, shaking_mps2, rates_hz, strict=True):
         if is_other_rate(rate_hz, usual_hz, usual_hz):
-            text = f"the sensors send {rate_hz:.3g} times a second, in the median run {usual_hz:.3g} times"
-            yield number, finding_of(Kind.RATE_DIFFERS, Severity.FAULT, text)
+            text = f"the sensors send {rate_hz:.3g} times a second, those of the median run {usual_hz:.3g} times"
+            yield number, Finding.of(Kind.RATE_DIFFERS, text)
         if abs(speed_mps / usual_mps - 1.0) > SPEED_DIFFERS_BY:
             text = f"mean of {speed_mps:.1f} m/s, the median run {usual_mps:.1f} m/s"
-            yield number, finding_of(Kind.SPEED_DIFFERS, Severity.NOTE, text)
+            yield number, Finding.of(Kind.SPEED_DIFFERS, text)
         if shakes_mps2 * SMOOTHER_BY < usual_mps2:
             text = f"vertical acceleration scatters by {shakes_mps2:.2g} m/s2, in the median run by {usual_mps2:.2g}"
-            yield number, finding_of(Kind.SMOOTH_ROAD, Severity.WARNING, text)
+            yield number, Finding.of(Kind.SMOOTH_ROAD, text)
 
 
 def load_findings(runs: Sequence[KnownRun], vehicle: Vehicle) -> Iterator[Finding]:
@@ -159,13 +139,13 @@ def load_findings(runs: Sequence[KnownRun], vehicle: Vehicle) -> Iterator[Findin
     loads = sorted({(run.payload_kg, round(run.front_share_pct, 2)) for run in runs})
     payload_kg, share_pct = (np.array(column) for column in zip(*loads, strict=True))
     if np.ptp(payload_kg) == 0.0:
-        yield finding_of(Kind.ONE_LOAD_ONLY, Severity.WARNING, f"{payload_kg[0]:g} kg in every run that can be used")
+        yield Finding.of(Kind.ONE_LOAD_ONLY, f"{payload_kg[0]:g} kg in every run that can be used")
         return
     if np.ptp(payload_kg) < ALIKE_SHARE * vehicle.empty_mass_kg:
         text = f"{payload_kg.min():g} to {payload_kg.max():g} kg on a vehicle of {vehicle.empty_mass_kg:g} kg"
-        yield finding_of(Kind.LOADS_ALIKE, Severity.WARNING, text)
+        yield Finding.of(Kind.LOADS_ALIKE, text)
     if np.ptp(share_pct) < SHARES_ALIKE_PCT:
         text = f"{share_pct.min():.1f} to {share_pct.max():.1f} %"
-        yield finding_of(Kind.SHARES_ALIKE, Severity.WARNING, text)
+        yield Finding.of(Kind.SHARES_ALIKE, text)
     elif len(loads) >= 3 and abs(correlation := float(np.corrcoef(payload_kg, share_pct)[0, 1])) > TOGETHER:
-        yield finding_of(Kind.LOAD_AND_SHARE_TOGETHER, Severity.WARNING, f"their correlation is {correlation:.2f}")
+        yield Finding.of(Kind.LOAD_AND_SHARE_TOGETHER, f"their correlation is {correlation:.2f}")

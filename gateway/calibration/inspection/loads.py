@@ -14,8 +14,7 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.half_car import KnownSpectra, fit_half_car, half_car_calibration, known_spectra, prior_of
-from gateway.calibration.inspection.explained import finding_of
-from gateway.calibration.inspection.finding import Finding, Kind, Severity
+from gateway.calibration.inspection.finding import Finding, Kind
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.located import locate
@@ -171,31 +170,21 @@ class _Labelled:
 
 
 def _swap_findings(all_runs: _Labelled, i: int, j: int, evidence: float) -> Iterator[tuple[int, Finding]]:
-    numbers = [all_runs.known[n].run.number for n in (i, j)]
-    text = f"exchanging the loads of runs {numbers[0]} and {numbers[1]} explains the drives better: "
-    text += f"evidence {evidence:.0f}, {LEAST_EVIDENCE:g} is beyond doubt"
-    for n in (i, j):
-        yield (
-            all_runs.known[n].run.number,
-            finding_of(Kind.LOADS_SWAPPED, Severity.FAULT, text + _weighed(all_runs, n, (i, j))),
-        )
-
-
-def _weighed(all_runs: _Labelled, i: int, left_out: Sequence[int]) -> str:
-    """The weight that the other sound runs find for run i, in words; empty if too few are left."""
-    if len(all_runs.known) - len(left_out) < LEAST_OTHERS:
-        return ""
-    point, _ = all_runs.weighed_by_others(i, left_out)
-    return f"; the other runs weigh this one at {_load(point.load)}, not {_stated(all_runs, i)}"
+    runs = {n: all_runs.known[n].run for n in (i, j)}
+    text = f"exchanging the loads of runs {runs[i].number} and {runs[j].number} explains the drives better: evidence "
+    text += f"{evidence:.0f}, where {LEAST_EVIDENCE:g} is beyond doubt"
+    for n, run in runs.items():
+        others = ""
+        if len(all_runs.known) - 2 >= LEAST_OTHERS:
+            point, _ = all_runs.weighed_by_others(n, (i, j))
+            others = f"; the other runs weigh this one at {_load(point.load)}, not {_load(run.load)}"
+        yield run.number, Finding.of(Kind.LOADS_SWAPPED, text + others)
 
 
 def _disagreement(all_runs: _Labelled, i: int, weighed: Point) -> tuple[int, Finding]:
-    text = f"the other runs weigh this one at {_load(weighed.load)}, the file says {_stated(all_runs, i)}"
-    return all_runs.known[i].run.number, finding_of(Kind.LOAD_DISAGREES, Severity.WARNING, text)
-
-
-def _stated(all_runs: _Labelled, i: int) -> str:
-    return _load(all_runs.known[i].run.load)
+    run = all_runs.known[i].run
+    text = f"the other runs weigh this one at {_load(weighed.load)}, but the file states {_load(run.load)}"
+    return run.number, Finding.of(Kind.LOAD_DISAGREES, text)
 
 
 def _load(load: Load) -> str:

@@ -1,11 +1,10 @@
-"""Findings about a drive's log before its rows are inspected: is it readable, and is it used for this drive only?"""
+"""A drive as it is inspected, and findings about its log: is it readable, and is it used for this drive only?"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 
-from gateway.calibration.inspection.explained import finding_of
-from gateway.calibration.inspection.finding import Finding, Kind, Severity
+from gateway.calibration.inspection.finding import Finding, Kind
 from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.known_run import KnownRun
 from gateway.records import Batch, Signal
@@ -32,31 +31,12 @@ class LogFacts:
 def log_findings(facts: LogFacts) -> Iterator[Finding]:
     """At most one fault: no log, or no piece of it; or a warning that some of it was lost."""
     if facts.unreadable is not None:
-        yield finding_of(Kind.LOG_UNREADABLE, Severity.FAULT, facts.unreadable)
+        yield Finding.of(Kind.LOG_UNREADABLE, facts.unreadable)
     elif facts.span_ns is None:
-        text = f"the log lasts {facts.duration_s:.0f} s, the run begins at {facts.start_s:g} s"
-        yield finding_of(Kind.CUT_AWAY, Severity.FAULT, text)
+        text = f"the log lasts {facts.duration_s:.0f} s, and the run begins at {facts.start_s:g} s"
+        yield Finding.of(Kind.CUT_AWAY, text)
     elif facts.damage is not None:
-        yield finding_of(Kind.LOG_DAMAGED, Severity.WARNING, facts.damage)
-
-
-def same_drive_findings(
-    logs: Mapping[int, LogFacts], loads: Mapping[int, tuple[float, float]]
-) -> Iterator[tuple[int, Finding]]:
-    """Runs, by number, that are the same piece of the same log: all but the first; all of them if loads differ."""
-    for one, other in combinations(logs, 2):
-        if _is_same_drive(logs[one], logs[other]):
-            is_same_load = loads[one] == loads[other]
-            text = f"runs {one} and {other} are the same drive" + ("" if is_same_load else " with two different loads")
-            numbers: Sequence[int] = (other,) if is_same_load else (one, other)
-            for number in numbers:
-                yield number, finding_of(Kind.SAME_DRIVE, Severity.FAULT, text)
-
-
-def _is_same_drive(one: LogFacts, other: LogFacts) -> bool:
-    if not one.sha256 or one.sha256 != other.sha256 or one.span_ns is None or other.span_ns is None:
-        return False
-    return one.span_ns[0] < other.span_ns[1] and other.span_ns[0] < one.span_ns[1]
+        yield Finding.of(Kind.LOG_DAMAGED, facts.damage)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,3 +63,20 @@ class SplitRun:
     def run(self) -> KnownRun:
         """The part to inspect."""
         return self.identification if self.has_identification else self.validation
+
+
+def same_drive_findings(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Finding]]:
+    """Runs, by number, that are the same piece of the same log: all but the first; all of them if loads differ."""
+    for one, other in combinations(drives, 2):
+        if _is_same_drive(one.log, other.log):
+            numbers = (one.identification.number, other.identification.number)
+            is_same_load = one.run.load == other.run.load
+            text = f"runs {numbers[0]} and {numbers[1]} are the same drive"
+            for number in numbers[1:] if is_same_load else numbers:
+                yield number, Finding.of(Kind.SAME_DRIVE, text if is_same_load else f"{text} with two different loads")
+
+
+def _is_same_drive(one: LogFacts, other: LogFacts) -> bool:
+    if not one.sha256 or one.sha256 != other.sha256 or one.span_ns is None or other.span_ns is None:
+        return False
+    return one.span_ns[0] < other.span_ns[1] and other.span_ns[0] < one.span_ns[1]

@@ -8,7 +8,6 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE, Traits
 from gateway.core.settings import BatchSettings
@@ -99,12 +98,12 @@ def unmapped_findings(facts: RowFacts) -> Iterator[Finding]:
     if not facts.streams:
         return
     if Signal.SPEED not in facts.streams and Signal.WHEEL_SPEED not in facts.streams:
-        yield finding_of(Kind.SIGNAL_UNMAPPED, Severity.FAULT, "neither speed nor wheel_speed is in the signal map")
+        yield Finding.of(Kind.SIGNAL_UNMAPPED, "neither speed nor wheel_speed is in the signal map")
     absent = [signal for signal in INERTIAL if signal not in facts.streams]
     if absent:
         severity = Severity.FAULT if len(absent) == len(INERTIAL) else Severity.WARNING
         text = f"{' and '.join(absent)} {'are' if len(absent) > 1 else 'is'} not in the signal map"
-        yield finding_of(Kind.SIGNAL_UNMAPPED, severity, f"{text}; axes and loads cannot be checked")
+        yield Finding.of(Kind.SIGNAL_UNMAPPED, f"{text}; axes and loads cannot be checked", severity)
 
 
 def rate_findings(
@@ -119,15 +118,15 @@ def rate_findings(
         if stream.n < 2:
             text = f"{signal} has {stream.n} samples in the whole run"
             why = f": {why_silent[signal]}" if signal in why_silent else ""
-            yield finding_of(Kind.SENSOR_SILENT, severity, text + why)
+            yield Finding.of(Kind.SENSOR_SILENT, text + why, severity)
         elif stream.rate_hz < RATE_MIN_SHARE * settings.rate_hz:
             text = (
                 f"{signal} comes at {stream.rate_hz:.3g} Hz, at least {RATE_MIN_SHARE * settings.rate_hz:g} are needed"
             )
-            yield finding_of(Kind.RATE_LOW, severity, text)
+            yield Finding.of(Kind.RATE_LOW, text, severity)
         elif not stream.jitter_share <= JITTER_SHARE_MAX:
             share = f"{100.0 * stream.jitter_share:.0f} %" if isfinite(stream.jitter_share) else "more than a whole one"
-            yield finding_of(Kind.JITTER, Severity.WARNING, f"intervals of {signal} are off by {share} of their length")
+            yield Finding.of(Kind.JITTER, f"intervals of {signal} are off by {share} of their length")
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,19 +144,17 @@ def gravity_findings(facts: RowFacts) -> tuple[Mended, list[Finding]]:
         return Mended(), []
     if _carries_gravity_instead(facts):
         text = f"vertical_acceleration has mean {stream.mean:.3g}, pitch_rate has {facts.mean(Signal.PITCH_RATE):.3g}"
-        return Mended(is_axis_sound=False), [finding_of(Kind.CHANNELS_SWAPPED, Severity.FAULT, text)]
+        return Mended(is_axis_sound=False), [Finding.of(Kind.CHANNELS_SWAPPED, text)]
     reads = f"vertical_acceleration has mean {stream.mean:.3g} m/s2"
     if abs(stream.mean + STANDARD_GRAVITY_MPS2) <= GRAVITY_TOLERANCE_MPS2:
-        return Mended(factor=-1.0), [finding_of(Kind.ACCELERATION_SIGN, Severity.FAULT, reads)]
+        return Mended(factor=-1.0), [Finding.of(Kind.ACCELERATION_SIGN, reads)]
     for misread, ratio in MISREAD_AS_MPS2.items():
         is_unit = abs(abs(stream.mean) / STANDARD_GRAVITY_MPS2 / ratio - 1.0) <= UNIT_TOLERANCE
         if is_unit and stream.std < STEADY_SHARE * abs(stream.mean):
             factor = np.sign(stream.mean) / ratio
             turned = "" if factor > 0.0 else ", and its axis points down"
-            return Mended(factor=float(factor)), [
-                finding_of(Kind.ACCELERATION_UNIT, Severity.FAULT, f"{reads}: {misread}{turned}")
-            ]
-    return Mended(is_axis_sound=False), [finding_of(Kind.ACCELERATION_AXIS, Severity.FAULT, reads + _elsewhere(facts))]
+            return Mended(factor=float(factor)), [Finding.of(Kind.ACCELERATION_UNIT, f"{reads}: {misread}{turned}")]
+    return Mended(is_axis_sound=False), [Finding.of(Kind.ACCELERATION_AXIS, reads + _elsewhere(facts))]
 
 
 def _carries_gravity_instead(facts: RowFacts) -> bool:
@@ -180,7 +177,7 @@ def bias_findings(facts: RowFacts) -> Iterator[Finding]:
     """A pitch rate whose mean no vehicle has."""
     bias = facts.mean(Signal.PITCH_RATE)
     if abs(bias) > BIAS_MAX_RADPS:
-        yield finding_of(Kind.PITCH_RATE_BIAS, Severity.WARNING, f"pitch_rate has mean {np.degrees(bias):.3g} deg/s")
+        yield Finding.of(Kind.PITCH_RATE_BIAS, f"pitch_rate has mean {np.degrees(bias):.3g} deg/s")
 
 
 def stands_still_but_shakes(facts: RowFacts) -> bool:

@@ -19,7 +19,6 @@ from gateway.calibration.inspection.axes import (
     position_findings,
     reading_of,
 )
-from gateway.calibration.inspection.explained import finding_of
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.log import SplitRun, log_findings
 from gateway.calibration.inspection.roll import (
@@ -129,8 +128,8 @@ def _swapped_finding(drive: SplitRun, vehicle: Vehicle, acceleration: Mended, ag
     axes, exchanged_agreement = _axes_findings(batches, seen, drive, vehicle, acceleration)
     if _PITCH_IS_NONE & _kinds(axes):
         return None
-    text = f"phases agree with the vehicle's by {exchanged_agreement:.2f} exchanged, by {agreement:.2f} as they are"
-    return finding_of(Kind.RATES_SWAPPED, Severity.FAULT, text)
+    text = f"the phases agree with the vehicle's by {exchanged_agreement:.2f} when exchanged, else by {agreement:.2f}"
+    return Finding.of(Kind.RATES_SWAPPED, text)
 
 
 def _if_speed_misread(
@@ -150,8 +149,7 @@ def _excitation_findings(
 ) -> Iterator[Finding]:
     rms_mps2 = spectra.acceleration_rms_mps2 * abs(acceleration.factor)
     if rms_mps2 < SMOOTH_MPS2:
-        text = f"vertical acceleration is {rms_mps2:.2g} m/s2 (root mean square)"
-        yield finding_of(Kind.SMOOTH_ROAD, Severity.WARNING, text)
+        yield Finding.of(Kind.SMOOTH_ROAD, f"vertical acceleration is {rms_mps2:.2g} m/s2 (root mean square)")
     low_hz, high_hz = spectra.freq_hz[1], spectra.freq_hz[-2]
     for signal, rms in (
         (Signal.VERTICAL_ACCELERATION, spectra.acceleration_rms_mps2),
@@ -164,15 +162,14 @@ def _excitation_findings(
         steps_rms = stream.resolution * sqrt((high_hz - low_hz) / (6.0 * stream.rate_hz))  # q^2 / 12 over half the rate
         share = (steps_rms / max(rms, np.finfo(float).tiny)) ** 2
         if share > STEPS_SHARE_MAX:
-            text = f"{min(share, 1.0):.0%} of {signal}'s power is its steps of {stream.resolution:.3g}"
-            yield finding_of(Kind.COARSE_RESOLUTION, Severity.WARNING, text)
+            text = f"{min(share, 1.0):.0%} of the power of {signal} comes from its steps of {stream.resolution:.3g}"
+            yield Finding.of(Kind.COARSE_RESOLUTION, text)
 
 
 def _speed_findings(drive: SplitRun, settings: BatchSettings) -> Iterator[Finding]:
     """Speed missing, frozen or outside the gate: a fault if that alone leaves no batch, else a warning."""
     if _is_standing(drive, settings):
-        text = "the speed reads 0 from beginning to end, the vehicle shakes as it does when driven"
-        yield finding_of(Kind.SPEED_FROZEN, Severity.FAULT, text)
+        yield Finding.of(Kind.SPEED_FROZEN, "the speed is always 0, but the vehicle shakes as it does when driven")
     if _is_too_short(drive, settings):
         return
     is_lost = all(batch.rejected for batch in drive.identification.batches)
@@ -181,12 +178,10 @@ def _speed_findings(drive: SplitRun, settings: BatchSettings) -> Iterator[Findin
         share = _share(drive.batches, why)
         if share >= REASON_SHARE_MIN and _is_mapped(drive.facts):
             severity = Severity.FAULT if is_lost and share > ruinous else Severity.WARNING
-            yield finding_of(kind, severity, f"{share:.0%} of the drive")
+            yield Finding.of(kind, f"{share:.0%} of the drive", severity)
     outside = _share(drive.batches, Why.TOO_SLOW) + _share(drive.batches, Why.TOO_FAST)
     if is_lost and outside > ruinous:  # towns and stops cost time, no more
-        yield finding_of(
-            Kind.SPEED_OUTSIDE_GATE, Severity.FAULT, f"{outside:.0%} of the drive{_speeds(drive, settings)}"
-        )
+        yield Finding.of(Kind.SPEED_OUTSIDE_GATE, f"{outside:.0%} of the drive{_speeds(drive, settings)}")
 
 
 def _is_mapped(facts: RowFacts) -> bool:
@@ -212,9 +207,9 @@ def _speeds(drive: SplitRun, settings: BatchSettings) -> str:
     speed = drive.facts.streams.get(Signal.SPEED)
     if speed is None:
         return ""
-    text = f": {speed.low:.3g} to {speed.high:.3g} m/s, the gate is {settings.speed_min_mps:g} to "
+    text = f": {speed.low:.3g} to {speed.high:.3g} m/s, permitted are {settings.speed_min_mps:g} to "
     text += f"{settings.speed_max_mps:g}"
-    for factor, mistake in ((3.6, "m/s taken for km/h"), (1.0 / 3.6, "km/h taken for m/s")):
+    for factor, mistake in ((3.6, "m/s read as km/h"), (1.0 / 3.6, "km/h read as m/s")):
         if settings.speed_min_mps <= factor * speed.low and factor * speed.high <= settings.speed_max_mps:
             text += f" ({factor * speed.low:.3g} to {factor * speed.high:.3g} if it is {mistake})"
     return text
@@ -232,13 +227,12 @@ def _masked_findings(drive: SplitRun) -> Iterator[Finding]:
         shares = {why: _share(drive.batches, why) for why in whys}
         if sum(shares.values()) > MASKED_SHARE_NOTED:
             text = ", ".join(f"{why} {share:.1%} of the drive" for why, share in shares.items() if share > 0.0)
-            yield finding_of(kind, Severity.WARNING, text)
+            yield Finding.of(kind, text)
 
 
 def _unsteady_findings(drive: SplitRun) -> Iterator[Finding]:
     if any(not batch.rejected for batch in drive.identification.batches):
-        text = f"fewer than {LEAST_SEGMENTS} unbroken stretches of 5 s at even speed"
-        yield finding_of(Kind.UNSTEADY, Severity.WARNING, text)
+        yield Finding.of(Kind.UNSTEADY, f"fewer than {LEAST_SEGMENTS} unbroken stretches of 5 s at even speed")
 
 
 def _batch_findings(drive: SplitRun, settings: BatchSettings, *, has_fault: bool) -> Iterator[Finding]:
@@ -250,14 +244,14 @@ def _batch_findings(drive: SplitRun, settings: BatchSettings, *, has_fault: bool
         if _is_standing(drive, settings):
             return
         longest_s = max((batch.duration_s for batch in batches), default=0.0)
-        text = f"of the {drive.facts.duration_s:.0f} s driven the longest unbroken stretch for identification lasts "
-        text += f"{longest_s:.0f} s, a batch needs {_needed_s(settings):.0f} s"
-        yield finding_of(Kind.TOO_SHORT, Severity.FAULT, text)
+        longest = f"{longest_s:.0f} of {drive.facts.duration_s:.0f} s"
+        text = f"the longest unbroken identification stretch lasts {longest}; a batch needs {_needed_s(settings):.0f} s"
+        yield Finding.of(Kind.TOO_SHORT, text)
     elif all(batch.rejected for batch in batches):
         if not has_fault:
-            yield finding_of(Kind.NO_USABLE_BATCH, Severity.FAULT, f"{len(batches)} batches: {_reasons(batches)}")
+            yield Finding.of(Kind.NO_USABLE_BATCH, f"{len(batches)} batches: {_reasons(batches)}")
     elif lost := [one for one in batches if one.rejected and Why.TOO_SHORT not in one.rejected]:  # ends are no loss
-        yield finding_of(Kind.BATCHES_LOST, Severity.NOTE, f"{len(lost)} of {len(batches)} batches: {_reasons(lost)}")
+        yield Finding.of(Kind.BATCHES_LOST, f"{len(lost)} of {len(batches)} batches: {_reasons(lost)}")
 
 
 def _reasons(batches: Sequence[Batch]) -> str:

@@ -16,7 +16,9 @@ class ReasonInWords(BaseModel):
 
     reason: Why = Field(examples=[Why.TOO_SLOW])
     cause: Cause = Field(examples=[Cause.DRIVE])
-    happened: str = Field(examples=["too much of the window below `speed_min_mps`: town, queue, yard"])
+    happened: str = Field(
+        examples=["the speed was below `speed_min_mps` for too much of the window: town traffic, a queue, a yard"]
+    )
     advice: str = Field(examples=["nothing; an open road is enough"])
 
 
