@@ -77,8 +77,8 @@ def typical_budget(budgets: Sequence[tuple[BudgetLine, ...]]) -> tuple[BudgetLin
 
 
 def _line(source: str, std: np.ndarray, posterior: Posterior) -> BudgetLine:
-    cg_left_m = float(std[CG_LEFT]) if posterior.size > CG_LEFT else math.nan
-    return BudgetLine(source, float(std[PAYLOAD]), float(std[FRONT_SHARE]), cg_left_m)
+    front_share_pct, cg_left_m = (float(std[i]) if posterior.size > i else math.nan for i in (FRONT_SHARE, CG_LEFT))
+    return BudgetLine(source, float(std[PAYLOAD]), front_share_pct, cg_left_m)
 
 
 def _with_remedy(line: BudgetLine, posterior: Posterior, is_shape_said: bool, is_empty_weighed: bool) -> BudgetLine:

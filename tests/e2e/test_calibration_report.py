@@ -185,6 +185,8 @@ def test_one_sensor_reports_what_it_can(tmp_path: Path) -> None:
     assert list(numbers["errors"]) == ["ratio_index"]
     assert numbers["errors"]["ratio_index"]["left_one_run_out"]["front_share"]["mean_abs_pct"] is None
     assert numbers["plan"] is None
+    reasons = {reason["rule"]: reason["text"] for reason in numbers["verdicts"][0]["reasons"]}
+    assert "Mostly due to" in reasons["payload_half_width"]
     page = Page((report / "report.html").read_text(encoding="utf-8"))
     assert {"ratio-index", "accuracy-ratio-index"} <= set(page.ids)
 

@@ -27,6 +27,7 @@ from gateway.calibration.plan import Expected
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate, Quantity
 from gateway.posterior import Posterior, Source
+from gateway.reasons import REMEDIES, SOURCES
 from gateway.records import Why
 
 VAN = Vehicle(
@@ -118,6 +119,8 @@ def test_the_width_names_its_main_cause_and_what_would_narrow_it() -> None:
         "Mostly due to the length and height of this very load: state in the vehicle's data what it carries, with its "
         "length and height (then ± 69 kg)."
     )
+    text = next(one.text for one in verdict(rows).reasons if one.rule == "front_share_half_width")
+    assert text.endswith(f"Mostly due to {SOURCES['day']}: {REMEDIES[Remedy.WEIGH_EMPTY]}.")
 
 
 def test_batches_of_one_run_say_no_more_of_coverage_than_the_run() -> None:

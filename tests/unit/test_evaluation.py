@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from support.calibrated import calibration_file
 from support.drives import T0_NS, drive, joined, later
 
-from gateway.calibration.judgement import Comparison, Judged, error_table, errors_of, judge
+from gateway.calibration.judgement import Comparison, Judged, error_table, errors_of, judge, width_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.calibrated import CalibratedVehicle
@@ -191,6 +191,16 @@ def test_a_sound_batch_is_answered_with_spread_and_origin() -> None:
     assert found.front_share.number == pytest.approx(48.0)
     assert found.ratio_index_acceleration > 0.0
     assert found.calibration_id == calibration_file().id
+
+
+def test_what_is_judged_names_the_main_cause_of_its_width() -> None:
+    run = KnownRun(1, "a.log", 100.0, 50.0, (BATCH,))
+    table = error_table(judge([run], calibration_file().for_core(), "ratio_index"), VAN, "ratio_index")
+    assert table.to_json()["batches"][0]["error_budget"]
+    width = width_of(table.judged, table.errors.payload, "payload")
+    assert width is not None
+    assert width.cause is not None
+    assert "Mostly due to" in width.sentence
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from gateway.budget import BudgetLine, budget_of, typical_budget
+from gateway.budget import BudgetLine, typical_budget
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import Campaign
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.judgement.evaluation import ErrorTable, Judged, Target, error_table, judge
-from gateway.core.cargo import is_said
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.vehicle import Vehicle
 
@@ -69,7 +68,7 @@ class Assessment:
     outcome: Outcome | None = None
 
 
-def stated_budget(judgement: Judgement, vehicle: Vehicle) -> tuple[BudgetLine, ...]:
+def stated_budget(judgement: Judgement) -> tuple[BudgetLine, ...]:
     """The sources of the error that the service states, over batches weighed as it weighs; empty if none was.
 
     Runs left out are not such batches: their shape is known to be that of the other known loads.
@@ -77,9 +76,8 @@ def stated_budget(judgement: Judgement, vehicle: Vehicle) -> tuple[BudgetLine, .
     part = next(
         (one for one in (BatchSet.VALIDATION, BatchSet.ALL, BatchSet.IDENTIFICATION) if one in judgement.tables), None
     )
-    posteriors = [one.estimate.posterior for one in judgement.tables[part].judged] if part else []
-    is_shape_said = is_said(vehicle)
-    budgets = [budget_of(one, is_shape_said=is_shape_said) for one in posteriors if one is not None]
+    judged = judgement.tables[part].judged if part else ()
+    budgets = [one.estimate.error_budget for one in judged if one.estimate.error_budget]
     return typical_budget(budgets) if budgets else ()
 
 

@@ -1,23 +1,25 @@
 """The error table of equation (12): estimates compared with weighed loads."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, nan
 from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from gateway.budget import budget_of
 from gateway.calibration.judgement.coverage import interval_scores
 from gateway.calibration.judgement.sideways import CgLeftErrors, JudgedLoad, WheelErrors, cg_left_errors, wheel_errors
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
+from gateway.core.cargo import is_said
 from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.core.weights import NOT_CALIBRATED, Unsprung, weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.posterior import Source
-from gateway.records import F64, Why
+from gateway.records import F64, Batch, Why
 
 Target = Literal["payload", "front_share"]
 TARGETS: Final[tuple[Target, ...]] = get_args(Target)
@@ -257,7 +259,7 @@ def judge(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: st
             run.name,
             run.payload_kg,
             run.front_share_pct,
-            weighed(_beside_known(estimate(batch, calibrated, estimator)), calibrated.vehicle, calibrated.unsprung),
+            weighed(_budgeted(batch, calibrated, estimator), calibrated.vehicle, calibrated.unsprung),
             _noted_cg_left_m(run, calibrated.vehicle),
             calibrated.unsprung,
         )
@@ -266,9 +268,16 @@ def judge(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: st
     ]
 
 
-def _beside_known(found: Estimate) -> Estimate:
-    """Known loads are placed by the stated front share of the empty vehicle: its error is in both and cancels."""
-    return found if found.posterior is None else found.answered(found.posterior.without(Source.EMPTY_SHARE))
+def _budgeted(batch: Batch, calibrated: CalibratedVehicle, estimator: str) -> Estimate:
+    """The estimate with its error budget. Known loads are placed by the stated front share of the empty vehicle: its
+    error is in both and cancels.
+    """
+    found = estimate(batch, calibrated, estimator)
+    if found.posterior is None:
+        return found
+    beside_known = found.posterior.without(Source.EMPTY_SHARE)
+    budget = budget_of(beside_known, is_shape_said=is_said(calibrated.vehicle))
+    return replace(found.answered(beside_known), error_budget=budget)
 
 
 def _noted_cg_left_m(run: KnownRun, vehicle: Vehicle) -> float:

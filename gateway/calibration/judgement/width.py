@@ -61,9 +61,11 @@ class Width:
         return f"{said} Mostly due to {source}{self._remedy(self.cause)}."
 
     def _remedy(self, cause: BudgetLine) -> str:
-        if cause.remedy is None or self.target != "payload":
+        """What narrows it; how far is known for the payload only."""
+        if cause.remedy is None:
             return ""
-        return f": {REMEDIES[cause.remedy]} (then ± {Z95 * cause.payload_with_remedy_kg:.0f} kg)"
+        after = f" (then ± {Z95 * cause.payload_with_remedy_kg:.0f} kg)" if self.target == "payload" else ""
+        return f": {REMEDIES[cause.remedy]}{after}"
 
 
 def width_of(judged: Sequence[Judged], errors: TargetErrors, target: Target) -> Width | None:

@@ -81,7 +81,7 @@ def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: LoadPlan |
 
 
 def _evaluation_sections(assessment: Assessment) -> list[Section]:
-    accuracy = [accuracy_section(one, stated_budget(one, assessment.vehicle)) for one in assessment.judgements]
+    accuracy = [accuracy_section(one, stated_budget(one)) for one in assessment.judgements]
     return [*accuracy, provenance_section(assessment)]
 
 
@@ -179,7 +179,7 @@ def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...], plan: Loa
             for one in assessment.judgements
         },
         "error_budget": {
-            one.estimator: budget_to_json(stated_budget(one, assessment.vehicle)) for one in assessment.judgements
+            one.estimator: budget_to_json(stated_budget(one)) for one in assessment.judgements
         },
         "plan": plan.to_json() if plan else None,
     }
