@@ -9,6 +9,7 @@ from gateway.bus.signals import SignalMap
 from gateway.config import Settings
 from gateway.errors import ConfigurationError
 from gateway.records import Signal
+from gateway.store import why_no_database
 from gateway.web import TokenFile, refuse_open_address
 
 
@@ -43,7 +44,10 @@ def _signals_that_lack(signal_map: SignalMap) -> Iterator[str]:
 
 
 def _store_that_cannot_be_written(directory: Path) -> Iterator[str]:
-    """Faults of the store's directory; a directory of another user is not checked for write permission."""
+    """Faults of the store's directory, found by making a database in it, or in the folder that it would be made in.
+
+    A directory of another user, to which this one may not write, is not checked.
+    """
     there = next(path for path in (directory, *directory.absolute().parents) if path.exists())
     if not there.is_dir():
         yield f"[store] directory = {directory}: {there} is a file; name a folder"
@@ -51,6 +55,8 @@ def _store_that_cannot_be_written(directory: Path) -> Iterator[str]:
         yield f"[store] directory = {directory}: is on a read-only file system; name a folder elsewhere"
     elif not os.access(there, os.W_OK | os.X_OK) and (there != directory or there.stat().st_uid == os.geteuid()):
         yield f"[store] directory = {directory}: {there} cannot be written; chmod u+w it, or name another folder"
+    elif os.access(there, os.W_OK | os.X_OK) and (why := why_no_database(there)) is not None:
+        yield f"[store] directory = {directory}: {there} cannot hold a database ({why}); name a folder on a disk"
 
 
 def _has_tokens(settings: Settings) -> bool:

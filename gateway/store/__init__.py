@@ -7,6 +7,7 @@ including the records that are not yet on disk. If the disk fails, the store rep
 from gateway.store.follower import Follower
 from gateway.store.reader import Latest, ServiceEvent, StoreReader
 from gateway.store.retention import Retention
+from gateway.store.schema import why_no_database
 from gateway.store.writer import Store
 
-__all__ = ["Follower", "Latest", "Retention", "ServiceEvent", "Store", "StoreReader"]
+__all__ = ["Follower", "Latest", "Retention", "ServiceEvent", "Store", "StoreReader", "why_no_database"]

@@ -1,7 +1,9 @@
 """The schema of the database: one journal, one table of documents, and the positions of its followers."""
 
 import sqlite3
+from contextlib import suppress
 from pathlib import Path
+from secrets import token_hex
 from typing import Final
 
 from gateway.errors import StoreRefusedError
@@ -63,6 +65,20 @@ def connect_writer(path: Path) -> sqlite3.Connection:
         connection.close()
         raise
     return connection
+
+
+def why_no_database(directory: Path) -> str | None:
+    """Why an existing directory cannot hold a database, found by making one and removing it; None if it can."""
+    path = directory / f".springscale-check-{token_hex(8)}.db"
+    try:
+        connect_writer(path).close()
+    except (OSError, sqlite3.Error) as fault:
+        return str(fault)
+    finally:
+        for name in (path.name, f"{path.name}-journal", f"{path.name}-wal", f"{path.name}-shm"):
+            with suppress(OSError):
+                (directory / name).unlink()
+    return None
 
 
 def connect_reader(path: Path) -> sqlite3.Connection:

@@ -2,8 +2,10 @@
 
 import importlib.util
 import re
+import sqlite3
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 from click.testing import CliRunner, Result
@@ -91,6 +93,34 @@ def test_a_store_that_cannot_be_written_is_not_called_good(tmp_path: Path) -> No
     config.write_text(config.read_text().replace(str(tmp_path / "state"), "/proc/sys/springscale"))
     again = CliRunner().invoke(springscale, ["check-config", str(config)])
     assert "directory = /proc/sys/springscale: " in str(again.exception)
+
+
+@pytest.mark.parametrize("virtual", ["/proc/springscale", "/proc/self/fd/springscale", "/sys/fs/springscale"])
+def test_a_store_in_a_file_system_without_files_is_not_called_good(virtual: str, tmp_path: Path) -> None:
+    """Root may write there, as permissions go; still no database can be made."""
+    checked(tmp_path)
+    config = tmp_path / "springscale.toml"
+    config.write_text(config.read_text().replace(str(tmp_path / "state"), virtual))
+    found = CliRunner().invoke(springscale, ["check-config", str(config)])
+    assert isinstance(found.exception, ConfigurationError)
+    assert f"directory = {virtual}: " in str(found.exception)
+
+
+def test_a_store_is_tried_and_nothing_is_left_behind(tmp_path: Path) -> None:
+    (tmp_path / "state").mkdir()
+    assert checked(tmp_path).exit_code == 0
+    assert list((tmp_path / "state").iterdir()) == []
+
+
+def test_a_store_on_a_full_disk_is_not_called_good(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(path: Path) -> NoReturn:
+        path.write_text("half a page")
+        raise sqlite3.OperationalError("database or disk is full")
+
+    monkeypatch.setattr("gateway.store.schema.connect_writer", full)
+    found = checked(tmp_path)
+    assert f"{tmp_path} cannot hold a database (database or disk is full)" in str(found.exception)
+    assert [path.name for path in tmp_path.iterdir()] == ["springscale.toml"]
 
 
 def test_every_fault_is_named_at_once(tmp_path: Path) -> None:
