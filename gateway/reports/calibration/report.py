@@ -178,8 +178,6 @@ def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...], plan: Loa
             one.estimator: {str(part): table.to_json() for part, table in one.tables.items()}
             for one in assessment.judgements
         },
-        "error_budget": {
-            one.estimator: budget_to_json(stated_budget(one)) for one in assessment.judgements
-        },
+        "error_budget": {one.estimator: budget_to_json(stated_budget(one)) for one in assessment.judgements},
         "plan": plan.to_json() if plan else None,
     }
