@@ -12,7 +12,7 @@ from typing import Any
 from made import ROOT
 
 sys.path.insert(0, str(ROOT))
-from benchmarks.accuracy.grades_page import limits  # benchmarks are not installed
+from benchmarks.accuracy.grades import limits  # benchmarks are not installed
 from benchmarks.accuracy.phones import BY_PHONE, CAN
 
 

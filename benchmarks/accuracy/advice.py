@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.accuracy.markdown import number, page, table
 from gateway.calibration.inspection import SplitRun
 from gateway.calibration.judgement import errors_of, judge
 from gateway.calibration.judgement.learning_curve import calibrated_on, triples_at_different_positions
@@ -28,6 +29,14 @@ Errors = tuple[float, float]  # mean |error| of payload and front share, percent
 ESTIMATOR: Final = "cross_spectrum"
 LEAST_RUNS: Final = 5  # three, and two to choose from
 BATCH_S: Final = 300.0  # BatchSettings.window_s
+ADVICE_ROWS: Final = (
+    ("before", "three runs"),
+    ("advised", "and the fourth that the plan advises"),
+    ("others", "and another fourth, on average"),
+    ("least", "and the fourth that the plan calls least useful"),
+    ("best", "best fourth by hindsight"),
+    ("worst", "worst fourth by hindsight"),
+)
 OnFit = Callable[[int, int], None]  # (calibrations done, calibrations in all)
 Scored = tuple[Errors, Errors]  # with misses, and of what was answered
 
@@ -237,3 +246,38 @@ def _mean(errors: Any) -> Errors:
 
 def _mean_known(column: np.ndarray) -> float:
     return float(np.mean(column)) if column.size else float("nan")
+
+
+def advice_page(found: Mapping[str, Any]) -> str:
+    """The page in Markdown, from AdviceStudy.to_json."""
+    missed, answered = found["with_misses"], found["answered"]
+    return page(
+        "Does the plan's advice help?",
+        "advice CAMPAIGN.toml --output DIR",
+        f"From each of {missed['n_choices']} triples of runs (the empty one, and two loads at different positions) "
+        "every other run of the campaign is taken as the fourth, and the plan, knowing the triple alone, says "
+        "which it would drive. Judged on the validation part of all runs, the same batches for every choice. Mean "
+        "|error| (12) of payload and of share, cross spectrum: once with every rejected batch counted as a "
+        "mid-range answer, once over answered batches only. The second flatters whoever refuses the hard ones, so "
+        "the first decides. What the plan itself expects after three runs, of the loads the vehicle may carry, "
+        f"is a mean |error| of {' and '.join(_pair(answered['expected']))} %: "
+        "cautious where it lies above what was found.",
+        "",
+        *table(
+            ("Calibrated on", "Payload %", "Share %", "Payload %, answered", "Share %, answered"),
+            [
+                *([what, *_pair(missed[key]), *_pair(answered[key])] for key, what in ADVICE_ROWS),
+                ["the advised one beats the average of the others", *_often(missed), *_often(answered)],
+            ],
+        ),
+        "",
+        on=f" on the campaign of the vehicle `{found['campaign']}`",
+    )
+
+
+def _pair(errors: Sequence[float | None]) -> list[str]:
+    return [number(str(i))({str(i): x}) for i, x in enumerate(errors)]
+
+
+def _often(comparison: Mapping[str, Any]) -> list[str]:
+    return [f"{'none' if x is None else f'{100.0 * x:.0f} %'} of triples" for x in comparison["better_share"]]

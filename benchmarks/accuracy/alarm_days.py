@@ -5,17 +5,13 @@ state of the gross weight's alarm at its end.
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
-from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.accuracy.coverage_drives import stated
 from benchmarks.accuracy.delivery import leg_of
-from benchmarks.accuracy.delivery_days import Day, Said, kept_day
-from benchmarks.accuracy.runner import OnDone, run_each
-from benchmarks.accuracy.vans import van_of
+from benchmarks.accuracy.delivery_days import Day, Said
+from benchmarks.accuracy.drives import stated, van_of
 from gateway.core.alarms import AlarmRules, AlarmState, AlarmWatch
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
@@ -28,14 +24,13 @@ CLASSES: Final = ("far_over", "over", "under", "far_under")
 End = tuple[str, str | None]  # the truth relative to the limit, and the alarm's state at the end of a leg
 
 
-def days(n_days: int, seed: int, *, workers: int = 1, kept: Path | None = None, on_day: OnDone) -> dict[str, Any]:
+def on_days(seed: int, days: Sequence[Day]) -> dict[str, Any]:
     """Legs over all days and limits, by the truth relative to the limit, and how many ended with an early or final
     alarm.
     """
-    legs = [leg for day in run_each(partial(legs_of, kept, seed), n_days, workers, on_day) for leg in day]
-    counts = Counter(legs)
+    counts = Counter(leg for number, day in enumerate(days) for leg in legs_of(seed, number, day))
     return {
-        "n_days": n_days,
+        "n_days": len(days),
         "seed": seed,
         "limits": list(LIMITS),
         "lines": [
@@ -52,9 +47,8 @@ def days(n_days: int, seed: int, *, workers: int = 1, kept: Path | None = None, 
     }
 
 
-def legs_of(kept: Path | None, seed: int, number: int) -> list[tuple[Said, str, str | None]]:
+def legs_of(seed: int, number: int, driven: Day) -> list[tuple[Said, str, str | None]]:
     """The legs of one day for each limit."""
-    driven = kept_day(kept, seed, number)
     vehicle = replace(stated(van_of(seed, number)), unsprung_front_kg=0.0, unsprung_rear_kg=0.0)
     return [
         (said, *leg)

@@ -1,7 +1,5 @@
 """How often alarms are right, and whether they are steady, for loads near a limit with errors as stated.
 
-    alarms(n_loads, seed) -> numbers for alarm_rules.json
-
 No vehicle is simulated. Each load's gross weight has a given distance from the limit in standard deviations of a batch;
 half of each batch's error variance is its own, half is shared by all batches of the load. The errors pass through the
 service's fusion and alarms. Whether real estimates have the stated errors is the subject of docs/coverage.md.
@@ -16,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.accuracy.alarm_days import NEAR
-from benchmarks.accuracy.markdown import page
+from benchmarks.accuracy.markdown import Column, Row, page, table_of, text
 from gateway.core.alarms import AlarmRules, AlarmState, AlarmWatch
 from gateway.core.change import Rules
 from gateway.core.fusion import epoch_of, fused_epoch
@@ -30,17 +28,7 @@ N_LOADS: Final = 500  # chosen: shares to 2 %
 SEED: Final = 20290  # arbitrary
 N_BATCHES: Final = 12  # chosen: of five minutes; an hour with one load
 STD_KG: Final = 15.0  # chosen: of a batch
-DISTANCES: Final = (
-    -3.0,
-    -2.0,
-    -1.0,
-    -0.5,
-    0.0,
-    0.5,
-    1.0,
-    2.0,
-    3.0,
-)  # chosen: of the true weight from the limit, in STD_KG
+DISTANCES: Final = (-3.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 3.0)  # chosen: of the true weight, in STD_KG
 WITHOUT_GAP: Final = 0.9  # a `clear_probability` equal to the early one
 _BATCH_NS: Final = 300 * NS_PER_S  # BatchSettings.window_s
 _LIMIT_PAYLOAD_KG: Final = 700.0  # chosen: of a small van
@@ -53,8 +41,6 @@ _VAN: Final = Vehicle(
     unsprung_rear_kg=100.0,
     gross_limit_kg=1800.0 + _LIMIT_PAYLOAD_KG,
 )
-
-
 _RULES: Final = Rules(_LIMIT_PAYLOAD_KG, _VAN.empty_mass_kg + _LIMIT_PAYLOAD_KG)
 _SHARE_STD_PCT: Final = 0.5  # chosen: has no effect on the gross weight
 
@@ -75,14 +61,14 @@ def alarms(n_loads: int, seed: int, on_line: Callable[[int, int], object] = lamb
     lines = []
     for distance in DISTANCES:
         drawn = np.random.default_rng([seed, round(10 * distance) + 1000]).standard_normal((n_loads, N_BATCHES + 1))
-        told = [told_of(AlarmRules(), distance, *_errors(row)) for row in drawn]
-        jumpy = [told_of(AlarmRules(clear_probability=WITHOUT_GAP), distance, *_errors(row)) for row in drawn]
-        lines.append({"distance": distance, **_line(told), "n_alarms_without_gap": sum(one.n_alarms for one in jumpy)})
+        found = [steps_of(AlarmRules(), distance, *_errors(row)) for row in drawn]
+        jumpy = [steps_of(AlarmRules(clear_probability=WITHOUT_GAP), distance, *_errors(row)) for row in drawn]
+        lines.append({"distance": distance, **_line(found), "n_alarms_without_gap": sum(one.n_alarms for one in jumpy)})
         on_line(len(lines), len(DISTANCES))
     return {"n_loads": n_loads, "seed": seed, "n_batches": N_BATCHES, "std_kg": STD_KG, "lines": lines}
 
 
-def told_of(rules: AlarmRules, distance: float, shared: float, own: list[float]) -> Load:
+def steps_of(rules: AlarmRules, distance: float, shared: float, own: list[float]) -> Load:
     """One load through fusion and alarms; errors are in standard deviations of a batch."""
     watch, epoch = AlarmWatch(replace(rules, off=("imbalance",)), "van"), None
     first: dict[AlarmState, int] = {}
@@ -110,21 +96,20 @@ def _batch(n: int, off: float) -> Estimate:
     return Estimate(n * _BATCH_NS, (n + 1) * _BATCH_NS, "made up").answered(posterior)
 
 
-def _line(told: list[Load]) -> dict[str, Any]:
-    early, final = ([n for n in (getattr(one, which) for one in told) if n] for which in ("early", "final"))
+def _line(loads: list[Load]) -> dict[str, Any]:
+    early, final = ([n for n in (getattr(one, which) for one in loads) if n] for which in ("early", "final"))
     return {
         "n_early": len(early),
         "n_final": len(final),
         "median_early": median(early) if early else None,
         "median_final": median(final) if final else None,
-        "n_alarms": sum(one.n_alarms for one in told),
+        "n_alarms": sum(one.n_alarms for one in loads),
     }
 
 
 def alarms_page(found: Mapping[str, Any]) -> str:
     """The page alarm_rules.md, from the numbers alone."""
     n_loads, rules = found["n_loads"], AlarmRules()
-    rows = [_row(line, n_loads) for line in found["lines"]]
     return page(
         "Alarms: how often they are right",
         f"alarms --loads {n_loads} --seed {found['seed']} --output DIR",
@@ -135,10 +120,7 @@ def alarms_page(found: Mapping[str, Any]) -> str:
         f"{rules.final_batches} batches, over at {100 * rules.clear_probability:g} %. Errors are as large as they "
         "stated; [coverage](coverage.md) says whether that is true of a vehicle.",
         "",
-        "| true weight over the limit, in standard deviations of a batch | warned early | by batch (median) "
-        "| confirmed | by batch (median) | alarms begun | and without a gap between told and over |",
-        "|---|---|---|---|---|---|---|",
-        *rows,
+        *table_of(COLUMNS, ({**line, "n": n_loads} for line in found["lines"])),
         "",
         "Errors that the batches of a load share do not average out: a load at its limit, or a little under it, can be "
         "confirmed by an hour of batches that are all off the same way. Without a gap an alarm would end as soon "
@@ -168,9 +150,7 @@ def _days_section(days: Mapping[str, Any]) -> list[str]:
         f"{limits} % of the rated payload in turn; what counts is how the alarm of the gross weight stands at the end "
         "of each leg that was weighed.",
         "",
-        "| campaign says | the true payload is | legs | no alarm | told early | confirmed |",
-        "|---|---|---|---|---|---|",
-        *(_day_row(line) for line in days["lines"]),
+        *table_of(DAY_COLUMNS, days["lines"]),
         "",
         "What was confirmed stays so through later legs, until their load says no. Where nobody said what the vans "
         "carry, they may weigh too little "
@@ -180,28 +160,32 @@ def _days_section(days: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _day_row(line: Mapping[str, Any]) -> str:
-    n, n_early, n_final = line["n"], line["n_early"], line["n_final"]
-    counts = (n - n_early - n_final, n_early, n_final)
-    shares = (f"{count} ({100 * count / max(n, 1):.0f} %)" for count in counts)
-    said = {"nothing": "nothing", "carries": "that it carries parcels"}[line["said"]]
-    return f"| {said} | {_WORDS[line['truth']].format(near=100 * NEAR)} | {n} | {' | '.join(shares)} |"
+def _part(key: str) -> Callable[[Row], str]:
+    return lambda row: f"{row[key]} ({100 * row[key] / max(row['n'], 1):.0f} %)"
 
 
-def _row(line: Mapping[str, Any], n_loads: int) -> str:
-    def share(n: int) -> str:
-        return f"{n} ({100 * n / n_loads:.0f} %)"
+def _no_alarm(row: Row) -> str:
+    return _part("n_none")({**row, "n_none": row["n"] - row["n_early"] - row["n_final"]})
 
-    def batch(n: float | None) -> str:
-        return "" if n is None else f"{n:g}"
 
-    cells = (
-        f"{line['distance']:+g}",
-        share(line["n_early"]),
-        batch(line["median_early"]),
-        share(line["n_final"]),
-        batch(line["median_final"]),
-        str(line["n_alarms"]),
-        str(line["n_alarms_without_gap"]),
-    )
-    return f"| {' | '.join(cells)} |"
+def _median(key: str) -> Callable[[Row], str]:
+    return lambda row: "" if row[key] is None else f"{row[key]:g}"
+
+
+COLUMNS: Final[tuple[Column, ...]] = (
+    ("true weight over the limit, in standard deviations of a batch", lambda row: f"{row['distance']:+g}"),
+    ("warned early", _part("n_early")),
+    ("by batch (median)", _median("median_early")),
+    ("confirmed", _part("n_final")),
+    ("by batch (median)", _median("median_final")),
+    ("alarms begun", text("n_alarms")),
+    ("and without a gap between the limits of start and end", text("n_alarms_without_gap")),
+)
+DAY_COLUMNS: Final[tuple[Column, ...]] = (
+    ("campaign says", lambda row: {"nothing": "nothing", "carries": "that it carries parcels"}[row["said"]]),
+    ("the true payload is", lambda row: _WORDS[row["truth"]].format(near=100 * NEAR)),
+    ("legs", text("n")),
+    ("no alarm", _no_alarm),
+    ("reported early", _part("n_early")),
+    ("confirmed", _part("n_final")),
+)

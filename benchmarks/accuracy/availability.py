@@ -1,23 +1,19 @@
 """The share of the time on the road that estimates cover, in driving that is slow, short or broken by stops.
 
-    table_of(n_vans, seed) -> a line per world, as Markdown
-
 Every van is calibrated by known loads at 50 km/h and then driven through each world with one load, or with one that
 changes at a stop. A second on the road counts as covered if it is within an estimate that is not provisional.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.accuracy.coverage_drives import MAP_NAME, Scope, unseen_load
 from benchmarks.accuracy.delivery_days import ROAD
-from benchmarks.accuracy.markdown import table
-from benchmarks.accuracy.runner import OnDone, run_each
-from benchmarks.accuracy.vans import FreshVan, fresh_van
+from benchmarks.accuracy.drives import MAP_NAME, FreshVan, Scope, fresh_van, unseen_load
+from benchmarks.accuracy.markdown import Column, number, page, table_of, text
+from benchmarks.accuracy.study import Study
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.core.calibrated import CalibratedVehicle
@@ -154,19 +150,6 @@ def _error_of(one: Estimate, true_kg: float) -> tuple[float, float, bool]:
     return one.payload.number - true_kg, 0.5 * (high - low), low <= true_kg <= high
 
 
-COLUMNS: Final = (
-    "world", "on the road [min]", "covered", "estimates", "refused", "mean error [kg]", "half-width [kg]", "held",
-)  # fmt: skip
-
-
-def table_of(n_vans: int, seed: int = SEED, *, workers: int = 1, on_van: OnDone = lambda done, of: None) -> list[str]:
-    """The table in Markdown."""
-    vans = list(run_each(partial(of_one_van, seed), n_vans, workers, on_van))
-    return table(
-        COLUMNS, [_cells(world.name, found) for world, found in zip(WORLDS, zip(*vans, strict=True), strict=True)]
-    )
-
-
 def of_one_van(seed: int, number: int) -> list[Found]:
     """One van through every world."""
     fresh = fresh_van(Scope(), seed, number)
@@ -175,16 +158,56 @@ def of_one_van(seed: int, number: int) -> list[Found]:
     return [driven(fresh, calibrated, world, one) for world, one in zip(WORLDS, seeds, strict=True)]
 
 
-def _cells(name: str, found: Sequence[Found]) -> list[str]:
+def numbers(seed: int, n: int, vans: Sequence[list[Found]]) -> dict[str, Any]:
+    """A row for each world."""
+    rows = [{"world": world.name, **_row(each)} for world, each in zip(WORLDS, zip(*vans, strict=True), strict=True)]
+    return {"seed": seed, "n_vans": n, "rows": rows}
+
+
+def _row(found: Sequence[Found]) -> dict[str, Any]:
     errors = [error for one in found for error in one.errors_kg]
     moving_s, covered_s = (sum(getattr(one, which) for one in found) for which in ("moving_s", "covered_s"))
-    figures = [f"{np.mean([abs(e[0]) for e in errors]):.1f}", f"{np.mean([e[1] for e in errors]):.0f}"]
-    return [
-        name,
-        f"{moving_s / 60.0:.0f}",
-        f"{100.0 * covered_s / moving_s:.0f} %",
-        str(len(errors)),
-        str(sum(one.n_refused for one in found)),
-        *(figures if errors else ["-", "-"]),
-        f"{sum(e[2] for e in errors)} of {len(errors)}",
-    ]
+    return {
+        "moving_min": moving_s / 60.0,
+        "covered_pct": 100.0 * covered_s / moving_s,
+        "n": len(errors),
+        "n_refused": sum(one.n_refused for one in found),
+        "mean_abs_kg": float(np.mean([abs(error[0]) for error in errors])) if errors else None,
+        "half_width_kg": float(np.mean([error[1] for error in errors])) if errors else None,
+        "n_held": sum(error[2] for error in errors),
+    }
+
+
+COLUMNS: Final[tuple[Column, ...]] = (
+    ("world", text("world")),
+    ("on the road [min]", number("moving_min", 0)),
+    ("covered", lambda row: f"{row['covered_pct']:.0f} %"),
+    ("estimates", text("n")),
+    ("refused", text("n_refused")),
+    ("mean error [kg]", number("mean_abs_kg", 1, unknown="-")),
+    ("half-width [kg]", number("half_width_kg", 0, unknown="-")),
+    ("held", lambda row: f"{row['n_held']} of {row['n']}"),
+)
+
+
+def availability_page(found: Mapping[str, Any]) -> str:
+    """The page in Markdown."""
+    return page(
+        "Time covered by estimates",
+        f"availability --vans {found['n_vans']} --seed {found['seed']}",
+        *table_of(COLUMNS, found["rows"]),
+        "",
+    )
+
+
+STUDY: Final = Study(
+    name="availability",
+    does="How much of the time on the road do estimates cover in slow or broken driving? ~1 minute a van.",
+    doing="driving vans through slow and broken worlds",
+    of_case=of_one_van,
+    numbers=numbers,
+    page=availability_page,
+    seed=SEED,
+    n=2,
+    least=1,
+)

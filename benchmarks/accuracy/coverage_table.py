@@ -131,6 +131,12 @@ def coverage_table(batches: Sequence[JudgedBatch], seed: int, refused: Sequence[
     return CoverageTable(seed, vans, tuple(lines), tuple(refused))
 
 
+def pooled(vans: Sequence[tuple[Sequence[JudgedBatch], Sequence[str]]], seed: int) -> dict[str, Any]:
+    """The table of all vans' batches, with the reasons of impossible calibrations."""
+    batches = [batch for of_van, _ in vans for batch in of_van]
+    return coverage_table(batches, seed, [reason for _, of_van in vans for reason in of_van]).to_json()
+
+
 def _is_of(batch: JudgedBatch, kind: str, estimator: str, has_roll_rate: bool) -> bool:
     return (batch.estimator, batch.has_roll_rate) == (estimator, has_roll_rate) and kind in (batch.kind, ALL_KINDS)
 

@@ -5,19 +5,15 @@ other tyres). It leaves empty and is loaded at the first stop; then parcels are 
 stops nothing happens. Legs last a little over one window, some over two; the bus sleeps while the van stands.
 """
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.accuracy.coverage_drives import MAP_NAME, Scope
+from benchmarks.accuracy.drives import MAP_NAME, Scope, fresh_van
 from benchmarks.accuracy.loads import box
-from benchmarks.accuracy.runner import kept
 from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, scattered
-from benchmarks.accuracy.vans import fresh_van
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.core.calibrated import CalibratedVehicle
@@ -44,8 +40,6 @@ STOP_S: Final = 600.0  # chosen
 ROAD: Final = ObstacleRoad(UnevenRoad(iso_road("B"), stretch_m=400.0, spread=0.4), potholes_per_km=1.0)
 PARCEL_PARTS: Final = (0.08, 0.22)  # chosen: of the rated payload
 N_PARCELS: Final = 6  # chosen
-
-
 FLOOR_PARTS: Final = (0.25, 1.0)  # chosen: of the wheelbase, places of parcels
 PARCEL_EXTENT_M: Final = ((0.3, 1.1), (0.2, 0.9))  # chosen: lengths and heights of single parcels
 
@@ -93,8 +87,8 @@ def day_of(seed: int, number: int) -> Day:
         )
         motion = Decoder(signal_map).decode(Wiring(MAP_NAME).frames_of(simulated.recording))
         for said, flow in flows.items():
-            told = (*flow.feed(motion), *flow.flush())
-            records[said] += [{**estimate_to_json(estimate), "spectra": None} for estimate in told]
+            found = (*flow.feed(motion), *flow.flush())
+            records[said] += [{**estimate_to_json(estimate), "spectra": None} for estimate in found]
         starts_ns.append(start_ns)
         distances_m.append(float(drive.travelled_m[-1]))
         start_ns += round((drive.duration_s + STOP_S) * NS_PER_S)
@@ -130,24 +124,6 @@ def loads_of_legs(van: Vehicle, rng: np.random.Generator) -> list[tuple[Load, ..
             aboard = aboard[1:]
         legs.append(tuple(aboard))
     return legs
-
-
-def kept_day(folder: Path | None, seed: int, number: int) -> Day:
-    """The day, read from ``folder`` if an earlier run stored it there, else simulated and stored."""
-    stored = kept(folder, f"day-{seed}-{number}", lambda: asdict(day_of(seed, number)))
-    return Day(**{name: from_json(stored[name]) for name, from_json in _FROM_JSON.items()})
-
-
-_FROM_JSON: Final[dict[str, Callable[[Any], Any]]] = {
-    "van": str,
-    "rated_kg": float,
-    "payload_kg": tuple,
-    "front_share_pct": tuple,
-    "distance_m": tuple,
-    "leg_start_ns": tuple,
-    "records": dict,
-}
-"""The type of each field of a day, from JSON."""
 
 
 def _parcel(van: Vehicle, rng: np.random.Generator) -> Load:

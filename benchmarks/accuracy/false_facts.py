@@ -1,13 +1,11 @@
 """False facts at commissioning: simulated vans are commissioned with one false answer each, and with true ones.
 
-    false_facts(n_lines, n_right, seed) -> FalseFacts
-
 Each passes the service's steps: the typed answers are checked (``doubts_of``), made a vehicle and compared with its
 line; then its empty drive is fitted and compared with both (``contradictions``). A fact is caught if any step refuses
 it or asks about it. No setting was chosen with these vans: the seed serves this study alone.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
@@ -15,11 +13,11 @@ from typing import Any, Final
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from benchmarks.accuracy.coverage_drives import AS_CALIBRATED, driven
-from benchmarks.accuracy.markdown import page
-from benchmarks.accuracy.runner import OnDone, run_each
-from benchmarks.accuracy.siblings.drives import MIXED, SCOPE, Drawn, draw_line, drawn_van, sister
-from benchmarks.accuracy.siblings.drives import Line as DrawnLine
+from benchmarks.accuracy.drives import AS_CALIBRATED, driven
+from benchmarks.accuracy.lines import MIXED, SCOPE, Drawn, draw_line, drawn_van, sister
+from benchmarks.accuracy.lines import Line as DrawnLine
+from benchmarks.accuracy.markdown import Column, Row, page, table_of, text
+from benchmarks.accuracy.study import Study
 from gateway.calibration.commissioning import NO_LINE, LineFacts, doubts_of, vehicle_table
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.half_car import fit_cross_spectrum
@@ -109,42 +107,18 @@ class Tried:
     caught_by: str
 
 
-@dataclass(frozen=True, slots=True)
-class FalseFacts:
-    """All commissionings of a study."""
-
-    seed: int
-    n_lines: int
-    false: tuple[Tried, ...]
-    right: tuple[Tried, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        """The figures for a file or a page."""
-        return {
-            "seed": self.seed,
-            "n_lines": self.n_lines,
-            "rows": [_row(fact.words, self.false) for fact in FALSE],
-            "right": {str(has): _counts(self.right, has_line=has) for has in (True, False)},
-        }
+Found = tuple[list[Tried], list[Tried]]  # false facts, and true ones
 
 
-def false_facts(
-    n_lines: int = N_LINES,
-    n_right: int = N_RIGHT,
-    seed: int = SEED,
-    *,
-    workers: int = 1,
-    on_van: OnDone = lambda done, of: None,
-) -> FalseFacts:
-    """Every false fact once in each of ``n_lines`` lines, and ``n_right`` vans of these lines with true answers."""
-    of_line = partial(_of_line, seed, n_lines, n_right)
-    found = list(run_each(of_line, n_lines, workers, on_van))
-    return FalseFacts(
-        seed,
-        n_lines,
-        tuple(one for false, _ in found for one in false),
-        tuple(one for _, right in found for one in right),
-    )
+def numbers(seed: int, n: int, lines: Sequence[Found]) -> dict[str, Any]:
+    """Every false fact once in each line, and vans of these lines with true answers."""
+    false, right = ([one for of_line in lines for one in of_line[which]] for which in (0, 1))
+    return {
+        "seed": seed,
+        "n_lines": n,
+        "rows": [_row(fact.words, false) for fact in FALSE],
+        "right": {str(has): _counts(right, has_line=has) for has in (True, False)},
+    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +129,8 @@ class _Known:
     facts: LineFacts
 
 
-def _of_line(seed: int, n_lines: int, n_right: int, number: int) -> tuple[list[Tried], list[Tried]]:
+def of_line(n_lines: int, n_right: int, seed: int, number: int) -> Found:
+    """All false facts in one line, and its part of the ``n_right`` vans with true answers."""
     sister_seeds, false_seeds, right_seeds, other_seeds = np.random.SeedSequence([seed, number]).spawn(4)
     own = _known(_drawn(seed, number), sister_seeds)
     another_seeds, alike_seeds = other_seeds.spawn(2)
@@ -242,19 +217,19 @@ def _commissioned(said: Mapping[str, Any], run: KnownRun, known: _Known | None) 
     return str(found[0].kind) if found else PASSED
 
 
-def _row(words: str, tried: tuple[Tried, ...]) -> dict[str, Any]:
-    mine = tuple(one for one in tried if one.words == words)
+def _row(words: str, tried: Sequence[Tried]) -> dict[str, Any]:
+    mine = [one for one in tried if one.words == words]
     return {"words": words, "with_line": _counts(mine, has_line=True), "without": _counts(mine, has_line=False)}
 
 
-def _counts(tried: tuple[Tried, ...], *, has_line: bool) -> dict[str, Any]:
+def _counts(tried: Sequence[Tried], *, has_line: bool) -> dict[str, Any]:
     mine = [one.caught_by for one in tried if one.has_line is has_line]
     caught = [by for by in mine if by != PASSED]
     return {"n": len(mine), "n_caught": len(caught), "by": sorted(set(caught))}
 
 
 def false_facts_page(found: Mapping[str, Any]) -> str:
-    """The page in Markdown, from FalseFacts.to_json."""
+    """The page in Markdown."""
     rows = found["rows"]
     n_with, n_without = (sum(row[way]["n_caught"] for row in rows) for way in ("with_line", "without"))
     of_with, of_without = (sum(row[way]["n"] for row in rows) for way in ("with_line", "without"))
@@ -268,9 +243,7 @@ def false_facts_page(found: Mapping[str, Any]) -> str:
         "answers are refused or asked about, or the drive contradicts them "
         "([commissioning](commissioning.md#doubts) lists what is asked).",
         "",
-        "| false fact | caught with its line | without a line | by |",
-        "|---|---|---|---|",
-        *(f"| {row['words']} | {_cell(row['with_line'])} | {_cell(row['without'])} | {_by(row)} |" for row in rows),
+        *table_of(COLUMNS, rows),
         f"| **all** | **{n_with} of {of_with}** | **{n_without} of {of_without}** | |",
         "",
         f"True facts, {right_with['n']} other vans of the same lines, half of them driven mixed: "
@@ -283,15 +256,34 @@ def false_facts_page(found: Mapping[str, Any]) -> str:
     )
 
 
-def _cell(counts: Mapping[str, Any]) -> str:
-    return f"{counts['n_caught']} of {counts['n']}" if counts["n"] else ""
+def _caught(way: str) -> Callable[[Row], str]:
+    return lambda row: f"{row[way]['n_caught']} of {row[way]['n']}" if row[way]["n"] else ""
 
 
-def _by(row: Mapping[str, Any]) -> str:
+def _by(row: Row) -> str:
     return ", ".join(f"`{by}`" for by in sorted({*row["with_line"]["by"], *row["without"]["by"]}))
 
 
-def each_line(found: FalseFacts) -> Iterator[str]:
-    """False facts that passed, and true ones that were questioned, for a terminal."""
-    yield from (f"passed: {one.words}, line {one.has_line}" for one in found.false if one.caught_by == PASSED)
-    yield from (f"asked: {one.caught_by}, line {one.has_line}" for one in found.right if one.caught_by != PASSED)
+COLUMNS: Final[tuple[Column, ...]] = (
+    ("false fact", text("words")),
+    ("caught with its line", _caught("with_line")),
+    ("without a line", _caught("without")),
+    ("by", _by),
+)
+
+
+def study_of(n_right: int = N_RIGHT, n_lines: int = N_LINES) -> Study[Found]:
+    """The study with this many true vehicles over so many lines."""
+    return Study(
+        name="false-facts",
+        does="Which false facts does commissioning catch, and does it accept true ones? ~3 minutes a line.",
+        doing="commissioning simulated vans",
+        of_case=partial(of_line, n_lines, n_right),
+        numbers=numbers,
+        page=false_facts_page,
+        seed=SEED,
+        n=n_lines,
+        counts="lines",
+        least=1,
+        kept_as=f"false-facts-{n_lines}-{n_right}",
+    )

@@ -1,14 +1,14 @@
 """The effect of ordinary sensor faults on estimates of recorded drives: refused, covered, or wrong.
 
-    faults(Study(Path("campaign.toml"), Path("vehicle.json"))) -> numbers for faults_page
+    faults(Drives(Path("campaign.toml"), Path("vehicle.json"))) -> numbers for faults_page
 
 Every log is rewritten with every fault (faulty_logs) and weighed as `springscale estimate` does.
 """
 
 import time
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,7 +17,8 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.accuracy.faulty_logs import Fault, Log, faults_of
-from benchmarks.accuracy.runner import OnDone, kept, run_each
+from benchmarks.accuracy.markdown import Column, Row, all_but, page, refused_cell, table_of, text
+from benchmarks.accuracy.study import OnDone, cases_of
 from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
 from gateway.calibration.campaign import Campaign, RunTable, chosen_runs, load_campaign
@@ -30,14 +31,13 @@ SEED: Final = 20_271  # arbitrary, of this study alone
 
 
 @dataclass(frozen=True, slots=True)
-class Study:
-    """The drives by their numbers (None: all), their calibration, and the directory of stored cases."""
+class Drives:
+    """The drives by their numbers (None: all), their calibration, and the seed of the faults."""
 
     campaign: Path
     calibration: Path
     runs: tuple[int, ...] | None = None
     names: tuple[str, ...] | None = None  # of faults; None: every one whose signals are mapped
-    kept: Path | None = None
     seed: int = SEED
 
 
@@ -67,14 +67,23 @@ class Case:
     batches: tuple[Judged, ...]
 
 
-def faults(study: Study, *, workers: int = 1, on_case: OnDone = lambda done, of: None) -> dict[str, Any]:
+def faults(
+    drives: Drives, *, workers: int = 1, kept: Path | None = None, on_case: OnDone = lambda done, of: None
+) -> dict[str, Any]:
     """Weigh every drive with every fault; a line for every fault and strength, over all drives."""
-    _, setup, runs, known = _loaded(study)
-    cases = list(run_each(partial(_case, study), len(runs) * len(known), workers, on_case))
+    _, setup, runs, known = _loaded(drives)
+    cases = cases_of(
+        partial(_case, drives),
+        len(runs) * len(known),
+        workers=workers,
+        kept=kept,
+        stored=partial(_name_of, drives),
+        on_done=on_case,
+    )
     return {
-        "campaign": f"{study.campaign.parent.name}/{study.campaign.name}",
+        "campaign": f"{drives.campaign.parent.name}/{drives.campaign.name}",
         "calibration": setup.calibration.id if setup.calibration else None,
-        "seed": study.seed,
+        "seed": drives.seed,
         "n_drives": len(runs),
         "cpu_s": round(sum(case.cpu_s for case in cases)),
         "lines": [
@@ -99,38 +108,43 @@ def _line(fault: Fault, batches: Sequence[Judged]) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=1)
-def _loaded(study: Study) -> tuple[Campaign, Setup, list[tuple[int, RunTable]], list[Fault]]:
-    campaign = load_campaign(study.campaign)
-    setup = load_setup(campaign.signals, study.calibration)
-    known = [one for one in faults_of(setup.signal_map) if study.names is None or one.name in study.names]
-    return campaign, setup, chosen_runs(campaign, study.runs), known
+def _loaded(drives: Drives) -> tuple[Campaign, Setup, list[tuple[int, RunTable]], list[Fault]]:
+    campaign = load_campaign(drives.campaign)
+    setup = load_setup(campaign.signals, drives.calibration)
+    known = [one for one in faults_of(setup.signal_map) if drives.names is None or one.name in drives.names]
+    return campaign, setup, chosen_runs(campaign, drives.runs), known
 
 
 @lru_cache(maxsize=1)
-def _log_of(study: Study, run: RunTable) -> Log:
-    campaign, setup, *_ = _loaded(study)
+def _log_of(drives: Drives, run: RunTable) -> Log:
+    campaign, setup, *_ = _loaded(drives)
     chunks = list(open_log(campaign.log_of(run), setup.signal_map)[0])
     columns = ("t_ns", "can_id", "length", "payload")
     frames = Frames(*(np.concatenate([getattr(chunk, name) for chunk in chunks]) for name in columns))
     return Log(frames, setup.signal_map)
 
 
-def _case(study: Study, number: int) -> Case:
-    """The case, from ``study.kept`` if it was stored there. The faults of one drive are consecutive."""
-    _, _, runs, known = _loaded(study)
-    (run_number, run), fault = runs[number // len(known)], known[number % len(known)]
-
-    def weighed() -> dict[str, Any]:
-        return asdict(_weighed(study, run, fault, np.random.default_rng([study.seed, run_number, *fault.id.encode()])))
-
-    stored = kept(study.kept, f"{study.seed}-{run_number}-{fault.id}", weighed)
-    return Case(stored["cpu_s"], tuple(Judged(tuple(one.pop("rejected")), **one) for one in stored["batches"]))
+def _case(drives: Drives, number: int) -> Case:
+    """One drive with one fault; the faults of one drive are consecutive."""
+    run_number, run, fault = _of_number(drives, number)
+    return _weighed(drives, run, fault, np.random.default_rng([drives.seed, run_number, *fault.id.encode()]))
 
 
-def _weighed(study: Study, run: RunTable, fault: Fault, rng: np.random.Generator) -> Case:
-    campaign, setup, *_ = _loaded(study)
+def _name_of(drives: Drives, number: int) -> str:
+    """The name under which the case is stored."""
+    run_number, _, fault = _of_number(drives, number)
+    return f"{drives.seed}-{run_number}-{fault.id}"
+
+
+def _of_number(drives: Drives, number: int) -> tuple[int, RunTable, Fault]:
+    _, _, runs, known = _loaded(drives)
+    return *runs[number // len(known)], known[number % len(known)]
+
+
+def _weighed(drives: Drives, run: RunTable, fault: Fault, rng: np.random.Generator) -> Case:
+    campaign, setup, *_ = _loaded(drives)
     begun_s = time.process_time()
-    log = _log_of(study, run)
+    log = _log_of(drives, run)
     with TemporaryDirectory() as folder:
         rewritten = Path(folder) / "can.log"
         write_candump(fault.rewrite(log, rng).frames, setup.signal_map.channel or "can0", rewritten)
@@ -150,3 +164,58 @@ def _judged(found: Estimate, payload_kg: float, front_share_pct: float) -> Judge
 def _outside(interval: tuple[float, float], true: float) -> float:
     low, high = interval
     return max(low - true, true - high, 0.0) / (0.5 * (high - low))
+
+
+LEAST_SAFE: Final = 0.9  # chosen: of the batches
+
+
+def faults_page(found: Mapping[str, Any]) -> str:
+    """The page in Markdown."""
+    lines = found["lines"]
+    total = {name: sum(line[name] for line in lines) for name in ("n_batches", "n_refused", "n_held")}
+    wrong = [line for line in lines if _n_outside(line)]
+    unsafe = [
+        f"{line['fault']} {line['strength']}".strip()
+        for line in lines
+        if _n_outside(line) > (1.0 - LEAST_SAFE) * line["n_batches"]
+    ]
+    return page(
+        "Sensor faults",
+        f"faults {found['campaign']} --calibration FILE --seed {found['seed']} --output DIR",
+        f"What ordinary faults of sensors do to the answers. The logs of {found['n_drives']} recorded drives with "
+        "known loads are rewritten, each time with one fault from the first frame on, and weighed as `springscale "
+        "estimate` weighs them, by a calibration that was made with a sound sensor. A fault is harmless where the "
+        "batch is refused, or where the 95 % intervals of both payload and front share hold the truth. An answer "
+        "outside is the worst that can happen: nobody sees it. The distance outside is given in half-widths of the "
+        f"interval. The {total['n_batches']} batches took {found['cpu_s'] / 60:.0f} minutes of one core.",
+        "",
+        f"- Refused: {total['n_refused']} of {total['n_batches']} batches.",
+        f"- Answered, and held by both intervals: {total['n_held']}.",
+        f"- Answered outside an interval: {total['n_batches'] - total['n_refused'] - total['n_held']}, under "
+        f"{len(wrong)} of {len(lines)} faults and strengths. The first line has no fault: such answers are among "
+        "the 5 % that an interval of 95 % leaves out of each quantity.",
+        f"- Refused or held in at least {100.0 * LEAST_SAFE:.0f} % of the batches: {all_but(unsafe)}",
+        "",
+        *table_of(COLUMNS, lines),
+        "",
+    )
+
+
+def _n_outside(line: Mapping[str, Any]) -> int:
+    return int(line["n_batches"] - line["n_refused"] - line["n_held"])
+
+
+def _furthest(quantity: str) -> Callable[[Row], str]:
+    return lambda line: f"{line[f'{quantity}_furthest']:.2f}" if line[f"{quantity}_furthest"] else ""
+
+
+COLUMNS: Final[tuple[Column, ...]] = (
+    ("Fault", text("fault")),
+    ("Strength", text("strength")),
+    ("Batches", text("n_batches")),
+    ("Refused, and why", lambda line: refused_cell(line["n_refused"], line["refused_by_reason"])),
+    ("Held", text("n_held")),
+    ("Outside", lambda line: str(_n_outside(line))),
+    ("Payload outside by up to", _furthest("payload")),
+    ("Share outside by up to", _furthest("front_share")),
+)

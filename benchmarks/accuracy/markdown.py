@@ -1,9 +1,17 @@
 """The page of a study in Markdown: its head, its tables, and their cells."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from gateway.calibration.judgement.coverage import IDEAL_SCORE
+
+Row = Mapping[str, Any]
+Column = tuple[str, Callable[[Row], str]]  # its head, and its cell in a row
+
+SCORE = (
+    "the interval score is their width and 40 times what the truth lies outside, in brackets what it would be for "
+    "normal errors and intervals of the right width"
+)
 
 
 def page(title: str, command: str, *lines: str, on: str = "", note: str = "") -> str:
@@ -22,7 +30,46 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     return [*head, *("| " + " | ".join(cells) + " |" for cells in rows)]
 
 
-def rejected_cell(line: Mapping[str, Any]) -> str:
+def table_of(columns: Sequence[Column], rows: Iterable[Row]) -> list[str]:
+    """The lines of a table, each cell computed from its row."""
+    return table([head for head, _ in columns], ([cell(row) for _, cell in columns] for row in rows))
+
+
+def text(key: str) -> Callable[[Row], str]:
+    """A cell as it is in the row."""
+    return lambda row: str(row[key])
+
+
+def number(key: str, digits: int = 2, unknown: str = "none") -> Callable[[Row], str]:
+    """A number with so many decimals."""
+    return lambda row: unknown if row[key] is None else f"{row[key]:.{digits}f}"
+
+
+def share(key: str) -> Callable[[Row], str]:
+    """A coverage: the share and its limits, percent."""
+    return lambda row: share_cell(row[key])
+
+
+def width_and_score(target: str, unit: str = "pct") -> tuple[Callable[[Row], str], Callable[[Row], str]]:
+    """Half the mean interval of a target, and its interval score with what would be ideal."""
+    score, error = f"{target}_interval_score_{unit}", f"{target}_mean_abs_{unit}"
+    return number(f"{target}_half_width_{unit}"), lambda row: score_cell(row[score], row[error])
+
+
+def target_columns(target: str, title: str, *, by_van: bool = False) -> list[Column]:
+    """Error, coverage, width and score of a target in the lines of coverage_table."""
+    half_width, score = width_and_score(target)
+    return [
+        (f"{title}, mean abs. error %", number(f"{target}_mean_abs_pct")),
+        ("with misses", number(f"{target}_mean_abs_pct_with_misses")),
+        ("95 % covers", share(f"{target}_coverage")),
+        *([("by van", share(f"{target}_coverage_by_van"))] if by_van else []),
+        ("+- %", half_width),
+        ("score % (ideal)", score),
+    ]
+
+
+def rejected_cell(line: Row) -> str:
     """How many, and why."""
     reasons = ", ".join(f"{n} {why}" for why, n in line["rejected_by_reason"].items())
     return f"{line['n_rejected']}: {reasons}" if reasons else str(line["n_rejected"])
@@ -39,11 +86,6 @@ def all_but(exceptions: Sequence[str]) -> str:
     return f"all but {', '.join(exceptions)}." if exceptions else "every line."
 
 
-def number_cell(x: float | None) -> str:
-    """Two decimals."""
-    return "none" if x is None else f"{x:.2f}"
-
-
 def share_cell(coverage: Mapping[str, Any] | None) -> str:
     """A share and its limits, percent."""
     if coverage is None:
@@ -54,3 +96,8 @@ def share_cell(coverage: Mapping[str, Any] | None) -> str:
 def score_cell(score: float | None, mean_abs: float | None) -> str:
     """A mean interval score, and what is ideal for errors of this mean."""
     return "none" if score is None or mean_abs is None else f"{score:.1f} ({IDEAL_SCORE * mean_abs:.1f})"
+
+
+def part_cell(n: int, of: int) -> str:
+    """How many of how many, and in percent."""
+    return f"{n} of {of} ({n / of:.0%})"

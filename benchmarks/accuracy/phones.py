@@ -1,8 +1,6 @@
 """The accuracy of a phone beside a CAN IMU on the same drives: three known loads calibrate, others are judged.
 
-    phones(n_rounds, seed) -> {"rows": [...], ...}
-
-Every van of gateway.sim.vans is driven ``n_rounds`` times: empty and with two known loads to calibrate, then with three
+Every van of gateway.sim.vans is driven in each round: empty and with two known loads to calibrate, then with three
 others. Both sensors are at the same place in the same drive. The phone's recording is exported in an app's format and
 imported by ``springscale import``; all further steps use the command line, as for any log. One app is enough: the
 others' exports become the same log except for rounding (tests/unit/test_phone_import.py).
@@ -18,7 +16,8 @@ from typing import Any, Final
 import numpy as np
 from click.testing import CliRunner
 
-from benchmarks.accuracy.markdown import page
+from benchmarks.accuracy.markdown import Column, Row, page, table_of, text
+from benchmarks.accuracy.study import Study
 from gateway.bus.logs import write_candump
 from gateway.cli import springscale
 from gateway.offline.phone import import_recording
@@ -39,30 +38,26 @@ BY_PHONE: Final = "phone"
 APP: Final = "sensor_logger_android"
 KNOWN: Final = ((0.0, 0.5), (0.35, 0.45), (0.8, 0.8))  # chosen: share of the rated payload, of the wheelbase
 JUDGED: Final = ((0.2, 0.6), (0.5, 0.7), (0.7, 0.5))  # chosen, likewise
-OnDrive = Callable[[int, int], None]
 
 
-def phones(n_rounds: int, seed: int = SEED, on_drive: OnDrive = lambda done, of: None) -> dict[str, Any]:
-    """Figures of both sensors over all vans and rounds, for the page and the JSON file."""
-    batches: dict[str, list[dict[str, Any]]] = {}
-    of = n_rounds * len(VANS) * len(KNOWN + JUDGED)
-    done = 0
-    for number, van in enumerate(VANS.values()):
-        for turn in range(n_rounds):
-            with tempfile.TemporaryDirectory() as folder:
-                drives = np.random.SeedSequence([seed, number, turn]).spawn(len(KNOWN + JUDGED))
-                for i, one in enumerate(drives):
-                    _drive(Path(folder), van, i, int(one.generate_state(1)[0]))
-                    done += 1
-                    on_drive(done, of)
-                for name in (CAN, BY_PHONE):
-                    batches.setdefault(name, []).extend(_judged(Path(folder) / name, van))
-    return {
-        "seed": seed,
-        "n_rounds": n_rounds,
-        "n_vans": len(VANS),
-        "rows": [{"sensor": name, **_figures(each)} for name, each in batches.items()],
-    }
+Batches = dict[str, list[dict[str, Any]]]  # by sensor
+
+
+def of_one_round(seed: int, number: int) -> Batches:
+    """One van in one round: the judged batches of both sensors."""
+    van = [*VANS.values()][number % len(VANS)]
+    drives = np.random.SeedSequence([seed, number % len(VANS), number // len(VANS)]).spawn(len(KNOWN + JUDGED))
+    with tempfile.TemporaryDirectory() as folder:
+        for i, one in enumerate(drives):
+            _drive(Path(folder), van, i, int(one.generate_state(1)[0]))
+        return {name: _judged(Path(folder) / name, van) for name in (CAN, BY_PHONE)}
+
+
+def numbers(seed: int, n: int, rounds: Sequence[Batches]) -> dict[str, Any]:
+    """Figures of both sensors over all vans and rounds."""
+    batches = {name: [one for each in rounds for one in each[name]] for name in (CAN, BY_PHONE)}
+    rows = [{"sensor": name, **_figures(each)} for name, each in batches.items()]
+    return {"seed": seed, "n_rounds": n, "n_vans": len(VANS), "rows": rows}
 
 
 def _drive(folder: Path, van: Vehicle, i: int, seed: int) -> None:
@@ -93,8 +88,8 @@ def _judged(folder: Path, van: Vehicle) -> list[dict[str, Any]]:
     campaign.write_text(_campaign(folder.name, van), encoding="utf-8")
     calibration = folder / "vehicle.json"
     _run("calibrate", str(campaign), "--output", str(calibration), "--estimator", "cross_spectrum")
-    told = json.loads(_run("evaluate", str(campaign), "--calibration", str(calibration), "--json"))
-    batches: list[dict[str, Any]] = told["batches"]
+    evaluated = json.loads(_run("evaluate", str(campaign), "--calibration", str(calibration), "--json"))
+    batches: list[dict[str, Any]] = evaluated["batches"]
     return [{**batch, "rated_kg": van.rated_payload_kg} for batch in batches]
 
 
@@ -134,13 +129,13 @@ def _figures(batches: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     answered = [one for one in whole if not one["rejected"]]
     figures: dict[str, Any] = {"n_batches": len(whole), "n_rejected": len(whole) - len(answered)}
     for quantity, unit, of in (("payload", "kg", "rated_kg"), ("front_share", "pct", None)):
-        told = [
+        judged = [
             (one[f"{quantity}_{unit}"], one[f"true_{quantity}_{unit}"], one[f"{quantity}_interval95_{unit}"])
             for one in answered
         ]
-        errors = np.array([estimate - true for estimate, true, _ in told])
-        half = np.array([(high - low) / 2.0 for _, _, (low, high) in told])
-        held = np.array([low <= true <= high for _, true, (low, high) in told])
+        errors = np.array([estimate - true for estimate, true, _ in judged])
+        half = np.array([(high - low) / 2.0 for _, _, (low, high) in judged])
+        held = np.array([low <= true <= high for _, true, (low, high) in judged])
         figures[quantity] = {
             f"mean_abs_{unit}": float(np.mean(np.abs(errors))),
             f"half_width_{unit}": float(np.mean(half)),
@@ -152,16 +147,31 @@ def _figures(batches: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return figures
 
 
+def _held(quantity: str) -> Callable[[Row], str]:
+    return lambda row: f"{100 * row[quantity]['coverage95']:.0f} %"
+
+
+def _payload_error(row: Row) -> str:
+    found = row["payload"]
+    return f"{found['mean_abs_kg']:.1f} kg ({found['mean_abs_pct_of_rated']:.1f} %)"
+
+
+COLUMNS: Final[tuple[Column, ...]] = (
+    ("Sensor", text("sensor")),
+    ("Batches", text("n_batches")),
+    ("Refused", text("n_rejected")),
+    ("Payload, mean abs. error (of the rated)", _payload_error),
+    ("Half-width (95 %)", lambda row: f"± {row['payload']['half_width_kg']:.1f} kg"),
+    ("Held", _held("payload")),
+    ("Front share, mean abs. error", lambda row: f"{row['front_share']['mean_abs_pct']:.2f} pp"),
+    ("Half-width (95 %)", lambda row: f"± {row['front_share']['half_width_pct']:.2f} pp"),
+    ("Held", _held("front_share")),
+)
+
+
 def phones_page(found: Mapping[str, Any]) -> str:
     """The page phone_accuracy.md from the numbers alone."""
     n = found["n_vans"] * found["n_rounds"]
-    rows = [
-        f"| {row['sensor']} | {row['n_batches']} | {row['n_rejected']} | {row['payload']['mean_abs_kg']:.1f} kg "
-        f"({row['payload']['mean_abs_pct_of_rated']:.1f} %) | ± {row['payload']['half_width_kg']:.1f} kg "
-        f"| {100 * row['payload']['coverage95']:.0f} % | {row['front_share']['mean_abs_pct']:.2f} pp "
-        f"| ± {row['front_share']['half_width_pct']:.2f} pp | {100 * row['front_share']['coverage95']:.0f} % |"
-        for row in found["rows"]
-    ]
     return page(
         "A phone beside a CAN IMU",
         f"phones --rounds {found['n_rounds']} --seed {found['seed']} --output DIR",
@@ -173,10 +183,27 @@ def phones_page(found: Mapping[str, Any]) -> str:
         "which makes the same log of every app's. The simulated floor is rigid: a phone on a carpet, or one that "
         "slides, will do worse. No real phone has been tried yet.",
         "",
-        "| Sensor | Batches | Refused | Payload, mean abs. error (of the rated) | Half-width (95 %) | Held "
-        "| Front share, mean abs. error | Half-width (95 %) | Held |",
-        "|---|---|---|---|---|---|---|---|---|",
-        *rows,
+        *table_of(COLUMNS, found["rows"]),
         "",
         note="Everything is simulated.",
     )
+
+
+def _n_vans(n_rounds: int) -> int:
+    return n_rounds * len(VANS)
+
+
+STUDY: Final = Study(
+    name="phones",
+    does="The accuracy of a phone beside a CAN IMU on the same drives; ~2 minutes a round.",
+    doing="driving vans with a phone on the floor",
+    of_case=of_one_round,
+    numbers=numbers,
+    page=phones_page,
+    seed=SEED,
+    n=2,
+    counts="rounds",
+    least=1,
+    n_cases=_n_vans,
+    file="phone_accuracy",
+)

@@ -1,6 +1,6 @@
 """Cramer-Rao bounds of payload and front share for each kind of observation.
 
-    bound_of(Seen.BOTH, unknown, scene) -> Bound
+    bound_of(Seen.BOTH, unknown, scene) -> Bound; ``limits`` are those of the paper's van on the paper's road
 
 On a road of displacement density s(f) the transforms X of the two sensors are complex Gaussian with
 
@@ -14,10 +14,14 @@ power. The road's level and slope in log s are always unknown.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from math import radians
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
+from gateway.calibration.half_car import prior_of
+from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.ideal_drive import RATE_HZ, Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import EFFECTIVE_SHARE, Point, Whittle
@@ -25,7 +29,10 @@ from gateway.core.cross_spectrum.model.half_car import frequency_response
 from gateway.core.cross_spectrum.model.parameters import INDEX, Ground, half_car
 from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.spectrum import frequencies_hz
+from gateway.core.vehicle import Vehicle
 from gateway.records import C128, F64
+from gateway.units import STANDARD_GRAVITY_MPS2
+from gateway.workbench.campaigns import PAPER_PAYLOAD_KG, PAPER_ROUGHNESS_M3, PAPER_SPEED_MPS, PAPER_WHEELBASE_M
 
 STEP: Final = 1e-5  # chosen: of a difference quotient
 PAYLOAD_STEP_KG: Final = 0.1  # chosen, likewise
@@ -183,3 +190,79 @@ _INFORMATION: Final[Mapping[Seen, Callable[[C128, C128], F64]]] = {
     Seen.POWERS: _of_powers,
     Seen.BOTH: _of_matrix,
 }
+
+
+PAPER_VAN: Final = Vehicle(
+    name="paper_van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=PAPER_WHEELBASE_M,
+    empty_front_share_pct=50.0,
+    sensor_position_m=3.1,
+)
+MODEL_SLACK: Final = 0.02  # chosen: share of unmodelled power
+SENSOR_NOISE: Final = (
+    (150e-6 * STANDARD_GRAVITY_MPS2) ** 2,
+    radians(0.01) ** 2,
+)  # per hertz, usual for automotive MEMS
+SHARE_RANGE_PCT: Final = 20.0  # the paper's range of front shares
+MILD: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "spring_front_npm": 0.1,
+        "spring_rear_npm": 0.1,
+        "damper_front_nspm": 0.2,
+        "damper_rear_nspm": 0.2,
+        "tyre_front_npm": 0.1,
+        "tyre_rear_npm": 0.1,
+        SPEED: 0.01,
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """One row: the observation, whether the vehicle is known, the disturbance, and the bound."""
+
+    seen: Seen
+    is_vehicle_known: bool
+    disturbance: str
+    bound: Bound
+
+    @property
+    def payload_pct(self) -> float:
+        """In percent of the paper's range, 450 kg."""
+        return 100.0 * self.bound.payload_std_kg / PAPER_PAYLOAD_KG
+
+    @property
+    def front_share_pct(self) -> float:
+        """In percent of the paper's range, 20 points."""
+        return 100.0 * self.bound.front_share_std_pct / SHARE_RANGE_PCT
+
+
+def limits(drive: Drive | None = None) -> list[Limit]:
+    """Bounds at half the rated payload, 50 % in front; by default 300 s at 50 km/h."""
+    driven = drive or Drive(300.0, PAPER_SPEED_MPS)
+    ground = Ground.of(PAPER_VAN)
+    point = Point(prior_of(PAPER_VAN).mean, PAPER_PAYLOAD_KG / 2.0, 0.5)
+    reading = Reading(PAPER_VAN.wheelbase_m, BAND_HZ, N_SEGMENT)
+    scenes = {
+        f"{100.0 * MODEL_SLACK:g} % slack": Scene(point, ground, reading, driven, PAPER_ROUGHNESS_M3, MODEL_SLACK),
+        "sensor noise": Scene(point, ground, reading, driven, PAPER_ROUGHNESS_M3, 0.0, *SENSOR_NOISE),
+    }
+    return [
+        Limit(seen, not unknown, name, bound_of(seen, unknown, scene))
+        for unknown in ({}, MILD)
+        for seen in Seen
+        for name, scene in scenes.items()
+    ]
+
+
+def limits_table(found: list[Limit]) -> str:
+    """The table in Markdown."""
+    lines = ["| seen | vehicle | beside the road | payload | front share |", "|---|---|---|---|---|"]
+    for one in found:
+        known = "known" if one.is_vehicle_known else "mild priors"
+        lines.append(
+            f"| {one.seen} | {known} | {one.disturbance} | {one.bound.payload_std_kg:.2f} kg, {one.payload_pct:.2f} % "
+            f"| {one.bound.front_share_std_pct:.3f} pp, {one.front_share_pct:.2f} % |"
+        )
+    return "\n".join(lines) + "\n"

@@ -1,7 +1,8 @@
-"""Speed and memory of the product: each module is a program that prints its figures.
+"""Speed and memory of the product.
 
-``python -m benchmarks.speed`` runs them in sequence into one table: ``decode`` and ``formats`` read logs beside others
-(``peers``), ``day`` estimates a working day, ``live`` receives, ``service`` is the whole service, ``web`` serves,
-``weigh`` estimates and calibrates, ``start`` starts, ``simulator`` drives. ``soak`` runs the service through a
-simulated week.
+``python -m benchmarks.speed`` calls ``measure`` of each part, one after the other, and prints one table: ``decode`` and
+``formats`` read logs beside others (``peers``), ``day`` estimates a working day, ``live`` receives, ``service`` is the
+whole service and ``idle`` the parked one, ``web`` serves, ``weigh`` estimates and calibrates, ``archive`` reprocesses,
+``start`` starts, ``simulator`` drives. Programs of their own are ``feed``, ``feeders``, ``fleet_report``,
+``footprint``, ``soak`` and ``soak_attack``.
 """

@@ -2,9 +2,8 @@
 
     python -m benchmarks.speed [--only decode,formats] [--quick] [--output docs/performance.json]
 
-Each part is a program (``python -m benchmarks.speed.PART``) and runs alone, in sequence. The figures are written as
-JSON, from which docs/make.py makes docs/performance.md. It takes about a quarter of an hour, and ten gigabytes of disk
-for the day.
+Each part runs alone in a process of its own, one after the other. The figures are written as JSON, from which
+docs/make.py makes docs/performance.md. It takes about a quarter of an hour, and ten gigabytes of disk for the day.
 """
 
 import argparse
@@ -21,28 +20,18 @@ from typing import Any, Final
 from benchmarks.speed.meter import in_own_process
 from benchmarks.speed.table import Line, lines_of
 
-PARTS: Final[dict[str, tuple[str, ...]]] = {
-    "decode": ("--minutes", "10"),
-    "formats": ("--minutes", "2"),
-    "day": ("--hours", "8"),
-    "live": ("--seconds", "10"),
-    "service": ("--seconds", "75"),
-    "idle": ("--seconds", "120"),
-    "web": ("--seconds", "10"),
+PARTS: Final[dict[str, tuple[float, ...]]] = {  # how much each measures, and how much when it is to be quick
+    "decode": (10.0, 1.0),  # minutes of log
+    "formats": (2.0, 0.5),  # minutes of log
+    "day": (8.0, 0.5),  # hours of log
+    "live": (10.0, 3.0),  # seconds
+    "service": (75.0, 70.0),  # seconds
+    "idle": (120.0, 20.0),  # seconds
+    "web": (10.0, 3.0),  # seconds
     "weigh": (),
-    "archive": ("--vehicles", "8"),
+    "archive": (8, 2),  # vehicles
     "start": (),
     "simulator": (),
-}
-QUICK: Final = {
-    "decode": "1",
-    "formats": "0.5",
-    "day": "0.5",
-    "live": "3",
-    "service": "70",
-    "idle": "20",
-    "web": "3",
-    "archive": "2",
 }
 MOST_LOAD: Final = 1.0  # load average over the last minute
 PACKAGES: Final = ("numpy", "python-can", "cantools", "hilspy", "asammdf", "can_decoder", "polars", "isal")
@@ -75,10 +64,8 @@ def measure(parts: Iterable[str], *, quick: bool) -> Iterator[dict[str, Any]]:
     found: dict[str, Any] = {"conditions": conditions() | {"is_quick": quick}}
     for part in parts:
         print(f"{time.strftime('%H:%M:%S')} {part} ...", file=sys.stderr, flush=True)
-        options = list(PARTS[part])
-        if quick and part in QUICK:
-            options[1] = QUICK[part]
-        found[part] = in_own_process(part, "--json", *options)
+        amounts = PARTS[part][quick:][:1]
+        found[part] = in_own_process(f"benchmarks.speed.{part}:measure", *amounts)
         found["conditions"]["load_average_after"] = os.getloadavg()[0]
         yield found
 

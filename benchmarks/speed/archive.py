@@ -1,29 +1,22 @@
 """How `springscale reprocess` uses the cores: a small fleet's logs by one process, then by one for each core.
 
-    python -m benchmarks.speed.archive [--vehicles 8] [--json]
-
 Each vehicle's log is two hours of the demo's drive, again and again; estimated by cross_spectrum. Time by the clock,
 the start of the processes included, both runs one after the other with nothing else changed.
 """
 
-import argparse
 import json
 import os
 import shutil
-import subprocess
-import sys
 import tempfile
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.speed.meter import ONE_THREAD
+from benchmarks.speed.meter import CALIBRATION, springscale
 from gateway.bus.logs.candump_write import append_candump
 from gateway.units import NS_PER_S
 from gateway.workbench import demo_drive, frames_of
 
-CALIBRATION: Final = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
 HOURS: Final = 2.0  # chosen: of each log
 MANIFEST: Final = """\
 signals = "springscale:reference"
@@ -50,15 +43,8 @@ def write_archive(folder: Path, n_vehicles: int) -> int:
 
 def reprocess(archive: Path, dataset: Path, n_workers: int) -> dict[str, float]:
     """Wall time and batches of one run."""
-    command = [sys.executable, "-m", "gateway", "reprocess", str(archive), "--output", str(dataset)]
-    begun_s = time.monotonic()
-    done = subprocess.run(
-        [*command, "--workers", str(n_workers), "--json"],
-        stdout=subprocess.PIPE,
-        check=True,
-        env=os.environ | ONE_THREAD,
-    )
-    return {"clock_s": time.monotonic() - begun_s, "batches": json.loads(done.stdout)["n_batches"]}
+    ran = springscale("reprocess", archive, "--output", dataset, "--workers", n_workers, "--json")
+    return {"clock_s": ran["clock_s"], "batches": json.loads(ran["output"])["n_batches"]}
 
 
 def measure(n_vehicles: int) -> dict[str, Any]:
@@ -70,15 +56,3 @@ def measure(n_vehicles: int) -> dict[str, Any]:
         n_frames = write_archive(folder / "archive", n_vehicles)
         runs = {str(n): reprocess(folder / "archive", folder / f"by-{n}", n) for n in (1, n_cores)}
     return {"vehicles": n_vehicles, "hours": HOURS, "frames": n_frames, "cores": n_cores, "workers": runs}
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--vehicles", type=int, default=8)
-    parser.add_argument("--json", action="store_true", help="print the figures for machines")
-    options = parser.parse_args()
-    print(json.dumps(measure(options.vehicles), indent=None if options.json else 1))
-
-
-if __name__ == "__main__":
-    main()

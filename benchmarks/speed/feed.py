@@ -5,20 +5,16 @@ python -m benchmarks.speed.feed --output docs/feed_cost.json
 
 import json
 import os
-import platform
 import struct
-import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-import click
 import numpy as np
 
-from gateway.cli.options import FILE
+from benchmarks.speed.meter import machine, print_and_write, springscale
 from gateway.sim.drive import rural, urban
 from gateway.sim.obstacles import UnevenRoad
 from gateway.sim.road import iso_road
@@ -29,24 +25,6 @@ from gateway.workbench.phones import PHONE, write_export
 RATE_HZ: Final = 100.0  # chosen: of the fake device
 SHORT_S: Final = 5.0  # chosen: the difference of both runs is the cost of feeding without the start
 LONG_S: Final = 35.0  # chosen: of the long run
-MEASURED: Final = """
-import resource, sys
-from gateway.cli import main
-try:
-    main(sys.argv[1:])
-finally:
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    peak = next(line for line in open("/proc/self/status") if line.startswith("VmHWM:"))
-    print("used", used.ru_utime + used.ru_stime, int(peak.split()[1]) / 1024, file=sys.stderr)
-"""
-
-
-def _run(*arguments: str) -> tuple[dict[str, Any], float, float]:
-    """The command's JSON output, its CPU seconds and its peak memory in MB."""
-    done = subprocess.run([sys.executable, "-c", MEASURED, *arguments], capture_output=True, text=True, check=True)
-    _, cpu_s, rss_mb = done.stderr.strip().splitlines()[-1].split()
-    told: dict[str, Any] = json.loads(done.stdout)
-    return told, float(cpu_s), float(rss_mb)
 
 
 def _device(folder: Path) -> Path:
@@ -84,12 +62,12 @@ def _write_samples(fifo: Path) -> None:
             time.sleep(max(0.0, begun_s + i / RATE_HZ - time.monotonic()))
 
 
-def _feed(for_s: float) -> tuple[dict[str, Any], float, float]:
+def _feed(for_s: float) -> dict[str, Any]:
     with TemporaryDirectory() as folder:
         writer = threading.Thread(target=_write_samples, args=(_device(Path(folder)),), daemon=True)
         writer.start()
-        options = ["--interface", "virtual", "--channel", "bench", "--gpsd", "", "--for-s", str(for_s), "--json"]
-        return _run("feed", *options, "--sysfs", f"{folder}/sys", "--nodes", f"{folder}/dev")
+        options = ["--interface", "virtual", "--channel", "bench", "--gpsd", "", "--for-s", for_s, "--json"]
+        return springscale("feed", *options, "--sysfs", f"{folder}/sys", "--nodes", f"{folder}/dev")
 
 
 def _import() -> dict[str, float]:
@@ -99,30 +77,24 @@ def _import() -> dict[str, float]:
     with TemporaryDirectory() as folder:
         export = Path(folder) / "phone.zip"
         write_export(simulate_drive(PAPER_VAN, (), road, drive, PHONE, 1).recording, export, "sensor_logger_android")
-        told, cpu_s, rss_mb = _run("import", str(export), f"{folder}/drive.log", "--json")
-        return {"drive_s": told["duration_s"], "cpu_s": cpu_s, "rss_mb": rss_mb}
+        ran = springscale("import", export, f"{folder}/drive.log", "--json")
+    return {"drive_s": json.loads(ran["output"])["duration_s"], "cpu_s": ran["cpu_s"], "rss_mb": ran["peak_mb"]}
 
 
-@click.command()
-@click.option("--output", type=FILE, default=None, help="file to write the numbers to")
-def measure(output: Path | None) -> None:
-    """Measure, print, and write to ``output`` if given."""
-    _, short_cpu_s, _ = _feed(SHORT_S)
-    told, long_cpu_s, rss_mb = _feed(LONG_S)
-    found = {
+def measure() -> dict[str, Any]:
+    """The feed for two lengths of time, and an import."""
+    short, long = _feed(SHORT_S), _feed(LONG_S)
+    told = json.loads(long["output"])
+    return {
         "rate_hz": RATE_HZ,
         "frames_per_s": told["sent"] / LONG_S,
         "told": told,
-        "cpu_pct": 100.0 * (long_cpu_s - short_cpu_s) / (LONG_S - SHORT_S),
-        "rss_mb": rss_mb,
-        "machine": f"{platform.machine()}, Python {platform.python_version()}",
+        "cpu_pct": 100.0 * (long["cpu_s"] - short["cpu_s"]) / (LONG_S - SHORT_S),
+        "rss_mb": long["peak_mb"],
+        "machine": machine(),
         "import": _import(),
     }
-    text = json.dumps(found, indent=1) + "\n"
-    if output is not None:
-        output.write_text(text, encoding="utf-8")
-    click.echo(text, nl=False)
 
 
 if __name__ == "__main__":
-    measure()
+    print_and_write(__doc__, measure)

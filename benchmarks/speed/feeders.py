@@ -6,8 +6,6 @@ Each polls the real web application, which has a new weight for every request, f
 databroker and Traccar are stand-ins that accept everything (KUKSA's with the stubs of its own client).
 """
 
-import json
-import platform
 import subprocess
 import sys
 import threading
@@ -21,15 +19,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-import click
 import grpc
 import uvicorn
 from kuksa.val.v1 import types_pb2, val_pb2, val_pb2_grpc
 from kuksa.val.v2 import val_pb2 as v2
 from kuksa.val.v2 import val_pb2_grpc as v2_grpc
 
-from benchmarks.speed.meter import cpu_of_s, peak_mb
-from gateway.cli.options import FILE
+from benchmarks.speed.meter import ROOT, cpu_of_s, machine, peak_mb, print_and_write
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
 from gateway.status import State, Status
@@ -37,7 +33,6 @@ from gateway.store import Store
 from gateway.units import NS_PER_S
 from gateway.web import Board, create_app, server_config
 
-DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 EVERY_S: Final = 0.1  # a question, here
 DEFAULT_EVERY_S: Final = {"kuksa": 5.0, "traccar": 10.0}  # --every-s of the two
 SETTLE_S: Final = 5.0  # the start of Python is not counted
@@ -167,7 +162,15 @@ def _weigh(board: Board, store: Store, stopping: threading.Event) -> None:
 def cost_of(name: str) -> dict[str, float]:
     """CPU seconds per request with its new weight, and peak memory in MB."""
     with weighing() as url, {"kuksa": databroker, "traccar": traccar}[name]() as (options, taken):
-        command = [sys.executable, str(DEPLOY / name / "feeder.py"), "--url", url, "--every-s", str(EVERY_S), *options]
+        command = [
+            sys.executable,
+            str(ROOT / "deploy" / name / "feeder.py"),
+            "--url",
+            url,
+            "--every-s",
+            str(EVERY_S),
+            *options,
+        ]
         feeder = subprocess.Popen(command)
         try:
             time.sleep(SETTLE_S)
@@ -182,16 +185,10 @@ def cost_of(name: str) -> dict[str, float]:
     return {**found, "every_s": every_s, "cpu_pct": 0.1 * found["cpu_ms_each"] / every_s}
 
 
-@click.command()
-@click.option("--output", type=FILE, default=None, help="file to write the numbers to")
-def measure(output: Path | None) -> None:
-    """Measure, print, and write to ``output`` if given."""
-    machine = f"{platform.machine()}, Python {platform.python_version()}"
-    text = json.dumps({"machine": machine, **{name: cost_of(name) for name in FEEDERS}}, indent=1) + "\n"
-    if output is not None:
-        output.write_text(text, encoding="utf-8")
-    click.echo(text, nl=False)
+def measure() -> dict[str, Any]:
+    """Each of them."""
+    return {"machine": machine(), **{name: cost_of(name) for name in FEEDERS}}
 
 
 if __name__ == "__main__":
-    measure()
+    print_and_write(__doc__, measure)

@@ -1,24 +1,19 @@
 """The fleet report over a year: its duration, its memory, and the size of its pages.
 
-    python -m benchmarks.speed.fleet_report [--vehicles 100] [--days 365] [--hours 2] [--output FILE] [--keep DIR]
+    python -m benchmarks.speed.fleet_report [--vehicles 100] [--days 365] [--hours 2] [--output FILE]
 
 Makes a data set like that of `springscale reprocess`, with random numbers: a batch every five minutes of driving,
 seasons that change the dampers of all vehicles, a few vehicles that drift, a few with a failing sensor. The report runs
 in a process of its own; memory is compared with that of a tenth of the vehicles.
 """
 
-import argparse
-import json
-import os
-import subprocess
-import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.speed.meter import print_and_write, springscale
 from gateway.archive.dataset import schema
 from gateway.archive.receipts import Slot, text_of
 from gateway.units import NS_PER_S
@@ -106,61 +101,27 @@ def _write(folder: Path, slot: Slot, columns: dict[str, Any]) -> None:
 
 def report(dataset: Path, output: Path) -> dict[str, float]:
     """Wall time, processor time and peak memory of the command; what it wrote."""
-    command = [sys.executable, "-m", "gateway", "fleet-report", str(dataset), "--output", str(output)]
-    begun_s = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-    _, code, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(code)
-    assert process.returncode == 0, command
+    ran = springscale("fleet-report", dataset, "--output", output)
     pages = list((output / "vehicles").glob("*.html"))
     return {
-        "seconds": time.perf_counter() - begun_s,
-        "cpu_s": used.ru_utime + used.ru_stime,
-        "peak_mb": used.ru_maxrss / 1024,
+        "seconds": ran["clock_s"],
+        "cpu_s": ran["cpu_s"],
+        "peak_mb": ran["peak_mb"],
         "page_kb": (output / "report.html").stat().st_size / 1e3,
         "vehicle_page_kb": sum(page.stat().st_size for page in pages) / max(1, len(pages)) / 1e3,
     }
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--vehicles", type=int, default=100)
-    parser.add_argument("--days", type=int, default=365)
-    parser.add_argument("--hours", type=float, default=2.0, help="of driving a day")
-    parser.add_argument("--json", action="store_true", help="print the figures for machines")
-    parser.add_argument("--output", type=Path, help="JSON file for the figures, such as docs/fleet_report.json")
-    parser.add_argument("--keep", type=Path, help="directory in which data set and report stay")
-    parser.add_argument("--write", type=Path, help=argparse.SUPPRESS)
-    asked = parser.parse_args()
-    if asked.write:
-        print(write_dataset(asked.write, asked.vehicles, asked.days, asked.hours))
-        return
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = asked.keep or Path(scratch)
-        figures: dict[str, Any] = {"vehicles": asked.vehicles, "days": asked.days, "hours_a_day": asked.hours}
-        for name, n_vehicles in (("tenth", max(1, asked.vehicles // 10)), ("whole", asked.vehicles)):
-            dataset = folder / f"dataset-{name}"
-            n_batches = _written_in_own_process(dataset, n_vehicles, asked)
-            figures[name] = {"batches": n_batches, **report(dataset, folder / f"report-{name}")}
-    if asked.output:
-        asked.output.write_text(json.dumps(figures, indent=1) + "\n")
-    if asked.json:
-        print(json.dumps(figures))
-        return
-    whole, tenth = figures["whole"], figures["tenth"]
-    print(
-        f"{asked.vehicles} vehicles, {asked.days} days, {whole['batches']:,} batches: {whole['seconds']:.0f} s "
-        f"({whole['cpu_s']:.0f} s of processor), peak {whole['peak_mb']:.0f} MB (a tenth of the vehicles: "
-        f"{tenth['peak_mb']:.0f} MB), page {whole['page_kb']:.0f} kB, each vehicle's {whole['vehicle_page_kb']:.0f} kB"
-    )
-
-
-def _written_in_own_process(dataset: Path, n_vehicles: int, asked: argparse.Namespace) -> int:
-    """Written by another process, because a child process inherits its parent's peak of memory."""
-    command = [sys.executable, "-m", "benchmarks.speed.fleet_report", "--write", str(dataset)]
-    command += ["--vehicles", str(n_vehicles), "--days", str(asked.days), "--hours", str(asked.hours)]
-    return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+def measure(vehicles: int, days: int, hours: float) -> dict[str, Any]:
+    """A report on a tenth of the vehicles, and on all of them."""
+    figures: dict[str, Any] = {"vehicles": vehicles, "days": days, "hours_a_day": hours}
+    with tempfile.TemporaryDirectory() as name:
+        for part, n_vehicles in (("tenth", max(1, vehicles // 10)), ("whole", vehicles)):
+            dataset = Path(name) / f"dataset-{part}"
+            n_batches = write_dataset(dataset, n_vehicles, days, hours)
+            figures[part] = {"batches": n_batches, **report(dataset, Path(name) / f"report-{part}")}
+    return figures
 
 
 if __name__ == "__main__":
-    main()
+    print_and_write(__doc__, measure, vehicles=100, days=365, hours=2.0)

@@ -1,38 +1,32 @@
 """The live path: CPU of receiving and decoding, compared with python-can's own receive loop in the same run.
 
-    python -m benchmarks.speed.live [--seconds 6] [--json]
-
 Frames come from another process as CAN datagrams over a loopback socket with kernel stamps, so that no CAN
 hardware is needed: everything but the socket's address family is the live path. A kernel-filtered bus is one
 of which only our 8.4 % arrive. Goals: under 3 % of a core on a kernel-filtered bus of 2500 frames/s, under
 150 MB, and nothing dropped at 8000 frames/s.
 """
 
-import argparse
-import json
-import resource
 import socket
 import struct
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
 from typing import Any
 
+from benchmarks.speed.meter import command_of, in_own_process, peak_mb
 from gateway.bus.live import LiveSource
 from gateway.bus.live.socketcan import SocketCanReceiver, ask_for_stamps
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.bus.signals.mapping import SignalMap
 
-PROGRAM = (sys.executable, "-m", "benchmarks.speed.live")
 OURS_SHARE = 0.084  # of the frames on the bus: two IMU messages at 100 Hz, GNSS at 10 Hz
 DRAIN_S = 0.1  # how often the pipeline looks into the inbox
 RATES = {"2500 frames/s": 2500, "8000 frames/s": 8000, "2500, filtered": 210, "8000, filtered": 672}
 
 
-def send(port: int, frames_per_s: int, seconds: float) -> None:
-    """The other end: frames at an even pace, in groups of a millisecond or more; all ours where filtered."""
+def send(port: int, frames_per_s: int, seconds: float) -> int:
+    """The other end: frames at an even pace, in groups of a millisecond or more -> how many; all ours if filtered."""
     is_filtered = frames_per_s < 1000
     frames = [struct.pack("=IB3x8s", *frame) for frame in _mix(is_filtered)]
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as wire:
@@ -44,7 +38,7 @@ def send(port: int, frames_per_s: int, seconds: float) -> None:
                 wire.send(frames[i % len(frames)])
             n_sent = max(n_sent, due)
             time.sleep(0.001)
-    print(n_sent)
+    return n_sent
 
 
 def _mix(is_filtered: bool) -> list[tuple[int, int, bytes]]:
@@ -113,8 +107,8 @@ def run(path: str, frames_per_s: int, seconds: float) -> dict[str, Any]:
     """One path at one rate; CPU is this process's from the first frame sent to the last."""
     signal_map = load_signal_map("springscale:reference")
     wire = listening_socket()
-    command = [*PROGRAM, "--send", str(wire.getsockname()[1]), "--rate", str(frames_per_s)]
-    sender = subprocess.Popen([*command, "--seconds", str(seconds)], stdout=subprocess.PIPE, text=True)
+    command = command_of(send, wire.getsockname()[1], frames_per_s, seconds)
+    sender = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     is_over = threading.Event()
 
     def end_with_the_sender() -> None:
@@ -129,55 +123,10 @@ def run(path: str, frames_per_s: int, seconds: float) -> dict[str, Any]:
     result = PATHS[path](wire, signal_map, is_over)
     result["cpu_pct"] = 100 * (time.process_time() - cpu_s) / (time.monotonic() - begun_s)
     result["sent"] = int(sender.stdout.read()) if sender.stdout else 0
-    result["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    result["peak_mb"] = peak_mb()
     return result
 
 
-def in_own_process(path: str, frames_per_s: int, seconds: float) -> dict[str, Any]:
-    command = [*PROGRAM, "--run", path, "--rate", str(frames_per_s), "--seconds", str(seconds)]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)
-    found: dict[str, Any] = json.loads(done.stdout)
-    return found
-
-
-def show(results: dict[str, Any]) -> None:
-    print(f"{'bus':<18}{'path':<24}{'CPU of a core':>14}{'received':>18}{'dropped':>9}{'peak MB':>9}")
-    for bus, paths in results.items():
-        for path, row in paths.items():
-            received = f"{row['frames']:,} / {row['sent']:,}"
-            dropped = "?" if row["dropped"] is None else f"{row['dropped']:,}"
-            print(f"{bus:<18}{path:<24}{row['cpu_pct']:>12.2f} %{received:>18}{dropped:>9}{row['peak_mb']:>9.0f}")
-    filtered, fastest = results["2500, filtered"]["springscale"], results["8000 frames/s"]["springscale"]
-    lost = fastest["sent"] - fastest["frames"]
-    print(
-        f"\nfiltered bus of 2500 frames/s: {filtered['cpu_pct']:.2f} % (goal < 3: {_verdict(filtered['cpu_pct'] < 3)})"
-    )
-    print(f"peak memory: {fastest['peak_mb']:.0f} MB (goal < 150: {_verdict(fastest['peak_mb'] < 150)})")
-    print(f"lost at 8000 frames/s: {lost} (goal 0: {_verdict(lost == 0)})")
-
-
-def _verdict(is_met: bool) -> str:
-    return "met" if is_met else "MISSED"
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=6.0, help="how long each path receives at each rate")
-    parser.add_argument("--json", action="store_true", help="print the figures for machines")
-    parser.add_argument("--run", choices=PATHS, help=argparse.SUPPRESS)
-    parser.add_argument("--rate", type=int, default=2500, help=argparse.SUPPRESS)
-    parser.add_argument("--send", type=int, help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.send:
-        send(options.send, options.rate, options.seconds)
-    elif options.run:
-        print(json.dumps(run(options.run, options.rate, options.seconds)))
-    else:
-        results = {
-            bus: {path: in_own_process(path, rate, options.seconds) for path in PATHS} for bus, rate in RATES.items()
-        }
-        print(json.dumps(results)) if options.json else show(results)
-
-
-if __name__ == "__main__":
-    main()
+def measure(seconds: float) -> dict[str, Any]:
+    """Every path at every rate."""
+    return {bus: {path: in_own_process(run, path, rate, seconds) for path in PATHS} for bus, rate in RATES.items()}

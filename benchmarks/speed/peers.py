@@ -1,17 +1,14 @@
 """Other libraries on the same candump log: the time to extract our three messages into arrays or values.
 
-    python -m benchmarks.speed.peers --run NAME --log FILE
-
 They are the dependency group ``bench``; missing ones are skipped with a message.
 """
 
-import argparse
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.speed.meter import best_of, print_run
+from benchmarks.speed.meter import ROOT, best_of
 
 OURS = (0x120, 0x121, 0x130)  # identifiers of the reference map
 
@@ -132,7 +129,7 @@ def polars_path(log: Path) -> dict[str, Any]:
 
 
 def _database() -> Path:
-    return Path(__file__).parents[2] / "dbc" / "springscale_reference.dbc"
+    return ROOT / "dbc/springscale_reference.dbc"
 
 
 PEERS: dict[str, Callable[[Path], dict[str, Any]]] = {
@@ -147,13 +144,6 @@ PEERS: dict[str, Callable[[Path], dict[str, Any]]] = {
 SLOW = ("asammdf, from .mf4", "can_decoder", "python-can + cantools")  # a shorter log is enough for these
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--run", choices=PEERS, required=True)
-    parser.add_argument("--log", type=Path, required=True)
-    options = parser.parse_args()
-    print_run(lambda: PEERS[options.run](options.log))
-
-
-if __name__ == "__main__":
-    main()
+def read_by(name: str, log: str) -> dict[str, Any]:
+    """One of them on a log."""
+    return PEERS[name](Path(log))

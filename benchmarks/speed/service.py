@@ -1,20 +1,16 @@
 """The whole service on a live drive with roll: CPU of one core and memory, provisional estimates included.
 
-    python -m benchmarks.speed.service [--seconds 75] [--json]
-
 The demo's drive comes in real time, as CAN datagrams over a loopback socket with kernel stamps (live.py): what a kernel
 filter lets through of a bus of 2500 frames/s. The first provisional estimates come after a minute; what a whole batch
 costs is measured by weigh.py.
 """
 
-import argparse
 import json
 import os
 import shutil
 import socket
 import struct
 import subprocess
-import sys
 import tempfile
 import time
 import urllib.request
@@ -22,21 +18,20 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.speed.live import listening_socket
-from benchmarks.speed.meter import ONE_THREAD, cpu_of_s, peak_mb
-from benchmarks.speed.start import REPOSITORY, SETTINGS
+from benchmarks.speed.meter import CALIBRATION, ONE_THREAD, command_of, cpu_of_s, in_own_process, peak_mb
+from benchmarks.speed.start import SETTINGS
 from gateway.bus.live.socketcan import SocketCanReceiver
 from gateway.config import load_settings
 from gateway.service.gateway import Gateway
 from gateway.setup import setup_of
 from gateway.units import NS_PER_S
 
-PROGRAM: Final = (sys.executable, "-m", "benchmarks.speed.service")
 BEGIN_S: Final = 60.0  # chosen: of the drive, which is at speed by then
 
 
-def serve(folder: Path) -> None:
+def serve(folder: str) -> None:
     """The service in a process of its own; prints where its bus and its web are."""
-    settings = load_settings(folder / "springscale.toml")
+    settings = load_settings(Path(folder) / "springscale.toml")
     wire = listening_socket()
 
     def on_started(gateway: Gateway) -> None:
@@ -46,8 +41,8 @@ def serve(folder: Path) -> None:
     Gateway(settings, setup_of(settings), on_started=on_started, open_receiver=lambda: receiver).run()
 
 
-def send(port: int, seconds: float) -> None:
-    """Send the drive in real time, in groups of five milliseconds; print the number of frames."""
+def send(port: int, seconds: float) -> int:
+    """Send the drive in real time, in groups of five milliseconds -> the number of frames."""
     from gateway.workbench import demo_drive, frames_of  # noqa: PLC0415 # nothing that the service's process should hold
 
     drive = frames_of(demo_drive())
@@ -63,25 +58,24 @@ def send(port: int, seconds: float) -> None:
                 wire.send(frames[n_sent])
                 n_sent += 1
             time.sleep(0.005)
-    print(n_sent)
+    return n_sent
 
 
 def measure(seconds: float) -> dict[str, Any]:
     """One drive of this many seconds."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        shutil.copy(REPOSITORY / "gateway/demo/paper_van.json", folder / "vehicle.json")
+        shutil.copy(CALIBRATION, folder / "vehicle.json")
         (folder / "springscale.toml").write_text(SETTINGS)
-        command = [*PROGRAM, "--serve", str(folder)]
+        environment, quiet = os.environ | ONE_THREAD, subprocess.DEVNULL
         service = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=os.environ | ONE_THREAD
+            command_of(serve, folder), stdout=subprocess.PIPE, stderr=quiet, text=True, env=environment
         )
         assert service.stdout is not None
         try:
             where = json.loads(service.stdout.readline())
             begun_s, begun_cpu_s = time.monotonic(), cpu_of_s(service.pid)
-            sender = [*PROGRAM, "--send", str(where["port"]), "--seconds", str(seconds)]
-            sent = subprocess.run(sender, check=True, stdout=subprocess.PIPE, text=True)
+            n_sent = in_own_process(send, where["port"], seconds)
             time.sleep(1.0)
             cpu_s, taken_s = cpu_of_s(service.pid) - begun_cpu_s, time.monotonic() - begun_s
             with urllib.request.urlopen(f"{where['url']}/api/v1/status") as answer:
@@ -92,24 +86,5 @@ def measure(seconds: float) -> dict[str, Any]:
         finally:
             service.terminate()
             service.wait(30.0)
-    lost = int(sent.stdout) - bus["n_frames"]
+    lost = n_sent - bus["n_frames"]
     return {**found, "seconds": seconds, "frames": bus["n_frames"], "lost": lost, "payload_kg": latest["payload_kg"]}
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=75.0)
-    parser.add_argument("--json", action="store_true", help="print the figures for machines")
-    parser.add_argument("--serve", type=Path, help=argparse.SUPPRESS)
-    parser.add_argument("--send", type=int, help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.serve:
-        serve(options.serve)
-    elif options.send:
-        send(options.send, options.seconds)
-    else:
-        print(json.dumps(measure(options.seconds), indent=None if options.json else 1))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,10 +1,5 @@
-"""How fast the simulator drives: seconds of driving per second of one core.
+"""How fast the simulator drives: seconds of driving per second of one core."""
 
-python -m benchmarks.speed.simulator [--json]
-"""
-
-import argparse
-import json
 import time
 from collections.abc import Callable
 
@@ -41,19 +36,3 @@ def measure() -> dict[str, float]:
         run()
         rates[name] = DRIVE_S / (time.process_time() - begun_s)
     return rates
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", action="store_true", help="print the figures for machines")
-    options = parser.parse_args()
-    rates = measure()
-    if options.json:
-        print(json.dumps(rates))
-        return
-    for name, rate in rates.items():
-        print(f"{name:26s} {rate:8.0f} x real time")
-
-
-if __name__ == "__main__":
-    main()

@@ -7,7 +7,6 @@ The bus is replaced by a receiver that repeats the frames of one simulated drive
 is the service as in a vehicle.
 """
 
-import argparse
 import asyncio
 import json
 import shutil
@@ -18,9 +17,10 @@ import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
+from typing import Any, Final
 
 from benchmarks.speed.endless_drive import EndlessDrive, ParkedFirst
+from benchmarks.speed.meter import CALIBRATION, print_and_write
 from gateway.config import load_settings
 from gateway.service.gateway import Gateway
 from gateway.service.lifecycle import live
@@ -43,7 +43,6 @@ lines = "."
 [log]
 level = "error"
 """
-LINE: Final = Path(__file__).parents[2] / "gateway/demo/paper_van.json"
 COMMISSIONING: Final = "/api/v1/calibration/commissioning"
 ANSWERS: Final = {  # of the van that made the demo's drive: axle weights with its 80 kg under each
     "kerb_front_axle_kg": 700.0,
@@ -146,7 +145,7 @@ def soak(hours_a_day: float, n_days: int) -> list[dict[str, float]]:
     with TemporaryDirectory() as folder:
         config = Path(folder) / "springscale.toml"
         config.write_text(SETTINGS)
-        shutil.copy(LINE, Path(folder) / "vehicle.json")
+        shutil.copy(CALIBRATION, Path(folder) / "vehicle.json")
         settings = load_settings(config)
 
         def on_started(gateway: Gateway) -> None:
@@ -176,23 +175,16 @@ def what_grew(days: list[dict[str, float]]) -> list[str]:
     return [f"{what} is {last[what]}, at most {most} is allowed" for what, most in allowed.items() if last[what] > most]
 
 
+def measure(days: int, hours: float) -> dict[str, Any]:
+    """The days with this many hours of driving, and their bounds; each day is printed when it is over."""
+    bounds = {"growth_allowed": GROWTH_ALLOWED, "most_allowed": MOST_ALLOWED}
+    return {"hours_a_day": hours, "days": soak(hours, days), **bounds}
+
+
 def main() -> None:
     """Print the days; exit with 1 if something grew."""
-    arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    arguments.add_argument("--days", type=int, default=7)
-    arguments.add_argument("--hours", type=float, default=4.0, help="of driving a day")
-    arguments.add_argument("--output", type=Path, help="JSON file for the figures")
-    asked = arguments.parse_args()
-    begun_s = time.monotonic()
-    days = soak(asked.hours, asked.days)
-    took_s = time.monotonic() - begun_s
-    if asked.output:
-        asked.output.parent.mkdir(exist_ok=True)
-        bounds = {"growth_allowed": GROWTH_ALLOWED, "most_allowed": MOST_ALLOWED}
-        asked.output.write_text(json.dumps({"hours_a_day": asked.hours, "days": days, **bounds}, indent=1) + "\n")
-    print(f"{asked.days} days of {asked.hours:g} h driving in {took_s:.0f} s")
-    grown = what_grew(days)
-    if grown:
+    found = print_and_write(__doc__, measure, days=7, hours=4.0)
+    if grown := what_grew(found["days"]):
         sys.exit("\n".join(grown))
 
 

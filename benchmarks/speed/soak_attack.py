@@ -6,7 +6,6 @@ assets. It ends with 1 where the process grew beyond its bound, a decent client 
 from those of the same drives without an attack.
 """
 
-import argparse
 import asyncio
 import contextlib
 import json
@@ -27,6 +26,8 @@ import httpx
 import numpy as np
 import trustme
 
+from benchmarks.speed.endless_drive import serve_when_told
+from benchmarks.speed.meter import CALIBRATION, ROOT, command_of, peak_mb, print_and_write
 from gateway.store import Store
 from gateway.web.pages import LIBRARY_URL
 from gateway.workbench import demo_drive, frames_of
@@ -48,7 +49,6 @@ ASKED: Final = (
     STREAM,
     LIBRARY_URL,
 )
-ROOT: Final = Path(__file__).parents[2]
 UNIT: Final = ROOT / "deploy/springscale.service"
 SETTINGS: Final = """\
 signals = "springscale:reference"
@@ -71,9 +71,8 @@ class Driven:
 
     def __init__(self, folder: Path, drive: Path, hours: float, days: int) -> None:
         self.state = folder / "state"
-        command = [sys.executable, "-m", "benchmarks.speed.attacked_service", str(folder / "springscale.toml")]
         self._process = subprocess.Popen(
-            [*command, str(drive), str(hours), str(days)],
+            command_of(serve_when_told, folder / "springscale.toml", drive, hours, days),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -98,9 +97,7 @@ class Driven:
 
     def most_mb(self) -> float:
         """Its peak memory."""
-        found = re.search(r"VmHWM:\s+(\d+) kB", Path(f"/proc/{self._process.pid}/status").read_text())
-        assert found is not None
-        return round(int(found[1]) / 1024, 1)
+        return round(peak_mb(self._process.pid), 1)
 
     def stop(self) -> None:
         """End it and wait. Raises CalledProcessError where it did not end well."""
@@ -114,7 +111,7 @@ def set_up(folder: Path, certificate: trustme.LeafCert, earlier: list[dict[str, 
     """Configuration, certificate and a history of before; the cursor of its first record."""
     folder.mkdir()
     (folder / "springscale.toml").write_text(SETTINGS)
-    shutil.copy(ROOT / "gateway/demo/paper_van.json", folder / "vehicle.json")
+    shutil.copy(CALIBRATION, folder / "vehicle.json")
     certificate.private_key_pem.write_to_path(folder / "web.key")
     certificate.cert_chain_pems[0].write_to_path(folder / "web.pem")
     with contextlib.closing(Store.open(folder / "state")) as store:
@@ -250,18 +247,14 @@ def soak_attack(hours: float, days: int) -> dict[str, Any]:
     return figures | calm_figures | {"estimates": len(expected), "different": n_different}
 
 
+def measure(days: int, hours: float) -> dict[str, Any]:
+    """The figures of days with this many hours of driving, and their bound."""
+    return soak_attack(hours, days) | {"hours": hours * days, "memory_allowed_mb": MOST_MB}
+
+
 def main() -> None:
     """Print the figures; exit with 1 if a bound was exceeded."""
-    arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    arguments.add_argument("--days", type=int, default=3)
-    arguments.add_argument("--hours", type=float, default=4.0, help="of driving a day")
-    arguments.add_argument("--output", type=Path, help="JSON file for the figures")
-    asked = arguments.parse_args()
-    figures = soak_attack(asked.hours, asked.days) | {"hours": asked.hours * asked.days, "memory_allowed_mb": MOST_MB}
-    print(json.dumps(figures))
-    if asked.output:
-        asked.output.parent.mkdir(exist_ok=True)
-        asked.output.write_text(json.dumps(figures, indent=1) + "\n")
+    figures = print_and_write(__doc__, measure, days=3, hours=4.0)
     if figures["memory_mb"] > MOST_MB:
         sys.exit(f"{figures['memory_mb']} MB, at most {MOST_MB:g} is allowed")
     if figures["different"] or not figures["estimates"]:

@@ -1,14 +1,10 @@
 """The cost of a start and the size of an installation.
 
-    python -m benchmarks.speed.start [--json]
-
 CPU time of the imports, the time from the command to READY=1 of the service (on an in-process bus, with the demo's
 calibration), the bytes of an installation by pip, and the installed size of the Debian package that `make deb` built,
 compiled code included.
 """
 
-import argparse
-import json
 import os
 import shutil
 import socket
@@ -22,9 +18,8 @@ from typing import Any, Final
 
 from packaging.requirements import Requirement
 
-from benchmarks.speed.meter import ONE_THREAD, best_of
+from benchmarks.speed.meter import CALIBRATION, ONE_THREAD, ROOT, best_of
 
-REPOSITORY: Final = Path(__file__).parents[2]
 SETTINGS: Final = """\
 signals = "springscale:reference"
 calibration = "vehicle.json"
@@ -53,7 +48,7 @@ def imports_s(module: str) -> float:
 
 def ready_s(folder: Path) -> float:
     """From the command to READY=1."""
-    shutil.copy(REPOSITORY / "gateway/demo/paper_van.json", folder / "vehicle.json")
+    shutil.copy(CALIBRATION, folder / "vehicle.json")
     (folder / "springscale.toml").write_text(SETTINGS)
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as notified:
         notified.bind(str(folder / "notify"))
@@ -76,7 +71,7 @@ def ready_s(folder: Path) -> float:
 
 def install_mb() -> dict[str, float]:
     """Megabytes of every package in a vehicle's installation, the largest first."""
-    sizes = {"springscale": _bytes_under(REPOSITORY / "gateway") + _bytes_under(REPOSITORY / "dbc")}
+    sizes = {"springscale": _bytes_under(ROOT / "gateway") + _bytes_under(ROOT / "dbc")}
     waiting = [("springscale", frozenset[str]())]
     while waiting:
         package, extras = waiting.pop()
@@ -97,7 +92,7 @@ def _bytes_under(folder: Path) -> float:
 
 def package_mb() -> float | None:
     """Installed size of the vehicle's Debian package; None if none was built or it cannot be read."""
-    package = max((REPOSITORY / "build").glob("springscale_*.deb"), key=lambda one: one.stat().st_mtime, default=None)
+    package = max((ROOT / "build").glob("springscale_*.deb"), key=lambda one: one.stat().st_mtime, default=None)
     if package is None or shutil.which("dpkg-deb") is None:
         return None
     told = subprocess.run(
@@ -121,14 +116,3 @@ def measure() -> dict[str, Any]:
         "install_mb": sum(sizes.values()),
         "largest_mb": dict(list(sizes.items())[:6]),
     }
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", action="store_true", help="print the figures for machines")
-    options = parser.parse_args()
-    print(json.dumps(measure(), indent=None if options.json else 1))
-
-
-if __name__ == "__main__":
-    main()

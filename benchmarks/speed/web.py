@@ -1,19 +1,15 @@
 """The web side: the rate of requests for the latest estimate over HTTP on one core.
 
-    python -m benchmarks.speed.web [--seconds 5] [--connections 16] [--json]
-
 Server, client and a bus of 2500 frames/s are three processes on the loopback interface. The server is the service: it
 receives and decodes the bus (CAN datagrams over a loopback socket, as in live.py; kernel-filtered, so that 210 frames/s
 of ours arrive), holds an estimate with spectra of the usual length and publishes a new one every 100 ms into eight open
 streams. Goal: 5000 requests/s with p99 under 20 ms, and no frame lost.
 """
 
-import argparse
 import asyncio
 import json
 import socket
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -27,6 +23,7 @@ import uvicorn
 import uvloop
 
 from benchmarks.speed import live
+from benchmarks.speed.meter import command_of, free_port
 from gateway.bus.live import LiveSource
 from gateway.bus.live.socketcan import SocketCanReceiver
 from gateway.bus.signals import Decoder, load_signal_map
@@ -45,6 +42,7 @@ LATEST = b"GET /api/v1/estimates/latest HTTP/1.1\r\nHost: localhost\r\n\r\n"
 STREAM = b"GET /api/v1/stream HTTP/1.1\r\nHost: localhost\r\n\r\n"
 STATUS = "http://127.0.0.1:{port}/api/v1/status"
 N_STREAMS = 8  # chosen
+N_CONNECTIONS = 16  # chosen
 BUS_FRAMES_PER_S = 210  # what a kernel filter lets through of 2500
 
 
@@ -160,11 +158,6 @@ async def ask(port: int, n_connections: int, seconds: float) -> list[float]:
     return took_s
 
 
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        return int(listener.getsockname()[1])
-
-
 def wait_until_up(port: int) -> None:
     for _ in range(400):
         try:
@@ -176,25 +169,16 @@ def wait_until_up(port: int) -> None:
     raise SystemExit("the server did not come up")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=5.0)
-    parser.add_argument("--connections", type=int, default=16)
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--serve", nargs=2, metavar=("DIRECTORY", "PORT"), help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
-    if arguments.serve:
-        serve(arguments.serve[0], int(arguments.serve[1]))
-        return
+def measure(seconds: float) -> dict[str, float]:
+    """Requests for this long."""
     port = free_port()
     with tempfile.TemporaryDirectory() as directory:
-        server = subprocess.Popen([sys.executable, "-m", "benchmarks.speed.web", "--serve", directory, str(port)])
+        server = subprocess.Popen(command_of(serve, directory, port))
         try:
             wait_until_up(port)
-            bus = [*live.PROGRAM, "--send", bus_of(port)["channel"]]
-            bus += ["--rate", str(BUS_FRAMES_PER_S), "--seconds", str(arguments.seconds)]
+            bus = command_of(live.send, int(bus_of(port)["channel"]), BUS_FRAMES_PER_S, seconds)
             sender = subprocess.Popen(bus, stdout=subprocess.PIPE, text=True)
-            took_s = uvloop.run(ask(port, arguments.connections, arguments.seconds))
+            took_s = uvloop.run(ask(port, N_CONNECTIONS, seconds))
             n_sent = int(sender.communicate()[0])
             time.sleep(0.5)
             heard = bus_of(port)
@@ -202,20 +186,11 @@ def main() -> None:
             server.terminate()
             server.wait(10.0)
     p50_ms, p99_ms = (float(1e3 * x) for x in np.percentile(took_s, [50.0, 99.0]))
-    figures = {
-        "requests_per_s": len(took_s) / arguments.seconds,
+    return {
+        "requests_per_s": len(took_s) / seconds,
         "p50_ms": p50_ms,
         "p99_ms": p99_ms,
         "frames_sent": n_sent,
         "frames_received": heard["n_frames"],
         "frames_dropped": heard["n_inbox_dropped"] + heard["n_kernel_dropped"],
     }
-    if arguments.json:
-        print(json.dumps(figures))
-    else:
-        print(f"latest estimate, {arguments.connections} connections, {N_STREAMS} streams open, bus live")
-        print("  " + ", ".join(f"{name} {x:.4g}" for name, x in figures.items()))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,11 +1,12 @@
 """A sample of `python -m benchmarks.accuracy faults`: recorded drives with faulty sensors mislead nobody."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 from support.recordings import calibrated_with_roll_rate, recordings
 
-from benchmarks.accuracy.faults import Study, faults
+from benchmarks.accuracy.faults import Drives, faults
 from gateway.records import Why
 
 NAMES = (
@@ -21,16 +22,18 @@ MOST_OUTSIDE = 0.5  # of a half-width, of either quantity: where an interval fai
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
-    kept = tmp_path_factory.mktemp("kept")
-    return Study(
-        recordings() / "mixed/campaign_roll.toml", calibrated_with_roll_rate(), runs=(3,), names=NAMES, kept=kept
-    )
+def drives() -> Drives:
+    return Drives(recordings() / "mixed/campaign_roll.toml", calibrated_with_roll_rate(), runs=(3,), names=NAMES)
 
 
 @pytest.fixture(scope="module")
-def lines(study: Study) -> dict[tuple[str, str], dict[str, Any]]:
-    return {(line["fault"], line["strength"]): line for line in faults(study)["lines"]}
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("kept")
+
+
+@pytest.fixture(scope="module")
+def lines(drives: Drives, kept: Path) -> dict[tuple[str, str], dict[str, Any]]:
+    return {(line["fault"], line["strength"]): line for line in faults(drives, kept=kept)["lines"]}
 
 
 def test_every_batch_is_refused_or_held_or_nearly_so(lines: dict[tuple[str, str], dict[str, Any]]) -> None:
@@ -63,7 +66,7 @@ def test_a_fault_is_refused_for_what_it_is(
 
 
 def test_what_was_weighed_before_is_not_weighed_again(
-    study: Study, lines: dict[tuple[str, str], dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+    drives: Drives, kept: Path, lines: dict[tuple[str, str], dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("benchmarks.accuracy.faults.estimates_of_logs", None)
-    assert faults(study)["lines"] == list(lines.values())
+    assert faults(drives, kept=kept)["lines"] == list(lines.values())

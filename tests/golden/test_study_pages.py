@@ -10,14 +10,13 @@ from typing import Any
 
 import pytest
 
-from benchmarks.accuracy.coverage_drives import TRIPS
-from benchmarks.accuracy.coverage_page import coverage_page
+from benchmarks.accuracy.coverage import coverage_page
 from benchmarks.accuracy.coverage_table import ALL_KINDS
-from benchmarks.accuracy.disturbances_page import disturbances_page
+from benchmarks.accuracy.disturbances import disturbances_page
+from benchmarks.accuracy.drives import TRIPS
 from benchmarks.accuracy.false_facts import false_facts_page
-from benchmarks.accuracy.faults_page import faults_page
-from benchmarks.accuracy.grades import GRADES
-from benchmarks.accuracy.grades_page import grades_page
+from benchmarks.accuracy.faults import faults_page
+from benchmarks.accuracy.grades import GRADES, grades_page
 from benchmarks.accuracy.phones import CAN, phones_page
 
 DOCS = Path(__file__).parents[2] / "docs"

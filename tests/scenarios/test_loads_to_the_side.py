@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.sideways_drives import SENSORS, VEHICLE, driven, known_drives
 
-from benchmarks.accuracy.coverage_drives import without_roll_rate
+from benchmarks.accuracy.drives import without_roll_rate
 from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle

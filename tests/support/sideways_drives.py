@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.accuracy.coverage_drives import known_run, stated
+from benchmarks.accuracy.drives import known_run, stated
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.calibration.known_run import KnownRun
 from gateway.sim.drive import constant

@@ -9,8 +9,7 @@ from support.half_car_road import VAN
 from support.known_runs import campaign, split_run
 
 from benchmarks.accuracy import advice
-from benchmarks.accuracy.advice import AdviceStudy, Choice, advice_of, compared
-from benchmarks.accuracy.pages import advice_page
+from benchmarks.accuracy.advice import AdviceStudy, Choice, advice_of, advice_page, compared
 from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.calibration.inspection import SplitRun
 from gateway.calibration.known_run import KnownRun

@@ -8,7 +8,6 @@ import pytest
 from support.half_car_road import CAR, VAN, batch_over_road
 from support.known_runs import LOADS, calibrated_on_loads, known_run
 
-from benchmarks.accuracy.budget import budget_page
 from benchmarks.accuracy.budget.alone import Shift, row_of
 from benchmarks.accuracy.budget.nature import (
     Gains,
@@ -22,6 +21,7 @@ from benchmarks.accuracy.budget.nature import (
     on_that_day,
 )
 from benchmarks.accuracy.budget.response import day_covariance, response_to
+from benchmarks.accuracy.budget.study import budget_page
 from benchmarks.accuracy.budget.together import Weighing, refusals_of, rows_of_weighings
 from gateway.core.cargo import shape_prior
 from gateway.core.cross_spectrum.drift import NATURE_STD, NATURE_TOGETHER_STD

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,8 +10,10 @@ from support.calibrated import ratio_index_calibration
 from support.drives import assert_same_batch, drive, with_roll
 from support.half_car_road import batch_over_road
 
-from benchmarks.accuracy import coverage, vans
-from benchmarks.accuracy.coverage_drives import (
+from benchmarks.accuracy import coverage, drives
+from benchmarks.accuracy.coverage_table import coverage_table
+from benchmarks.accuracy.disturbed import half_of_the_time, missing, stuck
+from benchmarks.accuracy.drives import (
     AS_CALIBRATED,
     NEAR_M,
     SIDEWAYS_M,
@@ -25,7 +28,6 @@ from benchmarks.accuracy.coverage_drives import (
     unseen_load,
     without_roll_rate,
 )
-from benchmarks.accuracy.disturbed import half_of_the_time, missing, stuck
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
@@ -102,11 +104,15 @@ def test_every_van_is_put_to_every_kind_of_drive(monkeypatch: pytest.MonkeyPatch
         calibrated_with.append(tuple(run.payload_kg for run in runs))
         return CalibratedVehicle("x", vehicle, (0.0, 1e4), (0.0, 100.0), ratio_index_calibration())
 
-    for module in (coverage, vans):
+    for module in (coverage, drives):
         monkeypatch.setattr(module, "driven", stand_in)
     monkeypatch.setattr(coverage, "calibrated_on", fit)
     done: list[tuple[int, int]] = []
-    table = coverage.coverage(Scope(n_vans=2, n_known_loads=4, n_tests=3), 11, on_van=lambda *step: done.append(step))
+    scope = Scope(n_known_loads=4, n_tests=3)
+    study = replace(coverage.STUDY, of_case=partial(coverage.of_one_van, scope=scope))
+    vans = study.cases(2, 11, on_done=lambda *step: done.append(step))
+    batches, refused = ([one for of_van in vans for one in of_van[which]] for which in (0, 1))
+    table = coverage_table(batches, 11, refused)
     assert len(calibrated_with) == 4  # each van with its roll rate, and without
     assert all(len(set(loads)) > 2 and loads[0] == 0.0 for loads in calibrated_with)
     assert {line.kind for line in table.lines} == {*TRIPS, "all"}

@@ -10,7 +10,7 @@ from support.calibrated import ratio_index_calibration
 from support.half_car_road import VAN
 from support.known_runs import campaign
 
-from benchmarks.accuracy.pages import learning_curve_page
+from benchmarks.accuracy.learning_curve import learning_curve_page
 from gateway.calibration.judgement import LearningCurve, curve_of, learning_curve
 from gateway.calibration.judgement.learning_curve import (
     Score,

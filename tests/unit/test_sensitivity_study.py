@@ -11,11 +11,12 @@ from click.testing import CliRunner
 from support.half_car_road import VAN, batch_over_road
 
 from benchmarks.accuracy import __main__ as command
-from benchmarks.accuracy import vans
-from benchmarks.accuracy.coverage_drives import Scope
-from benchmarks.accuracy.sensitivity import CONSTANTS, sensitivity_page, study
+from benchmarks.accuracy import drives
+from benchmarks.accuracy.drives import Scope
+from benchmarks.accuracy.sensitivity import study
 from benchmarks.accuracy.sensitivity.changes import pairs_of
-from benchmarks.accuracy.sensitivity.constants import USED_IN, Acts, Constant, scaled
+from benchmarks.accuracy.sensitivity.constants import CONSTANTS, USED_IN, Acts, Constant, scaled
+from benchmarks.accuracy.study import Study
 from gateway.calibration.half_car import calibrate_cross_spectrum
 from gateway.calibration.judgement import Judged
 from gateway.calibration.known_run import KnownRun
@@ -99,30 +100,30 @@ def test_every_setting_is_weighed_or_inspected(tmp_path: Path, monkeypatch: pyte
         refitted.append(1.0)
         return calibrated
 
-    def fresh(scope: Scope, seed: int, number: int) -> vans.FreshVan:
+    def fresh(scope: Scope, seed: int, number: int) -> drives.FreshVan:
         seeds = np.random.SeedSequence([seed, number])
-        van = vans.draw_van(number, np.random.default_rng(1))
+        van = drives.draw_van(number, np.random.default_rng(1))
         vehicle = replace(VAN, name=f"van {number}", payload_range_kg=(0.0, 420.0))
-        return vans.FreshVan(van, REFERENCE, vehicle, runs, np.random.default_rng(seeds), seeds)
+        return drives.FreshVan(van, REFERENCE, vehicle, runs, np.random.default_rng(seeds), seeds)
 
     monkeypatch.setattr(study, "calibrated_on", fit)
     monkeypatch.setattr(study, "fresh_van", fresh)
     monkeypatch.setattr(study, "driven", lambda *drive: runs[drive[5] % len(runs)])
     chosen = [next(one for one in CONSTANTS if one.acts is acts) for acts in Acts]
-    found = study.sensitivity(Scope(n_vans=2), 3, constants=chosen)
+    found = study.numbers(3, 2, [study.of_one_van(3, number, chosen) for number in range(2)], chosen)
     assert len(refitted) == 2 * (1 + 2)  # as it is, and what acts in calibration halved and doubled
     in_calibration, in_weighing, in_inspection = (one.name for one in chosen)
-    assert {*found.weighing} == {
+    assert {*found["weighing"]} == {
         "as it is", *(f"{name} x {by}" for name in (in_calibration, in_weighing) for by in ("0.5", "2"))
     }  # fmt: skip
-    assert {*found.inspection} == {"as it is", f"{in_inspection} x 0.5", f"{in_inspection} x 2"}
-    usual = found.inspection["as it is"]
-    assert (usual.n_right, usual.n_wrong) == (2 * (4 + 4), 2 * (1 + 4))
-    assert usual.n_doubted == 0
-    assert usual.n_named >= 8  # every sign; so little driving need not tell a label
-    monkeypatch.setattr(command.on_sensitivity, "sensitivity", lambda *_, **__: found)
+    assert {*found["inspection"]} == {"as it is", f"{in_inspection} x 0.5", f"{in_inspection} x 2"}
+    usual = found["inspection"]["as it is"]
+    assert (usual["n_right"], usual["n_wrong"]) == (2 * (4 + 4), 2 * (1 + 4))
+    assert usual["n_doubted"] == 0
+    assert usual["n_named"] >= 8  # every sign; so little driving need not tell a label
+    monkeypatch.setattr(Study, "run", lambda *_, **__: found)
     told = CliRunner().invoke(command.studies, ["sensitivity", "--output", str(tmp_path)], catch_exceptions=False)
     numbers = json.loads((tmp_path / "sensitivity.json").read_text(encoding="utf-8"))
-    assert told.stdout == (tmp_path / "sensitivity.md").read_text(encoding="utf-8") == sensitivity_page(numbers)
+    assert told.stdout == (tmp_path / "sensitivity.md").read_text(encoding="utf-8") == study.sensitivity_page(numbers)
     assert f"| `{in_calibration}` | 0.5 | " in told.stdout
-    assert f"| as they are | 1 | 0 of 16 | {usual.n_named} of 10 |" in told.stdout
+    assert f"| as they are | 1 | 0 of 16 | {usual['n_named']} of 10 |" in told.stdout

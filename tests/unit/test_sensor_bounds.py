@@ -9,8 +9,7 @@ from click.testing import CliRunner
 from support.half_car_road import VAN
 
 from benchmarks.accuracy.__main__ import studies
-from benchmarks.accuracy.bounds import MILD
-from benchmarks.accuracy.sensor_bounds import SPEED, Scene, Seen, bound_of
+from benchmarks.accuracy.sensor_bounds import MILD, SPEED, Scene, Seen, bound_of
 from gateway.calibration.half_car import prior_of
 from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.cross_spectrum.likelihood import Point

@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 
 from benchmarks.accuracy.coverage_table import JudgedBatch, coverage_table
-from benchmarks.accuracy.grades import GRADES, _facts
-from benchmarks.accuracy.grades_page import AS_GOOD, FAILS, WORKS, grades_page, limits, verdict_of
+from benchmarks.accuracy.grades import AS_GOOD, FAILS, GRADES, WORKS, _facts, grades_page, limits, verdict_of
 from gateway.sim.sensors import CANMOD, REFERENCE
 
 SAME = JudgedBatch(

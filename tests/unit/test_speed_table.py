@@ -57,7 +57,7 @@ def test_a_run_without_its_library_says_which(capsys):
     def run():
         raise ModuleNotFoundError("No module named 'hilspy'", name="hilspy")
 
-    meter.print_run(run)
+    meter.print_answer(run)
     assert json.loads(capsys.readouterr().out) == {"skipped": "hilspy is not installed"}
 
 

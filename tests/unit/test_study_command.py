@@ -1,6 +1,7 @@
 """python -m benchmarks.accuracy: what is printed and written, with stand-ins for the minutes of work."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,10 +10,13 @@ import pytest
 from click.testing import CliRunner
 
 from benchmarks.accuracy import __main__ as command
+from benchmarks.accuracy import siblings
+from benchmarks.accuracy import study as study_module
 from benchmarks.accuracy.advice import AdviceStudy, Choice, compared
-from benchmarks.accuracy.coverage_table import JudgedBatch, coverage_table
-from benchmarks.accuracy.siblings.drives import draw_line, drawn_van
-from benchmarks.accuracy.siblings.study import Way
+from benchmarks.accuracy.coverage_table import JudgedBatch
+from benchmarks.accuracy.lines import draw_line, drawn_van
+from benchmarks.accuracy.siblings import Way
+from benchmarks.accuracy.study import Study
 from gateway.calibration.judgement import LearningCurve
 from gateway.calibration.judgement.learning_curve import Score, Trial
 
@@ -101,8 +105,7 @@ def test_coverage_says_whether_it_falls_short(
         for i in range(200)
     ]
     refused = JudgedBatch("b", "b 1", "mixed", "cross_spectrum", ("gap",), 9.0, 9.0, False, False)
-    table = coverage_table([*batches, refused], seed=4, refused=["b: ratio_index: too few"])
-    monkeypatch.setattr(command.on_coverage, "coverage", lambda *_, **__: table)
+    monkeypatch.setattr(Study, "cases", lambda *_, **__: [([*batches, refused], ["b: ratio_index: too few"])])
     page = run("coverage", "--output", str(tmp_path / "out"))
     assert f"cross spectrum, with roll rate, all drives, payload: {100 - n_missed // 2} %" in page
     assert verdict in page
@@ -120,7 +123,7 @@ def test_siblings_are_told_way_by_way(tmp_path: Path, monkeypatch: pytest.Monkey
         for i in range(20)
     ]
     refused = JudgedBatch("van 0", "van 0 20", "mixed", Way.ALONE, ("gap",), 9.0, 9.0, False, False)
-    monkeypatch.setattr("benchmarks.accuracy.siblings.study.run_each", lambda *_: [batches, [refused]])
+    monkeypatch.setattr(Study, "cases", lambda *_, **__: [batches, [refused]])
     page = run("siblings", "--vans", "4", "--output", str(tmp_path / "out"))
     assert "3 simulated vans of 2 lines" in page
     assert f"| {Way.ALONE} | 21 | 1: 1 gap | 2.00 | 2.33 | 95 % (" in page
@@ -137,3 +140,29 @@ def test_a_line_and_its_siblings_are_drawn_alike_again() -> None:
     rates = [van.front.spring.rate_npm / drawn[0].van.front.spring.rate_npm for van in vans]
     assert len({*rates}) == 3
     assert all(0.85 < rate < 1.15 for rate in rates)
+
+
+N_COMPUTED: list[int] = []
+
+
+def counted_case(seed: int, number: int) -> list[JudgedBatch]:
+    N_COMPUTED.append(number)
+    return [JudgedBatch("van", f"run {number}", "mixed", "cross_spectrum", ("gap",), 1.0 + seed, 2.0, True, False)]
+
+
+def test_a_study_that_was_broken_off_resumes_with_the_finished_cases(tmp_path: Path) -> None:
+    """The cases that were read are those that were computed, NaN included."""
+    study = replace(siblings.STUDY, of_case=counted_case, n_cases=int)
+    N_COMPUTED.clear()
+    first = study.cases(2, 5, kept=tmp_path)
+    again = study.cases(3, 5, kept=tmp_path)
+    assert N_COMPUTED == [0, 1, 2]
+    assert repr(again[:2]) == repr(first)
+    assert repr(study.cases(3, 5)) == repr(again)
+    assert {path.name for path in tmp_path.iterdir()} == {f"siblings-5-{number}.json" for number in range(3)}
+    assert study.cases(1, 6, kept=tmp_path)[0][0].payload_error_pct == 7.0  # another seed is another case
+
+
+@pytest.mark.parametrize("study", command.STUDIES, ids=[study.name for study in command.STUDIES])
+def test_every_study_can_store_its_cases(study: Study) -> None:
+    assert isinstance(study_module._adapter_of(study.of_case).json_schema(), dict)

@@ -1,7 +1,5 @@
 """Each source alone: the same drive with one cause and without it, the observed shift against the predicted one.
 
-    alone(n_vans, seed) -> one Row per source
-
 The vans have no roll rate and no declared load, so every source is present. ``slope`` is the regression of the observed
 shifts on those that the estimator's own derivatives predict for the drawn cause. ``z2`` is the mean square of the
 observed shifts over the stated variance.
@@ -9,7 +7,6 @@ observed shifts over the stated variance.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -29,9 +26,17 @@ from benchmarks.accuracy.budget.nature import (
     to_one_side,
 )
 from benchmarks.accuracy.budget.response import day_covariance, response_to
-from benchmarks.accuracy.coverage_drives import TRIPS, Scope, Trip, known_run, rows_of, without_roll_rate
-from benchmarks.accuracy.runner import OnDone, run_each
-from benchmarks.accuracy.vans import FreshVan, fresh_van
+from benchmarks.accuracy.drives import (
+    TRIPS,
+    USUAL,
+    FreshVan,
+    Scope,
+    Trip,
+    fresh_van,
+    known_run,
+    rows_of,
+    without_roll_rate,
+)
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cargo import ShapePrior
@@ -48,16 +53,17 @@ PARTS: Final = (0.3, 0.9)  # chosen: of the rated payload
 PLACES: Final = (0.35, 0.85)  # chosen: of the wheelbase
 
 
+Pair = tuple[float, float]  # payload in kg, front share in percent
+
+
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """The shift of one batch by one source, payload in kg and front share in percent: found and predicted (2,), and the
-    stated variances (2,).
-    """
+    """The shift of one batch by one source, found and predicted, and the stated variances."""
 
     source: str
-    found: F64
-    predicted: F64
-    variance: F64
+    found: Pair
+    predicted: Pair
+    variance: Pair
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,10 +82,8 @@ class Row:
     front_share_found_pct: float
 
 
-def alone(n_vans: int, seed: int, *, workers: int = 1, on_van: OnDone = lambda done, of: None) -> list[dict[str, Any]]:
-    """Drive every van once as calibrated and once for each source."""
-    vans = run_each(partial(of_one_van, Scope(n_vans=n_vans), seed), n_vans, workers, on_van)
-    shifts = [shift for of_van in vans for shift in of_van]
+def rows_of_shifts(shifts: Sequence[Shift]) -> list[dict[str, Any]]:
+    """A row for each source."""
     sources = dict.fromkeys(shift.source for shift in shifts)
     return [asdict(row_of(source, [one for one in shifts if one.source == source])) for source in sources]
 
@@ -103,7 +107,7 @@ def row_of(source: str, shifts: Sequence[Shift]) -> Row:
 _OF_SHIFT: Final = ("found", "predicted", "variance")
 
 
-def of_one_van(scope: Scope, seed: int, number: int) -> list[Shift]:
+def of_one_van(seed: int, number: int, scope: Scope = USUAL) -> list[Shift]:
     """One draw of every source on one van."""
     fresh = fresh_van(scope, seed, number)
     runs = [without_roll_rate(run) for run in fresh.runs]
@@ -153,6 +157,12 @@ def _shape_of(load: Load, van: Vehicle) -> float:
     return float(np.log((load.length_m**2 + load.tall_m**2) / 12.0 + part * above_m**2))
 
 
+def _shifted(source: str, one: Weighed, usual: Weighed, predicted: F64, variance: F64) -> Shift:
+    found = one.posterior.mean - usual.posterior.mean
+    pairs = [(float(each[PAYLOAD]), float(each[FRONT_SHARE])) for each in (found, predicted, variance)]
+    return Shift(source, *pairs)
+
+
 def _of(name: Source, one: Weighed) -> F64:
     return np.asarray(np.sum(one.posterior.sources[name] ** 2, axis=0))
 
@@ -162,8 +172,8 @@ def _day(bench: _Bench) -> Iterator[Shift]:
     day = drawn_day(bench.rng)
     batches = bench.driven(on_that_day(bench.van, day), bench.load)
     for _, one, usual in bench.pairs(batches, exactly_known(bench.as_known)):
-        shift = one.posterior.mean - usual.posterior.mean
-        yield Shift("day", shift, response_to(usual, bench.known, day), np.diag(day_covariance(usual, bench.known)))
+        predicted, covariance = response_to(usual, bench.known, day), day_covariance(usual, bench.known)
+        yield _shifted("day", one, usual, predicted, np.diag(covariance))
 
 
 def _sensor(bench: _Bench) -> Iterator[Shift]:
@@ -174,7 +184,7 @@ def _sensor(bench: _Bench) -> Iterator[Shift]:
         believed, std = gain_of(batches[i].gravity_mps2, bench.known.gravity_mps2)
         left_open = (gains.acceleration - gains.rate - believed) / std
         column = usual.posterior.sources[Source.SENSOR][0]
-        yield Shift("sensor", one.posterior.mean - usual.posterior.mean, left_open * column, _of(Source.SENSOR, usual))
+        yield _shifted("sensor", one, usual, left_open * column, _of(Source.SENSOR, usual))
 
 
 def _shape(bench: _Bench) -> Iterator[Shift]:
@@ -192,8 +202,7 @@ def _shape(bench: _Bench) -> Iterator[Shift]:
         if isinstance(known := knowing[i], Weighed):
             goods, own = (one.posterior.sources[name][:1] for name in SHAPE)
             variance = np.sum(goods**2 + own**2, axis=0)
-            shift = one.posterior.mean - usual.posterior.mean
-            yield Shift("load length and height", shift, one.posterior.mean - known.posterior.mean, variance)
+            yield _shifted("load length and height", one, usual, one.posterior.mean - known.posterior.mean, variance)
 
 
 def _sideways(bench: _Bench) -> Iterator[Shift]:
@@ -203,8 +212,7 @@ def _sideways(bench: _Bench) -> Iterator[Shift]:
     z = bench.left_m / std_m * float(np.sign(bench.fresh.sensors.mount.left_m))
     for _, one, usual in bench.pairs(batches, exactly_known(bench.as_known)):
         column = usual.posterior.sources[Source.SIDEWAYS][0]
-        shift = one.posterior.mean - usual.posterior.mean
-        yield Shift("sideways", shift, z * column, _of(Source.SIDEWAYS, usual))
+        yield _shifted("sideways", one, usual, z * column, _of(Source.SIDEWAYS, usual))
 
 
 def _empty_share(bench: _Bench, runs: list[Any]) -> Iterator[Shift]:
@@ -218,5 +226,4 @@ def _empty_share(bench: _Bench, runs: list[Any]) -> Iterator[Shift]:
         if isinstance(one, Weighed) and isinstance(usual, Weighed):
             part = vehicle.empty_mass_kg / (vehicle.empty_mass_kg + float(usual.posterior.mean[PAYLOAD]))
             column = np.array([0.0, vehicle.empty_front_share_std_pct * part])
-            shift = one.posterior.mean - usual.posterior.mean
-            yield Shift("empty_share", shift, np.array([0.0, off_pct * part]), column**2)
+            yield _shifted("empty_share", one, usual, np.array([0.0, off_pct * part]), column**2)

@@ -7,7 +7,7 @@ from math import exp
 
 import numpy as np
 
-from benchmarks.accuracy.coverage_drives import Trip
+from benchmarks.accuracy.drives import Trip
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cargo import ShapePrior
 from gateway.core.cross_spectrum.drift import NATURE_STD, NATURE_TOGETHER_STD

@@ -1,7 +1,5 @@
 """All sources at once: vans that differ from their calibration in everything that the estimator allows for.
 
-    together(n_vans, seed) -> one Row for each of: with or without a roll rate, goods stated or not
-
 The fitter's empty share is wrong, springs, tyres and dampers are those of another day, the sensors have another
 temperature, loads have every length and height and any place across the floor.
 """
@@ -9,7 +7,6 @@ temperature, loads have every length and height and any place across the floor.
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from itertools import product
 from typing import Any, Final
 
@@ -25,10 +22,18 @@ from benchmarks.accuracy.budget.nature import (
     place_std_m,
     to_one_side,
 )
-from benchmarks.accuracy.coverage_drives import EMPTY_SHARE, TRIPS, Scope, known_run, rows_of, without_roll_rate
+from benchmarks.accuracy.drives import (
+    EMPTY_SHARE,
+    TRIPS,
+    USUAL,
+    FreshVan,
+    Scope,
+    fresh_van,
+    known_run,
+    rows_of,
+    without_roll_rate,
+)
 from benchmarks.accuracy.loads import SAYS, Shape, shaped_load
-from benchmarks.accuracy.runner import OnDone, run_each
-from benchmarks.accuracy.vans import FreshVan, fresh_van
 from gateway.calibration.judgement import coverage_of
 from gateway.calibration.judgement.coverage import interval_scores
 from gateway.calibration.judgement.learning_curve import calibrated_on
@@ -74,14 +79,6 @@ class Figures:
     interval_score: float | None
     coverage: dict[str, Any] | None
     coverage_by_van: dict[str, Any] | None
-
-
-def together(
-    n_vans: int, seed: int, *, workers: int = 1, on_van: OnDone = lambda done, of: None
-) -> list[dict[str, Any]]:
-    """Calibrate and drive every van."""
-    vans = run_each(partial(of_one_van, Scope(n_vans=n_vans), seed), n_vans, workers, on_van)
-    return rows_of_weighings([one for of_van in vans for one in of_van])
 
 
 def rows_of_weighings(weighings: Sequence[Weighing]) -> list[dict[str, Any]]:
@@ -137,7 +134,7 @@ def refusals_of(weighings: Sequence[Weighing]) -> dict[str, Any]:
     return {"rate": asdict(rate) if rate else None, "watched": watched}
 
 
-def of_one_van(scope: Scope, seed: int, number: int) -> list[Weighing]:
+def of_one_van(seed: int, number: int, scope: Scope = USUAL) -> list[Weighing]:
     """One van, calibrated with and without its roll rate, on the same drives."""
     fresh = fresh_van(scope, seed, number)
     vehicle, runs = as_stated(fresh.vehicle, fresh.runs, drawn_share_pct(fresh.vehicle, fresh.rng))

@@ -1,23 +1,19 @@
-"""Every constant halved and doubled: calibrate, weigh and inspect the same fresh vans, and compare.
+"""Every constant halved and doubled: calibrate, weigh and inspect the same fresh vans, and compare."""
 
-sensitivity(Scope(), seed) -> Sensitivity
-"""
-
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
-from functools import partial
 from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.accuracy.coverage_drives import TRIPS, Scope, driven, unseen_load
 from benchmarks.accuracy.coverage_table import JudgedBatch, Line, coverage_table, judged_batches
-from benchmarks.accuracy.runner import OnDone, run_each
+from benchmarks.accuracy.drives import TRIPS, USUAL, FreshVan, Scope, driven, fresh_van, unseen_load
+from benchmarks.accuracy.markdown import Column, Row, number, page, table_of, text
 from benchmarks.accuracy.sensitivity.changes import Pair, pairs_of
 from benchmarks.accuracy.sensitivity.constants import CONSTANTS, FACTORS, Acts, Constant, scaled
-from benchmarks.accuracy.vans import FreshVan, fresh_van
+from benchmarks.accuracy.study import Study
 from gateway.calibration.half_car import known_spectra
 from gateway.calibration.inspection.axes import apart_findings, phase_findings, phases
 from gateway.calibration.inspection.finding import Kind
@@ -67,59 +63,22 @@ class Weighing:
 
 
 @dataclass(frozen=True, slots=True)
-class Sensitivity:
-    """By setting ("NAME x 0.5", or as it is): the results of weighing and of inspection. ``constants`` are the original
-    values.
-    """
+class OfVan:
+    """One van under every setting, by its name."""
 
-    seed: int
-    n_vans: int
-    constants: dict[str, list[float]]
-    weighing: dict[str, Weighing]
-    inspection: dict[str, Inspected]
-
-    def to_json(self) -> dict[str, Any]:
-        """The figures for a file or a page."""
-        return asdict(self)
-
-
-@dataclass(frozen=True, slots=True)
-class _OfVan:
     batches: list[JudgedBatch]
     pairs: dict[str, list[Pair]]
     inspected: dict[str, Inspected]
 
 
-def sensitivity(
-    scope: Scope,
-    seed: int = SEED,
-    *,
-    constants: Sequence[Constant] = CONSTANTS,
-    workers: int = 1,
-    on_van: OnDone = lambda done, of: None,
-) -> Sensitivity:
-    """Drive every van once, and repeat the rest for every setting."""
-    vans = list(run_each(partial(of_one_van, scope, seed, constants), scope.n_vans, workers, on_van))
-    table = coverage_table([batch for van in vans for batch in van.batches], seed)
-    lines = {line.kind: line for line in table.lines}
-    pairs = {name: [pair for van in vans for pair in van.pairs[name]] for name in vans[0].pairs}
-    return Sensitivity(
-        seed,
-        scope.n_vans,
-        {one.name: [float(x) for x in np.ravel(one.current)] for one in constants},
-        {name: _weighing(lines[name], of_setting) for name, of_setting in pairs.items()},
-        {name: sum((van.inspected[name] for van in vans), Inspected()) for name in vans[0].inspected},
-    )
-
-
-def of_one_van(scope: Scope, seed: int, constants: Sequence[Constant], number: int) -> _OfVan:
+def of_one_van(seed: int, number: int, constants: Sequence[Constant] = CONSTANTS, scope: Scope = USUAL) -> OfVan:
     """One van under every setting."""
     fresh = fresh_van(scope, seed, number)
     tests = [
         driven(fresh.van, unseen_load(fresh.van, fresh.rng), trip, scope, one, len(fresh.runs) + i, fresh.sensors)
         for i, (trip, one) in enumerate(zip(TRIPS.values(), fresh.test_seed.spawn(len(TRIPS)), strict=True), 1)
     ]
-    found = _OfVan([], {}, {})
+    found = OfVan([], {}, {})
     usual = calibrated_on(fresh.runs, fresh.vehicle, ESTIMATOR)
     for name, constant, factor in _settings(constants):
         with scaled(constant, factor) if constant else nullcontext():
@@ -145,7 +104,7 @@ def setting(constant: Constant, factor: float) -> str:
     return f"{constant.name} x {factor:g}"
 
 
-def _weigh(name: str, calibrated: CalibratedVehicle, tests: Sequence[KnownRun], found: _OfVan) -> None:
+def _weigh(name: str, calibrated: CalibratedVehicle, tests: Sequence[KnownRun], found: OfVan) -> None:
     drives = [judge([run], calibrated, ESTIMATOR) for run in tests]
     found.pairs[name] = pairs_of(drives, Rules.of(calibrated.vehicle))
     for run, judged in zip(tests, drives, strict=True):
@@ -184,3 +143,114 @@ def _inspected(fresh: FreshVan) -> Inspected:
 def _kinds_of_axes(spectra: CrossSpectra, run: KnownRun, fresh: FreshVan) -> set[StrEnum]:
     seen = phases(spectra, run, fresh.vehicle)
     return {finding.kind for finding in (*apart_findings(spectra, seen), *phase_findings(seen, None))}
+
+
+def numbers(seed: int, n: int, vans: Sequence[OfVan], constants: Sequence[Constant] = CONSTANTS) -> dict[str, Any]:
+    """By setting ("NAME x 0.5", or as it is): the results of weighing and of inspection; and the original values."""
+    table = coverage_table([batch for van in vans for batch in van.batches], seed)
+    lines = {line.kind: line for line in table.lines}
+    pairs = {name: [pair for van in vans for pair in van.pairs[name]] for name in vans[0].pairs}
+    inspected = {name: sum((van.inspected[name] for van in vans), Inspected()) for name in vans[0].inspected}
+    return {
+        "seed": seed,
+        "n_vans": n,
+        "constants": {one.name: [float(x) for x in np.ravel(one.current)] for one in constants},
+        "weighing": {name: asdict(_weighing(lines[name], of_setting)) for name, of_setting in pairs.items()},
+        "inspection": {name: asdict(counted) for name, counted in inspected.items()},
+    }
+
+
+def sensitivity_page(found: Mapping[str, Any]) -> str:
+    """The page in Markdown."""
+    usual = found["weighing"][AS_IT_IS]
+    return page(
+        "Sensitivity",
+        f"sensitivity --output DIR --vans {found['n_vans']} --seed {found['seed']}",
+        "Some constants follow from no derivation. Here each is halved and doubled in turn, all else as it is, on "
+        f"{found['n_vans']} simulated vans that were not used to choose any setting: calibrated on six known "
+        f"loads, then driven "
+        "once in each of the ways of [coverage](coverage.md), each time with another load. Errors are percent of "
+        "the rated payload and of 20 percentage points, over batches that were answered; held is the share of "
+        "these whose 95 % interval holds the truth, +- the mean of half these intervals, and the score that of "
+        "their width and 40 times what the truth lies outside.",
+        "",
+        *table_of(WEIGHED, _settings_of(found["weighing"])),
+        "",
+        "## Smallest detectable change of load",
+        "",
+        f"Between two batches of five minutes, a change of {usual['smallest_change_kg']:.0f} kg (median) is "
+        "noticed every other time if the front share stays; a change of the share helps. Of the pairs of batches "
+        f"with one load {usual['n_false']} of {usual['n_unchanged']} were taken for two; of those with loads "
+        f"further apart than that {usual['n_seen']} of {usual['n_changed']} were.",
+        "",
+        "## Inspection",
+        "",
+        "The known drives of the same vans: as they are, with a third of the rated payload missing on the label of "
+        "the heaviest, and with the pitch rate turned over.",
+        "",
+        *table_of(INSPECTED, _settings_of(found["inspection"])),
+        "",
+        "## What each decides",
+        "",
+        *(_decided(one, found["constants"][one.name]) for one in CONSTANTS if one.name in found["constants"]),
+        "",
+    )
+
+
+def _settings_of(found: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The rows of a table: as it is, then each constant in each setting that was tried."""
+    tried = [(f"`{one.name}`", f"{by:g}", setting(one, by)) for one in CONSTANTS for by in FACTORS]
+    rows = [("as they are", "1", AS_IT_IS), *tried]
+    return [{"constant": name, "times": by, **found[key]} for name, by, key in rows if key in found]
+
+
+def _of_line(cell: Callable[[Row], str]) -> Callable[[Row], str]:
+    return lambda row: cell(row["line"])
+
+
+def _held(quantity: str) -> Callable[[Row], str]:
+    def cell(row: Row) -> str:
+        coverage = row["line"][f"{quantity}_coverage"]
+        return "–" if coverage is None else f"{100.0 * coverage['share']:.0f} %"
+
+    return cell
+
+
+WEIGHED: Final[tuple[Column, ...]] = (
+    ("Constant", text("constant")),
+    ("times", text("times")),
+    ("Payload, mean abs. error %", _of_line(number("payload_mean_abs_pct", unknown="–"))),
+    ("Share, mean abs. error %", _of_line(number("front_share_mean_abs_pct", unknown="–"))),
+    ("Payload held", _held("payload")),
+    ("Share held", _held("front_share")),
+    ("Payload, +- %", _of_line(number("payload_half_width_pct", unknown="–"))),
+    ("score %", _of_line(number("payload_interval_score_pct", unknown="–"))),
+    ("Share, +- %", _of_line(number("front_share_half_width_pct", unknown="–"))),
+    ("score %", _of_line(number("front_share_interval_score_pct", unknown="–"))),
+    ("Refused", _of_line(lambda line: f"{line['n_rejected']} of {line['n_batches']}")),
+    ("Change of load that shows, kg", number("smallest_change_kg", 0, unknown="–")),
+    ("Changes seen where none was", lambda row: f"{row['n_false']} of {row['n_unchanged']}"),
+)
+INSPECTED: Final[tuple[Column, ...]] = (
+    ("Constant", text("constant")),
+    ("times", text("times")),
+    ("Right ones doubted", lambda row: f"{row['n_doubted']} of {row['n_right']}"),
+    ("Wrong ones named", lambda row: f"{row['n_named']} of {row['n_wrong']}"),
+)
+
+
+def _decided(constant: Constant, was: Sequence[float]) -> str:
+    numbers = ", ".join(f"{x:g}" for x in was)
+    return f"- `{constant.name}` ({numbers}), in {constant.acts}: {constant.decides}."
+
+
+STUDY: Final = Study(
+    name="sensitivity",
+    does="The effect of each chosen constant: halved and doubled in turn; ~4 minutes a van.",
+    doing="driving vans, calibrating and weighing them over and over",
+    of_case=of_one_van,
+    numbers=numbers,
+    page=sensitivity_page,
+    seed=SEED,
+    n=12,
+)

@@ -23,7 +23,7 @@ import paho.mqtt.client as mqtt
 import trustme
 from paho.mqtt.enums import CallbackAPIVersion
 
-from benchmarks.speed.meter import cpu_of_s
+from benchmarks.speed.meter import cpu_of_s, free_port
 from gateway.uplink.link import MqttLink
 from gateway.uplink.outbox import OutboxMessage
 from gateway.uplink.settings import UplinkSettings
@@ -89,8 +89,7 @@ class Broker:
     def __init__(self, folder: Path, extra: str = "") -> None:
         if MOSQUITTO is None:
             raise SystemExit("mosquitto is needed to measure a broker: install Debian's package of that name")
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            self.port = int(free.getsockname()[1])
+        self.port = free_port()
         configuration = folder / "mosquitto.conf"
         limits = "max_queued_messages 0\nmax_inflight_messages 0\n"  # a back-end that lags loses nothing
         configuration.write_text(f"listener {self.port} 127.0.0.1\nallow_anonymous true\nuser root\n{limits}{extra}")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.speed.day import FRAMES_PER_S, busy_drive
+from benchmarks.speed.meter import CALIBRATION
 from gateway.bus.logs import motion_of_log, write_candump
 from gateway.bus.signals import load_signal_map
 from gateway.core.flow import Identity
@@ -17,7 +18,6 @@ from gateway.sim.scenario import START_NS
 from gateway.units import NS_PER_S
 from gateway.workbench import demo_drive, frames_of
 
-CALIBRATION = Path(__file__).parents[3] / "gateway/demo/paper_van.json"
 SIGNALS = "springscale:reference"
 REPEATS = 3  # chosen: the fastest counts
 APART_NS = 86_400 * NS_PER_S  # a drive a day

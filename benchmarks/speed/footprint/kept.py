@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.speed.footprint.drives import CALIBRATION, SIGNALS
+from benchmarks.speed.footprint.drives import SIGNALS
+from benchmarks.speed.meter import CALIBRATION
 from gateway.archive import place_of, slots_done
 from gateway.archive.manifest import load_manifest
 from gateway.archive.processes import Processes

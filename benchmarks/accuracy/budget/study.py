@@ -1,32 +1,53 @@
-"""The page of the budget study, from its numbers alone."""
+"""The study of the budget: both kinds of drives of every van, and the page."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
-from benchmarks.accuracy.markdown import number_cell, page, rejected_cell, score_cell, share_cell, table
+from benchmarks.accuracy.budget import alone, together
+from benchmarks.accuracy.budget.alone import Shift, rows_of_shifts
+from benchmarks.accuracy.budget.together import Weighing, rows_of_weighings
+from benchmarks.accuracy.markdown import (
+    Column,
+    Row,
+    number,
+    page,
+    rejected_cell,
+    score_cell,
+    share,
+    share_cell,
+    table_of,
+    text,
+)
+from benchmarks.accuracy.study import Study
 
-ALONE: Final = (
-    "Source", "Batches",
-    "Payload: stated kg", "found kg", "slope", "z squared",
-    "Share: stated %", "found %", "slope", "z squared",
-)  # fmt: skip
-TOGETHER: Final = (
-    "Roll rate", "Said", "Quantity", "Batches", "Rejected",
-    "Mean abs. error", "95 % covers", "by van", "z squared", "+-", "score (ideal)",
-)  # fmt: skip
+SEED: Final = 20_310  # arbitrary, of this study alone
 WATCHED: Final = {
     "misfit": "misfit",
     "tension": "tension",
     "sensor_position_score": "sensor position",
     "sensor_noise_score": "sensor noise",
 }
-REFUSALS: Final = ("Roll rate", "Batches", "Refused", *(f"{name}: 50, 99, 100 %" for name in WATCHED.values()))
 MOST_REFUSED: Final = 0.01  # chosen: share of healthy batches
 QUANTITIES: Final = {"payload": "payload, %", "front_share": "front share, %", "cg_left": "lateral place, cm"}
 SLOPE: Final = (0.8, 1.25)  # chosen: within a quarter
 Z2_ALONE: Final = (0.7, 1.4)  # chosen: single sources are few
 COVERAGE: Final = (0.93, 0.97)  # chosen: about 95 %
 Z2_TOGETHER: Final = (0.8, 1.2)  # chosen: within a fifth
+
+
+Found = tuple[list[Shift], list[Weighing]]
+
+
+def of_one_van(seed: int, number: int) -> Found:
+    """A van with each source alone, and another with all at once."""
+    return alone.of_one_van(seed, number), together.of_one_van(seed + 1, number)
+
+
+def numbers(seed: int, n: int, vans: Sequence[Found]) -> dict[str, Any]:
+    """A row for each source alone, and one for each way of weighing with all at once."""
+    shifts, weighings = [one for each, _ in vans for one in each], [one for _, each in vans for one in each]
+    rows = {"alone": rows_of_shifts(shifts), "together": rows_of_weighings(weighings)}
+    return {"seed": seed, "n_vans": n, **rows}
 
 
 def budget_page(found: Mapping[str, Any]) -> str:
@@ -48,7 +69,7 @@ def budget_page(found: Mapping[str, Any]) -> str:
         "z squared is the mean square of the shifts over the variances stated. Right are slopes from "
         f"{SLOPE[0]:g} to {SLOPE[1]:g} and z squared from {Z2_ALONE[0]:g} to {Z2_ALONE[1]:g}.",
         "",
-        *table(ALONE, [_alone_cells(row) for row in found["alone"]]),
+        *table_of(ALONE, found["alone"]),
         "",
         *_alone_verdicts(found["alone"]),
         "",
@@ -64,7 +85,7 @@ def budget_page(found: Mapping[str, Any]) -> str:
         f"and intervals of the right width. Right are {100 * COVERAGE[0]:.0f} to {100 * COVERAGE[1]:.0f} % and z "
         f"squared from {Z2_TOGETHER[0]:g} to {Z2_TOGETHER[1]:g}.",
         "",
-        *table(TOGETHER, [cells for row in found["together"] for cells in _together_cells(row)]),
+        *table_of(TOGETHER, [one for row in found["together"] for one in _by_quantity(row)]),
         "",
         *_together_verdicts(found["together"]),
         "",
@@ -75,24 +96,9 @@ def budget_page(found: Mapping[str, Any]) -> str:
         "to its limit each watched figure comes (ratios; at 1 a batch is refused). Nothing is said of the loads. "
         f"Right is a rate of at most {100.0 * MOST_REFUSED:g} %.",
         "",
-        *table(REFUSALS, [_refusal_cells(row) for row in found["together"] if not row["is_shape_said"]]),
+        *table_of(REFUSALS, [row for row in found["together"] if not row["is_shape_said"]]),
         "",
     )
-
-
-def _alone_cells(row: Mapping[str, Any]) -> list[str]:
-    return [
-        row["source"],
-        str(row["n"]),
-        number_cell(row["payload_stated_kg"]),
-        number_cell(row["payload_found_kg"]),
-        number_cell(row["payload_slope"]),
-        number_cell(row["payload_z2"]),
-        number_cell(row["front_share_stated_pct"]),
-        number_cell(row["front_share_found_pct"]),
-        number_cell(row["front_share_slope"]),
-        number_cell(row["front_share_z2"]),
-    ]
 
 
 def _alone_verdicts(rows: list[Mapping[str, Any]]) -> list[str]:
@@ -110,31 +116,54 @@ def _side(x: float, limits: tuple[float, float]) -> str:
     return f"below {limits[0]:g}" if x < limits[0] else f"above {limits[1]:g}"
 
 
-def _together_cells(row: Mapping[str, Any]) -> list[list[str]]:
-    return [
-        [
-            "yes" if row["has_roll_rate"] else "no",
-            "what is carried" if row["is_shape_said"] else "nothing",
-            words,
-            str(row["n_batches"]),
-            rejected_cell(row),
-            number_cell(row[name]["mean_abs"]),
-            share_cell(row[name]["coverage"]),
-            share_cell(row[name]["coverage_by_van"]),
-            number_cell(row[name]["z2"]),
-            number_cell(row[name]["half_width"]),
-            score_cell(row[name]["interval_score"], row[name]["mean_abs"]),
-        ]
-        for name, words in QUANTITIES.items()
-        if row[name]["n"]
-    ]
+def _by_quantity(row: Row) -> Iterator[Row]:
+    """The rows of the table: one a quantity that was answered."""
+    return ({**row, **row[name], "quantity": words} for name, words in QUANTITIES.items() if row[name]["n"])
 
 
-def _refusal_cells(row: Mapping[str, Any]) -> list[str]:
-    found = row["refusals"]
-    watched = [found["watched"].get(name) for name in WATCHED]
-    ratios = ["none" if one is None else f"{one['p50']:.2f}, {one['p99']:.2f}, {one['most']:.2f}" for one in watched]
-    return ["yes" if row["has_roll_rate"] else "no", str(row["n_batches"]), share_cell(found["rate"]), *ratios]
+def _roll(row: Row) -> str:
+    return "yes" if row["has_roll_rate"] else "no"
+
+
+def _ratios(name: str) -> Callable[[Row], str]:
+    def cell(row: Row) -> str:
+        found = row["refusals"]["watched"].get(name)
+        return "none" if found is None else f"{found['p50']:.2f}, {found['p99']:.2f}, {found['most']:.2f}"
+
+    return cell
+
+
+ALONE: Final[tuple[Column, ...]] = (
+    ("Source", text("source")),
+    ("Batches", text("n")),
+    ("Payload: stated kg", number("payload_stated_kg")),
+    ("found kg", number("payload_found_kg")),
+    ("slope", number("payload_slope")),
+    ("z squared", number("payload_z2")),
+    ("Share: stated %", number("front_share_stated_pct")),
+    ("found %", number("front_share_found_pct")),
+    ("slope", number("front_share_slope")),
+    ("z squared", number("front_share_z2")),
+)
+TOGETHER: Final[tuple[Column, ...]] = (
+    ("Roll rate", _roll),
+    ("Said", lambda row: "what is carried" if row["is_shape_said"] else "nothing"),
+    ("Quantity", text("quantity")),
+    ("Batches", text("n_batches")),
+    ("Rejected", rejected_cell),
+    ("Mean abs. error", number("mean_abs")),
+    ("95 % covers", share("coverage")),
+    ("by van", share("coverage_by_van")),
+    ("z squared", number("z2")),
+    ("+-", number("half_width")),
+    ("score (ideal)", lambda row: score_cell(row["interval_score"], row["mean_abs"])),
+)
+REFUSALS: Final[tuple[Column, ...]] = (
+    ("Roll rate", _roll),
+    ("Batches", text("n_batches")),
+    ("Refused", lambda row: share_cell(row["refusals"]["rate"])),
+    *((f"{words}: 50, 99, 100 %", _ratios(name)) for name, words in WATCHED.items()),
+)
 
 
 def _together_verdicts(rows: list[Mapping[str, Any]]) -> list[str]:
@@ -145,8 +174,20 @@ def _together_verdicts(rows: list[Mapping[str, Any]]) -> list[str]:
         for name, words in QUANTITIES.items():
             coverage, z2 = row[name]["coverage"], row[name]["z2"]
             if coverage is not None and not COVERAGE[0] <= coverage["share"] <= COVERAGE[1]:
-                share = f"{100.0 * coverage['share']:.0f} %"
-                lines.append(f"- {way}, {words.split(',')[0]}: intervals hold {share} of the truths.")
+                held = f"{100.0 * coverage['share']:.0f} %"
+                lines.append(f"- {way}, {words.split(',')[0]}: intervals hold {held} of the truths.")
             if z2 is not None and not Z2_TOGETHER[0] <= z2 <= Z2_TOGETHER[1]:
                 lines.append(f"- {way}, {words.split(',')[0]}: z squared is {z2:.2f}.")
     return lines or ["Every coverage and every z squared is right."]
+
+
+STUDY: Final = Study(
+    name="budget",
+    does="Does the error agree with its budget? Each source alone, then all at once; ~3 min a van.",
+    doing="driving vans with each source alone, and with all at once",
+    of_case=of_one_van,
+    numbers=numbers,
+    page=budget_page,
+    seed=SEED,
+    n=12,
+)

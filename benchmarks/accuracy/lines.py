@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.accuracy.coverage_drives import (
+from benchmarks.accuracy.drives import (
     AS_CALIBRATED,
     TRIPS,
     Scope,
