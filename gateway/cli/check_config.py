@@ -14,8 +14,7 @@ from gateway.records import json_line
 from gateway.service.commissioning import with_commissioned
 from gateway.service.startup_checks import startable_faults
 from gateway.setup import Setup, setup_of
-from gateway.uplink import uplink_settings
-from gateway.uplink.webhook import webhook_settings
+from gateway.uplink.settings import uplink_settings, webhook_settings
 
 
 @click.command("check-config")

@@ -20,8 +20,10 @@ from gateway.service.commissioning import Commissioning, Jobs, Lines, ServiceVeh
 from gateway.service.keeper import BatchKeeper
 from gateway.setup import Setup
 from gateway.store import Retention, Store
-from gateway.uplink import Outbox, Uplink, UplinkSettings, uplink_settings
-from gateway.uplink.webhook import Webhook, WebhookSettings, webhook_settings
+from gateway.uplink.outbox import Outbox
+from gateway.uplink.settings import UplinkSettings, WebhookSettings, uplink_settings, webhook_settings
+from gateway.uplink.uplink import Uplink
+from gateway.uplink.webhook import Webhook
 from gateway.web import Board, Scales
 
 SECONDS_PER_DAY = 86_400.0

@@ -27,7 +27,7 @@ from gateway.status import (
     VerificationStatus,
 )
 from gateway.store import Store
-from gateway.uplink import Uplink
+from gateway.uplink.uplink import Uplink
 from gateway.uplink.webhook import Webhook
 from gateway.web import Board
 

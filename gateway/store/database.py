@@ -15,11 +15,9 @@ from typing import Final, TypeVar
 from gateway.errors import StoreError
 from gateway.history import BATCHES, ESTIMATE, KINDS
 from gateway.log import Event, log_event
-from gateway.store.age import AgeClock
 from gateway.store.queries import INSERT, Stored, is_good, stored_row
-from gateway.store.retention import Retention, remove_old, remove_share
-from gateway.store.rows import Chain, DeliveryRow, DocumentRow, JournalRow, Row, checksum
-from gateway.store.schema import connect_writer, pragma
+from gateway.store.retention import AgeClock, Retention, remove_old, remove_share
+from gateway.store.schema import Chain, DeliveryRow, DocumentRow, JournalRow, Row, checksum, connect_writer, pragma
 
 T = TypeVar("T")
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from gateway.history import BATCHES, ENTRIES, Delivery
 from gateway.records import json_line
-from gateway.store.rows import JOURNAL_COLUMNS, JournalRow, checksum
+from gateway.store.schema import JOURNAL_COLUMNS, JournalRow, checksum
 
 LAST: Final = (1 << 63) - 1  # SQLite's largest integer
 # Read texts as bytes: a flipped bit may break UTF-8, and the checksum covers the bytes on disk.

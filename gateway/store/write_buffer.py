@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from gateway.history import KINDS
-from gateway.store.rows import DeliveryRow, DocumentRow, JournalRow, Row
+from gateway.store.schema import DeliveryRow, DocumentRow, JournalRow, Row
 
 SEQ_STRIDE: Final = 1 << 20  # each opening of a database begins a new stride
 RECENT: Final = 16  # records on disk that stay in memory: whoever follows closely needs no disk

@@ -16,10 +16,9 @@ from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.status import StoreState, StoreStatus
 from gateway.store.database import FILE_NAME, Database, is_damaged
-from gateway.store.follower import Follower
-from gateway.store.reader import StoreReader
+from gateway.store.reader import Follower, StoreReader
 from gateway.store.retention import Retention
-from gateway.store.rows import Chain, DocumentRow, JournalRow
+from gateway.store.schema import Chain, DocumentRow, JournalRow
 from gateway.store.write_buffer import WriteBuffer
 
 IDLE_S: Final = 900.0  # without new rows: how often age is looked at

@@ -3,9 +3,3 @@
 The store is the queue: senders follow its journal, deliver each record, and store the position they have reached. A
 broken connection is opened again with growing pauses.
 """
-
-from gateway.uplink.outbox import Outbox
-from gateway.uplink.settings import UplinkSettings, uplink_settings
-from gateway.uplink.uplink import Uplink
-
-__all__ = ["Outbox", "Uplink", "UplinkSettings", "uplink_settings"]

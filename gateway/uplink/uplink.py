@@ -5,7 +5,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from gateway.log import Event, log_event
 from gateway.status import UplinkStatus
@@ -17,16 +17,6 @@ from gateway.uplink.settings import UplinkSettings
 IDLE_S: Final = 5.0  # a turn with nothing to do; a new record ends it
 TURN_S: Final = 0.5  # likewise while an answer is awaited
 ANSWER_TIMEOUT_S: Final = 30.0  # a broker that takes longer is as good as gone
-
-
-class BrokerLink(Protocol):
-    """A connection to a broker."""
-
-    def send(self, message: OutboxMessage) -> int: ...
-    def turn(self, timeout_s: float) -> list[BrokerAnswer]: ...
-    def wake(self) -> None: ...
-    def close(self) -> None: ...
-    def abandon(self) -> None: ...
 
 
 class Uplink(Forwarder[UplinkStatus]):
@@ -43,7 +33,7 @@ class Uplink(Forwarder[UplinkStatus]):
         settings: UplinkSettings,
         outbox: Outbox,
         birth: Mapping[str, Any],
-        connect: Callable[[UplinkSettings, Mapping[str, Any]], BrokerLink] = MqttLink,
+        connect: Callable[[UplinkSettings, Mapping[str, Any]], MqttLink] = MqttLink,
         back_off: BackOff | None = None,
     ) -> None:
         super().__init__(outbox, UplinkStatus(settings.broker), back_off, settings.back_off_max_s)
@@ -70,7 +60,7 @@ class Uplink(Forwarder[UplinkStatus]):
             self._outbox.call(lambda: None)
             self._report = replace(self._report, is_connected=False)
 
-    def _deliver_in_turn(self, link: BrokerLink) -> None:
+    def _deliver_in_turn(self, link: MqttLink) -> None:
         """Send one message at a time and wait for the broker's acknowledgement, which keeps the order."""
         waiting: deque[OutboxMessage] = deque()
         while not self._stop.is_set():
@@ -82,7 +72,7 @@ class Uplink(Forwarder[UplinkStatus]):
             else:
                 link.turn(IDLE_S)
 
-    def _deliver_one(self, link: BrokerLink, message: OutboxMessage) -> None:
+    def _deliver_one(self, link: MqttLink, message: OutboxMessage) -> None:
         """Send one message and wait for its acknowledgement. Raises LinkError if there is none or it asks to retry."""
         answer = self._answer_for(link, link.send(message))
         if answer is None or message.is_extra:  # the refusal of a copy does not matter
@@ -100,7 +90,7 @@ class Uplink(Forwarder[UplinkStatus]):
         self._outbox.delivered(message)
         self._back_off.reset()
 
-    def _answer_for(self, link: BrokerLink, mid: int) -> BrokerAnswer | None:
+    def _answer_for(self, link: MqttLink, mid: int) -> BrokerAnswer | None:
         """The broker's answer; None if the service was stopped meanwhile. Raises LinkError after ANSWER_TIMEOUT_S."""
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
         while not self._stop.is_set():

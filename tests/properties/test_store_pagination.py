@@ -13,7 +13,7 @@ from support.patience import PATIENCE_S
 
 from gateway.records import Why
 from gateway.store import Store
-from gateway.store.rows import DocumentRow, JournalRow
+from gateway.store.schema import DocumentRow, JournalRow
 from gateway.store.write_buffer import WriteBuffer
 
 

@@ -21,8 +21,10 @@ from gateway.config.outward import UplinkSection
 from gateway.estimate import Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.store import Store
-from gateway.uplink import Outbox, Uplink, uplink_settings
 from gateway.uplink.home_assistant import ENTITIES
+from gateway.uplink.outbox import Outbox
+from gateway.uplink.settings import uplink_settings
+from gateway.uplink.uplink import Uplink
 
 pytestmark = [needs("hass"), needs_mosquitto]
 

@@ -20,7 +20,9 @@ from gateway.estimate import Estimate, Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Why
 from gateway.store import Store
-from gateway.uplink import Outbox, Uplink, uplink_settings
+from gateway.uplink.outbox import Outbox
+from gateway.uplink.settings import uplink_settings
+from gateway.uplink.uplink import Uplink
 
 pytestmark = [needs("node-red"), needs_mosquitto]
 

@@ -16,7 +16,7 @@ from gateway.history import BATCHES
 from gateway.log import Event
 from gateway.records import Why, json_line
 from gateway.store import Store, queries, schema
-from gateway.uplink import Outbox
+from gateway.uplink.outbox import Outbox
 
 N_RECORDS = 12
 N_FLIPS = 80

@@ -17,8 +17,10 @@ from support.patience import PATIENCE_S, wait_until
 from support.sequence import BackEnd
 
 from gateway.store import Store
-from gateway.uplink import Outbox, Uplink, UplinkSettings
 from gateway.uplink.forwarder import BackOff
+from gateway.uplink.outbox import Outbox
+from gateway.uplink.settings import UplinkSettings
+from gateway.uplink.uplink import Uplink
 
 pytestmark = needs_mosquitto
 

@@ -13,8 +13,10 @@ from support.small_broker import Refusal, SmallBroker
 
 from gateway.log import Event
 from gateway.store import Store
-from gateway.uplink import Outbox, Uplink, UplinkSettings
 from gateway.uplink.forwarder import BackOff
+from gateway.uplink.outbox import Outbox
+from gateway.uplink.settings import UplinkSettings
+from gateway.uplink.uplink import Uplink
 
 LARGE = (1, 4)
 

@@ -17,8 +17,7 @@ from support.sequence import BackEnd
 
 from gateway.records import json_line
 from gateway.store import Retention, Store
-from gateway.uplink import Outbox
-from gateway.uplink.outbox import OutboxMessage
+from gateway.uplink.outbox import Outbox, OutboxMessage
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = json.loads((ROOT / "docs/uplink.schema.json").read_text())

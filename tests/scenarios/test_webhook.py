@@ -19,10 +19,10 @@ from support.receiver import SECRET_TEXT, Fault, Receiver, cut, slow, status, tr
 
 from gateway.records import json_line
 from gateway.store import Store
-from gateway.uplink import Outbox
 from gateway.uplink.forwarder import BackOff
-from gateway.uplink.webhook import Webhook, WebhookSettings
-from gateway.uplink.webhook.webhook import TRIES
+from gateway.uplink.outbox import Outbox
+from gateway.uplink.settings import WebhookSettings
+from gateway.uplink.webhook import TRIES, Webhook
 
 KINDS = ("alarm", "event")
 

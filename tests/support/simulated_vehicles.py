@@ -18,8 +18,10 @@ from gateway.estimate_json import estimate_to_json
 from gateway.records import iso_utc, json_line
 from gateway.store import Store
 from gateway.units import NS_PER_S
-from gateway.uplink import Outbox, Uplink, uplink_settings
 from gateway.uplink.forwarder import BackOff
+from gateway.uplink.outbox import Outbox
+from gateway.uplink.settings import uplink_settings
+from gateway.uplink.uplink import Uplink
 from support.estimates import WINDOW_NS, make_estimate
 from support.patience import PATIENCE_S
 

@@ -13,7 +13,8 @@ from gateway.cli import main
 from gateway.cli import service as asked_service
 from gateway.service.pipeline import Pipeline
 from gateway.store import Store, StoreReader
-from gateway.uplink import Uplink, link
+from gateway.uplink import link
+from gateway.uplink.uplink import Uplink
 from gateway.web.access import connection
 from support.patience import PATIENCE_S
 

@@ -14,7 +14,7 @@ import yaml
 from support.fleet_view import FLEET, provision, write_table
 
 from gateway.config import load_settings
-from gateway.uplink import uplink_settings
+from gateway.uplink.settings import uplink_settings
 
 COMPOSE: dict[str, Any] = yaml.safe_load((FLEET / "compose.yaml").read_text())
 MADE_LATER = {"pki", "out", "pki/ca.pem", "out/subscriber"}  # by make_certificates.sh and provision.py

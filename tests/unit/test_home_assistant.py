@@ -19,8 +19,10 @@ from gateway.estimate import Estimate, Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Why
 from gateway.store import Store
-from gateway.uplink import Outbox, Uplink, uplink_settings
 from gateway.uplink.home_assistant import discovery
+from gateway.uplink.outbox import Outbox
+from gateway.uplink.settings import uplink_settings
+from gateway.uplink.uplink import Uplink
 
 BIRTH = {"vehicle_id": "van-17", "vin": "WVWZZZ1KZAW000001", "version": "1.2.3", "estimator": "cross_spectrum"}
 

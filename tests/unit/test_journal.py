@@ -16,8 +16,9 @@ from test_uplink import SETTINGS, FakeBroker, accepted
 from gateway.history import BATCHES, ENTRIES, KINDS
 from gateway.log import Event
 from gateway.store import Store, reader, writer
-from gateway.uplink import Outbox, Uplink
 from gateway.uplink.forwarder import BackOff
+from gateway.uplink.outbox import Outbox
+from gateway.uplink.uplink import Uplink
 from gateway.web import Board
 
 DAY_S = 86_400.0

@@ -8,7 +8,7 @@ from support.patience import PATIENCE_S
 
 from gateway.records import json_line
 from gateway.store import Retention, Store
-from gateway.uplink import Outbox
+from gateway.uplink.outbox import Outbox
 
 NAME = "https://fleet.example/hook"
 

@@ -11,7 +11,7 @@ from support.estimates import make_record
 from support.patience import PATIENCE_S
 
 from gateway.store import Retention, Store
-from gateway.uplink import Outbox
+from gateway.uplink.outbox import Outbox
 
 
 def entry(n: int, revision: int = 1, kind: str = "event") -> dict[str, Any]:

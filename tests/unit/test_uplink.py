@@ -19,10 +19,11 @@ from gateway.config.outward import UplinkSection
 from gateway.errors import ConfigurationError
 from gateway.log import Event
 from gateway.store import Retention, Store
-from gateway.uplink import Outbox, Uplink, UplinkSettings, uplink_settings
 from gateway.uplink.forwarder import BackOff
 from gateway.uplink.link import BrokerAnswer, LinkError
-from gateway.uplink.outbox import OutboxMessage
+from gateway.uplink.outbox import Outbox, OutboxMessage
+from gateway.uplink.settings import UplinkSettings, uplink_settings
+from gateway.uplink.uplink import Uplink
 
 KNOWN = dict(UplinkSection(host="fleet.example"))
 SETTINGS = UplinkSettings("broker.example", 8883, "springscale/van-17", "springscale-van-17")

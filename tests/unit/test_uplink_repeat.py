@@ -8,7 +8,7 @@ from support.estimates import make_record
 from support.patience import PATIENCE_S
 
 from gateway.store import Store
-from gateway.uplink import Outbox
+from gateway.uplink.outbox import Outbox
 
 
 class Clock:

@@ -16,8 +16,8 @@ from gateway.config.alarms import WebhookSection
 from gateway.errors import ConfigurationError
 from gateway.records import json_line
 from gateway.uplink.outbox import OutboxMessage
-from gateway.uplink.webhook import PostVerdict, SecretError, secrets_of, signed, webhook_settings
-from gateway.uplink.webhook.receiver import MOST_PAUSE_S, _seconds, body_of, post_verdict_of
+from gateway.uplink.settings import SecretError, secrets_of, webhook_settings
+from gateway.uplink.webhook import MOST_PAUSE_S, PostVerdict, _seconds, body_of, post_verdict_of, signed
 
 VAN = VehicleSection(id="van-17")
 

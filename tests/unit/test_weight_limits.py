@@ -22,7 +22,7 @@ from gateway.errors import ConfigurationError
 from gateway.estimate import Estimate
 from gateway.estimate_json import table_row
 from gateway.setup import Setup, load_setup, setup_of
-from gateway.uplink import Outbox
+from gateway.uplink.outbox import Outbox
 
 KG = st.floats(0.0, 50_000.0)
 STD_KG = st.floats(0.01, 500.0)
