@@ -31,7 +31,9 @@ from gateway.estimate_json import estimate_to_json
 from gateway.status import State, Status
 from gateway.store import Store
 from gateway.units import NS_PER_S
-from gateway.web import Board, create_app, server_config
+from gateway.web.access.serving import server_config
+from gateway.web.app import create_app
+from gateway.web.live.board import Board
 
 EVERY_S: Final = 0.1  # a question, here
 DEFAULT_EVERY_S: Final = {"kuksa": 5.0, "traccar": 10.0}  # --every-s of the two

@@ -36,7 +36,9 @@ from gateway.service.pipeline import Pipeline
 from gateway.status import BusStatus, State, Status
 from gateway.store import Store
 from gateway.units import NS_PER_S
-from gateway.web import Board, create_app, server_config
+from gateway.web.access.serving import server_config
+from gateway.web.app import create_app
+from gateway.web.live.board import Board
 
 LATEST = b"GET /api/v1/estimates/latest HTTP/1.1\r\nHost: localhost\r\n\r\n"
 STREAM = b"GET /api/v1/stream HTTP/1.1\r\nHost: localhost\r\n\r\n"

@@ -23,7 +23,7 @@ from gateway.setup import setup_of
 from gateway.sim.scenario import START_NS, Truth
 from gateway.store import Store
 from gateway.units import NS_PER_S
-from gateway.web import KnownLoad
+from gateway.web.routes.weights import KnownLoad
 from gateway.workbench import demo_drive, frames_of
 
 CHANNEL: Final = "springscale-demo"

@@ -8,7 +8,7 @@ import click
 from gateway.cli.options import NumberRange
 from gateway.config import load_settings
 from gateway.files.kept import become_owner_of
-from gateway.web import Scope, TokenFile
+from gateway.web.access.tokens import Scope, TokenFile
 
 SECONDS_PER_DAY = 86_400.0
 

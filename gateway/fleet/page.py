@@ -11,7 +11,7 @@ from starlette.responses import FileResponse, RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from gateway.fleet.lines import Line
-from gateway.web.access import SecurityHeaders
+from gateway.web.access.middleware import SecurityHeaders
 from gateway.web.pages import ASSETS
 
 

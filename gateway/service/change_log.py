@@ -8,7 +8,8 @@ from gateway.estimate import PLACES, Estimate
 from gateway.log import Event, log_event
 from gateway.records import Why
 from gateway.status import State, Status
-from gateway.web import Board, LatestWeights
+from gateway.web.live.board import Board
+from gateway.web.routes.weights import LatestWeights
 
 
 class BatchLog:

@@ -43,16 +43,10 @@ from gateway.service.verification.verification import VerificationService
 from gateway.setup import Setup
 from gateway.status import State
 from gateway.store import Store
-from gateway.web import (
-    KnownLoads,
-    Scales,
-    TokenFile,
-    create_app,
-    refuse_open_address,
-    server_config,
-    weigh_latest,
-)
-from gateway.web.access.serving import WebServer
+from gateway.web.access.serving import WebServer, refuse_open_address, server_config
+from gateway.web.access.tokens import TokenFile
+from gateway.web.app import create_app
+from gateway.web.routes.weights import KnownLoads, Scales, weigh_latest
 
 SUPERVISE_S = 0.25  # interval between checks for dead parts
 LOOK_S = 1.0  # interval between checks of the whole status

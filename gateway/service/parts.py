@@ -24,7 +24,8 @@ from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings, WebhookSettings, uplink_settings, webhook_settings
 from gateway.uplink.uplink import Uplink
 from gateway.uplink.webhook import Webhook
-from gateway.web import Board, Scales
+from gateway.web.live.board import Board
+from gateway.web.routes.weights import Scales
 
 SECONDS_PER_DAY = 86_400.0
 BYTES_PER_MB = 1_000_000

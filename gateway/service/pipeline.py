@@ -21,7 +21,7 @@ from gateway.log import Event, log_event
 from gateway.records import Frames, Why
 from gateway.service.signal_watch import SignalWatch, StandingWatch
 from gateway.store import Store
-from gateway.web import Board, boot_clock_s
+from gateway.web.live.board import Board, boot_clock_s
 
 DRAIN_S = 0.5  # longest wait for frames, and so the delay with which the end of a drive is noticed
 ASLEEP_DRAIN_S = 2.0  # the same between drives

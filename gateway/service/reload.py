@@ -16,7 +16,7 @@ from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event, set_log_level
 from gateway.service.commissioning import setup_in_use
 from gateway.setup import Setup
-from gateway.web import Tls, renew_certificate
+from gateway.web.access.serving import Tls, renew_certificate
 
 LIVE: Final = frozenset({"log.level", "web.tls_certificate", "web.tls_key"})
 

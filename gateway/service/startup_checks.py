@@ -10,7 +10,8 @@ from gateway.config import Settings
 from gateway.errors import ConfigurationError
 from gateway.records import Signal
 from gateway.store import why_no_database
-from gateway.web import TokenFile, refuse_open_address
+from gateway.web.access.serving import refuse_open_address
+from gateway.web.access.tokens import TokenFile
 
 
 def startable_faults(settings: Settings, signal_map: SignalMap) -> Iterator[str]:

@@ -29,7 +29,7 @@ from gateway.status import (
 from gateway.store import Store
 from gateway.uplink.uplink import Uplink
 from gateway.uplink.webhook import Webhook
-from gateway.web import Board
+from gateway.web.live.board import Board
 
 SENSOR_LOST_S = 10.0  # a sensor silent for this long on a bus that is alive is at fault
 NEEDED_SENSORS = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)

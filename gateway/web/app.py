@@ -13,45 +13,31 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.status import Status
 from gateway.store import StoreReader
 from gateway.web import pages
-from gateway.web.access import (
-    ConcurrencyLimit,
-    Guard,
-    HeadAsGet,
-    InChunks,
-    SecurityHeaders,
-    TokenFile,
-    WrongTokens,
-    describe_guard,
-    problems,
-)
-from gateway.web.live import Board, LatestShortcut
-from gateway.web.routes.absent import (
-    NO_ALARMS,
-    NO_COMMISSIONING,
-    NO_KNOWN_WEIGHTS,
-    NO_RECORD,
-    NO_TREND,
-    NO_VERIFICATION,
-)
-from gateway.web.routes.alarms import AlarmBackend, alarms_router
+from gateway.web.access import problems
+from gateway.web.access.guard import Guard, WrongTokens, describe_guard
+from gateway.web.access.middleware import ConcurrencyLimit, HeadAsGet, InChunks, SecurityHeaders
+from gateway.web.access.tokens import TokenFile
+from gateway.web.live.board import Board, LatestShortcut
+from gateway.web.routes import service_calls as service
+from gateway.web.routes.alarms import alarms_router
 from gateway.web.routes.cab import cab_router
-from gateway.web.routes.commissioning import CommissioningBackend, commissioning_router
-from gateway.web.routes.estimates import api_router
-from gateway.web.routes.events import events_router
-from gateway.web.routes.export import export_router
-from gateway.web.routes.health import health_router
-from gateway.web.routes.j1939 import j1939_router
-from gateway.web.routes.known_loads import KNOWN_LOADS_PATH, KnownLoads, known_loads_router
-from gateway.web.routes.known_weights import KnownWeightBackend, known_weights_router
-from gateway.web.routes.metrics import metrics_registry
+from gateway.web.routes.commissioning import commissioning_router
+from gateway.web.routes.history import api_router, events_router, export_router
+from gateway.web.routes.known_weights import known_weights_router
+from gateway.web.routes.monitoring import health_router, metrics_registry
 from gateway.web.routes.reasons import reasons_router
-from gateway.web.routes.record import FrameLog, record_router
+from gateway.web.routes.record import record_router
 from gateway.web.routes.spectra import spectra_router
-from gateway.web.routes.trend import TrendBackend, trend_router
 from gateway.web.routes.vehicle import vehicle_router
-from gateway.web.routes.verification import VerificationBackend, verification_router
-from gateway.web.routes.vss import vss_router
-from gateway.web.routes.weights import Scales, weights_router
+from gateway.web.routes.verification import trend_router, verification_router
+from gateway.web.routes.weights import (
+    KNOWN_LOADS_PATH,
+    KnownLoads,
+    Scales,
+    known_loads_router,
+    standards_router,
+    weights_router,
+)
 
 API_VERSION: Final = "1.0.0"
 _DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed while it drives.
@@ -79,13 +65,13 @@ def create_app(
     settings: WebSettings | None = None,
     calibrated: CalibratedVehicle | None = None,
     tokens: TokenFile | None = None,
-    known_weights: KnownWeightBackend | None = None,
-    commissioning: CommissioningBackend | None = None,
+    known_weights: service.KnownWeightBackend | None = None,
+    commissioning: service.CommissioningBackend | None = None,
     known_loads: KnownLoads | None = None,
-    record: FrameLog | None = None,
-    verification: VerificationBackend | None = None,
-    trend: TrendBackend | None = None,
-    alarms: AlarmBackend | None = None,
+    record: service.FrameLog | None = None,
+    verification: service.VerificationBackend | None = None,
+    trend: service.TrendBackend | None = None,
+    alarms: service.AlarmBackend | None = None,
     *,
     draws_trailers: bool = False,
 ) -> FastAPI:
@@ -124,18 +110,17 @@ def create_app(
         reasons_router(),
         vehicle_router(status, calibrated),
         spectra_router(board, calibrated),
-        known_weights_router(known_weights or NO_KNOWN_WEIGHTS),
-        verification_router(verification or NO_VERIFICATION),
-        trend_router(trend or NO_TREND),
-        commissioning_router(commissioning or NO_COMMISSIONING),
+        known_weights_router(known_weights or service.NO_KNOWN_WEIGHTS),
+        verification_router(verification or service.NO_VERIFICATION),
+        trend_router(trend or service.NO_TREND),
+        commissioning_router(commissioning or service.NO_COMMISSIONING),
         export_router(reader),
         events_router(reader),
-        alarms_router(reader, alarms or NO_ALARMS),
-        record_router(record or NO_RECORD),
+        alarms_router(reader, alarms or service.NO_ALARMS),
+        record_router(record or service.NO_RECORD),
         weights_router(board, scales),
         cab_router(board, reader, status, scales),
-        j1939_router(board, scales, draws_trailers=draws_trailers),
-        vss_router(board, scales),
+        standards_router(board, scales, draws_trailers=draws_trailers),
         health_router(status, metrics),
     ]
     if known_loads is not None:

@@ -15,7 +15,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.staticfiles import StaticFiles
 
-from gateway.web.access.headers import content_security_policy
+from gateway.web.access.middleware import content_security_policy
 
 _PLOTLY: Final = distribution("plotly")  # found by its metadata: importlib.resources would import it
 LIBRARY: Final = Path(str(_PLOTLY.locate_file("plotly/package_data/plotly.min.js")))

@@ -14,7 +14,8 @@ from support.web import Client
 
 from gateway.records import Why
 from gateway.status import State, Status
-from gateway.web import Scope, TokenFile, create_app
+from gateway.web.access.tokens import Scope, TokenFile
+from gateway.web.app import create_app
 from gateway.web.live.stream import EventStream
 from gateway.web.routes.alarms import Alarm
 

@@ -23,7 +23,8 @@ from support.web import Gateway
 from gateway.core.alarms import AlarmRules
 from gateway.records import Why
 from gateway.service.alarms import AlarmService
-from gateway.web import Scope, TokenFile, WebSettings
+from gateway.web.access.tokens import Scope, TokenFile
+from gateway.web.app import WebSettings
 
 COMMISSIONING = "/api/v1/calibration/commissioning"
 STEPS = ("lines", "line", "vehicle", "confirm", "empty", "fit", "undo")

@@ -81,7 +81,7 @@ def test_files(gateway):
 @pytest.mark.parametrize("path", ["events", "trips"])
 def test_parquet_holds_what_the_other_files_hold(gateway, path, monkeypatch):
     """Written in several row groups, each drained before the next."""
-    monkeypatch.setattr("gateway.web.routes.events._PAGE", 2)
+    monkeypatch.setattr("gateway.web.routes.history.ENTRIES_AT_A_TIME", 2)
     client = Client(gateway.app)
     answer = client.get(f"/api/v1/{path}.parquet")
     assert answer.headers["content-type"] == "application/vnd.apache.parquet"

@@ -12,11 +12,11 @@ from support.web import Client, Gateway
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
-from gateway.estimate_json import estimate_to_json
+from gateway.estimate_json import COLUMNS, estimate_to_json
 from gateway.records import Why
 from gateway.status import SignalHealth, State, Status
-from gateway.web import Board, create_app
-from gateway.web.routes.export import COLUMNS
+from gateway.web.app import create_app
+from gateway.web.live.board import Board
 
 N_ROWS = 1203  # several pages of the store, the last one not full
 

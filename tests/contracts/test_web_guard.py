@@ -14,10 +14,11 @@ from support.patience import PATIENCE_S, wait_until
 from support.web import Client, Gateway, serving
 
 from gateway.errors import ConfigurationError
-from gateway.web import Scope, Tls, TokenFile, WebSettings, refuse_open_address, server_config
-from gateway.web.access import connection
 from gateway.web.access import serving as web_serving
 from gateway.web.access.guard import WrongTokens, is_loopback
+from gateway.web.access.serving import Tls, refuse_open_address, server_config
+from gateway.web.access.tokens import Scope, TokenFile
+from gateway.web.app import WebSettings
 
 GUARDED = ["/api/v1/estimates/latest", "/api/v1/estimates", "/api/v1/status", "/api/v1/stream", "/metrics"]
 GUARDED += ["/api/v1/vehicle", "/api/v1/export.csv", "/health/ready", "/nothing", "/api/v1/estimates/latest/"]
@@ -207,7 +208,7 @@ def test_tls_files_that_cannot_be_used_are_said(tmp_path: Path) -> None:
 
 def test_a_handshake_takes_a_place_and_is_soon_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Limits once counted after it: 1100 silent connections kept everybody out."""
-    monkeypatch.setattr(connection, "CONNECTIONS_PER_ADDRESS", 10)
+    monkeypatch.setattr(web_serving, "CONNECTIONS_PER_ADDRESS", 10)
     authority = trustme.CA()
     pem = tmp_path / "server.pem"
     authority.issue_cert("localhost", "127.0.0.1").private_key_and_cert_chain_pem.write_to_path(pem)

@@ -14,8 +14,8 @@ from support.known_weights import FakePipeline, KnownWeightBench
 from support.web import Client, Gateway
 
 from gateway.calibration.known_weights_file import FILE_NAME, load_known_weights
-from gateway.web import Scope, TokenFile
 from gateway.web.access import problems
+from gateway.web.access.tokens import Scope, TokenFile
 from gateway.web.routes.known_weights import known_weights_router
 
 URL = "/api/v1/calibration/tare"

@@ -29,7 +29,7 @@ from gateway.status import (
     UplinkStatus,
     WebhookStatus,
 )
-from gateway.web import create_app
+from gateway.web.app import create_app
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 RULES = [

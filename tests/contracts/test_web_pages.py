@@ -9,8 +9,8 @@ import pytest
 from support.web import Client, Gateway
 
 from gateway.reasons import EXPLANATIONS, REMEDIES, SOURCES
-from gateway.web import KnownLoad
 from gateway.web.pages import LIBRARY, LIBRARY_URL
+from gateway.web.routes.weights import KnownLoad
 
 NAMED = re.compile(r"(?:<link[^>]* href=|src=|from )\"(/[^\"]*)\"")
 ROW = re.compile(r"^  (\S+): \[\s*\"(.*?)\",\s*\"(.*?)\",?\s*\],$", re.MULTILINE)

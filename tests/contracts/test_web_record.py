@@ -11,7 +11,7 @@ from support.patience import PATIENCE_S
 from support.web import Client, Gateway
 
 from gateway.bus.ring import RingLimits, RingLog
-from gateway.web import Scope, TokenFile
+from gateway.web.access.tokens import Scope, TokenFile
 
 URL = "/api/v1/record"
 LIMITS = RingLimits(max_bytes=10**9, max_daily_bytes=10**9, free_bytes=0, block_s=3600.0)

@@ -19,7 +19,8 @@ from gateway.core.spectrum import spectra_of
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import spectra_from_json
 from gateway.records import Spectra, Why
-from gateway.web import Board, create_app
+from gateway.web.app import create_app
+from gateway.web.live.board import Board
 
 SPEED_MPS = 14.0
 

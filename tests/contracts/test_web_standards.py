@@ -15,7 +15,7 @@ from gateway.core.vehicle import Vehicle
 from gateway.core.weights import weighed
 from gateway.estimate import Estimate, Quantity
 from gateway.records import Why
-from gateway.web import create_app
+from gateway.web.app import create_app
 
 VIN = "VF1" + "0" * 14
 VAN = Vehicle(

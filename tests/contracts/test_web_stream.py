@@ -15,9 +15,9 @@ from support.patience import PATIENCE_S, until
 from support.web import Client, Gateway, Server, serving
 
 from gateway.records import Why
-from gateway.web import WebSettings
+from gateway.web.app import WebSettings
 from gateway.web.live import stream
-from gateway.web.live.fanout import MOST_UNREAD, Fanout, StreamEvent
+from gateway.web.live.stream import MOST_UNREAD, Fanout, StreamEvent
 
 
 class Listener:

@@ -14,8 +14,8 @@ from support.web import Client, Gateway, serving
 from gateway.cli import springscale
 from gateway.errors import SpringscaleError
 from gateway.records import iso_utc
-from gateway.web import Scope, TokenFile
-from gateway.web.routes.verification_page import verification_page
+from gateway.web.access.tokens import Scope, TokenFile
+from gateway.web.routes.verification import verification_page
 
 URL = "/api/v1/calibration/verifications"
 AT = iso_utc(START_NS + 60_000_000_000)

@@ -14,7 +14,7 @@ from support.web import Gateway, serving
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Why, json_line
 from gateway.status import AlarmsStatus, OwnReading, Standing, State
-from gateway.web import Scope, TokenFile
+from gateway.web.access.tokens import Scope, TokenFile
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
 expect = playwright.expect

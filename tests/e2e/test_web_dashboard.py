@@ -13,7 +13,7 @@ from support.web import Gateway, serving
 from gateway.estimate import Z95
 from gateway.records import Why
 from gateway.status import State
-from gateway.web import Scope, TokenFile
+from gateway.web.access.tokens import Scope, TokenFile
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
 expect = playwright.expect

@@ -10,7 +10,8 @@ from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
 from support.web import serving
 
 from gateway.status import DeadLetter, WebhookStatus
-from gateway.web import Scope, TokenFile, create_app
+from gateway.web.access.tokens import Scope, TokenFile
+from gateway.web.app import create_app
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
 expect = playwright.expect

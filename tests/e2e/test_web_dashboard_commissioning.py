@@ -21,7 +21,7 @@ from gateway.records import Why
 from gateway.stated import VehicleAnswers
 from gateway.stated.doubt import Doubt, DoubtKind
 from gateway.units import NS_PER_S
-from gateway.web import Scope, TokenFile
+from gateway.web.access.tokens import Scope, TokenFile
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
 expect = playwright.expect

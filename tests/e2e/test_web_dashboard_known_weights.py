@@ -13,7 +13,7 @@ from support.known_weights import KnownWeightBench, with_all_sources
 from support.web import Gateway, serving
 
 from gateway.budget import BudgetLine, budget_of
-from gateway.web import Scope, TokenFile
+from gateway.web.access.tokens import Scope, TokenFile
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
 expect = playwright.expect

@@ -13,7 +13,8 @@ import uvicorn
 from support.patience import PATIENCE_S, until
 from support.web import Client, Gateway, Server, serving
 
-from gateway.web.access import concurrency, connection
+from gateway.web.access import middleware
+from gateway.web.access import serving as web_serving
 
 STRANGER = "127.0.0.2"  # another address of this machine
 
@@ -68,7 +69,7 @@ def test_a_request_that_never_ends_is_ended(tmp_path: Path, monkeypatch: pytest.
     async def scenario(server: Server) -> None:
         in_time = await begin_slowly(server)
         await assert_others_are_answered(server)
-        monkeypatch.setattr(connection, "REQUEST_S", 0.1)
+        monkeypatch.setattr(web_serving, "REQUEST_S", 0.1)
         await asyncio.gather(*(ended(each) for each in await begin_slowly(server)))
         for _, writer in in_time:
             writer.transport.abort()
@@ -83,7 +84,7 @@ def test_a_connection_that_asked_in_time_is_not_ended(tmp_path: Path) -> None:
             writer.write(b"GET /health/live HTTP/1.1\r\nHost: localhost\r\n\r\n")
             assert (await reader.readuntil(b'{"is_alive":true}')).startswith(b"HTTP/1.1 200")
             (held,) = server.uvicorn.server_state.connections
-            assert isinstance(held, connection.GuardedConnection)
+            assert isinstance(held, web_serving.GuardedConnection)
             assert held._deadline is None
         writer.transport.abort()
 
@@ -91,7 +92,7 @@ def test_a_connection_that_asked_in_time_is_not_ended(tmp_path: Path) -> None:
 
 
 def test_more_connections_than_one_address_may_have_are_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connection, "CONNECTIONS_PER_ADDRESS", 10)
+    monkeypatch.setattr(web_serving, "CONNECTIONS_PER_ADDRESS", 10)
 
     async def scenario(server: Server) -> None:
         flood = [await connect(server) for _ in range(25)]
@@ -143,7 +144,7 @@ def test_an_endless_body_is_refused(tmp_path: Path, kind: bytes) -> None:
 def test_an_endless_body_after_the_answer_is_cut_off(
     tmp_path: Path, kind: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connection, "LINGER_S", 0.05)
+    monkeypatch.setattr(web_serving, "LINGER_S", 0.05)
 
     async def scenario(server: Server) -> None:
         reader, writer = stranger = await connect(server)
@@ -192,11 +193,11 @@ def test_what_is_no_request_ends_with_400_and_leaves_no_word_in_the_log(
 
 def test_another_server_in_the_process_does_not_bring_these_words_back() -> None:
     uvicorn.Config("another:app")  # as it comes, it forgets the levels of all loggers below its own
-    assert not connection._log.isEnabledFor(logging.WARNING)
+    assert not web_serving._log.isEnabledFor(logging.WARNING)
 
 
 def test_who_reads_nothing_is_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connection, "UNREAD_S", 0.3)
+    monkeypatch.setattr(web_serving, "UNREAD_S", 0.3)
 
     async def scenario(server: Server) -> None:
         reader, writer = stranger = await connect(server)
@@ -212,7 +213,7 @@ def test_who_reads_nothing_is_cut_off(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_who_reads_nothing_gives_way_to_a_newcomer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connection, "CONNECTIONS", 20)
+    monkeypatch.setattr(web_serving, "CONNECTIONS", 20)
 
     async def scenario(server: Server) -> None:
         crowd = [await connect(server) for _ in range(20)]
@@ -224,8 +225,8 @@ def test_who_reads_nothing_gives_way_to_a_newcomer(tmp_path: Path, monkeypatch: 
 
 
 def test_one_address_waits_for_its_own_answers_and_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(concurrency, "WAIT_S", 0.2)
-    monkeypatch.setattr(concurrency, "STREAMS_PER_CLIENT", 2)
+    monkeypatch.setattr(middleware, "WAIT_S", 0.2)
+    monkeypatch.setattr(middleware, "STREAMS_PER_CLIENT", 2)
 
     async def scenario(server: Server) -> None:
         crowd = [await connect(server) for _ in range(3)]
@@ -247,8 +248,8 @@ def test_one_address_waits_for_its_own_answers_and_no_other(tmp_path: Path, monk
 
 def test_whatever_reads_the_history_waits_for_its_turn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Events, trips and alarms, as pages and as files, did not: one client could have taken every thread with them."""
-    monkeypatch.setattr(concurrency, "WAIT_S", 0.0)
-    monkeypatch.setattr(concurrency, "ANSWERS_PER_CLIENT", 0)
+    monkeypatch.setattr(middleware, "WAIT_S", 0.0)
+    monkeypatch.setattr(middleware, "ANSWERS_PER_CLIENT", 0)
     with Gateway(tmp_path) as gateway:
         client = Client(gateway.app)
         described = client.get("/openapi.json").json()["paths"]

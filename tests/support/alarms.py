@@ -15,7 +15,7 @@ from gateway.estimate_json import estimate_to_json
 from gateway.service.alarms import AlarmService
 from gateway.service.subject import Subject
 from gateway.store import Store
-from gateway.web import Board
+from gateway.web.live.board import Board
 from support.days import at, batch
 from support.estimates import posterior_of
 

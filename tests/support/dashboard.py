@@ -13,7 +13,7 @@ from gateway.core.spectrum import spectra_of
 from gateway.estimate import Estimate
 from gateway.records import Why
 from gateway.status import BusStatus, SignalHealth, State, Status, StoreStatus, UplinkStatus
-from gateway.web import KnownLoad
+from gateway.web.routes.weights import KnownLoad
 from support.estimates import WINDOW_NS, make_estimate, posterior_of
 from support.half_car_road import batch_over_road
 from support.patience import PATIENCE_S

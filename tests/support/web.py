@@ -18,11 +18,12 @@ from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.status import State, Status
 from gateway.store import Store
-from gateway.web import Board, KnownLoads, TokenFile, WebSettings, create_app, server_config
-from gateway.web.routes.commissioning import CommissioningBackend
-from gateway.web.routes.known_weights import KnownWeightBackend
-from gateway.web.routes.record import FrameLog
-from gateway.web.routes.verification import VerificationBackend
+from gateway.web.access.serving import server_config
+from gateway.web.access.tokens import TokenFile
+from gateway.web.app import WebSettings, create_app
+from gateway.web.live.board import Board
+from gateway.web.routes.service_calls import CommissioningBackend, FrameLog, KnownWeightBackend, VerificationBackend
+from gateway.web.routes.weights import KnownLoads
 from support.patience import PATIENCE_S
 
 

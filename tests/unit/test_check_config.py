@@ -15,7 +15,7 @@ from gateway.bus.live import usable_interfaces, what_lacks
 from gateway.bus.signals.signal_map import shipped_map
 from gateway.cli import springscale
 from gateway.errors import ConfigurationError
-from gateway.web import Scope, TokenFile
+from gateway.web.access.tokens import Scope, TokenFile
 
 SOUND = {"bus": 'interface = "virtual"\nchannel = "x"', "web": "port = 0", "batch": "window_s = 300.0"}
 

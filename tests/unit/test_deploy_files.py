@@ -12,7 +12,7 @@ from support.patience import PATIENCE_S
 
 from gateway.config import load_settings
 from gateway.core.weights import Limits
-from gateway.web import Scope, TokenFile
+from gateway.web.access.tokens import Scope, TokenFile
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 UNIT = (DEPLOY / "springscale.service").read_text()

@@ -19,7 +19,7 @@ from gateway.store import Store, reader, writer
 from gateway.uplink.forwarder import BackOff
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.uplink import Uplink
-from gateway.web import Board
+from gateway.web.live.board import Board
 
 DAY_S = 86_400.0
 

@@ -12,7 +12,8 @@ from support.web import Gateway, serving
 
 from gateway.cli.calibration import calibration as calibration_commands
 from gateway.errors import ConfigurationError, SpringscaleError
-from gateway.web import Scope, Tls, TokenFile, server_config
+from gateway.web.access.serving import Tls, server_config
+from gateway.web.access.tokens import Scope, TokenFile
 
 
 def run(*arguments: str, **environment: str) -> Result:

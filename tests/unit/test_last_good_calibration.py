@@ -15,7 +15,7 @@ from gateway.service.gateway import Gateway
 from gateway.service.last_good import keep_copy, setup_or_last_good
 from gateway.service.reload import Reloader
 from gateway.setup import setup_of
-from gateway.web import server_config
+from gateway.web.access.serving import server_config
 
 BROKEN = ["", "{", "gone", "changed"]
 

@@ -13,7 +13,8 @@ from gateway.log import Event
 from gateway.records import Why
 from gateway.service.change_log import BatchLog, StateLog
 from gateway.status import State, Status
-from gateway.web import Board, Scales, weigh_latest
+from gateway.web.live.board import Board
+from gateway.web.routes.weights import Scales, weigh_latest
 
 
 class Told:

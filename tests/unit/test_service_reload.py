@@ -34,7 +34,7 @@ from gateway.service.commissioning import commissioned, with_commissioned
 from gateway.service.gateway import Gateway as Service
 from gateway.service.reload import Reloader, changed_keys, tls_of
 from gateway.setup import setup_of
-from gateway.web import server_config
+from gateway.web.access.serving import server_config
 
 PLAIN = 'signals = "springscale:reference"\n'
 TLS = PLAIN + '[web]\ntls_certificate = "web.pem"\ntls_key = "web.key"\n'

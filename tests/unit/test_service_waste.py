@@ -18,7 +18,8 @@ from gateway.service.gateway import Gateway
 from gateway.service.status import StatusReport
 from gateway.setup import setup_of
 from gateway.status import Status
-from gateway.web import Board, Scales, weigh_latest
+from gateway.web.live.board import Board
+from gateway.web.routes.weights import Scales, weigh_latest
 
 VAN = Vehicle(
     name="van",

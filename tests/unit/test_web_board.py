@@ -10,7 +10,7 @@ from support.estimates import WINDOW_NS, make_estimate, make_record
 from gateway.estimate import Lack, Quantity, Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Why
-from gateway.web import Board
+from gateway.web.live.board import Board
 
 
 class Clock:
@@ -158,7 +158,7 @@ def test_what_is_shown_is_the_same_before_and_after_a_restart(board: Board, cloc
     board.publish(thirds)
     clock.now_s += 12.34
     before = board.shown()
-    assert (before.payload.number, before.age_s, before.is_stale) == (333.333333, 12.3, False)
+    assert (before.estimate.payload.number, before.age_s, before.is_stale) == (333.333333, 12.3, False)
     assert before.estimate is not None
     assert before.estimate.id == thirds.id
     again = Board(stale_after_s=900.0, clock=clock)

@@ -8,7 +8,7 @@ from click.testing import CliRunner, Result
 
 from gateway.cli.token import token as token_commands
 from gateway.errors import ConfigurationError
-from gateway.web import TokenFile
+from gateway.web.access.tokens import TokenFile
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from support.log import names
 
 from gateway.errors import ConfigurationError
 from gateway.log import Event
-from gateway.web import Scope, TokenFile
+from gateway.web.access.tokens import Scope, TokenFile
 
 
 class Clock:

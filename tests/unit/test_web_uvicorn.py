@@ -17,8 +17,7 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResp
 from uvicorn.protocols.utils import get_remote_addr
 from uvicorn.server import ServerState
 
-from gateway.web.access.connection import GuardedConnection
-from gateway.web.access.serving import TlsConfig, WebServer
+from gateway.web.access.serving import GuardedConnection, TlsConfig, WebServer
 
 # Callbacks of the protocol that are overridden and call the one above them, with their arguments
 OVERRIDDEN = {

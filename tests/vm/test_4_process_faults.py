@@ -14,7 +14,7 @@ import pytest
 from vm.harness.drives import loaded_drive, log_of
 from vm.harness.vehicle import CONFIG, PLAY, SETTINGS, STATE, Answer, Vehicle
 
-from gateway.web.access.connection import CONNECTIONS_PER_ADDRESS
+from gateway.web.access.serving import CONNECTIONS_PER_ADDRESS
 
 Recovered = Callable[[float], None]
 N_KILLS = int(os.environ.get("SPRINGSCALE_KILLS", "20"))

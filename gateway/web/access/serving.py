@@ -1,23 +1,212 @@
-"""Serving the application with uvicorn: address, TLS with limited handshakes, and shutdown.
+"""Serving the application with uvicorn: address, connections with limits, TLS with limited handshakes, and shutdown.
 
-Without tokens it only listens on a loopback address.
+Each client gets a fair share of time, memory and connections. Without tokens it only listens on a loopback address.
 """
 
 import asyncio
 import contextlib
+import logging
 import ssl
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import dataclass
+from http import HTTPStatus
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, Protocol, cast
 
 import uvicorn
 from fastapi import FastAPI
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from uvicorn.protocols.utils import get_remote_addr
 
 from gateway.errors import ConfigurationError
-from gateway.web.access.connection import REQUEST_S, GuardedConnection, has_slot
 from gateway.web.access.guard import is_loopback
+from gateway.web.access.middleware import SECURITY_HEADERS
+from gateway.web.access.problems import problem_response
+
+REQUEST_S: Final = 10.0  # from a connection's or a request's first byte to its last
+HEAD_BYTES: Final = 32_768  # request line and headers
+BODY_BYTES: Final = 32_768  # no route needs a tenth of it
+UPLOADS: Final = frozenset({b"/api/v1/calibration/commissioning/lines"})  # but this one: whole files come
+UPLOAD_BYTES: Final = 1_572_864  # of JSON, in which a file's line ends and quotes take two bytes
+LINGER_S: Final = 1.0  # for a refused client to read why; closed at once, its unread bytes would reset the answer away
+UNREAD_S: Final = 20.0  # in which a client must read some more of what waits for it
+UNREAD_BYTES: Final = 16_384  # that wait for one client before the answer itself has to
+CONNECTIONS: Final = 256  # some are left where four addresses have all that one may have
+CONNECTIONS_PER_ADDRESS: Final = 48  # its answers from the history and its streams (turns.py)
+
+_log = logging.getLogger(__name__)
+_log.setLevel(logging.ERROR)  # uvicorn warns of each request it cannot read: strangers could fill the log with them
+
+
+class GuardedConnection(HttpToolsProtocol):
+    """uvicorn's HTTP/1.1 protocol with the limits it leaves out.
+
+    A request that is not complete in time ends its connection (slow loris). A head or body that is too long, and
+    anything that is not HTTP, is answered with a problem and ends the connection; surplus connections are closed before
+    they cost anything. Answers in progress, streams among them, may take as long as they like, as long as the client
+    reads them. If all places are taken, the oldest connection without a token and without a request or answer in
+    progress is closed.
+
+    Under TLS it is created before the handshake, and gets its connection after it (tls.TlsHandshake).
+    """
+
+    def __init__(self, *parts: Any, **named_parts: Any) -> None:
+        super().__init__(*parts, **named_parts)
+        self.logger = _log
+        self.since_s = self.loop.time()
+        self._deadline: asyncio.TimerHandle | None = None
+        self._unread: asyncio.TimerHandle | None = None
+        self._early = b""  # came with the end of the handshake
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as in uvicorn
+        super().connection_made(transport)
+        transport.set_write_buffer_limits(UNREAD_BYTES)
+        self._n_head_bytes = self._n_body_bytes = 0
+        self._is_in_head = self._is_refused = False
+        self._deadline = self.loop.call_later(REQUEST_S, transport.abort)
+        if not has_slot(self, self.connections):
+            transport.abort()
+        elif self._early:
+            self.data_received(self._early)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._disarm()
+        self._await_reading(None)
+        if self.transport is not None:
+            super().connection_lost(exc)
+
+    def pause_writing(self) -> None:
+        super().pause_writing()
+        self._await_reading(self.transport.get_write_buffer_size())
+
+    def resume_writing(self) -> None:
+        super().resume_writing()
+        self._await_reading(None)
+
+    @property
+    def is_idle(self) -> bool:
+        """True if no request is in progress, or the answer is not read, and no token was shown."""
+        if self.scope is not None and "token_name" in self.scope.get("state", {}):
+            return False
+        return self.cycle is None or self.cycle.response_complete or self.flow.write_paused
+
+    def data_received(self, data: bytes) -> None:
+        if self.transport is None:
+            self._early += data
+            return
+        if self._is_refused:
+            return
+        super().data_received(data)
+        if self._is_in_head:
+            self._n_head_bytes += len(data)
+            self._refuse_long_head()
+
+    def on_message_begin(self) -> None:
+        super().on_message_begin()
+        self._is_in_head = True
+        self._n_head_bytes = self._n_body_bytes = 0
+        self._disarm()
+        self._deadline = self.loop.call_later(REQUEST_S, self.transport.abort)
+
+    def on_headers_complete(self) -> None:
+        self._is_in_head = False
+        self._n_head_bytes = len(self.url) + sum(len(name) + len(text) for name, text in self.headers)
+        self._refuse_long_head()
+        if not self._is_refused:
+            super().on_headers_complete()
+
+    def on_body(self, body: bytes) -> None:
+        self._n_body_bytes += len(body)
+        most = UPLOAD_BYTES if self.url.partition(b"?")[0] in UPLOADS else BODY_BYTES
+        if self._n_body_bytes > most and self.cycle.response_complete:
+            self._hear_no_more()  # it was answered before its end
+        elif self._n_body_bytes > most:
+            self._refuse(413, f"the body of a request may not be longer than {most // 1024} KiB")
+        if not self._is_refused:
+            super().on_body(body)
+
+    def on_message_complete(self) -> None:
+        if not self._is_refused:
+            self._disarm()
+            super().on_message_complete()
+
+    def send_400_response(self, msg: str) -> None:
+        """uvicorn's answer to a request it cannot parse."""
+        self._refuse(400, "this is not a valid HTTP request")
+
+    def _refuse_long_head(self) -> None:
+        if self._n_head_bytes > HEAD_BYTES:
+            self._refuse(431, "the head of a request may not be longer than 32 KiB")
+
+    def _refuse(self, status: int, detail: str) -> None:
+        """Answer once, unless the application has begun to, and close."""
+        if self._is_refused:
+            return
+        self._hear_no_more()
+        if self.cycle is not None and not self.cycle.response_complete:
+            if self.cycle.response_started:
+                self.transport.abort()  # no second answer into the first
+                return
+            self.cycle.disconnected = True  # the application's own answer comes too late
+            self.cycle.message_event.set()
+        self.transport.write(_on_the_wire(status, detail))
+        if self.transport.can_write_eof():  # TLS cannot
+            self.transport.write_eof()
+
+    def _hear_no_more(self) -> None:
+        self._is_refused = True
+        self._disarm()
+        self._deadline = self.loop.call_later(LINGER_S, self.transport.close)
+
+    def _await_reading(self, n_unread: int | None) -> None:
+        """Check again later: a client that has read nothing of ``n_unread`` bytes by then is cut off."""
+        if self._unread is not None:
+            self._unread.cancel()
+        self._unread = None if n_unread is None else self.loop.call_later(UNREAD_S, self._cut_off_unless_read, n_unread)
+
+    def _cut_off_unless_read(self, n_unread: int) -> None:
+        left = self.transport.get_write_buffer_size()
+        if left >= n_unread:
+            self.transport.abort()
+        else:
+            self._await_reading(left)
+
+    def _disarm(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+
+
+class ConnectionSlot(Protocol):
+    """What occupies one of the places: a connection, or one whose handshake is under way."""
+
+    client: tuple[str, int] | None
+    since_s: float
+    transport: asyncio.Transport
+
+    @property
+    def is_idle(self) -> bool: ...
+
+
+def has_slot(newcomer: ConnectionSlot, connections: Set[Any]) -> bool:
+    """Whether a connection that has just joined ``connections`` may stay; another may be closed for it."""
+    mine = newcomer.client and newcomer.client[0]
+    if sum(other.client is not None and other.client[0] == mine for other in connections) > CONNECTIONS_PER_ADDRESS:
+        return False
+    if len(connections) <= CONNECTIONS:
+        return True
+    idle = [other for other in connections if other is not newcomer and other.is_idle]
+    if idle:
+        min(idle, key=lambda other: other.since_s).transport.abort()
+    return bool(idle)
+
+
+def _on_the_wire(status: int, detail: str) -> bytes:
+    """A whole answer without the application: problem details with the headers that all answers have."""
+    problem = problem_response(status, detail)
+    head = [*problem.raw_headers, *SECURITY_HEADERS, (b"cache-control", b"no-store"), (b"connection", b"close")]
+    lines = [b"HTTP/1.1 %d %s" % (status, HTTPStatus(status).phrase.encode()), *(b": ".join(pair) for pair in head)]
+    return b"\r\n".join(lines) + b"\r\n\r\n" + bytes(problem.body)
 
 
 class TlsConfig(uvicorn.Config):

@@ -1,7 +1,7 @@
 """/api/v1/alarms: active and past alarms, since when, and who acknowledged them."""
 
 import asyncio
-from typing import Annotated, Final, Literal, Protocol
+from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Path, Query, Request
 from pydantic import BaseModel, Field
@@ -9,22 +9,9 @@ from starlette.responses import Response
 
 from gateway.history import ALARM
 from gateway.store import StoreReader
-from gateway.web.routes.estimates import HistoryQuery
-from gateway.web.routes.events import entries_of
-from gateway.web.routes.service_calls import call_service, token_name
+from gateway.web.routes.history import HistoryQuery, entries_of
+from gateway.web.routes.service_calls import AlarmBackend, call_service, token_name
 from gateway.web.schemas import Body, problem_responses
-
-
-class AlarmBackend(Protocol):
-    """The service's alarms. Blocking calls, made in threads; answers are JSON as described below."""
-
-    def standing(self) -> str:
-        """An array of Alarm, the worst first."""
-        ...
-
-    def acknowledge(self, alarm_id: str, by: str, note: str | None) -> str:
-        """The Alarm after it. Raises AlarmRefusedError."""
-        ...
 
 
 class AlarmStep(BaseModel):

@@ -1,6 +1,6 @@
 """/api/v1/calibration/commissioning: a vehicle calibrated on its own machine; one route for each step."""
 
-from typing import Annotated, Final, Literal, Protocol
+from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
@@ -9,10 +9,8 @@ from starlette.responses import Response
 from gateway.stated import VehicleAnswers
 from gateway.stated.doubt import DoubtKind
 from gateway.web.routes.known_weights import UndoQuery
-from gateway.web.routes.service_calls import call_service, token_name
+from gateway.web.routes.service_calls import CommissioningBackend, Source, call_service, token_name
 from gateway.web.schemas import Body, problem_responses, utf8_only
-
-Source = Literal["package", "administrator", "uploaded"]
 
 
 class Begin(Body):
@@ -191,24 +189,6 @@ class LinesFound(BaseModel):
 
 
 COMMISSIONING_PATH: Final = "/calibration/commissioning"
-
-
-class CommissioningBackend(Protocol):
-    """The service's commissioning. Blocking calls, made in threads; answers are JSON: a CommissioningState, or
-    LinesFound. All but ``state`` and ``lines`` raise CommissioningRefusedError.
-    """
-
-    def state(self) -> str: ...
-    def lines(self) -> str: ...
-    def begin(self, by: str, note: str | None) -> str: ...
-    def upload(self, name: str, content: str, signature: str | None) -> str: ...
-    def choose_line(self, name: str | None, source: Source | None) -> str: ...
-    def state_vehicle(self, answers: VehicleAnswers) -> str: ...
-    def confirm(self, by: str) -> str: ...
-    def is_empty(self, by: str, *, again: bool = False) -> str: ...
-    def fit_now(self, by: str) -> str: ...
-    def cancel(self, by: str) -> str: ...
-    def undo(self, by: str, *, to_factory: bool) -> str: ...
 
 
 def commissioning_router(backend: CommissioningBackend) -> APIRouter:

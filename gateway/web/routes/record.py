@@ -2,8 +2,8 @@
 
 import asyncio
 import re
-from collections.abc import AsyncIterator, Sequence
-from typing import Annotated, BinaryIO, Final, Protocol
+from collections.abc import AsyncIterator
+from typing import Annotated, BinaryIO, Final
 
 from fastapi import APIRouter, Header, Path, Request
 from pydantic import BaseModel, Field
@@ -13,38 +13,12 @@ from starlette.types import Receive, Scope, Send
 from gateway.records import iso_utc
 from gateway.web.access.guard import RECORD_PATH
 from gateway.web.access.problems import problem_response
+from gateway.web.routes.service_calls import FrameLog, KeptSegment
 from gateway.web.schemas import problem_responses
 
 PIECE_BYTES: Final = 65_536
 _MEDIA_TYPE: Final = "application/gzip"
 _RANGE: Final = re.compile(r"bytes=(?:([0-9]{1,18})-([0-9]{0,18})|-([0-9]{1,18}))")
-
-
-class KeptSegment(Protocol):
-    """A file of the ring log, as far as it can be fetched."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def n_bytes(self) -> int: ...
-    @property
-    def n_frames(self) -> int: ...
-    @property
-    def first_ns(self) -> int: ...
-    @property
-    def last_ns(self) -> int: ...
-
-
-class FrameLog(Protocol):
-    """The ring log. ``open`` blocks, and raises OSError if the disk fails."""
-
-    def segments(self) -> Sequence[KeptSegment]:
-        """Oldest first."""
-        ...
-
-    def open(self, name: str) -> tuple[BinaryIO, int] | None:
-        """A segment and the number of its bytes; None if there is none of that name."""
-        ...
 
 
 class SegmentTold(BaseModel):

@@ -1,7 +1,12 @@
-"""/api/v1/calibration/verifications: known loads compared with the estimates, as dated records."""
+"""How well the calibration still holds: known loads compared with the estimates, as dated records and pages to print,
+and the trend of the vehicle's parameters.
+"""
 
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Final, Literal, Protocol
+import base64
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, Path, Request
 from pydantic import BaseModel, Field
@@ -9,32 +14,17 @@ from starlette.responses import HTMLResponse, Response
 
 from gateway.stated_weight import StatedWeight
 from gateway.status import VerificationStatus
+from gateway.web.access.middleware import content_security_policy
 from gateway.web.access.problems import problem_response
-from gateway.web.routes.service_calls import REFUSALS, call_service, token_name
-from gateway.web.routes.stated_weights import Stated
-from gateway.web.routes.verification_page import POLICY, verification_page
+from gateway.web.routes.known_weights import Stated
+from gateway.web.routes.service_calls import REFUSALS, TrendBackend, VerificationBackend, call_service, token_name
 from gateway.web.schemas import Body, problem_responses
+from gateway.words import one_or_more
 
 VERIFICATIONS_PATH: Final = "/calibration/verifications"
 _PAGE: Final[dict[int | str, dict[str, Any]]] = {
     200: {"content": {"text/html": {"schema": {"type": "string"}}}, "description": "the page"}
 }
-
-
-class VerificationBackend(Protocol):
-    """The service's verifications. Blocking calls, made in threads; answers are JSON as described below."""
-
-    def state(self) -> str:
-        """A VerificationState."""
-        ...
-
-    def record(self, record_id: str) -> Mapping[str, Any] | None:
-        """A VerificationRecord; None if none has this id."""
-        ...
-
-    def verify(self, by: str, note: str | None, stated: Sequence[StatedWeight]) -> str:
-        """The new VerificationRecord. Raises WeightRefusedError."""
-        ...
 
 
 class VerificationRequest(Body):
@@ -141,3 +131,146 @@ def verification_router(backend: VerificationBackend) -> APIRouter:
         return HTMLResponse(verification_page(record), headers={"content-security-policy": POLICY})
 
     return router
+
+
+TREND_PATH: Final = "/calibration/trend"
+
+
+class PointTold(BaseModel):
+    """A week's mean, by the date of its Monday, or one empty vehicle."""
+
+    t: str
+    number: float
+    n: int = Field(description="batches in it")
+
+
+class ParameterTrend(BaseModel):
+    """Off the calibration: percent; the zero in kg."""
+
+    name: str = Field(examples=["damper_rear"])
+    unit: Literal["%", "kg"]
+    points: list[PointTold]
+    change: float | None = Field(description="from the first point to the last; null: too few points")
+    interval99: tuple[float, float] | None = Field(description="of the change")
+    is_drifting: bool
+    level: float | None = Field(description="where the newest batches stand off the calibration; null: too few of them")
+    level99: tuple[float, float] | None = Field(description="of the level")
+    is_off: bool = Field(
+        description="whether the level is neither chance nor small: dampers from 20 %, a gain from 2 %"
+    )
+
+
+class TrendState(BaseModel):
+    """Of the calibration in use."""
+
+    calibration_id: str | None
+    parameters: list[ParameterTrend]
+
+
+def trend_router(backend: TrendBackend) -> APIRouter:
+    """The route of the trend."""
+    router = APIRouter(prefix="/api/v1", tags=["calibration"])
+
+    @router.get(TREND_PATH, response_model=TrendState)
+    async def parameter_trend(request: Request) -> Response:
+        """Dampers, the delay's scale, the gyro's gain and the zero over the months: whether they drift or are off."""
+        return await call_service(request, backend.state)
+
+    return router
+
+
+_STYLE: Final = """
+body { font: 11pt/1.4 system-ui, sans-serif; color: #111; max-width: 48rem; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.4rem; margin-bottom: 0; }
+table { border-collapse: collapse; width: 100%; margin: 1rem 0; font-variant-numeric: tabular-nums; }
+th, td { border-bottom: 1px solid #bbb; padding: 0.3rem 0.5rem; text-align: right; vertical-align: top; }
+th:first-child, td:first-child { text-align: left; }
+dl { display: grid; grid-template-columns: 12rem 1fr; gap: 0.2rem 1rem; }
+dt { color: #444; } dd { margin: 0; overflow-wrap: anywhere; }
+.verdict { font-size: 1.2rem; font-weight: 600; border: 2px solid #111; display: inline-block; padding: 0.3rem; }
+.sign { margin-top: 3rem; display: flex; gap: 2rem; }
+.sign p { border-top: 1px solid #111; flex: 1; padding-top: 0.3rem; }
+@page { margin: 2cm; }
+"""
+_HASH: Final = base64.b64encode(hashlib.sha256(_STYLE.encode()).digest()).decode()
+POLICY: Final = content_security_policy(f"'sha256-{_HASH}'")
+
+
+def verification_page(record: Mapping[str, Any]) -> str:
+    """A VerificationRecord as HTML."""
+    rule = record["rule"]
+    axles = rule["permitted_axle_error_pct"]
+    asked = f"at most {rule['permitted_error_pct']:g} % of the known gross weight"
+    asked += "" if axles is None else f", and at most {axles:g} % of each axle's"
+    asked += f"; {one_or_more(rule['loads'], 'load', 'loads')} at least"
+    facts = {
+        "Vehicle": record["vehicle_id"] or "",
+        "Date": _moment(record["at"]),
+        "By": record["by"],
+        "Note": record["note"] or "",
+        "Permitted error": asked,
+        "Estimator": record["estimator"],
+        "Calibration": record["calibration_id"],
+        "Known weights": record["known_weights_id"] or "none: by the calibration alone",
+        "Record": record["id"],
+    }
+    parts = [
+        "<h1>Verification of on-board weighing</h1>",
+        f'<p class="verdict">{escape(record["verdict"])}</p>',
+        "<dl>"
+        + "".join(f"<dt>{escape(name)}</dt><dd>{escape(str(told))}</dd>" for name, told in facts.items())
+        + "</dl>",
+        _table(
+            (
+                "Load weighed",
+                "known payload [kg]",
+                "weighed ± 95 % [kg]",
+                "error [kg]",
+                "of the gross weight",
+                "within",
+            ),
+            [_load(load) for load in record["loads"]],
+        ),
+        *_axles(record["loads"]),
+        "<p>Known loads were compared with the estimates of the driving vehicle, each estimate without knowledge of "
+        "that very load; the calibration did not change. An error is estimate minus known.</p>",
+        '<div class="sign"><p>Place, date</p><p>Name, signature</p></div>',
+    ]
+    head = f'<meta charset="utf-8"><title>Verification {escape(record["at"][:10])}</title><style>{_STYLE}</style>'
+    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(parts) + "\n</body></html>\n"
+
+
+def _load(load: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        f"{_moment(load['t_start'])} to {_moment(load['t_end'])}, {one_or_more(load['n_batches'], 'batch', 'batches')}",
+        f"{load['known_payload_kg']:.0f}",
+        f"{load['payload_kg']:.0f} ± {1.96 * load['payload_std_kg']:.0f}",
+        f"{load['error_kg']:+.1f}",
+        f"{load['error_pct']:+.2f} %",
+        "yes" if load["is_within"] else "no",
+    )
+
+
+def _axles(loads: Iterable[Mapping[str, Any]]) -> list[str]:
+    rows = [
+        (
+            f"{_moment(load['t_start'])}, {name}",
+            f"{axle['known_kg']:.0f}",
+            f"{axle['error_kg']:+.1f}",
+            f"{axle['error_pct']:+.2f} %",
+        )
+        for load in loads
+        for name, axle in (("front axle", load["front_axle"]), ("rear axle", load["rear_axle"]))
+        if axle is not None
+    ]
+    return [_table(("Axle", "known [kg]", "error [kg]", "of the known"), rows)] if rows else []
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    top = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
+    lines = ("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{top}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+
+
+def _moment(text: str) -> str:
+    return f"{text[:10]} {text[11:16]} UTC"

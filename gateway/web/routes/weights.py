@@ -1,19 +1,24 @@
-"""/api/v1/weights/latest: gross weight, axle and wheel loads of the latest estimate, and whether they are too much."""
+"""/api/v1/weights/latest, /weights/j1939 and /vss: gross weight, axle and wheel loads of the latest estimate, whether
+they are too much, the same in the terms of SAE J1939 and of the COVESA Vehicle Signal Specification, and the actual
+load where it is known.
+"""
 
 import math
-from collections.abc import Sequence
-from dataclasses import asdict
-from typing import Final
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Final
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import NOT_CALIBRATED, PayloadPlace, is_over_limit, place_of, weighed
+from gateway.core.weights import NOT_CALIBRATED, PayloadPlace, is_over_limit, place_of, unsprung_kg, weighed
 from gateway.estimate import Estimate, Weight, Weights
+from gateway.j1939 import NOT_AVAILABLE, POWERED_WEIGHT, counts_of
+from gateway.quantities import QUANTITIES
 from gateway.records import iso_utc
-from gateway.web.live.board import Board
+from gateway.web.live.board import Board, Shown
 from gateway.web.schemas import WeightFigure, WeightFigures
 
 _NONE: Final = Estimate(0, 0, "")
@@ -95,13 +100,21 @@ def weigh_latest(board: Board, scales: Scales) -> LatestWeights:
         place: _figure(weight, [getattr(weights, place).kg for weights in history]) for place, weight in now.items()
     }
     return LatestWeights(
-        id=None if shown.estimate is None else shown.estimate.id,
-        t_end=None if shown.estimate is None else iso_utc(shown.estimate.t_end_ns),
-        age_s=shown.age_s,
-        is_stale=shown.is_stale,
+        **_when(shown),
         load=_place(scales.place(shown.estimate)),
         **figures,
     )
+
+
+def _when(shown: Shown) -> dict[str, Any]:
+    """The fields of WeighedWhen."""
+    estimate = shown.estimate
+    return {
+        "id": None if estimate is None else estimate.id,
+        "t_end": None if estimate is None else iso_utc(estimate.t_end_ns),
+        "age_s": shown.age_s,
+        "is_stale": shown.is_stale,
+    }
 
 
 def _figure(now: Weight, history_kg: Sequence[float]) -> WeightFigure:
@@ -121,3 +134,135 @@ def _place(place: PayloadPlace | None) -> LoadPlace | None:
 
 def _or_none(x: float) -> float | None:
     return round(x, 3) if math.isfinite(x) else None
+
+
+class J1939Weight(BaseModel):
+    """One parameter. ``raw`` is the count on the wire; 65535 means not available, 65024 error; then ``kg`` is null."""
+
+    pgn: int = Field(examples=[65258])
+    spn: int = Field(examples=[582])
+    name: str = Field(examples=["Axle Weight"])
+    axle: int | None = Field(None, description="counted from 1 at the front", examples=[1])
+    kg: float | None = Field(description="raw times the resolution", examples=[845.0])
+    kg_per_bit: float = Field(examples=[0.5])
+    raw: int = Field(ge=0, le=NOT_AVAILABLE, examples=[1690])
+
+
+class J1939Weights(WeighedWhen):
+    """Vehicle Weight (VW) and Combination Vehicle Weight (CVW) of the estimate that ``/estimates/latest`` shows."""
+
+    parameters: list[J1939Weight]
+
+
+_UINT16_LAST: Final = 65_535
+
+
+class VssPoint(BaseModel):
+    """One VSS signal; value null is unknown."""
+
+    path: str = Field(examples=["Vehicle.CurrentOverallWeight"])
+    value: float | int | None = Field(examples=[1894])
+    unit: str = Field(examples=["kg"])
+    timestamp: str | None = Field(description="end of the batch", examples=["2026-11-21T03:55:00.000000Z"])
+
+
+def standards_router(board: Board, scales: Scales, *, draws_trailers: bool) -> APIRouter:
+    """The weights in the terms of J1939 and VSS; ``draws_trailers`` as for the frames that are sent."""
+    router = APIRouter(prefix="/api/v1", tags=["standards"])
+
+    @router.get("/weights/j1939")
+    async def j1939_weights() -> J1939Weights:
+        """Axle, cargo and gross weights with the SPNs, resolutions and counts of SAE J1939-71."""
+        shown = board.shown()
+        counts = counts_of(shown.estimate, scales.weigh(shown.estimate), draws_trailers=draws_trailers)
+        return J1939Weights(
+            **_when(shown),
+            parameters=[
+                J1939Weight(**asdict(count.parameter), axle=count.axle, kg=count.kg, raw=count.raw)
+                for count in counts
+                if count.parameter is not POWERED_WEIGHT
+            ],
+        )
+
+    @router.get("/vss")
+    async def vss() -> list[VssPoint]:
+        """Core VSS paths and those of the Springscale overlay, of the latest estimate."""
+        return vss_points(board, scales)
+
+    return router
+
+
+def vss_points(board: Board, scales: Scales) -> list[VssPoint]:
+    """Every VSS path that we support, in a fixed order; docs/vss/springscale.vspec describes those of the overlay."""
+    weights, estimate = weigh_latest(board, scales), board.shown().estimate or _NONE
+    points = [
+        VssPoint(path="Vehicle.CurbWeight", value=_uint16(_kerb_kg(scales)), unit="kg", timestamp=None),
+        VssPoint(path="Vehicle.GrossWeight", value=_uint16(weights.gross.limit_kg), unit="kg", timestamp=None),
+    ]
+    for one in QUANTITIES:
+        figure = getattr(weights if one.is_weight else estimate, one.name)
+        known, std = (figure.kg, figure.std_kg) if one.is_weight else map(_finite, (figure.number, figure.std))
+        found = {one.vss: known, f"{one.vss}Std": std} if one.has_vss_std else {one.vss: _uint16(known)}
+        points += [
+            VssPoint(path=path, value=value, unit=one.vss_unit, timestamp=weights.t_end)
+            for path, value in found.items()
+        ]
+    return points
+
+
+def _kerb_kg(scales: Scales) -> float | None:
+    if scales.vehicle is None:
+        return None
+    return _finite(scales.vehicle.empty_mass_kg + sum(unsprung_kg(scales.vehicle)))
+
+
+def _finite(x: float) -> float | None:
+    return x if math.isfinite(x) else None
+
+
+def _uint16(kg: float | None) -> int | None:
+    """VSS gives these the type uint16."""
+    return None if kg is None else min(max(round(kg), 0), _UINT16_LAST)
+
+
+KNOWN_LOADS_PATH: Final = "/api/v1/known-loads"
+
+
+@dataclass(frozen=True, slots=True)
+class KnownLoad:
+    """From t_start_ns on, until the next: payload and front share of the sprung mass."""
+
+    t_start_ns: int
+    payload_kg: float
+    front_share_pct: float
+
+
+KnownLoads = Callable[[], Sequence[KnownLoad]]
+
+
+class KnownLoadTold(BaseModel):
+    """From ``t_start`` on, until the next."""
+
+    t_start: str = Field(json_schema_extra={"format": "date-time"})
+    payload_kg: float
+    front_share_pct: float
+
+
+class KnownLoadsTold(BaseModel):
+    """In order of time. They are for comparison only: no estimate uses them."""
+
+    items: list[KnownLoadTold]
+
+
+def known_loads_router(known_loads: KnownLoads) -> APIRouter:
+    """Their route; a service on the road has no known loads."""
+    router = APIRouter(tags=["api"])
+
+    @router.get(KNOWN_LOADS_PATH)
+    async def told() -> KnownLoadsTold:
+        """The actual load, as the simulator of the demonstration knows it."""
+        return KnownLoadsTold(
+            items=[KnownLoadTold(t_start=iso_utc(load.t_start_ns), **asdict(load)) for load in known_loads()]
+        )
+
+    return router

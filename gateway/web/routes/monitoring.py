@@ -1,4 +1,7 @@
-"""The status as Prometheus metrics: one table. Base units, counters end in _total, unknown is absent."""
+"""For monitoring: health, and the status as Prometheus metrics.
+
+Metrics are one table. Base units, counters end in _total, unknown is absent.
+"""
 
 import math
 from collections import Counter
@@ -6,15 +9,48 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from prometheus_client import CollectorRegistry, ProcessCollector
+from fastapi import APIRouter, Request
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, ProcessCollector, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from starlette.responses import JSONResponse, Response
 
 from gateway.estimate import PLACES
 from gateway.quantities import FOUND, Outward
 from gateway.records import Why
 from gateway.status import State, Status
+from gateway.web.access.problems import problem_response
 from gateway.web.live.board import Board, Shown
 from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
+from gateway.web.schemas import Alive, Ready, problem_responses
+
+
+def health_router(status: Callable[[], Status], registry: CollectorRegistry) -> APIRouter:
+    """/health/live, /health/ready, /metrics."""
+    router = APIRouter(tags=["health"])
+
+    @router.get("/health/live", response_model=Alive)
+    async def live() -> Response:
+        """200 as long as the process answers."""
+        return JSONResponse(Alive().model_dump())
+
+    @router.get("/health/ready", response_model=Ready, responses=problem_responses(503))
+    async def ready(request: Request) -> Response:
+        """200 while estimates are possible; else 503 with the reason."""
+        now = status()
+        if not now.is_ready:
+            return problem_response(503, now.not_ready_reason or now.sentence(), request.url.path)
+        return JSONResponse(Ready(state=now.state, warnings=list(now.warnings)).model_dump())
+
+    @router.get(
+        "/metrics",
+        response_class=Response,
+        responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
+    )
+    async def metrics() -> Response:
+        """Prometheus metrics, names springscale_*."""
+        return Response(generate_latest(registry), media_type=CONTENT_TYPE_LATEST)
+
+    return router
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,8 +137,8 @@ def _found(quantity: Outward) -> tuple[MetricRow, MetricRow]:
     name, std_name, factor = quantity.metric
     text = f"{quantity.words[0].upper()}{quantity.words[1:]}, by the latest estimate."
     return (
-        one(name, text, f"shown.{quantity.name}.number", factor),
-        one(std_name, _STD, f"shown.{quantity.name}.std", factor),
+        one(name, text, f"shown.estimate.{quantity.name}.number", factor),
+        one(std_name, _STD, f"shown.estimate.{quantity.name}.std", factor),
     )
 
 
@@ -249,7 +285,7 @@ TABLE: Final = (
 
 
 class StatusCollector:
-    """ConcurrencyLimit the present status into metrics at each request."""
+    """Turns the present status into metrics at each request."""
 
     def __init__(self, board: Board, scales: Scales, status: Callable[[], Status], responses: Counter[int]) -> None:
         self._board = board

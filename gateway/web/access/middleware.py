@@ -1,4 +1,4 @@
-"""Limits of concurrent answers that take memory, per client and in total, and answers sent in small pieces."""
+"""Layers around the application: limits of concurrent answers, long bodies in pieces, security headers, HEAD as GET."""
 
 import asyncio
 from collections import Counter
@@ -7,6 +7,86 @@ from typing import Final
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from gateway.web.access.problems import problem_response
+
+
+def content_security_policy(*more_styles: str) -> str:
+    """Files of this gateway alone; no inline script or style is allowed, unless ``more_styles`` say so."""
+    styles = " ".join(("'self'", *more_styles))
+    return (
+        f"default-src 'none'; script-src 'self'; style-src {styles}; img-src 'self' data:; connect-src 'self'; "
+        "font-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+
+
+SECURITY_HEADERS: Final = (
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (b"permissions-policy", b"camera=(), geolocation=(), microphone=()"),
+    (b"content-security-policy", content_security_policy().encode()),
+)
+_NO_STORE: Final = (b"cache-control", b"no-store")
+_NO_CACHE: Final = (b"cache-control", b"no-cache")  # may be cached, but must be revalidated
+
+
+class SecurityHeaders:
+    """ASGI middleware. Headers that an answer sets itself are kept.
+
+    An answer without caching headers is not cached, or revalidated if it has an ETag.
+    """
+
+    def __init__(self, app: ASGIApp, counts: Counter[int]) -> None:
+        self._app = app
+        self._counts = counts
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                self._counts[message["status"]] += 1
+                names = {name for name, _ in message["headers"]}
+                headers = [*message["headers"], *(more for more in SECURITY_HEADERS if more[0] not in names)]
+                if b"cache-control" not in names:
+                    headers.append(_NO_CACHE if b"etag" in names else _NO_STORE)
+                message["headers"] = headers
+            await send(message)
+
+        await self._app(scope, receive, send_with_headers)
+
+
+class HeadAsGet:
+    """ASGI middleware: HEAD is answered as GET is, without the body (RFC 9110, 9.3.2).
+
+    An answer that would go on, a stream or a file, is ended as if the client had left.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http" or scope["method"] != "HEAD":
+            await self._app(scope, receive, send)
+            return
+        answered = asyncio.Event()
+
+        async def send_head(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                await send(message)
+            elif not answered.is_set():
+                answered.set()
+                await send({"type": "http.response.body", "body": b""})
+
+        async def gone() -> Message:
+            await answered.wait()
+            return {"type": "http.disconnect"}
+
+        await self._app({**scope, "method": "GET"}, gone, send_head)
+
 
 ANSWERS: Final = 48  # from the history that are under way at a time
 ANSWERS_PER_CLIENT: Final = 16  # of one token, or of one address if there are none
