@@ -30,7 +30,9 @@ N_CUTS, N_RESTARTS, N_KILLS = 10, 3, 7
 DELIVERER = """
 import pathlib, sys, time
 from gateway.store import Store
-from gateway.uplink import Outbox, Uplink, UplinkSettings
+from gateway.uplink.outbox import Outbox
+from gateway.uplink.settings import UplinkSettings
+from gateway.uplink.uplink import Uplink
 from gateway.uplink.forwarder import BackOff
 
 store = Store.open(pathlib.Path(sys.argv[1]))

@@ -29,9 +29,10 @@ KINDS = ("alarm", "event")
 SENDER = """
 import pathlib, sys, time
 from gateway.store import Store
-from gateway.uplink import Outbox
+from gateway.uplink.outbox import Outbox
 from gateway.uplink.forwarder import BackOff
-from gateway.uplink.webhook import Webhook, WebhookSettings
+from gateway.uplink.settings import WebhookSettings
+from gateway.uplink.webhook import Webhook
 
 store = Store.open(pathlib.Path(sys.argv[1]))
 settings = WebhookSettings(False, "127.0.0.1", int(sys.argv[2]), "/hook", pathlib.Path(sys.argv[3]), ("alarm", "event"))
