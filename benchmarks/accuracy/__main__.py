@@ -30,7 +30,7 @@ from gateway.calibration.judgement import learning_curve as on_learning
 from gateway.cli.options import FILE, batch_settings, window
 from gateway.cli.progress import counted
 from gateway.config import ESTIMATOR_NAMES
-from gateway.core.cross_spectrum.ideal_drive import Drive
+from gateway.core.cross_spectrum.predicted import Drive
 from gateway.core.vehicle import Vehicle
 from gateway.errors import SpringscaleError
 from gateway.offline import inspect

@@ -20,8 +20,7 @@ from gateway.calibration.plan import Design, PlacedLoad, usual_drive, weighed_lo
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cargo import shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.ideal_drive import Drive
-from gateway.core.cross_spectrum.predicted import predicted
+from gateway.core.cross_spectrum.predicted import Drive, predicted
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 

@@ -23,11 +23,11 @@ import numpy as np
 from gateway.calibration.half_car import prior_of
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.ideal_drive import RATE_HZ, Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import EFFECTIVE_SHARE, Point, Whittle
 from gateway.core.cross_spectrum.model.half_car import frequency_response
 from gateway.core.cross_spectrum.model.parameters import INDEX, Ground, half_car
 from gateway.core.cross_spectrum.model.reading import Reading
+from gateway.core.cross_spectrum.predicted import RATE_HZ, Drive, expected_of, steady_spectra
 from gateway.core.spectrum import frequencies_hz
 from gateway.core.vehicle import Vehicle
 from gateway.records import C128, F64

@@ -115,7 +115,7 @@ def test_the_bound_shrinks_with_the_root_of_time() -> None:
     from benchmarks.accuracy.sensor_bounds import cramer_rao
     from gateway.calibration.half_car import calibrate_cross_spectrum
     from gateway.calibration.known_run import KnownRun
-    from gateway.core.cross_spectrum.ideal_drive import Drive
+    from gateway.core.cross_spectrum.predicted import Drive
 
     run = KnownRun(1, "empty", 0.0, 52.0, (batch_over_road(0.0, 52.0, seed=4),))
     calibration = calibrate_cross_spectrum([run], VAN)

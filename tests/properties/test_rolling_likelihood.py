@@ -7,7 +7,7 @@ import pytest
 from support.rolling_road import WIDE_VAN, batch_over_two_tracks
 
 from gateway.calibration.half_car import prior_of
-from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ
+from gateway.core.cross_spectrum.lateral import ROLL_BAND_HZ
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of
 from gateway.core.cross_spectrum.model.driven import spectral_model

@@ -25,10 +25,10 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum import locate
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import DRIFT_STD
-from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.located import raw_moves
 from gateway.core.cross_spectrum.measured import cross_spectra_of
+from gateway.core.cross_spectrum.predicted import Drive, expected_of, steady_spectra
 from gateway.core.vehicle import Load, front_share_pct
 from gateway.core.weights import weights_of
 from gateway.posterior import exactly

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from support.half_car_road import CAR
 from support.rolling_car import ROLLING_CAR
 
-from gateway.core.cross_spectrum.model.mount import Mount
+from gateway.core.cross_spectrum.model.reading import Mount
 from gateway.core.cross_spectrum.model.rolling_car import SidewaysLoad, rolling_response
 from gateway.records import C128
 

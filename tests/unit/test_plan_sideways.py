@@ -9,7 +9,7 @@ from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan import Advice, Expected, LoadPlan, OffCentreLoad, PlacedLoad
 from gateway.calibration.plan.plan import sideways_load
 from gateway.cli.calibrate_text import plan_sentences
-from gateway.core.cross_spectrum.ideal_drive import Drive
+from gateway.core.cross_spectrum.predicted import Drive
 from gateway.reports.calibration.runs import plan_section
 
 STRAIGHT = batch_over_road(0.0, 52.0, seed=1, duration_s=60.0)

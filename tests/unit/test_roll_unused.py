@@ -12,7 +12,7 @@ from gateway.calibration.half_car.prior import can_roll
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.lateral.unseen import sideways_columns
+from gateway.core.cross_spectrum.lateral import sideways_columns
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS

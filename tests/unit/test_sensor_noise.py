@@ -8,8 +8,7 @@ from support.half_car_road import RATE_HZ, VAN, batch_over_road, calibrated_on_k
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.floor import as_read, expected_floor, floor_of, noise_over, usual_floor
-from gateway.core.cross_spectrum.model.mount import Mount
-from gateway.core.cross_spectrum.model.reading import Reading
+from gateway.core.cross_spectrum.model.reading import Mount, Reading
 from gateway.records import Batch, Why
 from gateway.service.pipeline import noise_fault
 

@@ -7,7 +7,7 @@ from support.estimates import make_record
 from gateway.calibration.plan import Advice, Expected, LoadPlan, PlacedLoad
 from gateway.cli.calibrate_text import plan_sentences
 from gateway.cli.estimate import sentence
-from gateway.core.cross_spectrum.ideal_drive import Drive
+from gateway.core.cross_spectrum.predicted import Drive
 from gateway.reports.calibration.runs import best_next, plan_section
 
 EXPECTED = Expected(payload_std_kg=10.0, front_share_std_pct=0.5, reach_share=0.4)

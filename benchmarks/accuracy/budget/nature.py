@@ -11,7 +11,7 @@ from benchmarks.accuracy.drives import Trip
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cargo import ShapePrior
 from gateway.core.cross_spectrum.drift import NATURE_STD, NATURE_TOGETHER_STD
-from gateway.core.cross_spectrum.lateral.unseen import PAYLOAD_LEFT_PER_TRACK
+from gateway.core.cross_spectrum.lateral import PAYLOAD_LEFT_PER_TRACK
 from gateway.core.cross_spectrum.sensor_change import GAIN_PER_K, OFFSET_PER_K_MPS2, TEMPERATURE_STD_K
 from gateway.core.vehicle import Vehicle as StatedVehicle
 from gateway.records import Motion, Signal

@@ -11,9 +11,8 @@ from gateway.calibration.plan.design import BATCH_S, Design
 from gateway.calibration.plan.loads import empty, weighed_loads
 from gateway.calibration.plan.plan import WORTH_DRIVING
 from gateway.core.cargo import shape_prior
-from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
-from gateway.core.cross_spectrum.predicted import predicted
+from gateway.core.cross_spectrum.predicted import Drive, predicted
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.posterior import FRONT_SHARE, PAYLOAD, Source

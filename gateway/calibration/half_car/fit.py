@@ -33,10 +33,10 @@ from gateway.core.bends import joined_gains
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.estimator import moves_of, weigh
 from gateway.core.cross_spectrum.floor import usual_floor
-from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.located import raw_moves
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, names_of, upright
+from gateway.core.cross_spectrum.predicted import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.search import Found
 from gateway.core.vehicle import Load, Vehicle, front_share_pct
 from gateway.errors import CalibrationImpossibleError

@@ -9,7 +9,7 @@ import numpy as np
 
 from gateway.calibration.inheritance import Usual
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ
+from gateway.core.cross_spectrum.lateral import ROLL_BAND_HZ
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, Ground, level, mount_of

@@ -18,11 +18,11 @@ import numpy as np
 
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.calibration.plan.loads import PlacedLoad
-from gateway.core.cross_spectrum.ideal_drive import Drive, expected_of, steady_spectra
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Point, Whittle
 from gateway.core.cross_spectrum.located import raw_moves
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, Ground, upright
 from gateway.core.cross_spectrum.model.reading import Reading
+from gateway.core.cross_spectrum.predicted import Drive, expected_of, steady_spectra
 from gateway.core.vehicle import Vehicle
 from gateway.records import F64
 

@@ -24,9 +24,8 @@ from gateway.calibration.plan.design import BATCH_S, Design
 from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
 from gateway.core.cargo import shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.ideal_drive import Drive
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, upright
-from gateway.core.cross_spectrum.predicted import predicted
+from gateway.core.cross_spectrum.predicted import Drive, predicted
 from gateway.core.vehicle import Load, Vehicle, cg_left_m, front_share_pct
 from gateway.core.weights import weights_of
 from gateway.errors import CalibrationImpossibleError

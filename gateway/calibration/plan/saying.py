@@ -9,8 +9,7 @@ from typing import Any, Final
 from gateway.calibration.plan.design import BATCH_S
 from gateway.core.cargo import ShapePrior, is_said, shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.ideal_drive import Drive
-from gateway.core.cross_spectrum.predicted import predicted
+from gateway.core.cross_spectrum.predicted import Drive, predicted
 from gateway.core.vehicle import Carries, Load, Vehicle, front_share_pct
 from gateway.posterior import PAYLOAD
 

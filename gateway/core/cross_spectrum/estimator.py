@@ -18,7 +18,7 @@ from gateway.core.cargo import ShapePrior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import MOST_TENSION, wear_of
 from gateway.core.cross_spectrum.floor import SENSOR_OF, as_read, expected_floor, floor_of, noise_over
-from gateway.core.cross_spectrum.lateral.told import with_place
+from gateway.core.cross_spectrum.lateral import with_roll_share
 from gateway.core.cross_spectrum.located import Located, locate
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of, why_no_spectra
 from gateway.core.cross_spectrum.model.parameters import INDEX
@@ -102,7 +102,7 @@ def by_cross_spectrum(
         return replace(diagnosed, rejected=(why,))
     answer = diagnosed.answered(found.posterior)
     located = found.located
-    return with_place(answer, located.point, calibration) if located.sideways else answer
+    return with_roll_share(answer, located.point, calibration) if located.sideways else answer
 
 
 def weigh(batch: Batch, calibration: CrossSpectrumCalibration, prior: ShapePrior | None) -> Weighed | Why:

@@ -120,7 +120,7 @@ class Whittle:
         self._slope = _centred(np.log(freq_hz))
         self._level_stiffness = float(np.sum(self._level_weight * self._slope**2)) + ROAD_SLOPE_STD**-2
         self._last: _Whitened | None = None
-        self._sought: tuple[int, ...] = ()  # a search's few entries: those for which slopes will be asked again
+        self._searched: tuple[int, ...] = ()  # a search's few entries: those for which slopes will be asked again
         self._curvatures: dict[tuple[bytes, tuple[float, ...], tuple[int, ...]], Curvature] = {}
 
     def cost(self, point: Point) -> float:
@@ -156,8 +156,8 @@ class Whittle:
 
         The last few are cached: an answer asks again for those of its likeliest shape.
         """
-        if not self._sought or len(free) < len(self._sought):
-            self._sought = tuple(free)
+        if not self._searched or len(free) < len(self._searched):
+            self._searched = tuple(free)
         key = point.theta.tobytes(), point.loaded, tuple(free)
         if key not in self._curvatures:
             if len(self._curvatures) == MOST_KEPT:
@@ -211,7 +211,7 @@ class Whittle:
     def _whitened(self, point: Point) -> _Whitened:
         """The solution at a point, cached: a search asks for the cost and then for the slopes."""
         if self._last is None or not self._last.point.is_at(point):
-            solved = Solved.at(point.theta, point.loaded, self.ground, self.spectra, self._sought)
+            solved = Solved.at(point.theta, point.loaded, self.ground, self.spectra, self._searched)
             by = Whitener.of(with_noise(solved.noiseless, solved.model, self.spectra))
             self._last = _Whitened(point, solved, by, by(self._seen))
         return self._last

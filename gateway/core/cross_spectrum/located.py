@@ -19,8 +19,13 @@ from gateway.core.cross_spectrum.drift import (
     strain_of,
     tension_of,
 )
-from gateway.core.cross_spectrum.lateral.sought import ROLL_BAND_HZ, Sideways, sought_sideways, told_sideways
-from gateway.core.cross_spectrum.lateral.unseen import sideways_columns
+from gateway.core.cross_spectrum.lateral import (
+    ROLL_BAND_HZ,
+    Sideways,
+    most_probable_place,
+    sideways_at,
+    sideways_columns,
+)
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Curvature, Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, has_roll, level
@@ -89,7 +94,7 @@ class _Peak:
     found: Found
     packing: Packing
     rivals: F64 = field(default_factory=lambda: np.zeros((2, 2)))  # what others add to its covariance
-    freed: F64 | None = None  # drifting parameters, where dampers were sought that may have worn
+    freed: F64 | None = None  # drifting parameters, from a search in which dampers may have worn
 
 
 def locate(
@@ -102,7 +107,7 @@ def locate(
 
     ``prior`` is that of its shape and ``evidence`` the weight of the batch against it (None: the default); without a
     prior the load has the shape of the known ones. Each axle's movement depends on the load: we recompute the stroke
-    speeds at each solution and continue the search from it. With a roll rate the load is first sought on the centre
+    speeds at each solution and continue the search from it. With a roll rate the load is first searched on the centre
     line; then roll gives its lateral place, and the search continues from there. If the roll rate is lost, the sensor
     still reads roll: we assume its calibrated place, and the load on the centre line.
     """
@@ -115,8 +120,8 @@ def locate(
         located = _located(whittle, peak, shape, calibration, 0.0, evidence)
 
         def weigh(other: CrossSpectra) -> F64:
-            sought = _sought(Whittle(other, calibration.ground), peak.found.x, peak.packing, calibration, 0.0, COARSE)
-            return sought.x[-2:]
+            again = _search(Whittle(other, calibration.ground), peak.found.x, peak.packing, calibration, 0.0, COARSE)
+            return again.x[-2:]
 
         as_known = _point(peak.found.x, calibration, 0.0)
         unseen = sideways_columns(whittle.spectra, as_known, calibration, weigh)
@@ -126,14 +131,14 @@ def locate(
     moving = _moving(spectra, peak.found.x, placed)
     whittle = Whittle(moving.without_roll, calibration.ground)
     rolling = Whittle(moving.within(ROLL_BAND_HZ), calibration.ground)
-    place = sought_sideways(rolling, _point(peak.found.x, placed, 0.0))
-    peak = replace(peak, found=_sought(whittle, peak.found.x, peak.packing, placed, place.cg_left_m))
+    place = most_probable_place(rolling, _point(peak.found.x, placed, 0.0))
+    peak = replace(peak, found=_search(whittle, peak.found.x, peak.packing, placed, place.cg_left_m))
     shape = _shaped(whittle, peak, placed, place.cg_left_m, prior, evidence)
     placed = _as_shaped(placed, shape)
     x = peak.found.x if shape is None else shape.x
-    place = sought_sideways(rolling, _point(x, placed, place.cg_left_m))
+    place = most_probable_place(rolling, _point(x, placed, place.cg_left_m))
     located = _located(whittle, peak, shape, placed, place.cg_left_m, evidence)
-    sideways = told_sideways(rolling, place, located.point)
+    sideways = sideways_at(rolling, place, located.point)
     return replace(located, sideways=sideways, is_converged=located.is_converged and place.found.is_converged)
 
 
@@ -189,7 +194,7 @@ def answer_at(
     """
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
-    covariance = np.asarray(np.linalg.inv(_of_sought(whole, prior.precision)), float)
+    covariance = np.asarray(np.linalg.inv(_of_fitted(whole, prior.precision)), float)
     pull = whole.gradient[FITTED].copy()
     off = point.theta[DRIFTING] - prior.drifting
     pull[: len(DRIFTING)] += prior.precision @ off
@@ -221,7 +226,7 @@ def answer_at(
     )
 
 
-def _of_sought(whole: Curvature, precision: F64) -> F64:
+def _of_fitted(whole: Curvature, precision: F64) -> F64:
     """Information on the fitted parameters, prior included."""
     information: F64 = whole.information[np.ix_(FITTED, FITTED)] + np.pad(precision, (0, 2))
     return information
@@ -233,7 +238,7 @@ def raw_moves(whittle: Whittle, point: Point) -> tuple[F64, F64]:
     """
     n = len(point.theta)
     whole = whittle.curvature(point, [*range(len(PARAMETERS)), n, n + 1])
-    covariance = np.asarray(np.linalg.inv(_of_sought(whole, drift_precision())), float)
+    covariance = np.asarray(np.linalg.inv(_of_fitted(whole, drift_precision())), float)
     moves = np.zeros((2, len(PARAMETERS)))
     moves[:, STEADY] = -(covariance @ whole.information[np.ix_(FITTED, STEADY)])[-2:]
     return covariance[-2:, -2:], moves
@@ -253,7 +258,7 @@ def _shaped(
 
     def weighed_as(log_s: float, start: F64) -> Node:
         of_shape = _with_gyration(calibration, log_s)
-        found = _sought(whittle, start, peak.packing, of_shape, cg_left_m, OF_SHAPES)
+        found = _search(whittle, start, peak.packing, of_shape, cg_left_m, OF_SHAPES)
         point = _point(found.near, of_shape, cg_left_m)
         at = answer_at(whittle, point, of_shape, peak.packing, evidence, is_shape_known=False)
         ended = Waypoint(log_s, found.x, -at.covariance @ at.whole.information[FITTED, _GYRATION])
@@ -379,16 +384,16 @@ def _best(spectra: CrossSpectra, calibration: CrossSpectrumCalibration, precisio
         starts = [np.r_[packing.drifting, load] for load in _starting_loads(calibration)]
         costs = whittle.costs([_point(x, calibration, 0.0) for x in starts])
         tried = [starts[i] for i in np.argsort(costs, kind="stable")[:n].tolist()]
-        peaks += [_Peak(_sought(whittle, one, packing, calibration, 0.0, COARSE), packing) for one in tried]
+        peaks += [_Peak(_search(whittle, one, packing, calibration, 0.0, COARSE), packing) for one in tried]
     best = min(peaks, key=_rank)
     freed = None
     if strain_of(best.found.x[:-2] - best.packing.drifting) > LEAST_STRAIN:
         packing = worn(best.packing)
-        peaks.append(_Peak(_sought(whittle, best.found.x, packing, calibration, 0.0, COARSE), packing))
+        peaks.append(_Peak(_search(whittle, best.found.x, packing, calibration, 0.0, COARSE), packing))
         freed = peaks[-1].found.x[:-2]
         best = min(peaks, key=_rank)
     whittle = Whittle(_moving(spectra, best.found.x, calibration), calibration.ground)
-    found = _sought(whittle, best.found.x, best.packing, calibration, 0.0)
+    found = _search(whittle, best.found.x, best.packing, calibration, 0.0)
     return whittle, _Peak(found, best.packing, _rivalry(found, peaks), freed)
 
 
@@ -409,7 +414,7 @@ def _rivalry(found: Found, peaks: Sequence[_Peak]) -> F64:
     return spread
 
 
-def _sought(
+def _search(
     whittle: Whittle,
     start: F64,
     packing: Packing,

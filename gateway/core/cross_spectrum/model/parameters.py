@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar
-from gateway.core.cross_spectrum.model.mount import Mount
+from gateway.core.cross_spectrum.model.reading import Mount
 from gateway.core.cross_spectrum.model.rolling_car import Against, RollingCar
 from gateway.core.memoized import memoized
 from gateway.core.vehicle import Vehicle
