@@ -1,8 +1,8 @@
 """Roll parameters, fitted beside heave and pitch without affecting them.
 
 The half-car is fitted to what the sensors would measure on the centre line (core.cross_spectrum.model.reading); for
-that their position must be known. Roll is fitted to all three sensors with the half-car as found. Each needs the other, so
-they alternate (most_probable_vehicle).
+that their position must be known. Roll is fitted to all three sensors with the half-car as found. Each needs the other,
+so they alternate (most_probable_vehicle).
 
 A model of roll is cruder than one of heave: tyres slip sideways, axles turn about points that nobody measured. Fitted
 together, its errors would bend dampers and tyres of the half-car by several standard deviations (measured:
