@@ -16,8 +16,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from gateway.archive.dataset import OVER_LIMIT, OWN_STD, PROVENANCE, columns
 from gateway.archive.manifest import ManifestFile, VehicleEntry
 from gateway.bus.signals import SignalMapFile, shipped_map
-from gateway.bus.signals.resolve import QUANTITIES
-from gateway.bus.signals.signal_map import SignalEntry, shipped_maps
+from gateway.bus.signals.signal_map import QUANTITIES, SignalEntry, shipped_maps
 from gateway.calibration.axle_weights import (
     DIVISION_KG,
     ESTIMATED_UNSPRUNG_STD,

@@ -8,11 +8,10 @@ from typing import Any, Final
 import numpy as np
 from isal import igzip
 
-from gateway.bus.frames import join, merge_frames
+from gateway.bus.frames import join, merge_frames, message_of
 from gateway.bus.logs import open_whole_log
 from gateway.bus.logs.candump_write import append_candump
 from gateway.bus.logs.packed import zstd
-from gateway.bus.messages import message_of
 from gateway.bus.signals import shipped_map
 from gateway.records import EXTENDED_ID, Frames
 

@@ -34,7 +34,6 @@ WEIGHING: Final = (
     "archive/drives.py",
     "bus/frames.py",
     "bus/logs",
-    "bus/messages.py",
     "bus/signals",
     "core",
     "estimate.py",

@@ -98,7 +98,7 @@ class Broadcaster:
         every_s: float,
         weighed_now: Callable[[], Estimate | None],
     ) -> None:
-        self._fault: str | None = None
+        self.fault: str | None = None
         self.n_sent = 0  # frames
         self._place = (interface, channel, options)
         self._frames = WeightFrames(sender)
@@ -115,11 +115,6 @@ class Broadcaster:
         """Stop sending; a blocked bus may keep the thread a little longer."""
         self._stopping.set()
         self._thread.join(within_s)
-
-    @property
-    def fault(self) -> str | None:
-        """Why nothing is sent, for people."""
-        return self._fault
 
     def is_alive(self) -> bool:
         """True while the thread runs."""
@@ -145,8 +140,8 @@ class Broadcaster:
 
     def _note(self, fault: str | None) -> None:
         """Log a fault, and its end, once."""
-        if fault != self._fault:
+        if fault != self.fault:
             level = logging.INFO if fault is None else logging.WARNING
             event = Event.BROADCASTING if fault is None else Event.NOT_BROADCASTING
             log_event(event, level=level, interface=self._place[0], channel=self._place[1], fault=fault)
-        self._fault = fault
+        self.fault = fault

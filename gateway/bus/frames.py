@@ -1,11 +1,13 @@
-"""Columns of frames: splitting and joining."""
+"""Columns of frames: splitting, joining, and conversion from and to python-can messages."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
+import can
 import numpy as np
 
-from gateway.records import I64, Bool, Frames
+from gateway.records import EXTENDED_ID, I64, Bool, Frames
+from gateway.units import NS_PER_S
 
 LAST_SECOND: Final = 9_223_372_035  # int64 nanoseconds reach no further
 
@@ -58,11 +60,63 @@ def in_order(places: Sequence[I64], parts: Sequence[Frames], width: int) -> Fram
 def merge_frames(parts: Sequence[Frames]) -> Frames:
     """Joined in order of time; of equal stamps, the earlier part comes first. Payload widths may differ."""
     width = max((part.payload.shape[1] for part in parts), default=8)
-    return in_order([part.t_ns for part in parts], [_widened(part, width) for part in parts], width)
+    return in_order([part.t_ns for part in parts], [widened(part, width) for part in parts], width)
 
 
-def _widened(frames: Frames, width: int) -> Frames:
+def widened(frames: Frames, width: int) -> Frames:
+    """The frames with payload rows of at least ``width`` bytes, filled up with zeros."""
     missing = width - frames.payload.shape[1]
-    if missing == 0:
+    if missing <= 0:
         return frames
     return Frames(frames.t_ns, frames.can_id, frames.length, np.pad(frames.payload, ((0, 0), (0, missing))))
+
+
+class ExactStamp(float):
+    """A python-can time stamp, seconds as a float, that remembers its nanoseconds.
+
+    A double resolves today's seconds to a quarter of a microsecond only; python-can's in-process bus passes the object
+    itself on, so a replay arrives with the stamps it was sent with.
+    """
+
+    t_ns: int
+
+    def __new__(cls, t_ns: int) -> "ExactStamp":
+        """The stamp of integer nanoseconds since 1970."""
+        stamp = super().__new__(cls, t_ns / NS_PER_S)
+        stamp.t_ns = t_ns
+        return stamp
+
+
+def stamp_to_ns(stamp: float) -> int:
+    """Nanoseconds of a python-can stamp, to the microsecond: the resolution of a double for today's date."""
+    return stamp.t_ns if isinstance(stamp, ExactStamp) else round(stamp * 1e6) * 1000
+
+
+def message_id(message: can.Message) -> int:
+    """Identifier with EXTENDED_ID for 29 bits."""
+    return message.arbitration_id | (EXTENDED_ID if message.is_extended_id else 0)
+
+
+def frames_of(messages: Sequence[can.Message], width: int) -> Frames:
+    """Data messages as columns, in the order given. Bytes beyond ``width`` are cut off; the length stays true."""
+    if not messages:
+        return empty_frames(width)
+    rows = b"".join(bytes(message.data[:width]).ljust(width, b"\0") for message in messages)
+    return Frames(
+        np.array([stamp_to_ns(message.timestamp) for message in messages], np.int64),
+        np.array([message_id(message) for message in messages], np.uint32),
+        np.array([len(message.data) for message in messages], np.uint8),
+        np.frombuffer(rows, np.uint8).reshape(-1, width),
+    )
+
+
+def message_of(frames: Frames, row: int) -> can.Message:
+    """One row as a message with an exact stamp; CAN FD if it is longer than 8 bytes."""
+    can_id, length = int(frames.can_id[row]), int(frames.length[row])
+    return can.Message(
+        timestamp=ExactStamp(int(frames.t_ns[row])),
+        arbitration_id=can_id & ~EXTENDED_ID,
+        is_extended_id=bool(can_id & EXTENDED_ID),
+        is_fd=length > 8,
+        data=frames.payload[row, :length].tobytes(),
+    )

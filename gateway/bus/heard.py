@@ -90,12 +90,11 @@ MOST_SIMILAR: Final = 3
 
 def similar_to(message: MappedMessage, signal_map: SignalMap, heard: Sequence[Heard]) -> tuple[str, ...]:
     """Descriptions of unmapped identifiers that resemble ``message``, the most similar first."""
-    return tuple(_told(one) for one in _similar(message, signal_map, heard))
-
-
-def _told(one: Heard) -> str:
-    on = f" on {one.channel}" if one.channel else ""
-    return f"{one.name}{on}, {one.rate_hz:.0f} times a second, {one.lengths[0]} bytes"
+    return tuple(
+        f"{one.name}{f' on {one.channel}' if one.channel else ''}, {one.rate_hz:.0f} times a second, "
+        f"{one.lengths[0]} bytes"
+        for one in _similar(message, signal_map, heard)
+    )
 
 
 def _similar(message: MappedMessage, signal_map: SignalMap, heard: Sequence[Heard]) -> Iterator[Heard]:

@@ -11,11 +11,10 @@ from typing import Any, Final, Literal
 
 import can
 
-from gateway.bus.frames import take
+from gateway.bus.frames import message_of, take
 from gateway.bus.live import require_usable_interface
 from gateway.bus.live.source import system_reason
 from gateway.bus.logs import LogReport, open_whole_log
-from gateway.bus.messages import message_of
 from gateway.errors import BusError
 from gateway.records import Frames
 from gateway.units import NS_PER_S

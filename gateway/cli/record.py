@@ -11,7 +11,7 @@ from typing import Any, Final
 import click
 
 from gateway.bus.live import LiveSource
-from gateway.bus.ring.to_file import record_to_file
+from gateway.bus.ring.ring_log import record_to_file
 from gateway.bus.signals import load_signal_map
 from gateway.cli import options
 from gateway.cli.options import FILE, NumberRange, as_json

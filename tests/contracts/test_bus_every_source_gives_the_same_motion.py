@@ -17,12 +17,11 @@ from support.databases import SomeMessage, SomeSignal, dbc
 from support.encoded import encode_signals
 from support.patience import PATIENCE_S
 
-from gateway.bus.frames import join, merge_frames
+from gateway.bus.frames import join, merge_frames, message_of
 from gateway.bus.live import LiveSource
 from gateway.bus.logs import mf4, write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.logs.packed import zstd
-from gateway.bus.messages import message_of
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.bus.sink import BusSink, replay
 from gateway.errors import LogUnreadableError

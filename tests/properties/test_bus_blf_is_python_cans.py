@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.blf import CLASSIC, CLASSIC2, ERROR_EXT, FD, FD64, TEXT, blf_object, classic, fd, fd64, write_blf
 
-from gateway.bus.frames import join
+from gateway.bus.frames import frames_of, join
 from gateway.bus.logs import open_whole_log
-from gateway.bus.messages import frames_of
 
 SIGNATURE = b"LOBJ"  # what begins an object may also stand in a payload
 identifiers = st.one_of(st.integers(0, 0x7FF), st.integers(0, 0x1FFF_FFFF).map(lambda number: number | 0x8000_0000))

@@ -13,7 +13,7 @@ from gateway.bus.frames import join
 from gateway.bus.logs import LogReport, write_candump
 from gateway.bus.logs.candump import read_candump
 from gateway.bus.logs.candump_line import LineFrame, read_line
-from gateway.bus.logs.open import EVERY_FRAME
+from gateway.bus.signals import EVERY_IDENTIFIER
 from gateway.bus.signals.mapping import exact_filter
 from gateway.records import EXTENDED_ID, Frames
 
@@ -36,7 +36,7 @@ def table(rows) -> Frames:
 
 def read(path, block_bytes=1 << 16):
     report = LogReport(path)
-    chunks = read_candump(path, EVERY_FRAME, width=64, report=report, block_bytes=block_bytes)
+    chunks = read_candump(path, EVERY_IDENTIFIER, width=64, report=report, block_bytes=block_bytes)
     return join(list(chunks), 64), report
 
 

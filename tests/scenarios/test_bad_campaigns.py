@@ -11,8 +11,8 @@ import can
 import pytest
 from click.testing import CliRunner, Result
 
+from gateway.bus.frames import message_of
 from gateway.bus.logs import open_whole_log
-from gateway.bus.messages import message_of
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file import load_calibration
 from gateway.cli import springscale

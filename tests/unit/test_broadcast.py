@@ -20,7 +20,7 @@ from support.patience import wait_until
 import gateway
 from gateway.bus import broadcast as broadcaster_module
 from gateway.bus.broadcast import Broadcaster, Sender, WeightFrames
-from gateway.bus.messages import message_of
+from gateway.bus.frames import message_of
 from gateway.bus.sink import BusSink
 from gateway.cli import springscale
 from gateway.errors import ConfigurationError

@@ -8,7 +8,7 @@ import pytest
 
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.bus.signals.bit_field import BitField, Coding
-from gateway.bus.signals.samples import Rejected, is_j1939_code
+from gateway.bus.signals.decode import Rejected, is_j1939_code
 from gateway.records import EXTENDED_ID, Frames, Signal
 
 G = 9.80665

@@ -131,7 +131,7 @@ def test_a_fault_while_receiving_is_told_and_the_channel_opened_again(fault, lis
     assert source.counts().frames == 2
     assert source.state is SourceState.RECEIVING
     assert source.failure is None
-    assert told in source._told(error)
+    assert told in source_module.system_reason(error, source._channel)
 
 
 def test_a_channel_that_is_not_there_yet_is_waited_for(listen):

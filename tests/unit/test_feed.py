@@ -19,7 +19,7 @@ from support.patience import PATIENCE_S, wait_until
 
 from gateway.bus.feed import AXES, Feeder, Gpsd, IioDevice, find_devices, turned
 from gateway.bus.feed.feeder import Numbering
-from gateway.bus.messages import frames_of
+from gateway.bus.frames import frames_of
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.cli import springscale
 from gateway.cli.feed import SILENT_S

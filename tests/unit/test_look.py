@@ -11,9 +11,8 @@ from click.testing import CliRunner
 from support.bus_drive import bus_drive
 from support.encoded import encode_signals
 
-from gateway.bus.frames import merge_frames
+from gateway.bus.frames import merge_frames, message_of
 from gateway.bus.logs import write_candump
-from gateway.bus.messages import message_of
 from gateway.bus.signals import load_signal_map
 from gateway.cli import springscale
 from gateway.errors import ConfigurationError

@@ -10,7 +10,7 @@ from support.patience import wait_until
 
 from gateway.bus.live import LiveSource
 from gateway.bus.logs.open import open_log
-from gateway.bus.ring.to_file import record_to_file
+from gateway.bus.ring.ring_log import record_to_file
 from gateway.bus.signals import load_signal_map
 from gateway.bus.sink import BusSink
 from gateway.cli import springscale
@@ -21,7 +21,7 @@ DRIVE = white_noise(20.0, START_NS, seed=1)
 
 
 def test_every_mapped_frame_is_in_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.bus.ring.to_file.BLOCK_FRAMES", 1000)
+    monkeypatch.setattr("gateway.bus.ring.ring_log.FILE_BLOCK_FRAMES", 1000)
     source, stop = LiveSource("virtual", tmp_path.name, SIGNAL_MAP, silence_s=0.05), threading.Event()
 
     def play() -> None:

@@ -18,7 +18,7 @@ from gateway.bus.frames import take
 from gateway.bus.logs import open_whole_log
 from gateway.bus.logs.open import open_log
 from gateway.bus.ring import RingLimits, RingLog
-from gateway.bus.ring.block import packed_block
+from gateway.bus.ring.segment import packed_block
 from gateway.bus.signals import load_signal_map
 from gateway.log import Event
 from gateway.records import Frames

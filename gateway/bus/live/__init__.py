@@ -5,8 +5,8 @@ loss counted. After a bus error the thread waits and opens the bus again; it nev
 """
 
 from gateway.bus.live.bus_survey import BusSurvey, bus_survey_of
-from gateway.bus.live.inbox import Inbox
 from gateway.bus.live.python_can import require_usable_interface, usable_interfaces, what_lacks
+from gateway.bus.live.receiver import Inbox
 from gateway.bus.live.source import LiveSource, OpenReceiver, SourceState
 
 __all__ = [

@@ -13,18 +13,14 @@ from typing import Any, Final
 import can
 
 from gateway.bus.heard import Heard, counted, heard_on
-from gateway.bus.live.python_can import open_python_can
-from gateway.bus.live.socketcan import open_socketcan
-from gateway.bus.live.source import OpenReceiver
-from gateway.bus.signals import CAN_FD_BYTES, IdFilter
+from gateway.bus.live.source import OpenReceiver, opener_of
+from gateway.bus.signals import CAN_FD_BYTES, EVERY_IDENTIFIER
 from gateway.errors import BusError
-from gateway.records import EXTENDED_ID
 
 LOOK_S: Final = 2.0
 EVERY_S: Final = 60.0
 POLL_S: Final = 0.1
 STOP_WITHIN_S: Final = 1.0
-EVERY_IDENTIFIER: Final = (IdFilter(0, EXTENDED_ID), IdFilter(EXTENDED_ID, EXTENDED_ID))
 
 
 class BusSurvey:
@@ -77,8 +73,5 @@ class BusSurvey:
 
 def bus_survey_of(interface: str, channel: str, options: Mapping[str, Any]) -> BusSurvey:
     """A survey for channels that several programs may open: SocketCAN and the in-process bus."""
-    if interface == "socketcan":
-        return BusSurvey(lambda: open_socketcan(channel, EVERY_IDENTIFIER, CAN_FD_BYTES))
-    if interface == "virtual":
-        return BusSurvey(lambda: open_python_can(interface, channel, EVERY_IDENTIFIER, CAN_FD_BYTES, options))
-    return BusSurvey(None)
+    is_shared = interface in ("socketcan", "virtual")
+    return BusSurvey(opener_of(interface, channel, EVERY_IDENTIFIER, CAN_FD_BYTES, options) if is_shared else None)

@@ -9,9 +9,8 @@ from typing import Any, Final
 
 import can
 
-from gateway.bus.frames import LAST_SECOND
+from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of
 from gateway.bus.live.receiver import Burst
-from gateway.bus.messages import ExactStamp, frames_of
 from gateway.bus.signals import IdFilter
 from gateway.errors import BusError
 from gateway.records import EXTENDED_ID
@@ -122,21 +121,13 @@ def require_usable_interface(interface: str) -> None:
         raise BusError(lacking)
 
 
-def _require_known_interface(interface: str) -> None:
-    """Raise BusError, with the names of the known ones, for an interface python-can does not know."""
-    if interface not in can.VALID_INTERFACES:
-        raise BusError(f"[bus] interface {interface!r} is unknown; known are {', '.join(sorted(can.VALID_INTERFACES))}")
-
-
 def what_lacks(interface: str) -> str | None:
     """Why this interface cannot be used on this computer, and how to mend it; None if nothing is known to be missing.
 
     Drivers of adapters are not checked: only opening the channel would show that.
     """
-    try:
-        _require_known_interface(interface)
-    except BusError as fault:
-        return str(fault)
+    if interface not in can.VALID_INTERFACES:
+        return f"[bus] interface {interface!r} is unknown; known are {', '.join(sorted(can.VALID_INTERFACES))}"
     module, package = _PACKAGES.get(interface, ("can", "python-can"))
     if interface in _WINDOWS_ONLY and sys.platform != "win32":
         return f"[bus] interface {interface!r} exists on Windows only; choose another"

@@ -1,9 +1,12 @@
-"""The interface of all receivers: bursts of frames and counts of everything else."""
+"""The interface of all receivers, and the bounded queue between the receive thread and the pipeline."""
 
+import threading
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
+from gateway.bus.frames import join, take
 from gateway.records import Frames
 
 # SocketCAN's error classes (linux/can/error.h)
@@ -53,3 +56,61 @@ class Receiver(Protocol):
 def error_class_names(error_id: int) -> list[str]:
     """The classes an error frame's identifier states."""
     return [name for bit, name in _ERROR_CLASSES.items() if error_id & bit] or ["unspecified"]
+
+
+class Inbox:
+    """Frames in order of arrival; one thread puts, one drains.
+
+    When it is full, new frames are dropped and counted. With ``waits_for_room`` the putting thread waits instead: right
+    for an in-process bus, whose sender can wait, wrong for a real one.
+    """
+
+    def __init__(self, capacity_frames: int, width: int, *, waits_for_room: bool = False) -> None:
+        self._capacity = capacity_frames
+        self._width = width
+        self._waits_for_room = waits_for_room
+        self._bursts: list[Frames] = []
+        self._n_waiting = 0
+        self._n_dropped = 0
+        self._is_closed = False
+        self._changed = threading.Condition()
+
+    @property
+    def dropped(self) -> int:
+        """Frames lost because the pipeline did not keep up."""
+        return self._n_dropped
+
+    def __len__(self) -> int:
+        return self._n_waiting
+
+    def put(self, frames: Frames) -> None:
+        """Add a burst; frames without room are dropped and counted."""
+        with self._changed:
+            if self._waits_for_room:
+                self._changed.wait_for(lambda: self._n_waiting < self._capacity or self._is_closed)
+            elif len(frames) > self._capacity - self._n_waiting:
+                room = self._capacity - self._n_waiting
+                self._n_dropped += len(frames) - room
+                frames = take(frames, slice(room))
+            if len(frames):
+                self._bursts.append(frames)
+                self._n_waiting += len(frames)
+                self._changed.notify_all()
+
+    def drain(self, timeout_s: float) -> Frames | None:
+        """All waiting frames at once; None if there are none within ``timeout_s``."""
+        deadline = time.monotonic() + timeout_s
+        with self._changed:
+            while not self._bursts and not self._is_closed:
+                left_s = deadline - time.monotonic()
+                if left_s <= 0 or not self._changed.wait(left_s):
+                    break
+            bursts, self._bursts, self._n_waiting = self._bursts, [], 0
+            self._changed.notify_all()
+        return join(bursts, self._width) if bursts else None
+
+    def close(self) -> None:
+        """Close for new frames and wake the waiting thread. The frames inside can still be drained."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()

@@ -9,7 +9,7 @@ import logging
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from enum import StrEnum
@@ -17,11 +17,10 @@ from typing import Any, Final
 
 import can
 
-from gateway.bus.live.inbox import Inbox
 from gateway.bus.live.python_can import open_python_can, require_usable_interface
-from gateway.bus.live.receiver import BUS_OFF, Burst, Receiver
+from gateway.bus.live.receiver import BUS_OFF, Burst, Inbox, Receiver
 from gateway.bus.live.socketcan import open_socketcan, packets_received
-from gateway.bus.signals import SignalMap
+from gateway.bus.signals import IdFilter, SignalMap
 from gateway.log import Event, log_event
 
 POLL_S: Final = 0.3  # longest wait inside a receiver: how soon a stop is heeded
@@ -98,14 +97,9 @@ class LiveSource:
         self._interface, self._channel = interface, channel
         self._silence_s = silence_s
         width = signal_map.payload_width
-        is_socketcan = interface == "socketcan"
-        self._open: OpenReceiver = open_receiver or (
-            (lambda: open_socketcan(channel, signal_map.filters, width))
-            if is_socketcan
-            else (lambda: open_python_can(interface, channel, signal_map.filters, width, options or {}))
-        )
+        self._open = open_receiver or opener_of(interface, channel, signal_map.filters, width, options or {})
         self.inbox = Inbox(inbox_frames, width, waits_for_room=interface == "virtual")
-        self._packets_received = packets_received if is_socketcan else _none_told
+        self._packets_received = packets_received if interface == "socketcan" else lambda channel: 0
         self._tally: Counter[str] = Counter()
         self._error_classes: Counter[str] = Counter()
         self._dropped_before = 0  # by receivers already closed
@@ -182,7 +176,7 @@ class LiveSource:
                     self._listen(receiver)
                 return
             except (OSError, can.CanError) as fault:
-                self._enter(SourceState.READER_FAULT, self._told(fault))
+                self._enter(SourceState.READER_FAULT, system_reason(fault, self._channel))
             self._has_tried.set()
             self._tally["reconnects"] += 1
             pause_s = FIRST_PAUSE_S if self._tally["frames"] > n_before else min(2.0 * pause_s, LONGEST_PAUSE_S)
@@ -239,8 +233,14 @@ class LiveSource:
             return f"the bus is awake ({n_seen - self._seen_at_silence} frames), none has a mapped identifier"
         return f"no frame for {self._silence_s:g} s"
 
-    def _told(self, fault: Exception) -> str:
-        return system_reason(fault, self._channel)
+
+def opener_of(
+    interface: str, channel: str, filters: Sequence[IdFilter], width: int, options: Mapping[str, Any]
+) -> OpenReceiver:
+    """Opens the channel with these filters, on SocketCAN or through python-can."""
+    if interface == "socketcan":
+        return lambda: open_socketcan(channel, filters, width)
+    return lambda: open_python_can(interface, channel, filters, width, options)
 
 
 def system_reason(fault: Exception, channel: str) -> str:
@@ -248,7 +248,3 @@ def system_reason(fault: Exception, channel: str) -> str:
     number = fault.errno if isinstance(fault, OSError) else getattr(fault, "error_code", None)
     reason = _SYSTEM_REASONS.get(number or 0, str(fault) or type(fault).__name__)
     return reason.format(channel=channel)
-
-
-def _none_told(channel: str) -> int:
-    return 0

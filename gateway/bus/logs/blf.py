@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from gateway.bus.frames import LAST_SECOND, empty_frames, gathered, in_order
 from gateway.bus.logs.packed import open_log_file
-from gateway.bus.logs.report import LogReject, LogReport
-from gateway.bus.logs.selection import Selection
+from gateway.bus.logs.report import LogReject, LogReport, Selection
 from gateway.errors import LogUnreadableError
 from gateway.records import I64, U8, Bool, Frames
 from gateway.units import NS_PER_S

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.bus.frames import gathered, in_order, take
-from gateway.bus.logs.candump_line import LineFrame, NotData, read_line
-from gateway.bus.logs.candump_shape import LineShape, learn_shape
-from gateway.bus.logs.line_blocks import BLOCK_BYTES, LineBlock, line_blocks
-from gateway.bus.logs.report import LogReject, LogReport
+from gateway.bus.logs.candump_line import LineFrame, LineShape, NotData, learn_shape, read_line
+from gateway.bus.logs.packed import BLOCK_BYTES, LineBlock, line_blocks
+from gateway.bus.logs.report import LogReject, LogReport, passing
 from gateway.bus.signals import CLASSIC_BYTES, IdFilter
 from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 
@@ -129,7 +128,9 @@ class _CandumpReader:
             if len(hits) == n_before:
                 self._read_exactly(block, int(hits[0]), line, places, parts)
                 hits = hits[1:]
-        return self._passing(in_order(places, parts, self._width))
+        frames = in_order(places, parts, self._width)
+        is_wanted = passing(self._filters, frames.can_id)  # others have the text of a wanted one
+        return frames if is_wanted.all() else take(frames, is_wanted)
 
     def _read_shape(self, block: LineBlock, hits: I64, shape: LineShape, places: list[I64], parts: list[Frames]) -> I64:
         """Take the lines of one shape; those that remain are returned."""
@@ -144,9 +145,11 @@ class _CandumpReader:
     def _read_exactly(self, block: LineBlock, hit: int, line: bytes, places: list[I64], parts: list[Frames]) -> None:
         content = read_line(line)
         if isinstance(content, LogReject):
-            self._report.reject(
-                content, self._line_number(block, hit) if self._report.keeps_lines_of(content) else None
-            )
+            line_number = None
+            if self._report.keeps_lines_of(content):
+                n_before = int(np.count_nonzero(block.text[block.start : hit] == ord("\n")))
+                line_number = self._report.lines + n_before + 1
+            self._report.reject(content, line_number)
         elif content is NotData.REMOTE_FRAME:
             self._report.remote_frames += 1
         elif isinstance(content, LineFrame) and self._is_ours(content.channel, 1):
@@ -161,16 +164,6 @@ class _CandumpReader:
             return True
         self._report.other_channel += n_frames
         return False
-
-    def _passing(self, frames: Frames) -> Frames:
-        """Without the frames that only looked wanted."""
-        passes = np.zeros(len(frames), np.bool_)
-        for id_filter in self._filters:
-            passes |= id_filter.matches(frames.can_id)
-        return frames if passes.all() else take(frames, passes)
-
-    def _line_number(self, block: LineBlock, at: int) -> int:
-        return self._report.lines + int(np.count_nonzero(block.text[block.start : at] == ord("\n"))) + 1
 
     def _report_frameless(self, block: LineBlock, hashes: I64) -> None:
         """Count the non-empty lines without ``#``."""

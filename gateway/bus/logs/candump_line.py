@@ -1,13 +1,17 @@
-"""One line of a candump log, read exactly: the slow path for wanted lines of unusual shape."""
+"""Lines of a candump log: those of a common shape read all at once, the others exactly, one by one."""
 
 import re
 from dataclasses import dataclass
 from enum import Enum, auto
+from functools import cached_property
 from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gateway.bus.frames import LAST_SECOND
 from gateway.bus.logs.report import LogReject
-from gateway.records import EXTENDED_ID
+from gateway.records import EXTENDED_ID, F64, I64, U8, U32, Bool, Frames
 from gateway.units import NS_PER_S
 
 _TIME = re.compile(rb"\((\d{1,15})\.(\d{1,9})\)\s")
@@ -49,9 +53,10 @@ def read_line(line: bytes) -> LineFrame | NotData | LogReject:
     match = _LINE.fullmatch(line)
     if match is None:
         return _why_not(line)
-    t_ns = stamp_ns(match["seconds"], match["fraction"])
-    if t_ns is None:
+    seconds = int(match["seconds"])
+    if seconds > LAST_SECOND:
         return LogReject.BAD_TIME
+    t_ns = seconds * NS_PER_S + int(match["fraction"].ljust(9, b"0"))
     can_id = _identifier(match["id"])
     if not isinstance(can_id, int):
         return can_id
@@ -59,12 +64,6 @@ def read_line(line: bytes) -> LineFrame | NotData | LogReject:
         return NotData.REMOTE_FRAME
     payload = _payload(match["payload"], is_fd=match["fd"] is not None)
     return LineFrame(t_ns, match["channel"], can_id, payload) if isinstance(payload, bytes) else payload
-
-
-def stamp_ns(seconds: bytes, fraction: bytes) -> int | None:
-    """Digits before and after the point as integer nanoseconds, exactly; None beyond LAST_SECOND."""
-    whole = int(seconds)
-    return None if whole > LAST_SECOND else whole * NS_PER_S + int(fraction.ljust(9, b"0"))
 
 
 def _identifier(digits: bytes) -> int | NotData | LogReject:
@@ -93,3 +92,113 @@ def _why_not(line: bytes) -> LogReject:
     if b"#" not in line:
         return LogReject.NO_FRAME
     return LogReject.GARBLED if _TIME.match(line) else LogReject.BAD_TIME
+
+
+_SHAPE = re.compile(
+    rb"\((\d{1,15})\.(\d{1,9})\) ([!-~]{1,32}) ([0-9A-Fa-f]{8}|[0-9A-Fa-f]{3})(#|##[0-9A-Fa-f])"
+    rb"((?:[0-9A-Fa-f]{2})*)((?: [RT])?\r?\n)"
+)
+_NOT_HEX: Final = 0xFF
+_NIBBLES: Final = np.full(256, _NOT_HEX, np.uint8)
+for _digit in b"0123456789abcdefABCDEF":
+    _NIBBLES[_digit] = int(chr(_digit), 16)
+
+
+@dataclass(frozen=True)
+class LineShape:
+    """The widths of a line's parts and the bytes that never change within the shape."""
+
+    n_seconds: int
+    n_fraction: int
+    channel: bytes
+    n_id: int
+    is_fd: bool
+    n_payload: int
+    tail: bytes
+
+    @cached_property
+    def hash_at(self) -> int:
+        """Column of the first ``#``; column 0 is the newline before the line."""
+        return 1 + 1 + self.n_seconds + 1 + self.n_fraction + 2 + len(self.channel) + 1 + self.n_id
+
+    @cached_property
+    def template(self) -> U8:
+        """The whole line with NULs in place of digits."""
+        time = b"\0" * self.n_seconds + b"." + b"\0" * self.n_fraction
+        mark = b"##\0" if self.is_fd else b"#"
+        head = b"\n(" + time + b") " + self.channel + b" " + b"\0" * self.n_id + mark
+        return np.frombuffer(head + b"\0" * (2 * self.n_payload) + self.tail, np.uint8)
+
+    @cached_property
+    def literals(self) -> NDArray[np.intp]:
+        """Columns whose byte never changes."""
+        return np.flatnonzero(self.template)
+
+    @cached_property
+    def stamp_weights(self) -> tuple[F64, F64]:
+        """The weight of each digit of the seconds and of the fraction, in s and ns. Both sums are exact in a double."""
+        return _powers_of_ten(self.n_seconds - 1, self.n_seconds), _powers_of_ten(8, self.n_fraction)
+
+    def read(self, text: U8, hashes: I64, width: int) -> tuple[Bool, Frames]:
+        """Which of the lines around ``hashes`` (n,) have this shape, and the frames of those that do.
+
+        Payload beyond ``width`` bytes is cut off; the length is that of the line.
+        """
+        n_columns = len(self.template)
+        starts = np.ndarray(len(text) - n_columns + 1, f"V{n_columns}", buffer=text, strides=(1,))
+        rows = starts[hashes - self.hash_at].view(np.uint8).reshape(-1, n_columns)
+        fits = (rows[:, self.literals] == self.template[self.literals]).all(axis=1)
+        rows = rows if fits.all() else rows[fits]
+        lines = np.ascontiguousarray(rows.T)  # one row a column of the line: every step below runs along one
+        t_ns, has_stamp = self._stamps(lines)
+        can_id, has_id = self._identifiers(lines)
+        payload, has_payload = self._payloads(lines, width)
+        sound = has_stamp & has_id & has_payload
+        fits[fits] = sound
+        length = np.full(int(np.count_nonzero(sound)), self.n_payload, np.uint8)
+        if sound.all():
+            return fits, Frames(t_ns, can_id, length, payload)
+        return fits, Frames(t_ns[sound], can_id[sound], length, payload[sound])
+
+    def _stamps(self, lines: U8) -> tuple[I64, Bool]:
+        dot = 2 + self.n_seconds
+        digits = np.concatenate((lines[2:dot], lines[dot + 1 : dot + 1 + self.n_fraction])) - np.uint8(ord("0"))
+        seconds_weights, fraction_weights = self.stamp_weights
+        seconds = seconds_weights @ digits[: self.n_seconds].astype(np.float64)
+        fraction_ns = fraction_weights @ digits[self.n_seconds :].astype(np.float64)
+        t_ns = seconds.astype(np.int64) * NS_PER_S + fraction_ns.astype(np.int64)
+        return t_ns, (np.maximum.reduce(digits) <= 9) & (seconds <= LAST_SECOND)
+
+    def _identifiers(self, lines: U8) -> tuple[U32, Bool]:
+        nibbles = _NIBBLES.take(lines[self.hash_at - self.n_id : self.hash_at])
+        can_id = np.zeros(lines.shape[1], np.uint32)
+        for row in nibbles:
+            can_id = (can_id << np.uint32(4)) | row
+        last = np.uint32(0x1FFF_FFFF if self.n_id == 8 else 0x7FF)
+        is_sound = (np.maximum.reduce(nibbles) != _NOT_HEX) & (can_id <= last)
+        return can_id | np.uint32(EXTENDED_ID if self.n_id == 8 else 0), is_sound
+
+    def _payloads(self, lines: U8, width: int) -> tuple[U8, Bool]:
+        first = self.hash_at + (3 if self.is_fd else 1)
+        nibbles = _NIBBLES.take(lines[first : first + 2 * self.n_payload])
+        payload = np.zeros((lines.shape[1], width), np.uint8)
+        kept = min(self.n_payload, width)
+        payload[:, :kept] = ((nibbles[0::2] << np.uint8(4)) | nibbles[1::2])[:kept].T
+        is_sound: Bool = np.maximum.reduce(nibbles, initial=0) != _NOT_HEX
+        return payload, is_sound
+
+
+def _powers_of_ten(highest: int, n: int) -> F64:
+    return np.array([10.0 ** (highest - i) for i in range(n)])
+
+
+def learn_shape(line: bytes) -> LineShape | None:
+    """The shape of a sound line (its newline included), or None if it needs the exact path."""
+    match = _SHAPE.fullmatch(line)
+    if match is None:
+        return None
+    seconds, fraction, channel, identifier, mark, payload, tail = match.groups()
+    is_fd = len(mark) > 1
+    if len(payload) > (128 if is_fd else 16):
+        return None
+    return LineShape(len(seconds), len(fraction), channel, len(identifier), is_fd, len(payload) // 2, tail)

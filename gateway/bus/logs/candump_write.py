@@ -7,7 +7,8 @@ import numpy as np
 from isal import igzip
 from numpy.typing import NDArray
 
-from gateway.records import EXTENDED_ID, I64, U8, U32, Frames
+from gateway.bus.frames import take
+from gateway.records import EXTENDED_ID, I64, U8, Frames
 from gateway.units import NS_PER_S
 
 BEST_COMPRESSION: Final = 3  # of isal's 0 to 3
@@ -31,17 +32,7 @@ def append_candump(frames: Frames, channel: str, file: BinaryIO) -> None:
     """Write frames to an open log."""
     digits = NANOSECOND_DIGITS if np.any(frames.t_ns % 1000) else MICROSECOND_DIGITS
     for begin in range(0, len(frames), CHUNK_FRAMES):
-        piece = slice(begin, begin + CHUNK_FRAMES)
-        file.write(
-            _lines(
-                frames.t_ns[piece],
-                frames.can_id[piece],
-                frames.length[piece],
-                frames.payload[piece],
-                channel.encode(),
-                digits,
-            )
-        )
+        file.write(_lines(take(frames, slice(begin, begin + CHUNK_FRAMES)), channel.encode(), digits))
 
 
 def _open(path: Path) -> BinaryIO:
@@ -50,11 +41,12 @@ def _open(path: Path) -> BinaryIO:
     return cast(BinaryIO, igzip.IGzipFile(path, "wb", compresslevel=BEST_COMPRESSION))  # type: ignore[no-untyped-call] # isal has no types
 
 
-def _lines(t_ns: I64, can_id: U32, length: U8, payload: U8, channel: bytes, digits: int) -> bytes:
+def _lines(frames: Frames, channel: bytes, digits: int) -> bytes:
     """The lines of some frames: a table of bytes as wide as the longest line, unused places left out at the end."""
-    n = len(t_ns)
+    n, t_ns, can_id, length, payload = len(frames), frames.t_ns, frames.can_id, frames.length, frames.payload
     is_extended = (can_id & EXTENDED_ID) != 0
-    identifier = _hex_digits(can_id & np.uint32(~EXTENDED_ID & 0xFFFF_FFFF), 8)
+    number = (can_id & np.uint32(~EXTENDED_ID & 0xFFFF_FFFF))[:, None]
+    identifier = _HEX[(number >> np.arange(28, -1, -4, dtype=np.uint32)) & np.uint32(0xF)]
     is_fd = length > 8
     widest = int(length.max(initial=0))
     nibbles = np.stack((payload[:, :widest] >> 4, payload[:, :widest] & 0xF), axis=2).reshape(n, 2 * widest)
@@ -88,9 +80,3 @@ def _literal(text: bytes, n: int) -> U8:
 def _decimal(numbers: I64, digits: int) -> U8:
     places = 10 ** np.arange(digits - 1, -1, -1, dtype=np.int64)
     return (numbers[:, None] // places % 10 + ord("0")).astype(np.uint8)
-
-
-def _hex_digits(numbers: U32, digits: int) -> U8:
-    shifts = np.arange(4 * digits - 4, -1, -4, dtype=np.uint32)
-    text: U8 = _HEX[(numbers[:, None] >> shifts) & np.uint32(0xF)]
-    return text

@@ -10,12 +10,9 @@ from typing import Final, TextIO, cast
 import can
 from can.io.generic import MessageReader
 
-from gateway.bus.frames import LAST_SECOND
+from gateway.bus.frames import LAST_SECOND, frames_of, message_id
 from gateway.bus.logs.packed import open_log_file, unpacked_path
-from gateway.bus.logs.report import LogReject, LogReport
-from gateway.bus.logs.selection import Selection, is_same_channel
-from gateway.bus.messages import frames_of, message_id
-from gateway.errors import LogUnreadableError
+from gateway.bus.logs.report import LogReject, LogReport, Selection, is_same_channel
 from gateway.records import Frames
 
 CHUNK_FRAMES: Final = 4096
@@ -121,13 +118,5 @@ def _text_messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.M
 
 def _messages(path: Path, report: LogReport) -> Iterator[can.Message]:
     """Messages of a database."""
-    try:
-        with unpacked_path(path) as unpacked, can.SqliteReader(unpacked) as reader:
-            yield from reader
-    except LogUnreadableError:
-        raise
-    except Exception as fault:  # noqa: BLE001 # SQLite and python-can each have errors of their own for a damaged file
-        told = str(fault) or type(fault).__name__
-        if report.frames == 0:
-            raise LogUnreadableError(f"{path}: cannot be read as .db: {told}") from None
-        report.ended_early = f"the file is damaged: {told}"
+    with report.until_damage(".db"), unpacked_path(path) as unpacked, can.SqliteReader(unpacked) as reader:
+        yield from reader

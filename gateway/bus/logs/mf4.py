@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from gateway.bus.frames import LAST_SECOND, join, take
 from gateway.bus.logs.packed import unpacked_path
-from gateway.bus.logs.report import LogReject
-from gateway.bus.logs.selection import Selection
+from gateway.bus.logs.report import LogReject, Selection
 from gateway.errors import LogUnreadableError, ReaderMissingError
 from gateway.records import EXTENDED_ID, I64, U8, U32, Bool, Frames
 from gateway.units import NS_PER_S
@@ -38,18 +37,10 @@ def read_mf4(path: Path, selection: Selection, width: int) -> Iterator[Frames]:
         open_mdf = _asammdf()
     except ImportError:
         raise ReaderMissingError(f'{path}: reading .mf4 needs asammdf: pip install "springscale[mdf]"') from None
-    try:
-        with unpacked_path(path) as unpacked, closing(open_mdf(unpacked)) as mdf:
-            for frames in _in_order_of_time(_groups(mdf, selection, width), width):
-                report.hand_on(frames.t_ns)
-                yield frames
-    except LogUnreadableError:
-        raise
-    except Exception as fault:  # noqa: BLE001 # asammdf raises whatever a damaged file makes struct, zlib or numpy raise
-        told = str(fault) or type(fault).__name__
-        if report.frames == 0:
-            raise LogUnreadableError(f"{path}: cannot be read as .mf4: {told}") from None
-        report.ended_early = f"the file is damaged: {told}"
+    with report.until_damage(".mf4"), unpacked_path(path) as unpacked, closing(open_mdf(unpacked)) as mdf:
+        for frames in _in_order_of_time(_groups(mdf, selection, width), width):
+            report.hand_on(frames.t_ns)
+            yield frames
 
 
 @cache

@@ -9,13 +9,11 @@ from gateway.bus.logs.candump import read_candump
 from gateway.bus.logs.message_log import MESSAGE_SUFFIXES, read_message_log
 from gateway.bus.logs.mf4 import read_mf4
 from gateway.bus.logs.packed import PACKED_SUFFIXES, unpacked_suffix
-from gateway.bus.logs.report import LogReport
-from gateway.bus.logs.selection import Selection
-from gateway.bus.signals import CAN_FD_BYTES, Decoder, IdFilter, SignalMap
+from gateway.bus.logs.report import LogReport, Selection
+from gateway.bus.signals import CAN_FD_BYTES, EVERY_IDENTIFIER, Decoder, IdFilter, SignalMap
 from gateway.errors import LogUnreadableError
-from gateway.records import EXTENDED_ID, Frames, Motion
+from gateway.records import Frames, Motion
 
-EVERY_FRAME: Final = (IdFilter(0, EXTENDED_ID), IdFilter(EXTENDED_ID, EXTENDED_ID))
 CANDUMP_SUFFIXES: Final = (".log", ".txt", ".candump", "")
 BULK_READERS: Final = {".blf": read_blf, ".mf4": read_mf4}
 UNMISTAKABLE: Final = frozenset({".log", ".candump", *MESSAGE_SUFFIXES, *BULK_READERS} - {".csv", ".db"})
@@ -53,7 +51,7 @@ def open_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Frames],
 
 def open_whole_log(path: Path | str, channel: str | None = None) -> tuple[Iterator[Frames], LogReport]:
     """As open_log, with every data frame of any identifier, CAN FD included."""
-    return _open(Path(path), EVERY_FRAME, channel, CAN_FD_BYTES)
+    return _open(Path(path), EVERY_IDENTIFIER, channel, CAN_FD_BYTES)
 
 
 def _open(
@@ -61,7 +59,10 @@ def _open(
 ) -> tuple[Iterator[Frames], LogReport]:
     report = LogReport(path)
     suffix = unpacked_suffix(path)
-    _require_file(path)
+    if path.is_dir():
+        raise LogUnreadableError(f"{path}: is a folder, not a log file")
+    if not path.exists():
+        raise LogUnreadableError(f"{path}: no such file")
     if suffix in CANDUMP_SUFFIXES:
         _require_no_other_kind(path)
         return read_candump(path, filters, channel, width=width, report=report), report
@@ -94,10 +95,3 @@ def _require_no_other_kind(path: Path) -> None:
     for first, kind in OTHER_KINDS.items():
         if start.startswith(first):
             raise LogUnreadableError(f"{path}: is {kind}, not the text that its name says")
-
-
-def _require_file(path: Path) -> None:
-    if path.is_dir():
-        raise LogUnreadableError(f"{path}: is a folder, not a log file")
-    if not path.exists():
-        raise LogUnreadableError(f"{path}: no such file")

@@ -1,6 +1,8 @@
-"""The result of reading a log: counts, and the unreadable lines by reason."""
+"""What of a log is wanted, and the result of reading it: counts, and the unreadable lines by reason."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -8,8 +10,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from gateway.bus.signals import IdFilter
 from gateway.errors import LogUnreadableError
-from gateway.records import I64
+from gateway.records import I64, U32, Bool
 
 KEPT_LINE_NUMBERS: Final = 5
 NAMED_CHANNELS: Final = 8
@@ -109,6 +112,22 @@ class LogReport:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
             yield f"{self.path}: mapped frames are on {seen}; if these are one bus twice, name one in the map"
 
+    @contextmanager
+    def until_damage(self, kind: str) -> Iterator[None]:
+        """A library reads a binary log in the block: any exception is a damage, behind which nothing is read.
+
+        Raises LogUnreadableError if it comes before the first frame.
+        """
+        try:
+            yield
+        except LogUnreadableError:
+            raise
+        except Exception as fault:  # noqa: BLE001 # whatever a damaged file makes struct, zlib, numpy or SQLite raise
+            why = str(fault) or type(fault).__name__
+            if self.frames == 0:
+                raise LogUnreadableError(f"{self.path}: cannot be read as {kind}: {why}") from None
+            self.ended_early = f"the file is damaged: {why}"
+
     def require_frames(self) -> None:
         """After reading: raise LogUnreadableError, saying why, if not one wanted frame was found."""
         if self.wanted:
@@ -125,3 +144,49 @@ class LogReport:
             )
         why = f" ({self.ended_early})" if self.ended_early else ""
         raise LogUnreadableError(f"{self.path}: holds no CAN frame{why}; candump logs are recorded with candump -L")
+
+
+def is_same_channel(recorded: object, wanted: str | None) -> bool:
+    """Whether a recorded channel is the wanted one.
+
+    A number, as python-can counts channels, matches a name that ends in it (1 and "can1"). A format that
+    keeps no channel (.csv, .db) matches every name.
+    """
+    if wanted is None or recorded is None or str(recorded) == wanted:
+        return True
+    digits = re.search(r"\d+$", wanted)
+    return isinstance(recorded, int) and digits is not None and int(digits[0]) == recorded
+
+
+def passing(filters: Sequence[IdFilter], can_id: U32) -> Bool:
+    """Which identifiers (n,) pass one of the filters."""
+    passes = np.zeros(len(can_id), np.bool_)
+    for id_filter in filters:
+        passes |= id_filter.matches(can_id)
+    return passes
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """The frames that pass one of ``filters``, of ``channel`` or of all; the others are counted in ``report``."""
+
+    filters: Sequence[IdFilter]
+    channel: str | None
+    report: LogReport
+
+    def rows(self, can_id: U32, channel: I64 | None, is_remote: Bool | None = None) -> I64:
+        """Rows (m,) of the wanted data frames among all (n,), remote ones among them. A format may store no channel."""
+        self.report.frames += len(can_id)
+        rows = np.flatnonzero(passing(self.filters, can_id))
+        if is_remote is not None and is_remote[rows].any():
+            self.report.remote_frames += int(np.count_nonzero(is_remote[rows]))
+            rows = rows[~is_remote[rows]]
+        if channel is None:
+            return rows
+        for number in set(channel[rows].tolist()):
+            self.report.channels.add(str(number))
+            if not is_same_channel(number, self.channel):
+                is_other = channel[rows] == number
+                self.report.other_channel += int(np.count_nonzero(is_other))
+                rows = rows[~is_other]
+        return rows

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from gateway.bus.ring.block import BlockHead
-from gateway.bus.ring.segment import Segment, create_segment, mended_segment, name_of, names_in, open_segment
+from gateway.bus.ring.segment import BlockHead, Segment, create_segment, mended_segment, name_of, names_in, open_segment
 from gateway.files.kept import opened_folder
 from gateway.log import Event, log_event
 

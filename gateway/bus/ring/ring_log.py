@@ -1,4 +1,4 @@
-"""The thread of the ring log: collects frames for minutes and writes them as one block."""
+"""Frames of a live channel on disk in whole blocks: the thread of the ring log, and a recording into one file."""
 
 import logging
 import threading
@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import BinaryIO, Final
 
 from gateway.bus.frames import join
-from gateway.bus.ring.block import head_of, packed_block
+from gateway.bus.live import LiveSource
 from gateway.bus.ring.folder import RingFolder, RingLimits
-from gateway.bus.ring.segment import Segment
+from gateway.bus.ring.segment import Segment, head_of, packed_block
 from gateway.log import Event, log_event
 from gateway.records import Frames
 from gateway.status import RecordStatus
@@ -172,3 +172,54 @@ class RingLog:
         if fault != self._fault:
             log_event(Event.RECORD_REFUSED, level=logging.WARNING, fault=fault)
         self._fault = fault
+
+
+FILE_BLOCK_S: Final = 10.0
+FILE_BLOCK_FRAMES: Final = 65_536
+DRAIN_S: Final = 0.2
+
+OnFrames = Callable[[int], None]
+
+
+def record_to_file(
+    source: LiveSource,
+    channel: str,
+    path: Path,
+    stop: threading.Event,
+    *,
+    duration_s: float | None = None,
+    on_frames: OnFrames = lambda n: None,
+) -> int:
+    """Listen until ``stop`` or ``duration_s`` -> frames written. ``path`` must not exist yet. Raises OSError."""
+    end_s = None if duration_s is None else time.monotonic() + duration_s
+    held: list[Frames] = []
+    n_held = n_written = 0
+    due_s = time.monotonic() + FILE_BLOCK_S
+    with path.open("xb") as file:
+        source.start()
+        try:
+            while not (stop.is_set() or (end_s is not None and time.monotonic() >= end_s) or source.failure):
+                if (frames := source.inbox.drain(DRAIN_S)) is not None:
+                    held.append(frames)
+                    n_held += len(frames)
+                    on_frames(n_written + n_held)
+                if n_held >= FILE_BLOCK_FRAMES or time.monotonic() >= due_s:
+                    n_written += _written(file, held, channel)
+                    held, n_held, due_s = [], 0, time.monotonic() + FILE_BLOCK_S
+        finally:
+            source.stop()
+            while (frames := source.inbox.drain(0.0)) is not None:
+                held.append(frames)
+                n_held += len(frames)
+                on_frames(n_written + n_held)
+            n_written += _written(file, held, channel)
+    return n_written
+
+
+def _written(file: BinaryIO, held: list[Frames], channel: str) -> int:
+    if not held:
+        return 0
+    frames = join(held, held[0].payload.shape[1])
+    file.write(packed_block(frames, channel))
+    file.flush()
+    return len(frames)

@@ -6,10 +6,17 @@ counts what it refuses, an ``Encoder`` does the inverse for the simulator. Units
 
 from gateway.bus.signals.bit_field import Coding
 from gateway.bus.signals.database import DatabaseMessage, DatabaseSignal, load_messages
-from gateway.bus.signals.decode import Decoder
+from gateway.bus.signals.decode import Decoder, is_j1939_code
 from gateway.bus.signals.encode import Encoder
-from gateway.bus.signals.mapping import CAN_FD_BYTES, CLASSIC_BYTES, IdFilter, MappedMessage, id_name, j1939_filter
-from gateway.bus.signals.samples import is_j1939_code
+from gateway.bus.signals.mapping import (
+    CAN_FD_BYTES,
+    CLASSIC_BYTES,
+    EVERY_IDENTIFIER,
+    IdFilter,
+    MappedMessage,
+    id_name,
+    j1939_filter,
+)
 from gateway.bus.signals.signal_map import (
     SHIPPED_PREFIX,
     SignalMap,
@@ -23,6 +30,7 @@ from gateway.bus.signals.signal_map import (
 __all__ = [
     "CAN_FD_BYTES",
     "CLASSIC_BYTES",
+    "EVERY_IDENTIFIER",
     "SHIPPED_PREFIX",
     "Coding",
     "DatabaseMessage",

@@ -34,6 +34,9 @@ class IdFilter:
         return passes
 
 
+EVERY_IDENTIFIER = (IdFilter(0, EXTENDED_ID), IdFilter(EXTENDED_ID, EXTENDED_ID))
+
+
 @dataclass(frozen=True, slots=True)
 class Condition:
     """A field of the same message and its required raw bits: a multiplexer, or one entry of valid_when."""

@@ -1,18 +1,201 @@
-"""Signal maps: the TOML file that names our signals in a DBC, checked and resolved against its databases."""
+"""Signal maps: the TOML file that names our signals in a DBC, each entry checked and resolved against its databases."""
 
+import math
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from gateway.bus.signals.database import DatabaseMessage, closest, load_messages
-from gateway.bus.signals.mapping import MappedMessage, MappedSignal, SignalMap, exact_filter, j1939_filter
-from gateway.bus.signals.resolve import SignalEntry, resolve_signal
+from gateway.bus.signals.bit_field import BitField, Coding
+from gateway.bus.signals.database import DatabaseMessage, DatabaseSignal, closest, load_messages
+from gateway.bus.signals.mapping import Condition, MappedMessage, MappedSignal, SignalMap, exact_filter, j1939_filter
 from gateway.errors import SignalMapError
 from gateway.files.signed import Read
 from gateway.records import EXTENDED_ID, Signal
 from gateway.toml_file import load_toml
+from gateway.units import si_factor
+
+QUANTITIES: Final[Mapping[Signal, str]] = {
+    Signal.VERTICAL_ACCELERATION: "acceleration",
+    Signal.PITCH_RATE: "angular_rate",
+    Signal.SPEED: "speed",
+    Signal.ROLL_RATE: "angular_rate",
+    Signal.LONGITUDINAL_ACCELERATION: "acceleration",
+    Signal.LATERAL_ACCELERATION: "acceleration",
+    Signal.YAW_RATE: "angular_rate",
+    Signal.WHEEL_SPEED: "speed",
+    Signal.IGNITION: "state",
+    Signal.AMBIENT_TEMPERATURE: "temperature",
+    Signal.AXLE_WEIGHT: "mass",
+    Signal.LATITUDE: "angle",
+    Signal.LONGITUDE: "angle",
+    Signal.ODOMETER: "distance",
+    Signal.DOOR: "state",
+    Signal.AIR_SPRING_PRESSURE: "pressure",
+    Signal.RIDE_HEIGHT: "distance",
+    Signal.TRAILER: "state",
+}
+LONGEST_BYTES = 64  # of a CAN FD frame
+FEWEST_COUNTER_BITS: Final = 2
+MOST_COUNTER_BITS: Final = 32  # and no frames are lost round a longer one
+_EXACT_INTEGERS: Final = 1 << 53  # a double holds every integer up to here
+
+Accepted = int | float | str
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class SignalEntry(BaseModel):
+    """[signals.NAME]: the source of one of our signals."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    message: str = Field(description="name of the message in the DBC")
+    signal: str = Field(description="name of the signal in that message")
+    sign: Literal[-1, 1] = Field(1, description="-1 if the device counts against our axis (ISO 8855)")
+    unit: str | None = Field(None, description="unit of the DBC's physical values; overrides the DBC's own")
+    latency_s: float = Field(0.0, ge=0.0, le=10.0, description="delay between measurement and sending")
+    valid_when: dict[str, Accepted | list[Accepted]] = Field(
+        default_factory=dict, description="signals of the same message and the values under which this one counts"
+    )
+    counter: str | None = Field(
+        None,
+        description="signal of the same message that counts its frames: it distinguishes late frames from lost ones",
+    )
+    minimum: Finite | None = Field(None, description="least valid value in SI; overrides the DBC's range")
+    maximum: Finite | None = Field(None, description="greatest valid value in SI; overrides the DBC's range")
+
+
+def resolve_signal(
+    where: str, signal: Signal, entry: SignalEntry, message: DatabaseMessage, j1939: bool
+) -> MappedSignal:
+    """Resolve an entry of the map against its message. ``where`` begins every SignalMapError."""
+    named = _find(f"{where}.signal", entry.signal, message)
+    _require_decodable(f"{where}.signal", named, message)
+    to_si = entry.sign * _unit_factor(f"{where}.unit", signal, entry, named)
+    minimum, maximum = _valid_range(where, entry, named, to_si)
+    return MappedSignal(
+        signal=signal,
+        dbc_signal=named.name,
+        field=named.field,
+        to_si=to_si,
+        minimum=minimum,
+        maximum=maximum,
+        latency_s=entry.latency_s,
+        multiplexed_by=_multiplexers(where, named, message),
+        valid_when=tuple(_condition(where, name, allowed, message) for name, allowed in entry.valid_when.items()),
+        rejects_j1939_codes=(j1939 and bool(message.frame_id & EXTENDED_ID) and named.field.coding is Coding.UNSIGNED),
+        counter=None if entry.counter is None else _counter(f"{where}.counter", entry.counter, message),
+    )
+
+
+def _counter(where: str, name: str, message: DatabaseMessage) -> BitField:
+    """The field that counts the frames of the message."""
+    counter = _find(where, name, message)
+    _require_decodable(where, counter, message)
+    field = counter.field
+    if field.coding is Coding.FLOAT or not FEWEST_COUNTER_BITS <= field.length <= MOST_COUNTER_BITS:
+        kind = "a float" if field.coding is Coding.FLOAT else "an integer"
+        raise SignalMapError(
+            f"{where}: {name!r} is {kind} of {field.length} bits; "
+            f"a message counter is an integer of {FEWEST_COUNTER_BITS} to {MOST_COUNTER_BITS} bits"
+        )
+    if counter.multiplexer is not None:
+        raise SignalMapError(f"{where}: {name!r} is not in every frame of {message.name!r} (it is multiplexed)")
+    return field
+
+
+def _find(where: str, name: str, message: DatabaseMessage) -> DatabaseSignal:
+    if name in message.signals:
+        return message.signals[name]
+    raise SignalMapError(f"{where}: message {message.name!r} has no signal {name!r}; {closest(name, message.signals)}")
+
+
+def _require_decodable(where: str, signal: DatabaseSignal, message: DatabaseMessage) -> None:
+    field = signal.field
+    if field.coding is Coding.FLOAT and field.length not in (16, 32, 64):
+        raise SignalMapError(f"{where}: {signal.name!r} is a float of {field.length} bits; 16, 32 or 64 are possible")
+    if not 1 <= field.length <= 64:
+        raise SignalMapError(f"{where}: {signal.name!r} has {field.length} bits; 1 to 64 are possible")
+    if not 0 <= message.length <= LONGEST_BYTES:
+        raise SignalMapError(f"{where}: {message.name!r} has {message.length} bytes; a CAN frame carries at most 64")
+    if field.start < 0:
+        raise SignalMapError(f"{where}: {signal.name!r} begins at bit {field.start}; correct {message.source.name}")
+    if not (math.isfinite(field.scale) and math.isfinite(field.offset)):
+        raise SignalMapError(f"{where}: {signal.name!r} has no finite scale and offset; correct {message.source.name}")
+    if field.n_bytes > message.length:
+        raise SignalMapError(
+            f"{where}: {signal.name!r} ends in byte {field.n_bytes}, but {message.name!r} has {message.length}; "
+            f"correct {message.source.name}"
+        )
+    if field.scale == 0.0:
+        raise SignalMapError(f"{where}: {signal.name!r} has scale 0; correct {message.source.name}")
+    if _loses_integers(field):
+        raise SignalMapError(f"{where}: {signal.name!r} counts beyond 2^53, which a double cannot hold exactly")
+
+
+def _loses_integers(field: BitField) -> bool:
+    is_integer = field.coding is not Coding.FLOAT and field.scale.is_integer() and field.offset.is_integer()
+    return is_integer and max(map(abs, (*field.raw_range, *field.physical_range))) > _EXACT_INTEGERS
+
+
+def _unit_factor(where: str, signal: Signal, entry: SignalEntry, named: DatabaseSignal) -> float:
+    try:
+        return si_factor(QUANTITIES[signal], named.unit if entry.unit is None else entry.unit)
+    except SignalMapError as fault:
+        raise SignalMapError(f"{where}: {fault}") from None
+
+
+def _valid_range(where: str, entry: SignalEntry, named: DatabaseSignal, to_si: float) -> tuple[float, float]:
+    """Least and greatest valid SI: of the entry, else of the database, else of the bits."""
+    low, high = named.field.physical_range
+    if named.minimum is not None and named.maximum is not None and named.minimum < named.maximum:
+        low, high = float(named.minimum), float(named.maximum)
+    ends = sorted((low * to_si, high * to_si))
+    minimum = ends[0] if entry.minimum is None else entry.minimum
+    maximum = ends[1] if entry.maximum is None else entry.maximum
+    if minimum >= maximum:
+        raise SignalMapError(f"{where}: minimum {minimum:g} is not below maximum {maximum:g} (both in SI)")
+    return (minimum if math.isfinite(minimum) else math.nan), (maximum if math.isfinite(maximum) else math.nan)
+
+
+def _multiplexers(where: str, signal: DatabaseSignal, message: DatabaseMessage) -> tuple[Condition, ...]:
+    """The chain of multiplexers that put ``signal`` into a frame, outermost last."""
+    if signal.multiplexer is None:
+        return ()
+    selector = _find(where, signal.multiplexer, message)
+    selected = Condition(selector.field, tuple(_bits_of(raw, selector.field) for raw in signal.multiplexer_ids))
+    return (selected, *_multiplexers(where, selector, message))
+
+
+def _condition(where: str, name: str, allowed: Accepted | list[Accepted], message: DatabaseMessage) -> Condition:
+    key = f"{where}.valid_when"
+    judged = _find(key, name, message)
+    _require_decodable(key, judged, message)
+    choices = allowed if isinstance(allowed, list) else [allowed]
+    return Condition(judged.field, tuple(_allowed_bits(f"{key}.{name}", choice, judged) for choice in choices))
+
+
+def _allowed_bits(where: str, allowed: Accepted, signal: DatabaseSignal) -> int:
+    """The raw bits of a physical number, or of a named choice of the database."""
+    field = signal.field
+    if isinstance(allowed, str):
+        if allowed not in signal.choices:
+            raise SignalMapError(f"{where}: no value is called {allowed!r}; {closest(allowed, signal.choices)}")
+        return _bits_of(signal.choices[allowed], field)
+    if field.coding is Coding.FLOAT:
+        raise SignalMapError(f"{where}: {signal.name!r} is a float, which cannot be compared for equality")
+    raw = round((allowed - field.offset) / field.scale)
+    low, high = field.raw_range
+    if not low <= raw <= high or not math.isclose(raw * field.scale + field.offset, allowed, abs_tol=1e-9):
+        raise SignalMapError(f"{where}: {signal.name!r} can never be {allowed!r}")
+    return _bits_of(raw, field)
+
+
+def _bits_of(raw: int, field: BitField) -> int:
+    return raw & ((1 << field.length) - 1)
+
 
 __all__ = ["SignalEntry", "SignalMap", "SignalMapFile", "load_signal_map", "shipped_map", "shipped_maps"]
 
