@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from gateway.errors import SpringscaleError
     from gateway.estimate import Estimate, Quantity
     from gateway.estimate_json import estimate_to_json, table_row
-    from gateway.offline.arrays import estimate_arrays
-    from gateway.offline.estimates import estimates_of_logs
+    from gateway.offline.estimates import estimate_arrays, estimates_of_logs
     from gateway.records import Spectra, Why
     from gateway.setup import Setup, load_setup
 
@@ -46,7 +45,7 @@ _HOMES = {
     "Spectra": "gateway.records",
     "SpringscaleError": "gateway.errors",
     "Why": "gateway.records",
-    "estimate_arrays": "gateway.offline.arrays",
+    "estimate_arrays": "gateway.offline.estimates",
     "estimate_to_json": "gateway.estimate_json",
     "estimates_of_logs": "gateway.offline.estimates",
     "load_calibration": "gateway.calibration.file.calibration_file",

@@ -33,7 +33,7 @@ from gateway.config import ESTIMATOR_NAMES
 from gateway.core.cross_spectrum.predicted import Drive
 from gateway.core.vehicle import Vehicle
 from gateway.errors import SpringscaleError
-from gateway.offline import inspect
+from gateway.offline.campaigns import inspect
 
 STUDIES: Final[tuple[Study[Any], ...]] = (
     coverage.STUDY, budget.STUDY, disturbances.STUDY, grades.STUDY, delivery.STUDY, sensitivity.STUDY, siblings.STUDY,

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from typing import Any
 
 from benchmarks.speed.meter import command_of, in_own_process, peak_mb
-from gateway.bus.live import LiveSource
 from gateway.bus.live.socketcan import SocketCanReceiver, ask_for_stamps
+from gateway.bus.live.source import LiveSource
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.bus.signals.mapping import SignalMap
 

@@ -43,7 +43,7 @@ def serve(folder: str) -> None:
 
 def send(port: int, seconds: float) -> int:
     """Send the drive in real time, in groups of five milliseconds -> the number of frames."""
-    from gateway.workbench import demo_drive, frames_of  # noqa: PLC0415 # nothing that the service's process should hold
+    from gateway.workbench.simulate import demo_drive, frames_of  # noqa: PLC0415 # nothing that the service's process should hold
 
     drive = frames_of(demo_drive())
     since_s = (drive.t_ns - drive.t_ns[0]) / NS_PER_S - BEGIN_S

@@ -30,7 +30,7 @@ from benchmarks.speed.endless_drive import serve_when_told
 from benchmarks.speed.meter import CALIBRATION, ROOT, command_of, peak_mb, print_and_write
 from gateway.store import Store
 from gateway.web.pages import LIBRARY_URL
-from gateway.workbench import demo_drive, frames_of
+from gateway.workbench.simulate import demo_drive, frames_of
 
 MOST_MB: Final = 250.0  # chosen: bound of the service's memory
 N_STORED: Final = 1200  # records before, with spectra

@@ -24,8 +24,8 @@ import uvloop
 
 from benchmarks.speed import live
 from benchmarks.speed.meter import command_of, free_port
-from gateway.bus.live import LiveSource
 from gateway.bus.live.socketcan import SocketCanReceiver
+from gateway.bus.live.source import LiveSource
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings

@@ -31,7 +31,7 @@ from gateway.offline.campaigns import batches_of_motion, read_whole_log
 from gateway.records import Batch, Motion
 from gateway.setup import load_setup
 from gateway.toml_file import checked, read_toml
-from gateway.workbench import demo_drive, frames_of
+from gateway.workbench.simulate import demo_drive, frames_of
 
 PROGRAM: Final = (sys.executable, "-m", "gateway.calibration.commissioning.work")
 

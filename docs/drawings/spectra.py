@@ -10,7 +10,7 @@ from drawings.canvas import Canvas, Point
 from gateway.core.spectrum import frequencies_hz, segment_transforms
 from gateway.records import F64
 from gateway.sim.scenario import simulate_drive
-from gateway.workbench import bench_of
+from gateway.workbench.simulate import bench_of
 
 KIND: Final = "experiment"
 EMPTY: Final = 0  # drives of that campaign: nothing,

@@ -10,33 +10,22 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any, Final, Protocol, TypeVar
+from typing import Any, Final, TypeVar
 
 from gateway.archive.inventory import Inventory, look
 from gateway.archive.jobs import ArchiveJob
 from gateway.archive.manifest import Manifest
 from gateway.archive.places import Location
-from gateway.archive.processes import WorkerKilledError
 from gateway.archive.receipts import Slot, failure_files, slots_done, slots_failed
 from gateway.archive.run import JobOutcome, JobStatus, fail, run
 from gateway.archive.survey import Facts, LogFile, Surveyed, in_goes, survey
+from gateway.archive.workers import WorkerKilledError, Workers
 from gateway.errors import ConfigurationError
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
 AHEAD: Final = 2  # chosen: tasks queued per worker, so that none waits for the driver
-
-
-class Workers(Protocol):
-    """An executor (concurrent.futures) with its number of workers."""
-
-    @property
-    def n_workers(self) -> int:
-        """The number of concurrent tasks."""
-
-    def submit(self, fn: Callable[..., Answer], /, *args: Any, **kwargs: Any) -> "Future[Answer]":
-        """Run it on one of them."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import Any, Final, Literal
 import can
 
 from gateway.bus.frames import message_of, take
-from gateway.bus.live import require_usable_interface
+from gateway.bus.live.python_can import require_usable_interface
 from gateway.bus.live.source import system_reason
 from gateway.bus.logs import LogReport, open_whole_log
 from gateway.errors import BusError

@@ -21,8 +21,7 @@ from gateway.calibration.judgement import (
 from gateway.cli.options import CAMPAIGN, FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.progress import counted
 from gateway.errors import ConfigurationError
-from gateway.offline import judge_campaign
-from gateway.offline.campaigns import Split
+from gateway.offline.campaigns import Split, judge_campaign
 from gateway.records import json_line
 
 

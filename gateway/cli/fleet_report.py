@@ -5,11 +5,11 @@ from pathlib import Path
 import click
 
 from gateway.archive import place_of
-from gateway.archive.fleet import fleet_of
+from gateway.archive.fleet.fleet import fleet_of
 from gateway.cli.options import FILE, as_json
 from gateway.cli.progress import counted
 from gateway.records import json_line
-from gateway.reports.fleet import write_fleet_report
+from gateway.reports.fleet.report import write_fleet_report
 
 
 @click.command("fleet-report")

@@ -4,7 +4,7 @@ from typing import Any, Final
 
 import click
 
-from gateway.cli.commission_text import end_text
+from gateway.cli.commission import end_text
 from gateway.cli.options import LoadArgument, as_json
 from gateway.cli.service import Service, asks_service
 from gateway.errors import SpringscaleError

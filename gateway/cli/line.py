@@ -15,7 +15,7 @@ from gateway.cli.progress import Steps, counted
 from gateway.core.cross_spectrum.model.parameters import is_positive
 from gateway.errors import CampaignError, ConfigurationError
 from gateway.files.whole import refusal_told, write_whole
-from gateway.offline import inspect
+from gateway.offline.campaigns import inspect
 from gateway.records import json_line
 
 

@@ -7,9 +7,12 @@ from typing import Any
 
 import click
 
+from gateway.bus.heard import Heard
 from gateway.cli.options import FILE, as_json
-from gateway.offline.look import Described, Heard, Look, MapFit, write_draft
-from gateway.offline.look import look as look_at
+from gateway.offline.look.draft import write_draft
+from gateway.offline.look.look import Look, MapFit
+from gateway.offline.look.look import look as look_at
+from gateway.offline.look.readings import Described
 from gateway.records import EXTENDED_ID, JOURNEY, Signal, json_line
 
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import click
 
-from gateway.bus.live import usable_interfaces
+from gateway.bus.live.python_can import usable_interfaces
 from gateway.bus.sink import Speed
 from gateway.config import ESTIMATOR_NAMES, BatchSection
 from gateway.core.settings import BatchSettings

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import click
 
-from gateway.bus.live import LiveSource
+from gateway.bus.live.source import LiveSource
 from gateway.bus.ring.ring_log import record_to_file
 from gateway.bus.signals import load_signal_map
 from gateway.cli import options

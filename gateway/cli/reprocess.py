@@ -10,14 +10,13 @@ from typing import Final
 
 import click
 
-from gateway.archive.cluster import Cluster, cluster
 from gateway.archive.inventory import Forecast, forecast, look
 from gateway.archive.manifest import load_manifest
 from gateway.archive.places import place_of
-from gateway.archive.processes import Processes
 from gateway.archive.reprocess import Progress, Summary
 from gateway.archive.reprocess import reprocess as reprocess_archive
 from gateway.archive.run import JobStatus
+from gateway.archive.workers import Processes, Workers, cluster
 from gateway.cli.options import as_json, trusted_keys
 from gateway.cli.progress import StatusLine
 from gateway.files.signed import pinned_by
@@ -85,9 +84,9 @@ class _Progress:
 
 
 @contextmanager
-def _workers(scheduler: str | None, n_workers: int | None) -> Iterator[Processes | Cluster]:
+def _workers(scheduler: str | None, n_workers: int | None) -> Iterator[Workers]:
     """The executor of the jobs; stopped at once when the command stops."""
-    workers = Processes(n_workers) if scheduler is None else cluster(scheduler)
+    workers: Workers = Processes(n_workers) if scheduler is None else cluster(scheduler)
     try:
         yield workers
     except BaseException:

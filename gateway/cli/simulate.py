@@ -13,9 +13,8 @@ from gateway.cli.options import FILE, NumberRange, as_json
 from gateway.cli.progress import StatusLine, counted
 from gateway.records import json_line
 from gateway.sim.vans import VANS
-from gateway.workbench import Bench, bench_of, write_campaign
 from gateway.workbench.campaigns import PLANS
-from gateway.workbench.simulate import SENSORS_OF_MAP
+from gateway.workbench.simulate import SENSORS_OF_MAP, Bench, bench_of, write_campaign
 from gateway.workbench.simulate import stream as send_drives
 
 _BENCH = (

@@ -1,7 +1,6 @@
 """springscale.toml and SPRINGSCALE_* variables -> frozen settings. An unknown key is an error that names it.
 
-Tables about what a service keeps, and how it is calibrated and verified, are in ``sections``, about where weights are
-sent in ``outward``.
+Tables about the vehicle, its bus and its batches, the web and the store are here, the others in ``sections``.
 """
 
 from pathlib import Path
@@ -10,10 +9,10 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
-from gateway.config.alarms import AlarmsSection, WebhookSection
-from gateway.config.outward import BroadcastSection, UplinkSection
 from gateway.config.sections import (
     OF_CALIBRATION,
+    AlarmsSection,
+    BroadcastSection,
     CommissioningSection,
     KeepSection,
     LimitKg,
@@ -21,7 +20,9 @@ from gateway.config.sections import (
     RecordSection,
     Seconds,
     SettingsSection,
+    UplinkSection,
     VerificationSection,
+    WebhookSection,
 )
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError

@@ -1,13 +1,15 @@
-"""Tables of springscale.toml about what a service keeps on its disk, and how it is calibrated and verified there."""
+"""Tables of springscale.toml about a service's own work: what it keeps, calibrates and verifies, reports and sends."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final, Literal, Self
+from urllib.parse import urlsplit
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator, model_validator
 
 Seconds = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]  # 32 years: fits 64 bits in nanoseconds
 LimitKg = Annotated[float | None, Field(gt=0.0, le=100_000.0, allow_inf_nan=False)]  # road vehicles weigh less
 OF_CALIBRATION = "[default: as the calibration has it]"
+_LOCAL: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
 class SettingsSection(BaseModel):
@@ -82,3 +84,177 @@ class PositionSection(SettingsSection):
         description="decimals of a degree kept: 2 is about 1 km, 4 about 10 m [default: no positions are kept]",
     )
     forward: bool = Field(False, description="forward kept positions to the broker of [uplink] too")
+
+
+class UplinkSection(SettingsSection):
+    """Where estimates are forwarded to: an MQTT 5 broker, for vehicles that cannot be reached from outside."""
+
+    host: str | None = Field(None, min_length=1, description="the broker; without it nothing is forwarded")
+    port: int | None = Field(None, ge=1, le=65535, description="its port [default: 8883 with TLS, 1883 without]")
+    tls: bool = Field(True, description="encrypted, the broker's certificate checked")
+    ca: Path | None = Field(
+        None, description="PEM file of the authority that signed the broker's certificate [default: the system's]"
+    )
+    certificate: Path | None = Field(None, description="PEM file of our certificate, for a broker that requires one")
+    key: Path | None = Field(None, description="PEM file of its key")
+    username: str | None = Field(None, description="our client identifier at the broker")
+    password_file: Path | None = Field(None, description="file that contains only the password")
+    topic: str = Field("springscale/{vehicle_id}", min_length=1, description="branch below which this vehicle reports")
+    client_id: str | None = Field(None, min_length=1, description="[default: springscale- and the vehicle's id]")
+    keep_alive_s: int = Field(60, ge=5, le=3600, description="the link is probed after this long without traffic")
+    back_off_max_s: Seconds = Field(300.0, description="longest pause between two tries to connect")
+    repeat_s: float = Field(
+        0.0,
+        ge=0.0,
+        le=86_400.0,
+        description="after a break, records delivered in the last so many seconds before it are sent again: more than "
+        "the broker loses when it is killed",
+    )
+    wait_for_listener: bool = Field(
+        False,
+        description="a record without a subscriber at the broker, as MQTT 5 reports it, is kept here and tried again",
+    )
+    home_assistant: str | None = Field(
+        None,
+        min_length=1,
+        description="appear in Home Assistant on this broker: its discovery prefix, which is `homeassistant` unless "
+        "somebody changed it there",
+    )
+
+    @model_validator(mode="after")
+    def _keeps_its_secrets(self) -> "UplinkSection":
+        if (self.certificate is None) != (self.key is None):
+            raise ValueError("certificate and key belong together: give both or neither")
+        if self.password_file is not None and self.username is None:
+            raise ValueError("password_file needs username")
+        if self.password_file is not None and not self.tls and self.host not in _LOCAL:
+            raise ValueError("a password would cross the network in the clear: set tls = true")
+        return self
+
+
+class BroadcastSection(SettingsSection):
+    """Weights sent as J1939 frames onto another CAN bus than the one that the service listens to."""
+
+    interface: str | None = Field(
+        None, min_length=1, description="any python-can interface; without it nothing is ever sent on any bus"
+    )
+    channel: str | None = Field(None, min_length=1, description="its channel; never that of [bus]")
+    options: dict[str, str | int | float | bool] = Field(
+        default_factory=dict, description="further arguments of that python-can interface, e.g. bitrate"
+    )
+    source_address: int | None = Field(None, ge=0, le=253, description="J1939 source address, unique on that bus")
+    priority: int = Field(6, ge=0, le=7, description="J1939 priority; 0 is the most urgent")
+    every_s: float = Field(1.0, ge=0.1, le=3600.0, description="frames are sent so often")
+    first_axle: int = Field(1, ge=0, le=1, description="number that the receivers expect of the front axle")
+    draws_trailers: bool = Field(
+        False, description="then the gross weight of the combination is unknown and is not sent"
+    )
+
+    @model_validator(mode="after")
+    def _whole(self) -> "BroadcastSection":
+        if self.interface is not None and (self.channel is None or self.source_address is None):
+            raise ValueError("interface needs channel and source_address beside it")
+        if self.interface is None and (self.channel is not None or self.source_address is not None):
+            raise ValueError("nothing is sent without interface: give it, or leave out channel and source_address")
+        return self
+
+
+CAUSE_NAMES: Final = (  # those of core.alarms, which loads too much for this
+    *("overload", "imbalance", "sensor_fault", "drift", "no_estimate"),
+    *("overload.gross", "overload.front_axle", "overload.rear_axle"),
+    *("overload.front_left", "overload.front_right", "overload.rear_left", "overload.rear_right"),
+    *("imbalance.left_right", "imbalance.front_rear", "sensor_fault.silent", "sensor_fault.refused"),
+    *("drift.damper_front", "drift.damper_rear", "drift.delay", "drift.gyro_gain", "drift.zero"),
+)
+
+
+def _of_a_cause(name: str) -> str:
+    if name not in CAUSE_NAMES:
+        raise ValueError(f"is no alarm; known are {', '.join(CAUSE_NAMES)}")
+    return name
+
+
+CauseName = Annotated[str, AfterValidator(_of_a_cause)]
+
+
+class AlarmsSection(SettingsSection):
+    """When an alarm is raised, confirmed and ended. Permitted weights are those of the vehicle."""
+
+    off: tuple[CauseName, ...] = Field(
+        (), description='unwanted alarms, by name or by kind: `["drift", "overload.front_left"]`'
+    )
+    early_probability: float = Field(
+        0.9, gt=0.5, lt=1.0, description="raised early if it is so probable that a limit is exceeded, even by one batch"
+    )
+    final_probability: float = Field(
+        0.95, gt=0.5, lt=1.0, description="confirmed if the batches of one load together make it so probable"
+    )
+    final_batches: int = Field(2, ge=2, le=20, description="least number of batches of one load")
+    clear_probability: float = Field(
+        0.25, gt=0.0, le=0.5, description="the alarm ends when the load makes it no more probable than this"
+    )
+    side_share_max_pct: float = Field(
+        55.0, ge=50.0, le=100.0, description="of the sprung mass, on the wheels of one side (needs a roll rate)"
+    )
+    axle_share_max_pct: float = Field(75.0, ge=50.0, le=100.0, description="of the sprung mass, on one axle")
+    sensor_silent_s: float = Field(
+        60.0,
+        ge=10.0,
+        le=86_400.0,
+        description="a needed sensor that is silent for so long on a live bus raises an alarm",
+    )
+    sensor_silent_final_s: float = Field(600.0, ge=10.0, le=86_400.0, description="likewise, for sure")
+    no_estimate_min: float = Field(
+        120.0,
+        ge=5.0,
+        le=10_000.0,
+        description="minutes driven without an estimate before an early alarm; twice as long confirms it",
+    )
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.sensor_silent_final_s < self.sensor_silent_s:
+            raise ValueError("sensor_silent_final_s must not be below sensor_silent_s")
+        return self
+
+
+class WebhookSection(SettingsSection):
+    """Where alarms and events are pushed to: an address that takes signed HTTP requests."""
+
+    url: str | None = Field(
+        None, description="its address, https:// (http:// on this machine alone); without it nothing is pushed"
+    )
+    secret_file: Path | None = Field(
+        None, description="file with the secret we sign with: `whsec_` and base64, a line each; the first is the newest"
+    )
+    ca: Path | None = Field(
+        None, description="PEM file of the authority that signed the receiver's certificate [default: the system's]"
+    )
+    send: tuple[Literal["alarms", "events", "trips", "estimates"], ...] = Field(
+        ("alarms", "events"), min_length=1, description="what it is sent"
+    )
+    timeout_s: float = Field(20.0, ge=1.0, le=300.0, description="time limit for an answer")
+    back_off_max_s: float = Field(300.0, gt=0.0, le=86_400.0, description="longest pause between two tries")
+    give_up_h: float = Field(
+        72.0, gt=0.0, le=8760.0, description="hours after which a letter that is answered with a refusal is given up"
+    )
+
+    @field_validator("url")
+    @classmethod
+    def _is_an_address(cls, url: str | None) -> str | None:
+        if url is None:
+            return None
+        parts = urlsplit(url)  # raises ValueError for a port that is none, when it is asked for
+        if parts.scheme not in {"https", "http"} or not parts.hostname or (parts.port or 1) < 1:
+            raise ValueError("is no https:// address")
+        if parts.username is not None or parts.fragment or not url.isascii() or not url.isprintable() or " " in url:
+            raise ValueError("may contain neither a user nor a fragment, and no character that must be escaped")
+        if parts.scheme == "http" and parts.hostname not in _LOCAL:
+            raise ValueError("would cross the network in the clear: use https://")
+        return url
+
+    @model_validator(mode="after")
+    def _signs(self) -> Self:
+        if self.url is not None and self.secret_file is None:
+            raise ValueError("url needs secret_file")
+        return self

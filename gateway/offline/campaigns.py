@@ -28,7 +28,8 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.errors import CalibrationImpossibleError, LogUnreadableError
-from gateway.offline.look import unmapped_roll_rate, why_silent
+from gateway.offline.look.look import why_silent
+from gateway.offline.look.roles import unmapped_roll_rate
 from gateway.records import Batch, Motion, Signal, joined
 from gateway.units import NS_PER_S
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Final
 
 from gateway.calibration.trend import Trend
-from gateway.config.alarms import AlarmsSection
+from gateway.config.sections import AlarmsSection
 from gateway.core.alarms import (
     ENTRY_KIND,
     Alarm,

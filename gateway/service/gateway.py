@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from gateway.bus.live import OpenReceiver, SourceState, bus_survey_of
+from gateway.bus.live.bus_survey import bus_survey_of
+from gateway.bus.live.source import OpenReceiver, SourceState
 from gateway.bus.signals import Decoder
 from gateway.calibration.verification_file import VerificationRule
 from gateway.config import Settings

@@ -4,7 +4,7 @@ import os
 import sys
 from typing import Final
 
-from gateway.bus.live import OpenReceiver
+from gateway.bus.live.source import OpenReceiver
 from gateway.config import Settings
 from gateway.service.commissioning import commissioned, with_commissioned
 from gateway.service.gateway import Gateway, OnStarted

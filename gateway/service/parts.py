@@ -5,13 +5,12 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import version
 
 from gateway.bus.broadcast import Broadcaster, Sender
-from gateway.bus.live import LiveSource, OpenReceiver
+from gateway.bus.live.source import LiveSource, OpenReceiver
 from gateway.bus.ring import RingLimits, RingLog
 from gateway.calibration.kept import Shelf, ShelfLimits
 from gateway.calibration.kept.shelf import FOLDER
 from gateway.config import BusSection, Settings, StoreSection
-from gateway.config.outward import BroadcastSection
-from gateway.config.sections import KeepSection
+from gateway.config.sections import BroadcastSection, KeepSection
 from gateway.core.flow import Flow
 from gateway.errors import StoreError
 from gateway.estimate import Estimate

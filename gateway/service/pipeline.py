@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Final
 
-from gateway.bus.live import Inbox
+from gateway.bus.live.receiver import Inbox
 from gateway.bus.signals import Decoder
 from gateway.core.cross_spectrum.floor import NOISY_RATIO, SENSOR_OF
 from gateway.core.flow import Flow

@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from gateway.bus.live import what_lacks
+from gateway.bus.live.python_can import what_lacks
 from gateway.bus.signals import SignalMap
 from gateway.config import Settings
 from gateway.errors import ConfigurationError

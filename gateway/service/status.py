@@ -8,7 +8,8 @@ from importlib.metadata import version
 from typing import Final
 
 from gateway.bus.heard import similar_to
-from gateway.bus.live import BusSurvey, LiveSource, SourceState
+from gateway.bus.live.bus_survey import BusSurvey
+from gateway.bus.live.source import LiveSource, SourceState
 from gateway.bus.ring import RingLog
 from gateway.config import Settings
 from gateway.records import Signal

@@ -10,8 +10,7 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from gateway.config import VehicleSection
-from gateway.config.alarms import WebhookSection
-from gateway.config.outward import UplinkSection
+from gateway.config.sections import UplinkSection, WebhookSection
 from gateway.errors import ConfigurationError
 
 MOST_NAME_BYTES: Final = 65_535

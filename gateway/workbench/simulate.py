@@ -21,13 +21,16 @@ from gateway.bus.signals import SignalMapFile, shipped_map
 from gateway.bus.sink import BusSink, OnProgress, Speed, replay_frames
 from gateway.errors import ConfigurationError, SignalMapError
 from gateway.records import F64, Frames
-from gateway.sim.scenario import START_NS, SimulatedDrive, simulate_drive
+from gateway.sim.drive import Drive, Leg, constant, drive_of, standstill
+from gateway.sim.obstacles import UnevenRoad
+from gateway.sim.road import iso_road
+from gateway.sim.scenario import START_NS, LoadStep, SimulatedDrive, simulate_drive
 from gateway.sim.sensors import CANMOD, REFERENCE, Sensors
-from gateway.sim.vans import VANS
+from gateway.sim.vans import PAPER_VAN, VANS
 from gateway.sim.vehicle import Load, Vehicle, front_share_pct, payload_kg, payload_left_m
 from gateway.toml_file import load_toml
 from gateway.units import NS_PER_S
-from gateway.workbench.campaigns import PLANS, Carried, Plan, PlannedDrive, plan_of, share_range_pct
+from gateway.workbench.campaigns import PAPER_SPEED_MPS, PLANS, Carried, Plan, PlannedDrive, plan_of, share_range_pct
 from gateway.workbench.wiring import Wiring, unrelated_traffic
 
 
@@ -282,3 +285,41 @@ def _run_lines(vehicle: Vehicle, planned: PlannedDrive, carried: Carried) -> lis
     if carried.end_s < planned.drive.duration_s:
         lines.append(f"end_s = {carried.end_s:.3f}")
     return lines
+
+
+MAP_NAME: Final = "reference"
+LOADS: Final = (Load(270.0, 1.3), Load(400.0, 1.8), Load(150.0, 0.6))  # in turn
+WINDOW_S: Final = 300.0  # BatchSettings.window_s
+N_EMPTY_WINDOWS: Final = 3  # chosen
+N_LOADED_WINDOWS: Final = 2  # chosen
+STOP_S: Final = 75.0  # longer than the minute of standstill that ends a drive
+_JITTER_MPS: Final = 0.4  # how well a driver holds a speed
+
+
+def frames_of(driven: SimulatedDrive) -> Frames:
+    """The frames of a drive, encoded by the signal map "reference"."""
+    return Wiring(MAP_NAME).frames_of(driven.recording)
+
+
+def demo_drive(seed: int = 1, start_ns: int = START_NS) -> SimulatedDrive:
+    """Three empty windows of five minutes, a stop for loading, two loaded windows; returned with the true loads.
+
+    The first seed's load is 270 kg.
+    """
+    load = LOADS[(seed - 1) % len(LOADS)]
+    rng = np.random.default_rng(seed)
+    empty = _near_50_kmh(N_EMPTY_WINDOWS * WINDOW_S, rng, stops=True)
+    loaded = _near_50_kmh(N_LOADED_WINDOWS * WINDOW_S, rng, stops=False)
+    whole = empty.then(standstill(STOP_S)).then(loaded)
+    steps = [LoadStep(0.0, ()), LoadStep(empty.duration_s + STOP_S / 2.0, (load,))]
+    road = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
+    return simulate_drive(PAPER_VAN, steps, road, whole, REFERENCE, seed, start_ns)
+
+
+def _near_50_kmh(hold_s: float, rng: np.random.Generator, *, stops: bool) -> Drive:
+    """Accelerate from rest and hold the speed for hold_s; with the ramp this is slightly more than whole windows."""
+    legs = [Leg(PAPER_SPEED_MPS, hold_s)]
+    planned = drive_of([*legs, Leg(0.0, 1.0)] if stops else legs)
+    wandering = constant(PAPER_SPEED_MPS, planned.duration_s + 1.0, rng, _JITTER_MPS).speed_mps
+    held = planned.speed_mps * wandering[: len(planned.speed_mps)] / PAPER_SPEED_MPS
+    return Drive(held, planned.lateral_mps2, planned.step_s)

@@ -12,10 +12,10 @@ from distributed import LocalCluster
 from support.archive import Here, object_store, tables_of, uploaded, write_fleet
 
 from gateway.archive import failures, place_of, receipts, rows_of, slots_done
-from gateway.archive.cluster import Cluster, cluster
 from gateway.archive.manifest import load_manifest
 from gateway.archive.places import PlaceError
 from gateway.archive.reprocess import Progress, reprocess
+from gateway.archive.workers import Cluster, cluster
 from gateway.cli import springscale
 from gateway.errors import ConfigurationError
 
@@ -87,7 +87,7 @@ def test_the_command_works_on_a_cluster(tmp_path: Path, bucket: str, scheduler: 
 
 
 def test_a_scheduler_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.archive.cluster.CONNECT_WITHIN_S", 1)
+    monkeypatch.setattr("gateway.archive.workers.CONNECT_WITHIN_S", 1)
     with pytest.raises(PlaceError, match=r"tcp://127\.0\.0\.1:9: no Dask scheduler answers within 1 s: start one with"):
         cluster("tcp://127.0.0.1:9")
     with pytest.raises(ConfigurationError, match="no address of a Dask scheduler"):

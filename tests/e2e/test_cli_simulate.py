@@ -16,8 +16,7 @@ from gateway.cli.progress import StatusLine, counted
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.reports.paper.experiments import Extent
-from gateway.workbench import demo_drive, frames_of
-from gateway.workbench.demo_drive import LOADS, N_EMPTY_WINDOWS, N_LOADED_WINDOWS
+from gateway.workbench.simulate import LOADS, N_EMPTY_WINDOWS, N_LOADED_WINDOWS, demo_drive, frames_of
 
 LINE = "({t:.6f}) can1 101#0102030405060708\n"
 

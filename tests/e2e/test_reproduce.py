@@ -11,9 +11,7 @@ import pytest
 from gateway.calibration.file import load_calibration
 from gateway.errors import ConfigurationError
 from gateway.reports.paper.experiments import CAMPAIGNS, Extent
-from gateway.reports.paper.page import PLATES
-from gateway.reports.paper.reproduce import reproduce
-from gateway.reports.paper.table import PAPER_PCT, accuracy_page
+from gateway.reports.paper.reproduce import PAPER_PCT, PLATES, accuracy_page, reproduce
 from gateway.workbench import simulate
 from gateway.workbench.campaigns import Plan, plan_of
 

@@ -19,8 +19,7 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M
 from gateway.offline import campaigns as offline_campaigns
-from gateway.offline import inspect
-from gateway.offline.campaigns import Stretch, batches_of_motion, read_whole_log, rows_within
+from gateway.offline.campaigns import Stretch, batches_of_motion, inspect, read_whole_log, rows_within
 from gateway.records import Batch, Motion, Signal
 
 SETTINGS = BatchSettings()

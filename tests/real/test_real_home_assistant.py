@@ -17,7 +17,7 @@ from support.parts import needs
 from support.patience import wait_until
 
 from gateway.config import VehicleSection
-from gateway.config.outward import UplinkSection
+from gateway.config.sections import UplinkSection
 from gateway.estimate import Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.store import Store

@@ -15,7 +15,7 @@ from support.patience import wait_until
 from support.ports import free_port
 
 from gateway.config import VehicleSection
-from gateway.config.outward import UplinkSection
+from gateway.config.sections import UplinkSection
 from gateway.estimate import Estimate, Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Why

@@ -14,9 +14,9 @@ from gateway.archive import Location, PlaceError, failures, place_of, receipts, 
 from gateway.archive.inventory import forecast, look
 from gateway.archive.jobs import ArchiveJob
 from gateway.archive.manifest import load_manifest
-from gateway.archive.processes import WorkerKilledError
 from gateway.archive.reprocess import Summary, reprocess
 from gateway.archive.run import JobOutcome, JobStatus, fail, run
+from gateway.archive.workers import WorkerKilledError
 from gateway.errors import ConfigurationError, ReaderMissingError
 
 HOUR = 3600 * S

@@ -17,7 +17,7 @@ from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file import load_calibration
 from gateway.cli import springscale
 from gateway.errors import CalibrationImpossibleError
-from gateway.workbench import bench_of, write_campaign
+from gateway.workbench.simulate import bench_of, write_campaign
 
 DRIVE_S = 165.0
 WINDOW = ("--window-s", "50")

@@ -11,7 +11,7 @@ from gateway.calibration.campaign import load_campaign
 from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.settings import BatchSettings
-from gateway.offline import inspect
+from gateway.offline.campaigns import inspect
 
 N_RUNS = 4
 

@@ -11,7 +11,7 @@ from support.days import batch
 from support.patience import PATIENCE_S
 
 from gateway.calibration.trend import Trend, TrendPoint
-from gateway.config import alarms as settings
+from gateway.config import sections as settings
 from gateway.core.alarms import CAUSE_NAMES, AlarmRules
 from gateway.core.events import Rules
 from gateway.errors import AlarmRefusedError

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from support.archive import die
 
-from gateway.archive.processes import Processes, WorkerKilledError
 from gateway.archive.reprocess import Progress, done_by
+from gateway.archive.workers import Processes, WorkerKilledError
 
 
 @pytest.fixture(name="workers", scope="module")

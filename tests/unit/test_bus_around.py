@@ -8,8 +8,8 @@ import can
 from support.patience import PATIENCE_S, wait_until
 
 from gateway.bus.heard import similar_to
-from gateway.bus.live import BusSurvey, bus_survey_of
 from gateway.bus.live import bus_survey as around_module
+from gateway.bus.live.bus_survey import BusSurvey, bus_survey_of
 from gateway.bus.signals import load_signal_map
 
 MAP = load_signal_map("springscale:reference")

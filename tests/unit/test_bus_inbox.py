@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.patience import PATIENCE_S
 
-from gateway.bus.live import Inbox
+from gateway.bus.live.receiver import Inbox
 from gateway.records import Frames
 
 

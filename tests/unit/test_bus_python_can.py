@@ -4,9 +4,9 @@ import can
 import pytest
 from support.patience import wait_until
 
-from gateway.bus.live import LiveSource, SourceState
 from gateway.bus.live import source as source_module
 from gateway.bus.live.python_can import PythonCanReceiver
+from gateway.bus.live.source import LiveSource, SourceState
 from gateway.bus.signals import load_signal_map
 
 GARBLED = [

@@ -11,9 +11,9 @@ from support.log import logged, names
 from support.patience import PATIENCE_S, wait_until
 
 from gateway.bus.frames import empty_frames
-from gateway.bus.live import LiveSource, SourceState
 from gateway.bus.live import source as source_module
 from gateway.bus.live.receiver import Burst
+from gateway.bus.live.source import LiveSource, SourceState
 from gateway.bus.signals import load_signal_map
 from gateway.errors import BusError
 from gateway.log import Event

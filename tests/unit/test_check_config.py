@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 from support.commissioning import Bench, fitted, in_steps
 
-from gateway.bus.live import usable_interfaces, what_lacks
+from gateway.bus.live.python_can import usable_interfaces, what_lacks
 from gateway.bus.signals.signal_map import shipped_map
 from gateway.cli import springscale
 from gateway.errors import ConfigurationError

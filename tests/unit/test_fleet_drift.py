@@ -11,9 +11,8 @@ from support.fleet import row, week, write_table
 
 from gateway.archive import PlaceError, place_of
 from gateway.archive.dataset import SCHEMA_VERSION
-from gateway.archive.fleet import fleet_of
-from gateway.archive.fleet.drift import LEAST_VEHICLES, Series, common_movement, drifts_of
-from gateway.archive.fleet.trend import LEAST_POINTS
+from gateway.archive.fleet.drift import LEAST_POINTS, LEAST_VEHICLES, Series, common_movement, drifts_of
+from gateway.archive.fleet.fleet import fleet_of
 from gateway.errors import ConfigurationError
 from gateway.records import F64
 

@@ -10,7 +10,7 @@ import pytest
 from support.fleet import week, write_table
 
 from gateway.archive import place_of
-from gateway.archive.fleet import FleetSummary, fleet_of
+from gateway.archive.fleet.fleet import FleetSummary, fleet_of
 
 TEXT = (Path(__file__).parents[2] / "docs/fleet-report.md").read_text(encoding="utf-8")
 SQL = [one for block in re.findall(r"```sql\n(.*?)```", TEXT, re.DOTALL) for one in block.split(";") if one.strip()]

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from support.fleet import DAY_S, MONDAY_S, row, week, write_table
 from support.html_page import Page
 
-from gateway.archive.fleet import monday_of
+from gateway.archive.fleet.weeks import monday_of
 from gateway.cli import main, springscale
 from gateway.reports.fleet.text import page_of, time_axis
 from gateway.reports.fleet.vehicle import runs_of

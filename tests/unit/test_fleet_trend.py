@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import false_discovery_control, kendalltau, theilslopes
 
-from gateway.archive.fleet.trend import FALSE_SHARE, LEAST_POINTS, believed, trend_of
+from gateway.archive.fleet.drift import FALSE_SHARE, LEAST_POINTS, believed, trend_of
 from gateway.records import F64
 
 X = np.arange(52.0) / 52.0

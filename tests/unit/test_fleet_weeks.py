@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 from support.fleet import DAY_S, MONDAY_S, row, week, write_table
 
 from gateway.archive import place_of
-from gateway.archive.fleet import DRIFTING, Health, Share
-from gateway.archive.fleet.batches import Batches, read_batches
-from gateway.archive.fleet.sensors import troubles_of
+from gateway.archive.fleet.batches import DRIFTING, Batches, read_batches
+from gateway.archive.fleet.sensors import Health, Share, troubles_of
 from gateway.archive.fleet.weeks import monday_of, weeks_of
 from gateway.estimate import Z95
 from gateway.reasons import EXPLANATIONS, Cause

@@ -13,7 +13,7 @@ from support.estimates import make_estimate, make_record, with_everything
 from support.patience import wait_until
 
 from gateway.config import VehicleSection
-from gateway.config.outward import UplinkSection
+from gateway.config.sections import UplinkSection
 from gateway.errors import ConfigurationError
 from gateway.estimate import Estimate, Weight, Weights
 from gateway.estimate_json import estimate_to_json

@@ -12,7 +12,7 @@ from gateway.calibration.campaign import load_campaign
 from gateway.calibration.judgement.assessment import judged_left_out
 from gateway.calibration.ratio_index import fit_regression, index_rows
 from gateway.core.settings import BatchSettings
-from gateway.offline import calibrate
+from gateway.offline.campaigns import calibrate
 
 FEW = ((0.0, None), (150.0, 0.5), (200.0, 2.6))
 LOADS = ((0.0, None), (0.0, None), (400.0, 0.5), (400.0, 0.5), (400.0, 2.4), (400.0, 2.4))  # none beyond the others

@@ -13,7 +13,7 @@ from gateway.calibration.inspection import Severity, row_facts
 from gateway.calibration.inspection.rows import rate_findings
 from gateway.core.settings import BatchSettings
 from gateway.offline.campaigns import read_whole_log
-from gateway.offline.look import why_silent
+from gateway.offline.look.look import why_silent
 from gateway.records import EXTENDED_ID, Frames, Signal
 from gateway.status import DecodeCount, SignalHealth, State, Status
 

@@ -19,7 +19,7 @@ from gateway.calibration.inspection import Inspection, RunVerdict
 from gateway.calibration.plan import Expected, LoadPlan, plan_first, plan_next, stated_widths, usual_drive
 from gateway.calibration.plan.plan import FIRST_DRIVE, N_FIRST
 from gateway.cli import springscale
-from gateway.cli.calibrate_text import plan_sentences, widths_sentence
+from gateway.cli.calibrate import plan_sentences, widths_sentence
 from gateway.core.vehicle import Carries
 from gateway.core.weights import weights_of
 from gateway.errors import CalibrationImpossibleError, CampaignError

@@ -8,7 +8,7 @@ from support.half_car_road import VAN, batch_over_road
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan import Advice, Expected, LoadPlan, OffCentreLoad, PlacedLoad
 from gateway.calibration.plan.plan import sideways_load
-from gateway.cli.calibrate_text import plan_sentences
+from gateway.cli.calibrate import plan_sentences
 from gateway.core.cross_spectrum.predicted import Drive
 from gateway.reports.calibration.runs import plan_section
 

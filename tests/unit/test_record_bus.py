@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from support.bus_drive import START_NS, white_noise
 from support.patience import wait_until
 
-from gateway.bus.live import LiveSource
+from gateway.bus.live.source import LiveSource
 from gateway.bus.logs.open import open_log
 from gateway.bus.ring.ring_log import record_to_file
 from gateway.bus.signals import load_signal_map

@@ -23,7 +23,7 @@ from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAME
 from gateway.estimate import Quantity
 from gateway.records import F64, Why
 from gateway.reports.calibration.accuracy import accuracy_section
-from gateway.reports.calibration.knowledge import knowledge_chart, knowledge_of, knowledge_table, told
+from gateway.reports.calibration.half_car import knowledge_chart, knowledge_of, knowledge_table, told
 
 WIDE = replace(VAN, track_width_m=1.5, sensor_offset_left_m=0.3)
 ROLL_PRIOR = prior_of(WIDE, with_roll=True)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gateway.reports.charts import (
+    COLOURS,
     Axis,
     Chart,
     ChartLink,
@@ -21,7 +22,6 @@ from gateway.reports.charts import (
     Span,
     Table,
 )
-from gateway.reports.charts.chart import COLOURS
 from gateway.reports.charts.html import section_html, table_html
 from gateway.reports.charts.live import live, plotly_json, plotly_script
 from gateway.reports.charts.still import draw, save_still

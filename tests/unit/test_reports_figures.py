@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.reports.charts.figures import panels, save
+from gateway.reports.charts.still import panels, save
 
 
 def drawn(directory: Path, last: float) -> str:

@@ -7,7 +7,8 @@ from typing import Any, cast
 
 import pytest
 
-from gateway.bus.live import BusSurvey, SourceState
+from gateway.bus.live.bus_survey import BusSurvey
+from gateway.bus.live.source import SourceState
 from gateway.records import Signal
 from gateway.service.status import SENSOR_LOST_S, StatusReport
 from gateway.status import State

@@ -9,19 +9,25 @@ import numpy as np
 import pytest
 from support.patience import wait_until
 
-from gateway.bus.live import LiveSource
+from gateway.bus.live.source import LiveSource
 from gateway.bus.signals import load_signal_map
 from gateway.calibration.campaign import load_campaign
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import cg_left_m, left_share_pct
 from gateway.errors import ConfigurationError
-from gateway.offline import split_runs
+from gateway.offline.campaigns import split_runs
 from gateway.records import Signal, Why
 from gateway.sim.vans import PAPER_VAN, VANS
 from gateway.sim.vehicle import front_share_pct, payload_kg
-from gateway.workbench import bench_of, stream, write_campaign
 from gateway.workbench.campaigns import PLANS, plan_of
-from gateway.workbench.simulate import BETWEEN_DRIVES_S, SENSORS_OF_MAP, simulated_frames
+from gateway.workbench.simulate import (
+    BETWEEN_DRIVES_S,
+    SENSORS_OF_MAP,
+    bench_of,
+    simulated_frames,
+    stream,
+    write_campaign,
+)
 
 
 @pytest.mark.parametrize("vehicle", list(VANS))

@@ -5,7 +5,7 @@ import re
 from support.estimates import make_record
 
 from gateway.calibration.plan import Advice, Expected, LoadPlan, PlacedLoad
-from gateway.cli.calibrate_text import plan_sentences
+from gateway.cli.calibrate import plan_sentences
 from gateway.cli.estimate import sentence
 from gateway.core.cross_spectrum.predicted import Drive
 from gateway.reports.calibration.runs import best_next, plan_section

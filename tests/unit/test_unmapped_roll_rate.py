@@ -7,7 +7,7 @@ import pytest
 
 from gateway.bus.signals import load_signal_map
 from gateway.bus.signals.signal_map import shipped_map, shipped_maps
-from gateway.offline.look import unmapped_roll_rate
+from gateway.offline.look.roles import unmapped_roll_rate
 
 ROLL_ENTRY = re.compile(r"^\[signals\.roll_rate\].*?(?=^\[|\Z)", re.DOTALL | re.MULTILINE)
 NO_NAMES = ("j1939", "j1939_aceinna")  # their rates are numbered

@@ -15,7 +15,7 @@ from support.log import fields_of, names
 from support.patience import PATIENCE_S, wait_until
 
 from gateway.config import VehicleSection
-from gateway.config.outward import UplinkSection
+from gateway.config.sections import UplinkSection
 from gateway.errors import ConfigurationError
 from gateway.log import Event
 from gateway.store import Retention, Store

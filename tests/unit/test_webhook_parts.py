@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from support.receiver import SECRET, SECRET_TEXT
 
 from gateway.config import VehicleSection
-from gateway.config.alarms import WebhookSection
+from gateway.config.sections import WebhookSection
 from gateway.errors import ConfigurationError
 from gateway.records import json_line
 from gateway.uplink.outbox import OutboxMessage

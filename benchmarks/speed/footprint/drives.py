@@ -11,12 +11,12 @@ from gateway.bus.logs import motion_of_log, write_candump
 from gateway.bus.signals import load_signal_map
 from gateway.core.flow import Identity
 from gateway.estimate import Estimate
-from gateway.offline import estimates_of_logs
+from gateway.offline.estimates import estimates_of_logs
 from gateway.records import Frames
 from gateway.setup import Setup, load_setup
 from gateway.sim.scenario import START_NS
 from gateway.units import NS_PER_S
-from gateway.workbench import demo_drive, frames_of
+from gateway.workbench.simulate import demo_drive, frames_of
 
 SIGNALS = "springscale:reference"
 REPEATS = 3  # chosen: the fastest counts

@@ -10,8 +10,8 @@ from benchmarks.speed.footprint.drives import SIGNALS
 from benchmarks.speed.meter import CALIBRATION
 from gateway.archive import place_of, slots_done
 from gateway.archive.manifest import load_manifest
-from gateway.archive.processes import Processes
 from gateway.archive.reprocess import reprocess
+from gateway.archive.workers import Processes
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.records import json_line

@@ -1,16 +1,93 @@
-"""Drift of vehicles in excess of the fleet's common seasonal movement, and of chance among many vehicles."""
+"""Drift of vehicles beyond the seasonal movement that the fleet has in common, and beyond chance among many vehicles.
 
+A slope is the median of the slopes between all pairs of points (Theil, 1950). Its interval and its test are those of
+Kendall's S (P. K. Sen, J. Am. Stat. Assoc. 63, 1968), with its variance increased if the residuals are autocorrelated
+(K. H. Hamed and A. R. Rao, J. Hydrology 204, 1998). Among a thousand vehicles some slopes arise by chance: the share of
+those among the flagged ones is bounded under any dependence (Y. Benjamini and D. Yekutieli, Ann. Statist. 29, 2001).
+"""
+
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Final
 
 import numpy as np
+from scipy.special import ndtr
+from scipy.stats import rankdata
 
 from gateway.archive.fleet.batches import DRIFTING
-from gateway.archive.fleet.trend import DriftTrend, believed, trend_of
 from gateway.archive.fleet.weeks import Weeks
-from gateway.records import F64, I64
+from gateway.calibration.trend import around_the_median, pair_slopes, variance_of_s
+from gateway.estimate import Z95
+from gateway.records import F64, I64, Bool
+
+LEAST_POINTS: Final = 8  # chosen: with fewer points S is not approximately normal
+MOST_ALIKE: Final = 0.95  # chosen: bound of the autocorrelation, for a finite variance
+FALSE_SHARE: Final = 0.05  # chosen: of the flagged, those that may be there by chance
+
+
+@dataclass(frozen=True, slots=True)
+class DriftTrend:
+    """A slope in units per unit of x, its 95 % interval and its p-value."""
+
+    slope: float
+    low: float
+    high: float
+    p: float
+    n: int
+
+
+def trend_of(x: F64, y: F64) -> DriftTrend | None:
+    """The trend of y over x (n,), both finite, x rising; None with too few points."""
+    n = len(x)
+    if n < LEAST_POINTS:
+        return None
+    slopes = pair_slopes(x, y)
+    slope = float(np.median(slopes))
+    std = math.sqrt(variance_of_s(x, y) * _repeated(y - slope * x))
+    low, high = around_the_median(slopes, Z95 * std)
+    return DriftTrend(slope, low, high, _chance(float(np.sign(slopes).sum()), std), n)
+
+
+def believed(p: Sequence[float]) -> Bool:
+    """Which of these p-values (n,) are significant, with at most FALSE_SHARE of them by chance."""
+    chances = np.asarray(p, dtype=float)
+    n = len(chances)
+    if n == 0:
+        return np.zeros(0, dtype=bool)
+    order = np.argsort(chances)
+    allowed = FALSE_SHARE * np.arange(1, n + 1) / (n * np.sum(1.0 / np.arange(1, n + 1)))
+    below = np.flatnonzero(chances[order] <= allowed)
+    chosen = np.zeros(n, dtype=bool)
+    if below.size:
+        chosen[order[: below[-1] + 1]] = True
+    return chosen
+
+
+def _repeated(left: F64) -> float:
+    """Factor of the variance of S due to autocorrelation of neighbouring weeks; at least 1.
+
+    Ranks are taken to have an autocorrelation r, r squared over two weeks and so on. Its estimate from n points is too
+    small by about (1 + 4 r) / n (F. H. C. Marriott and J. A. Pope, Biometrika 41, 1954) for the removed mean, and by 1
+    / n more for the slope.
+    """
+    n = len(left)
+    ranks = rankdata(left) - (n + 1) / 2.0
+    power = float(ranks @ ranks)
+    if power == 0.0:
+        return 1.0
+    found = float(ranks[:-1] @ ranks[1:]) / power
+    alike = min(MOST_ALIKE, max(0.0, (n * found + 2.0) / (n - 4.0)))
+    lags = np.arange(1, n - 2)
+    counts = (n - lags) * (n - lags - 1.0) * (n - lags - 2.0) * alike**lags
+    return 1.0 + 2.0 / (n * (n - 1.0) * (n - 2.0)) * float(np.sum(counts))
+
+
+def _chance(s: float, std: float) -> float:
+    """Two-sided p-value, by the normal distribution with continuity correction."""
+    return 1.0 if std == 0.0 else min(1.0, 2.0 * float(ndtr(-max(0.0, abs(s) - 1.0) / std)))
+
 
 LEAST_IN_WEEK: Final = 5  # chosen: batches with a number for the median of a week
 LEAST_VEHICLES: Final = 20  # chosen: with fewer, common movement cannot be separated from a single vehicle's

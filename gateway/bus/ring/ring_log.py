@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import BinaryIO, Final
 
 from gateway.bus.frames import join
-from gateway.bus.live import LiveSource
+from gateway.bus.live.source import LiveSource
 from gateway.bus.ring.folder import RingFolder, RingLimits
 from gateway.bus.ring.segment import Segment, head_of, packed_block
 from gateway.log import Event, log_event

@@ -14,12 +14,12 @@ from gateway.bus.signals.mapping import (
     EVERY_IDENTIFIER,
     IdFilter,
     MappedMessage,
+    SignalMap,
     id_name,
     j1939_filter,
 )
 from gateway.bus.signals.signal_map import (
     SHIPPED_PREFIX,
-    SignalMap,
     SignalMapFile,
     load_signal_map,
     shipped_databases,

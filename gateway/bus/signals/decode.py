@@ -96,9 +96,6 @@ def is_j1939_code(field: BitField, bits: U64) -> Bool:
     return np.asarray(bits >= np.uint64((1 << field.length) - n_codes))
 
 
-__all__ = ["Decoder", "Rejected", "SignalCounts"]
-
-
 @dataclass(frozen=True, slots=True)
 class SignalCounts:
     """Outcomes of the frames that can carry one signal."""

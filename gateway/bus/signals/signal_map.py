@@ -197,8 +197,6 @@ def _bits_of(raw: int, field: BitField) -> int:
     return raw & ((1 << field.length) - 1)
 
 
-__all__ = ["SignalEntry", "SignalMap", "SignalMapFile", "load_signal_map", "shipped_map", "shipped_maps"]
-
 SHIPPED_PREFIX: Final = "springscale:"
 
 

@@ -7,12 +7,14 @@ right-hand rule of gyroscopes. A name with "pitch" or "roll" takes precedence.
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from gateway.bus.signals import MappedMessage, SignalMap
+from gateway.bus.signals.mapping import MappedSignal
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2
 from gateway.offline.look.readings import SignalReading
 from gateway.records import F64, Signal
@@ -52,23 +54,28 @@ def roles_of(readings: Sequence[SignalReading]) -> tuple[FoundRole, ...]:
     found = [each for each in (up, speed) if each]
     if up is not None:
         forward = _forward(readings, up, speed)
-        pitch, roll = _pitch(readings, up, forward), _roll(readings, up, forward)
+        pitch, roll = (
+            _named(readings, up, role, word) or _about(readings, up, role, axis, why)
+            for role, word, axis, why in (
+                (Signal.PITCH_RATE, _PITCH, _left(up, forward), "the rate about left = up x forward"),
+                (Signal.ROLL_RATE, ROLL, _ahead(up, forward), "the rate about forward"),
+            )
+        )
         found += [each for each in (forward, pitch, roll) if each]
     return tuple(sorted(found, key=lambda each: list(Signal).index(each.role)))
 
 
 def upright(readings: Iterable[SignalReading]) -> FoundRole | None:
     """The fastest acceleration that reads gravity."""
-    candidates = [r for r in readings if r.quantity == "acceleration" and _reads_gravity(r)]
+    candidates = [
+        r for r in readings
+        if r.quantity == "acceleration" and abs(abs(r.usual) - STANDARD_GRAVITY_MPS2) < GRAVITY_TOLERANCE_MPS2
+    ]  # fmt: skip
     if not candidates:
         return None
     best = max(candidates, key=lambda r: (round(r.rate_hz), -abs(abs(r.usual) - STANDARD_GRAVITY_MPS2)))
     sign = 1 if best.usual > 0.0 else -1
     return FoundRole(Signal.VERTICAL_ACCELERATION, best, sign, f"reads {best.usual:+.2f} m/s2: this axis is vertical")
-
-
-def _reads_gravity(reading: SignalReading) -> bool:
-    return abs(abs(reading.usual) - STANDARD_GRAVITY_MPS2) < GRAVITY_TOLERANCE_MPS2
 
 
 def tilt_deg(readings: Iterable[SignalReading], up: FoundRole) -> float:
@@ -134,18 +141,6 @@ def _second_by_second(t_s: F64, x: F64, n: int) -> F64:
     return np.where(n_samples > 0, total / np.maximum(n_samples, 1), np.nan)
 
 
-def _pitch(readings: Sequence[SignalReading], up: FoundRole, forward: FoundRole | None) -> FoundRole | None:
-    """The rate about the axis that points left."""
-    named = _named(readings, up, Signal.PITCH_RATE, _PITCH)
-    return named or _about(readings, up, Signal.PITCH_RATE, _left(up, forward), "the rate about left = up x forward")
-
-
-def _roll(readings: Sequence[SignalReading], up: FoundRole, forward: FoundRole | None) -> FoundRole | None:
-    """The rate about the axis that points forward."""
-    named = _named(readings, up, Signal.ROLL_RATE, ROLL)
-    return named or _about(readings, up, Signal.ROLL_RATE, _ahead(up, forward), "the rate about forward")
-
-
 def _named(readings: Sequence[SignalReading], up: FoundRole, role: Signal, word: re.Pattern[str]) -> FoundRole | None:
     """The rate with the word in its name; the name gives no sign."""
     fit = [r for r in _rates(readings, up) if word.search(r.signal.name) and "accel" not in r.signal.name.lower()]
@@ -166,12 +161,9 @@ def _about(
 
 def _rates(readings: Sequence[SignalReading], up: FoundRole) -> list[SignalReading]:
     """The angular rates of the same channel, those of the same message first, then the fastest."""
-    rates = [r for r in readings if r.quantity == "angular_rate" and r.described.heard.channel == _channel(up)]
+    channel = up.reading.described.heard.channel
+    rates = [r for r in readings if r.quantity == "angular_rate" and r.described.heard.channel == channel]
     return sorted(rates, key=lambda r: (r.described is not up.reading.described, -round(r.rate_hz)))
-
-
-def _channel(found: FoundRole) -> str | None:
-    return found.reading.described.heard.channel
 
 
 def _left(up: FoundRole, forward: FoundRole | None) -> tuple[str, int, bool]:
@@ -179,10 +171,14 @@ def _left(up: FoundRole, forward: FoundRole | None) -> tuple[str, int, bool]:
     ahead, ahead_sign, is_sure = _ahead(up, forward)
     if not ahead:
         return "", 1, False
-    up_axis = axis_of(up.reading.signal.name)
-    turns = np.cross(up.sign * np.eye(3)[_AXES.index(up_axis)], ahead_sign * np.eye(3)[_AXES.index(ahead)])
-    left = int(np.argmax(np.abs(turns)))
-    return _AXES[left], int(np.sign(turns[left])), is_sure
+    return *_crossed((axis_of(up.reading.signal.name), up.sign), (ahead, ahead_sign)), is_sure
+
+
+def _crossed(one: tuple[str, float], other: tuple[str, float]) -> tuple[str, int]:
+    """The axis along one x other and its sign; each is given by its name and a number of its sign."""
+    turns = np.cross(*(np.sign(sign) * np.eye(3)[_AXES.index(axis)] for axis, sign in (one, other)))
+    at = int(np.argmax(np.abs(turns)))
+    return _AXES[at], int(np.sign(turns[at]))
 
 
 def _ahead(up: FoundRole, forward: FoundRole | None) -> tuple[str, int, bool]:
@@ -205,3 +201,46 @@ def _speed(readings: Iterable[SignalReading]) -> FoundRole | None:
 def _is_speed(reading: SignalReading) -> bool:
     is_named = _SPEED.search(reading.name) and not _NO_SPEED.search(reading.signal.name)
     return bool(is_named and len(reading.x) and np.min(reading.x) > -1.0 and np.max(reading.x) < FASTEST_MPS)
+
+
+_ROLL_SIGN: Final = "sign 1 or -1: it must go up as a bend to the left begins"
+_BY_AXES: Final = "its sign by the right-hand rule from the two axes that are mapped"
+
+
+def unmapped_roll_rate(signal_map: SignalMap) -> str | None:
+    """The entry for the map; None if the map has a roll rate, or no name in the message suggests one.
+
+    A name with "roll" takes precedence. Otherwise it is the third axis beside those of the vertical acceleration and of
+    the pitch rate: forward = left x up, with left and up as these two are mapped.
+    """
+    pitch = next(_mapped(signal_map, Signal.PITCH_RATE), None)
+    if pitch is None or Signal.ROLL_RATE in signal_map.signals:
+        return None
+    message, pitch_rate = pitch
+    beside = [name for name in message.fields if name != pitch_rate.dbc_signal]
+    named = [name for name in beside if ROLL.search(name) and "accel" not in name.lower()]
+    if named:
+        return _entry(message, named[0], _ROLL_SIGN)
+    up = next((signal for _, signal in _mapped(signal_map, Signal.VERTICAL_ACCELERATION)), None)
+    axis, sign = "", 1
+    if up is not None:
+        up_axis, left_axis = axis_of(up.dbc_signal), axis_of(pitch_rate.dbc_signal)
+        if up_axis and left_axis and up_axis != left_axis:
+            axis, sign = _crossed((left_axis, pitch_rate.to_si), (up_axis, up.to_si))
+    like_pitch = [name for name in beside if axis and _with_axis(pitch_rate.dbc_signal, axis) == name]
+    return _entry(message, like_pitch[0], f"sign = {sign}, {_BY_AXES}") if like_pitch else None
+
+
+def _mapped(signal_map: SignalMap, wanted: Signal) -> Iterator[tuple[MappedMessage, MappedSignal]]:
+    for message in signal_map.messages:
+        yield from ((message, signal) for signal in message.signals if signal.signal is wanted)
+
+
+def _entry(message: MappedMessage, name: str, sign: str) -> str:
+    return f'[signals.roll_rate] with message = "{message.name}", signal = "{name}", and {sign}'
+
+
+def _with_axis(name: str, axis: str) -> str:
+    """The name of the same quantity about another axis: AngularRateZ and y give AngularRateY."""
+    at = max(name.lower().rfind(each) for each in _AXES)
+    return name[:at] + (axis.upper() if name[at].isupper() else axis) + name[at + 1 :]

@@ -7,16 +7,17 @@ They raise ConfigurationError if the directory cannot be created. The page is se
 from elsewhere, and reads without scripts.
 """
 
-import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
+from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import Campaign
 from gateway.calibration.judgement import (
     PART_NAMES,
     Assessment,
+    Grade,
     LearningCurve,
     Verdict,
     assess_calibration,
@@ -29,18 +30,22 @@ from gateway.estimate_json.errors import budget_to_json
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.half_car import half_car_section
 from gateway.reports.calibration.learning import learning_section
-from gateway.reports.calibration.page import ReportPage, page_html
 from gateway.reports.calibration.ratio_index import ratio_index_section
 from gateway.reports.calibration.runs import best_next, plan_section, provenance_section, runs_section
 from gateway.reports.calibration.spectra import spectra_section
-from gateway.reports.calibration.text import decimal, span
-from gateway.reports.charts import Chart, Section
-from gateway.reports.charts.live import plotly_json, plotly_script
-from gateway.reports.charts.still import save_still
-from gateway.reports.folder import made_folder
+from gateway.reports.calibration.text import decimal, estimator_name, span
+from gateway.reports.charts import Section
+from gateway.reports.charts.html import (
+    PLOTLY_FILE,
+    OnChart,
+    Page,
+    charts_of,
+    made_folder,
+    prose,
+    sections_html,
+    write_report,
+)
 from gateway.words import counted
-
-OnChart = Callable[[int, int], None]  # (charts drawn, charts in all)
 
 
 def write_calibration_report(
@@ -94,33 +99,17 @@ def _write(
     curve: LearningCurve | None = None,
 ) -> Path:
     made_folder(directory)
-    charts = list(_charts(sections))
-    for done, chart in enumerate(charts, 1):
-        save_still(chart, directory / "figures")
-        on_chart(done, len(charts))
     verdicts = verdicts_of(assessment, plan.now if plan else None)
-    page = ReportPage(
+    verdict = _verdict_html(verdicts, _in_short(assessment, verdicts[0]), best_next(plan) if plan else None)
+    page = Page(
         assessment.title,
-        _subtitle(assessment),
-        verdicts,
-        _in_short(assessment, verdicts[0]),
-        best_next(plan) if plan else None,
-        tuple(sections),
-        {chart.name: plotly_json(chart) for chart in charts},
+        f"<p>{prose(_subtitle(assessment))}</p>",
+        verdict + sections_html(sections),
+        ("verdict", "Skip to the verdict"),
+        PLOTLY_FILE if any(charts_of(sections)) else None,
     )
-    (directory / "plotly.min.js").write_text(plotly_script(), encoding="utf-8")
     numbers = report_json(assessment, verdicts, plan) | {"learning_curve": curve.to_json() if curve else None}
-    text = json.dumps(numbers, indent=1, allow_nan=False)
-    (directory / "report.json").write_text(text + "\n", encoding="utf-8")
-    report = directory / "report.html"
-    report.write_text(page_html(page), encoding="utf-8")
-    return report
-
-
-def _charts(sections: list[Section]) -> Iterator[Chart]:
-    for section in sections:
-        yield from section.charts
-        yield from (item for _, inside in section.folded for item in inside if isinstance(item, Chart))
+    return write_report(directory, page, sections, numbers, on_chart)
 
 
 def _subtitle(assessment: Assessment) -> str:
@@ -181,3 +170,38 @@ def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...], plan: Loa
         "error_budget": {one.estimator: budget_to_json(stated_budget(one)) for one in assessment.judgements},
         "plan": plan.to_json() if plan else None,
     }
+
+
+GRADE_TEXT: Final = {
+    Grade.FIT: "Fit for use",
+    Grade.RESERVED: "Fit for use with reservations",
+    Grade.UNFIT: "Not fit for use",
+}
+_RULE_TEXT: Final = {Grade.FIT: "Fit", Grade.RESERVED: "With reservations", Grade.UNFIT: "Not fit"}
+_GRADE_MARK: Final = {Grade.FIT: "✓", Grade.RESERVED: "!", Grade.UNFIT: "✗"}
+
+
+def _verdict_html(verdicts: Sequence[Verdict], in_short: str, next_run: str | None) -> str:
+    """The verdict on the estimator that the service runs, with the reasons of all."""
+    running = verdicts[0]
+    several = ", which the service runs by default" if len(verdicts) > 1 else ""
+    advice = f"<h3>What to drive next</h3><p>{prose(next_run)}</p>" if next_run else ""
+    return (
+        f'<section id="verdict" class="{running.grade}"><h2>{_mark(running.grade)} {GRADE_TEXT[running.grade]}</h2>'
+        f"<p>By the {escape(estimator_name(running.estimator))}{several}. {prose(in_short)}</p>{advice}"
+        f"{''.join(_reasons(verdict) for verdict in verdicts)}</section>"
+    )
+
+
+def _reasons(verdict: Verdict) -> str:
+    rows = "".join(
+        f'<li class="{reason.grade}">{_mark(reason.grade)} <span class="unseen">{_RULE_TEXT[reason.grade]}: </span>'
+        f"{prose(reason.text)}</li>"
+        for reason in verdict.reasons
+    )
+    name = estimator_name(verdict.estimator)
+    return f'<h3>{escape(name.capitalize())}: {GRADE_TEXT[verdict.grade].lower()}</h3><ul class="reasons">{rows}</ul>'
+
+
+def _mark(grade: Grade) -> str:
+    return f'<span class="mark" aria-hidden="true">{_GRADE_MARK[grade]}</span>'

@@ -1,15 +1,24 @@
-"""Sections, charts and tables as HTML, readable without scripts; plotly.min.js, if present, draws the charts."""
+"""A report's directory: sections, charts and tables as HTML, with figures and numbers beside it.
 
+The pages load nothing from other hosts and can be read without scripts; plotly.min.js, if present, draws the charts.
+"""
+
+import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
-from typing import Final
+from pathlib import Path
+from typing import Any, Final
 
-from gateway.reports.charts.chart import Cell, Chart, ChartLink, Section, Table
+from gateway.errors import ConfigurationError
+from gateway.reports.charts import Cell, Chart, ChartLink, Section, Table
+from gateway.reports.charts.live import plotly_json, plotly_script
+from gateway.reports.charts.still import save_still
 
 PLOTLY_FILE: Final = "plotly.min.js"
+OnChart = Callable[[int, int], None]  # (charts drawn, charts in all)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +50,48 @@ def document(page: Page) -> str:
     )
 
 
-def contents_html(sections: Sequence[Section]) -> str:
-    """Table of contents: links to the sections."""
+def write_report(
+    directory: Path,
+    page: Page,
+    sections: Sequence[Section],
+    numbers: Mapping[str, Any],
+    on_chart: OnChart = lambda done, of: None,
+) -> Path:
+    """Write report.html, its numbers as report.json, plotly and the charts' figures; return the path of report.html."""
+    charts = list(charts_of(sections))
+    for done, chart in enumerate(charts, 1):
+        save_still(chart, directory / "figures")
+        on_chart(done, len(charts))
+    (directory / PLOTLY_FILE).write_text(plotly_script(), encoding="utf-8")
+    text = json.dumps(numbers, indent=1, allow_nan=False, ensure_ascii=False)
+    (directory / "report.json").write_text(text + "\n", encoding="utf-8")
+    report = directory / "report.html"
+    report.write_text(document(page), encoding="utf-8")
+    return report
+
+
+def made_folder(directory: Path) -> None:
+    """Create the directory if needed. Raises ConfigurationError if that fails."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        why = f"no report can be written there ({fault.strerror}): name a directory"
+        raise ConfigurationError(f"{directory}: {why}") from None
+
+
+def charts_of(sections: Sequence[Section]) -> Iterator[Chart]:
+    """Every chart of the sections, collapsed ones too."""
+    for section in sections:
+        yield from section.charts
+        yield from (item for _, inside in section.folded for item in inside if isinstance(item, Chart))
+
+
+def sections_html(sections: Sequence[Section]) -> str:
+    """The table of contents and the sections."""
     links = "".join(f'<li><a href="#{one.anchor}">{escape(one.heading)}</a></li>' for one in sections)
-    return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
+    live = {chart.name: plotly_json(chart) for chart in charts_of(sections)}
+    body = "".join(section_html(one, live) for one in sections)
+    return f'<nav aria-label="Contents"><ul>{links}</ul></nav>{body}'
 
 
 def prose(text: str) -> str:

@@ -10,7 +10,7 @@ from plotly.io.json import to_json_plotly
 from plotly.offline import get_plotlyjs
 from plotly.subplots import make_subplots
 
-from gateway.reports.charts.chart import COLOURS, Axis, Chart, LineMark, Mark, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts import COLOURS, Axis, Chart, LineMark, Mark, Panel, Points, Ribbon, Rule, Span
 
 _LEGEND_PX: Final = 90  # chosen: by eye, like the next three
 _NAME_PX: Final = 20  # chosen: height of a name

@@ -8,8 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from gateway.archive.fleet import DRIFTING, OF_VEHICLE, Drift, FleetSummary, FleetVehicle
-from gateway.archive.fleet.trend import FALSE_SHARE
+from gateway.archive.fleet.batches import DRIFTING, OF_VEHICLE
+from gateway.archive.fleet.drift import FALSE_SHARE, Drift
+from gateway.archive.fleet.fleet import FleetSummary, FleetVehicle
 from gateway.reasons import Cause
 from gateway.reports.charts import Axis, Chart, ChartLink, LineMark, Mark, Panel, Points, Ribbon, Section, Table
 from gateway.reports.fleet.text import (

@@ -7,7 +7,10 @@ from collections.abc import Sequence
 from datetime import date
 from typing import Final
 
-from gateway.archive.fleet import OF_SENSOR, OF_VEHICLE, Drift, DriftTrend, Share, Trouble, monday_of
+from gateway.archive.fleet.batches import OF_SENSOR, OF_VEHICLE
+from gateway.archive.fleet.drift import Drift, DriftTrend
+from gateway.archive.fleet.sensors import Share, Trouble
+from gateway.archive.fleet.weeks import monday_of
 from gateway.reports.charts import Axis
 
 NONE: Final = "–"

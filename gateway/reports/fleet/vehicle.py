@@ -5,7 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.archive.fleet import DRIFTING, FleetVehicle
+from gateway.archive.fleet.batches import DRIFTING
+from gateway.archive.fleet.fleet import FleetVehicle
 from gateway.archive.fleet.weeks import known_reason
 from gateway.reasons import EXPLANATIONS, Cause
 from gateway.records import I64, Bool

@@ -16,8 +16,8 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.ratio_index.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
 from gateway.core.settings import BatchSettings
-from gateway.offline import calibrate, split_runs
-from gateway.workbench import bench_of, write_campaign
+from gateway.offline.campaigns import calibrate, split_runs
+from gateway.workbench.simulate import bench_of, write_campaign
 
 OnStep = Callable[[str, int, int], None]  # (what is being done, steps done, steps in all)
 

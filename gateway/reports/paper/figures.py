@@ -12,10 +12,11 @@ from gateway.calibration.ratio_index import N_SEGMENT, IndexRows, fit_regression
 from gateway.core.ratio_index.index import PAPER_BANDS, Band, band_pass_gain, mean_spectrum
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
 from gateway.records import F64
-from gateway.reports.charts.figures import COLOURS, panels
+from gateway.reports.charts.still import panels
 from gateway.reports.paper.experiments import Experiments, Method
 from gateway.units import NS_PER_S
 
+COLOURS = ("#0b6fa4", "#d1495b", "#2e8b57", "#8e6c8a", "#edae49")
 ACCELERATION = "acceleration"
 PITCH_RATE = "pitch_rate"
 UNIT = {ACCELERATION: "m/s²/√Hz", PITCH_RATE: "rad/s/√Hz"}
