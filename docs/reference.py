@@ -26,7 +26,7 @@ from gateway.calibration.axle_weights import (
     sprung_of,
 )
 from gateway.calibration.campaign import CampaignTable, RunTable
-from gateway.calibration.file import CalibrationFile
+from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.inspection.finding import Kind, Topic
 from gateway.cli.calibration import vehicle_block
 from gateway.config import Settings

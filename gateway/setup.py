@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gateway.bus.signals import SignalMap, load_signal_map
-from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.calibration.known_weights_file import load_known_weights
 from gateway.config import Settings
 from gateway.core.calibrated import CalibratedVehicle

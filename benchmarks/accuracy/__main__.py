@@ -25,7 +25,7 @@ from benchmarks.accuracy.sensitivity import study as sensitivity
 from benchmarks.accuracy.sensor_bounds import limits, limits_table
 from benchmarks.accuracy.study import Study
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.inspection import SplitRun
+from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.judgement import learning_curve as on_learning
 from gateway.cli.options import FILE, batch_settings, window
 from gateway.cli.progress import counted

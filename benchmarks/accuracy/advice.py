@@ -13,10 +13,12 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.accuracy.markdown import number, page, table
-from gateway.calibration.inspection import SplitRun
-from gateway.calibration.judgement import errors_of, judge
+from gateway.calibration.inspection.log import SplitRun
+from gateway.calibration.judgement.evaluation import errors_of, judge
 from gateway.calibration.judgement.learning_curve import calibrated_on, triples_at_different_positions
-from gateway.calibration.plan import Design, PlacedLoad, usual_drive, weighed_loads
+from gateway.calibration.plan.design import Design
+from gateway.calibration.plan.loads import PlacedLoad, weighed_loads
+from gateway.calibration.plan.plan import usual_drive
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cargo import shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration

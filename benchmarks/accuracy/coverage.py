@@ -25,8 +25,8 @@ from benchmarks.accuracy.markdown import (
     width_and_score,
 )
 from benchmarks.accuracy.study import Study
-from gateway.calibration.judgement import judge
 from gateway.calibration.judgement.coverage import PROMISED
+from gateway.calibration.judgement.evaluation import judge
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import CalibrationImpossibleError

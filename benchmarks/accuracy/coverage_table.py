@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.calibration.judgement import Coverage, Judged, coverage_of
-from gateway.calibration.judgement.coverage import interval_scores
+from gateway.calibration.judgement.coverage import Coverage, coverage_of, interval_scores
+from gateway.calibration.judgement.evaluation import Judged
 from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.records import Why

@@ -36,7 +36,7 @@ from benchmarks.accuracy.markdown import (
     width_and_score,
 )
 from benchmarks.accuracy.study import Study
-from gateway.calibration.judgement import judge
+from gateway.calibration.judgement.evaluation import judge
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.records import Motion, Why
 from gateway.sim.sensors import Sensors

@@ -18,15 +18,15 @@ from benchmarks.accuracy.lines import MIXED, SCOPE, Drawn, draw_line, drawn_van,
 from benchmarks.accuracy.lines import Line as DrawnLine
 from benchmarks.accuracy.markdown import Column, Row, page, table_of, text
 from benchmarks.accuracy.study import Study
-from gateway.calibration.commissioning import NO_LINE, LineFacts, doubts_of, vehicle_table
+from gateway.calibration.commissioning.answers import NO_LINE, LineFacts, doubts_of, vehicle_table
 from gateway.calibration.contradicted import contradictions
-from gateway.calibration.half_car import fit_cross_spectrum
+from gateway.calibration.half_car.fit import fit_cross_spectrum
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.line import Line, Sister, line_of
+from gateway.calibration.line.line import Line, Sister, line_of
 from gateway.errors import CampaignError, LineError
 from gateway.sim.vans import VANS
 from gateway.sim.vehicle import Load
-from gateway.stated import DIVISION_KG, VehicleAnswers
+from gateway.stated.facts import DIVISION_KG, VehicleAnswers
 
 SEED: Final = 20304  # arbitrary, of this study alone
 N_LINES: Final = 3  # chosen: one of each type

@@ -17,7 +17,7 @@ from benchmarks.accuracy.disturbed import noisier
 from benchmarks.accuracy.drives import AS_CALIBRATED, TRIPS, USUAL, Scope, driven, fresh_van
 from benchmarks.accuracy.markdown import number, page, rejected_cell, table
 from benchmarks.accuracy.study import Study
-from gateway.calibration.judgement import judge
+from gateway.calibration.judgement.evaluation import judge
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.errors import CalibrationImpossibleError
 from gateway.sim.sensors import CANMOD, REFERENCE, Sensors

@@ -20,8 +20,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car import prior_of
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
+from gateway.calibration.half_car.prior import prior_of
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.likelihood import EFFECTIVE_SHARE, Point, Whittle
 from gateway.core.cross_spectrum.model.half_car import frequency_response

@@ -14,10 +14,11 @@ from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, coverage_
 from benchmarks.accuracy.lines import Driven, draw_line, sibling, sister
 from benchmarks.accuracy.markdown import Column, page, rejected_cell, table_of, target_columns, text
 from benchmarks.accuracy.study import Study
-from gateway.calibration.half_car import CrossSpectrumFit, fit_cross_spectrum
-from gateway.calibration.judgement import judge
+from gateway.calibration.half_car.fit import CrossSpectrumFit, fit_cross_spectrum
+from gateway.calibration.judgement.evaluation import judge
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.line import Line, Sibling, Sister, line_of, with_siblings_left_out
+from gateway.calibration.line.left_out import Sibling, with_siblings_left_out
+from gateway.calibration.line.line import Line, Sister, line_of
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.known_weights import Knowledge, Observation
 from gateway.core.vehicle import Vehicle

@@ -18,9 +18,8 @@ from typing import Any, Final
 from benchmarks.speed.meter import CALIBRATION, ONE_THREAD, best_of, cpu_s, springscale
 from gateway.bus.signals import Decoder, SignalMap, load_signal_map
 from gateway.calibration.campaign import CampaignTable, load_campaign
-from gateway.calibration.commissioning import JOB, RESULT, Drive, Job, Result
-from gateway.calibration.commissioning.job import to_file
-from gateway.calibration.kept import KeptBatch, kept_batch_of, packed
+from gateway.calibration.commissioning.job import JOB, RESULT, Drive, Job, Result, to_file
+from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of, packed
 from gateway.config import ESTIMATOR_NAMES
 from gateway.config.sections import CommissioningSection
 from gateway.core.estimator import estimate

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.errors import CampaignError
-from gateway.stated import DIVISION_KG
+from gateway.stated.facts import DIVISION_KG
 
 UNSPRUNG_SHARE: Final = 0.065  # of the empty sprung mass, per axle; docs/campaign.md compares it with measured cars
 ESTIMATED_UNSPRUNG_STD: Final = 0.3  # chosen: of an unsprung mass that is estimated

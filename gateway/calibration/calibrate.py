@@ -10,14 +10,20 @@ import numpy as np
 
 from gateway.calibration.campaign import Campaign, file_sha256
 from gateway.calibration.contradicted import contradictions
-from gateway.calibration.file import CalibrationFile, ExpectedErrorsPart, LikeFile, ProvenancePart, RunPart, SeenPart
-from gateway.calibration.half_car import CrossSpectrumFit, fit_cross_spectrum
+from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file.line_file import LikeFile
+from gateway.calibration.file.parts import ExpectedErrorsPart, ProvenancePart, RunPart, SeenPart
+from gateway.calibration.half_car.fit import CrossSpectrumFit, fit_cross_spectrum
 from gateway.calibration.inheritance import Seen
-from gateway.calibration.inspection import Inspection, Kind, Severity, SplitRun
+from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.finding import Kind, Severity
+from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
-from gateway.calibration.line import Line
+from gateway.calibration.line.line import Line
 from gateway.calibration.line_files import line_of_files, line_part
-from gateway.calibration.ratio_index import BandChoice, RatioIndexFit, StructureChoice, fit_ratio_index
+from gateway.calibration.ratio_index.bands import BandChoice
+from gateway.calibration.ratio_index.choice import StructureChoice
+from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Batch

@@ -11,7 +11,7 @@ from gateway.core.known_weights import KnownWeightKind
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.core.weights import Unsprung
 from gateway.errors import WeightRefusedError
-from gateway.stated_weight import StatedWeight
+from gateway.stated.facts import StatedWeight
 
 LEAST_PAYLOAD_SHARE: Final = -0.1  # chosen: of the empty mass; less means another vehicle or another unit
 MOST_PAYLOAD_SHARE: Final = 3.0  # chosen: of the empty mass; more means another unit

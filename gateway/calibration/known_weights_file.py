@@ -17,7 +17,7 @@ from gateway.errors import ConfigurationError
 from gateway.estimate_json import posterior_from_json
 from gateway.files.kept import KeptFiles
 from gateway.records import ns_of
-from gateway.stated import Confirmation, Ending, KnownWeightFields
+from gateway.stated.facts import Confirmation, Ending, KnownWeightFields
 from gateway.toml_file import describe_faults
 
 FILE_NAME: Final = "known_weights.json"

@@ -3,18 +3,13 @@
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 
-from gateway.calibration.file import (
-    CalibrationFile,
-    EvidencePart,
-    ExpectedErrorsPart,
-    LikeFile,
-    LineFile,
-    LinePart,
-    SiblingPart,
-)
-from gateway.calibration.file.line_part import NAMES
+from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file.line_file import LikeFile, LineFile, SiblingPart
+from gateway.calibration.file.parts import NAMES, EvidencePart, ExpectedErrorsPart, LinePart
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.line import Evidence, Line, Sibling, Sister, line_of, with_siblings_left_out
+from gateway.calibration.line.evidence import Evidence
+from gateway.calibration.line.left_out import Sibling, with_siblings_left_out
+from gateway.calibration.line.line import Line, Sister, line_of
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS
 from gateway.errors import LineError
 

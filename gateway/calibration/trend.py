@@ -24,7 +24,7 @@ from gateway.units import NS_PER_S
 
 FILE_NAME: Final = "trend.json"
 MOST_WEEKS: Final = 520  # chosen: of all calibrations together, ten years; the newest are kept
-LEAST_POINTS: Final = {"week": 8, "zero": 5}
+LEAST_POINTS: Final = {"week": 8, "zero": 5}  # chosen: weeks, and readings of the empty vehicle, for a robust slope
 CONFIDENCE: Final = 0.99  # chosen: of a change's interval
 LEAST_BATCHES: Final = 24  # chosen: for a level; two hours, seldom with a single load or road
 ALIKE_BATCHES: Final = 6  # chosen: batches of one load and road with correlated errors

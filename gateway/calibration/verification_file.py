@@ -8,7 +8,7 @@ from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.file.parts import Part
 from gateway.calibration.known_weight import StatedLoad
 from gateway.core.vehicle import Vehicle
-from gateway.stated_weight import StatedWeight
+from gateway.stated.facts import StatedWeight
 
 FILE_NAME: Final = "verifications.json"
 MOST_ENTRIES: Final = 500  # chosen: beyond it the oldest are dropped

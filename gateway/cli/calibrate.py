@@ -9,21 +9,25 @@ import click
 
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.file import CalibrationFile, LikeFile, load_like
-from gateway.calibration.inspection import Finding, Inspection, Kind, RunVerdict, SplitRun
-from gateway.calibration.judgement import LearningCurve, curve_of
+from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file.line_file import LikeFile, load_like
+from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
+from gateway.calibration.inspection.log import SplitRun
+from gateway.calibration.judgement.learning_curve import LearningCurve, curve_of
 from gateway.calibration.line_files import line_of_files
-from gateway.calibration.plan import (
+from gateway.calibration.plan.loads import PlacedLoad
+from gateway.calibration.plan.plan import (
     Expected,
     LoadPlan,
-    PlacedLoad,
     StatedWidths,
     plan_first,
     plan_next,
     stated_widths,
     usual_drive,
 )
-from gateway.calibration.ratio_index import BandChoice, StructureChoice
+from gateway.calibration.ratio_index.bands import BandChoice
+from gateway.calibration.ratio_index.choice import StructureChoice
 from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, require_output_place, window
 from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES

@@ -10,23 +10,21 @@ import click
 
 from gateway.calibration.axle_weights import UNSPRUNG_SHARE, AxleWeights, Sprung, sprung_of
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.file import (
-    CalibrationFile,
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.file.comparison import (
     Check,
+    CheckResult,
     Difference,
-    ExpectedErrorsPart,
     FittedFigure,
-    LinePart,
     check_against_campaign,
     differences,
     figures_of,
-    load_calibration,
 )
-from gateway.calibration.file.check import CheckResult
+from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart
 from gateway.cli.known_weights import tare_commands, ticket_commands
 from gateway.cli.options import FILE, NumberRange, as_json
 from gateway.records import json_line
-from gateway.stated import DIVISION_KG
+from gateway.stated.facts import DIVISION_KG
 
 
 @click.group("calibration")

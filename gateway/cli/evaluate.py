@@ -6,18 +6,10 @@ from pathlib import Path
 import click
 
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.file import CalibrationFile, load_calibration
-from gateway.calibration.judgement import (
-    TARGETS,
-    BatchSet,
-    Errors,
-    ErrorTable,
-    Judged,
-    TargetErrors,
-    assess_evaluation,
-    error_table,
-    width_of,
-)
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.judgement.assessment import BatchSet, assess_evaluation
+from gateway.calibration.judgement.evaluation import TARGETS, Errors, ErrorTable, Judged, TargetErrors, error_table
+from gateway.calibration.judgement.verdict import width_of
 from gateway.cli.options import CAMPAIGN, FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.progress import counted
 from gateway.errors import ConfigurationError

@@ -6,7 +6,8 @@ from pathlib import Path
 import click
 
 from gateway.calibration.campaign import Campaign, file_sha256, load_campaign
-from gateway.calibration.file import CalibrationFile, LineFile, load_calibration, load_like
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.file.line_file import LineFile, load_like
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.line.scatter import SCATTER_STD
 from gateway.calibration.line_files import build_line

@@ -11,19 +11,15 @@ from gateway.bus.logs import LogReport, motion_of_log
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, OnRun, RunTable, chosen_runs, file_sha256
-from gateway.calibration.inspection import (
-    Finding,
-    Inspection,
-    LogFacts,
-    SplitRun,
-    inspect_campaign,
-    offset_findings,
-    row_facts,
-    unmapped_roll_findings,
-)
-from gateway.calibration.judgement import Judged, judge
+from gateway.calibration.inspection.campaign import Inspection, inspect_campaign
+from gateway.calibration.inspection.finding import Finding
+from gateway.calibration.inspection.log import LogFacts, SplitRun
+from gateway.calibration.inspection.roll import offset_findings, unmapped_roll_findings
+from gateway.calibration.inspection.rows import row_facts
+from gateway.calibration.judgement.evaluation import Judged, judge
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index import BandChoice, StructureChoice
+from gateway.calibration.ratio_index.bands import BandChoice
+from gateway.calibration.ratio_index.choice import StructureChoice
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings

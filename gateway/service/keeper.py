@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from gateway.bus.signals import SignalMap
-from gateway.calibration.kept import KeptBatch, Shelf, kept_batch_of
+from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of
+from gateway.calibration.kept.shelf import Shelf
 from gateway.estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.records import Batch, Motion

@@ -7,7 +7,7 @@ import hashlib
 import logging
 from pathlib import Path
 
-from gateway.calibration.file import CalibrationFile
+from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.config import Settings
 from gateway.errors import CalibrationFileError, UntrustedFileError
 from gateway.files.kept import KeptFiles

@@ -7,8 +7,7 @@ from importlib.metadata import version
 from gateway.bus.broadcast import Broadcaster, Sender
 from gateway.bus.live.source import LiveSource, OpenReceiver
 from gateway.bus.ring import RingLimits, RingLog
-from gateway.calibration.kept import Shelf, ShelfLimits
-from gateway.calibration.kept.shelf import FOLDER
+from gateway.calibration.kept.shelf import FOLDER, Shelf, ShelfLimits
 from gateway.config import BusSection, Settings, StoreSection
 from gateway.config.sections import BroadcastSection, KeepSection
 from gateway.core.flow import Flow

@@ -12,7 +12,7 @@ from support.estimates import posterior_of
 from support.half_car_road import batch_over_road
 from support.web import Client, Gateway
 
-from gateway.calibration.file import load_calibration
+from gateway.calibration.file.calibration_file import load_calibration
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.spectrum import spectra_of

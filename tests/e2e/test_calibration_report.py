@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from support.html_page import Page
 from support.known_load_logs import write_known_loads
 
-from gateway.calibration.file import load_calibration
+from gateway.calibration.file.calibration_file import load_calibration
 from gateway.cli import main, springscale
 from gateway.reports.calibration.text import decimal, percent
 

@@ -11,7 +11,7 @@ from support.known_load_logs import write_known_loads
 
 from gateway.calibration.calibrate import calibrate_inspected
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
 from gateway.estimate_json import estimate_to_json

@@ -14,12 +14,11 @@ from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
 from support.estimates import make_estimate
 from support.web import Gateway, serving
 
-from gateway.calibration.commissioning import Result
-from gateway.calibration.commissioning.job import Found
-from gateway.calibration.file import CalibrationFile
+from gateway.calibration.commissioning.job import Found, Result
+from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.records import Why
-from gateway.stated import VehicleAnswers
 from gateway.stated.doubt import Doubt, DoubtKind
+from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
 from gateway.web.access.tokens import Scope, TokenFile
 

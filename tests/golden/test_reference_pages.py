@@ -20,7 +20,7 @@ from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
 from gateway.estimate_json import FIELDS
 from gateway.records import Signal
-from gateway.stated import VehicleAnswers
+from gateway.stated.facts import VehicleAnswers
 from gateway.units import TO_SI
 
 ROOT = Path(__file__).parents[2]

@@ -12,7 +12,7 @@ from support.drives import SIGNALS, T0_NS, drive
 from support.half_car_road import VAN, batch_over_road
 
 from gateway.bus.frames import LAST_SECOND
-from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.calibrated import CalibratedVehicle

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 from support.commissioning import ANSWERS, WINDOW_S, Bench, fitted
 
-from gateway.calibration.commissioning import Result
+from gateway.calibration.commissioning.job import Result
 from gateway.errors import CommissioningRefusedError
 from gateway.records import Why
-from gateway.stated import VehicleAnswers
+from gateway.stated.facts import VehicleAnswers
 from gateway.web.routes.commissioning import CommissioningState
 
 ORDER = [None, "line", "vehicle", "empty", "drive", "fit"]

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.half_car_road import CAR, VAN, batch_over_road, weighed_as_known
 
-from gateway.calibration.half_car import calibrate_cross_spectrum, prior_of
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+from gateway.calibration.half_car.prior import prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.measured import log_amplitude_of

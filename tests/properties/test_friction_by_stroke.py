@@ -8,7 +8,7 @@ from support.half_car_road import CAR, weighed_as_known
 from support.rolling_car import ROLLING_CAR
 from support.rolling_road import WIDE_VAN, batch_over_two_tracks
 
-from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.half_car import HalfCar, frequency_response, strokes

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.half_car_road import VAN, batch_over_road
 
-from gateway.calibration.half_car import prior_of
+from gateway.calibration.half_car.prior import prior_of
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, Ground
@@ -113,7 +113,7 @@ def test_masked_samples_leave_no_trace() -> None:
 
 def test_the_bound_shrinks_with_the_root_of_time() -> None:
     from benchmarks.accuracy.sensor_bounds import cramer_rao
-    from gateway.calibration.half_car import calibrate_cross_spectrum
+    from gateway.calibration.half_car.fit import calibrate_cross_spectrum
     from gateway.calibration.known_run import KnownRun
     from gateway.core.cross_spectrum.predicted import Drive
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from gateway.calibration.half_car.prior import Prior
-from gateway.calibration.line import Evidence
+from gateway.calibration.line.evidence import Evidence
 from gateway.calibration.line.scatter import scatter_found
 from gateway.core.cross_spectrum.model.friction import RATES
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS

@@ -9,10 +9,12 @@ import pytest
 from support.half_car_road import VAN
 from support.odd_content import GONE, ODD, changed, places
 
-from gateway.calibration.file import LineFile, SiblingPart, load_like
 from gateway.calibration.file.calibration_file import content_id
-from gateway.calibration.half_car import prior_of
-from gateway.calibration.line import Evidence, Line, ModelLimits, Seen, Usual
+from gateway.calibration.file.line_file import LineFile, SiblingPart, load_like
+from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.inheritance import ModelLimits, Seen, Usual
+from gateway.calibration.line.evidence import Evidence
+from gateway.calibration.line.line import Line
 from gateway.calibration.line.scatter import default_scatter_std, is_inherited
 from gateway.calibration.line_files import line_of_files, line_part
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.rolling_road import WIDE_VAN, batch_over_two_tracks
 
-from gateway.calibration.half_car import prior_of
+from gateway.calibration.half_car.prior import prior_of
 from gateway.core.cross_spectrum.lateral import ROLL_BAND_HZ
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of

@@ -7,7 +7,7 @@ import pytest
 from support.calibrated import calibration_file
 from support.signing import Signer
 
-from gateway.calibration.file import load_calibration
+from gateway.calibration.file.calibration_file import load_calibration
 from gateway.errors import CalibrationFileError, UntrustedFileError
 from gateway.files.signed import Trust, signature_path
 

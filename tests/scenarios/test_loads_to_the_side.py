@@ -7,7 +7,7 @@ import pytest
 from support.sideways_drives import SENSORS, VEHICLE, driven, known_drives
 
 from benchmarks.accuracy.drives import without_roll_rate
-from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 from support.known_load_logs import SIGNALS, write_known_loads
 
-from gateway.calibration.file import load_calibration
+from gateway.calibration.file.calibration_file import load_calibration
 from gateway.cli import springscale
 from gateway.estimate_json import COLUMNS
 

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner, Result
 from support.known_load_logs import write_known_loads
 
-from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.cli import springscale
 from gateway.core.ratio_index.index import PAPER_BANDS
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE

@@ -7,15 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from gateway.calibration.commissioning import Job, Learned, Result
-from gateway.calibration.inspection import RowFacts
-from gateway.calibration.kept import KeptBatch, Shelf, ShelfLimits
+from gateway.calibration.commissioning.job import Job, Learned, Result
+from gateway.calibration.inspection.rows import RowFacts
+from gateway.calibration.kept.batch_file import KeptBatch
+from gateway.calibration.kept.shelf import Shelf, ShelfLimits
 from gateway.config.sections import CommissioningSection
 from gateway.core.settings import BatchSettings
 from gateway.files.signed import Trust
 from gateway.records import Batch, Why
 from gateway.service.commissioning import Commissioning, Jobs, Lines, ServiceVehicle
-from gateway.stated import VehicleAnswers
+from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
 from support.calibrated import calibration_file
 

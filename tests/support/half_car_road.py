@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum import by_cross_spectrum

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from gateway.calibration.half_car import calibrate_cross_spectrum
-from gateway.calibration.inspection import LogFacts, SplitRun
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+from gateway.calibration.inspection.log import LogFacts, SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.half_car import HalfCar

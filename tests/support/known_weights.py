@@ -15,7 +15,7 @@ from gateway.posterior import Posterior, Source
 from gateway.records import iso_utc
 from gateway.service.subject import Subject
 from gateway.service.verification.known_weights import KnownWeightService
-from gateway.stated_weight import StatedWeight
+from gateway.stated.facts import StatedWeight
 from gateway.store import Store
 from gateway.units import NS_PER_S
 from gateway.web.routes.known_weights import KnownWeightEntry, KnownWeightState

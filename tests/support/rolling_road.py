@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.rolling_car import RollingCar, SidewaysLoad, rolling_response

@@ -7,10 +7,10 @@ from typing import Any
 
 from gateway.calibration.axle_weights import UNSPRUNG_SHARE
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.commissioning import vehicle_table
+from gateway.calibration.commissioning.answers import vehicle_table
 from gateway.config import load_settings
 from gateway.core.vehicle import Vehicle
-from gateway.stated import VehicleAnswers
+from gateway.stated.facts import VehicleAnswers
 from gateway.store import Store
 from support.commissioned import Running, serve
 from support.recordings import recordings

@@ -10,8 +10,8 @@ from support.known_runs import campaign, split_run
 
 from benchmarks.accuracy import advice
 from benchmarks.accuracy.advice import AdviceStudy, Choice, advice_of, advice_page, compared
-from gateway.calibration.half_car import calibrate_cross_spectrum
-from gateway.calibration.inspection import SplitRun
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan.loads import weighed_loads
 from gateway.core.calibrated import CalibratedVehicle

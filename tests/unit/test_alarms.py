@@ -27,7 +27,7 @@ from gateway.core.alarms import (
     sentence,
 )
 from gateway.core.alarms.alarm import NO_ESTIMATE, REFUSED, SILENT
-from gateway.core.alarms.weighing import beyond_probability
+from gateway.core.alarms.rules import beyond_probability
 from gateway.core.fusion import epoch_of
 from gateway.errors import AlarmRefusedError
 from gateway.estimate import Estimate, Quantity

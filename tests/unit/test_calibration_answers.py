@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ndtri, stdtrit
 
-from gateway.calibration.judgement import LEVELS, Answers, Judged, answers_of, observed_coverage, standardised
+from gateway.calibration.judgement.answers import LEVELS, Answers, answers_of, observed_coverage, standardised
+from gateway.calibration.judgement.evaluation import Judged
 from gateway.estimate import Estimate, Quantity
 from gateway.records import Why
 

@@ -15,15 +15,8 @@ from hypothesis import strategies as st
 from support.calibrated import calibration_file
 
 from gateway.calibration.campaign import file_sha256, load_campaign
-from gateway.calibration.file import (
-    CalibrationFile,
-    FittedFigure,
-    check_against_campaign,
-    differences,
-    figures_of,
-    load_calibration,
-)
-from gateway.calibration.file.calibration_file import content_id
+from gateway.calibration.file.calibration_file import CalibrationFile, content_id, load_calibration
+from gateway.calibration.file.comparison import FittedFigure, check_against_campaign, differences, figures_of
 from gateway.cli.calibration import calibration as calibration_commands
 from gateway.core.ratio_index.regression import term_columns
 from gateway.errors import CalibrationFileError

@@ -10,8 +10,7 @@ import pytest
 from support.calibrated import calibration_file
 
 import gateway
-from gateway.calibration.file import load_calibration
-from gateway.calibration.file.calibration_file import content_id
+from gateway.calibration.file.calibration_file import content_id, load_calibration
 from gateway.errors import CalibrationFileError
 
 Change = Callable[[dict[str, Any]], Any]

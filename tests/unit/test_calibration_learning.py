@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from gateway.calibration.judgement import LearningCurve
-from gateway.calibration.judgement.learning_curve import Score, Trial
+from gateway.calibration.judgement.learning_curve import LearningCurve, Score, Trial
 from gateway.reports.calibration.learning import learning_section
 from gateway.reports.charts import Points
 from gateway.reports.charts.live import plotly_json

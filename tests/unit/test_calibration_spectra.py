@@ -5,7 +5,7 @@ import pytest
 from support.calibrated import ratio_index_calibration
 from support.half_car_road import RATE_HZ, VAN, batch_of, batch_over_road
 
-from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.ratio_index.index import Band
 from gateway.records import Batch

@@ -11,19 +11,12 @@ from support.calibrated import calibration_file
 
 from gateway.budget import BudgetLine, Remedy
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.inspection import Finding, Inspection, RunVerdict, Severity
-from gateway.calibration.inspection.finding import Kind
-from gateway.calibration.judgement import (
-    Assessment,
-    BatchSet,
-    Grade,
-    Judged,
-    Judgement,
-    Verdict,
-    error_table,
-    verdicts_of,
-)
-from gateway.calibration.plan import Expected
+from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
+from gateway.calibration.judgement.assessment import Assessment, BatchSet, Judgement
+from gateway.calibration.judgement.evaluation import Judged, error_table
+from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
+from gateway.calibration.plan.plan import Expected
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate, Quantity
 from gateway.posterior import Posterior, Source

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.commissioning import vehicle_table
+from gateway.calibration.commissioning.answers import vehicle_table
 from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import (
     MEASURED_OFFSET_STD_M,
@@ -14,7 +14,7 @@ from gateway.core.vehicle import (
     UNKNOWN_OFFSET_STD_M,
 )
 from gateway.errors import CampaignError
-from gateway.stated import VehicleAnswers
+from gateway.stated.facts import VehicleAnswers
 
 VEHICLE = {"name": '"van"', "empty_mass_kg": "1240.0", "wheelbase_m": "2.8", "sensor_position_m": "3.2"}
 EMPTY_RUN = {"log": '"a.log"', "payload_kg": "0.0"}

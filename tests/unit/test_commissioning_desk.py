@@ -17,9 +17,8 @@ from support.commissioning import ANSWERS, NOW_NS, WINDOW_S, Bench, fitted, in_s
 from support.log import names
 from support.power import KilledError, kill_at
 
-from gateway.calibration.commissioning import Result
-from gateway.calibration.commissioning.job import Found
-from gateway.calibration.file import CalibrationFile
+from gateway.calibration.commissioning.job import Found, Result
+from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.config import Settings
 from gateway.config.sections import CommissioningSection
 from gateway.errors import CommissioningRefusedError
@@ -28,8 +27,8 @@ from gateway.log import Event
 from gateway.records import Why
 from gateway.service.commissioning import commissioned, with_commissioned
 from gateway.service.commissioning.record import FILE_NAME, MOST_MADE, load_record
-from gateway.stated import VehicleAnswers
 from gateway.stated.doubt import Doubt, DoubtKind
+from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
 from gateway.web.routes.commissioning import CommissioningState
 

@@ -8,9 +8,9 @@ from support.half_car_road import CAR, VAN
 from support.known_runs import SIBLING, calibrated_on_loads, known_run
 
 from gateway.calibration.contradicted import contradictions
-from gateway.calibration.half_car import fit_cross_spectrum
+from gateway.calibration.half_car.fit import fit_cross_spectrum
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.line import Line, Sister, line_of
+from gateway.calibration.line.line import Line, Sister, line_of
 from gateway.core.vehicle import Vehicle
 from gateway.stated.doubt import Doubt, DoubtKind
 

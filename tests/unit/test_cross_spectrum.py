@@ -17,8 +17,7 @@ from support.half_car_road import (
     weighed,
 )
 
-from gateway.calibration.half_car import calibrate_cross_spectrum, fit_cross_spectrum
-from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED
+from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED, calibrate_cross_spectrum, fit_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.estimator import (

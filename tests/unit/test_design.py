@@ -11,13 +11,10 @@ from support.half_car_road import CAR, VAN
 from support.known_runs import known_run
 
 from benchmarks.accuracy.sensor_bounds import cramer_rao
-from gateway.calibration.half_car import (
-    calibrate_cross_spectrum,
-    fit_half_car,
-    half_car_calibration,
-    known_spectra,
-    prior_of,
-)
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum, half_car_calibration
+from gateway.calibration.half_car.known_spectra import known_spectra
+from gateway.calibration.half_car.most_probable_vehicle import fit_half_car
+from gateway.calibration.half_car.prior import prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan.design import Design
 from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads

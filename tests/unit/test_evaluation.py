@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from support.calibrated import calibration_file
 from support.drives import T0_NS, drive, joined, later
 
-from gateway.calibration.judgement import Comparison, Judged, error_table, errors_of, judge, width_of
+from gateway.calibration.judgement.evaluation import Comparison, Judged, error_table, errors_of, judge
+from gateway.calibration.judgement.verdict import width_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.calibrated import CalibratedVehicle

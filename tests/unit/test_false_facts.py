@@ -7,8 +7,8 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from benchmarks.accuracy.false_facts import FALSE, Fact, false_facts_page
-from gateway.calibration.commissioning import doubts_of
-from gateway.stated import VehicleAnswers
+from gateway.calibration.commissioning.answers import doubts_of
+from gateway.stated.facts import VehicleAnswers
 
 DOCS = Path(__file__).parents[2] / "docs"
 VAN = {

@@ -6,18 +6,11 @@ import pytest
 from support.half_car_road import VAN, batch_over_road
 from support.known_runs import LOADS, campaign, known_run
 
-from gateway.calibration.inspection import (
-    Finding,
-    Inspection,
-    RowFacts,
-    RunVerdict,
-    Severity,
-    SplitRun,
-    inspect_campaign,
-)
-from gateway.calibration.inspection.campaign import load_findings
-from gateway.calibration.inspection.finding import Kind
+from gateway.calibration.inspection.campaign import Inspection, inspect_campaign, load_findings
+from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.loads import _Labelled, compare_loads
+from gateway.calibration.inspection.log import SplitRun
+from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 

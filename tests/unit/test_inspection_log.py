@@ -5,9 +5,10 @@ from dataclasses import replace
 import pytest
 from support.half_car_road import VAN
 
-from gateway.calibration.inspection import LogFacts, RowFacts, SplitRun, inspect_campaign
+from gateway.calibration.inspection.campaign import inspect_campaign
 from gateway.calibration.inspection.finding import Kind
-from gateway.calibration.inspection.log import log_findings, same_drive_findings
+from gateway.calibration.inspection.log import LogFacts, SplitRun, log_findings, same_drive_findings
+from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 

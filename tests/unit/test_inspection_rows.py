@@ -7,8 +7,7 @@ import pytest
 from support.drives import T0_NS, changed, drive, without_rows
 from support.inspected import kinds, stated, traits_of_reference, verdict_on
 
-from gateway.calibration.inspection import row_facts
-from gateway.calibration.inspection.rows import gravity_findings, rate_findings, unmapped_findings
+from gateway.calibration.inspection.rows import gravity_findings, rate_findings, row_facts, unmapped_findings
 from gateway.core.settings import BatchSettings
 from gateway.records import Motion, Signal
 from gateway.sim.vans import PAPER_VAN

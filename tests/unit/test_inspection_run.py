@@ -20,7 +20,7 @@ from support.inspected import (
     without,
 )
 
-from gateway.calibration.inspection import Severity
+from gateway.calibration.inspection.finding import Severity
 from gateway.records import Motion, Signal
 from gateway.sim.drive import Drive, constant, urban
 from gateway.sim.vans import PAPER_VAN, VANS

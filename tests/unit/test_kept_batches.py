@@ -16,17 +16,10 @@ from support.power import KilledError, kill_at
 
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.inspection import row_facts
-from gateway.calibration.kept import (
-    KeptBatch,
-    KnownDrive,
-    Shelf,
-    ShelfLimits,
-    calibrate_kept,
-    kept_batch_of,
-    packed,
-    unpacked,
-)
+from gateway.calibration.inspection.rows import row_facts
+from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of, packed, unpacked
+from gateway.calibration.kept.drive import KnownDrive, calibrate_kept
+from gateway.calibration.kept.shelf import Shelf, ShelfLimits
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings

@@ -10,7 +10,7 @@ from gateway.core.weights import NOT_CALIBRATED, Unsprung, weights_of
 from gateway.errors import WeightRefusedError
 from gateway.estimate import Quantity
 from gateway.posterior import exactly
-from gateway.stated_weight import StatedWeight
+from gateway.stated.facts import StatedWeight
 
 AT = "2026-11-21T04:00:00Z"
 VAN = Vehicle(

@@ -20,7 +20,7 @@ from gateway.files.kept import KeptFiles
 from gateway.log import Event
 from gateway.posterior import FRONT_SHARE, PAYLOAD, Posterior, Source
 from gateway.service.verification.epochs import epoch_at, epochs_around
-from gateway.stated_weight import StatedWeight
+from gateway.stated.facts import StatedWeight
 
 LOADS_KG = (276.0, 398.0, 131.0, 250.0)
 

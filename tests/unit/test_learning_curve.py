@@ -11,10 +11,12 @@ from support.half_car_road import VAN
 from support.known_runs import campaign
 
 from benchmarks.accuracy.learning_curve import learning_curve_page
-from gateway.calibration.judgement import LearningCurve, curve_of, learning_curve
+from gateway.calibration.judgement import learning_curve
 from gateway.calibration.judgement.learning_curve import (
+    LearningCurve,
     Score,
     Trial,
+    curve_of,
     spread_of,
     subsets_to_drive,
     trial_of,

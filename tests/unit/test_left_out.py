@@ -10,7 +10,8 @@ from support.known_load_logs import write_known_loads
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.judgement.assessment import judged_left_out
-from gateway.calibration.ratio_index import fit_regression, index_rows
+from gateway.calibration.ratio_index.regression import fit_regression
+from gateway.calibration.ratio_index.table import index_rows
 from gateway.core.settings import BatchSettings
 from gateway.offline.campaigns import calibrate
 

@@ -8,8 +8,8 @@ from click.testing import CliRunner, Result
 from support.calibrated import calibration_file
 from support.known_load_logs import write_known_loads
 
-from gateway.calibration.file import load_calibration, load_like
-from gateway.calibration.file.calibration_file import content_id
+from gateway.calibration.file.calibration_file import content_id, load_calibration
+from gateway.calibration.file.line_file import load_like
 from gateway.cli import springscale
 from gateway.errors import ConfigurationError
 

@@ -8,10 +8,10 @@ import pytest
 from support.half_car_road import CAR, VAN, batch_over_road, weighed
 from support.known_runs import LOADS, SIBLING, calibrated_on_loads, known_run
 
-from gateway.calibration.half_car import calibrate_cross_spectrum, fit_cross_spectrum, prior_of
-from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED
-from gateway.calibration.half_car.prior import Prior
-from gateway.calibration.line import Line, Sibling, Sister, line_of, with_siblings_left_out
+from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED, calibrate_cross_spectrum, fit_cross_spectrum
+from gateway.calibration.half_car.prior import Prior, prior_of
+from gateway.calibration.line.left_out import Sibling, with_siblings_left_out
+from gateway.calibration.line.line import Line, Sister, line_of
 from gateway.calibration.line.scatter import SCATTER_STD
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.half_car import HalfCar

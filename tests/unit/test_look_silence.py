@@ -9,8 +9,8 @@ from support.bus_drive import bus_drive
 
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import load_signal_map
-from gateway.calibration.inspection import Severity, row_facts
-from gateway.calibration.inspection.rows import rate_findings
+from gateway.calibration.inspection.finding import Severity
+from gateway.calibration.inspection.rows import rate_findings, row_facts
 from gateway.core.settings import BatchSettings
 from gateway.offline.campaigns import read_whole_log
 from gateway.offline.look.look import why_silent

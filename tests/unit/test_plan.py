@@ -14,10 +14,20 @@ from support.half_car_road import VAN
 from support.known_runs import split_run
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.half_car import CrossSpectrumFit, calibrate_cross_spectrum, prior_of
-from gateway.calibration.inspection import Inspection, RunVerdict
-from gateway.calibration.plan import Expected, LoadPlan, plan_first, plan_next, stated_widths, usual_drive
-from gateway.calibration.plan.plan import FIRST_DRIVE, N_FIRST
+from gateway.calibration.half_car.fit import CrossSpectrumFit, calibrate_cross_spectrum
+from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.finding import RunVerdict
+from gateway.calibration.plan.plan import (
+    FIRST_DRIVE,
+    N_FIRST,
+    Expected,
+    LoadPlan,
+    plan_first,
+    plan_next,
+    stated_widths,
+    usual_drive,
+)
 from gateway.cli import springscale
 from gateway.cli.calibrate import plan_sentences, widths_sentence
 from gateway.core.vehicle import Carries

@@ -6,8 +6,8 @@ import numpy as np
 from support.half_car_road import VAN, batch_over_road
 
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.plan import Advice, Expected, LoadPlan, OffCentreLoad, PlacedLoad
-from gateway.calibration.plan.plan import sideways_load
+from gateway.calibration.plan.loads import PlacedLoad
+from gateway.calibration.plan.plan import Advice, Expected, LoadPlan, OffCentreLoad, sideways_load
 from gateway.cli.calibrate import plan_sentences
 from gateway.core.cross_spectrum.predicted import Drive
 from gateway.reports.calibration.runs import plan_section

@@ -7,17 +7,9 @@ import pytest
 from support.estimates import make_estimate
 from support.half_car_road import VAN
 
-from gateway.calibration.half_car import prior_of
-from gateway.calibration.judgement import (
-    BatchSet,
-    CgLeftErrors,
-    Errors,
-    ErrorTable,
-    Judged,
-    Judgement,
-    TargetErrors,
-    WheelErrors,
-)
+from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.judgement.assessment import BatchSet, Judgement
+from gateway.calibration.judgement.evaluation import CgLeftErrors, Errors, ErrorTable, Judged, TargetErrors, WheelErrors
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS, has_roll, names_of
 from gateway.estimate import Quantity

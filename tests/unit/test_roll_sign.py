@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from support.inspected import driven, kinds, scaled, stated, traits_of_reference
 
-from gateway.calibration.inspection import SplitRun, inspect_campaign, row_facts
+from gateway.calibration.inspection.campaign import inspect_campaign
+from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.inspection.roll import roll_sign_of
+from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.known_run import KnownRun
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings

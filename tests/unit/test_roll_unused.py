@@ -7,7 +7,7 @@ import pytest
 from support.half_car_road import VAN
 from support.rolling_road import WIDE_VAN, batch_over_two_tracks, calibrated_with_roll, runs_over_two_tracks
 
-from gateway.calibration.half_car import calibrate_cross_spectrum
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.half_car.prior import can_roll
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle

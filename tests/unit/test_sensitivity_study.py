@@ -17,8 +17,8 @@ from benchmarks.accuracy.sensitivity import study
 from benchmarks.accuracy.sensitivity.changes import pairs_of
 from benchmarks.accuracy.sensitivity.constants import CONSTANTS, USED_IN, Acts, Constant, scaled
 from benchmarks.accuracy.study import Study
-from gateway.calibration.half_car import calibrate_cross_spectrum
-from gateway.calibration.judgement import Judged
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+from gateway.calibration.judgement.evaluation import Judged
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.change import Rules

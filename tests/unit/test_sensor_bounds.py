@@ -10,7 +10,7 @@ from support.half_car_road import VAN
 
 from benchmarks.accuracy.__main__ import studies
 from benchmarks.accuracy.sensor_bounds import MILD, SPEED, Scene, Seen, bound_of
-from gateway.calibration.half_car import prior_of
+from gateway.calibration.half_car.prior import prior_of
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.model.parameters import Ground
 from gateway.core.cross_spectrum.model.reading import Reading

@@ -22,7 +22,7 @@ from support.patience import PATIENCE_S
 from support.signing import Signer
 from support.web import Gateway, Server, serving
 
-from gateway.calibration.commissioning import Result
+from gateway.calibration.commissioning.job import Result
 from gateway.config import Settings, load_settings
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS

@@ -4,7 +4,8 @@ import re
 
 from support.estimates import make_record
 
-from gateway.calibration.plan import Advice, Expected, LoadPlan, PlacedLoad
+from gateway.calibration.plan.loads import PlacedLoad
+from gateway.calibration.plan.plan import Advice, Expected, LoadPlan
 from gateway.cli.calibrate import plan_sentences
 from gateway.cli.estimate import sentence
 from gateway.core.cross_spectrum.predicted import Drive

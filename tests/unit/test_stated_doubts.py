@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from gateway.calibration.commissioning import LineFacts, doubts_of
-from gateway.stated import VehicleAnswers
+from gateway.calibration.commissioning.answers import LineFacts, doubts_of
 from gateway.stated.doubt import WORDS, Doubt, DoubtKind, meant_by
+from gateway.stated.facts import VehicleAnswers
 
 VAN: dict[str, Any] = {
     "kerb_front_axle_kg": 713.0,

@@ -17,8 +17,7 @@ from benchmarks.accuracy.coverage_table import JudgedBatch
 from benchmarks.accuracy.lines import draw_line, drawn_van
 from benchmarks.accuracy.siblings import Way
 from benchmarks.accuracy.study import Study
-from gateway.calibration.judgement import LearningCurve
-from gateway.calibration.judgement.learning_curve import Score, Trial
+from gateway.calibration.judgement.learning_curve import LearningCurve, Score, Trial
 
 SCORE = Score(3, 1, 2.5, 1.0, 1.25, 0.5, 6.0, 14.5, 3.0, None)
 CURVE = LearningCurve(

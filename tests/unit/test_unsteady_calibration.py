@@ -7,7 +7,7 @@ import pytest
 from support.half_car_road import VAN
 from support.known_runs import known_run
 
-from gateway.calibration.half_car import fit_cross_spectrum
+from gateway.calibration.half_car.fit import fit_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.errors import CalibrationImpossibleError
 

@@ -12,7 +12,7 @@ from support.verification import CALIBRATED, RULE, verification_desk
 from gateway.calibration.known_weight import WeightRefusal
 from gateway.errors import WeightRefusedError
 from gateway.records import iso_utc
-from gateway.stated_weight import Drive, StatedWeight
+from gateway.stated.facts import Drive, StatedWeight
 from gateway.store import Store
 
 DAY_NS = 86_400_000_000_000

@@ -17,7 +17,7 @@ from gateway.estimate_json import estimate_from_json, estimate_to_json
 from gateway.posterior import PAYLOAD
 from gateway.records import Why
 from gateway.service.verification.epochs import NEAR_NS, WeighedEpoch, epoch_at, epochs_of
-from gateway.stated_weight import Drive
+from gateway.stated.facts import Drive
 
 HOUR_NS = 3_600_000_000_000
 FIRST = drive_of(3, 100.0)

@@ -34,8 +34,7 @@ from benchmarks.accuracy.drives import (
     without_roll_rate,
 )
 from benchmarks.accuracy.loads import SAYS, Shape, shaped_load
-from gateway.calibration.judgement import coverage_of
-from gateway.calibration.judgement.coverage import interval_scores
+from gateway.calibration.judgement.coverage import coverage_of, interval_scores
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.judgement import Judged
+from gateway.calibration.judgement.evaluation import Judged
 from gateway.core import change
 from gateway.core.change import EVEN, Rules, probability
 from gateway.posterior import PAYLOAD, Posterior

@@ -14,11 +14,11 @@ from benchmarks.accuracy.markdown import Column, Row, number, page, table_of, te
 from benchmarks.accuracy.sensitivity.changes import Pair, pairs_of
 from benchmarks.accuracy.sensitivity.constants import CONSTANTS, FACTORS, Acts, Constant, scaled
 from benchmarks.accuracy.study import Study
-from gateway.calibration.half_car import known_spectra
+from gateway.calibration.half_car.known_spectra import known_spectra
 from gateway.calibration.inspection.axes import apart_findings, phase_findings, phases
 from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.inspection.loads import compare_loads
-from gateway.calibration.judgement import judge
+from gateway.calibration.judgement.evaluation import judge
 from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle

@@ -1,7 +1,15 @@
-"""The vehicle from the fitter's answers, and from the figures common to its line."""
+"""A fitter's answers: questions about those that are unlikely, and the vehicle of a campaign that follows from them.
 
-from collections.abc import Mapping
-from dataclasses import asdict
+    doubts_of(answers, line) -> questions, each with the answer that was probably meant
+    vehicle_table(answers, name) -> the vehicle
+
+The questions compare the answers with ordinary road vehicles, and with the line's other vehicles. They use no drive;
+``gateway.calibration.contradicted`` compares the same answers with a drive.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from math import inf
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -10,8 +18,238 @@ from pydantic import TypeAdapter, ValidationError
 from gateway.calibration.axle_weights import AxleWeights, sprung_of
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CampaignError
-from gateway.stated import VehicleAnswers
+from gateway.stated.doubt import Doubt, DoubtKind
+from gateway.stated.facts import VehicleAnswers
 from gateway.toml_file import describe_faults
+
+# Ordinary figures of vehicles with two axles. Chosen so that makers' figures of these lie inside: Smart fortwo 1.87 m
+# and 880 kg, Fiat 500, VW Golf 2.62 m and 1300 kg, Land Rover Defender 2.59 m and 2400 kg, VW Caddy, Ford Transit,
+# Mercedes Sprinter 4.33 m and 2400 kg, Hummer EV 3.44 m and 4100 kg, trucks of 7.5 t (4.2 m, 4 t) and 18 t (6 m, 8 t),
+# coaches.
+WHEELBASE_M: Final = (1.6, 7.5)
+MASS_PER_WHEELBASE2: Final = (110.0, 380.0)  # kg/m2, empty, driver and tank as in service
+FRONT_SHARE_PCT: Final = (36.0, 70.0)  # empty: 38 with the engine behind the rear axle, up to 65 in a van
+TRACK_M: Final = (1.15, 2.2)  # a microcar's to a truck's
+MOST_AHEAD_M: Final = 1.5  # a sensor ahead of the front axle: a long front overhang
+MOST_BEHIND: Final = 1.75  # wheelbases behind the front axle: a long rear overhang
+PAYLOAD_SHARE: Final = (0.05, 2.0)  # of the empty vehicle; a truck of 18 t carries 1.3 times its own weight
+MOST_LENGTH: Final = 1.6  # wheelbases; the floor of a van with a long overhang has 1.3
+MOST_HEIGHT_M: Final = 3.0  # above the floor: 4 m is the legal height
+UNSPRUNG_SHARE: Final = (0.025, 0.15)  # of the empty vehicle, one axle's wheels, brakes and half its links
+LEAST_SPRUNG: Final = 0.75  # of the empty vehicle
+
+# Figures that vehicles of a line share; shelves and a tail lift account for a tenth. Chosen.
+MOST_MASS_OFF: Final = 0.12
+MOST_AXLE_OFF: Final = 0.18  # chosen: shelves and a tail lift act mostly on one axle
+MOST_TRACK_OFF: Final = 0.05  # chosen: other wheels
+MOST_WHEELBASE_OFF: Final = 0.01  # as a line asks for
+GROSS_ROUNDED: Final = 1.005  # papers round; of the sum of the axles' limits, which is the most
+MOST_LIMIT: Final = 5.0  # times what is there empty: the rear axle of a truck
+
+KG_PER_POUND: Final = 0.45359237  # international pound
+M_PER_INCH: Final = 0.0254  # international inch
+M_PER_FOOT: Final = 0.3048  # international foot
+_DECIMALS: Final = (10.0, 0.1, 1000.0, 100.0, 0.01, 0.001)  # slips of the decimal point and of tonnes
+_MASS_SLIPS: Final = (*_DECIMALS, KG_PER_POUND)
+_LENGTH_SLIPS: Final = (10.0, 0.1, 0.01, 0.001, M_PER_INCH, M_PER_FOOT)  # centimetres, millimetres, inches, feet
+AXLES: Final = ("kerb_front_axle_kg", "kerb_rear_axle_kg")
+_SLIPPED: Final[Mapping[tuple[str, ...], tuple[float, ...]]] = MappingProxyType(
+    {
+        AXLES[:1]: _DECIMALS,
+        AXLES[1:]: _DECIMALS,
+        AXLES: _MASS_SLIPS,
+        ("wheelbase_m",): _LENGTH_SLIPS,
+        ("sensor_position_m",): _LENGTH_SLIPS,
+        ("sensor_offset_left_m",): _LENGTH_SLIPS,
+        ("track_width_m",): _LENGTH_SLIPS,
+        ("payload_length_m",): _LENGTH_SLIPS,
+        ("payload_height_m",): _LENGTH_SLIPS,
+        ("gross_limit_kg",): _MASS_SLIPS,
+        ("front_axle_limit_kg",): _MASS_SLIPS,
+        ("rear_axle_limit_kg",): _MASS_SLIPS,
+    }
+)
+"""Answers that are typed together, and the factors from the typed to the probably meant number."""
+
+
+@dataclass(frozen=True, slots=True)
+class LineFacts:
+    """A figure of a line's vehicles from its file; None if it has none."""
+
+    sprung_kg: float | None = None
+    wheelbase_m: float | None = None
+    axles_kg: tuple[float, float] | None = None
+    track_width_m: float | None = None
+
+
+NO_LINE: Final = LineFacts()
+_ANSWERS: Final = TypeAdapter(VehicleAnswers)
+
+
+def doubts_of(said: VehicleAnswers, line: LineFacts = NO_LINE) -> tuple[Doubt, ...]:
+    """Unlikely answers; with the answers that leave no doubt if one slip explains all."""
+    found = tuple(_checked(said, line))
+    meant = _meant(said, line) if found else {}
+    return tuple(one.model_copy(update={"meant": meant}) for one in found) if meant else found
+
+
+def _checked(said: VehicleAnswers, line: LineFacts) -> Iterator[Doubt]:
+    for rule in _RULES:
+        yield from rule(said, line)
+
+
+def _meant(said: VehicleAnswers, line: LineFacts) -> dict[str, Any]:
+    """The answers after which no doubt is left; empty if no single slip explains it."""
+    for changed in _candidates(said):
+        try:
+            fresh = _ANSWERS.validate_python(asdict(replace(said, **changed)))
+        except ValidationError:
+            continue
+        if next(_checked(fresh, line), None) is None and _has_wheelbase_of(line, fresh):
+            return changed
+    return {}
+
+
+def _candidates(said: VehicleAnswers) -> Iterator[dict[str, Any]]:
+    """Front and rear exchanged, then each slip that is usual."""
+    yield {AXLES[0]: said.kerb_rear_axle_kg, AXLES[1]: said.kerb_front_axle_kg}
+    for names, slips in _SLIPPED.items():
+        typed = [getattr(said, name) for name in names]
+        if None not in typed:
+            for slip in slips:
+                yield {name: _rounded(slip * number) for name, number in zip(names, typed, strict=True)}
+    if said.payload_range_kg is not None:
+        for slip in _DECIMALS:
+            yield {"payload_range_kg": (0.0, _rounded(slip * said.payload_range_kg[1]))}
+
+
+def _rounded(number: float) -> float:
+    return float(f"{number:.4g}")
+
+
+def _has_wheelbase_of(line: LineFacts, said: VehicleAnswers) -> bool:
+    return line.wheelbase_m is None or abs(said.wheelbase_m - line.wheelbase_m) <= MOST_WHEELBASE_OFF * line.wheelbase_m
+
+
+def _gross_kg(said: VehicleAnswers) -> float:
+    return said.kerb_front_axle_kg + said.kerb_rear_axle_kg
+
+
+def _is_within(number: float, span: tuple[float, float]) -> bool:
+    return span[0] <= number <= span[1]
+
+
+def _body(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
+    wheelbase_m, gross_kg = said.wheelbase_m, _gross_kg(said)
+    if not _is_within(wheelbase_m, WHEELBASE_M):
+        low_m, high_m = WHEELBASE_M
+        yield Doubt.of(DoubtKind.WHEELBASE, wheelbase_m=wheelbase_m, low_m=low_m, high_m=high_m)
+    low_kg, high_kg = (one * wheelbase_m**2 for one in MASS_PER_WHEELBASE2)
+    if not _is_within(gross_kg, (low_kg, high_kg)):
+        yield Doubt.of(DoubtKind.MASS, gross_kg=gross_kg, wheelbase_m=wheelbase_m, low_kg=low_kg, high_kg=high_kg)
+    front_pct = 100.0 * said.kerb_front_axle_kg / gross_kg
+    if not _is_within(front_pct, FRONT_SHARE_PCT):
+        low_pct, high_pct = FRONT_SHARE_PCT
+        yield Doubt.of(DoubtKind.FRONT_SHARE, front_pct=front_pct, low_pct=low_pct, high_pct=high_pct)
+
+
+def _beside_its_line(said: VehicleAnswers, line: LineFacts) -> Iterator[Doubt]:
+    front_kg, rear_kg = said.kerb_front_axle_kg, said.kerb_rear_axle_kg
+    sprung_kg = _sprung_kg(said)
+    if line.sprung_kg and sprung_kg and abs(sprung_kg - line.sprung_kg) > MOST_MASS_OFF * line.sprung_kg:
+        gross_kg = _gross_kg(said)
+        yield Doubt.of(DoubtKind.LINE_MASS, gross_kg=gross_kg, line_kg=gross_kg * line.sprung_kg / sprung_kg)
+    elif line.axles_kg and any(
+        abs(own - other) > MOST_AXLE_OFF * other for own, other in zip((front_kg, rear_kg), line.axles_kg, strict=True)
+    ):
+        line_front_kg, line_rear_kg = line.axles_kg
+        yield Doubt.of(
+            DoubtKind.LINE_AXLES,
+            front_kg=front_kg,
+            rear_kg=rear_kg,
+            line_front_kg=line_front_kg,
+            line_rear_kg=line_rear_kg,
+        )
+    track_m = said.track_width_m
+    if track_m and line.track_width_m and abs(track_m - line.track_width_m) > MOST_TRACK_OFF * line.track_width_m:
+        yield Doubt.of(DoubtKind.LINE_TRACK, track_m=track_m, line_m=line.track_width_m)
+
+
+def _sprung_kg(said: VehicleAnswers) -> float | None:
+    """None if the axle weights leave no body, which ``vehicle_table`` refuses."""
+    if said.empty_mass_kg is not None:
+        return said.empty_mass_kg
+    try:
+        return sprung_of(_axle_weights(said)).mass_kg
+    except CampaignError:
+        return None
+
+
+def _places(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
+    sensor_m, track_m, left_m = said.sensor_position_m, said.track_width_m, said.sensor_offset_left_m
+    if not -MOST_AHEAD_M <= sensor_m <= MOST_BEHIND * said.wheelbase_m:
+        yield Doubt.of(DoubtKind.SENSOR_PLACE, sensor_m=sensor_m, wheelbase_m=said.wheelbase_m)
+    if track_m is not None and not _is_within(track_m, TRACK_M):
+        yield Doubt.of(DoubtKind.TRACK, track_m=track_m, low_m=TRACK_M[0], high_m=TRACK_M[1])
+    if left_m is not None and abs(left_m) > 0.6 * (track_m or TRACK_M[1]):
+        yield Doubt.of(DoubtKind.SENSOR_SIDE, sensor_m=left_m)
+
+
+def _unsprung(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
+    gross_kg = _gross_kg(said)
+    low_kg, high_kg = (share * gross_kg for share in UNSPRUNG_SHARE)
+    for unsprung_kg in (said.unsprung_front_kg, said.unsprung_rear_kg):
+        if unsprung_kg is not None and not _is_within(unsprung_kg, (low_kg, high_kg)):
+            yield Doubt.of(DoubtKind.UNSPRUNG, unsprung_kg=unsprung_kg, low_kg=low_kg, high_kg=high_kg)
+    sprung_kg = said.empty_mass_kg
+    if sprung_kg is not None and not LEAST_SPRUNG * gross_kg <= sprung_kg < gross_kg:
+        yield Doubt.of(DoubtKind.SPRUNG, sprung_kg=sprung_kg, gross_kg=gross_kg)
+
+
+def _loads(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
+    gross_kg = _gross_kg(said)
+    payload_kg = said.payload_range_kg[1] if said.payload_range_kg else None
+    if payload_kg is not None:
+        if not _is_within(payload_kg, (PAYLOAD_SHARE[0] * gross_kg, PAYLOAD_SHARE[1] * gross_kg)):
+            yield Doubt.of(DoubtKind.PAYLOAD, payload_kg=payload_kg, gross_kg=gross_kg)
+        elif said.gross_limit_kg is not None and gross_kg + payload_kg > GROSS_ROUNDED * said.gross_limit_kg:
+            yield Doubt.of(
+                DoubtKind.PAYLOAD_LIMIT,
+                gross_kg=gross_kg,
+                payload_kg=payload_kg,
+                sum_kg=gross_kg + payload_kg,
+                limit_kg=said.gross_limit_kg,
+            )
+    if said.payload_length_m is not None and said.payload_length_m > MOST_LENGTH * said.wheelbase_m:
+        yield Doubt.of(DoubtKind.LOAD_LENGTH, length_m=said.payload_length_m, wheelbase_m=said.wheelbase_m)
+    if said.payload_height_m is not None and said.payload_height_m > MOST_HEIGHT_M:
+        yield Doubt.of(DoubtKind.LOAD_HEIGHT, height_m=said.payload_height_m)
+
+
+def _limits(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
+    gross_kg, limit_kg = _gross_kg(said), said.gross_limit_kg
+    axles = (
+        (said.kerb_front_axle_kg, said.front_axle_limit_kg),
+        (said.kerb_rear_axle_kg, said.rear_axle_limit_kg),
+    )
+    for axle_kg, permitted_kg in axles:
+        if permitted_kg is not None and not axle_kg < permitted_kg <= MOST_LIMIT * axle_kg:
+            yield Doubt.of(DoubtKind.AXLE_LIMIT, limit_kg=permitted_kg, axle_kg=axle_kg)
+    permitted = [kg for _, kg in axles if kg is not None]
+    axles_kg = sum(permitted) if len(permitted) == len(axles) else inf
+    if limit_kg is not None and not gross_kg < limit_kg <= min(GROSS_ROUNDED * axles_kg, MOST_LIMIT * gross_kg):
+        yield Doubt.of(DoubtKind.GROSS_LIMIT, limit_kg=limit_kg, gross_kg=gross_kg)
+
+
+_RULES: Final[tuple[Callable[[VehicleAnswers, LineFacts], Iterator[Doubt]], ...]] = (
+    _body,
+    _beside_its_line,
+    _places,
+    _unsprung,
+    _loads,
+    _limits,
+)
+
 
 OF_THE_LINE: Final = (
     "track_width_m",
@@ -27,20 +265,19 @@ OF_THE_LINE: Final = (
 
 _VEHICLE: Final = TypeAdapter(Vehicle)
 
-NO_LINE: Final[Mapping[str, Any]] = MappingProxyType({})
 
-
-def vehicle_table(said: VehicleAnswers, name: str, of_the_line: Mapping[str, Any] = NO_LINE) -> Vehicle:
+def vehicle_table(said: VehicleAnswers, name: str, of_the_line: Mapping[str, Any] = MappingProxyType({})) -> Vehicle:
     """[vehicle] of a campaign; ``name`` if none was typed. Raises CampaignError in words for people."""
     if (said.empty_mass_kg is None) != (said.empty_front_share_pct is None):
         raise CampaignError("empty_mass_kg and empty_front_share_pct belong together: give both or neither")
     typed = {name: answer for name, answer in asdict(said).items() if answer is not None and name != "division_kg"}
-    weights = AxleWeights(
-        said.kerb_front_axle_kg, said.kerb_rear_axle_kg, said.unsprung_front_kg, said.unsprung_rear_kg
-    )
     try:
-        sprung = sprung_of(weights, said.division_kg)
+        sprung = sprung_of(_axle_weights(said), said.division_kg)
         named = {"name": said.name.strip() or name}
         return _VEHICLE.validate_python(sprung.vehicle_keys() | dict(of_the_line) | typed | named)
     except ValidationError as fault:
         raise CampaignError(describe_faults("the vehicle that follows", fault, Vehicle)) from None
+
+
+def _axle_weights(said: VehicleAnswers) -> AxleWeights:
+    return AxleWeights(said.kerb_front_axle_kg, said.kerb_rear_axle_kg, said.unsprung_front_kg, said.unsprung_rear_kg)

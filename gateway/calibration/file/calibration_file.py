@@ -7,8 +7,7 @@ from typing import Any, Final, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from gateway.calibration.file.line_part import LinePart
-from gateway.calibration.file.parts import ExpectedErrorsPart, Part, ProvenancePart, SeenPart
+from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart, Part, ProvenancePart, SeenPart
 from gateway.calibration.file.sane import absurd
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration

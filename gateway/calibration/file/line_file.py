@@ -15,8 +15,7 @@ from gateway.calibration.file.calibration_file import (
     matches_its_id,
     read_content,
 )
-from gateway.calibration.file.line_part import LinePart
-from gateway.calibration.file.parts import ExpectedErrorsPart, Part
+from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart, Part
 from gateway.errors import CalibrationFileError
 from gateway.files.signed import Read
 from gateway.toml_file import describe_faults

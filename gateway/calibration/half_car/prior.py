@@ -23,19 +23,20 @@ from gateway.records import F64
 
 BOUNCE_HZ: Final = 1.35  # Gillespie, ch. 5
 DAMPING_RATIO: Final = 0.3  # Gillespie, ch. 5
-TYRE_NPM: Final = 400e3  # chosen: both tyres of an axle of a 1250 kg vehicle; scales with mass
+TYRE_NPM: Final = 400e3  # chosen: both tyres of an axle; scales with mass
 MOUNT_NPM: Final = 500e3  # chosen: both damper mounts of an axle; scales with mass
 GYRATION_PER_WHEELBASE: Final = 0.46  # Gillespie, ch. 5
 MOST_OFFSET_STD_M: Final = 0.1  # chosen: of the sensor's lateral place; a worse one is not used
 EMPTY_LEFT_STD_M: Final = 0.02  # chosen: driver, tank, sliding door
 SLACK: Final = 0.03  # chosen: share of unmodelled power
-SLOPE_STD_PER_KN: Final = 0.05  # chosen: of the spring rate's logarithm
+SLOPE_PER_KN, SLOPE_STD_PER_KN = 0.03, 0.05  # chosen: of the spring rate's logarithm
 BEND_STD_PER_KN: Final = 0.1
 """Chosen: of each bend. The bend at no added load equals the slope except where a load relieves the axle; their priors
 add up.
 """
 DAMPER_FRICTION, DAMPER_FRICTION_STD = 0.1, 0.3  # chosen: shares of the rate at the usual amplitude
-SPRING_FRICTION, SPRING_FRICTION_STD = 0.03, 0.05
+SPRING_FRICTION, SPRING_FRICTION_STD = 0.03, 0.05  # chosen: likewise
+REFERENCE_KG: Final = 1250.0  # chosen: the vehicle whose tyres, mounts and springs the figures here refer to
 TRACK_OFFSET_M: Final = 0.03  # chosen: between the tracks of both axles
 NOISE_ACCELERATION_M2PS3: Final = 1e-5  # chosen: 300 ug per root hertz
 NOISE_PITCH_RATE_RAD2PS: Final = 1e-8  # chosen: 0.006 deg/s per root hertz; steps of 0.25 deg/s at 100 Hz make 3e-8
@@ -54,7 +55,7 @@ _LOG_STD: Final = {
     "noise": 2.0,
     "track_offset": 1.0,
 }
-
+"""Chosen: standard deviations of logarithms, wide enough for any road vehicle."""
 
 _ROLL_STD: Final = {
     "roll_inertia_kgm2": 0.3,
@@ -158,15 +159,15 @@ def _body(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
     return {
         "pitch_inertia_kgm2": (log(inertia), _LOG_STD["pitch_inertia"]),
         "sensor_position_m": (vehicle.sensor_position_m, vehicle.sensor_position_std_m),
-        "payload_gyration_m2": (log(0.1), _LOG_STD["payload_gyration"]),
-        "payload_mode_hz": (log(25.0), _LOG_STD["payload_mode"]),
-        "payload_damping_ratio": (log(0.15), _LOG_STD["payload_damping"]),
+        "payload_gyration_m2": (log(0.1), _LOG_STD["payload_gyration"]),  # chosen: a compact load
+        "payload_mode_hz": (log(25.0), _LOG_STD["payload_mode"]),  # chosen: above the estimators' band
+        "payload_damping_ratio": (log(0.15), _LOG_STD["payload_damping"]),  # chosen: packed goods
         "noise_acceleration_m2ps3": (log(NOISE_ACCELERATION_M2PS3), _LOG_STD["noise"]),
         "noise_pitch_rate_rad2ps": (log(NOISE_PITCH_RATE_RAD2PS), _LOG_STD["noise"]),
         "track_offset_m": (log(TRACK_OFFSET_M), _LOG_STD["track_offset"]),
-        "gyro_lag_s": (0.0, 0.01),
-        "delay_scale": (0.0, 0.003),
-        "rear_lag_s": (0.0, 0.005),
+        "gyro_lag_s": (0.0, 0.01),  # chosen: one sample at 100 Hz
+        "delay_scale": (0.0, 0.003),  # chosen: of the speed, by tyre wear and receiver
+        "rear_lag_s": (0.0, 0.005),  # chosen: the rear axle's path to the body
     }
 
 
@@ -177,7 +178,7 @@ def _axle(end: str, vehicle: Vehicle) -> dict[str, tuple[float, float]]:
     damper_nspm = 2.0 * DAMPING_RATIO * (spring_npm * sprung_kg) ** 0.5
     given_kg = vehicle.unsprung_front_kg if end == "front" else vehicle.unsprung_rear_kg
     unsprung_kg = given_kg or UNSPRUNG_SHARE * vehicle.empty_mass_kg
-    scale = vehicle.empty_mass_kg / 1250.0
+    scale = vehicle.empty_mass_kg / REFERENCE_KG
     return {
         f"spring_{end}_npm": (log(spring_npm), _LOG_STD["spring"]),
         f"damper_{end}_nspm": (log(damper_nspm), _LOG_STD["damper"]),
@@ -186,7 +187,7 @@ def _axle(end: str, vehicle: Vehicle) -> dict[str, tuple[float, float]]:
         f"unsprung_{end}_kg": (log(unsprung_kg), WEIGHED_STD if given_kg else _LOG_STD["unsprung"]),
         f"damper_friction_{end}": (DAMPER_FRICTION, DAMPER_FRICTION_STD),
         f"spring_friction_{end}": (SPRING_FRICTION, SPRING_FRICTION_STD),
-        f"spring_slope_{end}_per_kn": (0.03 / scale, SLOPE_STD_PER_KN / scale),
+        f"spring_slope_{end}_per_kn": (SLOPE_PER_KN / scale, SLOPE_STD_PER_KN / scale),
         **{f"spring_bend_{end}_{i}_per_kn": (0.0, BEND_STD_PER_KN / scale) for i in range(len(BEND_SHARES))},
     }
 

@@ -5,24 +5,3 @@ verdict with findings for every run, findings about all runs together, and the r
 Logs, rows, axes and signs, and loads are checked in this order; a fault excludes its run from the calibration.
 The table of kinds (``finding``) has the words and the advice for each; docs/findings.md is made from it.
 """
-
-from gateway.calibration.inspection.campaign import Inspection, inspect_campaign
-from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
-from gateway.calibration.inspection.log import LogFacts, SplitRun
-from gateway.calibration.inspection.roll import offset_findings, unmapped_roll_findings
-from gateway.calibration.inspection.rows import RowFacts, row_facts
-
-__all__ = [
-    "Finding",
-    "Inspection",
-    "Kind",
-    "LogFacts",
-    "RowFacts",
-    "RunVerdict",
-    "Severity",
-    "SplitRun",
-    "inspect_campaign",
-    "offset_findings",
-    "row_facts",
-    "unmapped_roll_findings",
-]

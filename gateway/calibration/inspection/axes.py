@@ -17,8 +17,9 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car import KnownSpectra, fit_half_car, prior_of
-from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
+from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT, KnownSpectra
+from gateway.calibration.half_car.most_probable_vehicle import fit_half_car
+from gateway.calibration.half_car.prior import prior_of
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.estimator import COHERENCE_BAND_HZ
@@ -47,7 +48,7 @@ POSITION_WRONG_M: Final = 1.0  # chosen: deviation that excludes the run
 LEAST_SEGMENTS: Final = 20  # chosen: for a place; a sign needs fewer
 BELIEVED_AGREEMENT: Final = 0.92  # chosen: with this agreement the speed's unit is not tested
 UNIT_GAIN: Final = 0.04  # chosen: gain of agreement that proves a wrong unit of speed
-SPEED_MISREAD: Final = {
+SPEED_MISREAD: Final = {  # how many times too high the speed then reads; a mile has 1.609344 km
     "its numbers are km/h, but the signal map says m/s": 3.6,
     "its numbers are m/s, but the signal map says km/h": 1.0 / 3.6,
     "its numbers are km/h, but the signal map says mph": 1.609344,

@@ -13,7 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car import KnownSpectra, fit_half_car, half_car_calibration, known_spectra, prior_of
+from gateway.calibration.half_car.fit import half_car_calibration
+from gateway.calibration.half_car.known_spectra import KnownSpectra, known_spectra
+from gateway.calibration.half_car.most_probable_vehicle import fit_half_car
+from gateway.calibration.half_car.prior import prior_of
 from gateway.calibration.inspection.finding import Finding, Kind
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.likelihood import Point

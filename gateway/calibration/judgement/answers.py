@@ -12,7 +12,7 @@ from gateway.calibration.judgement.coverage import coverage_of
 from gateway.calibration.judgement.evaluation import Judged, Target
 from gateway.records import F64, I64
 
-LEVELS: Final = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99])
+LEVELS: Final = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99])  # chosen: even, and the tail
 
 
 @dataclass(frozen=True, slots=True, eq=False)

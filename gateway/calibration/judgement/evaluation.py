@@ -1,7 +1,7 @@
 """The error table of equation (12): estimates compared with weighed loads."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from math import isfinite, nan
 from typing import Any, Final, Literal, NamedTuple, get_args
 
@@ -9,20 +9,20 @@ import numpy as np
 
 from gateway.budget import budget_of
 from gateway.calibration.judgement.coverage import interval_scores
-from gateway.calibration.judgement.sideways import CgLeftErrors, JudgedLoad, WheelErrors, cg_left_errors, wheel_errors
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cargo import is_said
 from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle, cg_left_m
-from gateway.core.weights import NOT_CALIBRATED, Unsprung, weighed
-from gateway.estimate import Estimate
+from gateway.core.weights import NOT_CALIBRATED, Unsprung, weighed, weights_of
+from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
-from gateway.posterior import Source
+from gateway.posterior import Source, exactly
 from gateway.records import F64, Batch, Why
 
 Target = Literal["payload", "front_share"]
 TARGETS: Final[tuple[Target, ...]] = get_args(Target)
+WHEELS: Final = ("front_left", "front_right", "rear_left", "rear_right")
 
 
 class Comparison(NamedTuple):
@@ -67,10 +67,17 @@ class Judged:
         """The centre of gravity's lateral position in m, truth and estimate."""
         return Comparison(self.cg_left_m, self.estimate.cg_left.number, *self.estimate.cg_left.interval95)
 
-    @property
-    def carried(self) -> JudgedLoad:
-        """The truth of the whole load beside the estimate."""
-        return JudgedLoad(self.payload_kg, self.front_share_pct, self.cg_left_m, self.estimate, self.unsprung)
+    def wheels_off_pct(self, vehicle: Vehicle) -> F64:
+        """(4,) errors of the wheels' loads in percent of the gross weight; NaN where either is unknown.
+
+        A campaign does not state how the axles divide a sideways moment, and some do not state the unsprung masses: the
+        truth takes both from the estimate, so their errors are in neither.
+        """
+        roll_share = Quantity(self.estimate.roll_share_front, 0.0)
+        truth = exactly(self.payload_kg, self.front_share_pct, self.cg_left_m)
+        true = weights_of(vehicle, truth, roll_share, self.unsprung)
+        off_kg = [getattr(self.estimate.weights, wheel).kg - getattr(true, wheel).kg for wheel in WHEELS]
+        return np.array(off_kg) / true.gross.kg * 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +121,35 @@ class TargetErrors:
             "interval_score_pct": self.interval_score_pct,
         }
         return record | ({"mean_abs_pct_of_gross": self.mean_abs_pct_of_gross} if self.unit == "kg" else {})
+
+
+@dataclass(frozen=True, slots=True)
+class CgLeftErrors:
+    """Of the centre of gravity's lateral position, in m. None without an estimate."""
+
+    mean_abs_m: float | None
+    bias_m: float | None
+    std_m: float | None
+    max_abs_m: float | None
+    coverage95: float | None
+    half_width_m: float | None = None
+    interval_score_m: float | None = None
+
+    def to_json(self) -> dict[str, float | None]:
+        """The object that ``evaluate --json`` prints."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True)
+class WheelErrors:
+    """Of the four wheels' loads in percent of the gross weight. None if they are not known."""
+
+    mean_abs_pct_of_gross: float | None
+    max_abs_pct_of_gross: float | None
+
+    def to_json(self) -> dict[str, float | None]:
+        """The object that ``evaluate --json`` prints."""
+        return asdict(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,8 +230,8 @@ def errors_of(judged: Sequence[Judged], vehicle: Vehicle) -> Errors:
         rejected_by_reason={why: reasons.count(why) for why in sorted(set(reasons))},
         payload=_target_errors(payload, vehicle.payload_range_kg, "kg", unloaded_kg=_unloaded_kg(vehicle)),
         front_share=_target_errors(share, vehicle.front_share_range_pct, "pp"),
-        cg_left=cg_left_errors(cg_left),
-        wheels=wheel_errors([one.carried for one in whole], vehicle),
+        cg_left=_cg_left_errors(cg_left),
+        wheels=_wheel_errors(whole, vehicle),
     )
 
 
@@ -213,22 +249,64 @@ def _target_errors(
     error = estimated - true
     missed = 0.5 * (low + high) - compared[~answered, 0]
     percent = 100.0 / (high - low)
+    in_pct, in_unit = _Spread.of(error * percent), _Spread.of(error)
     return TargetErrors(
         unit,
-        mean_abs_pct=_mean(np.abs(error) * percent),
+        mean_abs_pct=in_pct.mean_abs,
         mean_abs_pct_with_misses=_mean(np.abs(np.r_[error, missed]) * percent),
-        bias_pct=_mean(error * percent),
-        std_pct=float(np.std(error * percent)) if error.size else None,
-        max_abs_pct=float(np.max(np.abs(error) * percent)) if error.size else None,
-        mean_abs=_mean(np.abs(error)),
-        bias=_mean(error),
-        std=float(np.std(error)) if error.size else None,
-        max_abs=float(np.max(np.abs(error))) if error.size else None,
+        bias_pct=in_pct.bias,
+        std_pct=in_pct.std,
+        max_abs_pct=in_pct.max_abs,
+        mean_abs=in_unit.mean_abs,
+        bias=in_unit.bias,
+        std=in_unit.std,
+        max_abs=in_unit.max_abs,
         coverage95=_mean(((lower <= true) & (true <= upper)).astype(float)),
         mean_abs_pct_of_gross=None if unloaded_kg is None else _mean(100.0 * np.abs(error) / (unloaded_kg + true)),
         half_width_pct=_mean(0.5 * (upper - lower) * percent),
         interval_score_pct=_mean(interval_scores(true, lower, upper) * percent),
     )
+
+
+def _cg_left_errors(compared: F64) -> CgLeftErrors | None:
+    """Of the rows (n, 4) of Comparison; None if no truth is known."""
+    known = compared[np.isfinite(compared[:, 0])]
+    if not len(known):
+        return None
+    true, estimated, low, high = known[np.isfinite(known[:, 1])].T
+    error = _Spread.of(estimated - true)
+    return CgLeftErrors(
+        mean_abs_m=error.mean_abs,
+        bias_m=error.bias,
+        std_m=error.std,
+        max_abs_m=error.max_abs,
+        coverage95=_mean(((low <= true) & (true <= high)).astype(float)),
+        half_width_m=_mean(0.5 * (high - low)),
+        interval_score_m=_mean(interval_scores(true, low, high)),
+    )
+
+
+def _wheel_errors(judged: Sequence[Judged], vehicle: Vehicle) -> WheelErrors | None:
+    """Over all batches whose wheel loads are known, in truth and by the estimate; None if there is none."""
+    off_pct = np.array([one.wheels_off_pct(vehicle) for one in judged]).reshape(-1, len(WHEELS))
+    known = np.abs(off_pct[np.isfinite(off_pct).all(axis=1)])
+    return WheelErrors(float(np.mean(known)), float(np.max(known))) if known.size else None
+
+
+class _Spread(NamedTuple):
+    """Statistics of errors; None without any."""
+
+    mean_abs: float | None
+    bias: float | None
+    std: float | None
+    max_abs: float | None
+
+    @classmethod
+    def of(cls, error: F64) -> "_Spread":
+        if not error.size:
+            return cls(None, None, None, None)
+        size = np.abs(error)
+        return cls(float(np.mean(size)), float(np.mean(error)), float(np.std(error)), float(np.max(size)))
 
 
 def _mean(x: F64) -> float | None:

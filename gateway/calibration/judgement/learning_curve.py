@@ -12,11 +12,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.calibration.half_car import calibrate_cross_spectrum
-from gateway.calibration.inspection import SplitRun
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
-from gateway.calibration.ratio_index import fit_ratio_index
+from gateway.calibration.ratio_index.fit import fit_ratio_index
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle, payload_position_m

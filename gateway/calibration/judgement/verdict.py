@@ -10,24 +10,27 @@ from enum import StrEnum
 from statistics import fmean
 from typing import Final
 
+import numpy as np
 from scipy.special import gammainc
 
+from gateway.budget import BudgetLine, typical_budget
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.inspection import RunVerdict, Severity
-from gateway.calibration.inspection.finding import Kind
+from gateway.calibration.inspection.finding import Kind, RunVerdict, Severity
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, BatchSet, Judgement
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, Target, TargetErrors
-from gateway.calibration.judgement.width import Width, width_of
-from gateway.calibration.plan import Expected
+from gateway.calibration.plan.plan import Expected
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Z95
 from gateway.posterior import FRONT_SHARE, PAYLOAD, Source
+from gateway.reasons import REMEDIES, SOURCES
 from gateway.words import counted
 
 FIT_ERROR_PCT: Final = 10.0  # chosen: of the range (12)
 MOST_ERROR_PCT: Final = 20.0  # chosen: of the range; a guess at mid-range errs by 25 % over evenly spread loads
+FIT_HALF_WIDTH_PCT: Final = 25.0  # chosen: of the range, half a 95 % interval for a mean normal error of FIT_ERROR_PCT
+MOST_HALF_WIDTH_PCT: Final = 50.0  # chosen: likewise for MOST_ERROR_PCT, when the interval is as wide as the range
 LEAST_COVERAGE: Final = 0.7  # chosen: 95 % intervals with certainly less coverage mislead
 TOO_WIDE: Final = 1e-3  # chosen: probability of so small errors with correct intervals (chi-squared over runs)
 FEW_REJECTED: Final = 0.2  # chosen: of the batches
@@ -69,6 +72,69 @@ class Verdict:
     def grade(self) -> Grade:
         """The worst of the reasons."""
         return max((reason.grade for reason in self.reasons), key=lambda grade: grade.rank, default=Grade.RESERVED)
+
+
+@dataclass(frozen=True, slots=True)
+class Width:
+    """Mean half-width of 95 % intervals over batches, in ``unit`` and percent of the range; ``cause`` is the largest
+    source of the error, None if the estimates have no budget.
+    """
+
+    target: Target
+    half: float
+    unit: str
+    percent: float
+    cause: BudgetLine | None
+
+    @property
+    def is_fit(self) -> bool:
+        """Whether intervals are narrow enough to plan with."""
+        return self.percent <= FIT_HALF_WIDTH_PCT
+
+    @property
+    def is_of_use(self) -> bool:
+        """Whether intervals are narrower than the range itself."""
+        return self.percent <= MOST_HALF_WIDTH_PCT
+
+    @property
+    def judged(self) -> str:
+        """The judgement in a word or two."""
+        return "fit" if self.is_fit else "wide" if self.is_of_use else "too wide to be of use"
+
+    @property
+    def sentence(self) -> str:
+        """The judgement with the main cause and its remedy."""
+        said = (
+            f"95 % intervals of {self.target.replace('_', ' ')} are ± {self.half:.3g} {self.unit} on average, "
+            f"{self.percent:.0f} % of the range: {self.judged} (fit to {FIT_HALF_WIDTH_PCT:g} %, no use beyond "
+            f"{MOST_HALF_WIDTH_PCT:g} %)."
+        )
+        if self.cause is None:
+            return said
+        source = SOURCES.get(self.cause.source, self.cause.source)
+        return f"{said} Mostly due to {source}{self._remedy(self.cause)}."
+
+    def _remedy(self, cause: BudgetLine) -> str:
+        """What narrows it; how far is known for the payload only."""
+        if cause.remedy is None:
+            return ""
+        after = f" (then ± {Z95 * cause.payload_with_remedy_kg:.0f} kg)" if self.target == "payload" else ""
+        return f": {REMEDIES[cause.remedy]}{after}"
+
+
+def width_of(judged: Sequence[Judged], errors: TargetErrors, target: Target) -> Width | None:
+    """None if no batch was answered with an interval."""
+    halves = [
+        0.5 * (compared.high - compared.low)
+        for compared in (one.compared(target) for one in judged)
+        if compared.low <= compared.high
+    ]
+    if not halves or errors.half_width_pct is None:
+        return None
+    budgets = [one.estimate.error_budget for one in judged if one.estimate.error_budget]
+    lines = typical_budget(budgets) if budgets else ()
+    cause = max(lines, key=lambda line: line.payload_kg if target == "payload" else line.front_share_pct, default=None)
+    return Width(target, float(np.mean(halves)), errors.unit, errors.half_width_pct, cause)
 
 
 def verdicts_of(assessment: Assessment, expected: Expected | None = None) -> tuple[Verdict, ...]:

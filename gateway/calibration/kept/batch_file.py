@@ -14,8 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.calibration.inspection import RowFacts, row_facts
-from gateway.calibration.inspection.rows import Stream
+from gateway.calibration.inspection.rows import RowFacts, Stream, row_facts
 from gateway.core.batch import Traits
 from gateway.errors import KeptBatchError
 from gateway.records import F64, Batch, Motion, Signal, Why

@@ -9,17 +9,11 @@ import numpy as np
 
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign
-from gateway.calibration.inspection import (
-    Finding,
-    Inspection,
-    LogFacts,
-    RowFacts,
-    SplitRun,
-    inspect_campaign,
-    offset_findings,
-    unmapped_roll_findings,
-)
-from gateway.calibration.inspection.rows import Stream
+from gateway.calibration.inspection.campaign import Inspection, inspect_campaign
+from gateway.calibration.inspection.finding import Finding
+from gateway.calibration.inspection.log import LogFacts, SplitRun
+from gateway.calibration.inspection.roll import offset_findings, unmapped_roll_findings
+from gateway.calibration.inspection.rows import RowFacts, Stream
 from gateway.calibration.kept.batch_file import KeptBatch
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings

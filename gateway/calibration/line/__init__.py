@@ -5,21 +5,3 @@ Each sister's drives are evidence on the line; the scatter between vehicles wide
 there (``line_of``, ``Line.prior_of``). With three sisters or more the scatter itself is estimated. Siblings left out in
 turn show how far intervals must be widened (``with_siblings_left_out``).
 """
-
-from gateway.calibration.inheritance import ModelLimits, Seen, Usual
-from gateway.calibration.line.evidence import Evidence
-from gateway.calibration.line.left_out import Sibling, TestedLine, with_siblings_left_out
-from gateway.calibration.line.line import Line, Sister, line_of
-
-__all__ = [
-    "Evidence",
-    "Line",
-    "ModelLimits",
-    "Seen",
-    "Sibling",
-    "Sister",
-    "TestedLine",
-    "Usual",
-    "line_of",
-    "with_siblings_left_out",
-]

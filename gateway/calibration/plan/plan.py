@@ -2,6 +2,7 @@
 
     plan_first(vehicle)                   before the first drive: a first campaign, from priors alone
     plan_next(outcome, vehicle)           after a calibration: the most informative runs, in order
+    stated_widths(known, vehicle, speed)  intervals of one batch now, and once the usual goods are stated
 
 Runs are chosen by gateway.calibration.plan.design. The expected figures are those that the service will state: standard
 deviations of five-minute batches over the loads that the vehicle carries, with every source of error.
@@ -9,28 +10,28 @@ deviations of five-minute batches over the loads that the vehicle carries, with 
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import Any, Final
 
 import numpy as np
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.half_car import Inherited, Prior, prior_of
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.calibration.half_car.left_out import model_error
+from gateway.calibration.half_car.prior import Inherited, Prior, prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan.design import BATCH_S, Design
 from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
-from gateway.core.cargo import shape_prior
+from gateway.core.cargo import ShapePrior, is_said, shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, upright
 from gateway.core.cross_spectrum.predicted import Drive, predicted
-from gateway.core.vehicle import Load, Vehicle, cg_left_m, front_share_pct
+from gateway.core.vehicle import Carries, Load, Vehicle, cg_left_m, front_share_pct
 from gateway.core.weights import weights_of
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimate import Quantity
-from gateway.posterior import Source, exactly
+from gateway.posterior import PAYLOAD, Source, exactly
 from gateway.records import F64
 from gateway.units import NS_PER_S
 
@@ -276,3 +277,58 @@ class _Planner:
             front_share_std_pct=math.sqrt(spread.front_share_std_pct**2 + float(self._beside[1])),
             reach_share=share_within_reach(self._targets, (*driven, *new)),
         )
+
+
+TYPICAL_PART: Final = 0.5  # chosen: of the largest payload
+TYPICAL_PLACE: Final = 0.5  # chosen: of the wheelbase, behind the front axle
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """The payload that one batch states, and half its 95 % interval."""
+
+    payload_kg: float
+    half_width_kg: float
+
+
+@dataclass(frozen=True, slots=True)
+class StatedOf:
+    """The estimate of goods of one kind: before and after they are stated."""
+
+    unsaid: Stated
+    said: Stated
+
+
+@dataclass(frozen=True, slots=True)
+class StatedWidths:
+    """The estimates of ``payload_kg`` in the middle of the wheelbase, for each kind of goods in ``carries``."""
+
+    payload_kg: float
+    carries: dict[Carries, StatedOf]
+
+    def to_json(self) -> dict[str, Any]:
+        """The figures as JSON."""
+        return asdict(self)
+
+
+def stated_widths(known: CrossSpectrumCalibration, vehicle: Vehicle, speed_mps: float) -> StatedWidths | None:
+    """Estimates for a load with each kind's median shape. None if the fitter stated the goods, or a single load was
+    driven.
+    """
+    if is_said(vehicle) or known.payload_seen_kg[0] == known.payload_seen_kg[1]:
+        return None
+    payload_kg = TYPICAL_PART * vehicle.payload_range_kg[1]
+    load = Load(payload_kg, front_share_pct(vehicle, payload_kg, TYPICAL_PLACE * vehicle.wheelbase_m))
+    drive = Drive(BATCH_S, speed_mps)
+    nothing_said = shape_prior(vehicle, *known.known_shape)
+
+    def stated(prior: ShapePrior, log_s: float) -> Stated:
+        payload = predicted(known, prior, load, drive, log_s).quantity(PAYLOAD)
+        low, high = payload.interval95
+        return Stated(payload.number, 0.5 * (high - low))
+
+    def stated_of(kind: Carries) -> StatedOf:
+        said = shape_prior(replace(vehicle, carries=kind), *known.known_shape)
+        return StatedOf(stated(nothing_said, said.median), stated(said, said.median))
+
+    return StatedWidths(payload_kg, {kind: stated_of(kind) for kind in Carries if kind is not Carries.MIXED})

@@ -17,12 +17,10 @@ from gateway.core.alarms.alarm import (
     AlarmState,
     alarm_from_json,
     alarm_to_json,
+    sentence,
 )
-from gateway.core.alarms.drives import NO_DRIVES, DriveTally
-from gateway.core.alarms.rules import AlarmRules, AlarmVerdict, Says
+from gateway.core.alarms.rules import NO_DRIVES, AlarmRules, AlarmVerdict, DriveTally, Says, verdicts_of
 from gateway.core.alarms.watch import AlarmWatch
-from gateway.core.alarms.weighing import verdicts_of
-from gateway.core.alarms.words import sentence
 
 ENTRY_KIND = "alarm"
 """The kind of an alarm's row in the store and in the event stream."""

@@ -4,9 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from gateway.core.alarms.alarm import CAUSES, Acknowledged, Alarm, AlarmCause, AlarmFigure, AlarmState, AlarmStep
-from gateway.core.alarms.drives import NO_DRIVES
-from gateway.core.alarms.rules import AlarmRules, Says
-from gateway.core.alarms.weighing import verdicts_of
+from gateway.core.alarms.rules import NO_DRIVES, AlarmRules, Says, verdicts_of
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights import NOT_CALIBRATED, Unsprung
 from gateway.errors import AlarmRefusedError

@@ -13,9 +13,8 @@ from dataclasses import replace
 from typing import Final
 
 from gateway.core.change import EVEN, Rules
-from gateway.core.events.day import Day
+from gateway.core.events.day import Day, trips_of
 from gateway.core.events.entry import Entry, EntryKind, is_news
-from gateway.core.events.trips import trips_of
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json, estimate_to_json
 

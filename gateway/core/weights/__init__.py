@@ -3,7 +3,17 @@
 weighed(estimate, vehicle, unsprung)    # the estimate as published; ``unsprung`` comes from calibration
 """
 
-from gateway.core.weights.limits import RELEASE_SHARE, Limits, is_over_limit, over_limit_probability
+from gateway.core.weights.limits import (
+    RELEASE_SHARE,
+    Light,
+    Limits,
+    Nearness,
+    Room,
+    is_over_limit,
+    nearness,
+    over_limit_probability,
+    rooms_of,
+)
 from gateway.core.weights.on_the_road import (
     NOT_CALIBRATED,
     PayloadPlace,
@@ -13,7 +23,6 @@ from gateway.core.weights.on_the_road import (
     weighed,
     weights_of,
 )
-from gateway.core.weights.room import Light, Nearness, Room, nearness, rooms_of
 
 __all__ = [
     "NOT_CALIBRATED",

@@ -8,25 +8,18 @@ import numpy as np
 from scipy.special import ndtri
 
 from gateway.budget import BudgetLine
-from gateway.calibration.judgement import (
-    LEVELS,
-    PART_NAMES,
-    PART_TEXT,
+from gateway.calibration.judgement.answers import LEVELS, Answers, answers_of, observed_coverage, standardised
+from gateway.calibration.judgement.assessment import PART_NAMES, PART_TEXT, BatchSet, Judgement
+from gateway.calibration.judgement.coverage import IDEAL_SCORE
+from gateway.calibration.judgement.evaluation import (
     TARGETS,
-    Answers,
-    BatchSet,
     CgLeftErrors,
     Comparison,
     Errors,
     Judged,
-    Judgement,
     Target,
     TargetErrors,
-    answers_of,
-    observed_coverage,
-    standardised,
 )
-from gateway.calibration.judgement.coverage import IDEAL_SCORE
 from gateway.estimate import Z95
 from gateway.reasons import REMEDIES, SOURCES
 from gateway.records import F64, iso_utc

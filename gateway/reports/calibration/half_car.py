@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car import Inherited, prior_of
+from gateway.calibration.half_car.prior import Inherited, prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra

@@ -6,13 +6,9 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index import (
-    FamilyTrial,
-    FittedRegression,
-    IndexRows,
-    RatioIndexFit,
-    index_rows,
-)
+from gateway.calibration.ratio_index.fit import FamilyTrial, RatioIndexFit
+from gateway.calibration.ratio_index.regression import FittedRegression
+from gateway.calibration.ratio_index.table import IndexRows, index_rows
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.records import F64

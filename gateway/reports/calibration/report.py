@@ -14,18 +14,11 @@ from typing import Any, Final
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import Campaign
-from gateway.calibration.judgement import (
-    PART_NAMES,
-    Assessment,
-    Grade,
-    LearningCurve,
-    Verdict,
-    assess_calibration,
-    stated_budget,
-    verdicts_of,
-)
+from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, assess_calibration, stated_budget
+from gateway.calibration.judgement.learning_curve import LearningCurve
+from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
 from gateway.calibration.line_files import line_in
-from gateway.calibration.plan import LoadPlan, plan_next
+from gateway.calibration.plan.plan import LoadPlan, plan_next
 from gateway.estimate_json.errors import budget_to_json
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.half_car import half_car_section

@@ -1,9 +1,10 @@
 """The runs and their findings, the plan of further runs, and the provenance of every number."""
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.inspection import Finding, RunVerdict, SplitRun
-from gateway.calibration.judgement import Assessment
-from gateway.calibration.plan import Advice, Expected, LoadPlan, OffCentreLoad
+from gateway.calibration.inspection.finding import Finding, RunVerdict
+from gateway.calibration.inspection.log import SplitRun
+from gateway.calibration.judgement.assessment import Assessment
+from gateway.calibration.plan.plan import Advice, Expected, LoadPlan, OffCentreLoad
 from gateway.estimate import Z95
 from gateway.records import Why
 from gateway.reports.calibration.text import NONE, decimal, percent, span

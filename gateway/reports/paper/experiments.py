@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Final
 
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.inspection import SplitRun
-from gateway.calibration.judgement import Errors, Judged, errors_of, judge
+from gateway.calibration.inspection.log import SplitRun
+from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index import N_SEGMENT, fit_regression, index_rows
+from gateway.calibration.ratio_index.regression import fit_regression
+from gateway.calibration.ratio_index.table import N_SEGMENT, index_rows
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration

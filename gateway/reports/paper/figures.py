@@ -6,9 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gateway.calibration.judgement import Judged
+from gateway.calibration.judgement.evaluation import Judged
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index import N_SEGMENT, IndexRows, fit_regression, index_rows
+from gateway.calibration.ratio_index.regression import fit_regression
+from gateway.calibration.ratio_index.table import N_SEGMENT, IndexRows, index_rows
 from gateway.core.ratio_index.index import PAPER_BANDS, Band, band_pass_gain, mean_spectrum
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
 from gateway.records import F64

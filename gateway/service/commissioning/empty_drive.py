@@ -6,8 +6,10 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.calibration.commissioning import Drive, Job, Result, vehicle_table
-from gateway.calibration.kept import KeptBatch, Shelf, packed
+from gateway.calibration.commissioning.answers import vehicle_table
+from gateway.calibration.commissioning.job import Drive, Job, Result
+from gateway.calibration.kept.batch_file import KeptBatch, packed
+from gateway.calibration.kept.shelf import Shelf
 from gateway.config.sections import CommissioningSection
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle, front_share_pct
@@ -18,7 +20,7 @@ from gateway.service.commissioning.record import MADE, LineChoice, MadeCalibrati
 from gateway.service.commissioning.record_store import RecordStore
 from gateway.service.commissioning.steps import LastInspection
 from gateway.service.commissioning.worker import Worker
-from gateway.stated import VehicleAnswers
+from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
 
 COMMAND: Final = "commissioned on the vehicle"

@@ -9,8 +9,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-from gateway.calibration.commissioning import OF_THE_LINE, LineFacts
-from gateway.calibration.file import CalibrationFile, LikeFile, load_like
+from gateway.calibration.commissioning.answers import OF_THE_LINE, LineFacts
+from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file.line_file import LikeFile, load_like
 from gateway.calibration.line_files import line_of_files
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, CommissioningRefusedError, ConfigurationError, LineError

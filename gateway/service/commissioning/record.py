@@ -6,13 +6,14 @@ from typing import Any, Final, Literal
 
 from pydantic import Field, ValidationError
 
-from gateway.calibration.commissioning import NO_LINE, Learned, LineFacts
+from gateway.calibration.commissioning.answers import NO_LINE, LineFacts
+from gateway.calibration.commissioning.job import Learned
 from gateway.calibration.file.parts import Part
 from gateway.core.vehicle import Vehicle
 from gateway.errors import ConfigurationError
 from gateway.files.kept import KeptFiles
-from gateway.stated import VehicleAnswers
 from gateway.stated.doubt import OF_THE_DRIVE, Doubt, DoubtKind
+from gateway.stated.facts import VehicleAnswers
 from gateway.toml_file import describe_faults
 
 FILE_NAME: Final = "commissioning.json"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gateway.calibration.file import load_calibration
+from gateway.calibration.file.calibration_file import load_calibration
 from gateway.errors import CalibrationFileError, CommissioningRefusedError, ConfigurationError
 from gateway.files.kept import BrokenFile, KeptFiles
 from gateway.log import Event, OnEvent, log_event, tell_event

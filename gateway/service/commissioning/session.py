@@ -4,8 +4,9 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, Protocol
 
-from gateway.calibration.commissioning import doubts_of, vehicle_table
-from gateway.calibration.kept import KeptBatch, Shelf
+from gateway.calibration.commissioning.answers import doubts_of, vehicle_table
+from gateway.calibration.kept.batch_file import KeptBatch
+from gateway.calibration.kept.shelf import Shelf
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CampaignError, CommissioningRefusedError
 from gateway.log import Event, OnEvent
@@ -16,8 +17,8 @@ from gateway.service.commissioning.record import Confirmed, EmptyClaim, Ended, L
 from gateway.service.commissioning.record_store import RecordStore
 from gateway.service.commissioning.steps import CommissioningStep, OpenWindow, Present, lines_json, state_json, step_of
 from gateway.service.commissioning.worker import Worker
-from gateway.stated import VehicleAnswers
 from gateway.stated.doubt import OF_THE_DRIVE, meant_by
+from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
 
 UPLOADED: Final = "uploaded"

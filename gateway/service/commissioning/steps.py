@@ -5,8 +5,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-from gateway.calibration.commissioning import Learned
-from gateway.calibration.commissioning.job import Found
+from gateway.calibration.commissioning.job import Found, Learned
 from gateway.service.commissioning.lines import LineFound
 from gateway.service.commissioning.record import CommissioningRecord, MadeCalibration, Underway
 from gateway.stated.doubt import OF_THE_DRIVE, Doubt

@@ -13,8 +13,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from gateway.calibration.commissioning import JOB, RESULT, Job, Result
-from gateway.calibration.commissioning.job import to_file
+from gateway.calibration.commissioning.job import JOB, RESULT, Job, Result, to_file
 
 FOLDER: Final = "commissioning"
 MODULE: Final = "gateway.calibration.commissioning.work"

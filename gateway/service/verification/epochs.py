@@ -12,7 +12,7 @@ from gateway.estimate_json import estimate_from_json
 from gateway.history import HistoryPage
 from gateway.posterior import Posterior, fused
 from gateway.records import iso_utc
-from gateway.stated_weight import Drive
+from gateway.stated.facts import Drive
 from gateway.units import NS_PER_S
 
 NEAR_NS: Final = 12 * 3600 * NS_PER_S  # a drive further away in time may have carried another load

@@ -27,8 +27,7 @@ from gateway.service.pipeline import Pipeline
 from gateway.service.subject import Subject
 from gateway.service.verification.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
 from gateway.service.verification.history_file import HistoryFile
-from gateway.stated import Confirmation, Ending
-from gateway.stated_weight import StatedWeight
+from gateway.stated.facts import Confirmation, Ending, StatedWeight
 
 ALL_KINDS: Final = tuple(KnownWeightKind)
 

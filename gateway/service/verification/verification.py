@@ -26,7 +26,7 @@ from gateway.records import iso_utc, json_line, ns_of
 from gateway.service.subject import Subject
 from gateway.service.verification.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
 from gateway.service.verification.history_file import HistoryFile
-from gateway.stated_weight import StatedWeight
+from gateway.stated.facts import StatedWeight
 from gateway.status import VerificationStatus
 from gateway.units import NS_PER_S
 

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from gateway.core.alarms.weighing import as_of_load
+from gateway.core.alarms.rules import as_of_load
 from gateway.core.events import EntryKind
 from gateway.core.weights import Light, Room, nearness, rooms_of
 from gateway.estimate import Estimate, Lack, Quantity, Weights

@@ -6,8 +6,8 @@ from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from starlette.responses import Response
 
-from gateway.stated import VehicleAnswers
 from gateway.stated.doubt import DoubtKind
+from gateway.stated.facts import VehicleAnswers
 from gateway.web.routes.known_weights import UndoQuery
 from gateway.web.routes.service_calls import CommissioningBackend, Source, call_service, token_name
 from gateway.web.schemas import Body, problem_responses, utf8_only

@@ -12,8 +12,7 @@ from starlette.responses import Response
 
 from gateway.core.known_weights import KnownWeightKind
 from gateway.records import iso_utc
-from gateway.stated import KnownWeightFields
-from gateway.stated_weight import Drive, StatedWeight
+from gateway.stated.facts import Drive, KnownWeightFields, StatedWeight
 from gateway.web.routes.service_calls import REFUSALS, KnownWeightBackend, call_service, token_name
 from gateway.web.schemas import Body, Instant, problem_responses
 

@@ -14,8 +14,7 @@ from starlette.responses import Response
 from gateway.core.known_weights import KnownWeightKind
 from gateway.errors import AlarmRefusedError, CommissioningRefusedError, WeightRefusedError
 from gateway.records import json_line
-from gateway.stated import VehicleAnswers
-from gateway.stated_weight import StatedWeight
+from gateway.stated.facts import StatedWeight, VehicleAnswers
 from gateway.web.access.problems import problem_response
 from gateway.web.schemas import problem_responses
 

@@ -12,7 +12,7 @@ from fastapi import APIRouter, Path, Request
 from pydantic import BaseModel, Field
 from starlette.responses import HTMLResponse, Response
 
-from gateway.stated_weight import StatedWeight
+from gateway.stated.facts import StatedWeight
 from gateway.status import VerificationStatus
 from gateway.web.access.middleware import content_security_policy
 from gateway.web.access.problems import problem_response

@@ -1,18 +1,91 @@
-"""Halts: stops between and within drives at which the load can have changed, with their prior probability.
+"""Which weighings are of one load: the stops at which it can have changed, and neighbours that agree.
 
 Batches count in order of arrival. If the clock was set back, the batches after it have the next ``clock`` number (0, 1,
 ...). Two times are compared by clock first, then by time stamp.
+
+Neighbours that are more likely one load than two are merged, the likeliest first. This is agglomerative clustering of
+neighbours by posterior odds, one merge at a time, like Ward's method with a Bayes factor as its distance (Ward, J. Am.
+Stat. Assoc. 58 (1963) 236-244). Each merged load is weighed again with all its batches, so further batches sharpen both
+sides of a change, and an apparent change may disappear.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import accumulate, pairwise
 from typing import Final
 
-from gateway.core.change import ROLLING
-from gateway.core.loads.load import Weighing
+from gateway.core.change import EVEN, ROLLING, Rules, probability
+from gateway.core.fusion import teaches
 from gateway.estimate import NOWHERE, UNWATCHED, Estimate, Place, Watched
+from gateway.posterior import Fusible, Posterior
 from gateway.units import NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
+class Weighing:
+    """One counted batch: ``measured`` without known weights (they come and go without a change of load), ``shown`` with
+    them. ``at`` is its index among all batches, ``by`` its calibration and estimator.
+    """
+
+    at: int
+    by: tuple[str | None, str]
+    measured: Posterior
+    shown: Posterior
+
+
+class Weighings:
+    """Weighings in order; any consecutive ones can be fused as one load."""
+
+    def __init__(self, each: Sequence[Weighing]) -> None:
+        self.each = each
+
+    @cached_property
+    def measured(self) -> Fusible:
+        return Fusible([one.measured for one in self.each])
+
+    @cached_property
+    def shown(self) -> Fusible:
+        return Fusible([one.shown for one in self.each])
+
+    def __len__(self) -> int:
+        return len(self.each)
+
+    def load(self, first: int, last: int) -> "FusedLoad":
+        """Weighings first to last (inclusive indexes) as one load."""
+        return FusedLoad(first, last, self)
+
+
+@dataclass(frozen=True)
+class FusedLoad:
+    """Weighings first to last (inclusive indexes), fused as one load."""
+
+    first: int
+    last: int
+    weighings: Weighings = field(repr=False)
+
+    @property
+    def n_batches(self) -> int:
+        return self.last - self.first + 1
+
+    @cached_property
+    def measured(self) -> Posterior:
+        """The fused posterior without known weights."""
+        return self.weighings.measured.fused(self.first, self.last + 1)
+
+    @cached_property
+    def shown(self) -> Posterior:
+        return self.weighings.shown.fused(self.first, self.last + 1)
+
+
+def weighings_of(estimates: Sequence[Estimate]) -> list[Weighing]:
+    """The weighings of the batches that give a payload."""
+    return [
+        Weighing(at, (one.calibration_id, one.estimator), one.as_measured, one.posterior)
+        for at, one in enumerate(estimates)
+        if teaches(one) and one.as_measured is not None and one.posterior is not None
+    ]
+
 
 LONG_S: Final = 60.0  # chosen: time enough to load or unload, as in core.fusion
 PRIORS: Final[dict[tuple[bool, bool | None], float]] = {
@@ -155,3 +228,51 @@ def _halts(estimates: Sequence[Estimate]) -> Iterator[Halt]:
 
 def _middle(begin_ns: int, end_ns: int) -> int:
     return (begin_ns + end_ns) // 2
+
+
+@dataclass(frozen=True, slots=True)
+class Loads:
+    """The loads in order, the load of each weighing, and the links between weighings."""
+
+    loads: tuple[FusedLoad, ...]
+    of_weighing: tuple[FusedLoad, ...]
+    links: Sequence[LoadLink]
+    rules: Rules
+
+    def sides(self, link: int) -> tuple[FusedLoad, FusedLoad]:
+        """The loads before and after a link, or the two parts of the load that spans it."""
+        before, after = self.of_weighing[link], self.of_weighing[link + 1]
+        if before is not after:
+            return before, after
+        return before.weighings.load(before.first, link), before.weighings.load(link + 1, before.last)
+
+    def probability(self, link: int) -> float:
+        """The probability that the load changed at this link."""
+        return _between(*self.sides(link), self.links, self.rules)
+
+
+def loads_of(
+    weighings: Sequence[Weighing], links: Sequence[LoadLink], rules: Rules, parted_from: float = EVEN
+) -> Loads:
+    """The loads of weighings with ``links`` between them; changes less likely than ``parted_from`` are ignored.
+
+    Weighings of different calibrations cannot be compared: a load always ends there.
+    """
+    whole = Weighings(weighings)
+    loads = [whole.load(i, i) for i in range(len(whole))]
+    odds = [_between(one, other, links, rules) for one, other in pairwise(loads)]
+    while odds and min(odds) < parted_from:
+        at = odds.index(min(odds))
+        loads[at : at + 2] = [whole.load(loads[at].first, loads[at + 1].last)]
+        del odds[at]
+        for near in (at - 1, at):
+            if 0 <= near < len(odds):
+                odds[near] = _between(loads[near], loads[near + 1], links, rules)
+    return Loads(tuple(loads), tuple(load for load in loads for _ in range(load.n_batches)), links, rules)
+
+
+def _between(before: FusedLoad, after: FusedLoad, links: Sequence[LoadLink], rules: Rules) -> float:
+    each = before.weighings.each
+    if each[before.last].by != each[after.first].by:
+        return 1.0
+    return probability(before.measured, after.measured, links[before.last].prior, rules)
