@@ -11,7 +11,7 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.flow import Flow, Identity
 from gateway.core.known_weights import Knowledge
 from gateway.core.settings import BatchSettings
-from gateway.core.weights import Limits
+from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError
 from gateway.files.signed import Read
 

@@ -12,7 +12,9 @@ from typing import Any, Final
 from benchmarks.accuracy.delivery import leg_of
 from benchmarks.accuracy.delivery_days import Day, Said
 from benchmarks.accuracy.drives import stated, van_of
-from gateway.core.alarms import AlarmRules, AlarmState, AlarmWatch
+from gateway.core.alarms.alarm import AlarmState
+from gateway.core.alarms.rules import AlarmRules
+from gateway.core.alarms.watch import AlarmWatch
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json

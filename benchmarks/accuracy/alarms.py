@@ -15,11 +15,13 @@ import numpy as np
 
 from benchmarks.accuracy.alarm_days import NEAR
 from benchmarks.accuracy.markdown import Column, Row, page, table_of, text
-from gateway.core.alarms import AlarmRules, AlarmState, AlarmWatch
+from gateway.core.alarms.alarm import AlarmState
+from gateway.core.alarms.rules import AlarmRules
+from gateway.core.alarms.watch import AlarmWatch
 from gateway.core.change import Rules
 from gateway.core.fusion import epoch_of, fused_epoch
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import weighed
+from gateway.core.weights.on_the_road import weighed
 from gateway.estimate import Estimate
 from gateway.posterior import Posterior, Source
 from gateway.units import NS_PER_S

@@ -17,8 +17,9 @@ from benchmarks.accuracy.markdown import Column, Row, page, part_cell, score_cel
 from benchmarks.accuracy.study import Study
 from gateway.calibration.judgement.coverage import interval_scores
 from gateway.core.change import Rules
-from gateway.core.events import Entry, EntryKind, Ledger
 from gateway.core.events.day import Day
+from gateway.core.events.entry import Entry, EntryKind
+from gateway.core.events.ledger import Ledger
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json
 

@@ -25,7 +25,7 @@ from gateway.calibration.known_weights_file import KnownWeights, known_weights_o
 from gateway.config import BatchSection, EstimatorName, TrustSection
 from gateway.config.sections import OF_CALIBRATION, LimitKg
 from gateway.core.settings import BatchSettings
-from gateway.core.weights import Limits
+from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError
 from gateway.files.signed import Trust
 from gateway.setup import Setup, load_setup

@@ -19,7 +19,7 @@ from gateway.core.vehicle import (
     front_share_pct,
     left_share_pct,
 )
-from gateway.core.weights import unsprung_kg
+from gateway.core.weights.on_the_road import unsprung_kg
 from gateway.errors import CampaignError
 from gateway.toml_file import checked, read_toml
 

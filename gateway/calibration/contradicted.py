@@ -29,7 +29,7 @@ from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, upright
 from gateway.core.late import special
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import unsprung_kg
+from gateway.core.weights.on_the_road import unsprung_kg
 from gateway.estimate import Z95
 from gateway.records import F64
 from gateway.stated.doubt import Doubt, DoubtKind

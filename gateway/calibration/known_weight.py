@@ -9,7 +9,7 @@ from typing import Final
 
 from gateway.core.known_weights import KnownWeightKind
 from gateway.core.vehicle import Vehicle, front_share_pct
-from gateway.core.weights import Unsprung
+from gateway.core.weights.on_the_road import Unsprung
 from gateway.errors import WeightRefusedError
 from gateway.stated.facts import StatedWeight
 

@@ -8,7 +8,7 @@ import click
 from gateway.calibration.known_weights_file import FILE_NAME
 from gateway.cli.options import FILE, as_json, trusted_keys
 from gateway.config import load_settings
-from gateway.core.weights import Limits
+from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError, UntrustedFileError
 from gateway.records import json_line
 from gateway.service.commissioning import with_commissioned

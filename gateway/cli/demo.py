@@ -20,8 +20,10 @@ from gateway.bus.sink import BusSink, replay_frames
 from gateway.cli.estimate import sentence
 from gateway.cli.options import NumberRange
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
-from gateway.core.alarms import AlarmRules, AlarmWatch, alarm_to_json
-from gateway.core.alarms import sentence as alarm_sentence
+from gateway.core.alarms.alarm import alarm_to_json
+from gateway.core.alarms.alarm import sentence as alarm_sentence
+from gateway.core.alarms.rules import AlarmRules
+from gateway.core.alarms.watch import AlarmWatch
 from gateway.core.flow import Identity
 from gateway.core.settings import BatchSettings
 from gateway.estimate_json import estimate_to_json

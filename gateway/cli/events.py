@@ -9,7 +9,7 @@ import click
 from gateway.cli import options
 from gateway.cli.estimate import prepared, with_known_weights
 from gateway.cli.options import FILE, as_json, one_estimator, window
-from gateway.core.events import Entry, EntryKind
+from gateway.core.events.entry import Entry, EntryKind
 from gateway.offline.estimates import entries_of_logs, require_order
 from gateway.records import json_line
 

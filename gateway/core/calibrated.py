@@ -7,7 +7,7 @@ from gateway.core.cargo import ShapePrior, is_said, shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import NOT_CALIBRATED, Unsprung
+from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung
 
 RANGE_MARGIN = 0.25  # chosen: share of the calibrated span, added at either end
 RATE_MARGIN = 0.25  # of a sampling rate: devices of one setting differ by 1 %, settings by a factor of 2; chosen

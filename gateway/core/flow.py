@@ -34,7 +34,7 @@ from gateway.core.pool import (
 )
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
-from gateway.core.weights import weighed
+from gateway.core.weights.on_the_road import weighed
 from gateway.estimate import UNWATCHED, Estimate, Way
 from gateway.posterior import Posterior
 from gateway.records import Batch, Motion, Why

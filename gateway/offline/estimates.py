@@ -11,7 +11,9 @@ from gateway.bus.logs import LogReport, motion_of_log
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import SignalMap
 from gateway.calibration.file.calibration_file import CalibrationFile
-from gateway.core.events import Entry, Ledger, Rules
+from gateway.core.change import Rules
+from gateway.core.events.entry import Entry
+from gateway.core.events.ledger import Ledger
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.errors import ArraysError, LogUnreadableError

@@ -11,20 +11,20 @@ from typing import Final
 
 from gateway.calibration.trend import Trend
 from gateway.config.sections import AlarmsSection
-from gateway.core.alarms import (
+from gateway.core.alarms.alarm import (
+    CAUSES,
+    DRIFTING,
     ENTRY_KIND,
+    SILENT,
     Alarm,
     AlarmFigure,
-    AlarmRules,
     AlarmState,
-    AlarmVerdict,
-    AlarmWatch,
-    Says,
     alarm_from_json,
     alarm_to_json,
     sentence,
 )
-from gateway.core.alarms.alarm import CAUSES, DRIFTING, SILENT
+from gateway.core.alarms.rules import AlarmRules, AlarmVerdict, Says
+from gateway.core.alarms.watch import AlarmWatch
 from gateway.errors import AlarmRefusedError, StoreError
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json

@@ -5,7 +5,9 @@ import logging
 from collections.abc import Mapping
 from typing import Any, Final
 
-from gateway.core.events import HORIZON, Entry, EntryKind, Ledger, Rules
+from gateway.core.change import Rules
+from gateway.core.events.entry import Entry, EntryKind
+from gateway.core.events.ledger import HORIZON, Ledger
 from gateway.errors import StoreError
 from gateway.estimate import Estimate
 from gateway.estimate_json import INSTANT, estimate_from_json

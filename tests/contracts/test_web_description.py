@@ -20,7 +20,7 @@ from support.known_weights import KnownWeightBench
 from support.patience import PATIENCE_S
 from support.web import Gateway
 
-from gateway.core.alarms import AlarmRules
+from gateway.core.alarms.rules import AlarmRules
 from gateway.records import Why
 from gateway.service.alarms import AlarmService
 from gateway.web.access.tokens import Scope, TokenFile

@@ -13,7 +13,7 @@ import pytest
 from support.days import RULES, day
 from support.web import Client, Gateway
 
-from gateway.core.events import Ledger
+from gateway.core.events.ledger import Ledger
 from gateway.records import json_line
 
 DAY = day(0.0, 500.0, 500.0, 320.0, 200.0, batches=2)

@@ -12,7 +12,7 @@ from support.web import Client, Gateway
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import weighed
+from gateway.core.weights.on_the_road import weighed
 from gateway.estimate import Estimate, Quantity
 from gateway.records import Why
 from gateway.web.app import create_app

@@ -10,7 +10,7 @@ from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
 from support.days import RULES, day
 from support.web import Gateway, serving
 
-from gateway.core.events import Ledger
+from gateway.core.events.ledger import Ledger
 from gateway.estimate import Estimate
 from gateway.records import json_line
 

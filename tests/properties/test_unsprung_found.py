@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from gateway.calibration.file.calibration_file import load_calibration
 from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import NOT_CALIBRATED, Unsprung, weighed, weights_of
+from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung, weighed, weights_of
 from gateway.estimate import PLACES, Estimate, Lack, Quantity, Weights
 from gateway.estimate_json import estimate_from_json, estimate_to_json
 from gateway.posterior import Posterior, exactly

@@ -10,15 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct, left_share_pct
-from gateway.core.weights import (
-    RELEASE_SHARE,
-    PayloadPlace,
-    is_over_limit,
-    place_of,
-    unsprung_kg,
-    weighed,
-    weights_of,
-)
+from gateway.core.weights.limits import RELEASE_SHARE, is_over_limit
+from gateway.core.weights.on_the_road import PayloadPlace, place_of, unsprung_kg, weighed, weights_of
 from gateway.estimate import PLACES, Z95, Estimate, Lack, Quantity, Weights
 from gateway.posterior import FRONT_SHARE, PAYLOAD, Posterior, Source, exactly
 from gateway.records import F64

@@ -5,11 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from gateway.core.alarms import AlarmRules
+from gateway.core.alarms.rules import AlarmRules
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.fusion import epoch_of
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import weighed
+from gateway.core.weights.on_the_road import weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.service.alarms import AlarmService

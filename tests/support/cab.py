@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.events import EntryKind
+from gateway.core.events.entry import EntryKind
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
 from gateway.records import iso_utc, json_line

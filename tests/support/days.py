@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from gateway.core.events import Entry, Ledger, Rules
+from gateway.core.change import Rules
+from gateway.core.events.entry import Entry
+from gateway.core.events.ledger import Ledger
 from gateway.estimate import UNWATCHED, Estimate, Place, Stop, Watched, Way, Weight, Weights
 from gateway.posterior import Posterior, Source
 from gateway.records import Why

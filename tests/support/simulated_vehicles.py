@@ -11,8 +11,7 @@ from typing import Any
 
 from gateway.config import load_settings
 from gateway.core.alarms.alarm import Alarm, AlarmCause, AlarmFigure, AlarmKind, AlarmState, AlarmStep, alarm_to_json
-from gateway.core.events import EntryKind
-from gateway.core.events.entry import entry_id
+from gateway.core.events.entry import EntryKind, entry_id
 from gateway.estimate import Estimate, Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.records import iso_utc, json_line

@@ -12,8 +12,9 @@ from support.patience import PATIENCE_S
 
 from gateway.calibration.trend import Trend, TrendPoint
 from gateway.config import sections as settings
-from gateway.core.alarms import CAUSE_NAMES, AlarmRules
-from gateway.core.events import Rules
+from gateway.core.alarms.alarm import CAUSE_NAMES
+from gateway.core.alarms.rules import AlarmRules
+from gateway.core.change import Rules
 from gateway.errors import AlarmRefusedError
 from gateway.records import Why
 from gateway.service.alarms import rules_of

@@ -11,23 +11,22 @@ from support.alarms import LIMIT_KG, VAN, of_load
 from support.days import T0_NS, at, batch
 from support.estimates import posterior_of
 
-from gateway.core.alarms import (
+from gateway.core.alarms.alarm import (
     CAUSE_NAMES,
+    NO_ESTIMATE,
+    REFUSED,
+    SILENT,
     Alarm,
     AlarmCause,
     AlarmFigure,
     AlarmKind,
-    AlarmRules,
     AlarmState,
-    AlarmVerdict,
-    AlarmWatch,
-    Says,
     alarm_from_json,
     alarm_to_json,
     sentence,
 )
-from gateway.core.alarms.alarm import NO_ESTIMATE, REFUSED, SILENT
-from gateway.core.alarms.rules import beyond_probability
+from gateway.core.alarms.rules import AlarmRules, AlarmVerdict, Says, beyond_probability
+from gateway.core.alarms.watch import AlarmWatch
 from gateway.core.fusion import epoch_of
 from gateway.errors import AlarmRefusedError
 from gateway.estimate import Estimate, Quantity

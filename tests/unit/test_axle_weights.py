@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 from gateway.calibration.axle_weights import UNSPRUNG_SHARE, AxleWeights, Sprung, sprung_of
 from gateway.cli import springscale
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import unsprung_kg
+from gateway.core.weights.on_the_road import unsprung_kg
 from gateway.errors import CampaignError
 
 TAPE = {"name": "van", "wheelbase_m": 2.8, "sensor_position_m": 3.1}

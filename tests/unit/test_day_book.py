@@ -9,7 +9,7 @@ import pytest
 from support.days import day, told
 from support.patience import PATIENCE_S
 
-from gateway.core.events import Rules
+from gateway.core.change import Rules
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.history import ENTRIES

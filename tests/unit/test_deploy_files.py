@@ -11,7 +11,7 @@ import pytest
 from support.patience import PATIENCE_S
 
 from gateway.config import load_settings
-from gateway.core.weights import Limits
+from gateway.core.weights.limits import Limits
 from gateway.web.access.tokens import Scope, TokenFile
 
 DEPLOY = Path(__file__).parents[2] / "deploy"

@@ -27,7 +27,7 @@ from gateway.core.cross_spectrum.located import raw_moves
 from gateway.core.cross_spectrum.measured import cross_spectra_of
 from gateway.core.cross_spectrum.predicted import Drive, expected_of, steady_spectra
 from gateway.core.vehicle import Load, front_share_pct
-from gateway.core.weights import weights_of
+from gateway.core.weights.on_the_road import weights_of
 from gateway.posterior import exactly
 
 PRIOR = prior_of(VAN)

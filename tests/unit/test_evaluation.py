@@ -18,7 +18,7 @@ from gateway.core.estimator import estimate
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import Unsprung, weighed
+from gateway.core.weights.on_the_road import Unsprung, weighed
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
 from gateway.posterior import exactly

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from gateway.cli.events import entry_sentence
-from gateway.core.events import Entry, EntryKind
+from gateway.core.events.entry import Entry, EntryKind
 
 EVENT: dict[str, Any] = {
     "revision": 1,

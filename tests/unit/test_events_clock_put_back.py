@@ -7,7 +7,9 @@ from itertools import pairwise
 import pytest
 from support.days import RULES, assert_a_restart_changes_nothing, batch, day, told, trips
 
-from gateway.core.events import Entry, Ledger, ledger
+from gateway.core.events import ledger
+from gateway.core.events.entry import Entry
+from gateway.core.events.ledger import Ledger
 from gateway.estimate import Estimate, Watched
 
 DAY_MIN = 24 * 60.0

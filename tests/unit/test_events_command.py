@@ -14,7 +14,7 @@ from support.known_weights import SUBJECT, KnownWeightBench
 from gateway.bus.logs import write_candump
 from gateway.cli import springscale
 from gateway.cli.events import entry_sentence
-from gateway.core.events import Entry, EntryKind
+from gateway.core.events.entry import Entry, EntryKind
 from gateway.errors import LogUnreadableError
 from gateway.units import NS_PER_S
 

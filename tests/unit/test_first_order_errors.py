@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct
-from gateway.core.weights import PayloadPlace, place_of, weights_of
+from gateway.core.weights.on_the_road import PayloadPlace, place_of, weights_of
 from gateway.estimate import PLACES, Quantity, Weights
 from gateway.posterior import Posterior, Source
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from gateway.calibration.known_weight import WeightRefusal, load_of
 from gateway.core.vehicle import Vehicle, front_share_pct
-from gateway.core.weights import NOT_CALIBRATED, Unsprung, weights_of
+from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung, weights_of
 from gateway.errors import WeightRefusedError
 from gateway.estimate import Quantity
 from gateway.posterior import exactly

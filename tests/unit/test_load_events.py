@@ -20,8 +20,8 @@ from support.days import (
 )
 
 from gateway.core.change import change_of, probability
-from gateway.core.events import Ledger
 from gateway.core.events import ledger as of_ledger
+from gateway.core.events.ledger import Ledger
 from gateway.core.loads import weighings_of
 from gateway.estimate import Estimate, Place, Stop, Watched
 from gateway.posterior import Posterior, Source

@@ -31,7 +31,7 @@ from gateway.calibration.plan.plan import (
 from gateway.cli import springscale
 from gateway.cli.calibrate import plan_sentences, widths_sentence
 from gateway.core.vehicle import Carries
-from gateway.core.weights import weights_of
+from gateway.core.weights.on_the_road import weights_of
 from gateway.errors import CalibrationImpossibleError, CampaignError
 from gateway.posterior import exactly
 from gateway.reports.calibration.runs import best_next

@@ -12,14 +12,14 @@ from gateway.calibration.ratio_index.choice import StructureChoice
 from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
-from gateway.core.ratio_index import RatioIndexCalibration, RegressionModel
-from gateway.core.ratio_index.index import PAPER_BANDS, indexes_of
+from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration, indexes_of
 from gateway.core.ratio_index.regression import (
     MODEL_9_PAYLOAD,
     MODEL_10_FRONT_SHARE,
     MODEL_11_FRONT_SHARE,
     MODEL_11_PAYLOAD,
     TERMS,
+    RegressionModel,
 )
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import Light, nearness, rooms_of, weights_of
+from gateway.core.weights.limits import Light, nearness, rooms_of
+from gateway.core.weights.on_the_road import weights_of
 from gateway.estimate import Z95, Weight, Weights
 from gateway.posterior import Posterior
 

@@ -17,7 +17,8 @@ from gateway.archive.manifest import load_manifest
 from gateway.cli import springscale
 from gateway.config import load_settings
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import Limits, over_limit_probability, weighed
+from gateway.core.weights.limits import Limits, over_limit_probability
+from gateway.core.weights.on_the_road import weighed
 from gateway.errors import ConfigurationError
 from gateway.estimate import Estimate
 from gateway.estimate_json import table_row

@@ -14,7 +14,7 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cargo import is_said
 from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle, cg_left_m
-from gateway.core.weights import NOT_CALIBRATED, Unsprung, weighed, weights_of
+from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung, weighed, weights_of
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
 from gateway.posterior import Source, exactly

@@ -8,7 +8,7 @@ import numpy as np
 
 from gateway.core.calibrated import RANGE_MARGIN
 from gateway.core.vehicle import Load, Vehicle, front_share_pct
-from gateway.core.weights import weights_of
+from gateway.core.weights.on_the_road import weights_of
 from gateway.posterior import exactly
 
 DRIVEN_PARTS: Final = (0.25, 0.5, 0.75, 1.0)  # chosen: of the largest payload

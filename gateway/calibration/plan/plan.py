@@ -28,7 +28,7 @@ from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, upright
 from gateway.core.cross_spectrum.predicted import Drive, predicted
 from gateway.core.vehicle import Carries, Load, Vehicle, cg_left_m, front_share_pct
-from gateway.core.weights import weights_of
+from gateway.core.weights.on_the_road import weights_of
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimate import Quantity
 from gateway.posterior import PAYLOAD, Source, exactly

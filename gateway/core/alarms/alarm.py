@@ -10,6 +10,9 @@ from typing import Any, Final
 from gateway.estimate import PLACES, Z95
 from gateway.records import iso_utc, ns_of
 
+ENTRY_KIND: Final = "alarm"
+"""The kind of an alarm's row in the store and in the event stream."""
+
 
 class AlarmKind(StrEnum):
     """What the alarm is about."""

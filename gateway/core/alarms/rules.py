@@ -22,7 +22,8 @@ from gateway.core.alarms.alarm import (
     AlarmState,
 )
 from gateway.core.vehicle import Vehicle, left_share_pct
-from gateway.core.weights import NOT_CALIBRATED, Unsprung, over_limit_probability, weighed
+from gateway.core.weights.limits import over_limit_probability
+from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung, weighed
 from gateway.estimate import UNKNOWN, Estimate, Quantity
 from gateway.reasons import EXPLANATIONS, Cause
 from gateway.records import Why

@@ -6,7 +6,7 @@ from dataclasses import replace
 from gateway.core.alarms.alarm import CAUSES, Acknowledged, Alarm, AlarmCause, AlarmFigure, AlarmState, AlarmStep
 from gateway.core.alarms.rules import NO_DRIVES, AlarmRules, Says, verdicts_of
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import NOT_CALIBRATED, Unsprung
+from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung
 from gateway.errors import AlarmRefusedError
 from gateway.estimate import Estimate
 

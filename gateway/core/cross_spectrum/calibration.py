@@ -9,7 +9,7 @@ from annotated_types import Ge, Gt
 from gateway.core.cross_spectrum.model.parameters import INDEX, LEAST_SLACK, PARAMETERS, Ground, mount_of
 from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Load
-from gateway.core.weights import Unsprung
+from gateway.core.weights.on_the_road import Unsprung
 from gateway.estimate import Quantity
 from gateway.records import F64
 from gateway.schema import STRICT

@@ -4,9 +4,3 @@ A batch and a RatioIndexCalibration go in; the indexes R_a and R_g, payload and 
 ``index`` has equations (6) to (8), ``regression`` the structures (9) to (11). docs/ratio-index.md describes its
 calibration.
 """
-
-from gateway.core.ratio_index.estimator import by_ratio_index
-from gateway.core.ratio_index.index import PAPER_BANDS, Band, RatioIndexCalibration, indexes_of
-from gateway.core.ratio_index.regression import RegressionModel
-
-__all__ = ["PAPER_BANDS", "Band", "RatioIndexCalibration", "RegressionModel", "by_ratio_index", "indexes_of"]

@@ -11,8 +11,8 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.core.alarms.rules import as_of_load
-from gateway.core.events import EntryKind
-from gateway.core.weights import Light, Room, nearness, rooms_of
+from gateway.core.events.entry import EntryKind
+from gateway.core.weights.limits import Light, Room, nearness, rooms_of
 from gateway.estimate import Estimate, Lack, Quantity, Weights
 from gateway.reasons import EXPLANATIONS, Cause
 from gateway.records import Why, iso_utc

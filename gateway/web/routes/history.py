@@ -13,8 +13,8 @@ from pydantic.json_schema import SkipJsonSchema
 from starlette.exceptions import HTTPException
 from starlette.responses import Response, StreamingResponse
 
-from gateway.core.events import EntryKind
 from gateway.core.events import entry as table
+from gateway.core.events.entry import EntryKind
 from gateway.estimate_json import COLUMNS, csv_cells
 from gateway.history import BATCHES, HistoryPage
 from gateway.records import json_line

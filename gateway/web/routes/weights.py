@@ -13,7 +13,8 @@ from pydantic import BaseModel, Field
 
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights import NOT_CALIBRATED, PayloadPlace, is_over_limit, place_of, unsprung_kg, weighed
+from gateway.core.weights.limits import is_over_limit
+from gateway.core.weights.on_the_road import NOT_CALIBRATED, PayloadPlace, place_of, unsprung_kg, weighed
 from gateway.estimate import Estimate, Weight, Weights
 from gateway.j1939 import NOT_AVAILABLE, POWERED_WEIGHT, counts_of
 from gateway.quantities import QUANTITIES
