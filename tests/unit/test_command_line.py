@@ -1,11 +1,17 @@
-"""What the command line says beside any one command: its version, a name mistyped, an interruption."""
+"""The command line beside any one command: version, mistyped names and numbers, what a start does not import."""
+
+import json
+import subprocess
+import sys
 
 import click
 import pytest
 from click.testing import CliRunner
+from support.patience import PATIENCE_S
 
 import gateway.cli
 from gateway.cli import INTERRUPTED, springscale
+from gateway.errors import BusError
 
 
 @pytest.mark.parametrize(("typed", "meant"), [("estmate", "estimate"), ("check_config", "check-config")])
@@ -36,3 +42,89 @@ def test_its_version_is_told_by_either_name() -> None:
     short, long = (CliRunner().invoke(springscale, [name]).output for name in ("-V", "--version"))
     assert short == long
     assert short.startswith("springscale, version ")
+
+
+NOWHERE = ("--url", "http://127.0.0.1:9")
+
+
+@pytest.mark.parametrize("text", ["nan", "inf", "-inf", "much"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("estimate", "drive.log", "--signals", "springscale:reference", "--window-s"),
+        ("calibration", "sprung", "--rear-axle-kg", "700", "--front-axle-kg"),
+        ("commission", "start", *NOWHERE, "--sensor-m"),
+        ("demo", "--once", "--speed"),
+        ("record", "bus", "a.log", "--signals", "x", "--interface", "virtual", "--channel", "x", "--for-s"),
+        ("simulate", "campaign", "paper", "somewhere", "--longest-s"),
+    ],
+)
+def test_what_is_no_number_is_a_usage_error(command: tuple[str, ...], text: str) -> None:
+    said = CliRunner().invoke(springscale, [*command, text])
+    assert said.exit_code == 2
+    assert f"Invalid value for '{command[-1]}'" in said.output
+
+
+@pytest.mark.parametrize("command", [("verification", "record", "--load"), ("calibration", "ticket", "add")])
+@pytest.mark.parametrize("text", ["nan", "inf", "much"])
+def test_a_known_weight_that_is_no_number_is_a_usage_error(command: tuple[str, ...], text: str) -> None:
+    said = CliRunner().invoke(springscale, [*command, f"gross_kg={text}", *NOWHERE])
+    assert said.exit_code == 2
+    assert f"gross_kg = {text!r} is no number" in said.output
+
+
+def test_a_drive_that_fails_ends_the_command_with_what_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    def drive(*_: object) -> None:
+        raise BusError("springscale-demo: the bus has gone")
+
+    monkeypatch.setattr("gateway.cli.demo.demo_drive", drive)
+    said = CliRunner().invoke(springscale, ["demo", "--once", "--json"])
+    assert isinstance(said.exception, BusError)  # as with every command, main makes one line of it
+
+
+HEAVY = (
+    "scipy.stats",
+    "scipy.signal",
+    "scipy",
+    "asammdf",
+    "pandas",
+    "matplotlib",
+    "numba",
+    "pyarrow",
+)
+
+
+def test_the_service_starts_without_what_it_does_not_need():
+    code = "import json, sys, gateway.service.gateway; print(json.dumps(sorted(sys.modules)))"
+    loaded = json.loads(subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout)
+    assert not set(HEAVY) & set(loaded)
+
+
+FITTING = ("gateway.calibration.half_car", "gateway.calibration.ratio_index", "gateway.calibration.line")
+
+
+def test_the_file_knows_nothing_of_the_fit() -> None:
+    command = (
+        f"import sys, gateway.calibration.file; print([name for name in sys.modules if name.startswith({FITTING})])"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", command], capture_output=True, text=True, timeout=PATIENCE_S, check=True
+    ).stdout
+    assert said.strip() == "[]"
+
+
+CODE = """
+import resource
+from gateway.calibration.commissioning.work import _take_little
+if {outside}:
+    resource.setrlimit(resource.RLIMIT_AS, ({outside}, {outside}))
+_take_little(8000.0)
+print(*resource.getrlimit(resource.RLIMIT_AS))
+"""
+
+
+@pytest.mark.parametrize(("outside", "most"), [(0, 8_000_000_000), (6_000_000_000, 6_000_000_000)])
+def test_the_narrower_of_two_bounds_holds(outside: int, most: int) -> None:
+    code = CODE.format(outside=outside)
+    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert told.split() == [str(most)] * 2

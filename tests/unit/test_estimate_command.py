@@ -1,19 +1,34 @@
-"""`estimate` where it weighed nothing: why, what to do, and the likely cause."""
+"""What springscale estimate says of each batch, of logs that are not quite sound, and of broken sensors."""
 
+import re
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
-from support.estimates import make_estimate, posterior_of
+from support.encoded import encode_signals
+from support.estimates import make_estimate, make_record, posterior_of
 
 import gateway.cli.estimate as command
+from gateway.bus.logs import open_whole_log
+from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.logs.packed import zstd
+from gateway.bus.signals import load_signal_map
+from gateway.calibration.plan.loads import PlacedLoad
+from gateway.calibration.plan.plan import Advice, Expected, LoadPlan
 from gateway.cli import springscale
+from gateway.cli.calibrate import plan_sentences
+from gateway.cli.estimate import sentence
+from gateway.core.cross_spectrum.predicted import Drive
 from gateway.errors import SpringscaleError
-from gateway.estimate import Estimate
-from gateway.records import Why
+from gateway.estimate import UNKNOWN, Estimate, Quantity, Weight, Weights
+from gateway.estimate_json import estimate_to_json
+from gateway.records import F64, Signal, Why
+from gateway.reports.calibration.runs import best_next, plan_section
 
 DEMO = str(files("gateway") / "demo" / "paper_van.json")
 
@@ -69,3 +84,181 @@ def test_what_the_road_or_a_sensor_did_is_not_laid_on_the_calibration(
 def test_one_batch_that_was_weighed_is_enough(monkeypatch: pytest.MonkeyPatch, log: Path) -> None:
     answer = make_estimate(1).answered(posterior_of(270.0, 48.0, 6.0, 0.2))
     assert said(monkeypatch, log, make_estimate(0, Why.MODEL_MISFIT), answer) is None
+
+
+ANSWER = replace(make_estimate(0), front_share=Quantity(50.5, 0.2, (50.1, 50.9)))
+
+
+def line(estimate: Estimate) -> str:
+    return sentence(estimate_to_json(estimate))
+
+
+def test_a_line_says_when_how_much_and_how_sure() -> None:
+    assert line(ANSWER) == (
+        "1970-01-01T00:00:00Z  payload   100.0 kg ±  12.0 (95 %)   front share 50.50 % ± 0.40 (95 %)    50.4 km/h"
+    )
+
+
+def test_what_the_calibration_does_not_hold_is_said_to_be_unknown() -> None:
+    """Loads all at one place calibrate the ratio index for payload alone."""
+    assert line(replace(ANSWER, front_share=UNKNOWN)) == (
+        "1970-01-01T00:00:00Z  payload   100.0 kg ±  12.0 (95 %)   front share unknown    50.4 km/h"
+    )
+    assert "payload unknown   front share 50.50 % ± 0.40 (95 %)" in line(replace(ANSWER, payload=UNKNOWN))
+
+
+def test_where_the_load_lies_sideways_is_said_where_something_tells() -> None:
+    aside = replace(ANSWER, cg_left=Quantity(-0.035, 0.004, (-0.043, -0.027)))
+    assert "(95 %)     -35 mm left ±   8 (95 %)    50.4 km/h" in line(aside)
+    assert "mm" not in line(ANSWER)
+
+
+def test_a_refusal_says_why() -> None:
+    assert line(make_estimate(0, Why.AMBIGUOUS)) == "1970-01-01T00:00:00Z  no estimate: ambiguous"
+
+
+def test_too_much_is_said_last() -> None:
+    heavy = Weights(gross=Weight(2010.0, 6.0, 2000.0, None), rear_axle=Weight(1120.0, 5.0, 1100.0, None))
+    assert line(replace(ANSWER, weights=heavy)).endswith(" 50.4 km/h   over the limit: gross, rear axle")
+
+
+LINE = "({:.6f}) {} 120#0011223344556677\n"
+
+
+@pytest.fixture
+def log_of(tmp_path):
+    def log_of(*lines):
+        (tmp_path / "a.log").write_text("".join(lines))
+        return tmp_path / "a.log"
+
+    return log_of
+
+
+def remarks(path, channel=None):
+    chunks, report = open_whole_log(path, channel)
+    for _ in chunks:
+        pass
+    return list(report.remarks())
+
+
+def test_nothing_is_said_of_a_sound_log(log_of):
+    assert remarks(log_of(*(LINE.format(i, "can0") for i in range(9)))) == []
+
+
+def test_lines_left_out_are_counted_by_reason(log_of):
+    path = log_of(LINE.format(1, "can0"), "(2.0) can0 120#011\n", "nonsense\n", "nonsense\n")
+    assert set(remarks(path)) == {
+        f"{path}: left out, half byte: 1, first in line 2",
+        f"{path}: left out, no frame: 2, first in line 3",
+    }
+
+
+def test_frames_of_several_channels_are_told_unless_one_is_named(log_of):
+    path = log_of(LINE.format(1, "can0"), LINE.format(1, "can1"))
+    assert remarks(path) == [
+        f"{path}: mapped frames are on can0, can1; if these are one bus twice, name one in the map"
+    ]
+    assert remarks(path, "can0") == []
+
+
+def test_estimate_tells_them_on_standard_error(tmp_path):
+    packed = zstd.compress("".join(LINE.format(i / 100, "can0") for i in range(20_000)).encode())
+    (tmp_path / "a.log.zst").write_bytes(packed[: len(packed) // 2])
+    ran = CliRunner().invoke(
+        springscale, ["estimate", str(tmp_path / "a.log.zst"), "--signals", "springscale:reference"]
+    )
+    assert ran.exit_code == 0
+    assert ran.stderr.startswith(f"{tmp_path / 'a.log.zst'}: the zstd stream is cut off; everything before was read\n")
+
+
+EXPECTED = Expected(payload_std_kg=10.0, front_share_std_pct=0.5, reach_share=0.4)
+PLAN = LoadPlan("van", 3, Drive(600.0, 14.0), EXPECTED, (Advice(PlacedLoad(300.0, 50.0, 1.4), EXPECTED),), None)
+
+
+def spreads(text: str) -> set[float]:
+    return {float(each) for each in re.findall(r"(?:±|\+-)\s*([\d.]+)", text)}
+
+
+def test_an_estimates_line() -> None:
+    record = make_record(0) | {"front_share_interval95_pct": [50.1, 50.9], "front_share_std_pct": 0.2}
+    assert spreads(sentence(record)) == {12.0, 0.4}
+    assert sentence(record).count("(95 %)") == 2
+
+
+def test_a_plan() -> None:
+    said = plan_sentences(PLAN)
+    assert spreads(said) == {20.0, 1.0}
+    assert said.count("(95 %)") == 2
+
+
+def test_a_reports_plan() -> None:
+    (table,) = plan_section(PLAN).tables
+    assert "± spans 95 %" in table.caption
+    assert spreads(" ".join(table.rows[0])) == {19.6, 0.98}
+    assert "(95 %)" in (best_next(PLAN) or "")
+
+
+MAP = ("--signals", "springscale:reference")
+N = 4000  # 40 s at 100 Hz
+LENGTHS = (1, 2, 3, 50, 2100)
+NOISE = np.random.default_rng(1).standard_normal((3, N))
+REST, HELD = np.zeros(N), np.full(N, 14.0)
+MOVED = (9.81 + NOISE[0], 0.05 * NOISE[1], 0.05 * NOISE[2], HELD)  # acceleration, pitch rate, roll rate, speed
+ONCE = np.where(np.arange(N) == N // 2, 1.0, 0.0)
+
+ODD: dict[str, tuple[F64, F64, F64, F64]] = {
+    "all constant": (9.81 + REST, REST, REST, HELD),
+    "all zero": (REST, REST, REST, REST),
+    "all at the end of their ranges": (32.0 + REST, 2.8 + REST, 2.8 + REST, 100.0 + REST),
+    "white noise": MOVED,
+    "pitch rate constant": (MOVED[0], REST, REST, HELD),
+    "acceleration constant": (9.81 + REST, *MOVED[1:]),
+    "one impulse": (9.81 + 20.0 * ONCE, 2.0 * ONCE, REST, HELD),
+    "one bit that toggles": (9.81 + 1e-3 * (NOISE[0] > 0.0), 1e-4 * (NOISE[1] > 0.0), REST, HELD),
+    "half a drive of nothing": (np.where(np.arange(N) < N // 2, 9.81, MOVED[0]), *MOVED[1:]),
+}
+STAMPS_S: dict[str, F64] = {
+    "one time stamp for all": np.zeros(N),
+    "backwards": -np.arange(N) / 100.0,
+    "ten in a second": np.arange(N // 10) / 10.0,
+    "a day between two": np.arange(20) * 86_400.0,
+}
+
+
+def write(path: Path, samples: tuple[F64, ...], t_s: F64) -> None:
+    """A candump log of the reference map."""
+    signals = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE, Signal.SPEED)
+    told = dict(zip(signals, samples, strict=True)) | {Signal.LONGITUDINAL_ACCELERATION: np.zeros(len(t_s))}
+    t_ns = np.round((1.7e9 + t_s) * 1e9).astype(np.int64)
+    frames = encode_signals(load_signal_map("springscale:reference"), dict.fromkeys(told, t_ns), told)
+    write_candump(frames, "can0", path)
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """All of them by name."""
+    folder, drive_s = tmp_path_factory.mktemp("odd"), np.arange(N) / 100.0
+    wanted: dict[str, tuple[tuple[F64, ...], F64]] = {name: (samples, drive_s) for name, samples in ODD.items()}
+    wanted |= {name: (tuple(x[: len(t_s)] for x in MOVED), t_s) for name, t_s in STAMPS_S.items()}
+    wanted |= {f"{n} samples": (tuple(x[:n] for x in MOVED), drive_s[:n]) for n in LENGTHS}
+    for name, (samples, t_s) in wanted.items():
+        write(folder / f"{name}.log", samples, t_s)
+    return {name: folder / f"{name}.log" for name in wanted}
+
+
+NAMES = [*ODD, *STAMPS_S, *(f"{n} samples" for n in LENGTHS)]
+
+
+def commands(log: Path) -> Iterator[list[str]]:
+    yield ["look", str(log)]
+    for estimator in ("cross_spectrum", "ratio_index"):
+        yield ["estimate", str(log), *MAP, "--calibration", DEMO, "--window-s", "20", "--estimator", estimator]
+    yield ["events", str(log), *MAP, "--calibration", DEMO, "--window-s", "20"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_ends_with_an_answer_or_a_clear_error(logs: dict[str, Path], name: str) -> None:
+    for asked in commands(logs[name]):
+        done = CliRunner().invoke(springscale, asked)
+        assert done.exception is None or isinstance(done.exception, SpringscaleError), (asked[0], done.exception)
+        assert "Warning" not in done.output

@@ -1,4 +1,4 @@
-"""The half-car against statics, a rigid block and the simulator's own equations of motion."""
+"""The half-car against statics, a rigid block and the simulator's own equations of motion; its mount on the van."""
 
 from dataclasses import replace
 
@@ -7,10 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.half_car_road import CAR
+from support.rolling_car import HALF_TRACK_M, ROLLING_CAR
 from support.textbook import half_car as textbook_half_car
 from support.textbook import linearised
 
-from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar, frequency_response
+from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar, frequency_response, half_car_numbers
+from gateway.core.cross_spectrum.model.motion import Frame, Motion, Numbers
+from gateway.core.cross_spectrum.model.reading import Mount
+from gateway.core.cross_spectrum.model.rolling_car import SidewaysLoad, rolling_numbers, rolling_response
+from gateway.records import C128
 from gateway.sim.vans import PAPER_VAN, SMALL_VAN
 from gateway.sim.vehicle import Axle as SimulatedAxle
 from gateway.sim.vehicle import Load, Vehicle, front_share_pct
@@ -125,3 +130,86 @@ def test_a_bend_stiffens_only_beyond_its_load() -> None:
     light, heavy = (50.0, 0.51), (400.0, 0.42)
     assert frequency_response(bent, *light, freq_hz) == frequency_response(CAR, *light, freq_hz)
     assert frequency_response(bent, *heavy, freq_hz) != frequency_response(CAR, *heavy, freq_hz)
+
+
+FREQ_HZ = np.array([0.7, 1.4, 3.3, 9.0, 13.0])
+UPRIGHT = half_car_numbers(CAR, 300.0, 0.47), Frame(CAR.wheelbase_m), 2
+ROLLING = rolling_numbers(ROLLING_CAR, SidewaysLoad(300.0, 0.47, 0.06)), Frame(CAR.wheelbase_m, HALF_TRACK_M), 3
+
+
+@pytest.mark.parametrize(("numbers", "frame", "n_sensors"), [UPRIGHT, ROLLING], ids=["upright", "rolling"])
+def test_slopes_are_what_a_small_change_of_each_number_does(numbers: Numbers, frame: Frame, n_sensors: int) -> None:
+    every = range(len(numbers.all))
+    slopes = Motion(numbers, frame, FREQ_HZ, n_sensors).slopes(every)
+    for i in every:
+        step = np.zeros_like(numbers.all)
+        step[i] = 1e-5 * max(abs(numbers.all[i, 0]), 0.1)
+        up, down = (Motion(Numbers(numbers.all + by), frame, FREQ_HZ, n_sensors).paths for by in (step, -step))
+        expected = (up - down) / (2.0 * step[i])
+        np.testing.assert_allclose(slopes[i], expected, rtol=1e-5, atol=1e-7 * np.abs(expected).max())
+
+
+def test_wanted_slopes_are_those_of_all() -> None:
+    numbers, frame, n_sensors = ROLLING
+    motion = Motion(numbers, frame, FREQ_HZ, n_sensors)
+    wanted = [1, 5, 9, 14, 17, 25, 29, 31]
+    np.testing.assert_array_equal(motion.slopes(wanted), motion.slopes(range(len(numbers.all)))[wanted])
+
+
+MOUNT_FREQ_HZ = np.linspace(0.5, 15.0, 30)
+OMEGA = 2.0 * np.pi * MOUNT_FREQ_HZ
+
+
+def process(seed: int) -> tuple[C128, C128, C128]:
+    """Heave where the sensor's place along the vehicle is, pitch and roll of a body: random transforms (4, m)."""
+    rng = np.random.default_rng(seed)
+    heave, pitch, roll = rng.standard_normal((3, 4, len(MOUNT_FREQ_HZ))) + 1j * rng.standard_normal(
+        (3, 4, len(MOUNT_FREQ_HZ))
+    )
+    return heave, pitch, roll
+
+
+def sensed(body: tuple[C128, C128, C128], left_m: float, yaw_rad: float, lag_s: float) -> tuple[C128, C128, C128]:
+    """A gyro turned to the left by a small angle, late by lag_s; an accelerometer left_m left."""
+    heave, pitch, roll = body
+    late = 1j * OMEGA * np.exp(-1j * OMEGA * lag_s)
+    return -(OMEGA**2) * (heave + left_m * roll), late * (pitch - yaw_rad * roll), late * (roll + yaw_rad * pitch)
+
+
+@given(
+    seed=st.integers(0, 2**31),
+    left_m=st.floats(-0.8, 0.8),
+    yaw_rad=st.floats(-0.1, 0.1),
+    lag_s=st.floats(-0.02, 0.02),
+)
+def test_what_the_place_put_in_is_taken_out(seed: int, left_m: float, yaw_rad: float, lag_s: float) -> None:
+    """Up to yaw^2, by which a small angle turned there and back is longer than it was."""
+    body = process(seed)
+    back = Mount(left_m, yaw_rad, lag_s).levelled(sensed(body, left_m, yaw_rad, lag_s), MOUNT_FREQ_HZ)
+    wanted = sensed(body, 0.0, 0.0, lag_s)
+    longer = 1.0 + yaw_rad**2
+    np.testing.assert_allclose(back[1], longer * wanted[1], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(back[2], longer * wanted[2], rtol=1e-9, atol=1e-9)
+    left_over = -left_m * yaw_rad**2 * -(OMEGA**2) * body[2]
+    np.testing.assert_allclose(back[0], wanted[0] + left_over, rtol=1e-9, atol=1e-7)
+
+
+@given(left_m=st.floats(-0.8, 0.8), yaw_rad=st.floats(-0.05, 0.05), lag_s=st.floats(-0.01, 0.01))
+def test_it_undoes_what_the_rolling_car_senses(left_m: float, yaw_rad: float, lag_s: float) -> None:
+    """Every path of a car with its sensor anywhere becomes that of the same car with it on the centre line."""
+    load = SidewaysLoad(280.0, 0.48, -0.05)
+    placed = replace(ROLLING_CAR, half_car=replace(CAR, gyro_lag_s=lag_s), sensor_left_m=left_m, gyro_yaw_rad=yaw_rad)
+    square = replace(placed, sensor_left_m=0.0, gyro_yaw_rad=0.0)
+    here, wanted = rolling_response(placed, load, MOUNT_FREQ_HZ), rolling_response(square, load, MOUNT_FREQ_HZ)
+    for name in ("together_front", "together_rear", "against_front", "against_rear"):
+        read, true = getattr(here, name), getattr(wanted, name)
+        levelled = np.stack(Mount(left_m, yaw_rad, lag_s).levelled((read[0], read[1], read[2]), MOUNT_FREQ_HZ))
+        scale = np.max(np.abs(np.concatenate([read, true])), axis=-1).reshape(2, 3).max(axis=0)[:, None]
+        assert np.max(np.abs(levelled - true) / scale) < 1e-9 + 2.0 * yaw_rad**2, name
+
+
+@given(seed=st.integers(0, 2**31), lag_s=st.floats(-0.02, 0.02))
+def test_on_the_centre_line_and_square_nothing_is_moved(seed: int, lag_s: float) -> None:
+    read = sensed(process(seed), 0.0, 0.0, lag_s)
+    for one, other in zip(Mount(0.0, 0.0, lag_s).levelled(read, MOUNT_FREQ_HZ), read, strict=True):
+        np.testing.assert_array_equal(one, other)

@@ -1,10 +1,13 @@
-"""Each way a drive can be spoiled gets its own diagnosis and no other, and a sound drive gets none."""
+"""Inspection of one run: logs that cannot be read, rates and gaps of its rows, and one diagnosis for each way to spoil
+it."""
 
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.drives import T0_NS, changed, drive, without_rows
+from support.half_car_road import VAN
 from support.inspected import (
     ACCELERATION,
     PITCH_RATE,
@@ -20,7 +23,12 @@ from support.inspected import (
     without,
 )
 
-from gateway.calibration.inspection.finding import Severity
+from gateway.calibration.inspection.campaign import inspect_campaign
+from gateway.calibration.inspection.finding import Kind, Severity
+from gateway.calibration.inspection.log import LogFacts, SplitRun, log_findings, same_drive_findings
+from gateway.calibration.inspection.rows import RowFacts, gravity_findings, rate_findings, row_facts, unmapped_findings
+from gateway.calibration.known_run import KnownRun
+from gateway.core.settings import BatchSettings
 from gateway.records import Motion, Signal
 from gateway.sim.drive import Drive, constant, urban
 from gateway.sim.vans import PAPER_VAN, VANS
@@ -206,3 +214,122 @@ def test_faults_come_first(sound: Motion) -> None:
     pitch_rate[:] = np.radians(4.0) - pitch_rate
     verdict = verdict_on(replace(sound, columns=columns), EMPTY, traits_of_reference())
     assert [finding.severity for finding in verdict.findings] == [Severity.FAULT, Severity.WARNING]
+
+
+TRAITS = traits_of_reference()
+
+
+def rate_kinds(motion: Motion) -> list[str]:
+    return [str(finding.kind) for finding in rate_findings(row_facts(motion, TRAITS), BatchSettings())]
+
+
+def test_facts_are_those_of_the_rows_in_any_order() -> None:
+    motion = drive(60.0)
+    facts = row_facts(motion, TRAITS)
+    shuffled = np.random.default_rng(1).permutation(len(motion))
+    other = row_facts(Motion(motion.signals, motion.t_ns[shuffled], motion.columns[shuffled]), TRAITS)
+    assert facts.duration_s == other.duration_s == pytest.approx(60.0, abs=0.1)
+    assert facts.streams[Signal.PITCH_RATE].rate_hz == pytest.approx(100.0)
+    assert facts.streams[Signal.SPEED].rate_hz == pytest.approx(10.0)
+    assert facts.mean(Signal.VERTICAL_ACCELERATION) == pytest.approx(9.81, abs=0.05)
+    assert np.isnan(facts.mean(Signal.AXLE_WEIGHT))
+    for signal, stream in facts.streams.items():
+        assert other.streams[signal].rate_hz == stream.rate_hz
+        assert other.streams[signal].mean == pytest.approx(stream.mean)
+
+
+def test_a_sound_drive_has_nothing_to_tell() -> None:
+    motion = drive(30.0)
+    assert rate_kinds(motion) == []
+    assert gravity_findings(row_facts(motion, TRAITS))[1] == []
+
+
+def test_a_slow_sensor_is_named() -> None:
+    assert rate_kinds(drive(30.0, rate_hz=30.0)) == ["rate_low", "rate_low"]
+
+
+def test_stamps_in_bursts_are_named() -> None:
+    motion = drive(30.0)
+    since_ns = motion.t_ns - T0_NS
+    burst_ns = 30_000_000
+    in_burst_ns = since_ns % burst_ns // 100  # three samples of each sensor, a tenth of a millisecond apart
+    bursts = replace(motion, t_ns=T0_NS + since_ns // burst_ns * burst_ns + in_burst_ns)
+    assert rate_kinds(bursts) == ["jitter", "jitter"]
+
+
+def test_a_silent_sensor_is_named_and_one_that_is_not_mapped_is_not() -> None:
+    motion = drive(30.0)
+    silent = changed(motion, Signal.PITCH_RATE, 0.0, 99.0, lambda x: np.full(len(x), np.nan))
+    assert rate_kinds(silent) == ["sensor_silent"]
+    assert rate_kinds(Motion((motion.signals[0], motion.signals[2]), motion.t_ns, motion.columns[:, [0, 2]])) == []
+
+
+@pytest.mark.parametrize(
+    ("kept", "said"),
+    [
+        ((0, 1, 2), []),
+        ((0, 1), ["fault: neither speed nor wheel_speed is in the signal map"]),
+        ((0, 2), ["warning: pitch_rate is not in the signal map; axes and loads cannot be checked"]),
+    ],
+)
+def test_a_signal_that_is_not_mapped_is_named(kept: tuple[int, ...], said: list[str]) -> None:
+    motion = drive(30.0)
+    assert motion.signals == (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
+    mapped = Motion(tuple(motion.signals[i] for i in kept), motion.t_ns, motion.columns[:, list(kept)])
+    found = unmapped_findings(row_facts(mapped, TRAITS))
+    assert [f"{finding.severity}: {finding.text}" for finding in found] == said
+
+
+def test_lost_frames_are_a_warning() -> None:
+    motion = without_rows(drive(130.0), 30.0, 36.0)
+    assert "warning:gaps" in kinds(verdict_on(motion, stated(PAPER_VAN, 3.2), TRAITS))
+
+
+SOUND = LogFacts("a" * 64, 900.0, 0.0, (0, 900))
+UNLADEN, LOADED = (0.0, 50.0), (420.0, 58.0)
+
+
+@pytest.mark.parametrize(
+    ("facts", "kinds"),
+    [
+        (SOUND, []),
+        (LogFacts(unreadable="a.log: holds no CAN frame"), [Kind.LOG_UNREADABLE]),
+        (replace(SOUND, start_s=2000.0, span_ns=None), [Kind.CUT_AWAY]),
+        (replace(SOUND, damage="the log ends early: the file is cut off"), [Kind.LOG_DAMAGED]),
+    ],
+)
+def test_how_a_log_was_read_is_told(facts: LogFacts, kinds: list[Kind]) -> None:
+    assert [finding.kind for finding in log_findings(facts)] == kinds
+
+
+def test_a_piece_beyond_the_end_says_where_the_log_ends() -> None:
+    (finding,) = log_findings(replace(SOUND, start_s=2000.0, span_ns=None))
+    assert finding.text == "the log lasts 900 s, and the run begins at 2000 s"
+
+
+@pytest.mark.parametrize(
+    ("other", "load", "numbers"),
+    [
+        (SOUND, UNLADEN, [2]),  # tells nothing new
+        (SOUND, LOADED, [1, 2]),  # one of the loads is wrong, and nobody knows which
+        (replace(SOUND, span_ns=(600, 1500)), LOADED, [1, 2]),
+        (replace(SOUND, span_ns=(900, 1800)), LOADED, []),  # the next piece of the same log
+        (replace(SOUND, sha256="b" * 64), LOADED, []),
+        (LogFacts(unreadable="gone"), LOADED, []),
+    ],
+)
+def test_two_runs_on_one_drive_are_found(other: LogFacts, load: tuple[float, float], numbers: list[int]) -> None:
+    runs = [KnownRun(1, "a.log", *UNLADEN, ()), KnownRun(2, "b.log", *load, ())]
+    told = list(
+        same_drive_findings([SplitRun(run, run, log=log) for run, log in zip(runs, (SOUND, other), strict=True)])
+    )
+    assert [number for number, _ in told] == numbers
+    assert all("runs 1 and 2" in finding.text for _, finding in told)
+
+
+def test_a_run_without_a_readable_log_is_told_once_and_a_load_far_beyond_the_range_is_doubted() -> None:
+    nothing = KnownRun(1, "a.log", 4200.0, 60.0, ())
+    unreadable = SplitRun(nothing, nothing, RowFacts(), log=LogFacts(unreadable="a.log: holds no CAN frame"))
+    ((verdict,), _) = inspect_campaign([unreadable], VAN, BatchSettings())
+    assert [finding.kind for finding in verdict.findings] == [Kind.LOG_UNREADABLE, Kind.LOAD_BEYOND_RANGE]
+    assert not verdict.is_usable

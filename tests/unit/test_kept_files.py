@@ -1,10 +1,11 @@
-"""The service's own directory, made hostile: nothing in it leads whoever works there elsewhere."""
+"""Files there whole or not at all, in a directory that somebody made hostile."""
 
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 from support.patience import PATIENCE_S
 
 from gateway.files.kept import KeptFiles
+from gateway.files.whole import write_whole, written_whole
 
 NOBODY = 65_534
 
@@ -91,3 +93,44 @@ def test_root_makes_a_token_with_the_rights_of_the_directorys_owner(of_nobody: P
     kept = state / "tokens.json"
     assert not kept.is_symlink()
     assert (kept.stat().st_uid, kept.stat().st_mode & 0o777) == (NOBODY, 0o600)
+
+
+def test_a_disk_that_fills_leaves_the_file_that_was_there(tmp_path: Path) -> None:
+    output = tmp_path / "vehicle.json"
+    write_whole(output, "old")
+    with pytest.raises(OSError, match="full"):
+        _filling(output)
+    assert output.read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["vehicle.json"]
+
+
+def _filling(output: Path) -> None:
+    with written_whole(output) as file:
+        file.write(b"half of the ne")
+        raise OSError("the disk is full")
+
+
+def test_the_new_one_has_the_rights_of_the_old_and_a_link_stays_one(tmp_path: Path) -> None:
+    output, link = tmp_path / "vehicle.json", tmp_path / "current.json"
+    write_whole(output, "old")
+    output.chmod(0o640)
+    link.symlink_to(output)
+    write_whole(link, "ö")
+    assert (output.read_bytes(), output.stat().st_mode & 0o777) == ("ö".encode(), 0o640)
+    assert link.is_symlink()
+
+
+def test_a_pipe_is_written_to_and_stays_one(tmp_path: Path) -> None:
+    pipe, heard = tmp_path / "pipe", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: heard.append(pipe.read_text()))
+    reader.start()
+    write_whole(pipe, "new")
+    reader.join(10.0)
+    assert heard == ["new"]
+    assert pipe.is_fifo()
+
+
+def test_a_folder_that_is_not_there_is_an_error_of_the_system(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        write_whole(tmp_path / "none" / "vehicle.json", "new")

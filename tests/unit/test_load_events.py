@@ -1,7 +1,10 @@
-"""Load events: what a change of weight between stops becomes, how sure it is, and how later batches correct it."""
+"""Load events and trips: what a change of weight between stops becomes, how sure it is, and how later batches, or a
+clock that is put right, change it."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -17,10 +20,13 @@ from support.days import (
     events,
     posterior,
     told,
+    trips,
 )
 
 from gateway.core.change import change_of, probability
+from gateway.core.events import ledger
 from gateway.core.events import ledger as of_ledger
+from gateway.core.events.entry import Entry
 from gateway.core.events.ledger import Ledger
 from gateway.core.loads import weighings_of
 from gateway.estimate import Estimate, Place, Stop, Watched
@@ -218,3 +224,181 @@ def test_three_standard_deviations_at_a_stop_are_told_whatever_their_probability
     (likely,) = events(day(300.0, 262.0))
     assert abs(likely["change_kg"]) >= 3.0 * likely["change_std_kg"]
     assert likely["probability"] < 0.9
+
+
+DAY_MIN = 24 * 60.0
+AHEAD_MIN = 3 * DAY_MIN + 7.0
+
+
+def moved(estimates: list[Estimate], minutes: float) -> list[Estimate]:
+    """The same batches by another clock; they have no stops of their own."""
+    by_ns = round(minutes * 60e9)
+    return [replace(one, t_start_ns=one.t_start_ns + by_ns, t_end_ns=one.t_end_ns + by_ns) for one in estimates]
+
+
+def put_right(*kg_of_leg: float | None, ahead: int, ahead_min: float = AHEAD_MIN, **how) -> list[Estimate]:
+    """A day whose first batches were driven by a clock that was ahead."""
+    whole = day(*kg_of_leg, **how)
+    return moved(whole[:ahead], ahead_min) + whole[ahead:]
+
+
+def told_with(estimates: list[Estimate]) -> Iterator[tuple[int, Entry]]:
+    ledger = Ledger(RULES)
+    return ((n, entry) for n, one in enumerate(estimates) for entry in ledger.add(one))
+
+
+def changes(estimates: list[Estimate]) -> list[dict]:
+    return [entry.record for entry in told(estimates).values() if entry.kind == "event"]
+
+
+@pytest.mark.parametrize("ahead_min", [18.0, 60.0, DAY_MIN, 3650 * DAY_MIN])
+def test_a_delivery_after_it_is_told_as_without_it(ahead_min):
+    (expected,) = changes(day(400.0, 400.0, 220.0))
+    (found,) = changes(put_right(400.0, 400.0, 220.0, ahead=1, ahead_min=ahead_min))
+    assert found == expected
+    assert found["stops"]
+
+
+def test_a_delivery_after_it_is_told_with_the_first_batch_that_weighs_it():
+    whole = put_right(400.0, 400.0, 220.0, ahead=4, batches=4)
+    assert min(n for n, entry in told_with(whole) if entry.kind == "event") == 8
+
+
+def test_the_stop_after_it_counts_as_likely_as_without_it():
+    """A change as small as this is told for the door that opened; rolling it would be noise."""
+    legs = {"batches": 2, "door": True}
+    (expected,) = changes(day(300.0, 300.0, 264.0, **legs))
+    (found,) = changes(put_right(300.0, 300.0, 264.0, ahead=2, **legs))
+    assert [stop["door_opened"] for stop in found["stops"]] == [True]
+    assert (found["t_start"], found["t_end"]) == (expected["t_start"], expected["t_end"])
+
+
+def test_trips_before_and_after_it_are_told_and_all_but_the_last_are_over():
+    found = trips(put_right(300.0, 300.0, 300.0, ahead=1))
+    assert [trip["is_over"] for trip in found] == [True, True, False]
+    assert all(trip["t_start"] < trip["t_end"] for trip in found)
+
+
+def test_a_load_while_it_was_put_right_is_told_at_the_right_time():
+    whole = put_right(400.0, 400.0, 100.0, 100.0, ahead=2)
+    (found,) = changes(whole)
+    assert found["change_kg"] == pytest.approx(-300.0)
+    assert found["t_start"] <= found["t_end"]
+    (right,) = changes(day(400.0, 400.0, 100.0, 100.0))
+    assert found["t_end"] == right["t_end"]
+
+
+def test_a_load_in_the_minutes_before_it_is_told_in_order():
+    """Two legs without a weighing, one by each clock: both stops are named that can have been long enough."""
+    whole = put_right(400.0, None, None, 100.0, ahead=2)
+    (found,) = changes(whole)
+    assert len(found["stops"]) == 2
+    assert found["t_start"] <= found["t_end"]
+    assert all(stop["t_start"] <= stop["t_end"] for stop in found["stops"])
+
+
+def test_each_drive_that_begins_in_1970_hides_no_load():
+    """No clock battery: the first batch of a day is of 1970, until the date is learned."""
+    evening, morning = day(300.0), moved(day(100.0, 100.0), DAY_MIN)
+    first = replace(batch(0.0, 1.0, None), t_start_ns=0, t_end_ns=60_000_000_000)
+    (expected,) = changes([*evening, *morning])
+    (found,) = changes([*evening, first, *morning])
+    for name in ("change_kg", "t_start", "t_end", "before", "after"):
+        assert found[name] == expected[name]
+
+
+def test_a_restart_after_it_goes_on_as_if_it_had_not_been():
+    assert_a_restart_changes_nothing(put_right(0.0, 500.0, 500.0, 320.0, 200.0, ahead=5, batches=2))
+
+
+def test_what_is_old_stays_as_it_was_told_whatever_the_clock_did(monkeypatch):
+    monkeypatch.setattr(ledger, "HORIZON", 60)
+    monkeypatch.setattr(ledger, "SETTLED", 30)
+    whole = put_right(400.0, 300.0, *[300.0] * 80, ahead=3)
+    revisions = [(n, entry) for n, entry in told_with(whole) if entry.kind == "event"]
+    assert len({entry.id for _, entry in revisions}) == 1
+    assert max(n for n, _ in revisions) <= 31
+    assert not revisions[-1][1].record["is_withdrawn"]
+
+
+def test_put_right_at_a_stop_the_door_that_opened_is_of_that_stop():
+    first, second = put_right(300.0, 264.0, ahead=1)
+    second = replace(second, way=replace(second.way, before=Watched(True, None)))
+    (found,) = changes([first, second])
+    assert [stop["door_opened"] for stop in found["stops"]] == [True]
+
+
+def test_revisions_rise_by_one_each():
+    found: dict[str, list[int]] = {}
+    for _, entry in told_with(put_right(0.0, 500.0, 320.0, 200.0, ahead=4, batches=3)):
+        found.setdefault(entry.id, []).append(entry.revision)
+    assert len(found) > 3
+    assert all(other == one + 1 for revisions in found.values() for one, other in pairwise(revisions))
+
+
+def test_a_trip_adds_up_what_was_carried():
+    first, second = trips(day(0.0, 500.0, batches=2))
+    assert (first["distance_m"], first["payload_kg"], first["carried_tkm"]) == (6000.0, 0.0, 0.0)
+    assert first["empty_share"] == 1.0
+    assert (second["distance_m"], second["payload_kg"]) == (6000.0, 500.0)
+    assert second["carried_tkm"] == pytest.approx(0.5 * 6.0)
+    low, high = second["carried_interval95_tkm"]
+    assert high - low == pytest.approx(2 * 1.96 * second["payload_std_kg"] / 1000 * 6.0, rel=0.01)
+    assert second["empty_share"] == 0.0
+    assert first["overloaded_share"] == second["overloaded_share"] == 0.0
+    assert (first["is_over"], second["is_over"]) == (True, False)
+
+
+def test_overloaded_way_is_counted_by_the_load_as_all_its_batches_tell_it():
+    (trip,) = trips(day(600.0, batches=2))
+    assert trip["overloaded_share"] == 1.0
+
+
+def test_a_drive_without_a_weighing_has_a_load_where_both_sides_agree():
+    assert [trip["payload_kg"] for trip in trips(day(300.0, None, 300.0))] == [300.0, 300.0, 300.0]
+    assert [trip["payload_kg"] for trip in trips(day(300.0, None, 100.0))] == [300.0, None, 100.0]
+
+
+def test_a_rejected_rest_of_a_drive_carries_the_drive_s_load():
+    (trip,) = trips([batch(0.0, 5.0, 300.0), batch(5.0, 6.0, None, metres=1000.0)])
+    assert trip["distance_m"] == 4000.0
+    assert trip["weighed_share"] == 1.0
+    assert trip["carried_tkm"] == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize(
+    ("first_m", "last_m", "distance_m", "by"),
+    [(1000.0, 4100.0, 3100.0, "odometer"), (1000.0, 9000.0, 3000.0, "speed"), (1000.0, 900.0, 3000.0, "speed")],
+)
+def test_the_odometer_is_believed_where_the_speed_agrees(first_m, last_m, distance_m, by):
+    one = batch(0.0, 5.0, 300.0)
+    one = replace(one, way=replace(one.way, odometer_start_m=first_m, odometer_end_m=last_m))
+    (trip,) = trips([one])
+    assert (trip["distance_m"], trip["distance_by"]) == (distance_m, by)
+
+
+@pytest.mark.parametrize(
+    ("odometer_m", "by"), [(2330, "speed"), (2340, "odometer"), (3990, "odometer"), (4010, "speed")]
+)
+def test_the_odometer_may_be_off_by_a_fifth_and_two_hundred_metres(odometer_m, by):
+    one = batch(0.0, 5.0, 300.0)
+    one = replace(one, way=replace(one.way, odometer_start_m=0.0, odometer_end_m=odometer_m))
+    (trip,) = trips([one])
+    assert trip["distance_by"] == by
+
+
+@pytest.mark.parametrize(("kg", "share"), [(59.0, 1.0), (61.0, 0.0)])
+def test_empty_is_less_than_three_per_cent_of_the_vehicle(kg, share):
+    (trip,) = trips([batch(0.0, 5.0, kg)])
+    assert trip["empty_share"] == share
+
+
+@pytest.mark.parametrize(("metres", "n_trips"), [(3.0, 0), (49.0, 0), (51.0, 1)])
+def test_moving_the_vehicle_in_the_yard_is_no_trip(metres, n_trips):
+    assert len(trips([batch(0.0, 5.0, 300.0, metres=metres)])) == n_trips
+
+
+def test_a_trip_ends_where_it_stopped():
+    (trip,) = trips([batch(0.0, 5.0, 300.0, place=Place(47.0, 8.0))])
+    assert trip["to"] == {"latitude_deg": 47.0, "longitude_deg": 8.0}
+    assert trip["from"] is None

@@ -1,7 +1,8 @@
-"""From an unknown log to a first signal map: what is heard, what fits, what points up, and what is lacking."""
+"""From an unknown log to a first signal map: what is heard, what fits, what points up, and why a sensor is silent."""
 
 import json
 import resource
+from collections.abc import Callable
 from pathlib import Path
 
 import can
@@ -14,10 +15,19 @@ from support.encoded import encode_signals
 from gateway.bus.frames import merge_frames, message_of
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import load_signal_map
+from gateway.bus.signals.bit_field import BitField, Coding
+from gateway.bus.signals.database import DatabaseSignal
+from gateway.calibration.inspection.finding import Severity
+from gateway.calibration.inspection.rows import rate_findings, row_facts
 from gateway.cli import springscale
+from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
+from gateway.offline.campaigns import read_whole_log
+from gateway.offline.look.look import journey_of, why_silent
+from gateway.offline.look.readings import SignalReading
 from gateway.offline.look.roles import axis_of
-from gateway.records import Frames, Signal
+from gateway.records import EXTENDED_ID, Frames, Signal
+from gateway.status import DecodeCount, SignalHealth, State, Status
 
 T0_NS = 1_790_000_000_000_000_000
 DBC = """VERSION ""
@@ -249,3 +259,113 @@ def test_a_database_of_another_device_is_no_certainty(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_axes_are_told_by_their_names(name: str, axis: str) -> None:
     assert axis_of(name) == axis
+
+
+class Heard:
+    rate_hz = 1.0
+
+
+class Described:
+    heard = Heard()
+
+
+def reading(name: str, quantity: str, x: list[float], scale: float = 1.0) -> SignalReading:
+    field = BitField(0, 32, coding=Coding.SIGNED, scale=scale)
+    signal = DatabaseSignal(name, field, "deg", None, None, {}, None, ())
+    return SignalReading(Described(), signal, quantity, np.arange(len(x), dtype=float), np.array(x))
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "x", "role"),
+    [
+        ("Latitude", "angle", [47.1, 47.2], Signal.LATITUDE),
+        ("GPS_Lat", "angle", [47.1, 47.2], Signal.LATITUDE),
+        ("PosLongitude", "angle", [-122.0, -122.1], Signal.LONGITUDE),
+        ("TotalVehicleDistance", "distance", [1000.0, 1000.0, 1125.0], Signal.ODOMETER),
+        ("Odometer", "distance", [5.0, 6.0], Signal.ODOMETER),
+        ("Latitude", "angle", [0.0, 0.0], None),  # no fix
+        ("Latitude", "angle", [95.0, 47.0], None),
+        ("LatitudeStdDev", "angle", [1.0, 2.0], None),
+        ("Heading", "angle", [10.0, 20.0], None),
+        ("Odometer", "distance", [6.0, 5.0], None),
+        ("PositionAccuracy", "distance", [6.0, 7.0], None),
+    ],
+)
+def test_name_unit_and_readings_together_tell_the_role(name, quantity, x, role):
+    found = journey_of([reading(name, quantity, x)])
+    assert [each.role for each in found] == ([] if role is None else [role])
+
+
+def test_the_finest_of_several_is_taken():
+    coarse, fine = reading("TotalDistance", "distance", [1.0, 2.0], 1000.0), reading("TripDistance", "distance", [1, 2])
+    assert [each.reading for each in journey_of([coarse, fine])] == [fine]
+
+
+REFERENCE = load_signal_map("springscale:reference")
+GYRO = 0x121
+Alter = Callable[[Frames], Frames]
+
+
+def renumbered(to: int) -> Alter:
+    def altered(frames: Frames) -> Frames:
+        can_id = np.where(frames.can_id == GYRO, np.uint32(to), frames.can_id)
+        return Frames(frames.t_ns, can_id, frames.length, frames.payload)
+
+    return altered
+
+
+def never_valid(frames: Frames) -> Frames:
+    payload = frames.payload.copy()
+    payload[frames.can_id == GYRO, 7] = 0
+    return Frames(frames.t_ns, frames.can_id, frames.length, payload)
+
+
+def cut_short(frames: Frames) -> Frames:
+    length = np.where(frames.can_id == GYRO, np.uint8(7), frames.length)
+    return Frames(frames.t_ns, frames.can_id, length, frames.payload)
+
+
+@pytest.mark.parametrize(
+    ("alter", "words"),
+    [
+        (renumbered(0x125), "nothing of IMU_GYRO (121) came; similar: 125 on can0, 100 times a second, 8 bytes"),
+        (
+            renumbered(0x121 | EXTENDED_ID),
+            "nothing of IMU_GYRO (121) came; similar: 00000121 on can0, 100 times a second, 8 bytes",
+        ),
+        (renumbered(0x700), "nothing of IMU_GYRO (121) came; and no identifier like it"),
+        (never_valid, "2000 frames of IMU_GYRO (121) came, none valid: 2000 invalid"),
+        (cut_short, "2000 frames of IMU_GYRO (121) came, none valid: 2000 wrong length"),
+    ],
+)
+def test_a_silent_sensor_says_why(alter: Alter, words: str, tmp_path: Path) -> None:
+    log = tmp_path / "drive.log"
+    write_candump(alter(bus_drive(20.0, seed=3)), "can0", log)
+    silent = (Signal.PITCH_RATE, Signal.ROLL_RATE)  # both come in one message
+    why = {signal: why_silent(log, REFERENCE, signal) for signal in silent}
+    assert why == dict.fromkeys(silent, words)
+    facts = row_facts(read_whole_log(log, REFERENCE)[0], REFERENCE.traits)
+    pitch, roll = rate_findings(facts, BatchSettings(), why)
+    assert pitch.text == f"pitch_rate has 0 samples in the whole run: {words}"
+    assert (pitch.severity, roll.severity) == (Severity.FAULT, Severity.WARNING)
+    assert roll.text == f"roll_rate has 0 samples in the whole run: {words}"
+
+
+@pytest.mark.parametrize(
+    ("counts", "words"),
+    [
+        ({"ok": 0}, "Silent: pitch rate (no frame of its message)."),
+        ({"ok": 0, "invalid": 900}, "Silent: pitch rate (900 frames came, all invalid)."),
+        ({"ok": 900}, "Silent: pitch rate."),
+    ],
+)
+def test_the_service_says_it_too(counts: dict[str, int], words: str) -> None:
+    status = Status(
+        version="1",
+        state=State.SENSOR_FAULT,
+        uptime_s=90.0,
+        calibration_id="sha256:ab",
+        signals=(SignalHealth(signal="pitch_rate", last_age_s=None),),
+        decode=tuple(DecodeCount(signal="pitch_rate", reason=reason, n=n) for reason, n in counts.items()),
+    )
+    assert words in status.state_in_words

@@ -1,11 +1,14 @@
-"""What a release says of itself agrees: one version, a valid citation, an image whose files and commands exist."""
+"""What a release, deploy/ and the locks say agrees with the program, and a Debian package holds its own code only."""
 
 import json
+import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
+from dataclasses import fields
 from fnmatch import fnmatch
 from importlib.metadata import version
 from pathlib import Path
@@ -13,10 +16,17 @@ from pathlib import Path
 import make_deb
 import pytest
 import yaml
+from machine_code import ELF_MAGIC, PROCESSORS, ForeignCodeError, require_own_code, wheel_options
+from make_deb import UNIMPORTED, of_desk
+from packaging.tags import Tag
+from packaging.utils import parse_wheel_filename
 from support.locks import ROOT, pins
 from support.patience import PATIENCE_S
 
+from gateway.config import load_settings
+from gateway.core.weights.limits import Limits
 from gateway.web.access.guard import PUBLIC_PATHS
+from gateway.web.access.tokens import Scope, TokenFile
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 IMAGE = (ROOT / "deploy/container/Containerfile").read_text()
@@ -95,3 +105,170 @@ def test_the_image_has_the_python_that_the_locks_are_for(stage: str) -> None:
     found = re.match(r"python:(3\.\d+)-slim", stage)
     assert found is not None
     assert found[1] == re.search(r"Python (3\.\d+)", (ROOT / "requirements.txt").read_text())[1]  # type: ignore[index]
+
+
+DEPLOY = Path(__file__).parents[2] / "deploy"
+UNIT = (DEPLOY / "springscale.service").read_text()
+COMMENTED_KEY = re.compile(r"^# (?=[a-z_]+ = )", re.MULTILINE)
+
+
+def test_the_shipped_configuration_is_good_as_it_is() -> None:
+    settings = load_settings(DEPLOY / "springscale.toml")
+    assert settings.bus.interface == "socketcan"
+    assert settings.store.directory == Path("/var/lib/springscale")
+
+
+def test_every_commented_key_of_the_shipped_configuration_is_a_setting(tmp_path: Path) -> None:
+    text, n_keys = COMMENTED_KEY.subn("", (DEPLOY / "springscale.toml").read_text())
+    assert n_keys > 10
+    (tmp_path / "springscale.toml").write_text(text)
+    settings = load_settings(tmp_path / "springscale.toml")
+    assert settings.web.tls_key == tmp_path / "web.key"
+
+
+def test_defaults_that_the_shipped_configuration_tells_are_the_defaults(tmp_path: Path) -> None:
+    examples = [
+        "calibration",
+        "calibrated_as",
+        "vin",
+        "tls_certificate",
+        "tls_key",
+        "interface",  # of another bus
+        "channel",
+        "source_address",
+        "url",
+        "secret_file",
+        *(one.name for one in fields(Limits)),
+    ]
+    kept = [
+        line
+        for line in (DEPLOY / "springscale.toml").read_text().splitlines()
+        if not line.startswith(tuple(f"# {key} =" for key in examples))
+    ]
+    (tmp_path / "springscale.toml").write_text("\n".join(kept))
+    as_shipped = load_settings(tmp_path / "springscale.toml")
+    (tmp_path / "springscale.toml").write_text(COMMENTED_KEY.sub("", "\n".join(kept)))
+    assert load_settings(tmp_path / "springscale.toml") == as_shipped
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd is not installed here")
+def test_the_sandbox_scores_below_one_and_a_half_and_what_remains_is_explained() -> None:
+    report = subprocess.run(
+        ["systemd-analyze", "security", "--no-pager", "--offline=true", str(DEPLOY / "springscale.service")],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=True,
+    ).stdout
+    score = re.search(r"exposure level for springscale.service: ([\d.]+)", report)
+    assert score is not None
+    assert float(score[1]) <= 1.5
+    explained = UNIT.partition("still counts, and why it stays:")[2]
+    remaining = re.findall(r"^✗ (?:RootDirectory|\w+)", report, re.MULTILINE)
+    assert remaining
+    assert [name for name in remaining if name.removeprefix("✗ ") not in explained] == []
+
+
+def test_a_configuration_fault_is_not_tried_again() -> None:
+    assert "\nRestartPreventExitStatus=2\n" in UNIT
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a file away")
+def test_a_token_made_by_root_can_be_read_by_the_service(tmp_path: Path) -> None:
+    os.chown(tmp_path, 12345, 12346)
+    TokenFile(tmp_path / "tokens.json").create("fleet", Scope.READ)
+    made = (tmp_path / "tokens.json").stat()
+    assert (made.st_uid, made.st_gid, made.st_mode & 0o777) == (12345, 12346, 0o600)
+
+
+VEHICLE = pins("requirements.txt")
+FOR_DESKS = ("matplotlib", "numba", "llvmlite", "pillow")
+UNUSED = ("watchfiles", "websockets")
+
+
+@pytest.mark.parametrize("name", [*FOR_DESKS, *UNUSED])
+def test_a_vehicle_does_without(name: str) -> None:
+    assert name not in VEHICLE
+
+
+def test_what_the_service_loads_by_name_is_locked() -> None:
+    assert {"httptools", "uvloop"} <= VEHICLE.keys()
+
+
+def test_the_workbench_has_all_of_a_vehicle_and_the_extra_at_the_same_versions() -> None:
+    desk = pins("requirements-workbench.txt")
+    assert desk.items() > VEHICLE.items()
+    extra = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["workbench"]
+    assert {requirement.partition(">=")[0] for requirement in extra} <= desk.keys() - VEHICLE.keys()
+
+
+@pytest.mark.parametrize("name", ["requirements-build.txt", "requirements-dev.txt"])
+def test_no_lock_contradicts_another(name: str) -> None:
+    others = {**pins("requirements-workbench.txt"), **pins("requirements-build.txt")}
+    both = pins(name).items() & others.items()
+    assert {package for package, _ in both} == pins(name).keys() & others.keys()
+
+
+def test_the_debian_packages_part_along_the_locks() -> None:
+    assert set(FOR_DESKS) <= of_desk()
+    assert of_desk() & VEHICLE.keys() == UNIMPORTED == {"narwhals", "plotly"}
+
+
+def planned(*arguments: str) -> str:
+    """The commands of a set-up from nothing, not run."""
+    if shutil.which("make") is None:
+        pytest.skip("needs make")
+    asked = ["make", "--no-print-directory", "--dry-run", "--always-make", *arguments]
+    return subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+
+
+def test_the_demonstration_takes_a_port() -> None:
+    assert "springscale demo --port 8123" in planned("demo", "PORT=8123")
+    assert "springscale demo --port 8000" in planned("demo")
+
+
+def test_an_installation_tells_how_far_it_is() -> None:
+    commands = planned("test")
+    assert commands.startswith('echo "Setting up .venv')
+    assert commands.count("pip install") + commands.count("pip --disable-pip-version-check install") >= 4
+    assert "--quiet" not in commands
+
+
+def elf(architecture: str) -> bytes:
+    """The head of an ELF file."""
+    return ELF_MAGIC.ljust(18, b"\0") + PROCESSORS[architecture].elf_machine.to_bytes(2, "little") + bytes(44)
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    (tmp_path / "numpy").mkdir()
+    (tmp_path / "numpy/core.so").write_bytes(elf("arm64"))
+    (tmp_path / "numpy/core.py").write_text("pure")
+    (tmp_path / "numpy/dangling.so").symlink_to("nowhere")
+    (tmp_path / "empty").write_bytes(b"")
+    return tmp_path
+
+
+def test_a_tree_of_one_processor_is_good(tree: Path) -> None:
+    require_own_code(tree, "arm64")
+
+
+def test_foreign_machine_code_is_named(tree: Path) -> None:
+    (tree / "stray.so").write_bytes(elf("amd64"))
+    with pytest.raises(ForeignCodeError, match=r"^not machine code for arm64: stray\.so$"):
+        require_own_code(tree, "arm64")
+
+
+def test_a_tree_without_machine_code_is_no_package_of_ours(tmp_path: Path) -> None:
+    with pytest.raises(ForeignCodeError, match="no machine code"):
+        require_own_code(tmp_path, "amd64")
+
+
+@pytest.mark.parametrize("processor", ["x86_64", "aarch64"])
+def test_wheels_are_chosen_for_the_processor_and_debian_12(processor: str) -> None:
+    options = wheel_options("arm64")
+    platforms = {option.removeprefix("--platform=") for option in options if option.startswith("--platform=")}
+    wheel = f"numpy-2.4.6-cp311-cp311-manylinux_2_27_{processor}.manylinux_2_28_{processor}.whl"
+    tags: frozenset[Tag] = parse_wheel_filename(wheel)[3]
+    assert bool({tag.platform for tag in tags} & platforms) == (processor == "aarch64")
+    assert not any("2_39" in platform for platform in platforms)

@@ -1,14 +1,19 @@
-"""A sensor that has become noisy is weighed with its noise in the model, and named where that leaves no answer."""
+"""Sensors that became noisy, or sample at another rate than in calibration."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.calibrated import calibration_file
 from support.half_car_road import RATE_HZ, VAN, batch_over_road, calibrated_on_known_loads, weighed
 
+from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
+from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.floor import as_read, expected_floor, floor_of, noise_over, usual_floor
 from gateway.core.cross_spectrum.model.reading import Mount, Reading
+from gateway.core.estimator import ESTIMATORS, estimate
 from gateway.records import Batch, Why
 from gateway.service.pipeline import noise_fault
 
@@ -88,3 +93,40 @@ def test_the_roll_rates_noise_reaches_a_sensor_that_is_brought_to_the_centre_lin
     np.testing.assert_allclose(found[0], 1.0 + 3.0 * (2.0 * np.pi * freq_hz * 0.4) ** 2)
     np.testing.assert_allclose(found[1:], [[2.03, 2.03], [3.0, 3.0]])
     np.testing.assert_allclose(as_read(np.array([1.0, 2.0, 3.0]), placed, freq_hz, with_roll=False), [[1, 1], [2, 2]])
+
+
+@pytest.fixture(scope="module")
+def batch() -> Batch:
+    return batch_over_road(100.0, 50.0, seed=1, duration_s=60.0)
+
+
+def calibrated_at(*rates_hz: float) -> CalibratedVehicle:
+    return replace(calibration_file().for_core(), sensor_rate_seen_hz=rates_hz or None)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize(("calibrated_hz", "driven_hz"), [(100.0, 50.0), (50.0, 100.0), (100.0, 200.0)])
+def test_another_rate_is_named(batch: Batch, estimator: str, calibrated_hz: float, driven_hz: float) -> None:
+    driven = replace(batch, sensor_rate_hz=driven_hz)
+    found = estimate(driven, calibrated_at(calibrated_hz, calibrated_hz), estimator)
+    assert found.rejected == (Why.SAMPLE_RATE,)
+    assert math.isnan(found.payload.number)
+
+
+@pytest.mark.parametrize("driven_hz", [99.0, 101.25, math.nan])
+def test_clocks_differ_a_little_and_some_tell_nothing(batch: Batch, driven_hz: float) -> None:
+    driven = replace(batch, sensor_rate_hz=driven_hz)
+    assert Why.SAMPLE_RATE not in estimate(driven, calibrated_at(100.0, 100.0), "ratio_index").rejected
+
+
+def test_a_calibration_that_does_not_say_its_rate_names_none(batch: Batch) -> None:
+    driven = replace(batch, sensor_rate_hz=50.0)
+    assert Why.SAMPLE_RATE not in estimate(driven, calibrated_at(), "ratio_index").rejected
+
+
+def test_a_calibration_remembers_the_rates_of_what_counts(batch: Batch) -> None:
+    batches = tuple(replace(batch, sensor_rate_hz=hz) for hz in (100.2, 99.8, math.nan))
+    refused = replace(batch, sensor_rate_hz=50.0, rejected=(Why.TOO_SLOW,))
+    assert sensor_rate_seen_hz([KnownRun(1, "a", 0.0, 50.0, (*batches, refused))]) == (99.8, 100.2)
+    assert sensor_rate_seen_hz([KnownRun(1, "a", 0.0, 50.0, (batches[-1],))]) is None
+    assert calibration_file().for_core().sensor_rate_seen_hz == (100.0, 100.0)

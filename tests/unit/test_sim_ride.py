@@ -1,14 +1,16 @@
-"""The full car obeys mechanics: energy, momentum, equilibrium, convergence."""
+"""The full car obeys mechanics: energy, momentum, equilibrium, convergence, and the half-car of the textbooks."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from support.statics import static_axle_loads_kg
-from support.textbook import linearised
+from support.textbook import half_car, linearised
 
 from gateway.records import F64
+from gateway.sim import compiled
 from gateway.sim.chassis import Chassis, chassis_of
 from gateway.sim.drive import Drive, Leg, constant, drive_of
 from gateway.sim.integrator import Course, integrate
@@ -220,3 +222,68 @@ def test_imbalance_shakes_at_the_wheels_frequency() -> None:
 def test_a_road_that_ends_too_early_is_refused() -> None:
     with pytest.raises(ValueError, match="needs 203 m of road, this one has 100 m"):
         ride(PAPER_VAN, (), PaperRoad().lay(100.0, np.random.default_rng(1)), Drive(np.full(401, 10.0), np.zeros(401)))
+
+
+PERIOD_S = 10.0
+LEAD_S = 12.0
+FREQUENCIES_HZ = np.arange(0.5, 12.05, 0.1)
+
+
+@pytest.mark.parametrize("speed_mps", [8.0, 50.0 / 3.6, 28.0])
+@pytest.mark.parametrize(
+    ("vehicle", "load"),
+    [(PAPER_VAN, Load(1e-6, 1.4)), (PAPER_VAN, Load(420.0, 2.6, height_m=1.1)), (LARGE_VAN, Load(700.0, 1.0))],
+)
+def test_transfer_functions_equal_the_closed_form(vehicle: Vehicle, load: Load, speed_mps: float) -> None:
+    linear = linearised(vehicle)
+    level = np.random.default_rng(0).uniform(0.0, 2.0 * math.pi, len(FREQUENCIES_HZ))
+    heights = 1e-4 * np.exp(1j * level)
+    step_m = 0.01
+    way_m = np.arange(round((speed_mps * (LEAD_S + PERIOD_S) + vehicle.wheelbase_m + 10.0) / step_m)) * step_m
+    when_s = (way_m - vehicle.wheelbase_m) / speed_mps
+    profile = np.zeros(len(way_m))
+    for frequency, height in zip(FREQUENCIES_HZ, heights, strict=True):
+        profile += (height * np.exp(2j * math.pi * frequency * when_s)).real
+    quiet = Drive(
+        np.full(round((LEAD_S + PERIOD_S) / 0.05) + 1, speed_mps), np.zeros(round((LEAD_S + PERIOD_S) / 0.05) + 1)
+    )
+    driven = ride(linear, (load,), Road(step_m, profile, profile), quiet)
+
+    begin, n = round(LEAD_S / driven.step_s), round(PERIOD_S / driven.step_s)
+    bins = np.rint(FREQUENCIES_HZ * PERIOD_S).astype(int)
+    turn_back = np.exp(-2j * math.pi * FREQUENCIES_HZ * LEAD_S)
+    expected = half_car(linear, load, speed_mps, FREQUENCIES_HZ)
+    sensor_behind_cog_m = 3.2 - vehicle.cog_position_m
+    s = 2j * math.pi * FREQUENCIES_HZ
+    for measured, closed_form in (
+        (driven.acceleration[:, 0] + sensor_behind_cog_m * driven.acceleration[:, 1],
+         s * s * (expected[:, 0] + sensor_behind_cog_m * expected[:, 1])),
+        (driven.rate[:, 1], s * expected[:, 1]),
+    ):  # fmt: skip
+        transfer = np.fft.rfft(measured[begin : begin + n])[bins] * 2.0 / n * turn_back / heights
+        error = np.abs(transfer - closed_form)
+        assert np.max(error / np.maximum(np.abs(closed_form), 0.05 * np.max(np.abs(closed_form)))) < 0.01
+
+
+def test_where_no_cache_can_be_written_it_compiles_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def njit_in_a_read_only_place(**options: object) -> Callable[[Callable[..., int]], Callable[..., int]]:
+        asked.append(options.get("cache", False))
+        if options.get("cache"):
+            raise RuntimeError("cannot cache function: no locator available")
+        return lambda function: function
+
+    monkeypatch.setattr(compiled, "njit", njit_in_a_read_only_place)
+    assert compiled.compiled(lambda x: x + 1)(2) == 3
+    assert asked == [True, False]
+
+
+def test_compiled_code_gives_what_python_gives() -> None:
+    def alternating(n: int) -> float:
+        total = 0.0
+        for k in range(n):
+            total += (-1.0) ** k / (2 * k + 1)
+        return total
+
+    assert compiled.compiled(alternating)(1000) == pytest.approx(alternating(1000), rel=1e-12)

@@ -1,12 +1,15 @@
-"""Roads have the spectra, the coherence and the obstacles that they were asked for."""
+"""Roads have the spectra, coherence and obstacles asked for, and drives over them are smooth and honest."""
 
+import cmath
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from scipy import signal
-from support.iri import iri_by_section
+from support.iri import BASE_M, K1, K2, MU, SPEED_MPS, C, iri_by_section, iri_m_per_km
 
+from gateway.sim.drive import JERK_MPS3, STEP_S, Drive, Leg, constant, drive_of, motorway, rural, standstill, urban
 from gateway.sim.obstacles import Bump, ObstacleRoad, UnevenRoad, with_bumps
 from gateway.sim.road import PaperRoad, Road, RoadRecipe, SpectralRoad, iso_road, iso_roughness_m3
 
@@ -113,3 +116,124 @@ def test_obstacles_are_as_frequent_as_asked() -> None:
     high = (road.left_m > 0.04).astype(int)
     assert np.count_nonzero(np.diff(deep) == 1) == pytest.approx(100, abs=25)
     assert np.count_nonzero(np.diff(high) == 1) == pytest.approx(20, abs=10)
+
+
+def golden_gain(wavelength_m: float, step_m: float) -> float:
+    """|z_s' - z_u'| over the road's slope for a sine, from the equations of motion; 250 mm difference as base."""
+    s = 2j * math.pi * SPEED_MPS / wavelength_m
+    body = (K2 + C * s) / (s * s + C * s + K2)  # sprung over unsprung
+    wheel = K1 / (MU * s * s + (C * s + K2) * (1.0 - body) + K1)
+    k = 2.0 * math.pi / wavelength_m
+    base = abs(cmath.exp(1j * k * BASE_M) - 1.0) / (BASE_M * k)
+    return abs(wheel * (1.0 - body)) * base
+
+
+@pytest.mark.parametrize("wavelength_m", [1.5, 2.3, 6.0, 15.0, 30.0])
+def test_a_sine_gives_its_transfer_function(wavelength_m: float) -> None:
+    step_m, amplitude_m = 0.01, 0.002
+    way_m = np.arange(round(40 * wavelength_m / step_m) + 5000) * step_m
+    slope = amplitude_m * 2.0 * math.pi / wavelength_m
+    expected = 1000.0 * slope * golden_gain(wavelength_m, step_m) * 2.0 / math.pi  # mean of |sine|
+    profile = amplitude_m * np.sin(2.0 * math.pi * way_m / wavelength_m)
+    last = iri_by_section(profile, step_m, 10.0 * wavelength_m)[2:]  # the start has died away
+    assert last == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize("waviness", [1.5, 1.8, 2.0, 2.2, 2.5])
+@pytest.mark.parametrize("road_class", ["A", "C"])
+def test_iso_spectra_give_the_known_formula(road_class: str, waviness: float) -> None:
+    """IRI = 2.21 sqrt(C 1e6) exp(-0.356 (w-2) + 0.13 (w-2)^2), C at 1 rad/m."""
+    roughness = iso_roughness_m3(road_class)
+    road = SpectralRoad(roughness, waviness).lay(20_000.0, np.random.default_rng(5))
+    from_two = waviness - 2.0
+    expected = 2.21 * math.sqrt(roughness * 1e6) * math.exp(-0.356 * from_two + 0.13 * from_two**2)
+    assert iri_m_per_km(road.left_m, road.step_m) == pytest.approx(expected, rel=0.05)
+
+
+def test_the_papers_road_of_6_mm_is_iri_4() -> None:
+    road = PaperRoad(sigma_m=0.006).lay(40_000.0, np.random.default_rng(6))
+    assert iri_m_per_km(road.left_m, road.step_m) == pytest.approx(4.0, rel=0.03)
+
+
+def test_flat_and_steadily_rising_roads_are_smooth() -> None:
+    way_m = np.arange(2000) * 0.05
+    assert iri_m_per_km(np.full(2000, 3.0), 0.05) == 0.0
+    assert iri_m_per_km(0.02 * way_m, 0.05) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_sample_step_hardly_matters() -> None:
+    fine = SpectralRoad(1e-6, step_m=0.025).lay(5000.0, np.random.default_rng(1))
+    coarse = fine.left_m[::5]
+    assert iri_m_per_km(coarse, 0.125) == pytest.approx(iri_m_per_km(fine.left_m, 0.025), rel=0.02)
+
+
+@pytest.mark.parametrize(("n", "step_m", "complaint"), [(100, 0.3, "at most 0.25 m"), (100, 0.05, "longer than 11")])
+def test_a_profile_that_the_standard_cannot_take_is_refused(n: int, step_m: float, complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        iri_m_per_km(np.zeros(n), step_m)
+
+
+RANDOM = {"urban": (urban, 0.0, 52.0), "rural": (rural, 0.0, 100.0), "motorway": (motorway, 0.0, 131.0)}
+
+
+@pytest.mark.parametrize("kind", RANDOM)
+def test_random_drives_keep_to_their_speeds_and_stop_at_the_end(kind: str) -> None:
+    make, low_kmh, high_kmh = RANDOM[kind]
+    drive = make(900.0, np.random.default_rng(1))
+    assert np.min(drive.speed_mps) * 3.6 >= low_kmh
+    assert 0.75 * high_kmh < np.max(drive.speed_mps) * 3.6 <= high_kmh
+    assert drive.speed_mps[0] == drive.speed_mps[-1] == 0.0
+    assert drive.duration_s == pytest.approx(900.0, abs=300.0)
+
+
+@pytest.mark.parametrize("make", [urban, rural, motorway])
+def test_the_seed_is_all_that_decides_about_a_drive(make: Callable[[float, np.random.Generator], Drive]) -> None:
+    one, same, other = (make(600.0, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    assert np.array_equal(one.speed_mps, same.speed_mps)
+    assert np.array_equal(one.lateral_mps2, same.lateral_mps2)
+    assert len(one.speed_mps) != len(other.speed_mps) or not np.allclose(one.speed_mps, other.speed_mps)
+
+
+def test_jerk_and_acceleration_stay_bounded() -> None:
+    drive = drive_of([Leg(20.0, 5.0, 2.0), Leg(0.0, 0.0, 2.0), Leg(15.0, 5.0, 1.0), Leg(0.0, 5.0, 2.0)])
+    acceleration = np.diff(drive.speed_mps) / STEP_S
+    assert np.max(np.abs(acceleration)) <= 2.0 + 1e-9
+    assert np.max(np.abs(np.diff(acceleration))) / STEP_S <= JERK_MPS3 * 1.001
+
+
+def test_urban_driving_stops_and_motorway_driving_does_not() -> None:
+    stops = [
+        np.count_nonzero(np.diff((make(1800.0, np.random.default_rng(3)).speed_mps == 0.0).astype(int)) == 1)
+        for make in (urban, rural, motorway)
+    ]
+    assert stops[0] >= 10
+    assert 1 <= stops[1] < stops[0]
+    assert stops[2] == 1  # the end
+
+
+def test_the_distance_is_the_speed_integrated() -> None:
+    drive = drive_of([Leg(10.0, 20.0)], start_mps=10.0)
+    assert drive.travelled_m == pytest.approx(10.0 * np.arange(len(drive.speed_mps)) * STEP_S)
+
+
+def test_a_constant_drive_wanders_as_much_as_asked() -> None:
+    drive = constant(13.9, 3600.0, np.random.default_rng(2), jitter_std_mps=0.3)
+    assert np.std(drive.speed_mps) == pytest.approx(0.3, rel=0.15)
+    assert np.mean(drive.speed_mps) == pytest.approx(13.9, abs=0.05)
+    assert np.max(np.abs(drive.longitudinal_mps2)) < 0.2
+    assert np.ptp(constant(13.9, 60.0, np.random.default_rng(2), jitter_std_mps=0.0).speed_mps) == 0.0
+
+
+def test_curves_are_driven_only_in_motion() -> None:
+    drive = urban(900.0, np.random.default_rng(4))
+    assert np.std(drive.lateral_mps2) > 0.1
+    assert not drive.lateral_mps2[drive.speed_mps == 0.0].any()
+
+
+def test_drives_join_where_their_speeds_meet() -> None:
+    stop, go = standstill(10.0), drive_of([Leg(10.0, 5.0), Leg(0.0, 2.0)])
+    whole = go.then(stop).then(go)
+    assert whole.duration_s == pytest.approx(2 * go.duration_s + 10.0)
+    assert whole.part(go.duration_s, go.duration_s + 10.0).speed_mps.max() == 0.0
+    with pytest.raises(ValueError, match=r"ends at 0\.0 m/s cannot go on at 12\.0 m/s"):
+        stop.then(constant(12.0, 5.0, np.random.default_rng(1), 0.0))

@@ -1,14 +1,16 @@
-"""The front door: seeds, load steps, truth."""
+"""The front door of the simulator: seeds, load steps, truth, vans drawn about a type, loads of the studies."""
 
 import numpy as np
 import pytest
 
+from benchmarks.accuracy.loads import FLOOR_PART, SAYS, Shape, drawn_load, shaped_load
+from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, OF_TYPES, Scatter, scattered
 from gateway.sim.drive import Leg, constant, drive_of, standstill
 from gateway.sim.road import PaperRoad
 from gateway.sim.scenario import START_NS, LoadStep, simulate_drive
 from gateway.sim.sensors import REFERENCE, Sensors
-from gateway.sim.vans import PAPER_VAN
-from gateway.sim.vehicle import Load
+from gateway.sim.vans import PAPER_VAN, VANS
+from gateway.sim.vehicle import Load, Vehicle, payload_kg
 
 IDEAL = Sensors()
 HOLD = constant(14.0, 20.0, np.random.default_rng(1))
@@ -87,3 +89,73 @@ def test_steps_among_constant_loads_are_refused_not_left_out() -> None:
     mixed = [LoadStep(0.0, ()), Load(100.0, 2.0), LoadStep(AT_REST_S, (Load(280.0, 2.1),))]
     with pytest.raises(ValueError, match="either constant or steps, not both"):
         simulate_drive(PAPER_VAN, mixed, PaperRoad(), STOP_AND_GO, IDEAL, 1)
+
+
+def test_no_scatter_is_the_type_itself() -> None:
+    assert scattered(PAPER_VAN, Scatter(), np.random.default_rng(1)) == PAPER_VAN
+
+
+def test_the_same_seed_draws_the_same_van_and_another_seed_another() -> None:
+    one, again, other = (scattered(PAPER_VAN, OF_TYPES, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    assert one == again
+    assert one != other
+
+
+def test_properties_scatter_as_much_as_is_said_and_each_axle_alone() -> None:
+    rng = np.random.default_rng(3)
+    vans = [scattered(PAPER_VAN, FROM_DAY_TO_DAY, rng) for _ in range(1500)]
+    front = np.log([van.front.damper.rebound_nspm / PAPER_VAN.front.damper.rebound_nspm for van in vans])
+    rear = np.log([van.rear.damper.rebound_nspm / PAPER_VAN.rear.damper.rebound_nspm for van in vans])
+    springs = np.log([van.rear.spring.rate_npm / PAPER_VAN.rear.spring.rate_npm for van in vans])
+    assert front.std() == pytest.approx(0.05, rel=0.08)
+    assert springs.std() == pytest.approx(0.015, rel=0.08)
+    assert abs(np.corrcoef(front, rear)[0, 1]) < 0.1
+    assert {van.sprung_kg for van in vans} == {PAPER_VAN.sprung_kg}
+
+
+def test_a_heavier_van_is_a_larger_van() -> None:
+    heavy = scattered(PAPER_VAN, Scatter(sprung=0.1), np.random.default_rng(7))
+    factor = heavy.sprung_kg / PAPER_VAN.sprung_kg
+    assert factor != 1.0
+    assert heavy.pitch_inertia_kgm2 / PAPER_VAN.pitch_inertia_kgm2 == pytest.approx(factor)
+    assert heavy.front.spring.rate_npm / PAPER_VAN.front.spring.rate_npm == pytest.approx(factor)
+    assert heavy.rated_payload_kg / PAPER_VAN.rated_payload_kg == pytest.approx(factor)
+    assert heavy.empty_front_share_pct == pytest.approx(PAPER_VAN.empty_front_share_pct)
+
+
+@pytest.mark.parametrize("van", VANS.values(), ids=list(VANS))
+@pytest.mark.parametrize("shape", Shape)
+def test_a_load_is_as_heavy_as_asked_and_within_the_vehicle(shape: Shape, van: Vehicle) -> None:
+    for seed in range(30):
+        place_m = float(np.random.default_rng(seed).uniform(0.1, 1.1)) * van.wheelbase_m
+        loads = shaped_load(shape, van, 250.0, place_m, np.random.default_rng(seed))
+        assert payload_kg(loads) == pytest.approx(250.0)
+        for load in loads:
+            assert load.position_m - 0.5 * load.length_m >= 0.0
+            assert load.position_m + 0.5 * load.length_m <= van.wheelbase_m + 2.6
+            assert load.height_m >= 0.6
+
+
+def test_kinds_differ_as_their_names_say() -> None:
+    van = VANS["paper_van"]
+
+    def extent(shape: Shape) -> tuple[float, float]:
+        loads = [shaped_load(shape, van, 250.0, 1.4, np.random.default_rng(seed))[0] for seed in range(50)]
+        return float(np.mean([one.length_m for one in loads])), float(np.mean([one.tall_m for one in loads]))
+
+    extents = {shape: extent(shape) for shape in Shape}
+    assert extents[Shape.PARCELS][0] > 1.5 * extents[Shape.BOX][0]
+    assert extents[Shape.BAY][0] == pytest.approx(FLOOR_PART * van.wheelbase_m)
+    assert extents[Shape.PIPES][0] > extents[Shape.LONG][0]
+    assert extents[Shape.PIPES][1] < 0.5
+    assert extents[Shape.TALL][1] > 1.2
+    assert len(shaped_load(Shape.ROOF, van, 250.0, 1.4, np.random.default_rng(1))) == 2
+    assert set(SAYS) == set(Shape)
+
+
+def test_what_is_drawn_is_of_every_kind() -> None:
+    van = VANS["paper_van"]
+    lengths = {round(drawn_load(van, 250.0, 1.4, np.random.default_rng(seed))[0].length_m, 3) for seed in range(60)}
+    assert len(lengths) > 30
+    assert min(lengths) < 1.2
+    assert max(lengths) > 2.5

@@ -1,8 +1,13 @@
-"""The uniform time line: what lies in band comes through, what would alias does not, gaps stay gaps."""
+"""The uniform time line: what lies in band comes through, what would alias does not, gaps stay gaps; its spline."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
+from gateway.core.memoized import memoized
+from gateway.core.spline import between, monotone_slopes, smooth_slopes
 from gateway.core.timeline import onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
 from gateway.records import F64, I64
 
@@ -128,3 +133,54 @@ def test_nothing_is_known_beyond_a_quarter_of_a_gap_from_either_end() -> None:
     known = GRID_S[np.isfinite(gridded(t_ns[kept], t_s[kept]))]
     assert t_s[200] - GAP_S / 4.0 <= known[0] <= t_s[200] + 0.02
     assert t_s[1199] - 0.02 <= known[-1] <= t_s[1199] + GAP_S / 4.0
+
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+@given(n=st.integers(4, 60), seed=seeds)
+def test_a_smooth_curve_is_the_cubic_spline(n: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    t, x = np.cumsum(rng.uniform(0.5, 2.0, n)), rng.standard_normal(n)
+    at = rng.uniform(t[0], t[-1], 50)
+    np.testing.assert_allclose(between(at, t, x, smooth_slopes(t, x)), CubicSpline(t, x)(at), rtol=1e-9, atol=1e-9)
+
+
+@given(n=st.integers(2, 12), seed=seeds)
+def test_a_monotone_curve_is_the_pchip(n: int, seed: int) -> None:
+    """Rounded, so that some neighbours are equal."""
+    rng = np.random.default_rng(seed)
+    t, x = np.cumsum(rng.uniform(0.5, 2.0, n)), np.round(rng.standard_normal((n, 3)), 1)
+    at = np.r_[t, rng.uniform(t[0], t[-1], 50)]
+    expected = PchipInterpolator(t, x)(at)
+    np.testing.assert_allclose(between(at, t, x, monotone_slopes(t, x)), expected, rtol=1e-9, atol=1e-9)
+
+
+def test_what_is_no_number_is_an_error_and_no_curve() -> None:
+    with pytest.raises(ValueError, match="infs or NaNs"):
+        smooth_slopes(np.arange(5.0), np.array([0.0, np.nan, 1.0, 2.0, 3.0]))
+
+
+def test_it_is_worked_out_once_for_the_same_content_and_anew_for_another() -> None:
+    asked: list[tuple[int, ...]] = []
+
+    @memoized
+    def doubled(x: F64) -> F64:
+        asked.append(x.shape)
+        return 2.0 * x
+
+    x = np.arange(6.0)
+    assert doubled(x).tolist() == doubled(x.copy()).tolist() == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]
+    assert doubled(x.reshape(2, 3)).shape == (2, 3)
+    x[0] = 7.0
+    assert doubled(x)[0] == 14.0
+    assert asked == [(6,), (2, 3), (6,)]
+
+
+def test_nobody_can_change_what_is_kept() -> None:
+    @memoized
+    def doubled(x: F64) -> F64:
+        return 2.0 * x
+
+    with pytest.raises(ValueError, match="read-only"):
+        doubled(np.ones(2))[0] = 0.0

@@ -1,4 +1,4 @@
-"""Tokens: shown once, kept as hashes, gone when revoked, expired or unreadable."""
+"""Tokens: shown once, kept as hashes, gone when revoked, expired or unreadable; the command that makes them."""
 
 import json
 import stat
@@ -7,10 +7,12 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner, Result
 from hypothesis import given
 from hypothesis import strategies as st
 from support.log import names
 
+from gateway.cli.token import token as token_commands
 from gateway.errors import ConfigurationError
 from gateway.log import Event
 from gateway.web.access.tokens import Scope, TokenFile
@@ -195,3 +197,37 @@ def test_an_edited_scope_must_be_a_scope(path: Path) -> None:
 def test_who_may_operate_may_read() -> None:
     allowed = {(held, wanted) for held in Scope for wanted in Scope if held.allows(wanted)}
     assert allowed == {(Scope.READ, Scope.READ), (Scope.OPERATE, Scope.READ), (Scope.OPERATE, Scope.OPERATE)}
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    path = tmp_path / "springscale.toml"
+    path.write_text('signals = "signals.toml"\n[store]\ndirectory = "state"\n')
+    return path
+
+
+def run(config: Path, *arguments: str) -> Result:
+    return CliRunner().invoke(token_commands, [*arguments, "--config", str(config)])
+
+
+def test_a_token_is_made_listed_and_revoked(config: Path) -> None:
+    made = run(config, "create", "fleet", "--scope", "operate", "--days", "30")
+    text = made.output.strip()
+    token = TokenFile(config.parent / "state" / "tokens.json").verify(text)
+    assert token is not None
+    assert token.expires_s == token.created_s + 30 * 86_400
+
+    listed = json.loads(run(config, "list", "--json").output)
+    assert (listed["name"], listed["scope"], listed["id"]) == ("fleet", "operate", token.id)
+    assert text.split("_", 2)[2] not in run(config, "list").output
+
+    assert run(config, "revoke", "fleet").exit_code == 0
+    assert run(config, "list").output == ""
+
+
+def test_mistakes_are_said(config: Path) -> None:
+    assert run(config, "create", "fleet", "--scope", "everything").exit_code == 2
+    assert run(config, "create", "fleet", "--days", "0").exit_code == 2
+    assert run(config, "create", "fleet", "--days", "nan").exit_code == 2
+    assert run(config, "create", "fleet", "--days", "inf").exit_code == 2
+    assert isinstance(run(config, "revoke", "fleet").exception, ConfigurationError)

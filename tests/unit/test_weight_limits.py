@@ -1,13 +1,18 @@
-"""Limits: whose count, where they are told, and how probable it is that a weight is over one."""
+"""Weights and their limits: standard deviations from slopes, how probable it is that one is over its limit, and how
+much more may go in."""
 
 import json
 import math
+from collections.abc import Callable
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from support.archive import write_manifest
 from support.calibrated import calibration_text
 from support.estimates import make_estimate, posterior_of
@@ -16,12 +21,13 @@ from support.web import Client, Gateway
 from gateway.archive.manifest import load_manifest
 from gateway.cli import springscale
 from gateway.config import load_settings
-from gateway.core.vehicle import Vehicle
-from gateway.core.weights.limits import Limits, over_limit_probability
-from gateway.core.weights.on_the_road import weighed
+from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct
+from gateway.core.weights.limits import Light, Limits, nearness, over_limit_probability, rooms_of
+from gateway.core.weights.on_the_road import PayloadPlace, place_of, weighed, weights_of
 from gateway.errors import ConfigurationError
-from gateway.estimate import Estimate
+from gateway.estimate import PLACES, Z95, Estimate, Quantity, Weight, Weights
 from gateway.estimate_json import table_row
+from gateway.posterior import Posterior, Source
 from gateway.setup import Setup, load_setup, setup_of
 from gateway.uplink.outbox import Outbox
 
@@ -192,3 +198,157 @@ def test_in_python_limits_are_given_by_name(tmp_path: Path) -> None:
     setup = load_setup("springscale:reference", tmp_path / "vehicle.json", "ratio_index", limits=limits)
     assert setup.calibrated is not None
     assert setup.calibrated.vehicle.gross_limit_kg == 1850.0
+
+
+VAN = Vehicle(
+    name="van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    sensor_position_m=0.0,
+    unsprung_front_kg=80.0,
+    unsprung_rear_kg=80.0,
+    gross_limit_kg=2000.0,
+    front_axle_limit_kg=1000.0,
+    rear_axle_limit_kg=1050.0,
+)
+WITHIN = st.floats(0.0, 1.0)
+
+
+def aboard(payload_kg: float, front_share_pct: float, std_kg: float = 6.0) -> Weights:
+    return weights_of(VAN, Posterior(np.array([payload_kg, front_share_pct]), np.diag([std_kg**2, 0.04])))
+
+
+def test_every_limit_leaves_its_own_room_the_tightest_first() -> None:
+    """300 kg, 48 % of 1540 kg in front: 819 and 881 kg on the axles, 1700 kg in all."""
+    rooms = rooms_of(aboard(300.0, 48.0))
+    assert [room.place for room in rooms] == ["rear_axle", "front_axle", "gross"]
+    assert [room.left.number for room in rooms] == pytest.approx([169.2, 180.8, 300.0])
+    assert rooms[2].left.std == pytest.approx(6.0)
+    assert rooms[2].surely_kg == pytest.approx(300.0 - Z95 * 6.0)
+
+
+@given(WITHIN, st.floats(0.0, 450.0), st.floats(44.0, 54.0))
+def test_the_tightest_room_fits_wherever_between_the_axles_it_is_put(
+    front_part: float, payload_kg: float, front_share_pct: float
+) -> None:
+    before = aboard(payload_kg, front_share_pct)
+    more_kg = rooms_of(before)[0].left.number
+    if more_kg <= 0.0:
+        return
+    front_kg = front_share_pct / 100.0 * (1240.0 + payload_kg) + front_part * more_kg
+    after = aboard(payload_kg + more_kg, 100.0 * front_kg / (1240.0 + payload_kg + more_kg))
+    assert all(weight.kg <= weight.limit_kg + 1e-6 for _, weight in after.items() if weight.limit_kg is not None)
+    tightest = {room.place: room.left.number for room in rooms_of(after)}
+    assert min(tightest.values()) >= -1e-6
+
+
+def test_an_overloaded_axle_leaves_less_than_nothing() -> None:
+    assert rooms_of(aboard(500.0, 40.0))[0].place == "rear_axle"
+    assert rooms_of(aboard(500.0, 40.0))[0].left.number == pytest.approx(1050.0 - 0.6 * 1740.0 - 80.0)
+
+
+def test_no_limit_or_no_weight_leaves_nothing_to_tell() -> None:
+    assert rooms_of(Weights()) == ()
+    assert rooms_of(Weights(gross=Weight(1700.0, 6.0, None, None))) == ()
+    assert rooms_of(Weights(gross=Weight(limit_kg=2000.0))) == ()
+    assert nearness(Weights()).light is Light.UNKNOWN
+    assert nearness(Weights()).places() == ()
+
+
+def test_how_sure_it_is_unknown_still_leaves_room() -> None:
+    [room] = rooms_of(Weights(gross=Weight(1700.0, math.nan, 2000.0, None)))
+    assert room.surely_kg == 300.0
+
+
+@pytest.mark.parametrize(
+    ("kg", "light"),
+    [(1900.0, Light.GO), (1980.3, Light.GO), (1980.5, Light.NEAR), (1999.9, Light.NEAR), (2000.1, Light.OVER)],
+)
+def test_the_light_turns_where_the_limit_enters_the_interval_and_at_the_limit(kg: float, light: Light) -> None:
+    """10 kg of standard deviation: the upper end of the interval is 19.6 kg above."""
+    found = nearness(Weights(gross=Weight(kg, 10.0, 2000.0, None), rear_axle=Weight(500.0, 5.0, 1000.0, None)))
+    assert found.light is light
+    assert found.places() == (() if light is Light.GO else ("gross",))
+
+
+def test_a_wheel_can_be_what_the_light_is_about() -> None:
+    found = nearness(Weights(gross=Weight(1900.0, 6.0, 2000.0, None), rear_left=Weight(560.0, 5.0, 550.0, None)))
+    assert (found.light, found.places()) == (Light.OVER, ("rear_left",))
+
+
+OTHER_VAN = Vehicle(
+    name="van",
+    empty_mass_kg=1240.0,
+    wheelbase_m=2.8,
+    sensor_position_m=0.0,
+    empty_front_share_pct=57.0,
+    empty_front_share_std_pct=0.0,
+    track_width_m=1.5,
+    empty_cg_left_m=0.06,
+    unsprung_front_kg=90.0,
+    unsprung_rear_kg=110.0,
+)
+STDS = np.array([9.0, 0.4, 0.006, 0.05])
+CORRELATIONS = {(0, 1): -0.5, (0, 2): 0.3, (1, 2): -0.4}
+
+
+@dataclass(frozen=True)
+class State:
+    """What is estimated, at a load of 400 kg that lies 0.25 m right of the centre line."""
+
+    payload_kg: float = 400.0
+    share_pct: float = front_share_pct(OTHER_VAN, 400.0, 1.9)
+    cg_left_m: float = cg_left_m(OTHER_VAN, 400.0, -0.25)
+    roll_share: float = 0.62
+
+
+def posterior(state: State) -> Posterior:
+    """Half of the covariance own, half from sources; with an error of the empty share, in which place has no part."""
+    correlations = np.eye(3)
+    for (one, other), shared in CORRELATIONS.items():
+        correlations[one, other] = correlations[other, one] = shared
+    covariance = correlations * np.outer(STDS[:3], STDS[:3])
+    columns = np.sqrt(0.5) * np.linalg.cholesky(covariance).T
+    sources = {Source.CALIBRATION: columns[:2], Source.LOAD_LENGTH: columns[2:]}
+    return Posterior(np.array([state.payload_kg, state.share_pct, state.cg_left_m]), 0.5 * covariance, sources)
+
+
+def weights(state: State) -> Weights:
+    return weights_of(OTHER_VAN, posterior(state), Quantity(state.roll_share, STDS[3]))
+
+
+def place(state: State) -> PayloadPlace:
+    found = place_of(OTHER_VAN, posterior(state).with_source(Source.EMPTY_SHARE, np.array([[0.0, 0.8, 0.0]])))
+    assert found is not None
+    return found
+
+
+def errors(of: Callable[[State], tuple[float, ...]]) -> NDArray[np.float64]:
+    """Covariance of what ``of`` tells, by central differences."""
+    slopes, names = [], list(State.__dataclass_fields__)
+    for name, std in zip(names, STDS, strict=True):
+        step = 1e-4 * std
+        up, down = (replace(State(), **{name: getattr(State(), name) + way * step}) for way in (1.0, -1.0))
+        slopes.append((np.array(of(up)) - np.array(of(down))) / (2.0 * step))
+    correlations = np.eye(4)
+    for (one, other), shared in CORRELATIONS.items():
+        correlations[one, other] = correlations[other, one] = shared
+    found: NDArray[np.float64] = np.array(slopes).T @ (correlations * np.outer(STDS, STDS)) @ np.array(slopes)
+    return found
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_a_weight_is_as_sure_as_what_it_hangs_on(name: str) -> None:
+    [[variance]] = errors(lambda state: (getattr(weights(state), name).kg,))
+    assert getattr(weights(State()), name).std_kg == pytest.approx(math.sqrt(variance), rel=1e-6)
+
+
+def test_a_place_is_as_sure_as_what_it_hangs_on_along_across_and_together() -> None:
+    covariance = errors(lambda state: astuple(place(state))[:3:2])
+    found = place(State())
+    assert (found.std_m, found.left_std_m) == pytest.approx(tuple(np.sqrt(np.diag(covariance))), rel=1e-6)
+    assert found.correlation * found.std_m * found.left_std_m == pytest.approx(covariance[0, 1], rel=1e-6)
+
+
+def test_the_place_is_the_one_that_statics_put_it_at() -> None:
+    assert (place(State()).position_m, place(State()).left_m) == pytest.approx((1.9, -0.25))

@@ -1,0 +1,236 @@
+"""Around the live source: its inbox, adapters that send what their driver cannot read, and the survey of a bus."""
+
+import errno
+import threading
+from contextlib import contextmanager
+
+import can
+import numpy as np
+import pytest
+from support.patience import PATIENCE_S, wait_until
+
+from gateway.bus.heard import similar_to
+from gateway.bus.live import bus_survey as around_module
+from gateway.bus.live import source as source_module
+from gateway.bus.live.bus_survey import BusSurvey, bus_survey_of
+from gateway.bus.live.python_can import PythonCanReceiver
+from gateway.bus.live.receiver import Inbox
+from gateway.bus.live.source import LiveSource, SourceState
+from gateway.bus.signals import load_signal_map
+from gateway.records import Frames
+
+
+def burst(first, n):
+    return Frames(
+        np.arange(first, first + n, dtype=np.int64),
+        np.zeros(n, np.uint32),
+        np.zeros(n, np.uint8),
+        np.zeros((n, 8), np.uint8),
+    )
+
+
+def test_what_was_put_comes_out_at_once_in_order():
+    inbox = Inbox(100, 8)
+    inbox.put(burst(0, 3))
+    inbox.put(burst(3, 2))
+    assert len(inbox) == 5
+    assert inbox.drain(0.0).t_ns.tolist() == [0, 1, 2, 3, 4]
+    assert inbox.drain(0.0) is None
+
+
+def test_a_full_inbox_keeps_the_oldest_and_counts_the_rest():
+    inbox = Inbox(5, 8)
+    inbox.put(burst(0, 4))
+    inbox.put(burst(4, 4))
+    inbox.put(burst(8, 4))
+    assert inbox.dropped == 7
+    assert inbox.drain(0.0).t_ns.tolist() == [0, 1, 2, 3, 4]
+
+
+def test_what_is_drained_makes_room_again():
+    inbox = Inbox(5, 8)
+    for first in range(0, 50, 5):
+        inbox.put(burst(first, 5))
+        inbox.drain(0.0)
+    assert inbox.dropped == 0
+
+
+def test_a_drain_waits_for_a_put():
+    inbox = Inbox(5, 8)
+    threading.Timer(0.05, inbox.put, [burst(7, 1)]).start()
+    assert inbox.drain(PATIENCE_S).t_ns.tolist() == [7]
+
+
+def test_a_closed_inbox_gives_what_it_holds_and_waits_no_more():
+    inbox = Inbox(5, 8)
+    inbox.put(burst(0, 2))
+    inbox.close()
+    assert len(inbox.drain(PATIENCE_S)) == 2
+    assert inbox.drain(PATIENCE_S) is None
+
+
+@pytest.mark.parametrize("n_bursts", [1, 40])
+def test_a_sender_that_can_wait_loses_nothing(n_bursts):
+    inbox = Inbox(8, 8, waits_for_room=True)
+    sender = threading.Thread(target=lambda: [inbox.put(burst(10 * i, 10)) for i in range(n_bursts)])
+    sender.start()
+    drained = []
+    while len(drained) < 10 * n_bursts:
+        frames = inbox.drain(PATIENCE_S)
+        assert frames is not None
+        drained += frames.t_ns.tolist()
+    sender.join()
+    assert drained == list(range(10 * n_bursts))
+    assert inbox.dropped == 0
+
+
+def test_closing_frees_a_sender_that_waits():
+    inbox = Inbox(1, 8, waits_for_room=True)
+    inbox.put(burst(0, 1))
+    sender = threading.Thread(target=inbox.put, args=[burst(1, 1)])
+    sender.start()
+    inbox.close()
+    sender.join(PATIENCE_S)
+    assert not sender.is_alive()
+
+
+GARBLED = [
+    ValueError("invalid literal for int() with base 16: '1g0'"),
+    IndexError("string index out of range"),
+    UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte"),
+    can.CanOperationError("the adapter is gone"),
+    OSError(5, "Input/output error"),
+]
+
+
+class FakeBus:
+    """Gives what the script says, then nothing."""
+
+    def __init__(self, *script: can.Message | Exception) -> None:
+        self.script = list(script)
+        self.is_shut_down = False
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        step = self.script.pop(0) if self.script else None
+        if isinstance(step, Exception):
+            raise step
+        return step
+
+    def shutdown(self) -> None:
+        self.is_shut_down = True
+
+
+def message(number: int) -> can.Message:
+    return can.Message(timestamp=1.0 + number, arbitration_id=0x120 + number, is_extended_id=False, data=bytes(8))
+
+
+@pytest.mark.parametrize("fault", GARBLED, ids=lambda fault: type(fault).__name__)
+def test_what_came_before_a_fault_is_given_first(fault: Exception) -> None:
+    receiver = PythonCanReceiver(FakeBus(message(0), message(1), fault), 8)  # type: ignore[arg-type] # as much as is asked
+    assert receiver.receive(0.0).frames.can_id.tolist() == [0x120, 0x121]
+    with pytest.raises((can.CanError, OSError)):
+        receiver.receive(0.0)
+
+
+@pytest.mark.parametrize("fault", GARBLED, ids=lambda fault: type(fault).__name__)
+def test_an_adapter_that_garbles_a_line_is_opened_anew(fault: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    """slcan's parser raises whatever noise on the line makes int() raise: it ended the thread and the service."""
+    monkeypatch.setattr(source_module, "FIRST_PAUSE_S", 0.001)
+    buses = [FakeBus(message(0), fault), FakeBus(message(1))]
+    opened = iter(buses)
+    signal_map = load_signal_map("springscale:reference")
+    source = LiveSource(
+        "virtual",
+        "garbled",
+        signal_map,
+        open_receiver=lambda: PythonCanReceiver(next(opened), 8),  # type: ignore[arg-type] # as above
+    )
+    source.start()
+    assert wait_until(lambda: source.counts().frames == 2)
+    assert source.failure is None
+    assert (source.counts().reconnects, buses[0].is_shut_down) == (1, True)
+    source.stop()
+    assert source.state is SourceState.STOPPED
+
+
+MAP = load_signal_map("springscale:reference")
+ACCELERATION = next(message for message in MAP.messages if message.frame_id == 0x120)
+
+
+@contextmanager
+def chatter(channel, *messages):
+    """Others on the bus, each message a hundred times a second or so."""
+    over = threading.Event()
+    bus = can.Bus(interface="virtual", channel=channel)
+
+    def talk():
+        while not over.wait(0.01):
+            for can_id, is_extended, length in messages:
+                bus.send(can.Message(arbitration_id=can_id, is_extended_id=is_extended, data=bytes(length)))
+
+    thread = threading.Thread(target=talk)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+        bus.shutdown()
+
+
+def test_every_identifier_of_either_width_is_heard_and_the_nearest_named(request):
+    channel = request.node.name
+    around = bus_survey_of("virtual", channel, {})
+    with chatter(channel, (0x122, False, 8), (0x120, True, 8), (0x7DF, False, 3), (0x121, False, 8)):
+        around.look()
+        assert wait_until(lambda: around.heard)
+    assert [one.name for one in around.heard] == ["121", "122", "7DF", "00000120"]
+    told = similar_to(ACCELERATION, MAP, around.heard)
+    assert [words.split(",")[0] for words in told] == ["00000120", "122"]  # 121 is mapped, 7DF is no neighbour
+    assert all("times a second, 8 bytes" in words for words in told)
+    around.forget()
+    assert around.heard == ()
+    around.stop()
+
+
+def test_one_look_at_a_time_and_one_a_minute(monkeypatch):
+    monkeypatch.setattr(around_module, "LOOK_S", 0.05)
+    n_opened = []
+
+    def broken():
+        n_opened.append(1)
+        raise OSError(errno.ENETDOWN, "Network is down")
+
+    around = BusSurvey(broken)
+    for _ in range(5):
+        around.look()
+    around.stop()
+    assert (len(n_opened), around.heard) == (1, ())
+    around.look()  # stopped
+    assert len(n_opened) == 1
+
+
+def test_a_sensor_that_comes_and_goes_begins_no_second_look_beside_the_first():
+    n_opened = []
+    is_over = threading.Event()
+
+    def slow():
+        n_opened.append(1)
+        is_over.wait(PATIENCE_S)
+        raise OSError(errno.ENETDOWN, "Network is down")
+
+    around = BusSurvey(slow)
+    around.look()
+    assert wait_until(lambda: n_opened)
+    around.forget()
+    around.look()
+    is_over.set()
+    around.stop()
+    assert len(n_opened) == 1
+
+
+def test_an_adapter_that_one_program_alone_may_open_is_left_alone():
+    around = bus_survey_of("slcan", "/dev/ttyUSB0", {})
+    around.look()
+    around.stop()
+    assert around.heard == ()

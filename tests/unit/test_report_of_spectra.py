@@ -1,0 +1,289 @@
+"""Spectra and roll in a report: levels, limits of so much driving, and the modelled spectra of a known vehicle."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.calibrated import ratio_index_calibration
+from support.estimates import make_estimate
+from support.half_car_road import CAR, RATE_HZ, VAN, batch_of, batch_over_road, parameters_of
+
+from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.judgement.assessment import BatchSet, Judgement
+from gateway.calibration.judgement.evaluation import CgLeftErrors, Errors, ErrorTable, Judged, TargetErrors, WheelErrors
+from gateway.calibration.known_run import KnownRun
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
+from gateway.core.cross_spectrum.measured import cross_spectra_of
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS, has_roll, names_of
+from gateway.core.cross_spectrum.model.reading import Reading
+from gateway.core.ratio_index.index import Band
+from gateway.core.spectrum import spectra_of
+from gateway.estimate import Quantity
+from gateway.records import F64, Batch, Spectra, Why
+from gateway.reports.calibration.accuracy import accuracy_section
+from gateway.reports.calibration.half_car import fits_of, knowledge_chart, knowledge_of, knowledge_table, told
+from gateway.reports.calibration.spectra import ACCELERATION, N_SEGMENT, PITCH_RATE, density_of, spectra_section
+from gateway.reports.charts import LineMark, Ribbon, Span
+
+
+def white(seed: int, n: int = 20_000) -> Batch:
+    rng = np.random.default_rng(seed)
+    return batch_of(rng.standard_normal(n), 0.1 * rng.standard_normal(n), np.full(n, 14.0))
+
+
+def test_white_noise_has_the_density_of_its_variance() -> None:
+    """Variance 1 over 25 Hz: 0.2 m/s2 per root hertz; a tenth of it for the pitch rate (Parseval)."""
+    level = (1.0 / (RATE_HZ / 2.0)) ** 0.5
+    a, g = density_of([white(1)], ACCELERATION), density_of([white(1)], PITCH_RATE)
+    assert a is not None
+    assert g is not None
+    assert np.sqrt(np.mean(a.amplitude**2)) == pytest.approx(level, rel=0.02)
+    assert np.sqrt(np.mean(g.amplitude**2)) == pytest.approx(0.1 * level, rel=0.02)
+
+
+def test_limits_hold_the_true_density_95_times_in_100() -> None:
+    level = (1.0 / (RATE_HZ / 2.0)) ** 0.5
+    held = []
+    for seed in range(40):
+        found = density_of([white(seed, 10_000)], ACCELERATION)
+        assert found is not None
+        held.append(np.mean((found.low <= level) & (level <= found.high)))
+    assert np.mean(held) == pytest.approx(0.95, abs=0.015)
+
+
+def test_batches_of_a_load_are_joined_and_none_is_none() -> None:
+    one, two = density_of([white(1)], ACCELERATION), density_of([white(1), white(2)], ACCELERATION)
+    assert one is not None
+    assert two is not None
+    assert two.n_segments == 2 * one.n_segments
+    assert np.all(two.high / two.low < one.high / one.low)
+    assert density_of([white(1, N_SEGMENT - 1)], ACCELERATION) is None
+    assert density_of([], ACCELERATION) is None
+
+
+def known(number: int, payload_kg: float, share_pct: float) -> KnownRun:
+    return KnownRun(
+        number, f"{number}.log", payload_kg, share_pct, (batch_over_road(payload_kg, share_pct, number, 60.0),)
+    )
+
+
+def test_a_curve_for_every_load_and_the_bands_where_they_are() -> None:
+    runs = [known(1, 0.0, 52.0), known(2, 200.0, 50.0), known(3, 200.0, 47.0)]
+    section = spectra_section(runs, ratio_index_calibration())
+    assert section is not None
+    of_load, of_share = (chart.panels[0] for chart in section.charts)
+    assert [mark.label for mark in of_load.marks if isinstance(mark, LineMark)] == ["0 kg", "200 kg"]
+    assert [mark.label for mark in of_share.marks if isinstance(mark, LineMark)] == ["47.0 %", "50.0 %", "52.0 %"]
+    assert sum(isinstance(mark, Ribbon) for mark in of_share.marks) == 3
+    bands = ratio_index_calibration().acceleration_bands
+    assert bands is not None
+    spans = [mark for mark in of_load.marks if isinstance(mark, Span)]
+    assert [Band((s.low + s.high) / 2.0, s.high - s.low) for s in spans] == [
+        Band(pytest.approx(band.centre_hz), pytest.approx(band.width_hz)) for band in bands
+    ]
+
+
+def test_the_fitted_half_car_shows_what_was_measured() -> None:
+    """Drives of a half-car: the one fitted to them explains their spectra, phase and coherence."""
+    runs = [
+        KnownRun(i, f"{i}.log", kg, pct, (batch_over_road(kg, pct, i, 200.0),))
+        for i, (kg, pct) in enumerate([(0.0, 52.0), (300.0, 47.0)], 1)
+    ]
+    fits = fits_of(runs, calibrate_cross_spectrum(runs, VAN))
+    assert [fit.run.number for fit in fits] == [1, 2]
+    for fit in fits:
+        at = np.searchsorted(fit.measured.freq_hz, fit.modelled.freq_hz)
+        told = fit.measured.coherence[at] > 0.5
+        phase = fit.modelled.phase_rad - fit.measured.phase_rad[at]
+        assert np.median(np.abs(np.angle(np.exp(1j * phase[told])))) < 0.02
+        assert np.median(np.abs(np.log(fit.modelled.pitch_rate / fit.measured.pitch_rate[at]))) < 0.1
+
+
+SPEED_MPS = 14.0
+DELAY_S = VAN.wheelbase_m / SPEED_MPS
+LOADED = Fitted(payload_kg=270.0, front_share_pct=47.0, delay_s=DELAY_S)
+
+
+@pytest.fixture(scope="module")
+def calibration() -> CrossSpectrumCalibration:
+    parameters = parameters_of(CAR)
+    return CrossSpectrumCalibration(
+        empty_mass_kg=VAN.empty_mass_kg,
+        empty_front_share_pct=VAN.empty_front_share_pct,
+        wheelbase_m=VAN.wheelbase_m,
+        band_hz=(1.1, 14.0),
+        n_segment=256,
+        names=PARAMETERS,
+        parameters=parameters,
+        covariance=np.zeros((len(parameters), len(parameters))),
+        directions=np.zeros((len(PARAMETERS), 0)),
+        model_std=(0.0, 0.0, 0.0),
+        misfit_limit=2.0,
+        acceleration_rms_mps2=1.0,
+        pitch_rate_rms_radps=0.05,
+        payload_seen_kg=(0.0, 400.0),
+        front_share_seen_pct=(40.0, 60.0),
+        speed_seen_mps=(5.0, 30.0),
+    )
+
+
+@pytest.fixture(scope="module")
+def seen() -> Spectra:
+    found = spectra_of(batch_over_road(270.0, 47.0, seed=3, speed_mps=SPEED_MPS, noise=0.0))
+    assert found is not None
+    return found
+
+
+def measured(seen: Spectra, modelled: Spectra) -> Spectra:
+    """The measured spectra at the modelled frequencies."""
+    kept = np.isin(seen.freq_hz, modelled.freq_hz)
+    return Spectra(*(getattr(seen, name)[kept] for name in Spectra.__slots__))
+
+
+def amplitude_misfit(seen: Spectra, modelled: Spectra) -> float:
+    beside = measured(seen, modelled)
+    logs = [
+        np.log(getattr(modelled, sensor) / getattr(beside, sensor))
+        for sensor in ("vertical_acceleration", "pitch_rate")
+    ]
+    return float(np.sqrt(np.mean(np.square(logs))))
+
+
+def test_it_lies_over_the_spectra_of_the_same_vehicle(seen: Spectra, calibration: CrossSpectrumCalibration) -> None:
+    modelled = modelled_spectra(seen, calibration, LOADED)
+    beside = measured(seen, modelled)
+    assert amplitude_misfit(seen, modelled) < 0.08  # 233 half-overlapping segments scatter by about 5 %
+    is_coherent = modelled.coherence > 0.8  # where it is low, the phase is anybody's guess
+    assert is_coherent.sum() > 20
+    turned = np.angle(np.exp(1j * (modelled.phase_rad - beside.phase_rad)))
+    assert np.abs(turned[is_coherent]).max() < 0.2
+    assert np.abs(modelled.coherence - beside.coherence).mean() < 0.08
+
+
+def test_a_payload_on_pallets_is_drawn_as_it_was_found(calibration: CrossSpectrumCalibration) -> None:
+    car = replace(CAR, payload_mode_hz=14.0)
+    ringing = spectra_of(batch_over_road(270.0, 47.0, seed=3, speed_mps=SPEED_MPS, noise=0.0, car=car))
+    assert ringing is not None
+    as_found = modelled_spectra(ringing, calibration, replace(LOADED, payload_mode_hz=14.0))
+    assert amplitude_misfit(ringing, as_found) < 0.08
+    as_calibrated = modelled_spectra(ringing, calibration, LOADED)
+    assert amplitude_misfit(ringing, as_calibrated) > 1.1 * amplitude_misfit(ringing, as_found)
+
+
+@pytest.mark.parametrize(("payload_kg", "front_share_pct"), [(0.0, 52.0), (270.0, 52.0), (420.0, 47.0)])
+def test_another_load_lies_beside_them(
+    seen: Spectra, calibration: CrossSpectrumCalibration, payload_kg: float, front_share_pct: float
+) -> None:
+    other = replace(LOADED, payload_kg=payload_kg, front_share_pct=front_share_pct)
+    right = amplitude_misfit(seen, modelled_spectra(seen, calibration, LOADED))
+    assert amplitude_misfit(seen, modelled_spectra(seen, calibration, other)) > 1.1 * right
+
+
+def test_what_it_says_it_says_again_of_itself(seen: Spectra, calibration: CrossSpectrumCalibration) -> None:
+    """The level is a line through the model's own spectra: nothing is left to move."""
+    once = modelled_spectra(seen, calibration, LOADED)
+    twice = modelled_spectra(once, calibration, LOADED)
+    for name in Spectra.__slots__:
+        np.testing.assert_allclose(getattr(twice, name), getattr(once, name), rtol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("gain", [0.1, 7.0])
+def test_a_rougher_road_lifts_both_alike(seen: Spectra, calibration: CrossSpectrumCalibration, gain: float) -> None:
+    louder = replace(seen, vertical_acceleration=gain * seen.vertical_acceleration, pitch_rate=gain * seen.pitch_rate)
+    one, other = (modelled_spectra(each, calibration, LOADED) for each in (seen, louder))
+    np.testing.assert_allclose(other.pitch_rate, gain * one.pitch_rate, rtol=1e-9)
+    np.testing.assert_allclose(other.coherence, one.coherence, rtol=1e-12)
+
+
+def test_varied_speeds_blur_the_wheelbase(seen: Spectra, calibration: CrossSpectrumCalibration) -> None:
+    """Speeds that differ fill the notches that one delay cuts, most at high frequencies."""
+    steady = modelled_spectra(seen, calibration, LOADED)
+    varied = modelled_spectra(seen, calibration, replace(LOADED, delay_std_s=0.2 * DELAY_S))
+    is_high = steady.freq_hz > 5.0
+    assert np.ptp(np.log(varied.pitch_rate[is_high])) < np.ptp(np.log(steady.pitch_rate[is_high]))
+
+
+def test_the_delays_of_a_batch_are_those_of_its_speed() -> None:
+    batch = batch_over_road(0.0, 52.0, seed=4, duration_s=60.0, speed_mps=SPEED_MPS)
+    spectra = cross_spectra_of([batch], Reading(VAN.wheelbase_m, (1.1, 14.0), 256))
+    assert spectra is not None
+    assert spectra.delay_mean_s == pytest.approx(DELAY_S)
+    assert spectra.delay_std_s == pytest.approx(0.0, abs=1e-9)
+
+
+WIDE = replace(VAN, track_width_m=1.5, sensor_offset_left_m=0.3)
+ROLL_PRIOR = prior_of(WIDE, with_roll=True)
+
+
+def rolling_calibration(theta: F64, std: F64) -> CrossSpectrumCalibration:
+    """As if a fit had ended with these parameters and standard deviations (n,)."""
+    return CrossSpectrumCalibration(
+        empty_mass_kg=WIDE.empty_mass_kg,
+        empty_front_share_pct=WIDE.empty_front_share_pct,
+        wheelbase_m=WIDE.wheelbase_m,
+        band_hz=(1.1, 14.0),
+        n_segment=256,
+        names=names_of(theta),
+        parameters=theta,
+        covariance=np.diag(std**2),
+        directions=np.zeros((len(theta), 0)),
+        model_std=(10.0, 0.2, 0.002),
+        misfit_limit=3.0,
+        acceleration_rms_mps2=0.5,
+        pitch_rate_rms_radps=0.05,
+        payload_seen_kg=(0.0, 420.0),
+        front_share_seen_pct=(40.0, 60.0),
+        speed_seen_mps=(12.0, 15.0),
+        track_width_m=1.5 if has_roll(theta) else None,
+    )
+
+
+def test_what_the_drives_told_of_roll_is_in_the_report() -> None:
+    std = ROLL_PRIOR.std.copy()
+    std[-1] *= 0.25
+    known = knowledge_of(rolling_calibration(ROLL_PRIOR.mean, std), WIDE)
+    assert [one.name for one in known] == [*PARAMETERS, *ROLL_PARAMETERS]
+    assert known[-1].name == "empty_left_m"
+    assert known[-1].left_over == pytest.approx(0.25)
+    assert all(one.left_over == pytest.approx(1.0) for one in known[:-1])
+    assert "roll_inertia_kgm2" in told(known)
+    assert "empty_left_m" not in told(known)
+    assert "roll" in [panel.title for panel in knowledge_chart(known).panels]
+    rows = {row[0]: row for row in knowledge_table(known).rows}
+    assert set(rows) == {name for name in names_of(ROLL_PRIOR.mean) if not name.startswith("slack_")}
+    before = float(rows["roll_inertia_kgm2"][1])
+    assert before == pytest.approx(1240.0 * (0.42 * 1.5) ** 2, rel=1e-3)  # in its unit, not its logarithm
+
+
+def test_a_calibration_without_a_roll_rate_says_nothing_of_roll() -> None:
+    prior = prior_of(WIDE)
+    known = knowledge_of(rolling_calibration(prior.mean, prior.std), WIDE)
+    assert [one.name for one in known] == list(PARAMETERS)
+    assert "roll" not in [panel.title for panel in knowledge_chart(known).panels]
+
+
+def judged(cg_left: CgLeftErrors | None, wheels: WheelErrors | None) -> Judgement:
+    """One set: a place answered to a noted one, one to a load that nobody placed, and no weight."""
+    none = TargetErrors("kg", None, None, None, None, None, None, None, None, None, None)
+    errors = Errors(0, 0, {}, none, replace(none, unit="pp"), cg_left, wheels)
+    told = replace(make_estimate(0, Why.TOO_SLOW), cg_left=Quantity.normal(0.01, 0.02))
+    batches = (Judged(1, "1.log", 0.0, 52.0, told, 0.0), Judged(2, "2.log", 100.0, 50.0, told))
+    return Judgement("cross_spectrum", {BatchSet.VALIDATION: ErrorTable("cross_spectrum", batches, errors, ())})
+
+
+def test_how_well_places_to_the_side_were_told_stands_with_the_accuracy() -> None:
+    found = CgLeftErrors(mean_abs_m=0.0123, bias_m=0.0, std_m=0.02, max_abs_m=0.03, coverage95=0.9)
+    (sentence,) = accuracy_section(judged(found, WheelErrors(1.26, 2.0))).paragraphs[1:]
+    assert "12 mm on average over 1 answer " in sentence
+    assert "90 %" in sentence
+    assert "1.3 % of the gross weight" in sentence
+    (sentence,) = accuracy_section(judged(found, None)).paragraphs[1:]
+    assert "gross weight" not in sentence
+
+
+def test_no_word_of_places_that_nobody_noted_or_told() -> None:
+    assert len(accuracy_section(judged(None, None)).paragraphs) == 1
+    untold = CgLeftErrors(None, None, None, None, None)
+    assert len(accuracy_section(judged(untold, None)).paragraphs) == 1
