@@ -11,7 +11,15 @@ from support.rolling_car import HALF_TRACK_M, ROLLING_CAR
 from support.textbook import half_car as textbook_half_car
 from support.textbook import linearised
 
-from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar, frequency_response, half_car_numbers
+from gateway.core.cross_spectrum.model.half_car import (
+    INVERSE_PAYLOAD_KG,
+    Axle,
+    HalfCar,
+    body_masses_kg,
+    frequency_response,
+    half_car_numbers,
+    spring_npm,
+)
 from gateway.core.cross_spectrum.model.motion import Frame, Motion, Numbers
 from gateway.core.cross_spectrum.model.reading import Mount
 from gateway.core.cross_spectrum.model.rolling_car import SidewaysLoad, rolling_numbers, rolling_response
@@ -124,12 +132,29 @@ def test_a_payload_on_a_soft_floor_feels_heavier_below_its_mode() -> None:
     assert at_soft.acceleration_front == pytest.approx(at_rigid.acceleration_front, rel=0.02)
 
 
-def test_a_bend_stiffens_only_beyond_its_load() -> None:
+def test_springs_stiffen_by_the_exponential_of_slope_and_bends() -> None:
+    """A slope of 0.1 per kN and a bend of 0.5 beyond 1 kN: under 2 kN the rate is exp(0.1 * 2 + 0.5 * 1) times that of
+    the empty vehicle, under 0.5 kN exp(0.05) times.
+    """
+    axle = replace(CAR.rear, spring_slope_per_kn=0.1, spring_bends_per_kn=(0.5,), bend_loads_kn=(1.0,))
+    for added_kn, logarithm in ((0.0, 0.0), (0.5, 0.05), (2.0, 0.7)):
+        assert spring_npm(axle, 1000.0 * added_kn / 9.80665) == pytest.approx(axle.spring_npm * np.exp(logarithm))
+
+
+def test_a_bend_acts_only_beyond_its_load() -> None:
     bent = replace(CAR, rear=replace(CAR.rear, spring_bends_per_kn=(0.5,), bend_loads_kn=(1.0,)))
     freq_hz = np.array([1.5])
     light, heavy = (50.0, 0.51), (400.0, 0.42)
     assert frequency_response(bent, *light, freq_hz) == frequency_response(CAR, *light, freq_hz)
     assert frequency_response(bent, *heavy, freq_hz) != frequency_response(CAR, *heavy, freq_hz)
+
+
+@pytest.mark.parametrize(("payload_kg", "felt"), [(3000.0, 0.9999), (INVERSE_PAYLOAD_KG, 0.5), (0.0, 0.0)])
+def test_the_place_of_a_load_fades_with_its_mass(payload_kg: float, felt: float) -> None:
+    """All of it over the rear axle: (R - F)^2 / 4 L would be L / 4, and the mass felt between the axles nothing."""
+    all_kg = CAR.empty_mass_kg + payload_kg
+    _, (_, _, between_kg) = body_masses_kg(CAR, payload_kg, CAR.empty_front_share * CAR.empty_mass_kg / all_kg)
+    assert between_kg == pytest.approx(payload_kg / 4.0 * (1.0 - felt), abs=1e-3)
 
 
 FREQ_HZ = np.array([0.7, 1.4, 3.3, 9.0, 13.0])
