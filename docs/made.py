@@ -1,5 +1,16 @@
-"""Common parts of the page generators: filled marks, tables, and comparison."""
+"""Common parts of the page generators: filled marks and sentences, tables, and comparison.
 
+Prose lives in the pages. Two marks stand for what a program writes:
+
+    <!-- made: NAME -->             what a function of docs/make.py returns
+    <!-- end: NAME -->
+
+    <!-- from feed_cost.json: {cpu_pct:.1f} % of one core and {rss_mb:.0f} MB. -->
+    the same sentence with the numbers of docs/feed_cost.json
+    <!-- end -->
+"""
+
+import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -9,8 +20,10 @@ from typing import Any
 from pydantic import TypeAdapter
 
 ROOT = Path(__file__).parents[1]
-
-
+DOCS = ROOT / "docs"
+SENTENCES = re.compile(
+    r"(?P<mark><!-- from (?P<file>[\w.]+\.json): (?P<template>.*?) -->\n).*?(?P<end><!-- end -->)", re.DOTALL
+)
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e-?\d+)?")
 
 
@@ -30,7 +43,7 @@ def keep_up_to_date(page: Path, text: str, *, is_check: bool, tolerance: float =
 
 
 def filled(text: str, parts: Mapping[str, Callable[[], str]]) -> str:
-    """``text`` with the parts between <!-- made: NAME --> and <!-- end: NAME --> replaced.
+    """``text`` with the parts between <!-- made: NAME --> and <!-- end: NAME --> replaced, and its sentences filled.
 
     Raises ValueError for a part without its marks, or marks without their part.
     """
@@ -41,7 +54,16 @@ def filled(text: str, parts: Mapping[str, Callable[[], str]]) -> str:
         between = re.compile(rf"(<!-- made: {name} -->\n).*?(<!-- end: {name} -->)", re.DOTALL)
         made = make()
         text = between.sub(lambda found, made=made: f"{found[1]}{made}{found[2]}", text)  # type: ignore[misc]
-    return text
+    return SENTENCES.sub(_with_numbers, text)
+
+
+def _with_numbers(found: re.Match[str]) -> str:
+    return f"{found['mark']}{found['template'].format(**numbers(found['file']))}\n{found['end']}"
+
+
+def numbers(file: str) -> Any:
+    """What a JSON file in docs/ holds."""
+    return json.loads((DOCS / file).read_text(encoding="utf-8"))
 
 
 def table(heading: str, rows: Iterable[Sequence[str]]) -> str:

@@ -62,7 +62,7 @@ def is_same(kept: str, printed: str, rule: str | None) -> bool:
     return agrees(kept, printed, _last_digit)
 
 
-def written_anew(page: str) -> str:
+def with_outputs(page: str) -> str:
     """The page with today's outputs; an output that is the same but for what may differ stays as it is."""
     steps = list(STEP.finditer(page))
     printed = printed_by([step["commands"] for step in steps])
@@ -97,10 +97,10 @@ def _free_port() -> str:
 def main() -> None:
     """Write the page, or compare it."""
     page = PAGE.read_text(encoding="utf-8")
-    anew = written_anew(page)
+    now = with_outputs(page)
     if "--check" not in sys.argv[1:]:
-        PAGE.write_text(anew, encoding="utf-8")
-    elif anew != page:
+        PAGE.write_text(now, encoding="utf-8")
+    elif now != page:
         sys.exit(f"{PAGE.relative_to(ROOT)} does not say what its commands print: run `python docs/make_tutorial.py`")
 
 

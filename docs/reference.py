@@ -43,7 +43,7 @@ MEANINGS: Final = {
     Signal.VERTICAL_ACCELERATION: "needed; z up, about +9.81 m/s² at rest (gravity is removed later)",
     Signal.PITCH_RATE: "needed; about y, positive **nose down**",
     Signal.SPEED: "needed; over ground, from GNSS",
-    Signal.ROLL_RATE: "about x, positive **left side up**; tells where the load lies sideways, never refuses a batch",
+    Signal.ROLL_RATE: "about x, positive **left side up**; gives the load's lateral position, never refuses a batch",
     Signal.LONGITUDINAL_ACCELERATION: "x forward; inspection names swapped axes with it",
     Signal.LATERAL_ACCELERATION: "y left; with `yaw_rate` and `roll_rate` it watches the gyro's gain in bends",
     Signal.YAW_RATE: "about z, positive **nose left**; likewise",
@@ -100,68 +100,29 @@ MEASURED = {"Ford Escort": (75.0, 4.5, 4.5), "VW Vanagon": (90.21635, 5.56015, 5
 GOLDEN_CAR: float = 0.15  # unsprung over sprung mass of a quarter-car, both axles together
 
 
-def sprung_section() -> str:
-    """The calculation of sprung mass and front share from axle weights, with the example's numbers."""
+def sprung_printed() -> str:
+    """The command that computes sprung mass and front share from the example's axle weights, and its output."""
+    command = f"springscale calibration sprung --front-axle-kg {WEIGHED.front_kg:g} --rear-axle-kg {WEIGHED.rear_kg:g}"
+    return f"```console\n$ {command}\n{vehicle_block(sprung_of(WEIGHED))}\n```\n"
+
+
+def sprung_assumed() -> str:
+    """What the command assumes, with its sources, and the standard deviations of the example."""
     body = sprung_of(WEIGHED)
-    estimated_pct, given_pct = 100.0 * ESTIMATED_UNSPRUNG_STD, 100.0 * WEIGHED_STD
-    shares = {car: 100.0 * (front + rear) / 2.0 / sprung for car, (sprung, front, rear) in MEASURED.items()}
-    cars = " and ".join(f"{pct:.1f} % ({car})" for car, pct in shares.items())
-    return f"""\
-## From axle weights to sprung mass and front share
-
-`kerb_front_axle_kg` and `kerb_rear_axle_kg` are enough: if `empty_mass_kg` is absent, it, its front share and their
-standard deviation follow from them as below, as in [commissioning](commissioning.md).
-
-A weighbridge shows F under the front axle and R under the rear one. Weigh the empty vehicle on level ground, with
-driver and tank as in service. The body rests on the front axle with its share s. Wheels, brakes and axles (u) are not
-carried by the springs. Each axle is in static equilibrium:
-
-$$F = s M + u_f \\qquad R = (1 - s) M + u_r$$
-
-The sum gives the sprung mass, the first line its front share:
-
-$$M = F + R - u_f - u_r \\qquad s = \\frac{{F - u_f}}{{M}}$$
-
-| symbol | key | meaning |
-|---|---|---|
-| $F$, $R$ | `kerb_front_axle_kg`, `kerb_rear_axle_kg` | scale reading, kg |
-| $u_f$, $u_r$ | `unsprung_front_kg`, `unsprung_rear_kg` | unsprung masses, kg |
-| $M$ | `empty_mass_kg` | sprung mass of the empty vehicle, kg |
-| $s$ | `empty_front_share_pct` | its share on the front axle, in percent in the file |
-
-The command does it, and prints a block to paste (`--json` for programs):
-
-```console
-$ springscale calibration sprung --front-axle-kg {WEIGHED.front_kg:g} --rear-axle-kg {WEIGHED.rear_kg:g}
-{vehicle_block(body)}
-```
-
-**Where the unsprung masses are unknown** (no `--unsprung-front-kg`, `--unsprung-rear-kg`), each is taken as
-k = {100 * UNSPRUNG_SHARE:.1f} % of the sprung mass, so with both unknown
-
-$$M = \\frac{{F + R}}{{1 + 2 k}}$$
-
-The same share is the centre of calibration's prior, and the block does not contain an estimate, so that calibration
-goes on treating it as one. Sources:
-
-- the paper's van has 160 kg beside 1240 kg (Table 1, read as four times 40 kg), {100 * 80 / 1240:.1f} % an axle;
-- published parameters of two real vehicles have {cars}
-  (CommonRoad vehicle models, from vehicle dynamics studies of the US Department of Transportation);
-- the quarter-car of the roughness index has {100 * GOLDEN_CAR:.0f} % for both axles, {100 * GOLDEN_CAR / 2:.1f} % each
-  (M. W. Sayers, S. M. Karamihas, The Little Book of Profiling, 1998).
-
-**How sure that is.** The standard deviation of an unsprung mass is taken as {estimated_pct:.0f} % where it is estimated
-and {given_pct:.0f} % where it is given: beam axles and twin tyres weigh more than these sources say. A reading rounded
-to steps of {DIVISION_KG:g} kg (`--division-kg`) adds {DIVISION_KG:g}/√12 = {DIVISION_KG / 12**0.5:.1f} kg. Taken as
-independent, to first order:
-
-$$\\sigma_M^2 = \\sigma_f^2 + \\sigma_r^2$$
-
-$$\\sigma_s^2 = \\frac{{(1 - s)^2 \\sigma_f^2 + s^2 \\sigma_r^2}}{{M^2}}$$
-
-with $\\sigma_f$ of $F - u_f$ and $\\sigma_r$ of $R - u_r$. In the example that is {body.mass_std_kg:.0f} kg and
-{body.front_share_std_pct:.2f} percentage points.
-"""
+    cars = {car: 100.0 * (front + rear) / 2.0 / sprung for car, (sprung, front, rear) in MEASURED.items()}
+    source = ", ".join(f"{pct:.1f} % ({car})" for car, pct in cars.items())
+    rows = (
+        ("unsprung mass of an axle, k", f"{100 * UNSPRUNG_SHARE:.1f} % of the sprung mass"),
+        ("that of the paper's van (Table 1)", f"{100 * 80 / 1240:.1f} %"),
+        ("of two real vehicles (CommonRoad vehicle models)", source),
+        ("of the quarter-car of the roughness index (Sayers, Karamihas 1998)", f"{100 * GOLDEN_CAR / 2:.1f} %"),
+        ("standard deviation of an unsprung mass that is estimated", f"{100 * ESTIMATED_UNSPRUNG_STD:.0f} %"),
+        ("of one that is given", f"{100 * WEIGHED_STD:.0f} %"),
+        ("standard deviation of a reading in steps of d (`--division-kg`)", f"d/√12 = {DIVISION_KG / 12**0.5:.1f} kg"),
+        ("in the example: standard deviation of M", f"{body.mass_std_kg:.0f} kg"),
+        ("in the example: standard deviation of s", f"{body.front_share_std_pct:.2f} percentage points"),
+    )
+    return table("quantity | figure", rows)
 
 
 # -- an estimate --
@@ -452,7 +413,8 @@ PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
         "top": lambda: key_table(CampaignTable, "vehicle", "runs"),
         "vehicle": lambda: key_table(Vehicle),
         "runs": lambda: key_table(RunTable),
-        "sprung": sprung_section,
+        "sprung": sprung_printed,
+        "assumed": sprung_assumed,
     },
     "estimate.md": {
         "batch": lambda: fields_table("batch"),

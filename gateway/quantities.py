@@ -70,7 +70,7 @@ QUANTITIES: Final = (
     Outward(
         "payload",
         "kg",
-        "load aboard in addition to the empty vehicle",
+        "load in addition to the empty vehicle",
         "Vehicle.Load.Payload",
         label="Payload",
         spns=(181,),

@@ -39,7 +39,7 @@ class RunTable(_Table):
     log: Path = Field(
         description="its log: candump text, .asc, .blf, .mf4, .trc or .csv, each also as .gz, .zst or .xz"
     )
-    payload_kg: Kilograms = Field(description="load aboard in addition to the empty vehicle: L; 0 for an empty run")
+    payload_kg: Kilograms = Field(description="load in addition to the empty vehicle: L; 0 for an empty run")
     payload_position_m: Metres | None = Field(
         None, description="its centre of gravity behind the front axle: d; a loaded run needs it or `front_share_pct`"
     )

@@ -103,7 +103,7 @@ class VehicleFields:
     )
     empty_cg_left_m: MetresLeft = field(
         default=0.0,
-        metadata=described("centre of gravity of the empty vehicle, driver aboard, left of the centre line"),
+        metadata=described("centre of gravity of the empty vehicle with driver, left of the centre line"),
     )
     unsprung_front_kg: WeightKg | None = field(
         default=None,

@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-import fleet_counts
+import measured
 import pytest
 
-RUNS = json.loads(fleet_counts.COUNTS.read_text(encoding="utf-8"))
+RUNS = json.loads(measured.COUNTS.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("counts", RUNS, ids=lambda counts: str(counts["vehicles"]))
@@ -21,9 +21,9 @@ def test_nothing_was_lost_and_nothing_doubled(counts: dict[str, Any]) -> None:
 def test_a_run_takes_the_place_of_the_last_with_as_many_vehicles(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fleet_counts, "COUNTS", tmp_path / "fleet_test.json")
-    fleet_counts.COUNTS.write_text(json.dumps(RUNS[:1]))
+    monkeypatch.setattr(measured, "COUNTS", tmp_path / "fleet_test.json")
+    measured.COUNTS.write_text(json.dumps(RUNS[:1]))
     for n, seconds in ((500, 9.0), (RUNS[0]["vehicles"], 7.0), (500, 8.0)):
-        fleet_counts.take({**RUNS[0], "vehicles": n, "seconds": seconds})
-    told = [(run["vehicles"], run["seconds"]) for run in json.loads(fleet_counts.COUNTS.read_text())]
+        measured.take({**RUNS[0], "vehicles": n, "seconds": seconds})
+    told = [(run["vehicles"], run["seconds"]) for run in json.loads(measured.COUNTS.read_text())]
     assert told == [(RUNS[0]["vehicles"], 7.0), (500, 8.0)]

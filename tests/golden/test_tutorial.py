@@ -9,8 +9,8 @@ import pytest
 @pytest.mark.skipif(shutil.which("curl") is None, reason="the tutorial asks the service with curl")
 def test_the_tutorial_does_what_it_says() -> None:
     page = make_tutorial.PAGE.read_text(encoding="utf-8")
-    anew = make_tutorial.written_anew(page)
-    assert anew == page, "run `python docs/make_tutorial.py` and read whether its words still hold"
+    now = make_tutorial.with_outputs(page)
+    assert now == page, "run `python docs/make_tutorial.py` and read whether its words still hold"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,297 @@
+"""The parts of pages made from measurements: the JSON files of docs/, which benchmarks, studies and tests wrote.
+
+``record`` and ``take`` copy the results of the last test runs there (docs/make.py --record, --counts).
+"""
+
+import json
+import re
+import sys
+import tomllib
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from textwrap import fill
+from typing import Any, Final
+
+from made import DOCS, ROOT, numbers, table
+
+from gateway.calibration.judgement.coverage import IDEAL_SCORE
+
+sys.path.insert(0, str(ROOT))
+from benchmarks.accuracy.grades import limits  # benchmarks are not installed
+from benchmarks.speed.table import lines_of
+
+# -- accuracy --
+
+IN_README: Final = (
+    "5 different vans, mixed, with roll rate",
+    "5 different vans, another speed, with roll rate",
+    "5 different vans, mixed, on pallets, with roll rate",
+    "5 different vans, mixed, another day, with roll rate",
+)
+HEAD: Final = (
+    "| mean error, payload / front share | ratio index | cross spectrum | its 95 % intervals contain the truth "
+    "| half as wide as | score (ideal) | refused |\n|---|---|---|---|---|---|---|"
+)
+
+
+SAMPLE: Final = re.compile(
+    r"(?P<mark><!-- (?P<n>\d+) lines of docs/tutorial.md, from: (?P<first>[^\n]+) -->\n)"
+    r".*?(?P<end><!-- end of output -->)",
+    re.DOTALL,
+)
+
+
+def errors() -> str:
+    """All rows, of errors.md."""
+    return "\n".join([HEAD, *_error_rows()]) + "\n"
+
+
+def errors_in_readme() -> str:
+    """A few of them."""
+    of_title = {row.split("|")[1].strip(): row for row in _error_rows()}
+    return "\n".join([HEAD, *(of_title[title] for title in IN_README)]) + "\n"
+
+
+def _error_rows() -> list[str]:
+    """Every row, as Markdown."""
+    coverage = numbers("coverage.json")["lines"]
+    kinds = dict.fromkeys((line["kind"], line["has_roll_rate"]) for line in coverage if line["kind"] != "all")
+    return [_covered(kind, has_roll_rate, coverage) for kind, has_roll_rate in kinds]
+
+
+def _covered(kind: str, has_roll_rate: bool, lines: list[dict[str, Any]]) -> str:
+    of = {line["estimator"]: line for line in lines if (line["kind"], line["has_roll_rate"]) == (kind, has_roll_rate)}
+    ours = of["cross_spectrum"]
+    held = _held(ours["payload_coverage"]["share"], ours["front_share_coverage"]["share"])
+    refused = f"{ours['n_rejected']} of {ours['n_batches']}"
+    title = f"{ours['n_vans']} different vans, {kind}{', with roll rate' if has_roll_rate else ''}"
+    errors, others = _pair(ours, "mean_abs_pct"), _pair(of["ratio_index"], "mean_abs_pct")
+    widths = _widths([_of_line(ours, target, "mean_abs_pct") for target in ("payload", "front_share")])
+    return f"| {title} | {others} | **{errors}** | {held} | {widths} | {refused} |"
+
+
+def _pair(line: Mapping[str, Any], ending: str) -> str:
+    found = [line[f"{what}_{ending}"] for what in ("payload", "front_share")]
+    return " / ".join("none" if pct is None else f"{pct:.1f} %" for pct in found)
+
+
+Widths = tuple[float | None, float | None, float | None]  # half-width, interval score, mean absolute error
+
+
+def _of_line(line: Mapping[str, Any], target: str, mean: str) -> Widths:
+    return line[f"{target}_half_width_pct"], line[f"{target}_interval_score_pct"], line[f"{target}_{mean}"]
+
+
+def _widths(of_both: Sequence[Widths]) -> str:
+    """Two cells: half-widths, and interval scores with what would be ideal."""
+    half_widths = " / ".join("none" if half is None else f"{half:.1f} %" for half, _, _ in of_both)
+    scores = " / ".join(
+        "none" if score is None or mean is None else f"{score:.0f} ({IDEAL_SCORE * mean:.0f})"
+        for _, score, mean in of_both
+    )
+    return f"{half_widths} | {scores}"
+
+
+def _held(payload: float | None, share: float | None) -> str:
+    return " / ".join("none" if held is None else f"{100.0 * held:.0f} %" for held in (payload, share))
+
+
+def with_samples(text: str) -> str:
+    """``text`` with the samples of the tutorial's outputs as they are in the tutorial."""
+    return SAMPLE.sub(_sample, text)
+
+
+def _sample(place: re.Match[str]) -> str:
+    """This many lines of the tutorial, from the first with the given beginning. Raises ValueError if there is none."""
+    lines = (DOCS / "tutorial.md").read_text(encoding="utf-8").splitlines()
+    first = next((number for number, line in enumerate(lines) if line.startswith(place["first"])), None)
+    if first is None:
+        raise ValueError(f"docs/tutorial.md has no line that begins with {place['first']!r}, which README.md shows")
+    shown = "\n".join(lines[first : first + int(place["n"])])
+    return f"{place['mark']}```text\n{shown}\n```\n{place['end']}"
+
+
+def noise_that_works() -> str:
+    """The noisiest sensors that weigh as well as the simulated one."""
+    return limits(numbers("sensor-grades.json"))
+
+
+# -- speed --
+
+
+def conditions() -> str:
+    """Where and how `make bench` measured, and the goals that were missed."""
+    found = numbers("performance.json")
+    where = found["conditions"]
+    packages = ", ".join(f"{name} {version}" for name, version in where["packages"].items())
+    goals = [line for line in lines_of(found) if line.goal]
+    missed = [line for line in goals if not line.is_met]
+    measured = (
+        f"Measured by `make bench`{', cut short by `--quick`,' if where['is_quick'] else ''} on {where['machine']}, "
+        f"Python {where['python']}, with {packages}. The load average was {where['load_average_before']:.1f} before "
+        f"and {where['load_average_after']:.1f} after."
+    )
+    verdict = f"{len(goals) - len(missed)} of {len(goals)} goals are met" + (", missed are:" if missed else ".")
+    listed = [f"- {line.what} ({line.section}): {line.figure}, {line.goal}" for line in missed]
+    return "\n".join([fill(measured, 120), "", verdict, *(["", *listed] if listed else [])]) + "\n"
+
+
+def speeds() -> str:
+    """A table for each section of the benchmarks."""
+    sections = groupby(lines_of(numbers("performance.json")), key=lambda line: line.section)
+    return "\n".join(
+        f"## {name[0].upper()}{name[1:]}\n\n"
+        + table("what | measured | goal", ((line.what, line.figure, line.verdict) for line in lines))
+        for name, lines in sections
+    )
+
+
+def feed_printed() -> str:
+    """The output of the feed in its measurement."""
+    return f"```json\n{json.dumps(numbers('feed_cost.json')['told'], separators=(',', ':'))}\n```\n"
+
+
+# -- faults --
+
+RECORDED: Final = {
+    "vm-results.json": "faults.json",
+    "soak.json": "soak.json",
+    "soak_attack.json": "soak_attack.json",
+    "vm-soak.json": "soak_faults.json",
+}
+"""What a run leaves in build/, and where it is kept."""
+
+# Test, what it does, and the figures that tell how often, over how many records, and what the disk lost
+ENDURED = (
+    (
+        "test_killed_again_and_again_it_loses_and_doubles_nothing",
+        "SIGKILL",
+        "kills",
+        "records_after_kills",
+        "",
+    ),
+    (
+        "test_no_power_cut_loses_or_doubles_a_committed_record",
+        "power cut",
+        "power_cuts",
+        "records_after_power_cuts",
+        "sectors_lost_at_power_cuts",
+    ),
+)
+FIGURES = {
+    "security_score": "`systemd-analyze security springscale` (0 is best, 10 worst)",
+    "sustained_frames_per_s": "frames/s of a timed canplayer log without one lost, by candump and by the service",
+    "boot_after_power_cut_s": "s from power on to a running system after a power cut",
+    "sectors_lost_at_power_cuts": "sectors of 512 bytes that power cuts lost, none of a committed record",
+    "reference_std_kg": "kg: standard deviation of a 20 s batch, reference map",
+    "j1939_std_kg": "kg: standard deviation of a 20 s batch, J1939",
+    "reference_same_stamps_kg": "kg between HTTP and `springscale estimate` on candump's recording of the replay, "
+    "reference map; 0.05 standard deviations are allowed",
+    "j1939_same_stamps_kg": "kg between HTTP and `springscale estimate` on candump's recording of the replay, J1939; "
+    "0.05 standard deviations are allowed",
+    "late_ms": "ms that canplayer's frames were late at most, 99 of 100, in the replay compared below",
+    "reference_new_stamps_kg": "kg between HTTP and `springscale estimate` on the log that canplayer read, reference "
+    "map; 0.5 standard deviations are allowed, for the kernel stamps frames when they come",
+    "j1939_new_stamps_kg": "kg between HTTP and `springscale estimate` on canplayer's log, J1939; the same allowance",
+}
+
+
+def faults() -> str:
+    """A table for each area of the system, with the recoveries of the last recorded runs."""
+    rows: list[dict[str, str]] = tomllib.loads((ROOT / "tests/faults.toml").read_text(encoding="utf-8"))["row"]
+    tests = numbers("faults.json")["tests"]
+    head = "fault | what is done | what must happen | recovery | test"
+    return "\n".join(
+        f"## {area}\n\n{table(head, (_fault(row, tests) for row in rows if row['area'] == area))}"
+        for area in dict.fromkeys(row["area"] for row in rows)
+    )
+
+
+def _fault(row: dict[str, str], tests: dict[str, Any]) -> tuple[str, ...]:
+    file, _, name = row["test"].partition("::")
+    runs = [run for test, run in tests.items() if test.partition("[")[0] == name]
+    times = sorted(run["recovery_s"] for run in runs if run["recovery_s"] is not None)
+    recovery = f"{times[-1]:.1f} s" if times else ""
+    if file.startswith("tests/vm") and not (runs and all(run["outcome"] == "passed" for run in runs)):
+        recovery = "not yet seen to pass"
+    return row["fault"], row["injected"], row["must"], recovery, f"[{name}](../{file})"
+
+
+def fault_figures() -> str:
+    """Each by the last run that measured it."""
+    figures = numbers("faults.json")["figures"]
+    return table(" | ", ((text, f"{figures[name]:.4g}") for name, text in FIGURES.items() if name in figures))
+
+
+def soak_days() -> str:
+    """The simulated week, a row for each day."""
+    head = "day | estimates | rejected | memory, MB | file handles | threads | database and log, MB | recorded, MB"
+    keys = ("day", "estimates", "rejected", "memory_mb", "handles", "threads", "database_mb", "record_mb")
+    return table(head, ([f"{day[key]:g}" for key in keys] for day in numbers("soak.json")["days"]))
+
+
+def endured() -> str:
+    """The kills and power cuts."""
+    soak = numbers("soak_faults.json")
+    rows = (
+        (name, *(str(soak["figures"].get(key, "")) for key in keys), f"{run['recovery_s']:.1f} s")
+        for test, name, *keys in ENDURED
+        if (run := soak["tests"].get(test)) and run["outcome"] == "passed"
+    )
+    head = " | times | records committed meanwhile | sectors of 512 bytes lost | slowest recovery"
+    return table(head, rows)
+
+
+def record() -> None:
+    """Store the measurements of the last runs, keeping earlier ones for what these did not measure."""
+    for source, target in RECORDED.items():
+        found, kept = ROOT / "build" / source, DOCS / target
+        if found.exists():
+            measured = json.loads(kept.read_text()) if kept.exists() else {}
+            for name, new in json.loads(found.read_text()).items():
+                measured[name] = measured.get(name, {}) | new if isinstance(new, dict) else new
+            kept.write_text(json.dumps(measured, indent=1, sort_keys=True) + "\n")
+
+
+# -- the fleet test --
+
+COUNTS = DOCS / "fleet_test.json"
+
+
+def fleet_test() -> str:
+    """The faults injected and their effect, a column for the last run with each number of vehicles."""
+    runs = json.loads(COUNTS.read_text(encoding="utf-8"))
+    times = {1: "once", 2: "twice", 3: "three times"}
+    first = runs[0]
+    blows = ", ".join(f"{blow} {times[n]}" for blow, n in first["blows"].items())
+    columns = [_counted(counts) for counts in runs]
+    head = " | ".join(["", *(f"{counts['vehicles']} vehicles" for counts in runs)])
+    lines = table(head, ([name, *(str(column[name]) for column in columns)] for name in columns[0]))
+    return (
+        f"`make fleet-test`, last run on {first['machine']} with {first['database']}: vehicles simulated with the\n"
+        "product's own store, outbox and uplink, over TLS, a hundred in each process.\n"
+        f"Killed meanwhile: {blows}.\n\n{lines}"
+    )
+
+
+def _counted(counts: dict[str, Any]) -> dict[str, Any]:
+    """One run's figures by name."""
+    return {
+        "Seconds": counts["seconds"],
+        "Estimates written by the vehicles, rows of them": f"{counts['estimates']}, {counts['estimate_rows']}",
+        "Load events, trips and alarms, rows of them": f"{counts['entries']}, {counts['entry_rows']}",
+        "Lost": counts["estimates"] + counts["entries"] - counts["estimate_rows"] - counts["entry_rows"],
+        "Ids in more than one row": counts["ids_doubled"],
+        "Records whose predecessor is missing": counts["records_missing"],
+        "Messages acknowledged by the broker": counts["messages_acknowledged"],
+        "Repeated after a break, at least": counts["messages_said_again"],
+        "A record in the database, indexes included": f"{counts['bytes_of_an_estimate']} bytes",
+        "Connections that the vehicles made": counts["connections_of_vehicles"],
+    }
+
+
+def take(counts: dict[str, Any]) -> None:
+    """Store these counts in place of the last run with as many vehicles."""
+    others = [run for run in json.loads(COUNTS.read_text(encoding="utf-8")) if run["vehicles"] != counts["vehicles"]]
+    runs = sorted([*others, counts], key=lambda run: int(run["vehicles"]))
+    COUNTS.write_text(json.dumps(runs, indent=1) + "\n", encoding="utf-8")
