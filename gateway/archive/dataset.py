@@ -88,9 +88,7 @@ def row_of(record: Mapping[str, Any]) -> dict[str, Any]:
 
 def parquet_of(rows: Sequence[Mapping[str, Any]]) -> bytes:
     """Rows as one Parquet file: the same rows give the same bytes on any computer."""
-    pa = _pyarrow()
-    import pyarrow.parquet as pq  # noqa: PLC0415 - an extra; _pyarrow() has told if it is missing
-
+    pa, pq = pyarrow_and_parquet()
     table = pa.Table.from_pylist([dict(row) for row in rows], schema=schema())
     sink = io.BytesIO()
     pq.write_table(table, sink, compression="zstd")
@@ -99,9 +97,7 @@ def parquet_of(rows: Sequence[Mapping[str, Any]]) -> bytes:
 
 def rows_of(dataset: Location, slot: Slot, wanted: Sequence[str] | None = None) -> list[dict[str, Any]]:
     """The rows of one receipt, with these columns or all; instants are aware datetimes, UTC."""
-    _pyarrow()
-    import pyarrow.parquet as pq  # noqa: PLC0415 - an extra; _pyarrow() has told if it is missing
-
+    _, pq = pyarrow_and_parquet()
     table = pq.read_table(io.BytesIO(dataset.read(slot.table)), columns=None if wanted is None else list(wanted))
     rows: list[dict[str, Any]] = table.to_pylist()
     return rows
@@ -109,9 +105,7 @@ def rows_of(dataset: Location, slot: Slot, wanted: Sequence[str] | None = None) 
 
 def table_rows(file: io.BytesIO, where: str) -> list[dict[str, Any]]:
     """The rows of any Parquet file. Raises ConfigurationError naming ``where`` for another file."""
-    pa = _pyarrow()
-    import pyarrow.parquet as pq  # noqa: PLC0415 - an extra; _pyarrow() has told if it is missing
-
+    pa, pq = pyarrow_and_parquet()
     try:
         rows: list[dict[str, Any]] = pq.read_table(file).to_pylist()
     except (pa.ArrowException, OSError) as fault:
@@ -121,7 +115,7 @@ def table_rows(file: io.BytesIO, where: str) -> list[dict[str, Any]]:
 
 def schema() -> "pa.Schema":
     """The table's schema in Arrow's terms; its version is in the metadata."""
-    pa = _pyarrow()
+    pa, _ = pyarrow_and_parquet()
     kinds = {
         "text": pa.string(),
         "whole": pa.int64(),
@@ -175,10 +169,11 @@ def _cell(kind: FieldKind, told: Any) -> Any:
     return list(told.items()) if kind is NUMBERS_BY_NAME else told
 
 
-def _pyarrow() -> Any:
-    """The library, loaded when a table is made; a vehicle does not have it."""
+def pyarrow_and_parquet() -> tuple[Any, Any]:
+    """pyarrow and pyarrow.parquet, loaded when a table is made or read; a vehicle does not have them."""
     try:
-        import pyarrow  # noqa: PLC0415 - an extra, see above
+        import pyarrow  # noqa: PLC0415 - an extra
+        import pyarrow.parquet  # noqa: PLC0415 - likewise
     except ModuleNotFoundError:
         raise ConfigurationError(MISSING) from None
-    return pyarrow
+    return pyarrow, pyarrow.parquet

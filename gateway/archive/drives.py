@@ -111,7 +111,6 @@ class JobDrives:
 
 
 def readable(logs: Sequence[JobLog]) -> list[JobLog]:
-    """Logs with a frame."""
     return [one for one in logs if one.facts.first_ns is not None]
 
 

@@ -36,12 +36,10 @@ class Inventory:
 
     @property
     def size(self) -> int:
-        """Bytes of all logs."""
         return sum(log.size for log in self.all_logs)
 
     @property
     def n_vehicles(self) -> int:
-        """The number of vehicles in the manifest."""
         return len(self.facts)
 
     def unknown(self) -> Iterator[tuple[str, list[LogFile]]]:
@@ -122,7 +120,6 @@ class Forecast:
         return 0.0 if not self.size_to_do else self.size_to_do / (self.rate * self.n_workers) if self.rate else None
 
     def to_json(self) -> dict[str, Any]:
-        """The forecast as JSON."""
         told = {
             name: getattr(self, name) for name in ("n_vehicles", "n_logs", "n_new_logs", "n_jobs", "n_done", "n_failed")
         }

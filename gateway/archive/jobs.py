@@ -112,7 +112,6 @@ class ArchiveJob:
 
     @property
     def size(self) -> int:
-        """Bytes of its own logs."""
         return sum(one.log.size for one in self.logs)
 
     def knowledge_at(self, t_ns: int) -> Knowledge | None:

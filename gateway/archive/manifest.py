@@ -7,7 +7,6 @@ in an object store.
 
 import fnmatch
 import io
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, time
@@ -29,7 +28,7 @@ from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError
 from gateway.files.signed import Trust
 from gateway.setup import Setup, load_setup
-from gateway.toml_file import checked
+from gateway.toml_file import checked, read_toml
 from gateway.units import NS_PER_S
 
 NAMES: Final = ("archive.toml", "archive.parquet")  # names of a folder's own manifest
@@ -159,7 +158,7 @@ def load_manifest(named: str, pinned: Trust = EVERYBODY) -> Manifest:
     if name.endswith(".parquet"):
         told = checked({"vehicles": _entries(content, where)}, where, ManifestFile)
     else:
-        told = checked(_tables(content, where), where, ManifestFile)
+        told = checked(read_toml(where, read=lambda _: content), where, ManifestFile)
     entries = told.vehicles
     if told.vehicles_in is not None:
         if entries:
@@ -244,18 +243,9 @@ def _read(base: Location, name: str, trust: Trust = EVERYBODY) -> bytes:
 
 def _below(base: Location, named: str) -> Location:
     """A folder in a manifest: another place if it is a URL or an absolute path."""
-    return place_of(named) if "://" in named or named.startswith("/") else base.at(_plain(named))
-
-
-def _plain(named: str) -> str:
-    return "" if named in (".", "./") else named.removeprefix("./")
-
-
-def _tables(content: bytes, where: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(content.decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as fault:
-        raise ConfigurationError(f"{where}: not valid TOML: {fault}") from None
+    if "://" in named or named.startswith("/"):
+        return place_of(named)
+    return base.at("" if named == "." else named.removeprefix("./"))
 
 
 def _entries(content: bytes, where: Path) -> list[dict[str, Any]]:

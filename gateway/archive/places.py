@@ -53,7 +53,6 @@ class Location:
         return self.url if local is None else str(local)
 
     def at(self, path: str) -> "Location":
-        """A folder inside it."""
         here = self.local(path)
         if here is not None:
             return place_of(here)
@@ -75,7 +74,8 @@ class Location:
             return []
         with self._faults(below):
             found = [one for page in obs.list(self._store(), below.strip("/") or None) for one in page]
-        return sorted((_item(one) for one in found), key=lambda item: item.path)
+        items = (Item(one["path"], one["size"], one["e_tag"] or one["last_modified"].isoformat()) for one in found)
+        return sorted(items, key=lambda item: item.path)
 
     def read(self, path: str) -> bytes:
         """The content of a small file. Raises FileNotFoundError, else PlaceError."""
@@ -103,7 +103,6 @@ class Location:
             self._settle(path)
 
     def remove(self, path: str) -> None:
-        """Remove a file if it exists."""
         with self._faults(path):
             try:
                 _obstore().delete(self._store(), path)
@@ -154,7 +153,8 @@ class Location:
         except FileNotFoundError:
             raise FileNotFoundError(f"{where}: no such file") from None
         except (obs.exceptions.BaseError, OSError) as fault:
-            raise PlaceError(f"{where}: {_first_words(fault)}") from None
+            first_line = str(fault).strip().partition("\n")[0]  # a debug dump follows it
+            raise PlaceError(f"{where}: {first_line[:400]}") from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,10 +196,6 @@ def _store_of(url: str) -> "ObjectStore":
     return from_url(url)
 
 
-def _item(meta: Any) -> Item:
-    return Item(meta["path"], meta["size"], meta["e_tag"] or meta["last_modified"].isoformat())
-
-
 def _sha256_of(path: Path) -> str:
     try:
         with path.open("rb") as file:
@@ -208,8 +204,3 @@ def _sha256_of(path: Path) -> str:
         raise FileNotFoundError(f"{path}: no such file") from None
     except OSError as fault:
         raise PlaceError(f"{path}: cannot be read: {fault.strerror or fault}") from None
-
-
-def _first_words(fault: BaseException) -> str:
-    """The first line of the library's message, without its debug dump."""
-    return str(fault).strip().partition("\n")[0][:400]

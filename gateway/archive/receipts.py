@@ -40,12 +40,10 @@ class Slot:
 
     @property
     def table(self) -> str:
-        """The path of its rows."""
         return f"{ESTIMATES}/{self.folder}/{self.job}.parquet"
 
     @property
     def receipt(self) -> str:
-        """The path of its receipt."""
         return f"{RECEIPTS}/{self.folder}/{self.job}.json"
 
     def failure(self, log: str | None = None) -> str:
@@ -58,7 +56,6 @@ Wanted = Callable[[Slot], bool]
 
 
 def every(slot: Slot) -> bool:
-    """Accept every slot."""
     return True
 
 
@@ -98,7 +95,6 @@ def failures(dataset: Location | Path | str) -> list[dict[str, Any]]:
 
 
 def text_of(receipt: Mapping[str, Any]) -> bytes:
-    """The content of a receipt's file."""
     content = {"format": FORMAT, "version": FORMAT_VERSION, **receipt}
     return (json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
 

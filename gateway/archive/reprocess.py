@@ -87,12 +87,10 @@ class Summary:
     took_s: float = 0.0
 
     def count(self, status: JobStatus) -> int:
-        """Jobs of this run with this status."""
         return sum(outcome.status is status for outcome in self.outcomes)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Jobs by status."""
         return {
             "done": self.count(JobStatus.DONE),
             "already": self.n_already + self.count(JobStatus.ALREADY),
@@ -103,7 +101,6 @@ class Summary:
 
     @property
     def n_failed_logs(self) -> int:
-        """Unreadable logs of this run."""
         return sum(outcome.n_failed_logs for outcome in self.outcomes)
 
     @property
@@ -112,7 +109,6 @@ class Summary:
         return not (self.count(JobStatus.FAILED) or self.n_failed_logs or self.lost)
 
     def to_json(self) -> dict[str, Any]:
-        """The summary as JSON."""
         return {
             "n_vehicles": self.n_vehicles,
             "n_logs": self.n_logs,

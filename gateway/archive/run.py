@@ -71,7 +71,7 @@ def run(job: ArchiveJob) -> JobOutcome:
         rows += [_row(job, one, found) for found in read.estimates]
         told.append(_told(one, read.report))
     for one, reason in failures.items():
-        _tell_failure(job, one, reason)
+        _keep_failure(job, one, reason)
     outcome = JobOutcome(
         slot=job.slot,
         status=JobStatus.DONE if told or rows else JobStatus.FAILED,
@@ -82,13 +82,15 @@ def run(job: ArchiveJob) -> JobOutcome:
         n_failed_logs=len(failures),
         failures=tuple(failures.values())[:TOLD_FAILURES],
     )
-    return _written(job, outcome, rows, told, failures) if told or rows else _failed(job, outcome)
+    if told or rows:
+        return _written(job, outcome, rows, told, failures)
+    fail(job, f"none of its {len(job.logs)} logs could be read; the first: {outcome.failures[0]}")
+    return outcome
 
 
 def fail(job: ArchiveJob, reason: str) -> JobOutcome:
     """Record in the data set that a job failed, and why."""
-    content = {"vehicle": job.slot.vehicle, "month": job.slot.month, "job": job.slot.job, "log": None, "reason": reason}
-    job.dataset.replace(job.slot.failure(), text_of(content))
+    _keep_failure(job, None, reason)
     return JobOutcome(job.slot, JobStatus.FAILED, job.size, failures=(reason,))
 
 
@@ -125,15 +127,11 @@ def _told(one: JobLog, report: LogReport) -> dict[str, Any]:
     return told | {"rejected_lines": report.n_rejected, "ended_early": report.ended_early}
 
 
-def _tell_failure(job: ArchiveJob, one: JobLog, reason: str) -> None:
-    slot = job.slot
-    content = {"vehicle": slot.vehicle, "month": slot.month, "job": slot.job, "log": one.log.name, "reason": reason}
-    job.dataset.replace(slot.failure(one.log.name), text_of({**content, "sha256": one.facts.sha256}))
-
-
-def _failed(job: ArchiveJob, outcome: JobOutcome) -> JobOutcome:
-    fail(job, f"none of its {len(job.logs)} logs could be read; the first: {outcome.failures[0]}")
-    return outcome
+def _keep_failure(job: ArchiveJob, one: JobLog | None, reason: str) -> None:
+    """Of one log, or of the whole job."""
+    slot, log = job.slot, None if one is None else one.log.name
+    content = {"vehicle": slot.vehicle, "month": slot.month, "job": slot.job, "log": log, "reason": reason}
+    job.dataset.replace(slot.failure(log), text_of(content | ({"sha256": one.facts.sha256} if one else {})))
 
 
 def _written(

@@ -109,7 +109,6 @@ class _Worker:
         return answer
 
     def end(self) -> None:
-        """Kill the process."""
         self._process.kill()
         self._process.join()
         self._pipe.close()

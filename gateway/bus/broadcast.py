@@ -108,7 +108,6 @@ class Broadcaster:
         self._thread = threading.Thread(target=self._run, name="broadcast", daemon=True)
 
     def start(self) -> None:
-        """Start the thread."""
         self._thread.start()
 
     def stop(self, within_s: float = STOP_WITHIN_S) -> None:
@@ -117,7 +116,6 @@ class Broadcaster:
         self._thread.join(within_s)
 
     def is_alive(self) -> bool:
-        """True while the thread runs."""
         return self._thread.is_alive()
 
     def _run(self) -> None:

@@ -55,7 +55,6 @@ class _Count:
     kept: list[Frames] = field(default_factory=list)
 
     def add(self, frames: Frames) -> None:
-        """Count further frames."""
         self.first_ns = int(frames.t_ns.min()) if not self.n else min(self.first_ns, int(frames.t_ns.min()))
         self.last_ns = max(self.last_ns, int(frames.t_ns.max()))
         self.n += len(frames)
@@ -102,8 +101,7 @@ def _similar(message: MappedMessage, signal_map: SignalMap, heard: Sequence[Hear
     mapped = [m.id_filter for m in signal_map.messages]
     free = [
         one for one in heard
-        if not any(ids.matches(np.array([one.can_id], np.uint32))[0] for ids in mapped)
-        or message.id_filter.matches(np.array([one.can_id], np.uint32))[0]
+        if not any(ids.is_for(one.can_id) for ids in mapped) or message.id_filter.is_for(one.can_id)
     ]  # fmt: skip
     ranked = sorted((_distance(message, one), one.can_id, i) for i, one in enumerate(free))
     for distance, _, i in ranked[:MOST_SIMILAR]:

@@ -52,7 +52,6 @@ class BusSink(AbstractContextManager["BusSink"]):
     def __exit__(
         self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the channel."""
         self._bus.shutdown()
 
 

@@ -31,8 +31,6 @@ from gateway.calibration.ratio_index.choice import StructureChoice
 from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, require_output_place, window
 from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
-from gateway.core.settings import BatchSettings
-from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError, CampaignError, ConfigurationError
 from gateway.estimate import Z95
 from gateway.files.whole import refusal_told, write_whole
@@ -109,7 +107,9 @@ def plan_sentences(plan: LoadPlan) -> str:
     what = "most would bring" if is_enough else "drive next"
     minutes, kmh = plan.drive.duration_s / 60.0, 3.6 * plan.drive.speed_mps
     lines = [
-        _now(plan),
+        f"{plan.vehicle}: nothing driven yet; expected from typical road vehicles"
+        if plan.now is None
+        else f"{plan.vehicle}, {plan.n_driven} runs driven: expected {_expected(plan.now)}",
         *(["enough is driven: no further run would narrow answers by a tenth"] if is_enough else []),
         f"{what}, each for {minutes:.0f} minutes near {kmh:.0f} km/h:",
         *(f"{i}. {_load(step.load)}: then {_expected(step.expected)}" for i, step in enumerate(plan.advice, 1)),
@@ -138,12 +138,6 @@ def widths_sentence(widths: StatedWidths) -> str:
         f"kg as {kinds}; "
         "± values are 95 % intervals. State it in [vehicle]: carries, or payload_length_m and payload_height_m."
     )
-
-
-def _now(plan: LoadPlan) -> str:
-    if plan.now is None:
-        return f"{plan.vehicle}: nothing driven yet; expected from typical road vehicles"
-    return f"{plan.vehicle}, {plan.n_driven} runs driven: expected {_expected(plan.now)}"
 
 
 def _load(load: PlacedLoad) -> str:
@@ -226,9 +220,11 @@ def calibrate(
     _ask_for_payload_range(loaded, is_needed=wants_plan)
     sisters = [load_like(path) for path in like]
     if not loaded.runs:
-        _plan_first(loaded.vehicle, sisters, as_json=as_json)
+        first = plan_first(loaded.vehicle, inherited=line_of_files(sisters) if sisters else None)
+        click.echo(json_line({"plan": first.to_json()}) if as_json else plan_sentences(first))
         return
-    inspection = _inspect(loaded, numbers, batch_settings(window_s))
+    with counted("reading drives") as on_run:
+        inspection = inspect(loaded, batch_settings(window_s), numbers=numbers, on_run=on_run)
     if sisters:
         inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)  # other loads were driven with the sisters
     _tell_inspection(inspection, as_json=as_json, is_all=only_checks)
@@ -285,12 +281,6 @@ def _command(
     return shlex.join(words)
 
 
-def _plan_first(vehicle: Vehicle, like: Sequence[LikeFile], *, as_json: bool) -> None:
-    """--plan before any drive."""
-    plan = plan_first(vehicle, inherited=line_of_files(like) if like else None)
-    click.echo(json_line({"plan": plan.to_json()}) if as_json else plan_sentences(plan))
-
-
 def _ask_for_payload_range(campaign: Campaign, *, is_needed: bool) -> None:
     """Errors are in percent of it, and a plan stays within it: a van of 3.5 t carries far more than the default."""
     if campaign.states_payload_range:
@@ -317,12 +307,6 @@ def _require_places(output: Path | None, report: Path | None) -> None:
         require_output_place(output)
     if report is not None and report.exists() and not report.is_dir():
         raise click.UsageError(f"--report {report}: is a file, not a directory")
-
-
-def _inspect(campaign: Campaign, numbers: Sequence[int] | None, settings: BatchSettings) -> Inspection:
-    """The chosen drives, read and inspected with a progress bar."""
-    with counted("reading drives") as on_run:
-        return inspect(campaign, settings, numbers=numbers, on_run=on_run)
 
 
 def _curve(campaign: Campaign, outcome: Outcome) -> LearningCurve:

@@ -1,5 +1,6 @@
 """springscale calibration: look at calibration files, compare and check them; state known weights to a service."""
 
+import math
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
@@ -54,7 +55,7 @@ def diff(one: Path, other: Path, as_json: bool) -> None:
     ours, theirs = load_calibration(one), load_calibration(other)
     changes = differences(ours, theirs)
     if as_json:
-        listed = [asdict(each) | {"n_std": _finite(each.n_std)} for each in changes]
+        listed = [asdict(each) | {"n_std": None if each.n_std == math.inf else each.n_std} for each in changes]
         click.echo(json_line({"ids": [ours.id, theirs.id], "is_identical": not changes, "differences": listed}))
     elif not changes:
         click.echo(f"identical: {ours.id}" if ours.id == theirs.id else "identical but for the ids")
@@ -136,10 +137,6 @@ def _plain(fact: Any) -> str:
     return f"{fact:.6g}" if isinstance(fact, float) else "absent" if fact is None else str(fact)
 
 
-def _finite(n_std: float | None) -> float | None:
-    return None if n_std is None or n_std == float("inf") else n_std
-
-
 def vehicle_block(sprung: Sprung) -> str:
     """The table with a comment on the source of its figures. The keys that a tape measures are named, not made up."""
     head = [
@@ -164,7 +161,10 @@ def calibration_text(held: CalibrationFile) -> str:
         "calibrated for": _ranges(held),
         "expected errors (runs left out of the fit)": _expected(held),
         **({"inherited from its line": _line(held.line)} if held.line else {}),
-        **{_title(part, figures): _figures(figures, held.line) for part, figures in figures_of(held).items()},
+        **{
+            f"{part}: {len(figures)} parameters ± their standard deviations": _figures(figures, held.line)
+            for part, figures in figures_of(held).items()
+        },
         "warnings": iter(held.warnings or ("none",)),
         "made by": _provenance(held),
     }
@@ -204,10 +204,6 @@ def _errors(errors: ExpectedErrorsPart) -> str:
     parts = ["payload unknown" if payload is None else f"payload {payload:.1f} kg rms"]
     parts.append("front share unknown" if share is None else f"front share {share:.2f} percentage points rms")
     return ", ".join(parts)
-
-
-def _title(part: str, figures: Sequence[FittedFigure]) -> str:
-    return f"{part}: {len(figures)} parameters ± their standard deviations"
 
 
 def _figures(figures: Sequence[FittedFigure], line: LinePart | None) -> Iterator[str]:

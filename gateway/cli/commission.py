@@ -66,7 +66,6 @@ def doubts_text(doubts: list[dict[str, Any]]) -> str:
 
 
 def progress_text(underway: dict[str, Any]) -> str:
-    """One line, while it is driven."""
     driven = f"{underway['driven_s'] / 60.0:.0f} min driven, {one_or_more(underway['n_batches'], 'window', 'windows')}"
     learned, next_s = underway["learned"], underway["next_window_s"]
     if next_s is not None:

@@ -184,7 +184,6 @@ class _Driver:
         self._thread.start()
 
     def end(self) -> None:
-        """Stop driving."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join(5.0)

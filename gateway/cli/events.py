@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from gateway.cli import options
-from gateway.cli.estimate import prepared, with_known_weights
+from gateway.cli.estimate import half_width, prepared, with_known_weights
 from gateway.cli.options import FILE, as_json, one_estimator, window
 from gateway.core.events.entry import Entry, EntryKind
 from gateway.offline.estimates import entries_of_logs, require_order
@@ -51,19 +51,24 @@ def entry_sentence(entry: Entry) -> str:
 
 
 def _event(told: Mapping[str, Any]) -> str:
-    change, half = told["change_kg"], _half(told["change_interval95_kg"])
+    change, half = told["change_kg"], half_width(told["change_interval95_kg"])
     what = f"{abs(change):.0f} kg {'loaded' if change >= 0.0 else 'unloaded'} (± {half:.0f} kg)"
     sure = "" if told["probability"] >= SURE else f", {told['probability']:.0%} probable"
     if told["is_withdrawn"]:
         what, sure = "withdrawn, nothing was loaded or unloaded after all", ""
     after = told["after"]
-    where = _place(told["place"])
+    place = told["place"]
+    where = "" if place is None else f"; at {place['latitude_deg']}, {place['longitude_deg']}"
     return f"{_span(told)}  {what}{sure}; {after['payload_kg']:.0f} kg aboard then{where}"
 
 
 def _trip(told: Mapping[str, Any]) -> str:
     payload = told["payload_kg"]
-    load = "load unknown" if payload is None else f"{payload:.0f} kg (± {_half(told['payload_interval95_kg']):.0f} kg)"
+    load = (
+        "load unknown"
+        if payload is None
+        else f"{payload:.0f} kg (± {half_width(told['payload_interval95_kg']):.0f} kg)"
+    )
     carried = "" if told["carried_tkm"] is None else f", {told['carried_tkm']:.2f} tonne-kilometres"
     going = "" if told["is_over"] else ", still going"
     return f"{_span(told)}  drove {told['distance_m'] / 1000.0:.1f} km with {load}{carried}{going}"
@@ -71,17 +76,5 @@ def _trip(told: Mapping[str, Any]) -> str:
 
 def _span(told: Mapping[str, Any]) -> str:
     """Begin and end in UTC, with the date of the end only if it differs."""
-    (day, begun), (last_day, ended) = (_minute(told[name]) for name in ("t_start", "t_end"))
+    (day, begun), (last_day, ended) = ((told[name][:10], told[name][11:16]) for name in ("t_start", "t_end"))
     return f"{day} {begun} to {ended if last_day == day else f'{last_day} {ended}'}"
-
-
-def _minute(t: str) -> tuple[str, str]:
-    return t[:10], t[11:16]
-
-
-def _half(interval: tuple[float, float]) -> float:
-    return (interval[1] - interval[0]) / 2.0
-
-
-def _place(place: Mapping[str, float] | None) -> str:
-    return "" if place is None else f"; at {place['latitude_deg']}, {place['longitude_deg']}"

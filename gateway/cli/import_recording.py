@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
+from gateway.bus.feed.iio import AXES
 from gateway.cli.options import FILE, as_json
-from gateway.offline.phone import PHONE_AXES, Imported
+from gateway.offline.phone import Imported
 from gateway.offline.phone import import_recording as import_from
 from gateway.records import json_line
 
@@ -17,7 +18,7 @@ from gateway.records import json_line
 @click.argument("output", type=FILE)
 @click.option(
     "--forward",
-    type=click.Choice(list(PHONE_AXES)),
+    type=click.Choice(list(AXES)),
     default=None,
     help="the phone's axis that points ahead; y is its top edge [default: found from braking and bends]",
 )
@@ -56,7 +57,7 @@ def _axes(found: Imported) -> str:
     """Which of the phone's axes are nearest to forward and up, with the probability."""
     names = []
     for what, row in (("ahead", found.axes.to_vehicle[0]), ("up", found.axes.to_vehicle[2])):
-        nearest = max(PHONE_AXES, key=lambda name: float(PHONE_AXES[name] @ row))
+        nearest = max(AXES, key=lambda name: float(AXES[name] @ row))
         names.append(f"the phone's {nearest} points {what}")
     is_named = math.isnan(found.axes.fit)
     return " and ".join(names) + (", as named" if is_named else f" (braking and bends agree by {found.axes.fit:.2f})")

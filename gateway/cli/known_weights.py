@@ -6,8 +6,7 @@ import click
 
 from gateway.cli.commission import end_text
 from gateway.cli.options import LoadArgument, as_json
-from gateway.cli.service import Service, asks_service
-from gateway.errors import SpringscaleError
+from gateway.cli.service import Service, asks_service, only_one
 from gateway.estimate import Z95
 from gateway.records import json_line
 from gateway.words import one_or_more
@@ -104,13 +103,7 @@ def withdraw(service: Service, ticket_id: str, as_json: bool) -> None:
 def _standing(service: Service, begin: str) -> str:
     """The entry in use whose id begins with this text."""
     ids = [one["id"] for one in service.ask(PATH)["history"] if one["ended"] is None]
-    found = [one for one in ids if one.startswith(begin) or one.removeprefix("sha256:").startswith(begin)]
-    if len(found) != 1:
-        raise SpringscaleError(
-            f"{begin}: {len(found) or 'no'} known weights begin like this:"
-            " `springscale calibration ticket show` lists them"
-        )
-    return str(found[0])
+    return only_one(ids, begin, "known weights", "springscale calibration ticket show")
 
 
 def _noted(note: str | None) -> dict[str, str]:

@@ -13,7 +13,7 @@ from gateway.offline.look.draft import write_draft
 from gateway.offline.look.look import Look, MapFit
 from gateway.offline.look.look import look as look_at
 from gateway.offline.look.readings import Described
-from gateway.records import EXTENDED_ID, JOURNEY, Signal, json_line
+from gateway.records import EXTENDED_ID, JOURNEY, json_line
 
 
 @click.command("look")
@@ -93,11 +93,7 @@ def _readings(seen: Look) -> Iterator[str]:
     for found in seen.found:
         if found.reading.quantity != "acceleration":
             sign = "" if found.role in JOURNEY else f", sign {found.sign:+d}"
-            yield f"{_words(found.role)}: {found.reading.name}{sign}: {found.why}"
-
-
-def _words(role: Signal) -> str:
-    return role.replace("_", " ").capitalize()
+            yield f"{found.role.replace('_', ' ').capitalize()}: {found.reading.name}{sign}: {found.why}"
 
 
 def _fits(seen: Look) -> Iterator[str]:
@@ -142,7 +138,7 @@ def look_json(seen: Look) -> dict[str, Any]:
         "log": str(seen.log),
         "duration_s": round(seen.duration_s, 3),
         "n_frames": seen.report.wanted,
-        "identifiers": [_identifier(one) | _described(names.get(id(one))) for one in seen.heard],
+        "identifiers": [_identifier(one, names.get(id(one))) for one in seen.heard],
         "accelerations": [
             {"name": r.name, "usual_mps2": round(r.usual, 3)} for r in seen.accelerations
         ],
@@ -174,7 +170,7 @@ def look_json(seen: Look) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _identifier(one: Heard) -> dict[str, Any]:
+def _identifier(one: Heard, known: Described | None) -> dict[str, Any]:
     return {
         "channel": one.channel,
         "id": one.name,
@@ -182,10 +178,6 @@ def _identifier(one: Heard) -> dict[str, Any]:
         "n_frames": one.n_frames,
         "rate_hz": round(one.rate_hz, 2),
         "lengths": list(one.lengths),
+        "message": known.message.name if known else None,
+        "database": known.message.source.name if known else None,
     }
-
-
-def _described(known: Described | None) -> dict[str, Any]:
-    if known is None:
-        return {"message": None, "database": None}
-    return {"message": known.message.name, "database": known.message.source.name}

@@ -109,7 +109,6 @@ class SpeedFactor(click.ParamType[Speed]):
     name = "speed"
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
-        """As the help shows it."""
         return "NUMBER|max"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Speed:

@@ -28,7 +28,6 @@ class StatusLine(AbstractContextManager["StatusLine"]):
     def __exit__(
         self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Clear the line."""
         if self._is_shown:
             click.echo("\r\x1b[K", err=True, nl=False)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from gateway.bus.logs import LogReport
-from gateway.bus.sink import ReplayProgress, Speed
+from gateway.bus.sink import Speed
 from gateway.bus.sink import replay as send_log
 from gateway.cli import options
 from gateway.cli.options import FILE, as_json
@@ -30,14 +30,10 @@ def replay(log: Path, interface: str, channel: str, from_channel: str | None, sp
             channel,
             from_channel=from_channel,
             speed=speed,
-            on_progress=lambda sent: status.show(_so_far(sent)),
+            on_progress=lambda sent: status.show(f"{sent.recorded_s:.0f} s of the log, {sent.n_sent} frames sent"),
         )
     _require_sent(report, from_channel)
     click.echo(json_line({"sent": report.wanted, **report.to_json()}) if as_json else _sentences(report))
-
-
-def _so_far(progress: ReplayProgress) -> str:
-    return f"{progress.recorded_s:.0f} s of the log, {progress.n_sent} frames sent"
 
 
 def _require_sent(report: LogReport, from_channel: str | None) -> None:

@@ -107,7 +107,6 @@ def how_far(progress: Progress) -> str:
 
 
 def forecast_in_words(ahead: Forecast) -> str:
-    """What a run would do."""
     lines = [
         f"{counted(ahead.n_vehicles, 'vehicle')}, {counted(ahead.n_logs, 'log')}, {size(ahead.size)}",
         f"{counted(ahead.n_jobs, 'job')}: {ahead.n_done} done, {ahead.n_failed} failed before, "
@@ -127,7 +126,6 @@ def forecast_in_words(ahead: Forecast) -> str:
 
 
 def summary_in_words(summary: Summary, output: str) -> str:
-    """What a run has done."""
     batches = sum(outcome.n_batches for outcome in summary.outcomes)
     weighed = sum(outcome.n_weighed for outcome in summary.outcomes)
     counts = summary.counts

@@ -27,17 +27,10 @@ QUICK_LONGEST_S: Final = 155.0  # two thirds of it, which identify, hold one bat
 @as_json
 def reproduce(output: Path, seed: int, quick: bool, workers: int, as_json: bool) -> None:
     """The paper's figures and tables, its numbers beside ours, as report.html with all its files."""
+    whole = Extent(seed, workers=workers)
+    extent = Extent(seed, QUICK_WINDOW_S, QUICK_LONGEST_S, workers) if quick else whole
     with counted("starting") as on_step:
-        report = write_report(
-            output, extent_of(seed, workers, quick=quick), lambda what, done, of: on_step(done, of, what)
-        )
+        report = write_report(output, extent, lambda what, done, of: on_step(done, of, what))
         on_step(N_STEPS, N_STEPS)
     written = {"report": report, "results": output / "results.json", "accuracy": output / "accuracy.md"}
     click.echo(json_line({name: str(path) for name, path in written.items()}) if as_json else str(report))
-
-
-def extent_of(seed: int, workers: int, *, quick: bool) -> Extent:
-    """The paper's extent, or a quick one."""
-    if quick:
-        return Extent(seed, QUICK_WINDOW_S, QUICK_LONGEST_S, workers)
-    return Extent(seed, workers=workers)

@@ -5,7 +5,7 @@ import json
 import ssl
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from http.client import HTTPException, HTTPResponse
@@ -93,6 +93,14 @@ class Service:
         return urllib.request.build_opener(
             urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=context)
         )
+
+
+def only_one(ids: Iterable[str], begin: str, what: str, command: str) -> str:
+    """The id that begins with this text, sha256: aside. Raises SpringscaleError if there are none or several."""
+    found = [one for one in ids if one.startswith(begin) or one.removeprefix("sha256:").startswith(begin)]
+    if len(found) != 1:
+        raise SpringscaleError(f"{begin}: {len(found) or 'no'} {what} begin like this: `{command}` lists them")
+    return found[0]
 
 
 def asks_service(command: Command) -> Command:

@@ -7,14 +7,14 @@ from typing import Any
 
 import click
 
-from gateway.bus.sink import ReplayProgress, Speed
+from gateway.bus.sink import Speed
 from gateway.cli import options
 from gateway.cli.options import FILE, NumberRange, as_json
 from gateway.cli.progress import StatusLine, counted
 from gateway.records import json_line
 from gateway.sim.vans import VANS
 from gateway.workbench.campaigns import PLANS
-from gateway.workbench.simulate import SENSORS_OF_MAP, Bench, bench_of, write_campaign
+from gateway.workbench.simulate import SENSORS_OF_MAP, bench_of, write_campaign
 from gateway.workbench.simulate import stream as send_drives
 
 _BENCH = (
@@ -91,11 +91,12 @@ def campaign(directory: Path, workers: int, as_json: bool, **bench_options: Any)
 @as_json
 def stream(interface: str, channel: str, speed: Speed, as_json: bool, **bench_options: Any) -> None:
     """Send the drives of this KIND to a bus, one after the other."""
-    bench: Bench = bench_of(**bench_options)
-
-    def show(sent: ReplayProgress) -> None:
-        status.show(f"{sent.recorded_s:.0f} s driven, {sent.n_sent} frames sent")
-
     with StatusLine() as status:
-        n_sent = send_drives(bench, interface, channel, speed=speed, on_progress=show)
+        n_sent = send_drives(
+            bench_of(**bench_options),
+            interface,
+            channel,
+            speed=speed,
+            on_progress=lambda sent: status.show(f"{sent.recorded_s:.0f} s driven, {sent.n_sent} frames sent"),
+        )
     click.echo(json_line({"sent": n_sent}) if as_json else f"{n_sent} frames sent")

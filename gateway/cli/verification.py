@@ -6,7 +6,7 @@ from typing import Any, Final
 import click
 
 from gateway.cli.options import FILE, LoadArgument, as_json
-from gateway.cli.service import Service, asks_service
+from gateway.cli.service import Service, asks_service, only_one
 from gateway.errors import SpringscaleError
 from gateway.estimate import Z95
 from gateway.files.whole import refusal_told, written_whole
@@ -55,16 +55,12 @@ def record(service: Service, loads: tuple[dict[str, Any], ...], note: str | None
 def export(service: Service, record_id: str, output: Path) -> None:
     """Write one record as a page to print: RECORD_ID as `show` prints it, or its first letters."""
     ids = [entry["id"] for entry in service.ask(PATH)["history"]]
-    found = [one for one in ids if one.startswith(record_id) or one.removeprefix("sha256:").startswith(record_id)]
-    if len(found) != 1:
-        raise SpringscaleError(
-            f"{record_id}: {len(found) or 'no'} records begin like this: `springscale verification show` lists them"
-        )
-    with service.opened(f"{PATH}/{found[0]}") as answer:
+    found = only_one(ids, record_id, "records", "springscale verification show")
+    with service.opened(f"{PATH}/{found}") as answer:
         page = answer.read()
     with refusal_told(output, SpringscaleError), written_whole(output) as file:
         file.write(page)
-    click.echo(f"{output}: record {found[0][:19]}")
+    click.echo(f"{output}: record {found[:19]}")
 
 
 def _state_text(state: dict[str, Any]) -> str:

@@ -72,7 +72,6 @@ class PublicKey:
 
     @property
     def point(self) -> bytes:
-        """The 32 bytes of the key."""
         return self.blob[-KEY_BYTES:]
 
     @property
@@ -147,7 +146,6 @@ def armoured(key: PublicKey, hash_name: str, signed: bytes) -> str:
 
 
 def signature_path(path: Path) -> Path:
-    """Path of the signature of ``path``."""
     return path.with_name(path.name + SUFFIX)
 
 

@@ -130,7 +130,6 @@ class Bundle:
     runs: tuple[PackedRun, ...]
 
     def to_json(self) -> dict[str, Any]:
-        """The result as JSON."""
         return {
             "written": str(self.output),
             "sha256": file_sha256(self.output),

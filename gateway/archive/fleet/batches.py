@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from gateway.archive.dataset import SCHEMA_VERSION
-from gateway.archive.places import MISSING, Location, PlaceError
+from gateway.archive.dataset import SCHEMA_VERSION, pyarrow_and_parquet
+from gateway.archive.places import Location, PlaceError
 from gateway.archive.receipts import Slot
 from gateway.errors import ConfigurationError
 from gateway.records import F64, I64, Bool
@@ -58,12 +58,10 @@ class Batches:
 
     @property
     def is_answered(self) -> Bool:
-        """Batches without a refusal."""
         answered: Bool = ~np.any([np.zeros(len(self), dtype=bool), *self.rejected.values()], axis=0)
         return answered
 
     def rows(self, chosen: Bool) -> "Batches":
-        """Some of the batches."""
         return Batches(
             self.t_end_ns[chosen],
             tuple(compress(self.calibration_id, chosen)),
@@ -94,7 +92,7 @@ def read_batches(dataset: Location, jobs: Sequence[Slot]) -> Batches:
         t_end_ns[order],
         tuple(ids[n] for n in order),
         {name: np.concatenate([part.numbers[name] for part in parts])[order] for name in _NUMBERS},
-        {reason: np.concatenate([_of_reason(part, reason) for part in parts])[order] for reason in reasons},
+        {reason: np.concatenate([_refused_for(part, reason) for part in parts])[order] for reason in reasons},
         np.concatenate([part.is_over_limit for part in parts])[order],
     )
 
@@ -110,16 +108,12 @@ def _require_once(t_end_ns: I64, job: I64, jobs: Sequence[Slot]) -> None:
         )
 
 
-def _of_reason(part: Batches, reason: str) -> Bool:
+def _refused_for(part: Batches, reason: str) -> Bool:
     return part.rejected.get(reason, np.zeros(len(part), dtype=bool))
 
 
 def _read(dataset: Location, slot: Slot) -> Batches:
-    try:
-        import pyarrow as pa  # noqa: PLC0415 - an extra
-        import pyarrow.parquet as pq  # noqa: PLC0415 - likewise
-    except ModuleNotFoundError:
-        raise ConfigurationError(MISSING) from None
+    pa, pq = pyarrow_and_parquet()
     where = f"{dataset}/{slot.table}"
     try:
         file = pq.ParquetFile(io.BytesIO(dataset.read(slot.table)))
@@ -151,15 +145,10 @@ def _batches_of(table: "pa.Table") -> Batches:
     return Batches(
         table["t_end_ns"].to_numpy(),
         tuple(one or "" for one in table["calibration_id"].to_pylist()),
-        {name: _floats(table[name]) for name in _NUMBERS},
+        {name: table[name].to_numpy().astype(np.float64) for name in _NUMBERS},
         _reasons(table["rejected"].combine_chunks()),
         _lengths(table["over_limit"].combine_chunks()) > 0,
     )
-
-
-def _floats(column: Any) -> F64:
-    numbers: F64 = column.to_numpy().astype(np.float64)
-    return numbers
 
 
 def _lengths(lists: Any) -> I64:

@@ -8,21 +8,19 @@ Only one vehicle's batches are in memory at a time; a few numbers per week are k
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import date
-from typing import Any, Final
 
 import numpy as np
 
 from gateway.archive.fleet.batches import Batches, by_vehicle, read_batches
 from gateway.archive.fleet.drift import Drift, Series, drifts_of, series_of
 from gateway.archive.fleet.sensors import Health, Trouble, troubles_of
-from gateway.archive.fleet.weeks import DAY_NS, Weeks, weeks_of
+from gateway.archive.fleet.weeks import DAY_NS, Weeks, date_of, weeks_of
 from gateway.archive.places import Location
 from gateway.archive.receipts import failures, slots_done
 from gateway.errors import ConfigurationError
 from gateway.records import Bool
 
 OnVehicle = Callable[[int, int], None]  # (vehicles done, vehicles in all)
-EPOCH: Final = date(1970, 1, 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +118,7 @@ def fleet_of(dataset: Location, on_vehicle: OnVehicle = lambda done, of: None) -
 def _vehicle(name: str, batches: Batches) -> tuple[FleetVehicle, Series]:
     """The summary of a vehicle with its drifts still to be judged, and the series for that."""
     answered, since = batches.is_answered, weeks_of(batches.rows(_by_last_calibration(batches)))
-    first, last = (EPOCH.fromordinal(EPOCH.toordinal() + int(t // DAY_NS)) for t in batches.t_end_ns[[0, -1]])
+    first, last = (date_of(t // DAY_NS) for t in batches.t_end_ns[[0, -1]])
     vehicle = FleetVehicle(
         name,
         len(batches),
@@ -145,8 +143,7 @@ def _by_last_calibration(batches: Batches) -> Bool:
 
 
 def _failures(dataset: Location) -> tuple[Failure, ...]:
-    return tuple(_failure(told) for told in failures(dataset))
-
-
-def _failure(told: Mapping[str, Any]) -> Failure:
-    return Failure(str(told.get("vehicle")), str(told.get("month")), told.get("log"), str(told.get("reason")))
+    return tuple(
+        Failure(str(one.get("vehicle")), str(one.get("month")), one.get("log"), str(one.get("reason")))
+        for one in failures(dataset)
+    )

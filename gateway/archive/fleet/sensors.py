@@ -3,14 +3,14 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import date, timedelta
+from datetime import date
 from enum import StrEnum
 from typing import Final
 
 import numpy as np
 
 from gateway.archive.fleet.batches import Batches
-from gateway.archive.fleet.weeks import CAUSES, DAY_NS
+from gateway.archive.fleet.weeks import CAUSES, DAY_NS, date_of
 from gateway.estimate import Z95
 from gateway.reasons import Cause
 from gateway.records import F64, I64, Bool
@@ -78,13 +78,13 @@ def _troubles(batches: Batches) -> Iterator[Trouble]:
         if CAUSES.get(reason) is Cause.SENSORS and refused.any():
             is_bad = np.add.reduceat(refused.astype(np.int64), first) >= BAD_DAY_SHARE * n
             met = day_of[refused]
-            yield _trouble(reason, int(refused.sum()), days, is_bad, (_date(met[0]), _date(met[-1])))
+            yield _trouble(reason, int(refused.sum()), days, is_bad, (date_of(met[0]), date_of(met[-1])))
 
 
 def _trouble(reason: str, n_batches: int, days: I64, is_bad: Bool, met: tuple[date, date]) -> Trouble:
     recent = Share(int(is_bad[-RECENT_DAYS:].sum()), len(is_bad[-RECENT_DAYS:]))
     health = Health.BAD if recent.is_surely_bad else Health.WAS_BAD if _was_bad(is_bad) else Health.SOME
-    since = _date(days[_first_of_the_bad(is_bad)]) if health is Health.BAD else None
+    since = date_of(days[_first_of_the_bad(is_bad)]) if health is Health.BAD else None
     return Trouble(reason, n_batches, Share(int(is_bad.sum()), len(is_bad)), recent, health, *met, since)
 
 
@@ -121,7 +121,3 @@ def _log_likelihood(n_bad: I64, n: I64) -> F64:
         )
     likelihood: F64 = parts
     return likelihood
-
-
-def _date(day: int) -> date:
-    return date(1970, 1, 1) + timedelta(days=int(day))

@@ -46,13 +46,16 @@ class Weeks:
         return tuple(monday_of(int(number)) for number in self.number)
 
 
+def date_of(day: int) -> date:
+    """The date so many days after 1970-01-01."""
+    return date(1970, 1, 1) + timedelta(days=int(day))
+
+
 def monday_of(number: int) -> date:
-    """The first day of a week."""
     return _MONDAY + timedelta(weeks=number)
 
 
 def weeks_of(batches: Batches) -> Weeks:
-    """The weeks in which batches ended."""
     week_of = (batches.t_end_ns // DAY_NS + _DAYS_BEFORE) // 7
     number, first, n = np.unique(week_of, return_index=True, return_counts=True)
     answered = batches.is_answered

@@ -92,7 +92,6 @@ class Feeder:
         self._ended: BusError | None = None
 
     def stop(self) -> None:
-        """Request the end."""
         self._stopping.set()
 
     def run(self, on_tick: Callable[[FeedState], None] = lambda state: None) -> None:

@@ -60,7 +60,6 @@ class Gpsd:
         return [fix for line in lines if (fix := self._fix(line)) is not None]
 
     def close(self) -> None:
-        """Close the connection."""
         if self._socket is not None:
             with contextlib.suppress(OSError):
                 self._socket.close()

@@ -128,7 +128,6 @@ class IioDevice:
             ) from None
 
     def close(self) -> None:
-        """Stop the buffer."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1

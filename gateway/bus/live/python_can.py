@@ -90,7 +90,6 @@ class PythonCanReceiver:
         )
 
     def close(self) -> None:
-        """Shut the bus down."""
         self._bus.shutdown()
 
 

@@ -71,7 +71,6 @@ class SocketCanReceiver:
         return self._burst(*self._drain())
 
     def close(self) -> None:
-        """Close the socket."""
         self._socket.close()
 
     def _drain(self) -> tuple[list[bytes], list[bytes]]:

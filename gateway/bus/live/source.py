@@ -114,7 +114,6 @@ class LiveSource:
 
     @property
     def state(self) -> SourceState:
-        """The present state of the source."""
         return self._state
 
     @property
@@ -141,7 +140,6 @@ class LiveSource:
             self._thread.join(timeout_s)
 
     def counts(self) -> SourceCounts:
-        """The counts so far."""
         receiver = self._receiver
         return SourceCounts(
             frames=self._tally["frames"],

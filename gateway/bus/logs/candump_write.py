@@ -29,7 +29,6 @@ def write_candump(frames: Frames, channel: str, path: Path | str) -> None:
 
 
 def append_candump(frames: Frames, channel: str, file: BinaryIO) -> None:
-    """Write frames to an open log."""
     digits = NANOSECOND_DIGITS if np.any(frames.t_ns % 1000) else MICROSECOND_DIGITS
     for begin in range(0, len(frames), CHUNK_FRAMES):
         file.write(_lines(take(frames, slice(begin, begin + CHUNK_FRAMES)), channel.encode(), digits))

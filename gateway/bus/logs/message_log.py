@@ -53,7 +53,7 @@ def _ours(messages: Iterator[can.Message], selection: Selection) -> Iterator[can
         report.frames += 1
         can_id = message_id(message)
         if can_id not in is_mapped:
-            is_mapped[can_id] = any(can_id & f.mask == f.can_id for f in selection.filters)
+            is_mapped[can_id] = any(ids.is_for(can_id) for ids in selection.filters)
         if not is_mapped[can_id]:
             continue
         report.channels.add(str(message.channel))
@@ -117,6 +117,5 @@ def _text_messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.M
 
 
 def _messages(path: Path, report: LogReport) -> Iterator[can.Message]:
-    """Messages of a database."""
     with report.until_damage(".db"), unpacked_path(path) as unpacked, can.SqliteReader(unpacked) as reader:
         yield from reader

@@ -96,7 +96,6 @@ class InflatedStream(io.RawIOBase):
         self._packed = b""
 
     def readable(self) -> bool:
-        """A stream to read from."""
         return True
 
     def readinto(self, buffer: "WriteableBuffer") -> int:

@@ -87,11 +87,9 @@ class LogReport:
 
     @property
     def n_rejected(self) -> int:
-        """Lines refused for any reason."""
         return sum(lines.count for lines in self.rejects.values())
 
     def to_json(self) -> dict[str, Any]:
-        """The counts for machines."""
         counts = ("lines", "frames", "wanted", "other_channel", "remote_frames", "error_frames", "out_of_order")
         rejects = {str(r): {"count": n.count, "first_lines": n.first_lines} for r, n in self.rejects.items()}
         return {

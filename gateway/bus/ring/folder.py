@@ -106,7 +106,6 @@ class RingFolder:
         self._segments = (*older, newest.with_block(head))
 
     def close(self) -> None:
-        """Close the newest segment."""
         if self._growing is not None:
             with suppress(OSError):
                 self._growing.file.close()

@@ -48,7 +48,6 @@ class RingLog:
         self._thread = threading.Thread(target=self._run, name="ring-log", daemon=True)
 
     def start(self) -> None:
-        """Start the thread."""
         self._thread.start()
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
@@ -81,7 +80,6 @@ class RingLog:
         return tuple(segment for segment in self._folder.segments() if segment.n_blocks)
 
     def open(self, name: str) -> tuple[BinaryIO, int] | None:
-        """As ``RingFolder.open``."""
         return self._folder.open(name)
 
     def status(self) -> RecordStatus:

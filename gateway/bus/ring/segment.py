@@ -109,7 +109,6 @@ class Segment:
         return number_of(self.name) or 0
 
     def with_block(self, head: BlockHead) -> "Segment":
-        """With one more block at its end."""
         is_first = self.n_blocks == 0
         return Segment(
             self.name,

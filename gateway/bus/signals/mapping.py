@@ -29,9 +29,12 @@ class IdFilter:
     mask: int
 
     def matches(self, can_id: U32) -> Bool:
-        """Which identifiers (n,) pass."""
         passes: Bool = (can_id & np.uint32(self.mask)) == np.uint32(self.can_id)
         return passes
+
+    def is_for(self, can_id: int) -> bool:
+        """The same of one identifier."""
+        return can_id & self.mask == self.can_id
 
 
 EVERY_IDENTIFIER = (IdFilter(0, EXTENDED_ID), IdFilter(EXTENDED_ID, EXTENDED_ID))

@@ -72,8 +72,7 @@ def _fits(name: str, heard: Sequence[Heard]) -> Iterator[MapFit]:
 
 
 def _is_mapped(one: Heard, signal_map: SignalMap) -> bool:
-    ids = np.array([one.can_id], np.uint32)
-    return any(message.id_filter.matches(ids)[0] and message.length in one.lengths for message in signal_map.messages)
+    return any(m.id_filter.is_for(one.can_id) and m.length in one.lengths for m in signal_map.messages)
 
 
 NO_CHANNEL: Final = "None"  # how python-can's readers name the channel of a log that keeps none

@@ -49,7 +49,6 @@ class SignalReading:
 
     @property
     def rate_hz(self) -> float:
-        """The rate of its frames."""
         return self.described.heard.rate_hz
 
     @cached_property

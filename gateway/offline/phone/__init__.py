@@ -5,7 +5,7 @@ and whether it recorded the road, ``axes`` its orientation; a candump log with t
 out.
 """
 
-from gateway.offline.phone.imported import PHONE_AXES, Imported, import_recording, imported
+from gateway.offline.phone.imported import Imported, import_recording, imported
 from gateway.offline.phone.recording import read_recording
 
-__all__ = ["PHONE_AXES", "Imported", "import_recording", "imported", "read_recording"]
+__all__ = ["Imported", "import_recording", "imported", "read_recording"]

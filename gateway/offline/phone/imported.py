@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from gateway.bus.feed.iio import AXES
 from gateway.bus.frames import merge_frames
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import SHIPPED_PREFIX, Encoder, load_signal_map, shipped_map
@@ -16,7 +17,7 @@ from gateway.files.whole import refusal_told, write_whole
 from gateway.offline.phone.axes import Axes, axes_of
 from gateway.offline.phone.quality import Remark, remarks_on, ride_of, still_stretch
 from gateway.offline.phone.recording import read_recording
-from gateway.offline.phone.tables import Fixes, PhoneRecording, Vectors
+from gateway.offline.phone.tables import PhoneRecording, Vectors
 from gateway.records import F64, Frames, iso_utc
 from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
 
@@ -24,9 +25,6 @@ MAP_NAME: Final = "phone"
 CHANNEL: Final = "phone0"
 SHORTEST_S: Final = 60.0  # chosen: least stretch without a movement of the phone
 SURE_COMPASS: Final = 0.5  # chosen: correlation that decides the sign
-PHONE_AXES: Final = {
-    f"{sign}{axis}": (-1.0 if sign else 1.0) * np.eye(3)[i] for sign in ("", "-") for i, axis in enumerate("xyz")
-}
 _DEG: Final = np.pi / 180.0  # radians
 
 
@@ -103,32 +101,21 @@ def imported(recording: PhoneRecording, forward: str | None = None) -> Imported:
         raise SpringscaleError(
             f"{recording.path}: the phone lay still for {max(seconds, 0.0):.0f} s at most: fix it to the floor"
         )
-    part = _part(recording, stretch)
-    ahead = None if forward is None else PHONE_AXES[forward]
-    part, axes, sign_from, doubts = _signed(part, ahead)
+    ahead = None if forward is None else AXES[forward]
+    part, axes, sign_from, doubts = _signed(recording.within(*stretch), ahead)
     if axes is None:
         raise SpringscaleError(
             f"{recording.path}: which way is forward cannot be told: it takes two minutes of drive with some braking "
             "and bends, and a satellite speed; or name the phone's axis that points ahead by --forward (y: its top)"
         )
     vertical = part.accel.xyz @ axes.to_vehicle[2]
-    remarks = [*_moves(moved, stretch), *doubts, *_gravity(axes), *remarks_on(part, vertical, stretch)]
+    remarks = [*_moves(moved, stretch), *doubts]
+    if abs(axes.gravity_mps2 - STANDARD_GRAVITY_MPS2) > 0.5:
+        wrong = f"the accelerometer reads gravity as {axes.gravity_mps2:.2f} m/s2: its scale is wrong"
+        remarks.append(Remark("gravity", wrong))
+    remarks += remarks_on(part, vertical, stretch)
     ride_mps2, _ = ride_of(part.accel, vertical, part.fixes)
     return Imported(part, stretch, axes, sign_from, ride_mps2, tuple(remarks))
-
-
-def _part(recording: PhoneRecording, stretch: tuple[int, int]) -> PhoneRecording:
-    begin_ns, end_ns = stretch
-
-    def cut(vectors: Vectors) -> Vectors:
-        inside = (vectors.t_ns >= begin_ns) & (vectors.t_ns < end_ns)
-        return Vectors(vectors.t_ns[inside], vectors.xyz[inside])
-
-    fixes = recording.fixes
-    inside = (fixes.t_ns >= begin_ns) & (fixes.t_ns < end_ns)
-    columns = (fixes.speed_mps, fixes.bearing_deg, fixes.latitude_deg, fixes.longitude_deg)
-    kept = Fixes(fixes.t_ns[inside], *(column[inside] for column in columns))
-    return replace(recording, accel=cut(recording.accel), gyro=cut(recording.gyro), fixes=kept)
 
 
 def _signed(part: PhoneRecording, forward: F64 | None) -> tuple[PhoneRecording, Axes | None, str, tuple[Remark, ...]]:
@@ -166,11 +153,6 @@ def _moves(moved: tuple[int, ...], stretch: tuple[int, int]) -> Iterator[Remark]
     if moved:
         begin, end = (iso_utc(t_ns)[11:19] for t_ns in stretch)
         yield Remark("cut", f"only {begin} to {end} UTC is taken, the longest time in which it lay still")
-
-
-def _gravity(axes: Axes) -> Iterator[Remark]:
-    if abs(axes.gravity_mps2 - STANDARD_GRAVITY_MPS2) > 0.5:
-        yield Remark("gravity", f"the accelerometer reads gravity as {axes.gravity_mps2:.2f} m/s2: its scale is wrong")
 
 
 def frames_of(found: Imported, *, with_position: bool = True) -> Frames:

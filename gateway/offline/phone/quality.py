@@ -126,8 +126,11 @@ def _apart(times_ns: Sequence[int]) -> Iterator[int]:
 
 
 def remarks_on(recording: PhoneRecording, vertical_mps2: F64, stretch: tuple[int, int]) -> Iterator[Remark]:
-    """Obstacles to a good estimate from this stretch, and their remedies. vertical_mps2 (n,) at the times of accel."""
-    accel, gyro = _within(recording.accel, stretch), _within(recording.gyro, stretch)
+    """Obstacles to a good estimate from the recording of one stretch [ns], and their remedies.
+
+    vertical_mps2 (n,) is at the times of accel.
+    """
+    accel, gyro = recording.accel, recording.gyro
     for what, vectors in (("accelerometer", accel), ("gyroscope", gyro)):
         rate_hz = sample_rate_hz(vectors.t_ns)
         if rate_hz < LEAST_RATE_HZ:
@@ -143,11 +146,6 @@ def remarks_on(recording: PhoneRecording, vertical_mps2: F64, stretch: tuple[int
         yield Remark("rows", f"{recording.n_unusable} rows of the export are no numbers or came twice; left out")
 
 
-def _within(vectors: Vectors, stretch: tuple[int, int]) -> Vectors:
-    inside = (vectors.t_ns >= stretch[0]) & (vectors.t_ns < stretch[1])
-    return Vectors(vectors.t_ns[inside], vectors.xyz[inside])
-
-
 def _pauses(t_ns: I64) -> Iterator[Remark]:
     waits = np.diff(t_ns)
     if n := int(np.count_nonzero(waits > PAUSED_NS)):
@@ -161,8 +159,7 @@ def _pauses(t_ns: I64) -> Iterator[Remark]:
 
 def _lost(fixes: Fixes, stretch: tuple[int, int]) -> Iterator[Remark]:
     """Gaps of the speed."""
-    inside = np.isfinite(fixes.speed_mps) & (fixes.t_ns >= stretch[0]) & (fixes.t_ns < stretch[1])
-    known = fixes.t_ns[inside]
+    known = fixes.t_ns[np.isfinite(fixes.speed_mps)]
     if not len(known):
         yield Remark(
             "no_speed", "there is no satellite speed: allow the app the precise location, and lie in sight of sky"

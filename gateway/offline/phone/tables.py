@@ -5,8 +5,9 @@ import io
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path, PurePosixPath
+from typing import TypeVar
 
 import numpy as np
 
@@ -33,6 +34,14 @@ class Fixes:
     longitude_deg: F64
 
 
+Samples = TypeVar("Samples", Vectors, Fixes)
+
+
+def _cut(samples: Samples, begin_ns: int, end_ns: int) -> Samples:
+    inside = (samples.t_ns >= begin_ns) & (samples.t_ns < end_ns)
+    return type(samples)(*(getattr(samples, each.name)[inside] for each in fields(samples)))
+
+
 @dataclass(frozen=True, slots=True)
 class PhoneRecording:
     """A phone's recording. ``accel`` includes gravity.
@@ -49,6 +58,11 @@ class PhoneRecording:
     gyro: Vectors
     fixes: Fixes
     n_unusable: int
+
+    def within(self, begin_ns: int, end_ns: int) -> "PhoneRecording":
+        """The samples and fixes in [begin, end)."""
+        accel, gyro = (_cut(vectors, begin_ns, end_ns) for vectors in (self.accel, self.gyro))
+        return replace(self, accel=accel, gyro=gyro, fixes=_cut(self.fixes, begin_ns, end_ns))
 
 
 @dataclass(frozen=True, slots=True)

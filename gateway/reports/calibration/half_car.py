@@ -32,7 +32,6 @@ class RunFit:
 
     @property
     def title(self) -> str:
-        """The run in words."""
         return f"Run {self.run.number}: {self.run.payload_kg:g} kg at {self.run.front_share_pct:.1f} % front"
 
 

@@ -142,12 +142,10 @@ class Chart:
 
     @property
     def n_columns(self) -> int:
-        """Number of panels in a row."""
         return min(self.most_columns, len(self.panels))
 
     @property
     def n_rows(self) -> int:
-        """Number of rows of panels."""
         return -(-len(self.panels) // self.n_columns)
 
 

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from functools import singledispatch
 from typing import Any, Final
 
 import plotly.graph_objects as go
@@ -67,7 +66,7 @@ def _add_panel(figure: go.Figure, chart: Chart, panel: Panel, number: int, seen:
         if isinstance(mark, Rule | Span):
             _add_shape(figure, mark, named, place)
         else:
-            figure.add_traces([{**trace, **named} for trace in _traces(mark)], rows=place["row"], cols=place["col"])
+            figure.add_trace({**_trace(mark), **named}, **place)
     figure.update_xaxes(**_axis(panel.x), **place)
     figure.update_yaxes(**_axis(panel.y), **place)
 
@@ -81,7 +80,7 @@ def _named(mark: Mark, seen: set[str]) -> dict[str, Any]:
 
 
 def _axis(axis: Axis) -> dict[str, Any]:
-    limits = None if axis.limits is None else [_position(axis, end) for end in axis.limits]
+    limits = None if axis.limits is None else [math.log10(end) if axis.is_log else end for end in axis.limits]
     named = {
         "tickmode": "array",
         "tickvals": [at for at, _ in axis.named],
@@ -98,10 +97,6 @@ def _axis(axis: Axis) -> dict[str, Any]:
     }
 
 
-def _position(axis: Axis, at: float) -> float:
-    return math.log10(at) if axis.is_log else at
-
-
 def _add_shape(figure: go.Figure, mark: Rule | Span, named: dict[str, Any], place: dict[str, int]) -> None:
     colour = COLOURS[mark.colour]
     if isinstance(mark, Span):
@@ -113,36 +108,21 @@ def _add_shape(figure: go.Figure, mark: Rule | Span, named: dict[str, Any], plac
         add(mark.at, exclude_empty_subplots=False, **drawn, **named, **place)
 
 
-@singledispatch
-def _traces(mark: object) -> list[dict[str, Any]]:
-    raise TypeError(f"no drawing for {type(mark).__name__}")
-
-
-@_traces.register
-def _(mark: LineMark) -> list[dict[str, Any]]:
-    style = {"color": COLOURS[mark.colour], "dash": mark.dash, "width": 1.6}
-    return [{"type": "scatter", "mode": "lines", "x": mark.x, "y": mark.y, "line": style}]
-
-
-@_traces.register
-def _(mark: Points) -> list[dict[str, Any]]:
-    trace: dict[str, Any] = {
-        "type": "scatter",
-        "mode": "markers",
-        "x": mark.x,
-        "y": mark.y,
-        "marker": {"color": COLOURS[mark.colour], "symbol": mark.marker, "size": 8},
-        "text": list(mark.notes) or None,
-    }
-    if mark.low is not None and mark.high is not None:
-        reach = {"array": mark.high - mark.y, "arrayminus": mark.y - mark.low}
-        trace["error_y"] = {"type": "data", "symmetric": False, "thickness": 1.0, "width": 2, **reach}
-    return [trace]
-
-
-@_traces.register
-def _(mark: Ribbon) -> list[dict[str, Any]]:
-    """A closed polygon: along the upper bound and back along the lower."""
-    style = {"fill": "toself", "fillcolor": COLOURS[mark.colour], "opacity": _OPACITY, "line": {"width": 0}}
-    around_x, around_y = [*mark.x, *mark.x[::-1]], [*mark.high, *mark.low[::-1]]
-    return [{"type": "scatter", "mode": "lines", "x": around_x, "y": around_y, "hoverinfo": "skip", **style}]
+def _trace(mark: LineMark | Points | Ribbon) -> dict[str, Any]:
+    colour = COLOURS[mark.colour]
+    match mark:
+        case LineMark():
+            line = {"color": colour, "dash": mark.dash, "width": 1.6}
+            return {"type": "scatter", "mode": "lines", "x": mark.x, "y": mark.y, "line": line}
+        case Points():
+            style = {"color": colour, "symbol": mark.marker, "size": 8}
+            trace: dict[str, Any] = {"type": "scatter", "mode": "markers", "x": mark.x, "y": mark.y, "marker": style}
+            trace["text"] = list(mark.notes) or None
+            if mark.low is not None and mark.high is not None:
+                reach = {"array": mark.high - mark.y, "arrayminus": mark.y - mark.low}
+                trace["error_y"] = {"type": "data", "symmetric": False, "thickness": 1.0, "width": 2, **reach}
+            return trace
+        case Ribbon():  # a closed polygon: along the upper bound and back along the lower
+            filled = {"fill": "toself", "fillcolor": colour, "opacity": _OPACITY, "line": {"width": 0}}
+            outline = {"x": [*mark.x, *mark.x[::-1]], "y": [*mark.high, *mark.low[::-1]]}
+            return {"type": "scatter", "mode": "lines", **outline, "hoverinfo": "skip", **filled}

@@ -4,7 +4,6 @@ The figures have no global state and are saved reproducibly: the same numbers gi
 """
 
 import io
-from functools import singledispatch
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,7 +13,7 @@ from matplotlib.axis import XAxis, YAxis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from gateway.reports.charts import COLOURS, Axis, Chart, LineMark, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts import COLOURS, Axis, Chart, LineMark, Mark, Panel, Points, Ribbon, Rule, Span
 
 _STYLE: Final[Any] = {  # matplotlib types its keys one by one
     "svg.fonttype": "none",
@@ -115,44 +114,21 @@ def _with_plain_ticks(axis: XAxis | YAxis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def _legend(label: str) -> str:
-    return label or "_"  # matplotlib leaves names that begin so out of the legend
-
-
-@singledispatch
-def _draw_mark(mark: object, axes: Axes, order: int) -> None:
-    raise TypeError(f"no drawing for {type(mark).__name__}")
-
-
-@_draw_mark.register
-def _(mark: LineMark, axes: Axes, order: int) -> None:
-    axes.plot(mark.x, mark.y, color=COLOURS[mark.colour], linestyle=_DASHES[mark.dash], linewidth=1.2,
-              label=_legend(mark.label), zorder=order)  # fmt: skip
-
-
-@_draw_mark.register
-def _(mark: Points, axes: Axes, order: int) -> None:
-    colour = COLOURS[mark.colour]
-    if mark.low is not None and mark.high is not None:
-        axes.vlines(mark.x, mark.low, mark.high, color=colour, linewidth=0.8, alpha=0.6, zorder=order)
-    axes.plot(
-        mark.x, mark.y, _MARKERS[mark.marker], color=colour, markersize=4, label=_legend(mark.label), zorder=order
-    )
-
-
-@_draw_mark.register
-def _(mark: Ribbon, axes: Axes, order: int) -> None:
-    axes.fill_between(mark.x, mark.low, mark.high, color=COLOURS[mark.colour], alpha=0.18, linewidth=0.0,
-                      label=_legend(mark.label), zorder=order)  # fmt: skip
-
-
-@_draw_mark.register
-def _(mark: Rule, axes: Axes, order: int) -> None:
-    across = axes.axvline if mark.is_vertical else axes.axhline
-    across(mark.at, color=COLOURS[mark.colour], linestyle=_DASHES[mark.dash], linewidth=1.0, label=_legend(mark.label),
-           zorder=order)  # fmt: skip
-
-
-@_draw_mark.register
-def _(mark: Span, axes: Axes, order: int) -> None:
-    axes.axvspan(mark.low, mark.high, color=COLOURS[mark.colour], alpha=0.3, linewidth=0.0, label=_legend(mark.label))
+def _draw_mark(mark: Mark, axes: Axes, order: int) -> None:
+    # matplotlib leaves names that begin with an underscore out of the legend
+    style: dict[str, Any] = {"color": COLOURS[mark.colour], "label": mark.label or "_"}
+    match mark:
+        case LineMark():
+            axes.plot(mark.x, mark.y, linestyle=_DASHES[mark.dash], linewidth=1.2, zorder=order, **style)
+        case Points():
+            if mark.low is not None and mark.high is not None:
+                bars: dict[str, Any] = {"color": style["color"], "linewidth": 0.8, "alpha": 0.6}
+                axes.vlines(mark.x, mark.low, mark.high, zorder=order, **bars)
+            axes.plot(mark.x, mark.y, _MARKERS[mark.marker], markersize=4, zorder=order, **style)
+        case Ribbon():
+            axes.fill_between(mark.x, mark.low, mark.high, alpha=0.18, linewidth=0.0, zorder=order, **style)
+        case Rule():
+            across = axes.axvline if mark.is_vertical else axes.axhline
+            across(mark.at, linestyle=_DASHES[mark.dash], linewidth=1.0, zorder=order, **style)
+        case Span():
+            axes.axvspan(mark.low, mark.high, alpha=0.3, linewidth=0.0, **style)

@@ -59,7 +59,6 @@ def looks_of(fleet: FleetSummary) -> list[Look]:
 
 
 def fleet_sections(fleet: FleetSummary, looks: Sequence[Look]) -> list[Section]:
-    """All sections of the overview page."""
     failed = [_failed(fleet)] if fleet.failures else []
     return [_look_section(looks), _vehicles(fleet), _loads(fleet), _refusals(fleet), _drift(fleet), *failed, _how()]
 

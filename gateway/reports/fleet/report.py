@@ -68,7 +68,6 @@ def _page(title: str, head: str, sections: Sequence[Section], first: str, plotly
 
 
 def fleet_json(fleet: FleetSummary, looks: Sequence[Look], source: str) -> dict[str, Any]:
-    """All numbers of the pages, by vehicle."""
     return {
         "dataset": source,
         "from": str(fleet.first),

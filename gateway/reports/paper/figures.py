@@ -235,7 +235,6 @@ def figure_drive(experiments: Experiments, kind: str, method: Method) -> Figure:
 
 
 def figure_13(experiments: Experiments) -> Figure:
-    """The experimental grid."""
     figure, (axes,) = panels(1, 1)
     runs = experiments.driven["experiment"].identification
     axes.plot([run.payload_kg for run in runs], [run.front_share_pct for run in runs], "s", color=COLOURS[0])
