@@ -27,48 +27,19 @@ TYRE_NPM: Final = 400e3  # chosen: both tyres of an axle; scales with mass
 MOUNT_NPM: Final = 500e3  # chosen: both damper mounts of an axle; scales with mass
 GYRATION_PER_WHEELBASE: Final = 0.46  # Gillespie, ch. 5
 MOST_OFFSET_STD_M: Final = 0.1  # chosen: of the sensor's lateral place; a worse one is not used
-EMPTY_LEFT_STD_M: Final = 0.02  # chosen: driver, tank, sliding door
-SLACK: Final = 0.03  # chosen: share of unmodelled power
-SLOPE_PER_KN, SLOPE_STD_PER_KN = 0.03, 0.05  # chosen: of the spring rate's logarithm
+REFERENCE_KG: Final = 1250.0  # chosen: the vehicle whose tyres, mounts and springs the figures here refer to
 BEND_STD_PER_KN: Final = 0.1
 """Chosen: of each bend. The bend at no added load equals the slope except where a load relieves the axle; their priors
 add up.
 """
-DAMPER_FRICTION, DAMPER_FRICTION_STD = 0.1, 0.3  # chosen: shares of the rate at the usual amplitude
-SPRING_FRICTION, SPRING_FRICTION_STD = 0.03, 0.05  # chosen: likewise
-REFERENCE_KG: Final = 1250.0  # chosen: the vehicle whose tyres, mounts and springs the figures here refer to
-TRACK_OFFSET_M: Final = 0.03  # chosen: between the tracks of both axles
 NOISE_ACCELERATION_M2PS3: Final = 1e-5  # chosen: 300 ug per root hertz
-NOISE_PITCH_RATE_RAD2PS: Final = 1e-8  # chosen: 0.006 deg/s per root hertz; steps of 0.25 deg/s at 100 Hz make 3e-8
+NOISE_RATE_RAD2PS: Final = 1e-8  # chosen: 0.006 deg/s per root hertz; steps of 0.25 deg/s at 100 Hz make 3e-8
+NOISE_STD: Final = 2.0  # chosen: of the noises' logarithms
 
-_LOG_STD: Final = {
-    "spring": 0.35,
-    "damper": 0.5,
-    "damper_mount": 1.0,
-    "tyre": 0.3,
-    "unsprung": ESTIMATED_UNSPRUNG_STD,
-    "pitch_inertia": 0.25,
-    "payload_gyration": 0.7,
-    "payload_mode": 0.6,
-    "payload_damping": 0.5,
-    "slack": 1.0,
-    "noise": 2.0,
-    "track_offset": 1.0,
-}
-"""Chosen: standard deviations of logarithms, wide enough for any road vehicle."""
-
-_ROLL_STD: Final = {
-    "roll_inertia_kgm2": 0.3,
-    "payload_roll_gyration_m2": 0.7,
-    "anti_roll_front_npm": 1.0,
-    "anti_roll_rear_npm": 1.0,
-    "damper_against_front": 0.3,
-    "damper_against_rear": 0.3,
-    "tracks_apart_m": 0.5,
-    "twist_level": 0.5,
-    "gyro_yaw_rad": 0.05,  # 3 degrees
-}
-"""Chosen: of model.usual_roll's figures, wide enough for cars and vans. Of logarithms except the last."""
+Rows = dict[str, tuple[float, float]]
+"""By parameter: mean and standard deviation; of the logarithm for a positive one (model.parameters.is_positive). The
+standard deviations are chosen: wide enough for any road vehicle.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,45 +104,34 @@ def can_roll(vehicle: Vehicle) -> bool:
 
 def prior_of(vehicle: Vehicle, *, with_roll: bool = False) -> Prior:
     """The prior of a vehicle from its mass, wheelbase, share and sensor position; with roll also from its track."""
-    entries = _body(vehicle) | _axle("front", vehicle) | _axle("rear", vehicle)
+    rows = _body(vehicle) | _axle("front", vehicle) | _axle("rear", vehicle)
     names = PARAMETERS
     if with_roll:
         names += ROLL_PARAMETERS
-        entries |= _roll(vehicle)
-    entries |= {name: (log(SLACK), _LOG_STD["slack"]) for name in names if name.startswith("slack_")}
-    mean, std = np.array([entries[name] for name in names]).T
+        rows |= _roll(vehicle)
+    rows |= {name: (log(0.03), 1.0) for name in names if name.startswith("slack_")}  # chosen: share of unmodelled power
+    mean, std = np.array([rows[name] for name in names]).T
     return Prior.independent(mean, std)
 
 
-def _roll(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
-    if vehicle.track_width_m is None:
-        raise ValueError("a vehicle that rolls needs the width of its track")
-    usual = usual_roll(vehicle.empty_mass_kg, vehicle.track_width_m)
-    return {name: (mean, _ROLL_STD[name]) for name, mean in usual.items()} | {
-        "noise_roll_rate_rad2ps": (log(NOISE_PITCH_RATE_RAD2PS), _LOG_STD["noise"]),
-        "sensor_left_m": (vehicle.sensor_left_m, vehicle.sensor_left_std_m),
-        "empty_left_m": (vehicle.empty_cg_left_m, EMPTY_LEFT_STD_M),
-    }
-
-
-def _body(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
+def _body(vehicle: Vehicle) -> Rows:
     inertia = vehicle.empty_mass_kg * (GYRATION_PER_WHEELBASE * vehicle.wheelbase_m) ** 2
     return {
-        "pitch_inertia_kgm2": (log(inertia), _LOG_STD["pitch_inertia"]),
+        "pitch_inertia_kgm2": (log(inertia), 0.25),
         "sensor_position_m": (vehicle.sensor_position_m, vehicle.sensor_position_std_m),
-        "payload_gyration_m2": (log(0.1), _LOG_STD["payload_gyration"]),  # chosen: a compact load
-        "payload_mode_hz": (log(25.0), _LOG_STD["payload_mode"]),  # chosen: above the estimators' band
-        "payload_damping_ratio": (log(0.15), _LOG_STD["payload_damping"]),  # chosen: packed goods
-        "noise_acceleration_m2ps3": (log(NOISE_ACCELERATION_M2PS3), _LOG_STD["noise"]),
-        "noise_pitch_rate_rad2ps": (log(NOISE_PITCH_RATE_RAD2PS), _LOG_STD["noise"]),
-        "track_offset_m": (log(TRACK_OFFSET_M), _LOG_STD["track_offset"]),
+        "payload_gyration_m2": (log(0.1), 0.7),  # chosen: a compact load
+        "payload_mode_hz": (log(25.0), 0.6),  # chosen: above the estimators' band
+        "payload_damping_ratio": (log(0.15), 0.5),  # chosen: packed goods
+        "noise_acceleration_m2ps3": (log(NOISE_ACCELERATION_M2PS3), NOISE_STD),
+        "noise_pitch_rate_rad2ps": (log(NOISE_RATE_RAD2PS), NOISE_STD),
+        "track_offset_m": (log(0.03), 1.0),  # chosen: between the tracks of both axles
         "gyro_lag_s": (0.0, 0.01),  # chosen: one sample at 100 Hz
         "delay_scale": (0.0, 0.003),  # chosen: of the speed, by tyre wear and receiver
         "rear_lag_s": (0.0, 0.005),  # chosen: the rear axle's path to the body
     }
 
 
-def _axle(end: str, vehicle: Vehicle) -> dict[str, tuple[float, float]]:
+def _axle(end: str, vehicle: Vehicle) -> Rows:
     share = vehicle.empty_front_share
     sprung_kg = vehicle.empty_mass_kg * (share if end == "front" else 1.0 - share)
     spring_npm = sprung_kg * (2.0 * pi * BOUNCE_HZ) ** 2 * 1.15  # in series with the tyre
@@ -180,15 +140,37 @@ def _axle(end: str, vehicle: Vehicle) -> dict[str, tuple[float, float]]:
     unsprung_kg = given_kg or UNSPRUNG_SHARE * vehicle.empty_mass_kg
     scale = vehicle.empty_mass_kg / REFERENCE_KG
     return {
-        f"spring_{end}_npm": (log(spring_npm), _LOG_STD["spring"]),
-        f"damper_{end}_nspm": (log(damper_nspm), _LOG_STD["damper"]),
-        f"damper_mount_{end}_npm": (log(MOUNT_NPM * scale), _LOG_STD["damper_mount"]),
-        f"tyre_{end}_npm": (log(TYRE_NPM * scale), _LOG_STD["tyre"]),
-        f"unsprung_{end}_kg": (log(unsprung_kg), WEIGHED_STD if given_kg else _LOG_STD["unsprung"]),
-        f"damper_friction_{end}": (DAMPER_FRICTION, DAMPER_FRICTION_STD),
-        f"spring_friction_{end}": (SPRING_FRICTION, SPRING_FRICTION_STD),
-        f"spring_slope_{end}_per_kn": (SLOPE_PER_KN / scale, SLOPE_STD_PER_KN / scale),
+        f"spring_{end}_npm": (log(spring_npm), 0.35),
+        f"damper_{end}_nspm": (log(damper_nspm), 0.5),
+        f"damper_mount_{end}_npm": (log(MOUNT_NPM * scale), 1.0),
+        f"tyre_{end}_npm": (log(TYRE_NPM * scale), 0.3),
+        f"unsprung_{end}_kg": (log(unsprung_kg), WEIGHED_STD if given_kg else ESTIMATED_UNSPRUNG_STD),
+        f"damper_friction_{end}": (0.1, 0.3),  # chosen: share of the rate at the usual amplitude
+        f"spring_friction_{end}": (0.03, 0.05),  # chosen: likewise
+        f"spring_slope_{end}_per_kn": (0.03 / scale, 0.05 / scale),  # chosen: of the spring rate's logarithm
         **{f"spring_bend_{end}_{i}_per_kn": (0.0, BEND_STD_PER_KN / scale) for i in range(len(BEND_SHARES))},
+    }
+
+
+def _roll(vehicle: Vehicle) -> Rows:
+    if vehicle.track_width_m is None:
+        raise ValueError("a vehicle that rolls needs the width of its track")
+    usual = usual_roll(vehicle.empty_mass_kg, vehicle.track_width_m)
+    stds = {
+        "roll_inertia_kgm2": 0.3,
+        "payload_roll_gyration_m2": 0.7,
+        "anti_roll_front_npm": 1.0,
+        "anti_roll_rear_npm": 1.0,
+        "damper_against_front": 0.3,
+        "damper_against_rear": 0.3,
+        "tracks_apart_m": 0.5,
+        "twist_level": 0.5,
+        "gyro_yaw_rad": 0.05,  # 3 degrees
+    }
+    return {name: (mean, stds[name]) for name, mean in usual.items()} | {
+        "noise_roll_rate_rad2ps": (log(NOISE_RATE_RAD2PS), NOISE_STD),
+        "sensor_left_m": (vehicle.sensor_left_m, vehicle.sensor_left_std_m),
+        "empty_left_m": (vehicle.empty_cg_left_m, 0.02),  # chosen: driver, tank, sliding door
     }
 
 

@@ -100,27 +100,17 @@ class TargetErrors:
     std: float | None
     max_abs: float | None
     coverage95: float | None
-    mean_abs_pct_of_gross: float | None = None
     half_width_pct: float | None = None
     interval_score_pct: float | None = None
+    mean_abs_pct_of_gross: float | None = None
 
     def to_json(self) -> dict[str, float | None]:
-        """The object that ``evaluate --json`` prints for one quantity."""
-        record = {
-            "mean_abs_pct": self.mean_abs_pct,
-            "mean_abs_pct_with_misses": self.mean_abs_pct_with_misses,
-            "bias_pct": self.bias_pct,
-            "std_pct": self.std_pct,
-            "max_abs_pct": self.max_abs_pct,
-            f"mean_abs_{self.unit}": self.mean_abs,
-            f"bias_{self.unit}": self.bias,
-            f"std_{self.unit}": self.std,
-            f"max_abs_{self.unit}": self.max_abs,
-            "coverage95": self.coverage95,
-            "half_width_pct": self.half_width_pct,
-            "interval_score_pct": self.interval_score_pct,
-        }
-        return record | ({"mean_abs_pct_of_gross": self.mean_abs_pct_of_gross} if self.unit == "kg" else {})
+        """The object that ``evaluate --json`` prints for one quantity: names without a unit get this one."""
+        figures = {name: figure for name, figure in asdict(self).items() if name != "unit"}
+        if self.unit != "kg":
+            del figures["mean_abs_pct_of_gross"]
+        in_unit = ("mean_abs", "bias", "std", "max_abs")
+        return {f"{name}_{self.unit}" if name in in_unit else name: figure for name, figure in figures.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,10 +125,6 @@ class CgLeftErrors:
     half_width_m: float | None = None
     interval_score_m: float | None = None
 
-    def to_json(self) -> dict[str, float | None]:
-        """The object that ``evaluate --json`` prints."""
-        return asdict(self)
-
 
 @dataclass(frozen=True, slots=True)
 class WheelErrors:
@@ -146,10 +132,6 @@ class WheelErrors:
 
     mean_abs_pct_of_gross: float | None
     max_abs_pct_of_gross: float | None
-
-    def to_json(self) -> dict[str, float | None]:
-        """The object that ``evaluate --json`` prints."""
-        return asdict(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,8 +166,8 @@ class Errors:
             "rejected_by_reason": self.rejected_by_reason,
             "payload": self.payload.to_json(),
             "front_share": self.front_share.to_json(),
-            "cg_left": self.cg_left.to_json() if self.cg_left else None,
-            "wheels": self.wheels.to_json() if self.wheels else None,
+            "cg_left": asdict(self.cg_left) if self.cg_left else None,
+            "wheels": asdict(self.wheels) if self.wheels else None,
         }
 
 

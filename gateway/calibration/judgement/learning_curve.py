@@ -14,7 +14,7 @@ import numpy as np
 
 from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.inspection.log import SplitRun
-from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
+from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.ratio_index.fit import fit_ratio_index
 from gateway.config import ESTIMATOR_NAMES
@@ -50,18 +50,9 @@ class Score:
     @classmethod
     def of(cls, errors: Errors) -> "Score":
         """The figures that a curve needs."""
-        return cls(
-            n_batches=errors.n_batches,
-            n_rejected=errors.n_rejected,
-            payload_mean_abs_pct=errors.payload.mean_abs_pct,
-            payload_coverage95=errors.payload.coverage95,
-            payload_half_width_pct=errors.payload.half_width_pct,
-            payload_interval_score_pct=errors.payload.interval_score_pct,
-            front_share_mean_abs_pct=errors.front_share.mean_abs_pct,
-            front_share_coverage95=errors.front_share.coverage95,
-            front_share_half_width_pct=errors.front_share.half_width_pct,
-            front_share_interval_score_pct=errors.front_share.interval_score_pct,
-        )
+        names = ("mean_abs_pct", "coverage95", "half_width_pct", "interval_score_pct")
+        figures = {f"{target}_{name}": getattr(errors.of(target), name) for target in TARGETS for name in names}
+        return cls(errors.n_batches, errors.n_rejected, **figures)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,25 +177,21 @@ def triples_at_different_positions(runs: Sequence[KnownRun], vehicle: Vehicle) -
 
 def spread_of(scores: Sequence[Score]) -> ScoreSpread:
     """Statistics over trials; each trial counts once, however many batches it answered."""
+
+    def known(name: str) -> list[float]:
+        return [figure for score in scores if (figure := getattr(score, name)) is not None]
+
     n_batches = sum(score.n_batches for score in scores)
-    payload = _known([score.payload_mean_abs_pct for score in scores])
-    share = _known([score.front_share_mean_abs_pct for score in scores])
-    return ScoreSpread(
-        n_trials=len(scores),
-        rejected_share=sum(score.n_rejected for score in scores) / n_batches if n_batches else None,
-        payload_mean_pct=_mean(payload),
-        payload_std_pct=float(np.std(payload)) if payload else None,
-        payload_worst_pct=max(payload, default=None),
-        payload_coverage95=_mean(_known([score.payload_coverage95 for score in scores])),
-        payload_half_width_pct=_mean(_known([score.payload_half_width_pct for score in scores])),
-        payload_interval_score_pct=_mean(_known([score.payload_interval_score_pct for score in scores])),
-        front_share_mean_pct=_mean(share),
-        front_share_std_pct=float(np.std(share)) if share else None,
-        front_share_worst_pct=max(share, default=None),
-        front_share_coverage95=_mean(_known([score.front_share_coverage95 for score in scores])),
-        front_share_half_width_pct=_mean(_known([score.front_share_half_width_pct for score in scores])),
-        front_share_interval_score_pct=_mean(_known([score.front_share_interval_score_pct for score in scores])),
-    )
+    spread: dict[str, float | None] = {}
+    for target in TARGETS:
+        errors_pct = known(f"{target}_mean_abs_pct")
+        spread[f"{target}_mean_pct"] = _mean(errors_pct)
+        spread[f"{target}_std_pct"] = float(np.std(errors_pct)) if errors_pct else None
+        spread[f"{target}_worst_pct"] = max(errors_pct, default=None)
+        for name in (f"{target}_coverage95", f"{target}_half_width_pct", f"{target}_interval_score_pct"):
+            spread[name] = _mean(known(name))
+    rejected_share = sum(score.n_rejected for score in scores) / n_batches if n_batches else None
+    return ScoreSpread(len(scores), rejected_share, **spread)
 
 
 def _rung(n_runs: int, estimator: str, trials: Sequence[Trial]) -> Rung:
@@ -216,10 +203,6 @@ def _rung(n_runs: int, estimator: str, trials: Sequence[Trial]) -> Rung:
         left_out=spread_of([trial.left_out for trial in trials if trial.left_out]),
         validation=spread_of([trial.validation for trial in trials if trial.validation]),
     )
-
-
-def _known(figures: Sequence[float | None]) -> list[float]:
-    return [figure for figure in figures if figure is not None]
 
 
 def _mean(figures: Sequence[float]) -> float | None:

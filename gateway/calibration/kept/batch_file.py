@@ -23,6 +23,8 @@ FORMAT: Final = "springscale-batch"
 VERSION: Final = 3  # of the format
 MOST_SAMPLES: Final = 1_000_000  # chosen: an hour at 200 Hz has 720 000
 _FLOATS: Final = ("vertical_acceleration_mps2", "pitch_rate_radps", "speed_mps")
+_FIELDS: Final = ("t_start_ns", "t_end_ns", "drive_start_ns", "rate_hz", "gravity_mps2", "gap_share", "shares",
+                  "longest_stop_s", "rejected", "is_provisional", "sensor_rate_hz", "gyro_gain")  # fmt: skip
 _DIGEST_BYTES: Final = 32  # of SHA-256
 _FASTEST: Final = 1  # zlib level; the best one saves 2 % more at many times the cost
 
@@ -56,24 +58,11 @@ def packed(kept: KeptBatch) -> bytes:
         "signals_id": kept.signals_id,
         "n": len(batch.usable),
         "has_roll": batch.roll_rate_radps is not None,
-        "batch": {
-            "t_start_ns": batch.t_start_ns,
-            "t_end_ns": batch.t_end_ns,
-            "drive_start_ns": batch.drive_start_ns,
-            "rate_hz": batch.rate_hz,
-            "gravity_mps2": _known(batch.gravity_mps2),
-            "gap_share": batch.gap_share,
-            "shares": {str(why): share for why, share in batch.shares.items()},
-            "longest_stop_s": batch.longest_stop_s,
-            "rejected": [str(why) for why in batch.rejected],
-            "is_provisional": batch.is_provisional,
-            "sensor_rate_hz": _known(batch.sensor_rate_hz),
-            "gyro_gain": batch.gyro_gain,
-        },
+        "batch": {name: _json(getattr(batch, name)) for name in _FIELDS},
         "facts": {
             "duration_s": kept.facts.duration_s,
             "streams": {
-                str(signal): {key: _known(number) for key, number in asdict(stream).items()}
+                str(signal): {key: _json(number) for key, number in asdict(stream).items()}
                 for signal, stream in kept.facts.streams.items()
             },
         },
@@ -141,9 +130,9 @@ def _from_sorted(raw: bytes, n: int) -> F64:
     return numbers.astype(np.float64)
 
 
-def _known(number: float) -> float | None:
-    """The number, or None for NaN, which JSON lacks."""
-    return number if math.isfinite(number) else None
+def _json(figure: Any) -> Any:
+    """A figure in JSON, which lacks NaN: None stands for it."""
+    return None if isinstance(figure, float) and not math.isfinite(figure) else figure
 
 
 def _nan_if_none(number: float | None) -> float:

@@ -7,8 +7,9 @@ from typing import Final
 import numpy as np
 
 from gateway.core.calibrated import RANGE_MARGIN
-from gateway.core.vehicle import Load, Vehicle, front_share_pct
+from gateway.core.vehicle import Load, Vehicle, cg_left_m, front_share_pct
 from gateway.core.weights.on_the_road import weights_of
+from gateway.estimate import Quantity
 from gateway.posterior import exactly
 
 DRIVEN_PARTS: Final = (0.25, 0.5, 0.75, 1.0)  # chosen: of the largest payload
@@ -18,6 +19,7 @@ WEIGHED_PARTS: Final = tuple(np.linspace(0.05, 1.0, 6).tolist())
 WEIGHED_PLACES: Final = tuple(np.linspace(0.1, 1.0, 7).tolist())
 PAYLOAD_STEP_KG: Final = 10.0  # chosen: round numbers for people
 POSITION_STEP_M: Final = 0.1  # chosen: round numbers for people
+EVEN: Final = 0.5  # chosen: front axle's part of a roll moment, if unknown
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,12 +85,15 @@ def _is_near(x: float, seen: Sequence[float]) -> bool:
 
 def _within_limits(vehicle: Vehicle, loads: Iterable[tuple[float, float]]) -> tuple[PlacedLoad, ...]:
     placed = (PlacedLoad(kg, m, front_share_pct(vehicle, kg, m)) for kg, m in dict.fromkeys(loads))
-    return (empty(vehicle), *(load for load in placed if _is_allowed(vehicle, load)))
+    return (empty(vehicle), *(load for load in placed if is_allowed(vehicle, load)))
 
 
-def _is_allowed(vehicle: Vehicle, load: PlacedLoad) -> bool:
-    """Whether the load is within the limits; unknown weights are not checked."""
-    weights = weights_of(vehicle, exactly(load.payload_kg, load.front_share_pct))
+def is_allowed(vehicle: Vehicle, load: PlacedLoad, payload_left_m: float | None = None) -> bool:
+    """Whether the load is within the limits, those of single wheels too if its lateral place is given; unknown weights
+    are not checked.
+    """
+    place = () if payload_left_m is None else (cg_left_m(vehicle, load.payload_kg, payload_left_m),)
+    weights = weights_of(vehicle, exactly(load.payload_kg, load.front_share_pct, *place), Quantity(EVEN, 0.0))
     return not any(weight.is_over_limit for _, weight in weights.items())
 
 

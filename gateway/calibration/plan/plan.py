@@ -22,16 +22,21 @@ from gateway.calibration.half_car.left_out import model_error
 from gateway.calibration.half_car.prior import Inherited, Prior, prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan.design import BATCH_S, Design
-from gateway.calibration.plan.loads import PlacedLoad, drivable_loads, empty, share_within_reach, weighed_loads
+from gateway.calibration.plan.loads import (
+    PlacedLoad,
+    drivable_loads,
+    empty,
+    is_allowed,
+    share_within_reach,
+    weighed_loads,
+)
 from gateway.core.cargo import ShapePrior, is_said, shape_prior
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS, upright
 from gateway.core.cross_spectrum.predicted import Drive, predicted
 from gateway.core.vehicle import Carries, Load, Vehicle, cg_left_m, front_share_pct
-from gateway.core.weights.on_the_road import weights_of
 from gateway.errors import CalibrationImpossibleError
-from gateway.estimate import Quantity
-from gateway.posterior import PAYLOAD, Source, exactly
+from gateway.posterior import PAYLOAD, Source
 from gateway.records import F64
 from gateway.units import NS_PER_S
 
@@ -39,7 +44,6 @@ LEAST_CG_LEFT_M: Final = 0.03  # chosen: of the sprung mass; a load near the mid
 TRACK_PART: Final = 0.25  # chosen: of the track width; a heavy load between wheel arches can be this far off
 USUAL_TRACK_M: Final = 1.5  # chosen: of cars and vans
 PLACE_STEP_M: Final = 0.05  # chosen: round numbers for people
-EVEN: Final = 0.5  # chosen: front axle's part of a roll moment, if unknown
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +63,7 @@ def sideways_load(runs: Sequence[KnownRun], vehicle: Vehicle) -> OffCentreLoad |
         return None
     left_m = round(round(TRACK_PART * (vehicle.track_width_m or USUAL_TRACK_M) / PLACE_STEP_M) * PLACE_STEP_M, 6)
     placed = [OffCentreLoad(load, left_m) for load in drivable_loads(vehicle) if load.payload_kg > 0.0]
-    allowed = [one for one in placed if _is_allowed(vehicle, one)]
+    allowed = [one for one in placed if is_allowed(vehicle, one.load, left_m)]
     middle_pct = vehicle.empty_front_share_pct
     return max(
         allowed, key=lambda one: (one.load.payload_kg, -abs(one.load.front_share_pct - middle_pct)), default=None
@@ -69,14 +73,6 @@ def sideways_load(runs: Sequence[KnownRun], vehicle: Vehicle) -> OffCentreLoad |
 def _has_sideways(runs: Sequence[KnownRun], vehicle: Vehicle) -> bool:
     noted_m = [cg_left_m(vehicle, run.payload_kg, run.payload_left_m) for run in runs if run.payload_left_m is not None]
     return any(abs(left_m - vehicle.empty_cg_left_m) >= LEAST_CG_LEFT_M for left_m in noted_m)
-
-
-def _is_allowed(vehicle: Vehicle, placed: OffCentreLoad) -> bool:
-    """Whether it is within the limits of single wheels; those of axles and gross weight are already met."""
-    at_m = cg_left_m(vehicle, placed.load.payload_kg, placed.payload_left_m)
-    load = exactly(placed.load.payload_kg, placed.load.front_share_pct, at_m)
-    weights = weights_of(vehicle, load, Quantity(EVEN, 0.0))
-    return not any(weight.is_over_limit for _, weight in weights.items())
 
 
 FIRST_DRIVE: Final = Drive(600.0, 50.0 / 3.6)  # chosen: ten minutes in town traffic
