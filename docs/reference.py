@@ -195,6 +195,10 @@ DIAGNOSTICS: Final = {
     "sensor_position_score": "pull to another place or gain of the sensor, in standard deviations; refused beyond 6",
     "sensor_noise_score": "slope towards more noise in the acceleration, as roll makes it, in the same unit; refused "
     "above 6",
+    "soft_mass_score": "slope towards a mass on a soft support behind the rear axle, in the same unit; refused above 5 "
+    "if it weighs more than 10 kg",
+    "soft_mass_kg": "that mass, as one step of the search finds it",
+    "soft_mass_hz": "the frequency at which it swings",
     "noise_acceleration_ratio": "noise of the accelerometer from 16.5 to 20 Hz relative to the greatest expected: "
     "from 2 on the model includes it",
     "noise_pitch_rate_ratio": "the same for the pitch rate",

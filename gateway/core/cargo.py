@@ -41,7 +41,8 @@ BODY_MASS_PART: Final = 0.8  # k above at half the payload of a van; it varies f
 COMPACT_SCATTER: Final = 0.4  # chosen: of log s, for loads like the known ones
 SPREAD_PART: Final = 0.5  # chosen: share of undeclared loads that are spread out; the others are like the known loads
 ROOF_ABOVE_FLOOR_LOAD_M: Final = 1.1  # roof loads of vans: 1.9 m above the road against 0.8 to 0.9 m
-TOW_BAR_BEHIND_LOAD_M: Final = 1.7  # coupling 0.9 m behind the rear axle, loads about 0.8 m ahead of it
+TOW_BAR_BEHIND_AXLE_M: Final = 0.9  # of the rear axle to the coupling; chosen: vans have 0.8 to 1.1 m
+TOW_BAR_BEHIND_LOAD_M: Final = 1.7  # the same, and loads lie about 0.8 m ahead of that axle
 OUTLYING_PARTS: Final = (0.1, 0.2, 0.3, 0.4)  # chosen: part of a load on the roof rack or tow bar, if there is one
 SMOOTHING: Final = 0.15  # chosen: kernel width in log s, about the resolution of the table
 

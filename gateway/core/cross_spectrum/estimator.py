@@ -275,6 +275,9 @@ def _diagnostics(found: Weighed, calibration: CrossSpectrumCalibration) -> dict[
         "tension": located.tension,
         "sensor_position_score": located.scores.position,
         "sensor_noise_score": located.scores.noise,
+        "soft_mass_score": located.soft_mass.score,
+        "soft_mass_kg": located.soft_mass.kg,
+        "soft_mass_hz": located.soft_mass.resonance_hz,
         **dict(zip(SENSOR_OF, found.loudness.tolist(), strict=False)),
         "payload_gyration_m2": math.exp(theta[INDEX["payload_gyration_m2"]]),
         "payload_mode_hz": math.exp(theta[INDEX["payload_mode_hz"]]),
@@ -287,6 +290,8 @@ def _diagnostics(found: Weighed, calibration: CrossSpectrumCalibration) -> dict[
 def disbelieved(found: Weighed, calibration: CrossSpectrumCalibration) -> Why | None:
     """Why an answer is not accepted; SENSOR_NOISY if a noisy sensor may be the cause."""
     why = _disbelieved(found, calibration)
+    if why is None and found.located.soft_mass.is_there:
+        return Why.SOFT_LOAD
     return Why.SENSOR_NOISY if found.is_noisy and why in (*_BY_NOISE, Why.SENSOR_CHANGED) else why
 
 

@@ -11,7 +11,7 @@ within ROAD_RIPPLE.
 (P. Whittle, "The analysis of multiple stationary time series", J. R. Stat. Soc. B 15, 1953.)
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -21,10 +21,11 @@ from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.driven import are_in_motion
 from gateway.core.cross_spectrum.model.expected import expected_of_driven, with_noise
 from gateway.core.cross_spectrum.model.matrix import SpectralMatrix, Whitener
+from gateway.core.cross_spectrum.model.motion import Motion
 from gateway.core.cross_spectrum.model.parameters import Ground, has_roll
-from gateway.core.cross_spectrum.model.slopes import Solved, solved_at, spectral_slopes
+from gateway.core.cross_spectrum.model.slopes import Solved, slopes_of_paths, solved_at, spectral_slopes
 from gateway.core.vehicle import Load
-from gateway.records import F64
+from gateway.records import C128, F64
 
 EFFECTIVE_SHARE: Final = 0.5  # chosen: neighbouring Hann bins and half-overlapping segments are correlated
 ROAD_RIPPLE: Final = 0.3  # standard deviation of log s about its line; chosen (`benchmarks.accuracy sensitivity`)
@@ -165,9 +166,24 @@ class Whittle:
             self._curvatures[key] = self._curvature(point, free)
         return self._curvatures[key]
 
-    def _curvature(self, point: Point, free: Sequence[int]) -> Curvature:
+    def curvature_beside(self, point: Point, free: Sequence[int], by_level: Callable[[Motion], C128]) -> Curvature:
+        """Derivatives by the ``free`` entries, then by further causes of which ``by_level`` gives the derivatives of
+        the paths (5, k, p, s, m).
+        """
         z = self._whitened(point)
         rows = self._rows(z, free)
+        asked = [z.known.index(entry) for entry in free]
+        slopes = slopes_of_paths(z.solved, self.spectra, by_level(z.solved.model.motion))
+        return self._curvature_of(z, np.concatenate([rows[:, asked], self._whitened_rows(z, slopes)], axis=1))
+
+    def _curvature(self, point: Point, free: Sequence[int]) -> Curvature:
+        z = self._whitened(point)
+        whole = self._curvature_of(z, self._rows(z, free))
+        asked = [z.known.index(entry) for entry in free]
+        return Curvature(whole.gradient[asked], whole.information[np.ix_(asked, asked)])
+
+    def _curvature_of(self, z: _Whitened, rows: F64) -> Curvature:
+        """From the slopes (b m p^2, k) of the residuals."""
         level, x = self._root_level_weight * _centred(np.log(z.trace / self._p)), self._root_level_weight * self._slope
         shape = _traceless(z.seen) * (-self._p / z.trace * np.sqrt(self._n))
         residual = np.stack([*shape, level], axis=-1)
@@ -175,8 +191,7 @@ class Whittle:
         residual[..., -1] -= along * x
         d_along = np.tensordot(x, rows.reshape(*residual.shape, -1)[:, :, -1], 2)
         information = rows.T @ rows - np.outer(d_along, d_along) / self._level_stiffness
-        asked = [z.known.index(entry) for entry in free]
-        return Curvature((residual.ravel() @ rows)[asked], information[np.ix_(asked, asked)])
+        return Curvature(residual.ravel() @ rows, information)
 
     def _rows(self, z: _Whitened, free: Sequence[int]) -> F64:
         """(b m p^2, k) the residuals' slopes at a point, extended by those of ``free``.
@@ -187,15 +202,19 @@ class Whittle:
         in_motion = are_in_motion(missing, len(z.point.theta))
         missing = [*in_motion, *(entry for entry in missing if entry not in in_motion)]
         if missing:
-            z.by_part = self._by_part(z) if z.by_part is None else z.by_part
-            d = z.by_part @ spectral_slopes(z.solved, self.spectra, missing)
-            d[:, :, -1] -= d[:, :, -1].mean(axis=1, keepdims=True)
-            d[:, :, -1] *= self._root_level_weight[:, None]
-            rows = d.reshape(-1, len(missing))
+            rows = self._whitened_rows(z, spectral_slopes(z.solved, self.spectra, missing))
             z.rows = rows if z.rows is None else np.concatenate([z.rows, rows], axis=1)
             z.known += missing
         assert z.rows is not None
         return z.rows
+
+    def _whitened_rows(self, z: _Whitened, slopes: F64) -> F64:
+        """(b m p^2, k) the residuals' slopes, from those of the expected spectra (b, m, p^2, k)."""
+        z.by_part = self._by_part(z) if z.by_part is None else z.by_part
+        d = z.by_part @ slopes
+        d[:, :, -1] -= d[:, :, -1].mean(axis=1, keepdims=True)
+        d[:, :, -1] *= self._root_level_weight[:, None]
+        return d.reshape(-1, slopes.shape[-1])
 
     def _by_part(self, z: _Whitened) -> F64:
         """(b, m, p^2, p^2) derivative of the whitened matrix by each part of the matrix.

@@ -34,6 +34,7 @@ from gateway.core.cross_spectrum.packing import LEAST_STRAIN, Packing, packings,
 from gateway.core.cross_spectrum.search import Found, most_probable
 from gateway.core.cross_spectrum.sensor_change import FITTED, SensorScores, gain_moves, scores_of, weighed
 from gateway.core.cross_spectrum.shape import EVIDENCE, EVIDENCE_WITHOUT_ROLL, Node, Shaped, Waypoint, shaped
+from gateway.core.cross_spectrum.soft_mass import SoftMass, soft_mass_of
 from gateway.core.vehicle import Load
 from gateway.posterior import NORMAL_TAILS, Source
 from gateway.records import F64
@@ -79,6 +80,7 @@ class Located:
     misfit: float
     tension: float
     scores: SensorScores
+    soft_mass: SoftMass
     is_reversed: bool
     is_ambiguous: bool
     is_converged: bool
@@ -330,6 +332,7 @@ def _located(
         ),
         freed=dampers_of((x[:-2] if peak.freed is None else peak.freed) - prior.drifting),
         scores=scores_of(judged, at_peak, found, replace(fitted, parameters=parameters), prior.precision),
+        soft_mass=soft_mass_of(whittle, at_peak, calibration, prior),
         is_reversed=_is_reversed(whittle, at_peak, misfit, fitted),
         as_known=_point(peak.found.x, calibration, cg_left_m).load,
         is_converged=peak.found.is_converged if shape is None else shape.is_converged,

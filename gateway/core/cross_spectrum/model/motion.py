@@ -230,6 +230,18 @@ class Motion:
                 into[:] = self._by_sensor()[rows]
         return found
 
+    def by_suspended_mass(self, behind_m: float, felt: C128) -> C128:
+        """(..., k, p, s, m) derivatives of the paths by a mass (kg) in the body's middle plane, ``behind_m`` behind the
+        front axle, that acts on the body like ``felt`` (k, m) times itself.
+        """
+        rear = behind_m / self._frame.wheelbase_m
+        front = 1.0 - rear
+        on_front, on_rear, on_both = self._moved()[:3]
+        at_place = front**2 * on_front + rear**2 * on_rear + front * rear * on_both
+        per_kg = np.moveaxis(at_place * self._omega**2, (0, 1), (-3, -2))
+        slopes: C128 = per_kg[..., None, :, :, :] * felt[:, None, None]
+        return slopes
+
     def _compliance(self) -> C128:
         """(c, c, ..., m) the inverse of the stiffness; roll is eliminated first."""
         stiffness = self._axles.stiffness

@@ -87,14 +87,30 @@ def spectral_slopes(solved: Solved, spectra: CrossSpectra, free: Sequence[int]) 
     of_vehicle = are_in_motion(free, len(solved.theta))
     if of_vehicle:
         by_level = _by_level(solved.numbers_by(of_vehicle), model.motion)
-        moved = level_weights(spectra.log_movement) @ by_level
-        moved = moved.reshape(*by.phase.shape, -1, len(of_vehicle))
-        np.matmul(_by_response(by, model), moved, out=slopes[..., : len(of_vehicle)])
+        slopes[..., : len(of_vehicle)] = _of_paths(by_level, len(of_vehicle), solved, spectra)
     _fill_in_slack(slopes, free, by, model, spectra)
     if not _OF_ROAD.isdisjoint(free):
         _fill_in_road(slopes, free, by, model, spectra)
     slopes = tapered_parts(slopes, spectra)
     _add_noise(slopes, solved.noiseless, model, spectra, free)
+    return slopes
+
+
+def slopes_of_paths(solved: Solved, spectra: CrossSpectra, by_level: C128) -> F64:
+    """(b, m, p^2, k) derivatives of the expected spectra, from those of the paths (5, k, p, s, m) at each of
+    friction.levels().
+    """
+    k = by_level.shape[1]
+    slopes = tapered_parts(_of_paths(_by_frequency(by_level), k, solved, spectra), spectra)
+    _add_noise(slopes, solved.noiseless, solved.model, spectra, ())
+    return slopes
+
+
+def _of_paths(by_level: F64, k: int, solved: Solved, spectra: CrossSpectra) -> F64:
+    """(b, m, p^2, k) derivatives of the matrix without taper and noise, from ``by_level`` (5, m 2 p s k)."""
+    by = solved.driven
+    moved = (level_weights(spectra.log_movement) @ by_level).reshape(*by.phase.shape, -1, k)
+    slopes: F64 = _by_response(by, solved.model) @ moved
     return slopes
 
 
@@ -117,8 +133,19 @@ def _by_level(by_entry: F64, motion: Motion) -> F64:
     n_levels, _, p, s, m = slopes.shape
     by_number = slopes.view(float).reshape(n_levels, len(moving), -1)
     by_level = by_number.transpose(0, 2, 1) @ by_entry[:, moving]
-    by_frequency = by_level.reshape(n_levels, p, s, m, -1).swapaxes(2, 3).swapaxes(1, 2)
-    return by_frequency.reshape(n_levels, -1)
+    return _in_order_of_frequency(by_level.reshape(n_levels, p, s, m, -1))
+
+
+def _by_frequency(slopes: C128) -> F64:
+    """(5, m 2 p s k) the real and imaginary parts of derivatives (5, k, p, s, m) of the paths."""
+    n_levels, k, p, s, m = slopes.shape
+    parts = np.ascontiguousarray(slopes).view(float).reshape(n_levels, k, -1).transpose(0, 2, 1)
+    return _in_order_of_frequency(parts.reshape(n_levels, p, s, m, -1))
+
+
+def _in_order_of_frequency(parts: F64) -> F64:
+    """(5, m 2 p s k) of (5, p, s, m, 2 k)."""
+    return parts.swapaxes(2, 3).swapaxes(1, 2).reshape(len(parts), -1)
 
 
 def _by_response(by: Driven, model: SpectralModel) -> F64:
