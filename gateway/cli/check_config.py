@@ -11,8 +11,8 @@ from gateway.config import load_settings
 from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError, UntrustedFileError
 from gateway.records import json_line
-from gateway.service.commissioning import with_commissioned
-from gateway.service.startup_checks import startable_faults
+from gateway.service.calibration_in_use import with_commissioned
+from gateway.service.lifecycle import startable_faults
 from gateway.setup import Setup, setup_of
 from gateway.uplink.settings import uplink_settings, webhook_settings
 

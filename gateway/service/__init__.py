@@ -3,7 +3,3 @@
 Inputs are the settings with their files (signal map, calibration) and frames from the bus. Estimates go to the store,
 the web and the uplink; every change of state goes to the log and to systemd.
 """
-
-from gateway.service.gateway import Gateway, GatewayFailedError, OnStarted
-
-__all__ = ["Gateway", "GatewayFailedError", "OnStarted"]

@@ -18,9 +18,8 @@ from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event
 from gateway.notify import Notifier
 from gateway.service.alarms import AlarmService, rules_of
-from gateway.service.change_log import BatchLog, StateLog, call_each
-from gateway.service.last_good import keep_copy
-from gateway.service.load_events import LoadEventLog
+from gateway.service.batch_log import BatchLog, LoadEventLog, StateLog, call_each
+from gateway.service.calibration_in_use import keep_copy
 from gateway.service.part import CLOSE_WITHIN_S, Deadline, Questions, Sending, ServicePart, in_own_thread, stop_in_turn
 from gateway.service.parts import (
     Forwarding,

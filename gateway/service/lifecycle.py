@@ -1,14 +1,78 @@
-"""Lifecycle of the service: run one gateway with the calibration in use, and restart for another calibration."""
+"""Lifecycle of the service: checks before the start, one gateway with the calibration in use, and the restart."""
 
 import os
 import sys
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Final
 
+from gateway.bus.live.python_can import what_lacks
 from gateway.bus.live.source import OpenReceiver
+from gateway.bus.signals.mapping import SignalMap
 from gateway.config import Settings
-from gateway.service.commissioning import commissioned, with_commissioned
+from gateway.errors import ConfigurationError
+from gateway.records import Signal
+from gateway.service.calibration_in_use import commissioned, with_commissioned
 from gateway.service.gateway import Gateway, OnStarted
 from gateway.service.reload import LoadSettings
+from gateway.store import why_no_database
+from gateway.web.access.serving import refuse_open_address
+from gateway.web.access.tokens import TokenFile
+
+
+def startable_faults(settings: Settings, signal_map: SignalMap) -> Iterator[str]:
+    """Faults that would prevent the start or a fresh estimate, each with its remedy."""
+    yield from _signals_that_lack(signal_map)
+    yield from _store_that_cannot_be_written(settings.store.directory)
+    lacking = what_lacks(settings.bus.interface)
+    if lacking is not None:
+        yield lacking
+    if settings.broadcast.interface is not None and (lacking := what_lacks(settings.broadcast.interface)) is not None:
+        yield lacking.replace("[bus]", "[broadcast]")
+    try:
+        refuse_open_address(settings.web.host, has_tokens=_has_tokens(settings))
+    except ConfigurationError as fault:
+        yield str(fault)
+    if settings.web.stale_after_s < settings.batch.window_s:
+        yield (
+            f"[web] stale_after_s = {settings.web.stale_after_s:g} is below [batch] window_s = "
+            f"{settings.batch.window_s:g}: every estimate would be stale before the next; set it to three windows"
+        )
+
+
+def _signals_that_lack(signal_map: SignalMap) -> Iterator[str]:
+    """Missing signals: weighing needs two inertial signals and a speed."""
+    mapped = set(signal_map.signals)
+    for signal in (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE):
+        if signal not in mapped:
+            yield f"{signal_map.name} maps no {signal}, which every estimate needs: add [signals.{signal}]"
+    if not mapped & {Signal.SPEED, Signal.WHEEL_SPEED}:
+        yield f"{signal_map.name} maps no speed, which every estimate needs: add [signals.speed]"
+
+
+def _store_that_cannot_be_written(directory: Path) -> Iterator[str]:
+    """Faults of the store's directory, found by making a database in it, or in the folder that it would be made in.
+
+    A directory of another user, to which this one may not write, is not checked.
+    """
+    there = next(path for path in (directory, *directory.absolute().parents) if path.exists())
+    if not there.is_dir():
+        yield f"[store] directory = {directory}: {there} is a file; name a folder"
+    elif os.statvfs(there).f_flag & os.ST_RDONLY:
+        yield f"[store] directory = {directory}: is on a read-only file system; name a folder elsewhere"
+    elif not os.access(there, os.W_OK | os.X_OK) and (there != directory or there.stat().st_uid == os.geteuid()):
+        yield f"[store] directory = {directory}: {there} cannot be written; chmod u+w it, or name another folder"
+    elif os.access(there, os.W_OK | os.X_OK) and (why := why_no_database(there)) is not None:
+        yield f"[store] directory = {directory}: {there} cannot hold a database ({why}); name a folder on a disk"
+
+
+def _has_tokens(settings: Settings) -> bool:
+    """Whether the service has tokens; also true if this user may not read the file."""
+    try:
+        return bool(TokenFile(settings.store.directory / "tokens.json").tokens())
+    except ConfigurationError:
+        return True
+
 
 RESTART_CODE: Final = 75  # exit code after which systemd restarts the service (deploy/springscale.service)
 

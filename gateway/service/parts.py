@@ -14,7 +14,10 @@ from gateway.core.flow import Flow
 from gateway.errors import StoreError
 from gateway.estimate import Estimate
 from gateway.log import Event, log_event
-from gateway.service.commissioning import Commissioning, Jobs, Lines, ServiceVehicle, why_not_allowed
+from gateway.service.calibration_in_use import why_not_allowed
+from gateway.service.commissioning.empty_drive import Jobs, ServiceVehicle
+from gateway.service.commissioning.lines import Lines
+from gateway.service.commissioning.session import Commissioning
 from gateway.service.keeper import BatchKeeper
 from gateway.setup import Setup
 from gateway.store import Retention, Store

@@ -14,7 +14,7 @@ import uvicorn
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event, set_log_level
-from gateway.service.commissioning import setup_in_use
+from gateway.service.calibration_in_use import setup_in_use
 from gateway.setup import Setup
 from gateway.web.access.serving import Tls, renew_certificate
 

@@ -15,7 +15,9 @@ from gateway.config.sections import CommissioningSection
 from gateway.core.settings import BatchSettings
 from gateway.files.signed import Trust
 from gateway.records import Batch, Why
-from gateway.service.commissioning import Commissioning, Jobs, Lines, ServiceVehicle
+from gateway.service.commissioning.empty_drive import Jobs, ServiceVehicle
+from gateway.service.commissioning.lines import Lines
+from gateway.service.commissioning.session import Commissioning
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
 from support.calibrated import calibration_file

@@ -4,7 +4,7 @@ import threading
 from typing import Any
 
 from gateway.cli import main
-from gateway.service.commissioning import Commissioning
+from gateway.service.commissioning.session import Commissioning
 
 
 def never(*_: Any) -> str:

@@ -18,7 +18,7 @@ from gateway.core.change import Rules
 from gateway.errors import AlarmRefusedError
 from gateway.records import Why
 from gateway.service.alarms import rules_of
-from gateway.service.load_events import ledger_of
+from gateway.service.batch_log import ledger_of
 from gateway.status import BusStatus, SignalHealth, State, Status
 
 OVER = LIMIT_KG + 60.0

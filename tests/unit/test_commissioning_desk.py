@@ -25,8 +25,9 @@ from gateway.errors import CommissioningRefusedError
 from gateway.files.kept import KeptFiles
 from gateway.log import Event
 from gateway.records import Why
-from gateway.service.commissioning import commissioned, with_commissioned
-from gateway.service.commissioning.record import FILE_NAME, MOST_MADE, load_record
+from gateway.service.calibration_in_use import commissioned, with_commissioned
+from gateway.service.commissioning.record import FILE_NAME, MOST_MADE, CommissioningRecord
+from gateway.service.record_file import RecordFile, load_record
 from gateway.stated.doubt import Doubt, DoubtKind
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
@@ -437,7 +438,7 @@ def test_a_full_disk_while_driving_is_told_and_the_next_window_counts(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patch:
-        patch.setattr("gateway.service.commissioning.record_store.save_record", full)
+        patch.setattr(RecordFile, "keep", full)
         driving.drive(0)
     assert driving.desk.fault is not None
     assert Event.COMMISSIONING_NOT_KEPT in names(caplog)
@@ -550,7 +551,7 @@ def test_a_service_starts_with_what_was_made_here(driving: Bench) -> None:
     for n in range(2):
         driving.drive(n)
     driving.worker.finish(fitted())
-    active = load_record(driving.directory).active
+    active = load_record(driving.directory / FILE_NAME, CommissioningRecord()).active
     assert active is not None
     chosen = with_commissioned(settings)
     assert chosen.calibration == driving.directory / active.file_name

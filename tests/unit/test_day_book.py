@@ -13,7 +13,7 @@ from gateway.core.change import Rules
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.history import ENTRIES
-from gateway.service.load_events import LoadEventLog
+from gateway.service.batch_log import LoadEventLog
 from gateway.setup import load_setup
 from gateway.store import Store
 

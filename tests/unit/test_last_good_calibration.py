@@ -11,8 +11,8 @@ from support.web import Gateway as Web
 from gateway.config import Settings, load_settings
 from gateway.errors import CalibrationFileError, ConfigurationError
 from gateway.log import LOGGER
+from gateway.service.calibration_in_use import keep_copy, setup_or_last_good
 from gateway.service.gateway import Gateway
-from gateway.service.last_good import keep_copy, setup_or_last_good
 from gateway.service.reload import Reloader
 from gateway.setup import setup_of
 from gateway.web.access.serving import server_config

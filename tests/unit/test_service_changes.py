@@ -11,7 +11,7 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.estimate import Estimate
 from gateway.log import Event
 from gateway.records import Why
-from gateway.service.change_log import BatchLog, StateLog
+from gateway.service.batch_log import BatchLog, StateLog
 from gateway.status import State, Status
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import Scales, weigh_latest

@@ -30,7 +30,7 @@ from gateway.errors import ConfigurationError
 from gateway.log import LOGGER, set_log_level
 from gateway.notify import Notifier
 from gateway.service import lifecycle as life
-from gateway.service.commissioning import commissioned, with_commissioned
+from gateway.service.calibration_in_use import commissioned, with_commissioned
 from gateway.service.gateway import Gateway as Service
 from gateway.service.reload import Reloader, changed_keys, tls_of
 from gateway.setup import setup_of

@@ -13,7 +13,7 @@ from gateway.cli import springscale
 from gateway.config import load_settings
 from gateway.errors import CalibrationFileError, ConfigurationError, SignalMapError, UntrustedFileError
 from gateway.files.signed import PublicKey, Trust, load_public_keys, signature_path
-from gateway.service.last_good import keep_copy, setup_or_last_good
+from gateway.service.calibration_in_use import keep_copy, setup_or_last_good
 from gateway.setup import setup_of
 
 # All by OpenSSH 9.2: `ssh-keygen -t ed25519`, then `printf 'weights\n' > a` and `ssh-keygen -Y sign -n NAMESPACE a`

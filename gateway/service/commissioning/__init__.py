@@ -5,20 +5,3 @@ made.
 whether another calibration is due. It owns ``commissioning.json`` (``CommissioningRecord``), the calibrations named
 there, and the folder ``lines``; the fit runs in a process of its own (``Worker``).
 """
-
-from gateway.service.commissioning.empty_drive import Jobs, ServiceVehicle
-from gateway.service.commissioning.lines import Lines
-from gateway.service.commissioning.session import Commissioning, DrivePosition
-from gateway.service.commissioning.start import commissioned, setup_in_use, why_not_allowed, with_commissioned
-
-__all__ = [
-    "Commissioning",
-    "DrivePosition",
-    "Jobs",
-    "Lines",
-    "ServiceVehicle",
-    "commissioned",
-    "setup_in_use",
-    "why_not_allowed",
-    "with_commissioned",
-]

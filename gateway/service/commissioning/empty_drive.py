@@ -16,8 +16,7 @@ from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.errors import CalibrationFileError, CommissioningRefusedError
 from gateway.log import Event
 from gateway.records import Why
-from gateway.service.commissioning.record import MADE, LineChoice, MadeCalibration, Underway
-from gateway.service.commissioning.record_store import RecordStore
+from gateway.service.commissioning.record import MADE, LineChoice, MadeCalibration, RecordStore, Underway
 from gateway.service.commissioning.steps import LastInspection
 from gateway.service.commissioning.worker import Worker
 from gateway.stated.facts import VehicleAnswers
@@ -162,7 +161,7 @@ class EmptyDrive:
         elif underway.empty is not None:  # whatever drive was under way is over
             change["empty"] = underway.empty.model_copy(update={"drive_start_ns": None, "newest_ns": None})
         try:
-            self._book.keep(underway.model_copy(update=change))
+            self._book.keep_underway(underway.model_copy(update=change))
         except CommissioningRefusedError as refusal:
             self._book.cannot_store(refusal)
 
@@ -179,7 +178,7 @@ class EmptyDrive:
             change["batches"] = (*underway.batches, kept.id)
         now = underway.model_copy(update=change)
         if now != underway:
-            self._book.keep(now)
+            self._book.keep_underway(now)
             self._shelf.hold(OWNER, [*now.batches, *([now.open_batch] if now.open_batch else [])])
         if before is not None and before != now.open_batch:
             self._shelf.remove(before)
@@ -245,7 +244,7 @@ class EmptyDrive:
         if result.calibration is None or result.calibration_id is None or not is_wanted or doubted.open_doubts:
             fault = result.fault or result.refusal
             change = {"learned": result.learned, "fault": fault, "is_fit_asked": False}
-            self._book.keep(doubted.model_copy(update=change))
+            self._book.keep_underway(doubted.model_copy(update=change))
             return
         name = self._book.write_calibration(result.calibration, result.calibration_id)
         line = underway.line or LineChoice(name="")

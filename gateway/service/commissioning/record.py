@@ -1,20 +1,25 @@
-"""commissioning.json: the commissioning under way, and the calibrations made. Replaced atomically."""
+"""commissioning.json and the files named in it: the commissioning under way, and the calibrations made."""
 
-import json
+import logging
+import threading
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from gateway.calibration.commissioning.answers import NO_LINE, LineFacts
 from gateway.calibration.commissioning.job import Learned
+from gateway.calibration.file.calibration_file import load_calibration
 from gateway.calibration.file.parts import Part
 from gateway.core.vehicle import Vehicle
-from gateway.errors import ConfigurationError
+from gateway.errors import CalibrationFileError, CommissioningRefusedError
 from gateway.files.kept import KeptFiles
+from gateway.log import Event, OnEvent, log_event, tell_event
+from gateway.records import iso_utc
+from gateway.service.record_file import RecordFile
 from gateway.stated.doubt import OF_THE_DRIVE, Doubt, DoubtKind
 from gateway.stated.facts import VehicleAnswers
-from gateway.toml_file import describe_faults
 
 FILE_NAME: Final = "commissioning.json"
 MADE: Final = "commissioned-"  # the names of calibrations begin so
@@ -143,20 +148,69 @@ class CommissioningRecord(Part):
         return self.model_copy(update={"made": made})
 
 
-def load_record(directory: Path) -> CommissioningRecord:
-    """Empty if there is none yet. Raises ConfigurationError for an invalid file."""
-    path = directory / FILE_NAME
-    try:
-        return CommissioningRecord.model_validate_json(KeptFiles(directory).read(FILE_NAME))
-    except FileNotFoundError:
-        return CommissioningRecord()
-    except OSError as fault:
-        raise ConfigurationError(f"{path}: cannot be read: {fault.strerror or fault}") from None
-    except ValidationError as fault:
-        raise ConfigurationError(describe_faults(path, fault, CommissioningRecord)) from None
+class RecordStore(RecordFile[CommissioningRecord]):
+    """The file and those that it names. A caller that reads and then changes holds ``lock``."""
 
+    def __init__(self, directory: Path, on_event: OnEvent, clock_ns: Callable[[], int]) -> None:
+        self.directory = directory
+        self.lock = threading.RLock()
+        self._on_event = on_event
+        self._clock_ns = clock_ns
+        super().__init__(directory / FILE_NAME, CommissioningRecord())
 
-def save_record(directory: Path, record: CommissioningRecord) -> None:
-    """Write the record; on disk when this returns. Raises OSError, and then the old file stays."""
-    text = json.dumps(record.model_dump(mode="json"), indent=1, allow_nan=False, ensure_ascii=False)
-    KeptFiles(directory).write(FILE_NAME, (text + "\n").encode())
+    def keep_underway(self, underway: Underway | None) -> None:
+        """Save the commissioning under way. Raises as :meth:`save`."""
+        self.save(self.record.model_copy(update={"underway": underway}))
+
+    def save(self, record: CommissioningRecord) -> None:
+        """Write the record to disk. Raises CommissioningRefusedError if the disk fails; then nothing has changed."""
+        try:
+            self.keep(record)
+        except OSError as fault:
+            raise CommissioningRefusedError(
+                "not_stored", f"{self.path} cannot be written, so nothing has changed: {fault}"
+            ) from None
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file beside it atomically. Raises CommissioningRefusedError."""
+        try:
+            KeptFiles(self.directory).write(name, content)
+        except OSError as fault:
+            raise CommissioningRefusedError("not_stored", f"{name} cannot be written: {fault}") from None
+
+    def write_calibration(self, text: str, calibration_id: str) -> str:
+        """Write a calibration that was made here -> the name of its file, after reading it back.
+
+        Raises CommissioningRefusedError, and CalibrationFileError if the file differs from the fit.
+        """
+        name = f"{MADE}{calibration_id.removeprefix('sha256:')[:16]}.json"
+        self.write(name, text.encode())
+        if load_calibration(self.directory / name).id != calibration_id:
+            raise CalibrationFileError(f"{name}: is not what was fitted")
+        return name
+
+    def forget_others(self) -> None:
+        """Remove calibrations and copies of lines that the record no longer names. Raises OSError."""
+        named = {one.file_name for one in self.record.made} | {one.line.copy_name for one in self.record.made}
+        if self.record.underway is not None and self.record.underway.line is not None:
+            named.add(self.record.underway.line.copy_name)
+        for path in (*self.directory.glob(f"{MADE}*.json"), *self.directory.glob("line-*.json")):
+            if path.name not in named:
+                path.unlink()
+
+    def cannot_store(self, refusal: Exception) -> None:
+        """Report that a change made without a request could not be stored; the next change stores it too."""
+        self.fault = f"the commissioning cannot be kept: {refusal}"
+        log_event(Event.COMMISSIONING_NOT_KEPT, level=logging.WARNING, fault=str(refusal))
+
+    def tell(self, event: Event, fields: Mapping[str, Any], level: int = logging.INFO) -> None:
+        """Write an event to the log and to the store."""
+        tell_event(event, fields, self._on_event, level)
+
+    def now(self) -> str:
+        """The present time, RFC 3339."""
+        return iso_utc(self._clock_ns())
+
+    def set_aside(self, fault: str, aside: str) -> None:
+        self.fault = f"{fault} (it {aside}): calibrations made on the vehicle are not in use"
+        self.tell(Event.COMMISSIONING_SET_ASIDE, {"fault": fault, "set_aside": aside}, level=logging.ERROR)

@@ -13,8 +13,7 @@ from gateway.log import Event, OnEvent
 from gateway.records import json_line
 from gateway.service.commissioning.empty_drive import EmptyDrive, Jobs, MakeWorker, ServiceVehicle
 from gateway.service.commissioning.lines import Lines, require_alike
-from gateway.service.commissioning.record import Confirmed, EmptyClaim, Ended, LineChoice, Source, Underway
-from gateway.service.commissioning.record_store import RecordStore
+from gateway.service.commissioning.record import Confirmed, EmptyClaim, Ended, LineChoice, RecordStore, Source, Underway
 from gateway.service.commissioning.steps import CommissioningStep, OpenWindow, Present, lines_json, state_json, step_of
 from gateway.service.commissioning.worker import Worker
 from gateway.stated.doubt import OF_THE_DRIVE, meant_by
@@ -132,7 +131,7 @@ class Commissioning:
                 )
             begun = Underway(begun_at=self._book.now(), by=by, note=note, signals_id=self._vehicle.signals_id)
             self._drive.forget()
-            self._book.keep(begun)
+            self._book.keep_underway(begun)
             self._book.tell(Event.COMMISSIONING, {"step": CommissioningStep.LINE, "by": by})
             return self.state()
 
@@ -145,7 +144,7 @@ class Commissioning:
                 choice, content = self._lines.choose(name, source or UPLOADED)
                 self._book.write(str(choice.copy_name), content)
             self._require_usable(choice, underway.vehicle)
-            self._book.keep(underway.model_copy(update={"line": choice} | _anew(underway.vehicle, choice)))
+            self._book.keep_underway(underway.model_copy(update={"line": choice} | _anew(underway.vehicle, choice)))
             self._drive.fit()
             return self.state()
 
@@ -155,7 +154,7 @@ class Commissioning:
             underway = self._underway(CommissioningStep.VEHICLE)
             line = underway.line or LineChoice(name="")
             self._require_usable(line, answers)
-            self._book.keep(underway.model_copy(update={"vehicle": answers} | _anew(answers, line)))
+            self._book.keep_underway(underway.model_copy(update={"vehicle": answers} | _anew(answers, line)))
             self._drive.fit()
             return self.state()
 
@@ -172,7 +171,7 @@ class Commissioning:
             confirmed = Confirmed(at=self._book.now(), by=by, kinds=kinds)
             is_of_drive = any(kind in OF_THE_DRIVE for kind in kinds)
             change = {"confirmed": (*underway.confirmed, confirmed), "is_fit_asked": is_of_drive}
-            self._book.keep(underway.model_copy(update=change))
+            self._book.keep_underway(underway.model_copy(update=change))
             self._book.tell(Event.COMMISSIONING_CONFIRMED, {"doubts": list(kinds), "by": by})
             self._drive.fit()
             return self.state()
@@ -194,7 +193,7 @@ class Commissioning:
             if underway.empty is None or again:
                 if underway.empty is not None:
                     self._drive.forget()
-                self._book.keep(underway.model_copy(update={"empty": claim} | _not_driven(underway)))
+                self._book.keep_underway(underway.model_copy(update={"empty": claim} | _not_driven(underway)))
                 self._book.tell(Event.COMMISSIONING, {"step": CommissioningStep.DRIVE, "by": by})
             return self.state()
 
@@ -207,7 +206,7 @@ class Commissioning:
                     "no_batch",
                     "no batch of the empty drive has counted yet: drive on until one has",
                 )
-            self._book.keep(underway.model_copy(update={"is_fit_asked": True, "fault": None}))
+            self._book.keep_underway(underway.model_copy(update={"is_fit_asked": True, "fault": None}))
             self._book.tell(Event.COMMISSIONING, {"step": CommissioningStep.FIT, "by": by})
             self._drive.fit()
             return self.state()
@@ -216,7 +215,7 @@ class Commissioning:
         """Discard the commissioning under way; earlier calibrations stay."""
         with self._book.lock:
             self._underway()
-            self._book.keep(None)
+            self._book.keep_underway(None)
             self._drive.forget()
             self._book.tell(Event.COMMISSIONING_CANCELLED, {"by": by})
             return self.state()

@@ -24,9 +24,9 @@ from gateway.posterior import FRONT_SHARE, PAYLOAD, Posterior, Source
 from gateway.quantity import Quantity
 from gateway.records import iso_utc, json_line, ns_of
 from gateway.service.pipeline import Pipeline
+from gateway.service.record_file import RecordFile
 from gateway.service.subject import Subject
 from gateway.service.verification.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
-from gateway.service.verification.history_file import HistoryFile
 from gateway.stated.facts import Confirmation, Ending, StatedWeight
 
 ALL_KINDS: Final = tuple(KnownWeightKind)
@@ -75,7 +75,7 @@ class KnownWeightService:
         self._on_event = on_event
         self._clock_ns = clock_ns
         self._lock = threading.Lock()
-        self._file = HistoryFile(directory / FILE_NAME, KnownWeights())
+        self._file = RecordFile(directory / FILE_NAME, KnownWeights())
         self._use()
 
     @property
@@ -113,7 +113,7 @@ class KnownWeightService:
                 "error_std_kg": None if math.isnan(std) else std,
                 "offer": self._offer(),
                 "fault": self._file.fault,
-                "history": [self._shown(one) for one in reversed(self._file.history.entries) if one.kind in kinds],
+                "history": [self._shown(one) for one in reversed(self._file.record.entries) if one.kind in kinds],
             }
         )
 
@@ -160,7 +160,7 @@ class KnownWeightService:
             is_contradicted = replace(entry.observation, posterior=estimated).is_contradicted
             entry = entry.model_copy(update={"is_contradicted": is_contradicted})
             entry = entry.model_copy(update={"id": entry.content_id()})
-            self._keep(self._file.history.with_entry(entry))
+            self._keep(self._file.record.with_entry(entry))
             self._tell(Event.WEIGHT_KNOWN, entry, by)
             return json_line(self._shown(entry))
 
@@ -171,7 +171,7 @@ class KnownWeightService:
             if not entry.is_held:
                 raise WeightRefusedError(WeightRefusal.NOT_HELD, "this known weight is in use: nothing to confirm")
             confirmed = Confirmation(at=iso_utc(self._clock_ns()), by=by)
-            self._keep(self._file.history.changed(entry_id, confirmed=confirmed))
+            self._keep(self._file.record.changed(entry_id, confirmed=confirmed))
             self._tell(Event.WEIGHT_CONFIRMED, entry, by)
             return self.state()
 
@@ -206,7 +206,7 @@ class KnownWeightService:
     def _own(self) -> list[KnownWeight]:
         """Entries of the present calibration and estimator, oldest first."""
         own = (self._subject.calibration_id, self._subject.estimator)
-        return [one for one in self._file.history.entries if (one.calibration_id, one.estimator) == own]
+        return [one for one in self._file.record.entries if (one.calibration_id, one.estimator) == own]
 
     def _shown(self, entry: KnownWeight) -> dict[str, Any]:
         shown = entry.model_dump(mode="json", exclude={"posterior"})
@@ -285,13 +285,13 @@ class KnownWeightService:
             )
 
     def _standing(self, entry_id: str) -> KnownWeight:
-        found = next((one for one in self._file.history.entries if one.id == entry_id and one.ended is None), None)
+        found = next((one for one in self._file.record.entries if one.id == entry_id and one.ended is None), None)
         if found is None:
             raise WeightRefusedError(WeightRefusal.NO_SUCH_WEIGHT, _NO_SUCH)
         return found
 
     def _end(self, entries: Sequence[KnownWeight], by: str, why: str) -> None:
-        history = self._file.history
+        history = self._file.record
         end = Ending.model_validate({"at": iso_utc(self._clock_ns()), "by": by, "why": why})
         for entry in entries:
             history = history.changed(entry.id, ended=end)
@@ -311,7 +311,7 @@ class KnownWeightService:
 
     def _use(self) -> None:
         subject = self._subject
-        self._pipeline.flow.knowledge = self._file.history.knowledge(subject.calibration_id, subject.estimator)
+        self._pipeline.flow.knowledge = self._file.record.knowledge(subject.calibration_id, subject.estimator)
 
     def _tell(self, event: Event, entry: KnownWeight, by: str) -> None:
         """Write an event to the log and to the store."""

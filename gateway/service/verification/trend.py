@@ -12,9 +12,9 @@ from gateway.calibration.trend import FILE_NAME, Trend, TrendHistory, trends_of
 from gateway.estimate_json import estimate_from_json
 from gateway.log import Event, log_event
 from gateway.records import json_line
+from gateway.service.record_file import RecordFile
 from gateway.service.subject import Subject
 from gateway.service.verification.epochs import Ask
-from gateway.service.verification.history_file import HistoryFile
 
 FIRST_S: Final = 30.0  # first run after the start
 EVERY_S: Final = 3600.0
@@ -33,7 +33,7 @@ class TrendService:
         self._subject = subject
         self._ask = ask
         self._zeros = zeros
-        self._file = HistoryFile(directory / FILE_NAME, TrendHistory())
+        self._file = RecordFile(directory / FILE_NAME, TrendHistory())
         self._trends: tuple[Trend, ...] = ()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="trend", daemon=True)
@@ -67,7 +67,7 @@ class TrendService:
 
     def catch_up(self) -> None:
         """Read all new batches, and judge. Raises StoreError, TimeoutError or OSError."""
-        history = before = self._file.history
+        history = before = self._file.record
         while not self._stop.is_set():
             page = self._ask(limit=PAGE, cursor=history.cursor, with_spectra=False)
             estimates = [estimate_from_json(json.loads(item)) for item in page.items]
@@ -82,7 +82,7 @@ class TrendService:
     def _judge(self) -> None:
         calibrated = self._subject.calibrated
         mass_kg = 0.0 if calibrated is None else calibrated.vehicle.empty_mass_kg
-        self._trends = trends_of(self._file.history.weeks, self._zeros(), self._subject.calibration_id, mass_kg)
+        self._trends = trends_of(self._file.record.weeks, self._zeros(), self._subject.calibration_id, mass_kg)
 
     def _run(self) -> None:
         wait_s = FIRST_S

@@ -23,9 +23,9 @@ from gateway.errors import WeightRefusedError
 from gateway.log import Event, OnEvent, tell_event
 from gateway.quantity import Quantity
 from gateway.records import iso_utc, json_line, ns_of
+from gateway.service.record_file import RecordFile
 from gateway.service.subject import Subject
 from gateway.service.verification.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
-from gateway.service.verification.history_file import HistoryFile
 from gateway.stated.facts import StatedWeight
 from gateway.status import VerificationStatus
 from gateway.units import NS_PER_S
@@ -60,7 +60,7 @@ class VerificationService:
         self._on_event = on_event
         self._clock_ns = clock_ns
         self._lock = threading.Lock()
-        self._file = HistoryFile(directory / FILE_NAME, VerificationHistory())
+        self._file = RecordFile(directory / FILE_NAME, VerificationHistory())
 
     @property
     def fault(self) -> str | None:
@@ -71,7 +71,7 @@ class VerificationService:
 
     def status(self) -> VerificationStatus:
         """When the present calibration was last verified, and whether it is due."""
-        own = [entry for entry in self._file.history.entries if entry.calibration_id == self._subject.calibration_id]
+        own = [entry for entry in self._file.record.entries if entry.calibration_id == self._subject.calibration_id]
         last = own[-1] if own else None
         is_asked_for = self._every_days > 0.0 and self._subject.calibrated is not None
         due_ns = None
@@ -80,7 +80,7 @@ class VerificationService:
             every_ns = round(self._every_days * NS_PER_DAY)
             due_ns = ns_of(passed[-1].at) + every_ns if passed else self._clock_ns()
         return VerificationStatus(
-            n_records=len(self._file.history.entries),
+            n_records=len(self._file.record.entries),
             last_at=None if last is None else last.at,
             last_verdict=None if last is None else last.verdict,
             due_at=None if due_ns is None else iso_utc(due_ns),
@@ -89,7 +89,7 @@ class VerificationService:
 
     def state(self) -> str:
         """JSON: the requirements, when the next one is due, and the records, newest first."""
-        entries = [entry.model_dump(mode="json") for entry in reversed(self._file.history.entries)]
+        entries = [entry.model_dump(mode="json") for entry in reversed(self._file.record.entries)]
         return json_line(
             {
                 "rule": self._rule.model_dump(),
@@ -101,7 +101,7 @@ class VerificationService:
 
     def record(self, record_id: str) -> Mapping[str, Any] | None:
         """One record by its id; None if there is none."""
-        found = next((entry for entry in self._file.history.entries if entry.id == record_id), None)
+        found = next((entry for entry in self._file.record.entries if entry.id == record_id), None)
         return None if found is None else found.model_dump(mode="json")
 
     def verify(self, by: str, note: str | None, stated: Sequence[StatedWeight]) -> str:
@@ -127,7 +127,7 @@ class VerificationService:
         entry = entry.model_copy(update={"id": entry.content_id()})
         with self._lock:
             try:
-                self._file.keep(self._file.history.with_entry(entry))
+                self._file.keep(self._file.record.with_entry(entry))
             except OSError as fault:
                 raise WeightRefusedError(WeightRefusal.NOT_STORED, f"the record cannot be kept: {fault}") from None
         told: dict[str, Any] = {"verification_id": entry.id, "by": by, "verdict": entry.verdict, "n_loads": len(loads)}

@@ -1,0 +1,57 @@
+"""A record in a JSON file beside the database: validated when read, set aside if invalid, replaced atomically."""
+
+import logging
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from pydantic import ValidationError
+
+from gateway.calibration.file.parts import Part
+from gateway.errors import ConfigurationError
+from gateway.files.kept import BrokenFile, KeptFiles
+from gateway.log import Event, log_event
+from gateway.toml_file import describe_faults
+
+R = TypeVar("R", bound=Part)
+
+
+def load_record(path: Path, empty: R) -> R:
+    """``empty`` if there is no file yet. Raises ConfigurationError for an invalid one."""
+    try:
+        return type(empty).model_validate_json(KeptFiles(path.parent).read(path.name))
+    except FileNotFoundError:
+        return empty
+    except OSError as fault:
+        raise ConfigurationError(f"{path}: cannot be read: {fault.strerror or fault}") from None
+    except ValidationError as fault:
+        raise ConfigurationError(describe_faults(path, fault, type(empty))) from None
+
+
+class RecordFile(Generic[R]):
+    """Not thread-safe. Every change is on disk before it is in ``record``.
+
+    ``fault`` says what happened to an invalid file.
+    """
+
+    def __init__(self, path: Path, empty: R) -> None:
+        """Reads the file; ``empty`` is the record if there is none, and defines its type."""
+        self.path = path
+        self.fault: str | None = None
+        self.record = empty
+        self._broken = BrokenFile(path)
+        try:
+            self.record = load_record(path, empty)
+        except ConfigurationError as broken:
+            self.set_aside(str(broken), self._broken.set_aside())
+
+    def keep(self, record: R) -> None:
+        """Replace the record; on disk when this returns. Raises OSError; then nothing has changed."""
+        self._broken.make_way()
+        KeptFiles(self.path.parent).write(self.path.name, (record.model_dump_json(indent=1) + "\n").encode())
+        self.record = record
+        self.fault = None
+
+    def set_aside(self, fault: str, aside: str) -> None:
+        """Report an invalid file; ``aside`` says what became of it."""
+        self.fault = f"{self.path} is invalid, its history starts empty (it {aside})"
+        log_event(Event.HISTORY_SET_ASIDE, level=logging.ERROR, file=str(self.path), fault=fault, set_aside=aside)
