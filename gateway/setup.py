@@ -20,6 +20,20 @@ NOBODY = Identity()  # a log without a configuration belongs to no named vehicle
 
 
 @dataclass(frozen=True, slots=True)
+class Subject:
+    """The vehicle that a service weighs, its calibration and the estimator in use."""
+
+    calibrated: CalibratedVehicle | None
+    estimator: str
+    vehicle_id: str | None
+
+    @property
+    def calibration_id(self) -> str | None:
+        """Identifier of the calibration in use; None without one."""
+        return None if self.calibrated is None else self.calibrated.id
+
+
+@dataclass(frozen=True, slots=True)
 class Setup:
     """Everything that turns frames into estimates, loaded and checked.
 
@@ -40,6 +54,16 @@ class Setup:
             calibrated = replace(calibrated, vehicle=self.limits.on(calibrated.vehicle))
         object.__setattr__(self, "calibrated", calibrated)
 
+    @property
+    def subject(self) -> Subject:
+        """What is weighed and by which calibration."""
+        return Subject(self.calibrated, self.estimator, self.identity.vehicle_id)
+
+    @property
+    def calibration_id(self) -> str | None:
+        """Identifier of the calibration in use; None without one."""
+        return self.subject.calibration_id
+
     def flow(self, settings: BatchSettings) -> Flow:
         """A fresh pipeline."""
         return Flow(settings, self.signal_map.traits, self.calibrated, self.estimator, self.identity, self.knowledge)
@@ -49,8 +73,7 @@ class Setup:
 
         Raises ConfigurationError for an invalid file.
         """
-        calibration_id = self.calibration.id if self.calibration else None
-        return replace(self, knowledge=load_known_weights(path).knowledge(calibration_id, self.estimator))
+        return replace(self, knowledge=load_known_weights(path).knowledge(self.calibration_id, self.estimator))
 
 
 def load_setup(

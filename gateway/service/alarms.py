@@ -31,7 +31,7 @@ from gateway.estimate_json import estimate_from_json
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.service.status import NEEDED_SENSORS
-from gateway.service.subject import Subject
+from gateway.setup import Subject
 from gateway.status import AlarmsStatus, State, Status
 from gateway.store import Store, StoreReader
 

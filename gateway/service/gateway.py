@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+from gateway.bus.broadcast import Broadcaster
 from gateway.bus.live.bus_survey import bus_survey_of
 from gateway.bus.live.source import OpenReceiver, SourceState
 from gateway.bus.signals import Decoder
@@ -20,7 +21,7 @@ from gateway.notify import Notifier
 from gateway.service.alarms import AlarmService, rules_of
 from gateway.service.batch_log import BatchLog, LoadEventLog, StateLog, call_each
 from gateway.service.calibration_in_use import keep_copy
-from gateway.service.part import CLOSE_WITHIN_S, Deadline, Questions, Sending, ServicePart, in_own_thread, stop_in_turn
+from gateway.service.part import CLOSE_WITHIN_S, Deadline, Questions, ServicePart, in_own_thread, stop_in_turn
 from gateway.service.parts import (
     Forwarding,
     board_of,
@@ -36,13 +37,14 @@ from gateway.service.parts import (
 from gateway.service.pipeline import Pipeline
 from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
-from gateway.service.subject import Subject
 from gateway.service.verification.known_weights import KnownWeightService
 from gateway.service.verification.trend import TrendService
 from gateway.service.verification.verification import VerificationService
 from gateway.setup import Setup
 from gateway.status import State
 from gateway.store import Store
+from gateway.uplink.uplink import Uplink
+from gateway.uplink.webhook import Webhook
 from gateway.web.access.serving import WebServer, refuse_open_address, server_config
 from gateway.web.access.tokens import TokenFile
 from gateway.web.app import create_app
@@ -56,6 +58,7 @@ BUS_WITHIN_S = 2.0  # for the bus reader during a stop
 PIPELINE_WITHIN_S = 10.0  # for the pipeline: a full inbox contains several windows
 FLUSH_WITHIN_S = 8.0  # for writing to the disk
 
+Sending = Broadcaster | Uplink | Webhook
 OnStarted = Callable[["Gateway"], None]
 
 
@@ -103,7 +106,7 @@ class Gateway:
         self.commissioning = commissioning_of(settings, setup, self.keeper, flow, self.store)
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.ring_log = ring_log_of(settings, setup)
-        subject = Subject(setup.calibrated, setup.estimator, setup.identity.vehicle_id)
+        subject = setup.subject
         self.alarms = AlarmService(rules_of(settings.alarms), subject, self.store)
         self.pipeline = Pipeline(
             self.source.inbox,
@@ -203,8 +206,7 @@ class Gateway:
         ]
         if (ring_log := self.ring_log) is not None:
             beside.append(ServicePart("recorder", ring_log.start, ring_log.stop, lambda: ring_log.fault))
-        senders: tuple[Sending | None, ...] = (self.broadcaster, self.uplink, self.webhook)
-        beside += [_sender_part(sender) for sender in senders if sender is not None]
+        beside += [_sender_part(one) for one in (self.broadcaster, self.uplink, self.webhook) if one is not None]
         beside.append(ServicePart("survey of the bus", lambda: None, self.bus_survey.stop))
         return vital, tuple(beside)
 

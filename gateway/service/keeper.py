@@ -6,14 +6,15 @@ import threading
 import time
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 from gateway.bus.signals import SignalMap
-from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of
+from gateway.calibration.kept.batch_file import kept_batch_of
 from gateway.calibration.kept.shelf import Shelf
 from gateway.estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.records import Batch, Motion
+from gateway.service.commissioning.session import Commissioning
 
 MOST_WAITING: Final = 4  # batches in the queue; each has some megabytes of rows, and one comes every few minutes
 STOP_WITHIN_S: Final = 3.0
@@ -26,28 +27,6 @@ class _Handed:
     rows: Motion
 
 
-class Listener(Protocol):
-    """Receives batches in the keeper's thread, after those that count are stored."""
-
-    @property
-    def wants_all(self) -> bool:
-        """Whether it also receives provisional and rejected batches. Safe from any thread."""
-        ...
-
-    def hear(self, kept: KeptBatch) -> None:
-        """Receive one batch."""
-        ...
-
-
-class NoListener:
-    """A listener that ignores every batch."""
-
-    wants_all = False
-
-    def hear(self, kept: KeptBatch) -> None:
-        """Do nothing."""
-
-
 class BatchKeeper:
     """Stores every batch that an estimator could use on ``shelf``, and passes all batches to ``listener``.
 
@@ -56,7 +35,7 @@ class BatchKeeper:
 
     def __init__(self, shelf: Shelf, signal_map: SignalMap) -> None:
         self.shelf = shelf
-        self.listener: Listener = NoListener()
+        self.listener: Commissioning | None = None
         self.fault: str | None = None
         self.n_lost = 0  # batches that should have been kept and were not
         self._signal_map = signal_map
@@ -69,7 +48,7 @@ class BatchKeeper:
 
     def keep(self, batch: Batch, found: Estimate, rows: Motion) -> None:
         """Queue a batch, from the pipeline's thread; if the queue is full the batch is lost and counted."""
-        if not (_counts(batch) or self.listener.wants_all):
+        if not _counts(batch) and self._listening is None:
             return
         try:
             self._waiting.put_nowait(_Handed(found.id, batch, rows))
@@ -115,8 +94,13 @@ class BatchKeeper:
                 self._lose(str(refusal))
                 return
             self.fault = None
-        if self.listener.wants_all:
-            self.listener.hear(kept)
+        if (listener := self._listening) is not None:
+            listener.hear(kept)
+
+    @property
+    def _listening(self) -> Commissioning | None:
+        """The listener while it takes all batches, those that do not count too."""
+        return self.listener if self.listener is not None and self.listener.wants_all else None
 
     def _lose(self, why: str) -> None:
         self.n_lost += 1

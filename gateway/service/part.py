@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import ClassVar, Final, Protocol
+from typing import Final
 
 from gateway.log import Event, log_event
 
@@ -37,18 +37,6 @@ class ServicePart:
         """The fault to show in the status: the death of a part that is not vital, else its fault."""
         death = None if self.is_vital else self.death()
         return self.fault() if death is None else f"{death}; weighing goes on, a restart brings it back"
-
-
-class Sending(Protocol):
-    """A part with a thread that sends estimates."""
-
-    NAME: ClassVar[str]
-
-    @property
-    def fault(self) -> str | None: ...
-    def start(self) -> None: ...
-    def stop(self, timeout_s: float, /) -> None: ...
-    def is_alive(self) -> bool: ...
 
 
 class Deadline:

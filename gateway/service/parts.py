@@ -41,21 +41,16 @@ def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with
         "vin": setup.identity.vin,
         "version": version("springscale"),
         "estimator": setup.estimator,
-        "calibration_id": setup.calibration.id if setup.calibration else None,
+        "calibration_id": setup.calibration_id,
     }
     outbox = Outbox(
         store,
-        _queue_name(wanted),
+        wanted.queue,
         with_places=with_places,
         repeat_s=wanted.repeat_s,
         with_latest=wanted.home_assistant is not None,
     )
     return Uplink(wanted, outbox, birth)
-
-
-def _queue_name(wanted: UplinkSettings) -> str:
-    """Name of the queue position. It belongs to the receiver: another broker or topic starts at the first record."""
-    return f"mqtt://{wanted.broker}/{wanted.topic}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +70,7 @@ class Forwarding:
     @property
     def queues(self) -> tuple[str, ...]:
         """Names of their queue positions."""
-        broker = () if self.broker is None else (_queue_name(self.broker),)
-        return broker if self.webhook is None else (*broker, self.webhook.queue)
+        return tuple(one.queue for one in (self.broker, self.webhook) if one is not None)
 
 
 def webhook_of(wanted: WebhookSettings | None, store: Store, *, with_places: bool) -> Webhook | None:
@@ -104,9 +98,8 @@ def board_of(stale_after_s: float, store: Store, setup: Setup) -> Board:
     except (StoreError, TimeoutError, ValueError, KeyError) as fault:  # the last two: another version's record
         log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
     heard = board.heard()
-    calibration_id = setup.calibration.id if setup.calibration else None
-    if heard is not None and heard.calibration_id != calibration_id:
-        log_event(Event.CALIBRATION_CHANGED, calibration_id=calibration_id, before=heard.calibration_id)
+    if heard is not None and heard.calibration_id != setup.calibration_id:
+        log_event(Event.CALIBRATION_CHANGED, calibration_id=setup.calibration_id, before=heard.calibration_id)
     return board
 
 

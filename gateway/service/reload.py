@@ -72,8 +72,10 @@ class Reloader:
             log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=str(fault))
             return []
         self.fault = None
-        ids = [setup.calibration.id if setup.calibration else None for setup in (self._setup, fresh)]
-        has_changed = {"calibration": ids[0] != ids[1], "signals": self._setup.signal_map != fresh.signal_map}
+        has_changed = {
+            "calibration": self._setup.calibration_id != fresh.calibration_id,
+            "signals": self._setup.signal_map != fresh.signal_map,
+        }
         return [key for key, it_has in has_changed.items() if it_has]
 
     def _is_live(self, key: str, tls: Tls | None) -> bool:

@@ -73,7 +73,7 @@ class StatusReport:
             uptime_s=time.monotonic() - self.started_s,
             vehicle_id=self.setup.identity.vehicle_id,
             vin=self.setup.identity.vin,
-            calibration_id=self.setup.calibrated.id if self.setup.calibrated else None,  # hashed once, not each time
+            calibration_id=self.setup.calibration_id,
             known_weights_id=known.id if (known := self.pipeline.flow.knowledge) else None,
             estimator=self.setup.estimator,
             bus=self._bus(),

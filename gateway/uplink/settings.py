@@ -46,6 +46,11 @@ class UplinkSettings:
         """host:port, for people."""
         return f"{self.host}:{self.port}"
 
+    @property
+    def queue(self) -> str:
+        """Name of the queue position. It belongs to the receiver: another broker or topic starts from the beginning."""
+        return f"mqtt://{self.broker}/{self.topic}"
+
     def tls_context(self) -> ssl.SSLContext | None:
         """Checks the broker's certificate and name. Raises ConfigurationError for files that cannot be used."""
         if not self.tls:

@@ -13,7 +13,7 @@ from gateway.core.weights.on_the_road import weighed
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.service.alarms import AlarmService
-from gateway.service.subject import Subject
+from gateway.setup import Subject
 from gateway.store import Store
 from gateway.web.live.board import Board
 from support.days import at, batch

@@ -13,8 +13,8 @@ from gateway.core.known_weights import Knowledge, KnownWeightKind
 from gateway.estimate import Estimate
 from gateway.posterior import Posterior, Source
 from gateway.records import iso_utc
-from gateway.service.subject import Subject
 from gateway.service.verification.known_weights import KnownWeightService
+from gateway.setup import Subject
 from gateway.stated.facts import StatedWeight
 from gateway.store import Store
 from gateway.units import NS_PER_S

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gateway.calibration.verification_file import VerificationRule
-from gateway.service.subject import Subject
 from gateway.service.verification.verification import VerificationService
+from gateway.setup import Subject
 from gateway.store import Store
 from support.calibrated import calibration_file
 from support.epochs import START_NS

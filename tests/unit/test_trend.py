@@ -21,9 +21,9 @@ from gateway.estimate_json import estimate_to_json
 from gateway.history import HistoryPage
 from gateway.log import Event
 from gateway.records import Why
-from gateway.service.subject import Subject
 from gateway.service.verification import trend as trend_keeper
 from gateway.service.verification.trend import TrendService
+from gateway.setup import Subject
 from gateway.units import NS_PER_S
 
 MONDAY_NS = 1_790_035_200 * NS_PER_S  # 2026-09-22 is a Tuesday

@@ -2,11 +2,12 @@
 
 import time
 from collections.abc import Callable
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from gateway.calibration.commissioning.answers import doubts_of, vehicle_table
 from gateway.calibration.kept.batch_file import KeptBatch
 from gateway.calibration.kept.shelf import Shelf
+from gateway.core.scheduler import Scheduler
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CampaignError, CommissioningRefusedError
 from gateway.log import Event, OnEvent
@@ -23,25 +24,6 @@ from gateway.units import NS_PER_S
 UPLOADED: Final = "uploaded"
 
 
-class DrivePosition(Protocol):
-    """The part of the scheduler that an empty drive needs: the present position in time. Safe from any thread."""
-
-    @property
-    def drive_start_ns(self) -> int | None:
-        """Start of the drive under way; None between drives."""
-        ...
-
-    @property
-    def newest_ns(self) -> int | None:
-        """The newest stamp of that drive."""
-        ...
-
-    @property
-    def open_window_ns(self) -> tuple[int, int] | None:
-        """Start of the open window of that drive, and the newest stamp in it."""
-        ...
-
-
 class Commissioning:
     """Thread-safe; a call may wait for the disk. A power cut does not undo an answered step."""
 
@@ -50,7 +32,7 @@ class Commissioning:
         jobs: Jobs,
         lines: Lines,
         shelf: Shelf,
-        drives: DrivePosition,
+        drives: Scheduler,
         vehicle: ServiceVehicle,
         *,
         on_event: OnEvent,

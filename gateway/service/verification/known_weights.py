@@ -25,8 +25,8 @@ from gateway.quantity import Quantity
 from gateway.records import iso_utc, json_line, ns_of
 from gateway.service.pipeline import Pipeline
 from gateway.service.record_file import RecordFile
-from gateway.service.subject import Subject
 from gateway.service.verification.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
+from gateway.setup import Subject
 from gateway.stated.facts import Confirmation, Ending, StatedWeight
 
 ALL_KINDS: Final = tuple(KnownWeightKind)

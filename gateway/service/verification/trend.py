@@ -13,8 +13,8 @@ from gateway.estimate_json import estimate_from_json
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.service.record_file import RecordFile
-from gateway.service.subject import Subject
 from gateway.service.verification.epochs import Ask
+from gateway.setup import Subject
 
 FIRST_S: Final = 30.0  # first run after the start
 EVERY_S: Final = 3600.0

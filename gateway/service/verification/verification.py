@@ -24,8 +24,8 @@ from gateway.log import Event, OnEvent, tell_event
 from gateway.quantity import Quantity
 from gateway.records import iso_utc, json_line, ns_of
 from gateway.service.record_file import RecordFile
-from gateway.service.subject import Subject
 from gateway.service.verification.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
+from gateway.setup import Subject
 from gateway.stated.facts import StatedWeight
 from gateway.status import VerificationStatus
 from gateway.units import NS_PER_S
