@@ -3,8 +3,16 @@
 ``FIELDS`` is the one place that knows its names, its schema and its columns in a CSV file.
 """
 
-from gateway.estimate_json.errors import posterior_from_json, posterior_to_json
-from gateway.estimate_json.fields import COLUMNS, FIELDS, EstimateField, Presence
+from gateway.estimate_json.fields import (
+    COLUMNS,
+    FIELDS,
+    EstimateField,
+    Presence,
+    csv_cells,
+    estimate_from_json,
+    estimate_to_json,
+    table_row,
+)
 from gateway.estimate_json.kinds import (
     INSTANT,
     NUMBERS_BY_NAME,
@@ -12,10 +20,11 @@ from gateway.estimate_json.kinds import (
     SPECTRA,
     WEIGHTS,
     FieldKind,
+    posterior_from_json,
+    posterior_to_json,
     spectra_from_json,
     spectra_to_json,
 )
-from gateway.estimate_json.objects import csv_cells, estimate_from_json, estimate_to_json, table_row
 
 __all__ = [
     "COLUMNS",

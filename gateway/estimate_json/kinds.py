@@ -1,4 +1,8 @@
-"""How fields of one kind are written in JSON and read back: numbers, intervals, instants, reasons, weights, spectra."""
+"""How fields of one kind are written in JSON and read back: numbers, weights, spectra, posteriors, ways.
+
+Of the posterior and its budget every error is written by its source. A way has distances, standstills, door and
+ignition, and positions if they are kept.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -7,7 +11,21 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.estimate import PLACES, UNKNOWN_INTERVAL, Lack, Weight, Weights
+from gateway.budget import BudgetLine, Remedy
+from gateway.estimate import (
+    NOWHERE,
+    PLACES,
+    UNKNOWN_INTERVAL,
+    UNWATCHED,
+    Lack,
+    Place,
+    Stop,
+    Watched,
+    Way,
+    Weight,
+    Weights,
+)
+from gateway.posterior import NORMAL_TAILS, Posterior, Source
 from gateway.records import F64, Spectra, Why, iso_utc, ns_of
 
 
@@ -126,3 +144,136 @@ WEIGHT_COLUMNS: Final = (
     OVER_LIMIT,
 )
 SPECTRA: Final = FieldKind(dict[str, list[float | None]] | None, spectra_to_json, spectra_from_json)
+
+
+DIGITS: Final = 7
+
+
+def posterior_to_json(posterior: Posterior) -> dict[str, Any]:
+    """The JSON object of a posterior: names as in the class, arrays as lists."""
+    return {
+        "mean": [rounded(x, 9) for x in posterior.mean.tolist()],
+        "own": _rows(posterior.own),
+        "sources": {str(name): _rows(columns) for name, columns in posterior.sources.items()},
+        "tails": [rounded(x, DIGITS) for x in posterior.tails],
+    }
+
+
+def posterior_from_json(record: Mapping[str, Any]) -> Posterior:
+    """The inverse of :func:`posterior_to_json`, within its rounding."""
+    low, high = record.get("tails", NORMAL_TAILS)
+    sources = {Source(name): np.array(rows, float) for name, rows in record["sources"].items()}
+    return Posterior(np.array(record["mean"], float), np.array(record["own"], float), sources, (low, high))
+
+
+def _rows(matrix: F64) -> list[list[float | None]]:
+    return [[rounded(x, DIGITS) for x in row] for row in matrix.tolist()]
+
+
+def budget_to_json(budget: Sequence[BudgetLine]) -> list[dict[str, Any]]:
+    """The JSON array of a budget: one object per source."""
+    return [
+        {
+            "source": line.source,
+            "payload_kg": rounded(line.payload_kg, 4),
+            "front_share_pct": rounded(line.front_share_pct, 4),
+            "cg_left_m": rounded(line.cg_left_m, 4),
+            "remedy": None if line.remedy is None else str(line.remedy),
+            "payload_with_remedy_kg": rounded(line.payload_with_remedy_kg, 4),
+        }
+        for line in budget
+    ]
+
+
+def budget_from_json(records: Sequence[Mapping[str, Any]]) -> tuple[BudgetLine, ...]:
+    """The inverse of :func:`budget_to_json`, within its rounding."""
+    numbers = ("payload_kg", "front_share_pct", "cg_left_m", "payload_with_remedy_kg")
+    return tuple(
+        BudgetLine(
+            source=record["source"],
+            remedy=None if record["remedy"] is None else Remedy(record["remedy"]),
+            **{name: float("nan") if record[name] is None else record[name] for name in numbers},
+        )
+        for record in records
+    )
+
+
+POSTERIOR: Final = FieldKind(
+    dict[str, Any] | None, lambda one: None if one is None else posterior_to_json(one), posterior_from_json
+)
+BUDGET: Final = FieldKind(list[dict[str, Any]], budget_to_json, budget_from_json)
+
+
+def way_to_json(way: Way) -> dict[str, Any]:
+    """The JSON object of a way; unknown is None."""
+    return {
+        "distance_m": rounded(way.distance_m, 9),
+        "known_s": way.known_s,
+        "moving_s": way.moving_s,
+        "odometer_start_m": rounded(way.odometer_start_m, 9),
+        "odometer_end_m": rounded(way.odometer_end_m, 9),
+        "start": place_to_json(way.start),
+        "end": place_to_json(way.end),
+        "stops": [_stop(stop) for stop in way.stops],
+        "before": _watched(way.before),
+        "since": None if way.since_ns is None else INSTANT.write(way.since_ns),
+    }
+
+
+def way_from_json(told: Mapping[str, Any]) -> Way:
+    """The inverse of :func:`way_to_json`, within its rounding."""
+    return Way(
+        distance_m=_known(told["distance_m"]),
+        known_s=told["known_s"],
+        moving_s=told["moving_s"],
+        odometer_start_m=_known(told["odometer_start_m"]),
+        odometer_end_m=_known(told["odometer_end_m"]),
+        start=_place_of(told["start"]),
+        end=_place_of(told["end"]),
+        stops=tuple(map(_stop_of, told["stops"])),
+        before=_watched_of(told["before"]),
+        since_ns=None if told["since"] is None else INSTANT.read(told["since"]),
+    )
+
+
+def place_to_json(place: Place) -> dict[str, float] | None:
+    """Latitude and longitude in degrees; None if they are unknown or not kept."""
+    if not place.is_known:
+        return None
+    return {"latitude_deg": place.latitude_deg, "longitude_deg": place.longitude_deg}
+
+
+def _place_of(told: Mapping[str, float] | None) -> Place:
+    return NOWHERE if told is None else Place(told["latitude_deg"], told["longitude_deg"])
+
+
+def _stop(stop: Stop) -> dict[str, Any]:
+    return {
+        "t_start": INSTANT.write(stop.t_start_ns),
+        "t_end": INSTANT.write(stop.t_end_ns),
+        **_watched(stop.watched),
+        "place": place_to_json(stop.place),
+    }
+
+
+def _stop_of(told: Mapping[str, Any]) -> Stop:
+    return Stop(INSTANT.read(told["t_start"]), INSTANT.read(told["t_end"]), _watched_of(told), _place_of(told["place"]))
+
+
+def _watched(seen: Watched) -> dict[str, bool | None]:
+    return {"door_opened": seen.door_opened, "ignition_off": seen.ignition_off}
+
+
+def _watched_of(told: Mapping[str, Any]) -> Watched:
+    seen = Watched(told["door_opened"], told["ignition_off"])
+    return UNWATCHED if seen == UNWATCHED else seen
+
+
+def _known(told: float | None) -> float:
+    return math.nan if told is None else told
+
+
+WAY = FieldKind(dict[str, Any] | None, lambda way: None if way is None else way_to_json(way), way_from_json)
+EXAMPLE = way_to_json(
+    Way(3521.4, 299.8, 251.2, 18_204_300.0, 18_207_800.0, stops=(Stop(0, 20_000_000_000, Watched(True, False)),))
+)

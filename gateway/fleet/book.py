@@ -100,7 +100,6 @@ class SqliteBook:
             return [self._line(vehicle) for (vehicle,) in self._database.execute(_VEHICLES).fetchall()]
 
     def close(self) -> None:
-        """Close the file."""
         with self._lock:
             self._database.close()
 

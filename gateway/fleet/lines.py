@@ -65,7 +65,7 @@ def line_of(
         gross_limit_kg=limit_kg,
         used_share=_used(payload_kg, gross_kg, limit_kg),
         over=[place for place, weight in weights.items() if weight and weight.get("is_over_limit")],
-        alarms=[_alarm(one) for one in alarms if one.get("is_active")],
+        alarms=[LineAlarm.model_validate(one) for one in alarms if one.get("is_active")],
     )
 
 
@@ -75,7 +75,3 @@ def _used(payload_kg: float | None, gross_kg: float | None, limit_kg: float | No
         return None
     capacity_kg = payload_kg + limit_kg - gross_kg
     return max(0.0, payload_kg / capacity_kg) if capacity_kg > 0.0 else None
-
-
-def _alarm(told: Mapping[str, Any]) -> LineAlarm:
-    return LineAlarm(kind=told["kind"], where=told["where"], state=told["state"], t_start=told["t_start"])

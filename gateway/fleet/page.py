@@ -63,7 +63,6 @@ class FleetPage:
         return int(self._socket.getsockname()[1])
 
     def start(self) -> None:
-        """Begin to answer."""
         self._thread.start()
 
     def stop(self) -> None:

@@ -46,14 +46,10 @@ class BatchLog:
             rejected=found.rejected,
         )
         if not found.is_provisional:
-            self._tell_reasons(found.rejected)
+            before, self._rejected = self._rejected, frozenset(found.rejected)
+            if self._rejected != before:
+                log_event(Event.REASONS_CHANGED, rejected=found.rejected, before=sorted(before))
             self._tell_overload()
-
-    def _tell_reasons(self, rejected: tuple[Why, ...]) -> None:
-        """Log the reasons of rejection if they differ from those of the batch before."""
-        before, self._rejected = self._rejected, frozenset(rejected)
-        if self._rejected != before:
-            log_event(Event.REASONS_CHANGED, rejected=rejected, before=sorted(before))
 
     def _tell_overload(self) -> None:
         before, self._overloaded = self._overloaded, self._now_overloaded()

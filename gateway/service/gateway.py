@@ -219,7 +219,6 @@ class Gateway:
 
     @property
     def url(self) -> str:
-        """Address of the dashboard, once started."""
         port = self._server.servers[0].sockets[0].getsockname()[1]
         scheme = "https" if self._server.config.is_ssl else "http"
         return f"{scheme}://{self._settings.web.host}:{port}"
@@ -306,15 +305,11 @@ class Gateway:
         now = self.status()
         log_state(now)
         self.alarms.watch(now, self.trend.trends)
-        self._look_around(now.state)
-        self._notifier.send_status(now.sentence())
-
-    def _look_around(self, state: State) -> None:
-        """Survey the bus while a sensor is silent: it may send under an identifier that the filters exclude."""
-        if state in (State.WAITING_FOR_BUS, State.SENSOR_FAULT):
-            self.bus_survey.look()
+        if now.state in (State.WAITING_FOR_BUS, State.SENSOR_FAULT):
+            self.bus_survey.look()  # a silent sensor may send under an identifier that the filters exclude
         else:
             self.bus_survey.forget()
+        self._notifier.send_status(now.sentence())
 
     def _dead_part(self, serving: asyncio.Task[None]) -> str | None:
         """Which vital part died, and why; None while all work."""

@@ -43,7 +43,6 @@ class BatchKeeper:
         self._thread = threading.Thread(target=self._run, name="batch-keeper", daemon=True)
 
     def start(self) -> None:
-        """Start the thread."""
         self._thread.start()
 
     def keep(self, batch: Batch, found: Estimate, rows: Motion) -> None:

@@ -74,7 +74,6 @@ class Pipeline:
         self._thread = threading.Thread(target=self._run, name="pipeline", daemon=True)
 
     def start(self) -> None:
-        """Begin to read the inbox."""
         self._thread.start()
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
@@ -95,7 +94,6 @@ class Pipeline:
         return self.flow.scheduler.drive_start_ns is None or time.monotonic() - newest_s > silence_s
 
     def is_alive(self) -> bool:
-        """True while the thread runs."""
         return self._thread.is_alive()
 
     def _run(self) -> None:

@@ -64,7 +64,6 @@ class StatusReport:
     started_s: float = field(init=False, default_factory=time.monotonic)
 
     def __call__(self) -> Status:
-        """The status as of now."""
         state = self.state()
         not_ready = self._why_not_ready(state)
         return Status(

@@ -74,7 +74,6 @@ def page(
 
 
 def stored_row(connection: sqlite3.Connection, seq: int) -> Stored | None:
-    """One row as stored in the file."""
     found: Stored | None = connection.execute(f"SELECT {_STORED} FROM journal WHERE seq = ?", (seq,)).fetchone()
     return found
 

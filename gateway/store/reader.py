@@ -121,11 +121,9 @@ class StoreReader:
         return self.page(ENTRIES if kind is None else (kind,), **question)
 
     def follow(self, kinds: Sequence[str], after: str | None, on_news: Callable[[], None]) -> "Follower":
-        """As :meth:`Store.follow`."""
         return self._store.follow(kinds, after, on_news)
 
     def head(self) -> str:
-        """Cursor of the newest record accepted."""
         return self._store.head()
 
     def behind(self, kinds: Sequence[str], seq: int, limit: int) -> list[JournalRow]:
@@ -167,7 +165,6 @@ class StoreReader:
         return found[2].decode() if found and checksum(found[:3]) == found[3] else None
 
     def calibration(self, calibration_id: str) -> str | None:
-        """A calibration's JSON by its hash."""
         return self.document(f"calibration {calibration_id}")
 
     def delivery(self, uplink: str, kinds: Sequence[str] = (*BATCHES, *ENTRIES)) -> Delivery:
@@ -214,15 +211,12 @@ class StoreReader:
             return
         try:
             with closing(connect_reader(self._store.path)) as connection:
-                self._limit_time(connection)
+                end_s = time.monotonic() + self._limit_s
+                connection.set_progress_handler(lambda: time.monotonic() > end_s, _STEPS_PER_LOOK)
                 connection.execute("BEGIN")  # one snapshot for the whole query
                 yield connection
         except sqlite3.Error as error:
             raise self._explained(error) from error
-
-    def _limit_time(self, connection: sqlite3.Connection) -> None:
-        end_s = time.monotonic() + self._limit_s
-        connection.set_progress_handler(lambda: time.monotonic() > end_s, _STEPS_PER_LOOK)
 
     def _explained(self, error: sqlite3.Error) -> Exception:
         if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
@@ -334,7 +328,6 @@ class Follower:
         self._after = cursor
 
     def close(self) -> None:
-        """Stop following."""
         self._buffer.unlisten(self)
 
     def _seq(self, epoch: str) -> int:

@@ -93,7 +93,6 @@ def connect_reader(path: Path) -> sqlite3.Connection:
 
 
 def pragma(connection: sqlite3.Connection, name: str) -> int:
-    """An integer pragma of the file."""
     return int(connection.execute(f"PRAGMA {name}").fetchone()[0])
 
 

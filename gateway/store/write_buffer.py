@@ -88,7 +88,6 @@ class WriteBuffer:
             return f"{self._epoch}-{numbered.seq}"
 
     def add(self, document: DocumentRow) -> None:
-        """Accept a document."""
         with self._changed:
             self._add(document)
 
@@ -120,7 +119,6 @@ class WriteBuffer:
             return max((self._newest.get(kind, 0) for kind in kinds), default=0)
 
     def head(self) -> str:
-        """Cursor of the newest record."""
         with self._changed:
             return f"{self._epoch}-{self._next_seq - 1}"
 

@@ -89,7 +89,6 @@ class Store:
         return self._append(kind, entry_id, t_end_ns, text, revision)
 
     def write_event(self, kind: str, detail: Mapping[str, Any]) -> None:
-        """Accept an event of the service itself."""
         self._append(SERVICE, "", self._clock_ns(), f"{kind}\n{json_line(detail)}")
 
     def write_document(self, name: str, text: str) -> None:
@@ -114,11 +113,9 @@ class Store:
         return Follower(self._buffer, self.reader(), self._linked, kinds, after, on_news)
 
     def head(self) -> str:
-        """Cursor of the newest record accepted."""
         return self._buffer.head()
 
     def delivery(self, uplink: str, kinds: Sequence[str] = (*BATCHES, *ENTRIES)) -> Delivery:
-        """As ``StoreReader.delivery``."""
         return self.reader().delivery(uplink, kinds)
 
     def flush(self, timeout_s: float) -> bool:

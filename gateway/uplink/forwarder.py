@@ -28,7 +28,6 @@ class BackOff:
         self._draw = draw or random.Random()  # of the system's entropy: vehicles must not agree
 
     def next_s(self) -> float:
-        """The next pause."""
         pause_s = self._draw.uniform(0.0, self._ceiling_s)
         self._ceiling_s = min(2.0 * self._ceiling_s, self._last_s)
         return pause_s
@@ -61,7 +60,6 @@ class Forwarder(ABC, Generic[Report]):
         self._thread = threading.Thread(target=self._run, name=self.NAME, daemon=True)
 
     def start(self) -> None:
-        """Begin to deliver."""
         self._thread.start()
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
@@ -72,7 +70,6 @@ class Forwarder(ABC, Generic[Report]):
             self._thread.join(timeout_s)
 
     def is_alive(self) -> bool:
-        """True while the thread runs."""
         return self._thread.is_alive()
 
     def report(self) -> Report:

@@ -74,7 +74,8 @@ class MqttLink:
             self._hang_up()
             raise
         if settings.home_assistant is not None:
-            self._introduce(*discovery(settings.home_assistant, settings.topic, birth))
+            topic, text = discovery(settings.home_assistant, settings.topic, birth)
+            self._client.publish(topic, text.encode(), qos=1, retain=True)  # a refusal does not stop the delivery
 
     def send(self, message: OutboxMessage) -> int:
         """Send a message -> packet identifier of its answer. A message larger than the broker's limit is not sent."""
@@ -166,7 +167,7 @@ class MqttLink:
         client.will_set(f"{settings.topic}/status", lost, qos=1, retain=True, properties=will)
         client.on_connect = self._on_connect
         client.on_disconnect = self._on_disconnect
-        client.on_publish = self._on_publish
+        client.on_publish = lambda _client, _userdata, mid, code, _told: self._answer(mid, code)
         return client
 
     def _connect(self) -> None:
@@ -198,10 +199,6 @@ class MqttLink:
     def _announce(self, presence: Mapping[str, Any]) -> int:
         return self._publish("status", json.dumps(presence), retain=True)
 
-    def _introduce(self, topic: str, text: str) -> None:
-        """Publish the discovery message of Home Assistant; its refusal does not stop the delivery."""
-        self._client.publish(topic, text.encode(), qos=1, retain=True)
-
     def _publish(self, leaf: str, text: str, *, retain: bool = False, properties: Properties | None = None) -> int:
         sent = self._client.publish(
             f"{self._settings.topic}/{leaf}", text.encode(), qos=1, retain=retain, properties=properties
@@ -218,9 +215,6 @@ class MqttLink:
         self._loss = f"the connection to {self._settings.broker} was lost: {code}"
         if code.value in _HOPELESS and self._under_way != _NOTHING:
             self._answer(self._under_way, code)
-
-    def _on_publish(self, _client: Any, _userdata: Any, mid: int, code: ReasonCode, _told: Any) -> None:
-        self._answer(mid, code)
 
     def _answer(self, mid: int, code: ReasonCode) -> None:
         if mid == self._under_way:

@@ -19,7 +19,7 @@ from gateway.calibration.judgement.learning_curve import LearningCurve
 from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
 from gateway.calibration.line_files import line_in
 from gateway.calibration.plan.plan import LoadPlan, plan_next
-from gateway.estimate_json.errors import budget_to_json
+from gateway.estimate_json.kinds import budget_to_json
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.half_car import half_car_section
 from gateway.reports.calibration.learning import learning_section

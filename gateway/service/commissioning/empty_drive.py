@@ -36,7 +36,6 @@ class BatchFile:
 
     @property
     def duration_s(self) -> float:
-        """Length of the window."""
         return (self.t_end_ns - self.t_start_ns) / NS_PER_S
 
 
@@ -202,7 +201,6 @@ class EmptyDrive:
             self._start(self._jobs.job(vehicle, underway.line, files, is_fit=True))
 
     def _look(self, kept: KeptBatch) -> None:
-        """Start the inspection of one window."""
         underway = self._book.record.underway
         if underway is None or underway.vehicle is None or underway.line is None:
             return
@@ -227,7 +225,9 @@ class EmptyDrive:
             if self.is_over or underway is None or underway.vehicle is None or job is not self._job:
                 return
             if result.fault is None:
-                self.looked = LastInspection(result.findings, _seconds(job))
+                self.looked = LastInspection(
+                    result.findings, float(job.settings["window_s"]) * len(job.drives[0].batches)
+                )
             if not job.is_fit:
                 return
             try:
@@ -273,8 +273,3 @@ class EmptyDrive:
     def _table(self, answers: VehicleAnswers, line: LineChoice) -> Vehicle:
         table = vehicle_table(answers, self._vehicle.name, line.shared)
         return replace(table, name=self._vehicle.name) if self._vehicle.is_name_fixed else table
-
-
-def _seconds(job: Job) -> float:
-    """Seconds of driving that a job covers."""
-    return float(job.settings["window_s"]) * len(job.drives[0].batches)

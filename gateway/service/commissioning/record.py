@@ -87,7 +87,6 @@ class Underway(Part):
 
     @property
     def open_doubts(self) -> tuple[Doubt, ...]:
-        """Unconfirmed doubts."""
         confirmed = {kind for one in self.confirmed for kind in one.kinds}
         return tuple(one for one in self.doubts if one.kind not in confirmed)
 
@@ -172,7 +171,6 @@ class RecordStore(RecordFile[CommissioningRecord]):
             ) from None
 
     def write(self, name: str, content: bytes) -> None:
-        """Write a file beside it atomically. Raises CommissioningRefusedError."""
         try:
             KeptFiles(self.directory).write(name, content)
         except OSError as fault:
@@ -208,7 +206,6 @@ class RecordStore(RecordFile[CommissioningRecord]):
         tell_event(event, fields, self._on_event, level)
 
     def now(self) -> str:
-        """The present time, RFC 3339."""
         return iso_utc(self._clock_ns())
 
     def set_aside(self, fault: str, aside: str) -> None:

@@ -51,12 +51,10 @@ class Commissioning:
 
     @property
     def book(self) -> RecordStore:
-        """The store of the calibrations made here."""
         return self._book
 
     @property
     def fault(self) -> str | None:
-        """A fault of the record, for people."""
         return self._book.fault
 
     @property
@@ -93,7 +91,6 @@ class Commissioning:
             return json_line(state_json(self._book.record, self._present()))
 
     def lines(self) -> str:
-        """JSON: the LinesFound."""
         return json_line(lines_json(tuple(self._lines.found())))
 
     def upload(self, name: str, content: str, signature: str | None) -> str:

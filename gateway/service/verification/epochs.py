@@ -42,9 +42,14 @@ class WeighedEpoch:
         """Fused posterior of all batches by the calibration alone."""
         return fused(self.measured)
 
+    @property
+    def scale(self) -> tuple[str | None, str]:
+        """The calibration and the estimator by which it was weighed."""
+        return self.calibration_id, self.estimator
+
     def require(self, calibration_id: str | None, estimator: str) -> None:
         """Raises WeightRefusedError if it was weighed by another calibration or estimator."""
-        if (self.calibration_id, self.estimator) != (calibration_id, estimator):
+        if self.scale != (calibration_id, estimator):
             raise WeightRefusedError(
                 WeightRefusal.OTHER_CALIBRATION,
                 f"the load of {self.label()} was weighed by another calibration or estimator than the one in use: "
@@ -67,7 +72,7 @@ def epochs_of(estimates: Iterable[Estimate]) -> list[WeighedEpoch]:
         if found is None:
             continue
         before = epochs[-1] if epochs else None
-        if before is not None and found.n_batches == before.n_batches + 1 and _is_same_scale(found, before):
+        if before is not None and found.n_batches == before.n_batches + 1 and found.scale == before.scale:
             ids = (*before.batch_ids, *found.batch_ids)[-BATCH_IDS:]
             measured = (*before.measured, *found.measured)
             epochs[-1] = replace(found, t_start_ns=before.t_start_ns, batch_ids=ids, measured=measured)
@@ -138,7 +143,3 @@ def _epoch_so_far(found: Estimate) -> WeighedEpoch | None:
         known_weights_id=found.known_weights_id,
         measured=(measured,),
     )
-
-
-def _is_same_scale(one: WeighedEpoch, other: WeighedEpoch) -> bool:
-    return (one.calibration_id, one.estimator) == (other.calibration_id, other.estimator)

@@ -40,7 +40,6 @@ class TrendService:
         self._judge()
 
     def start(self) -> None:
-        """Start the thread."""
         self._thread.start()
 
     def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Set
 from dataclasses import dataclass
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any, Final, Protocol, cast
+from typing import Any, Final, cast
 
 import uvicorn
 from fastapi import FastAPI
@@ -177,19 +177,11 @@ class GuardedConnection(HttpToolsProtocol):
             self._deadline = None
 
 
-class ConnectionSlot(Protocol):
-    """What occupies one of the places: a connection, or one whose handshake is under way."""
+def has_slot(newcomer: "GuardedConnection | TlsHandshake", connections: Set[Any]) -> bool:
+    """Whether a connection that has just joined ``connections`` may stay; another may be closed for it.
 
-    client: tuple[str, int] | None
-    since_s: float
-    transport: asyncio.Transport
-
-    @property
-    def is_idle(self) -> bool: ...
-
-
-def has_slot(newcomer: ConnectionSlot, connections: Set[Any]) -> bool:
-    """Whether a connection that has just joined ``connections`` may stay; another may be closed for it."""
+    A connection whose handshake is under way occupies a place too.
+    """
     mine = newcomer.client and newcomer.client[0]
     if sum(other.client is not None and other.client[0] == mine for other in connections) > CONNECTIONS_PER_ADDRESS:
         return False
@@ -249,7 +241,6 @@ class TlsHandshake(asyncio.Protocol):
         self._connections.discard(self)
 
     def shutdown(self) -> None:
-        """The server stops."""
         self.transport.abort()
 
     async def _shake_hands(self) -> None:

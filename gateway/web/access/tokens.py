@@ -8,7 +8,6 @@ import secrets
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
@@ -61,7 +60,6 @@ class Token(BaseModel):
         return self.expires_s is not None and not self.created_s <= now_s < self.expires_s
 
     def expiry(self) -> str:
-        """When it ends, for people."""
         return "never" if self.expires_s is None else f"{datetime.fromtimestamp(self.expires_s, UTC):%Y-%m-%dT%H:%MZ}"
 
 
@@ -73,20 +71,7 @@ class _Content(BaseModel):
     tokens: tuple[Token, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class _Read:
-    """The file as last read."""
-
-    stamp: tuple[int, int, int] | None
-    by_id: dict[str, Token]
-
-
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """Whether a token was required in this state of the file."""
-
-    stamp: tuple[int, int, int] | None
-    are_in_use: bool
+_Stamp = tuple[int, int, int] | None
 
 
 class TokenFile:
@@ -99,8 +84,8 @@ class TokenFile:
         self._path = path
         self._files = KeptFiles(path.parent)
         self._clock_s = clock_s
-        self._read = _Read(None, {})
-        self._asked_at: _Asked | None = None
+        self._read: tuple[_Stamp, dict[str, Token]] = (None, {})  # the tokens by id, as last read
+        self._asked_at: tuple[_Stamp, bool] | None = None  # whether a token was required in this state of the file
         self.fault: str | None = None  # why no token is accepted, for the status
 
     def create(self, name: str, scope: Scope, lifetime_s: float | None = None) -> str:
@@ -176,15 +161,15 @@ class TokenFile:
         A file without tokens requires none. If the file disappears while tokens are in use, one is still required.
         """
         stamp = self._files.stamp(self._path.name)
-        if self._asked_at is not None and stamp == self._asked_at.stamp:
-            return self._asked_at.are_in_use
-        was_asked = self._asked_at is not None and self._asked_at.are_in_use
+        if self._asked_at is not None and stamp == self._asked_at[0]:
+            return self._asked_at[1]
+        was_asked = self._asked_at is not None and self._asked_at[1]
         if stamp is None and was_asked:
             self.fault = self.fault or f"{self._path} has gone while tokens were in use: no token is accepted"
             are_in_use = True
         else:
             are_in_use = self.are_in_use()
-        self._asked_at = _Asked(self._files.stamp(self._path.name), are_in_use)
+        self._asked_at = (self._files.stamp(self._path.name), are_in_use)
         return are_in_use
 
     def _tokens_or_set_aside(self) -> tuple[Token, ...]:
@@ -222,15 +207,15 @@ class TokenFile:
     def _known(self) -> dict[str, Token]:
         """The tokens by id, read again whenever the file has changed. With an unreadable file nobody is let in."""
         stamp = self._files.stamp(self._path.name)
-        if stamp != self._read.stamp:
+        if stamp != self._read[0]:
             try:
-                self._read = _Read(stamp, {token.id: token for token in self.tokens()})
-                self.fault = None if self._read.by_id else self.fault
+                self._read = (stamp, {token.id: token for token in self.tokens()})
+                self.fault = None if self._read[1] else self.fault
             except ConfigurationError as fault:
                 log_event(Event.TOKENS_UNREADABLE, level=logging.ERROR, fault=str(fault))
-                self._read = _Read(stamp, {})
+                self._read = (stamp, {})
                 self.fault = f"no token is accepted: {fault}"
-        return self._read.by_id
+        return self._read[1]
 
     def _write(self, tokens: tuple[Token, ...]) -> None:
         """Replace the file in one step, readable by its owner alone."""

@@ -145,7 +145,6 @@ class Board:
         return (f"{answer.tag}.stale" if is_stale else answer.tag), head + answer.rest
 
     def shown(self) -> Shown:
-        """The estimate shown now, with its age."""
         answer = self._answer
         age_s = self._age_s(answer)
         return Shown(answer.estimate, None if age_s is None else round(age_s, 1), self._is_stale(answer))

@@ -72,7 +72,6 @@ _REFUSALS: Final = problem_responses(400, 404, 409, 422, 503)
 
 
 def alarms_router(reader: StoreReader, backend: AlarmBackend) -> APIRouter:
-    """The routes of the alarms."""
     router = APIRouter(prefix="/api/v1", tags=["alarms"])
 
     @router.get("/alarms", response_model=AlarmsPage, responses=problem_responses(422, 503))

@@ -5,7 +5,7 @@ import json
 import math
 from collections.abc import Callable
 from enum import StrEnum
-from typing import Any, Final, Literal
+from typing import Final, Literal, get_args
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field
 from gateway.core.alarms.rules import as_of_load
 from gateway.core.events.entry import EntryKind
 from gateway.core.weights.limits import Light, Room, nearness, rooms_of
-from gateway.estimate import Estimate, Lack, Quantity, Weights
+from gateway.estimate import Estimate, Lack, Quantity
 from gateway.reasons import EXPLANATIONS, Cause
 from gateway.records import Why, iso_utc
 from gateway.status import OwnReading, State, Status
@@ -100,7 +100,6 @@ _EVENTS: Final = 20  # a corrected one comes again behind newer ones
 
 
 def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], scales: Scales) -> APIRouter:
-    """The route for the driver."""
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
 
     @router.get("/cab", responses=problem_responses(503))
@@ -126,13 +125,13 @@ def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
             over_limit_probability=_or_none(max(near.probabilities.values(), default=None), 4),
             room=[] if is_doubted else [_room(room) for room in rooms_of(weights)],
             is_doubted=is_doubted,
-            has_limits=_has_limits(weights),
+            has_limits=any(getattr(weights, place).limit_kg is not None for place in get_args(RoomPlace)),
             lacks=weights.gross.lacks,
             payload_kg=None if load is None else _or_none(load.payload.number, 1),
             payload_interval95_kg=None if load is None else _interval(load.payload),
             alarms=now.alarms.standing,
             rejected=[str(why) for why in rejected],
-            last_event=_newest(await asyncio.to_thread(_events, reader)),
+            last_event=await asyncio.to_thread(_last_event, reader),
             own_readings=now.own_readings,
         )
 
@@ -157,10 +156,6 @@ def _room(room: Room) -> RoomLeft:
     )
 
 
-def _has_limits(weights: Weights) -> bool:
-    return any(one.limit_kg is not None for one in (weights.gross, weights.front_axle, weights.rear_axle))
-
-
 def _rejected(heard: Estimate | None, shown: Estimate | None) -> tuple[Why, ...]:
     """Of the last whole batch, if none was weighed since. A provisional estimate does not replace a refused batch."""
     if heard is None:
@@ -169,14 +164,10 @@ def _rejected(heard: Estimate | None, shown: Estimate | None) -> tuple[Why, ...]
     return () if is_weighed_since else heard.rejected
 
 
-def _events(reader: StoreReader) -> tuple[str, ...]:
-    return tuple(reader.page((EntryKind.EVENT,), limit=_EVENTS, newest_first=True).items)
-
-
-def _newest(texts: tuple[str, ...]) -> CabEvent | None:
-    """The latest of the active ones."""
-    told: list[dict[str, Any]] = [json.loads(text) for text in texts]
-    standing = [one for one in told if not one["is_withdrawn"]]
+def _last_event(reader: StoreReader) -> CabEvent | None:
+    """The latest load event that is not withdrawn."""
+    page = reader.page((EntryKind.EVENT,), limit=_EVENTS, newest_first=True)
+    standing = [one for one in map(json.loads, page.items) if not one["is_withdrawn"]]
     if not standing:
         return None
     last = max(standing, key=lambda one: str(one["t_end"]))
@@ -184,13 +175,10 @@ def _newest(texts: tuple[str, ...]) -> CabEvent | None:
 
 
 def _interval(quantity: Quantity) -> list[float] | None:
-    low, high = quantity.interval95 if math.isfinite(quantity.interval95[0]) else _of_std(quantity)
+    """The fused estimate of a load has no interval of its own (Epoch): then that of its standard deviation."""
+    has_own = math.isfinite(quantity.interval95[0])
+    low, high = (quantity if has_own else Quantity.normal(quantity.number, quantity.std)).interval95
     return [round(low, 1), round(high, 1)] if math.isfinite(low) and math.isfinite(high) else None
-
-
-def _of_std(quantity: Quantity) -> tuple[float, float]:
-    """The fused estimate of a load has no interval of its own (Epoch)."""
-    return Quantity.normal(quantity.number, quantity.std).interval95
 
 
 def _or_none(x: float | None, digits: int) -> float | None:

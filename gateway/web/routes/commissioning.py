@@ -192,7 +192,6 @@ COMMISSIONING_PATH: Final = "/calibration/commissioning"
 
 
 def commissioning_router(backend: CommissioningBackend) -> APIRouter:
-    """The routes of a commissioning."""
     router = APIRouter(prefix="/api/v1" + COMMISSIONING_PATH, tags=["calibration"])
     refusals = problem_responses(403, 409, 503)
     of_body = {**refusals, **problem_responses(400, 422)}

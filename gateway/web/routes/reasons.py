@@ -45,7 +45,6 @@ class ReasonsInWords(BaseModel):
 
 
 def reasons_router() -> APIRouter:
-    """The route that explains."""
     router = APIRouter(prefix="/api/v1", tags=["api"])
     explained = ReasonsInWords(
         items=[

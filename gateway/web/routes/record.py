@@ -38,7 +38,6 @@ class SegmentsTold(BaseModel):
 
 
 def record_router(log: FrameLog) -> APIRouter:
-    """The routes of the ring log."""
     router = APIRouter(tags=["record"])
 
     @router.get(RECORD_PATH)

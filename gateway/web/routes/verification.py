@@ -95,7 +95,6 @@ class VerificationState(BaseModel):
 
 
 def verification_router(backend: VerificationBackend) -> APIRouter:
-    """The routes of verification."""
     router = APIRouter(prefix="/api/v1", tags=["calibration"])
 
     @router.get(VERIFICATIONS_PATH, response_model=VerificationState)
@@ -168,7 +167,6 @@ class TrendState(BaseModel):
 
 
 def trend_router(backend: TrendBackend) -> APIRouter:
-    """The route of the trend."""
     router = APIRouter(prefix="/api/v1", tags=["calibration"])
 
     @router.get(TREND_PATH, response_model=TrendState)

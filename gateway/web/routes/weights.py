@@ -82,7 +82,6 @@ class Scales:
 
 
 def weights_router(board: Board, scales: Scales) -> APIRouter:
-    """The route of weights."""
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
 
     @router.get("/weights/latest")
