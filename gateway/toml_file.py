@@ -1,5 +1,6 @@
 """Reads TOML files written by people and checks them against a model; every fault names its file and key."""
 
+import re
 import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass
@@ -16,6 +17,7 @@ from gateway.files.signed import Read
 Model = TypeVar("Model", bound=BaseModel)
 
 SIMILAR: Final = 0.7  # of difflib's ratio: a letter too many, too few or another one, or a unit left out
+_OF_KEY: Final = "[key]"  # how pydantic ends the place of a fault in a key itself
 
 _BEYOND: Final = {  # pydantic's type of fault -> (its words, the bound's name in the fault)
     "less_than_equal": ("is above", "le"),
@@ -88,6 +90,8 @@ def describe_faults(where: Path | str, fault: ValidationError, model: type) -> s
 def _key(location: tuple[int | str, ...]) -> str:
     key = ""
     for part in location:
+        if part == _OF_KEY:
+            continue
         key += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if key else part
     return key or "(file)"
 
@@ -95,8 +99,9 @@ def _key(location: tuple[int | str, ...]) -> str:
 def _what(fault: dict[str, Any], model: type) -> str:
     if fault["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         *table, key = fault["loc"]
-        meant = get_close_matches(str(key), _keys_of(model, table), 1, SIMILAR)
-        return f"unknown key; did you mean {meant[0]}?" if meant else "unknown key; remove it or check its spelling"
+        return _unknown(str(key), _keys_of(model, table))
+    if fault["type"] == "enum" and fault["loc"][-1] == _OF_KEY:
+        return _unknown(str(fault["input"]), re.findall("'([^']+)'", fault["ctx"]["expected"]))
     if fault["type"] in ("missing", "missing_keyword_only_argument", "missing_argument"):
         return "missing; it must be given"
     if fault["type"] in _BEYOND:
@@ -104,6 +109,11 @@ def _what(fault: dict[str, Any], model: type) -> str:
     message = fault["msg"].removeprefix("Value error, ")
     shown = repr(fault.get("input"))
     return message if fault["type"] == "value_error" or len(shown) > 60 else f"{message} (it says {shown})"
+
+
+def _unknown(key: str, known: Sequence[str]) -> str:
+    meant = get_close_matches(key, known, 1, SIMILAR)
+    return f"unknown key; did you mean {meant[0]}?" if meant else "unknown key; remove it or check its spelling"
 
 
 def _keys_of(model: type, table: Sequence[int | str]) -> list[str]:

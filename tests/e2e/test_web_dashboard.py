@@ -159,6 +159,14 @@ def test_in_german_on_a_phone_and_on_a_wide_desk(site: str, browser: Any, width:
     page.close()
 
 
+def test_charts_write_numbers_as_the_page_does(site: str, browser: Any) -> None:
+    made = Watched(browser, locale="de-DE")
+    made.page.goto(site)
+    expect(made.page.locator("#payload-chart[data-drawn]")).to_be_visible()
+    assert made.page.evaluate("document.getElementById('payload-chart').layout.separators") == ",."
+    made.page.close()
+
+
 def test_a_wide_screen_is_used(site: str, browser: Any) -> None:
     """Three cards beside each other, to the edges; the rarer ones fill columns below them."""
     made = Watched(browser, viewport={"width": 1800, "height": 1000})
@@ -197,7 +205,7 @@ def test_it_follows_what_happens(gateway: Gateway, watched: Watched) -> None:
         gateway.board.publish(make_estimate(20, is_provisional=True))
         expect(page.locator("#note")).to_contain_text("Early value")
         gateway.publish(make_estimate(20, Why.SPEED_FROZEN))
-        expect(page.locator("#rejected")).to_contain_text("Speed frozen: the speed repeated one number")
+        expect(page.locator("#rejected")).to_contain_text("Speed frozen: the speed repeated the same number")
         expect(page.locator("#recent tr")).to_have_count(2)
         gateway.board.close()
 

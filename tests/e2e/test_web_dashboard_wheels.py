@@ -12,10 +12,10 @@ import pytest
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched, demo_calibration, weighed
 from support.web import Gateway, serving
 
-from gateway.core import weights
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.fusion import epoch_of
 from gateway.core.vehicle import cg_left_m
+from gateway.core.weights import on_the_road as weights
 from gateway.estimate import Estimate
 from gateway.posterior import Posterior
 

@@ -121,7 +121,11 @@ def test_with_j1939_an_11_bit_message_is_still_matched_whole(write_map):
 
 FAULTS = {
     "no such key": (ACCEL + "typo = 1\n", ["signals.vertical_acceleration.typo", "unknown key"]),
-    "no such signal of ours": (ACCEL.replace("vertical_", "sideways_"), ["sideways_acceleration"]),
+    "no such signal of ours": (
+        ACCEL.replace("vertical_acceleration", "vertical_aceleration"),
+        ["signals.vertical_aceleration: unknown key; did you mean vertical_acceleration?"],
+    ),
+    "nothing like a signal of ours": (ACCEL.replace("vertical_acceleration", "xyz"), ["signals.xyz: unknown key"]),
     "no message": (ACCEL.replace("IMU", "IMV"), ["vertical_acceleration.message", "'IMV'", "did you mean 'IMU'"]),
     "no signal": (ACCEL.replace("AccelZ", "AccelY"), ["'AccelY'", "did you mean 'AccelZ'"]),
     "unit unknown": (ACCEL.replace("AccelZ", "Odd"), ["vertical_acceleration.unit", "'furlong'", "m/s^2"]),

@@ -84,14 +84,14 @@ show(({ latest, sources, remedies: advised }) => {
   if (lines.length === 0) return;
   const half = (std) => figure(Z95 * std, 0, "kg");
   write("budget-why", phrase("why", { kg: half(latest.payload_std_kg) }));
-  const told = lines.filter((line) => line.payload_kg > 0);
-  element("budget-lines").replaceChildren(...told.map((line) => {
+  const shown = lines.filter((line) => Z95 * line.payload_kg >= 0.5); // less would read as 0 kg
+  element("budget-lines").replaceChildren(...shown.map((line) => {
     const built = made("li", [made("span", capital(sources.get(line.source) ?? words(line.source))), made("span", `±\u00a0${half(line.payload_kg)}`)]);
     built.style.setProperty("--part", `${(100 * line.payload_kg) / latest.payload_std_kg}%`);
     return built;
   }));
   const helps = ({ remedy, payload_with_remedy_kg: then }) => advised.has(remedy) && half(then) !== half(latest.payload_std_kg);
-  const remedies = new Map(told.filter(helps).map((line) => [line.remedy, line.payload_with_remedy_kg]));
+  const remedies = new Map(shown.filter(helps).map((line) => [line.remedy, line.payload_with_remedy_kg]));
   element("budget-better").hidden = remedies.size === 0;
   element("budget-remedies").replaceChildren(...[...remedies].sort(([, one], [, other]) => one - other).map(([remedy, then]) =>
     made("li", phrase("budget_remedy", { advice: capital(advised.get(remedy)), now: half(latest.payload_std_kg), then: half(then) }))));

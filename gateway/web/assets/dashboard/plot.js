@@ -1,9 +1,13 @@
 // plotly.js, fetched after the numbers are on the page, and what all charts have in common.
 
 import { learn } from "/assets/dashboard/known.js";
+import { locale } from "/assets/language.js";
 
 const CONFIG = { displayModeBar: false, responsive: true, showTips: false };
 const isTouch = matchMedia("(pointer: coarse)");
+
+const part = (type) => new Intl.NumberFormat(locale, { useGrouping: "always" }).formatToParts(1234.5).find((one) => one.type === type).value;
+const SEPARATORS = part("decimal") + part("group"); // as the page writes its numbers
 
 let loading = null;
 
@@ -58,6 +62,7 @@ function layout({ xaxis, yaxis, ...more }) {
     font: { family: "system-ui, sans-serif", size: 12, color: colour("soft") },
     hoverlabel: { bgcolor: colour("card"), bordercolor: colour("soft"), font: { color: colour("ink") } },
     hovermode: "closest",
+    separators: SEPARATORS,
     showlegend: false,
     dragmode: isTouch.matches ? false : "zoom",
     xaxis: axis(xaxis),

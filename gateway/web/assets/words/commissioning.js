@@ -115,7 +115,7 @@ export const COMMISSIONING_WORDS = {
   com_better_load: ["More empty driving would hardly improve it: a known load would. State one under \u201cKnown weights\u201d after a drive.", "Mehr Leerfahrt hilft kaum: eine bekannte Ladung hilft. Nach einer Fahrt unter „Bekannte Gewichte“ eintragen."],
   com_better_line: ["Without a line the stiffness of the springs is unknown, and nothing confirms that the vehicle was empty: weigh one load, or commission it again with its line.", "Ohne Baureihe ist unbekannt, wie hart die Federn sind und ob es leer war: eine Ladung wiegen oder mit Baureihe neu kalibrieren."],
   com_in_use: ["Calibration made here in use", "Hier erstellte Kalibrierung im Einsatz"],
-  com_of_settings: ["that of the settings, or none", "die der Einstellungen, oder keine"],
+  com_of_settings: ["the one named in the settings, if any", "die in den Einstellungen genannte, falls dort eine steht"],
   com_made: ["{vehicle}, {line}, from {n} window, {time} by {by}{note}|{vehicle}, {line}, from {n} windows, {time} by {by}{note}", "{vehicle}, {line}, aus {n} Abschnitt, {time} von {by}{note}|{vehicle}, {line}, aus {n} Abschnitten, {time} von {by}{note}"],
   com_of_line: ["of the line {name}", "Baureihe {name}"],
   com_without_line: ["without a line", "ohne Baureihe"],
