@@ -143,6 +143,7 @@ def test_in_german_on_a_phone_and_on_a_wide_desk(site: str, browser: Any, width:
     expect(page.locator("#payload-range")).to_have_text("95 %: 258 bis 282 kg")
     expect(page.locator("#state-name")).to_have_text("Wiegt")
     expect(page.locator("#overload")).to_have_text("Hinterachse über der Grenze.")
+    expect(page.locator("#calibrated")).to_contain_text("Kreuzspektren", use_inner_text=False)
     expect(page.locator("#rejected")).to_contain_text(
         "Zu langsam: zu viel des Abschnitts war langsamer", use_inner_text=False
     )

@@ -123,7 +123,7 @@ def test_what_was_made_is_undone_after_a_question(gateway: Gateway, bench: Bench
         expect(watched.page.locator("#commissioning-in-use")).to_contain_text("van-17, without a line, from 2 windows")
         watched.page.locator("#commissioning-undo").click()
         watched.page.get_by_role("button", name="Yes").click()
-        expect(watched.page.locator("#commissioning-in-use")).to_contain_text("that of the settings")
+        expect(watched.page.locator("#commissioning-in-use")).to_contain_text("the one named in the settings")
         watched.page.get_by_text("What was made here").click()
         expect(watched.page.locator("#commissioning-entries li")).to_contain_text("undone")
         assert watched.complaints == []
@@ -326,4 +326,5 @@ def test_meanwhile_the_load_says_that_it_is_being_calibrated(gateway: Gateway, b
         watched.page.goto(server.url)
         expect(watched.page.locator("#note")).to_contain_text("the vehicle is being calibrated")
         expect(watched.page.locator("#note")).not_to_contain_text("springscale")
+        expect(watched.page.locator("#rejected")).not_to_contain_text("springscale", use_inner_text=False)
         gateway.board.close()

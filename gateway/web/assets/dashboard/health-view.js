@@ -4,7 +4,7 @@ import { show } from "/assets/dashboard/known.js";
 import { element, made, pair, row } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
 import { isAsleep, isSilent } from "/assets/dashboard/sleep.js";
-import { UNKNOWN, between, capital, clock, duration, figure, number, words } from "/assets/dashboard/words.js";
+import { UNKNOWN, between, capital, clock, duration, figure, number } from "/assets/dashboard/words.js";
 
 const NEEDED = new Set(["vertical_acceleration", "pitch_rate", "speed"]);
 
@@ -91,7 +91,7 @@ show(({ vehicle }) => {
     pairs.push(
       pair(phrase("empty_mass"), figure(figures.empty_mass_kg, 0, "kg")),
       pair(phrase("wheelbase"), figure(figures.wheelbase_m, 2, "m")),
-      pair(phrase("estimator"), words(vehicle.estimator ?? UNKNOWN)),
+      pair(phrase("estimator"), vehicle.estimator ? phrase.named("estimator", vehicle.estimator) : UNKNOWN),
       pair(phrase("seen_payloads"), between(calibration.payload_seen_kg, 0, "kg")),
       pair(phrase("seen_shares"), between(calibration.front_share_seen_pct, 1, "%")),
       pair(phrase("seen_speeds"), calibration.speed_seen_mps ? between(calibration.speed_seen_mps.map((mps) => 3.6 * mps), 0, "km/h") : UNKNOWN),
@@ -109,20 +109,26 @@ function withCode(text) {
 const N_SHOWN = 3;
 const USUAL = "The drive"; // a cause that asks nobody for anything
 
-function rejection(batch, reasons) {
+/** What to do about a reason; a vehicle without calibration is calibrated on this page where that is allowed. */
+function advised(reason, advice, commissioning) {
+  if (reason !== "no_calibration" || !commissioning?.is_allowed) return [made("em", phrase("what_to_do")), ...withCode(advice), "."];
+  return [phrase(commissioning.underway || commissioning.is_pending ? "none_meanwhile" : "none_uncalibrated")];
+}
+
+function rejection(batch, reasons, commissioning) {
   const when = made("time", clock(batch.t_end));
   when.dateTime = batch.t_end;
   const parts = batch.rejected.map((reason) => {
     const told = reasons.get(reason);
-    const said = told ? [": ", ...withCode(told.happened), ". ", made("em", phrase("what_to_do")), ...withCode(told.advice), "."] : [];
+    const said = told ? [": ", ...withCode(told.happened), ". ", ...advised(reason, told.advice, commissioning)] : [];
     return made("p", [made("strong", capital(phrase.named("reason", reason))), ...said], told?.cause === USUAL ? "usual" : "");
   });
   return made("li", [when, ...parts]);
 }
 
-show(({ batches, reasons }) => {
+show(({ batches, reasons, commissioning }) => {
   if (batches === null) return;
   const rejected = batches.filter((batch) => batch.rejected.length > 0).slice(0, N_SHOWN);
-  const items = rejected.map((batch) => rejection(batch, reasons));
+  const items = rejected.map((batch) => rejection(batch, reasons, commissioning));
   element("rejected").replaceChildren(...(items.length ? items : [made("li", phrase("none"))]));
-}, "batches", "reasons");
+}, "batches", "reasons", "commissioning");

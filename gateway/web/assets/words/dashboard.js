@@ -271,6 +271,8 @@ export const DASHBOARD = {
   empty_mass: ["Empty sprung mass", "Gefederte Leermasse"],
   wheelbase: ["Wheelbase", "Radstand"],
   estimator: ["Estimator", "Schätzer"],
+  "estimator.cross_spectrum": ["cross-spectral", "Kreuzspektren"],
+  "estimator.ratio_index": ["ratio index", "Verhältnisindex"],
   seen_payloads: ["Calibrated payloads", "Kalibrierte Nutzlasten"],
   seen_shares: ["Calibrated front shares", "Kalibrierte Vorderachsanteile"],
   seen_speeds: ["Calibrated mean speeds", "Kalibrierte Geschwindigkeiten"],
