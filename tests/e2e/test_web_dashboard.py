@@ -355,6 +355,8 @@ def test_the_keyboard_reaches_everything_in_order(site: str, watched: Watched) -
     page = watched.page
     page.goto(site)
     expect(page.locator("#recent tr")).to_have_count(4)
+    for late in ("History as a table", "Spectra as a table", "Verify with a known load …"):
+        expect(page.get_by_text(late)).to_be_visible()  # each is drawn when its numbers come
     order = []
     for _ in range(10):
         page.keyboard.press("Tab")

@@ -2,7 +2,7 @@
 
 import { show } from "/assets/dashboard/known.js";
 import { element, made, pair, row } from "/assets/dashboard/page.js";
-import { phrase } from "/assets/dashboard/phrases.js";
+import { calibratedHere, phrase } from "/assets/dashboard/phrases.js";
 import { isAsleep, isSilent } from "/assets/dashboard/sleep.js";
 import { UNKNOWN, between, capital, clock, duration, figure, number } from "/assets/dashboard/words.js";
 
@@ -111,8 +111,8 @@ const USUAL = "The drive"; // a cause that asks nobody for anything
 
 /** What to do about a reason; a vehicle without calibration is calibrated on this page where that is allowed. */
 function advised(reason, advice, commissioning) {
-  if (reason !== "no_calibration" || !commissioning?.is_allowed) return [made("em", phrase("what_to_do")), ...withCode(advice), "."];
-  return [phrase(commissioning.underway || commissioning.is_pending ? "none_meanwhile" : "none_uncalibrated")];
+  const here = reason === "no_calibration" ? calibratedHere(commissioning) : null;
+  return here === null ? [made("em", phrase("what_to_do")), ...withCode(advice), "."] : [here];
 }
 
 function rejection(batch, reasons, commissioning) {

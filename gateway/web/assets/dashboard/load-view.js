@@ -2,7 +2,7 @@
 
 import { ageNow, known, show } from "/assets/dashboard/known.js";
 import { element, made, say, write } from "/assets/dashboard/page.js";
-import { phrase } from "/assets/dashboard/phrases.js";
+import { calibratedHere, phrase } from "/assets/dashboard/phrases.js";
 import { UNKNOWN, Z95, ago, between, capital, clock, figure, kmh, reasons as named, withStd, words } from "/assets/dashboard/words.js";
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interval", { between: between(bounds, digits, unit) }));
@@ -10,9 +10,8 @@ const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interv
 /** The outcome of the last batch, if none was weighed yet, and what to do about it. */
 function noneYet(refusal, reasons, commissioning) {
   if (refusal == null) return phrase("none_yet");
-  if (refusal.rejected.includes("no_calibration") && commissioning?.is_allowed) {
-    return phrase(commissioning.underway || commissioning.is_pending ? "none_meanwhile" : "none_uncalibrated");
-  }
+  const here = refusal.rejected.includes("no_calibration") ? calibratedHere(commissioning) : null;
+  if (here !== null) return here;
   const advice = refusal.rejected.map((reason) => reasons.get(reason)?.advice).filter(Boolean).map((text) => `${text.replaceAll("`", "")}.`);
   const todo = advice.length ? phrase("to_do", { advice: advice.join(" ") }) : "";
   return phrase("none_because", { reasons: named(refusal.rejected) }) + todo;

@@ -22,4 +22,10 @@ export function explained({ items, sources, remedies }) {
   };
 }
 
+/** What to do about a batch without calibration where this page may calibrate the vehicle; null where it may not. */
+export function calibratedHere(commissioning) {
+  if (!commissioning?.is_allowed) return null;
+  return phrase(commissioning.underway || commissioning.is_pending ? "none_meanwhile" : "none_uncalibrated");
+}
+
 fill(phrase);
