@@ -5,6 +5,7 @@ It needs Debian's mosquitto.
 """
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -16,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.speed.footprint.broker import MOSQUITTO, Broker
-from benchmarks.speed.meter import cpu_of_s, free_port
+from benchmarks.speed.meter import ENVIRONMENT, cpu_of_s, free_port
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
 from gateway.records import Spectra
@@ -72,6 +73,7 @@ def measure(seconds: float) -> dict[str, Any]:
     """Start broker and service, let them settle, and measure the service's cost over this time."""
     if MOSQUITTO is None:
         return {"skipped": "mosquitto is not installed"}
+    quiet = subprocess.DEVNULL
     with TemporaryDirectory(dir=Path.cwd()) as folder:
         here, port = Path(folder), free_port()
         (here / "secret").write_text("whsec_" + "A" * 40 + "\n")
@@ -79,7 +81,7 @@ def measure(seconds: float) -> dict[str, Any]:
         service = [sys.executable, "-m", "gateway", "run", "--config", str(here / "springscale.toml")]
         with Broker(here) as broker:
             (here / "springscale.toml").write_text(SETTINGS.format(port=port, broker=broker.port))
-            running = subprocess.Popen(service, cwd=here, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            running = subprocess.Popen(service, cwd=here, env=os.environ | ENVIRONMENT, stdout=quiet, stderr=quiet)
             try:
                 time.sleep(SETTLE_S)
                 with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/status") as answer:

@@ -11,7 +11,7 @@ import struct
 import subprocess
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from benchmarks.speed.meter import command_of, in_own_process, peak_mb
@@ -22,7 +22,10 @@ from gateway.bus.signals.mapping import SignalMap
 
 OURS_SHARE = 0.084  # of the frames on the bus: two IMU messages at 100 Hz, GNSS at 10 Hz
 DRAIN_S = 0.1  # how often the pipeline looks into the inbox
+N_RUNS = 3  # chosen: a single run met 2.5 % of other work once
 RATES = {"2500 frames/s": 2500, "8000 frames/s": 8000, "2500, filtered": 210, "8000, filtered": 672}
+
+Receive = Callable[[threading.Event], dict[str, Any]]  # until the event is set; what it received
 
 
 def send(port: int, frames_per_s: int, seconds: float) -> int:
@@ -58,22 +61,26 @@ def listening_socket() -> socket.socket:
     return wire
 
 
-def receive_ours(wire: socket.socket, signal_map: SignalMap, is_over: threading.Event) -> dict[str, Any]:
+def ours(wire: socket.socket, signal_map: SignalMap) -> Receive:
     """LiveSource and the decoder, as the service runs them."""
     source = LiveSource("socketcan", "bench", signal_map, open_receiver=lambda: SocketCanReceiver(wire, 8))
     decoder = Decoder(signal_map)
-    source.start()
-    n_rows = 0
-    while not is_over.is_set():
-        is_over.wait(DRAIN_S)
-        frames = source.inbox.drain(0.0)
-        n_rows += len(decoder.decode(frames)) if frames is not None else 0
-    counts = source.counts()
-    source.stop()
-    return {"frames": counts.frames, "samples": n_rows, "dropped": counts.dropped_inbox + counts.dropped_kernel}
+
+    def receive(is_over: threading.Event) -> dict[str, Any]:
+        source.start()
+        n_rows = 0
+        while not is_over.is_set():
+            is_over.wait(DRAIN_S)
+            frames = source.inbox.drain(0.0)
+            n_rows += len(decoder.decode(frames)) if frames is not None else 0
+        counts = source.counts()
+        source.stop()
+        return {"frames": counts.frames, "samples": n_rows, "dropped": counts.dropped_inbox + counts.dropped_kernel}
+
+    return receive
 
 
-def receive_python_can(wire: socket.socket, signal_map: SignalMap, is_over: threading.Event) -> dict[str, Any]:
+def python_can(wire: socket.socket, signal_map: SignalMap) -> Receive:
     """python-can's SocketcanBus over the same kind of socket, cantools for the mapped frames."""
     import cantools  # noqa: PLC0415 # what ours shall not hold in memory
     from can.interfaces.socketcan import socketcan as python_can_socketcan  # noqa: PLC0415
@@ -84,29 +91,33 @@ def receive_python_can(wire: socket.socket, signal_map: SignalMap, is_over: thre
     peer.create_socket = lambda: wire
     peer.bind_socket = lambda sock, channel: None
     peer.SocketcanBus._apply_filters = lambda self, filters: None
-    n_frames = n_rows = 0
-    with peer.SocketcanBus("bench", local_loopback=True) as bus:
-        while not is_over.is_set():
-            frame = bus.recv(0.1)
-            if frame is None:
-                continue
-            n_frames += 1
-            if (message := messages.get(frame.arbitration_id)) is not None:
-                message.decode(frame.data, decode_choices=False)
-                n_rows += 1
-    return {"frames": n_frames, "samples": n_rows, "dropped": None}
+
+    def receive(is_over: threading.Event) -> dict[str, Any]:
+        n_frames = n_rows = 0
+        with peer.SocketcanBus("bench", local_loopback=True) as bus:
+            while not is_over.is_set():
+                frame = bus.recv(0.1)
+                if frame is None:
+                    continue
+                n_frames += 1
+                if (message := messages.get(frame.arbitration_id)) is not None:
+                    message.decode(frame.data, decode_choices=False)
+                    n_rows += 1
+        return {"frames": n_frames, "samples": n_rows, "dropped": None}
+
+    return receive
 
 
-PATHS: dict[str, Callable[[socket.socket, SignalMap, threading.Event], dict[str, Any]]] = {
-    "springscale": receive_ours,
-    "python-can + cantools": receive_python_can,
+PATHS: dict[str, Callable[[socket.socket, SignalMap], Receive]] = {
+    "springscale": ours,
+    "python-can + cantools": python_can,
 }
 
 
 def run(path: str, frames_per_s: int, seconds: float) -> dict[str, Any]:
     """One path at one rate; CPU is this process's from the first frame sent to the last."""
-    signal_map = load_signal_map("springscale:reference")
     wire = listening_socket()
+    receive = PATHS[path](wire, load_signal_map("springscale:reference"))
     command = command_of(send, wire.getsockname()[1], frames_per_s, seconds)
     sender = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     is_over = threading.Event()
@@ -120,7 +131,7 @@ def run(path: str, frames_per_s: int, seconds: float) -> dict[str, Any]:
     wire_peek = wire.recv(1, socket.MSG_PEEK)
     assert wire_peek
     cpu_s, begun_s = time.process_time(), time.monotonic()
-    result = PATHS[path](wire, signal_map, is_over)
+    result = receive(is_over)
     result["cpu_pct"] = 100 * (time.process_time() - cpu_s) / (time.monotonic() - begun_s)
     result["sent"] = int(sender.stdout.read()) if sender.stdout else 0
     result["peak_mb"] = peak_mb()
@@ -128,5 +139,17 @@ def run(path: str, frames_per_s: int, seconds: float) -> dict[str, Any]:
 
 
 def measure(seconds: float) -> dict[str, Any]:
-    """Every path at every rate."""
-    return {bus: {path: in_own_process(run, path, rate, seconds) for path in PATHS} for bus, rate in RATES.items()}
+    """Every path at every rate, some times: of the runs that lost most frames, the cheapest.
+
+    The paths take turns, so that a disturbance meets both.
+    """
+    runs: dict[str, dict[str, list[dict[str, Any]]]] = {bus: {path: [] for path in PATHS} for bus in RATES}
+    for _ in range(N_RUNS):
+        for bus, rate in RATES.items():
+            for path in PATHS:
+                runs[bus][path].append(in_own_process(run, path, rate, seconds))
+    return {bus: {path: max(each, key=_judged) for path, each in paths.items()} for bus, paths in runs.items()}
+
+
+def _judged(found: Mapping[str, Any]) -> tuple[int, float]:
+    return found["sent"] - found["frames"], -found["cpu_pct"]

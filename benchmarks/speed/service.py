@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.speed.live import listening_socket
-from benchmarks.speed.meter import CALIBRATION, ONE_THREAD, command_of, cpu_of_s, in_own_process, peak_mb
+from benchmarks.speed.meter import CALIBRATION, ENVIRONMENT, command_of, cpu_of_s, in_own_process, peak_mb
 from benchmarks.speed.start import SETTINGS
 from gateway.bus.live.socketcan import SocketCanReceiver
 from gateway.config import load_settings
@@ -67,7 +67,7 @@ def measure(seconds: float) -> dict[str, Any]:
         folder = Path(name)
         shutil.copy(CALIBRATION, folder / "vehicle.json")
         (folder / "springscale.toml").write_text(SETTINGS)
-        environment, quiet = os.environ | ONE_THREAD, subprocess.DEVNULL
+        environment, quiet = os.environ | ENVIRONMENT, subprocess.DEVNULL
         service = subprocess.Popen(
             command_of(serve, folder), stdout=subprocess.PIPE, stderr=quiet, text=True, env=environment
         )

@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from packaging.requirements import Requirement
 
-from benchmarks.speed.meter import CALIBRATION, ONE_THREAD, ROOT, best_of
+from benchmarks.speed.meter import CALIBRATION, ENVIRONMENT, ROOT, best_of
 
 SETTINGS: Final = """\
 signals = "springscale:reference"
@@ -39,7 +39,7 @@ def imports_s(module: str) -> float:
 
     def run(code: str) -> float:
         command = [sys.executable, "-c", code]
-        environment = os.environ | ONE_THREAD
+        environment = os.environ | ENVIRONMENT
         found = best_of(3, lambda: {"code": subprocess.run(command, check=True, env=environment).returncode})
         return float(found["seconds"])
 
@@ -53,7 +53,7 @@ def ready_s(folder: Path) -> float:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as notified:
         notified.bind(str(folder / "notify"))
         notified.settimeout(60.0)
-        environment = os.environ | ONE_THREAD | {"NOTIFY_SOCKET": str(folder / "notify")}
+        environment = os.environ | ENVIRONMENT | {"NOTIFY_SOCKET": str(folder / "notify")}
         begun_s = time.monotonic()
         command = [sys.executable, "-m", "gateway", "run", "--config", str(folder / "springscale.toml")]
         service = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)

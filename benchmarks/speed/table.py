@@ -55,6 +55,10 @@ def _below(section: str, what: str, figure: float, unit: str, most: float, digit
     return Line(section, what, told, f"at most {most:g} {unit}", figure <= most, held_by)
 
 
+def _times(ratio: float) -> str:
+    return f"{ratio:.2g} x" if ratio < 10 else f"{ratio:,.0f} x"
+
+
 def _decode(found: Mapping[str, Any]) -> Iterator[Line]:
     section = "candump text to arrays"
     ours = found["rows"]["springscale"]
@@ -66,8 +70,7 @@ def _decode(found: Mapping[str, Any]) -> Iterator[Line]:
         if row is ours:
             yield _below(section, name, row["ns_per_frame"], "ns a frame", 25, 0)
             continue
-        beside = f", {times:.2g} x ours" if times < 10 else f", {times:.0f} x ours"
-        yield Line(section, name, f"{row['ns_per_frame']:,.0f} ns a frame{beside}")
+        yield Line(section, name, f"{row['ns_per_frame']:,.0f} ns a frame, {_times(times)} ours")
     yield _below(section, "memory", ours["peak_mb"], "MB", 150, 0)
 
 
@@ -84,7 +87,7 @@ def _formats(found: Mapping[str, Any]) -> Iterator[Line]:
         times = peer["ns_per_frame"] / ours["ns_per_frame"]
         least = LEAST_TIMES.get(suffix)
         goal = f"at least {least} x" if least else ""
-        yield Line("every format", suffix, f"{told}, {times:.2g} x python-can's reader", goal, times >= (least or 0))
+        yield Line("every format", suffix, f"{told}, {_times(times)} python-can's reader", goal, times >= (least or 0))
 
 
 def _day(found: Mapping[str, Any]) -> Iterator[Line]:

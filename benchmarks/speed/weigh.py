@@ -15,7 +15,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.speed.meter import CALIBRATION, ONE_THREAD, best_of, cpu_s, springscale
+from benchmarks.speed.meter import CALIBRATION, ENVIRONMENT, best_of, cpu_s, springscale
 from gateway.bus.signals import Decoder, SignalMap, load_signal_map
 from gateway.calibration.campaign import CampaignTable, load_campaign
 from gateway.calibration.commissioning.job import JOB, RESULT, Drive, Job, Result, to_file
@@ -68,7 +68,7 @@ def commissioning(campaign: Path, line: Path, folder: Path) -> dict[str, float]:
     folder.mkdir()
     to_file(_job(campaign, line, folder), folder / JOB)
     begun_s = cpu_s()
-    subprocess.run([*PROGRAM, str(folder)], check=True, env=os.environ | ONE_THREAD)
+    subprocess.run([*PROGRAM, str(folder)], check=True, env=os.environ | ENVIRONMENT)
     taken_s = cpu_s() - begun_s
     result = Result.model_validate_json((folder / RESULT).read_bytes())
     if result.calibration is None:

@@ -41,6 +41,12 @@ def test_who_is_not_installed_is_left_out_with_a_word():
     assert figures["wc -l"] == "7 ns a frame, 0.17 x ours"
 
 
+def test_a_large_ratio_is_a_whole_number():
+    row = {"springscale": {"ns_per_frame": 82.0, "peak_mb": 225.0}, "python-can": {"ns_per_frame": 10_000.0}}
+    (line,) = lines_of({"formats": {"rows": {".mf4": row}}})
+    assert line.figure == "82 ns a frame, 225 MB, 122 x python-can's reader"
+
+
 def test_what_a_parked_vehicle_costs_is_told():
     idle = {"n_delivered": 1000, "processor_s_per_hour": 12.34, "disk_kb_per_hour": 1234.0}
     assert [line.figure for line in lines_of({"idle": idle})] == ["12.3 s an hour", "1,234 kB an hour"]
