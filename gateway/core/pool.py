@@ -19,7 +19,7 @@ import numpy as np
 from gateway.core.bends import joined_gains
 from gateway.core.change import Rules
 from gateway.core.journey import LEAST_STOP_S
-from gateway.core.loads import Halt, LoadLink, Weighing, halts_of, loads_of
+from gateway.core.loads import LONG_S, Halt, LoadLink, Weighing, halts_of, loads_of
 from gateway.core.settings import BatchSettings
 from gateway.core.spectrum import longest_run
 from gateway.estimate import Estimate, Way
@@ -46,6 +46,7 @@ class Part:
 
     @property
     def usable_s(self) -> float:
+        """Usable driving (s)."""
         return float(np.count_nonzero(self.batch.usable)) / self.batch.rate_hz
 
     @property
@@ -72,15 +73,24 @@ def has_stretch(window: Batch) -> bool:
 
 
 def continued(parts: Parts, window: Batch) -> Parts:
-    """The parts that a window may be pooled with: none after a long break or a clock set back; and, if the window is a
-    batch by itself, none of another drive.
+    """The parts that a window may be pooled with: none after a long break or a clock set back; if the window is a batch
+    by itself, none of another drive; and no rest of an earlier load (:func:`_is_rest`).
     """
     if not parts:
         return ()
     last = parts[-1].batch
     break_ns = window.t_start_ns - last.t_end_ns
     is_next = 0 <= break_ns <= MOST_BREAK_S * NS_PER_S
-    return parts if is_next and (window.rejected or window.drive_start_ns == last.drive_start_ns) else ()
+    is_of_drive = bool(window.rejected) or window.drive_start_ns == last.drive_start_ns
+    return parts if is_next and is_of_drive and not _is_rest(parts, window, break_ns) else ()
+
+
+def _is_rest(parts: Parts, window: Batch, break_ns: int) -> bool:
+    """True if the parts are too short for the change test, and the vehicle then stood long enough to load, while the
+    window is long enough to do without them: mixed in, they would weigh as a part of the old load.
+    """
+    is_short = sum(part.usable_s for part in parts) < LEAST_SIDE_S
+    return is_short and break_ns >= LONG_S * NS_PER_S and Part(window, Way()).usable_s >= LEAST_LOAD_S
 
 
 def is_batch(parts: Parts, settings: BatchSettings) -> bool:

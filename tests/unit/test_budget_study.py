@@ -24,7 +24,7 @@ from benchmarks.accuracy.budget.response import day_covariance, response_to
 from benchmarks.accuracy.budget.study import budget_page
 from benchmarks.accuracy.budget.together import Weighing, refusals_of, rows_of_weighings
 from gateway.core.cargo import shape_prior
-from gateway.core.cross_spectrum.drift import NATURE_STD, NATURE_TOGETHER_STD
+from gateway.core.cross_spectrum.drift import NATURE_STD, NATURE_TOGETHER_STD, kind_of
 from gateway.core.cross_spectrum.estimator import Weighed, weigh
 from gateway.core.cross_spectrum.sensor_change import GAIN_STD
 from gateway.core.vehicle import front_share_pct
@@ -38,8 +38,7 @@ def test_days_scatter_as_nature_does() -> None:
     rng = np.random.default_rng(1)
     days = [drawn_day(rng) for _ in range(20_000)]
     for name in days[0]:
-        kind = name.split("_")[0]
-        std = np.hypot(NATURE_STD[name], NATURE_TOGETHER_STD[kind])
+        std = np.hypot(NATURE_STD[name], NATURE_TOGETHER_STD[kind_of(name)])
         assert np.std([day[name] for day in days]) == pytest.approx(std, rel=0.03)
     front, rear = (np.array([day[f"tyre_{end}_npm"] for day in days]) for end in ("front", "rear"))
     assert np.cov(front, rear)[0, 1] == pytest.approx(NATURE_TOGETHER_STD["tyre"] ** 2, rel=0.05)

@@ -30,8 +30,8 @@ def natural_covariance(entries: list[int], otherwise: F64) -> F64:
     covariance = np.diag([NATURE_STD.get(name, usual) ** 2 for name, usual in zip(names, otherwise, strict=True)])
     for i, one in enumerate(names):
         for j, other in enumerate(names):
-            kind = one.split("_")[0]
-            if {one, other} <= {*NATURE_STD} and kind == other.split("_")[0]:
+            kind, kind_of_other = (name.replace("rear", "front").split("_front")[0] for name in (one, other))
+            if {one, other} <= {*NATURE_STD} and kind == kind_of_other:
                 covariance[i, j] += NATURE_TOGETHER_STD.get(kind, 0.0) ** 2
     return covariance
 

@@ -91,6 +91,14 @@ def test_short_drives_are_pooled_over_the_stops_between_them() -> None:
     assert spans(told(motion), motion) == [(0, 80, "rest"), (0, 220, 100), (280, 360, "rest")]
 
 
+def test_a_rest_too_short_to_be_weighed_is_not_mixed_with_the_load_after_a_long_stop() -> None:
+    drives = [later(drive(80.0, seed=seed), at_s) for seed, at_s in ((2, 120.0), (3, 230.0))]
+    motion = joined(drive(25.0), *drives)
+    assert spans(told(motion), motion) == [(0, 25, "rest"), (120, 200, "rest"), (120, 310, 100)]
+    waited = joined(drive(25.0), *(later(one, -55.0) for one in drives))  # the engine stopped for 40 s
+    assert spans(told(waited), waited)[-1][0] == 0
+
+
 def test_a_batch_of_the_next_drive_begins_with_that_drive() -> None:
     motion = joined(drive(100.0), later(drive(160.0, seed=2), 200.0))
     assert spans(told(motion), motion) == [(0, 100, "rest"), (200, 350, 100), (350, 360, "rest")]

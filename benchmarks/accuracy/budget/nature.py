@@ -10,23 +10,28 @@ import numpy as np
 from benchmarks.accuracy.drives import Trip
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cargo import ShapePrior
-from gateway.core.cross_spectrum.drift import NATURE_STD, NATURE_TOGETHER_STD
+from gateway.core.cross_spectrum.drift import NATURE_STD, NATURE_TOGETHER_STD, kind_of
 from gateway.core.cross_spectrum.lateral import PAYLOAD_LEFT_PER_TRACK
 from gateway.core.cross_spectrum.sensor_change import GAIN_PER_K, OFFSET_PER_K_MPS2, TEMPERATURE_STD_K
 from gateway.core.vehicle import Vehicle as StatedVehicle
 from gateway.records import Motion, Signal
-from gateway.sim.vehicle import Axle, Load, Vehicle
+from gateway.sim.vehicle import Axle, Damper, Load, Vehicle
+
+USUAL_STROKE_MPS = 0.1
+"""Chosen: standard deviation of a suspension's stroke speed at which a share of friction is a share of the damping."""
 
 
 def drawn_day(rng: np.random.Generator) -> dict[str, float]:
-    """Logarithms of springs, tyres and dampers relative to calibration, by the names of parameters."""
+    """Logarithms of springs, tyres and dampers relative to calibration, and changes of the dampers' friction shares, by
+    the names of parameters.
+    """
     common = {kind: std * rng.standard_normal() for kind, std in NATURE_TOGETHER_STD.items()}
     own = {name: std * rng.standard_normal() for name, std in NATURE_STD.items()}
-    return {name: x + common[kind] for name, x in own.items() if (kind := name.split("_")[0]) in common}
+    return {name: x + common[kind] for name, x in own.items() if (kind := kind_of(name)) in common}
 
 
 def on_that_day(van: Vehicle, day: Mapping[str, float]) -> Vehicle:
-    """The same van with its springs, tyres and dampers changed."""
+    """The same van with its springs, tyres, dampers and their friction changed."""
     return replace(van, front=_axle(van.front, day, "front"), rear=_axle(van.rear, day, "rear"))
 
 
@@ -39,12 +44,23 @@ def _axle(axle: Axle, day: Mapping[str, float], end: str) -> Axle:
         spring=replace(
             axle.spring, rate_npm=axle.spring.rate_npm * spring, progression_npm2=axle.spring.progression_npm2 * spring
         ),
-        damper=replace(
-            axle.damper,
-            compression_nspm=axle.damper.compression_nspm * damper,
-            rebound_nspm=axle.damper.rebound_nspm * damper,
-        ),
+        damper=_sticking(axle.damper, damper, day[f"damper_friction_{end}"]),
         wheel=replace(axle.wheel, tyre_npm=axle.wheel.tyre_npm * tyre),
+    )
+
+
+def _sticking(damper: Damper, times: float, share: float) -> Damper:
+    """``damper`` with its rate multiplied, and this share of it moved from the oil to friction.
+
+    A friction force F damps like a rate sqrt(2 / pi) F / sigma at the stroke speed sigma.
+    """
+    rate_nspm = times * 0.5 * (damper.compression_nspm + damper.rebound_nspm)
+    friction_n = times * damper.friction_n + share * rate_nspm * USUAL_STROKE_MPS * math.sqrt(math.pi / 2.0)
+    return replace(
+        damper,
+        compression_nspm=damper.compression_nspm * times * (1.0 - share),
+        rebound_nspm=damper.rebound_nspm * times * (1.0 - share),
+        friction_n=max(friction_n, 0.0),
     )
 
 

@@ -20,8 +20,11 @@ from gateway.records import F64, Why
 
 USUAL_PAYLOAD_SHARE: Final = 0.004  # of the empty mass, see below
 USUAL_FRONT_SHARE_PCT: Final = 0.1  # likewise
-USUAL_CG_LEFT_M: Final = 0.002
-"""Model errors of simulated vans that serve no other purpose (`benchmarks.accuracy budget`)."""
+USUAL_CG_LEFT_M: Final = 0.005
+"""Model errors of simulated vans that serve no other purpose (`benchmarks.accuracy budget`). That of the place is most
+of all an error of the empty vehicle's middle, which runs that are left out have in common and do not show: four vans
+whose middle is on the centre line were calibrated with 1 to 19 mm.
+"""
 USUAL_PER_REACH: Final = 1.0  # chosen: growth of the error beyond the known loads; it doubles within an empty mass
 USUAL_REACH: Final = 0.1  # chosen: of runs at the edge of a campaign, in parts of the empty mass
 PRIOR_RUNS: Final = 6  # chosen: number of runs that the other vans count for

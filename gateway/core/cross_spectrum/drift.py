@@ -46,6 +46,8 @@ NATURE_STD: Final[Mapping[str, float]] = MappingProxyType(
         "tyre_rear_npm": 0.015,
         "damper_front_nspm": 0.03,  # wear
         "damper_rear_nspm": 0.03,
+        "damper_friction_front": 0.02,  # seals and bushings: a fifth of a usual share of 0.1
+        "damper_friction_rear": 0.02,
         "payload_mode_hz": 0.6,  # on the floor, on pallets, in a rack
     }
 )
@@ -56,6 +58,7 @@ NATURE_TOGETHER_STD: Final[Mapping[str, float]] = MappingProxyType(
         "spring": 0.01,  # rubber in parallel with steel, over 10 K
         "tyre": 0.03,  # goes with its pressure, and that with the absolute temperature: 10 K are 3.4 %
         "damper": 0.05,  # the oil's viscosity, as far as valves let it through
+        "damper_friction": 0.02,  # stiffer rubber when it is cold
     }
 )
 """Chosen: the deviation common to both axles, in addition: the temperature of the day."""
@@ -70,11 +73,16 @@ DRIFTING: Final = [INDEX[name] for name in DRIFT_STD]
 STEADY: Final = [i for i in range(len(PARAMETERS)) if i not in DRIFTING]
 
 
+def kind_of(name: str) -> str:
+    """What a parameter of an axle is, whichever the axle: spring, tyre, damper, damper_friction."""
+    return name.partition("_front")[0].partition("_rear")[0]
+
+
 def _covariance(by_itself: Mapping[str, float], together: Mapping[str, float], names: Sequence[str]) -> F64:
     """(k, k) covariance of ``names``, from the standard deviation of each and the part common to both axles."""
     covariance = np.diag([by_itself.get(name, 0.0) ** 2 for name in names])
     for kind, std in together.items():
-        is_of_kind = np.array([name.startswith(f"{kind}_") and name in by_itself for name in names], dtype=float)
+        is_of_kind = np.array([kind_of(name) == kind and name in by_itself for name in names], dtype=float)
         covariance += std**2 * np.outer(is_of_kind, is_of_kind)
     return covariance
 
@@ -154,20 +162,21 @@ def _factor(covariance: F64) -> F64:
 
 _IS_PACKING: Final = np.array([name.startswith("payload_") for name in DRIFT_STD])
 _BEYOND_BELIEVED: Final = _NATURE_OF_DRIFTING - _BELIEVED
-_DAY_OF_STEADY: Final = _factor(NATURE_OF_STEADY)
+DAY_OF_STEADY: Final = _factor(NATURE_OF_STEADY)
+"""(s, c) change of the STEADY parameters with each of the day's first c causes."""
 _DAY_OF_DRIFTING: Final = _factor(np.where(np.outer(~_IS_PACKING, ~_IS_PACKING), _BEYOND_BELIEVED, 0.0))
 _PACKING_OF_DRIFTING: Final = _factor(np.where(np.outer(_IS_PACKING, _IS_PACKING), _BEYOND_BELIEVED, 0.0))
 
 
 def day_columns(found: F64, moves: F64, precision: F64) -> F64:
-    """(6, k) change of drifting parameters and load by the day's springs, tyres and dampers.
+    """(8, k) change of drifting parameters and load by the day's springs, tyres, dampers and their friction.
 
     ``found`` (k, k) is their covariance in the search, ``precision`` that of its prior, ``moves`` (k, s) their change
     with each of the STEADY parameters. A parameter that drifts further than the prior allows shifts the answer by the
     part that the prior determines: found times precision (S. F. Schmidt's consider covariance, Adv. Control Syst. 3,
     1966).
     """
-    return np.concatenate([(moves @ _DAY_OF_STEADY).T, (_pulls(found, precision) @ _DAY_OF_DRIFTING).T])
+    return np.concatenate([(moves @ DAY_OF_STEADY).T, (_pulls(found, precision) @ _DAY_OF_DRIFTING).T])
 
 
 def packing_columns(found: F64, precision: F64) -> F64:

@@ -207,8 +207,10 @@ def posterior_of(
     mean -= outward @ located.gain_moves * gain[0]
     own = outward @ located.own @ outward.T
     moves = moves_of(located, len(calibration.parameters))
+    columns = {name: of_load @ outward.T for name, of_load in located.columns.items()}
     if side is not None:
         own[2, 2] += side.own_variance
+        columns[Source.DAY][:, 2] += side.day
     by_calibration = moves @ calibration.directions
     left_over = moves @ calibration.covariance @ moves.T - by_calibration @ by_calibration.T
     left_over += outward @ located.rival_covariance @ outward.T
@@ -220,7 +222,7 @@ def posterior_of(
         own=own,
         sources={
             Source.CALIBRATION: by_calibration.T,
-            **{name: columns @ outward.T for name, columns in located.columns.items()},
+            **columns,
             Source.SENSOR: gain[1] * (outward @ located.gain_moves)[None],
             Source.MODEL: np.vstack([of_model, _root(left_over)]),
         },

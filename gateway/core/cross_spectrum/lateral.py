@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.drift import DRIFTING
+from gateway.core.cross_spectrum.drift import DAY_OF_STEADY, DRIFTING, STEADY
 from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
 from gateway.core.cross_spectrum.measured import CrossSpectra
 from gateway.core.cross_spectrum.model.expected import expected_of_driven
@@ -74,14 +74,16 @@ class Sideways:
     """Centre of gravity (m) of the sprung mass, left of the centre line, given the load.
 
     own_variance (m2) is the error from the batch's length and road. moves (n,) is its derivative by each parameter of
-    the vehicle, moves_with_load (2,) by payload (m/kg) and front share (m per 0..1). is_mount_changed: the sensor is
-    not where, or not turned as, it was at calibration.
+    the vehicle, moves_with_load (2,) by payload (m/kg) and front share (m per 0..1). day (c,) is its change with each
+    of the day's causes under the same load. is_mount_changed: the sensor is not where, or not turned as, it was at
+    calibration.
     """
 
     cg_left_m: float
     own_variance: float
     moves: F64
     moves_with_load: F64
+    day: F64
     is_mount_changed: bool
 
 
@@ -117,17 +119,22 @@ def most_probable_place(rolling: Whittle, point: Point) -> Place:
     )
 
 
-def sideways_at(rolling: Whittle, place: Place, point: Point) -> Sideways:
-    """The place with its variance and derivatives."""
+def sideways_at(rolling: Whittle, place: Place, point: Point, drifted: F64) -> Sideways:
+    """The place with its variance and derivatives; ``drifted`` (c, k) is the change of the drifting parameters with
+    each of the day's causes.
+    """
     there, n, found = _at(point, place.found.x), len(point.theta), place.found
     whole = rolling.curvature(there, range(n + 3))
     moves = -found.covariance[-1] @ whole.information[_free(there)]
+    day = drifted @ moves[DRIFTING]
+    day[: DAY_OF_STEADY.shape[1]] += moves[STEADY] @ DAY_OF_STEADY
     moves[[*FREE, *DRIFTING]] = 0.0
     return Sideways(
         cg_left_m=place.cg_left_m,
         own_variance=float(found.covariance[-1, -1]),
         moves=moves[:n],
         moves_with_load=moves[n : n + 2],
+        day=day,
         is_mount_changed=any(
             abs(_off(INDEX[name], whole, found, _free(there))) > most for name, most in MOST_MOUNT_CHANGE.items()
         ),

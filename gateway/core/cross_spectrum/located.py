@@ -62,7 +62,8 @@ class Located:
     """The most probable load of a batch and its uncertainty; a load is payload (kg) and front share (0..1).
 
     own (2, 2) is the covariance specific to this batch, from its length and road. moves (2, p) is the load's derivative
-    by each of the half-car's parameters, columns (k, 2) its change by one standard deviation of each source's causes,
+    by each of the half-car's parameters, columns (c, 2) its change by one standard deviation of each source's causes,
+    drifted (c, k) that of the drifting parameters with the day's causes,
     gain_moves (2,) its derivative by the logarithm of the accelerometer's gain. rival_covariance comes from competing
     peaks. tails are those of the error from the load's shape. tension is the distance of the drifting parameters from
     their calibration (drift.tension_of). is_converged is false if a search behind the answer did not converge. freed
@@ -74,6 +75,7 @@ class Located:
     own: F64
     moves: F64
     columns: Mapping[Source, F64]
+    drifted: F64
     tails: tuple[float, float]
     gain_moves: F64
     rival_covariance: F64
@@ -140,7 +142,7 @@ def locate(
     x = peak.found.x if shape is None else shape.x
     place = most_probable_place(rolling, _point(x, placed, place.cg_left_m))
     located = _located(whittle, peak, shape, placed, place.cg_left_m, evidence)
-    sideways = sideways_at(rolling, place, located.point)
+    sideways = sideways_at(rolling, place, located.point, located.drifted)
     return replace(located, sideways=sideways, is_converged=located.is_converged and place.found.is_converged)
 
 
@@ -302,8 +304,9 @@ def _located(
         x = x + np.r_[np.zeros(len(DRIFTING)), at.shift[-2:]]
         point = _point(x, calibration, cg_left_m)
     whole, found = at.whole, at.covariance
+    day = day_columns(found, at.steady, prior.precision)
     columns = {
-        Source.DAY: day_columns(found, at.steady, prior.precision)[:, -2:],
+        Source.DAY: day[:, -2:],
         Source.LOAD_LENGTH: packing_columns(found, prior.precision)[:, -2:],
     }
     if shape is not None:
@@ -322,6 +325,7 @@ def _located(
         own=own,
         moves=at.moves,
         columns=columns,
+        drifted=day[:, :-2],
         tails=NORMAL_TAILS if shape is None else shape.tails,
         gain_moves=gain_moves(whole, whittle, point, found)[-2:],
         rival_covariance=peak.rivals,
