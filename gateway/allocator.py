@@ -8,7 +8,7 @@ are glibc's (mallopt(3)); other C libraries have none and need none.
 import ctypes
 from typing import Final
 
-M_TRIM_THRESHOLD: Final = -1
+M_TRIM_THRESHOLD: Final = -1  # malloc.h, as the next
 M_MMAP_THRESHOLD: Final = -3
 KEPT_BYTES: Final = 32 << 20  # kept at the top of the heap: about the arrays of one batch; chosen
 MAPPED_BYTES: Final = 16 << 20  # an array of at least this size is mapped, and unmapped when it is freed

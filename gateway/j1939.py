@@ -10,7 +10,7 @@ from gateway.quantities import QUANTITIES
 # SAE J1939-71, table 1, numbers of two bytes
 NOT_AVAILABLE: Final = 0xFFFF
 ERROR: Final = 0xFE00  # here: more than two bytes can say, or less than nothing
-LARGEST: Final = 0xFAFF
+LARGEST: Final = 0xFAFF  # the last valid one
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ SENTENCES: Final[dict[State, str]] = {
 OTHERS_ONLY: Final = "The bus is awake (identifiers heard: {}), but none of them is mapped."
 
 
-SILENT_AFTER_S: Final = 5.0
+SILENT_AFTER_S: Final = 5.0  # chosen: many times the period of any mapped frame
 
 
 class _Told(BaseModel):

@@ -7,7 +7,7 @@ from gateway.errors import SignalMapError
 
 STANDARD_GRAVITY_MPS2: Final = 9.80665  # CGPM 1901
 
-NS_PER_S: Final = 1_000_000_000
+NS_PER_S: Final = 1_000_000_000  # SI
 
 TO_SI: Final[dict[str, dict[str, float]]] = {
     "acceleration": {

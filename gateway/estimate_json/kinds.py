@@ -146,7 +146,7 @@ WEIGHT_COLUMNS: Final = (
 SPECTRA: Final = FieldKind(dict[str, list[float | None]] | None, spectra_to_json, spectra_from_json)
 
 
-DIGITS: Final = 7
+DIGITS: Final = 7  # chosen: significant ones, of numbers that are computed with again
 
 
 def posterior_to_json(posterior: Posterior) -> dict[str, Any]:

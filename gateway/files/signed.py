@@ -27,15 +27,15 @@ COMMAND: Final = "ssh-keygen -Y sign -n springscale -f KEY"
 NAMESPACE: Final = b"springscale"  # a signature for another purpose by the same key is not valid here
 KEY_TYPE: Final = b"ssh-ed25519"
 MAGIC: Final = b"SSHSIG"
-VERSION: Final = (1).to_bytes(4)
+VERSION: Final = (1).to_bytes(4)  # OpenSSH, PROTOCOL.sshsig
 NO_SIGNATURE: Final = (
     f"its {SUFFIX} is no signature of an ed25519 key for the namespace springscale; sign it where the key is"
 )
 HASHES: Final = ("sha512", "sha256")  # ssh-keygen uses the first by default
 BEGIN: Final = "-----BEGIN SSH SIGNATURE-----\n"
 END: Final = "\n-----END SSH SIGNATURE-----\n"
-COLUMNS: Final = 70
-KEY_BYTES: Final = 32
+COLUMNS: Final = 70  # of base64, as ssh-keygen writes
+KEY_BYTES: Final = 32  # RFC 8032, as the next
 SIGNATURE_BYTES: Final = 64
 MOST_BYTES: Final = 4096  # of a signature file, which has about 300
 

@@ -17,7 +17,7 @@ from gateway.records import I64, JOURNEY, Signal
 
 MOSTLY: Final = 0.5  # more often than not
 COUNTED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE)  # timed by the message counter
-COUNTER_BITS: Final = range(2, 33)
+COUNTER_BITS: Final = range(2, 33)  # chosen: one bit is a toggle
 FIX_3D: Final = 3  # usual code of a three-dimensional GNSS fix
 _COUNTER_WORDS: Final = ("counter", "count", "alive", "sequence", "seq")
 
