@@ -5,12 +5,11 @@ interface that is listened to is opened elsewhere (``bus.live``) and never sent 
 """
 
 import logging
-import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import cantools
 import numpy as np
@@ -20,6 +19,7 @@ from gateway.errors import BusError
 from gateway.estimate import Estimate, Weights
 from gateway.j1939 import AXLE_WEIGHT, NOT_AVAILABLE, counts_of
 from gateway.log import Event, log_event
+from gateway.part import ThreadPart
 from gateway.records import EXTENDED_ID, Frames
 
 DATABASE: Final = "j1939_weights.dbc"
@@ -77,17 +77,17 @@ class WeightFrames:
         return bytes(message.encode(raw, scaling=False, padding=True, strict=False))
 
 
-RETRY_S: Final = 5.0
-STOP_WITHIN_S: Final = 1.0
+RETRY_S: Final = 5.0  # chosen: pause after a fault of the bus
 
 
-class Broadcaster:
+class Broadcaster(ThreadPart):
     """Sends the weights of ``weighed_now`` every ``every_s`` seconds until :meth:`stop`.
 
-    ``weighed_now`` returns None if the estimate is too old to be sent. ``fault`` says why nothing is sent, for people.
+    ``weighed_now`` returns None if the estimate is too old to be sent. ``fault`` says why nothing is sent.
     """
 
-    NAME: ClassVar = "sender of weights"
+    NAME = "sender of weights"
+    fault: str | None = None
 
     def __init__(
         self,
@@ -98,25 +98,12 @@ class Broadcaster:
         every_s: float,
         weighed_now: Callable[[], Estimate | None],
     ) -> None:
-        self.fault: str | None = None
+        super().__init__("broadcast")
         self.n_sent = 0  # frames
         self._place = (interface, channel, options)
         self._frames = WeightFrames(sender)
         self._every_s = every_s
         self._weighed_now = weighed_now
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="broadcast", daemon=True)
-
-    def start(self) -> None:
-        self._thread.start()
-
-    def stop(self, within_s: float = STOP_WITHIN_S) -> None:
-        """Stop sending; a blocked bus may keep the thread a little longer."""
-        self._stopping.set()
-        self._thread.join(within_s)
-
-    def is_alive(self) -> bool:
-        return self._thread.is_alive()
 
     def _run(self) -> None:
         while not self._stopping.is_set():

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from gateway.bus.broadcast import Broadcaster
 from gateway.bus.live.bus_survey import bus_survey_of
 from gateway.bus.live.source import OpenReceiver, SourceState
 from gateway.bus.signals import Decoder
@@ -21,7 +20,7 @@ from gateway.notify import Notifier
 from gateway.service.alarms import AlarmService, rules_of
 from gateway.service.batch_log import BatchLog, LoadEventLog, StateLog, call_each
 from gateway.service.calibration_in_use import keep_copy
-from gateway.service.part import CLOSE_WITHIN_S, Deadline, Questions, ServicePart, in_own_thread, stop_in_turn
+from gateway.service.part import CLOSE_WITHIN_S, Deadline, Questions, in_own_thread, stop_in_turn
 from gateway.service.parts import (
     Forwarding,
     board_of,
@@ -42,23 +41,19 @@ from gateway.service.verification.trend import TrendService
 from gateway.service.verification.verification import VerificationService
 from gateway.setup import Setup
 from gateway.status import State
-from gateway.store import Store
-from gateway.uplink.uplink import Uplink
-from gateway.uplink.webhook import Webhook
 from gateway.web.access.serving import WebServer, refuse_open_address, server_config
 from gateway.web.access.tokens import TokenFile
 from gateway.web.app import create_app
 from gateway.web.routes.weights import KnownLoads, Scales, weigh_latest
 
-SUPERVISE_S = 0.25  # interval between checks for dead parts
-LOOK_S = 1.0  # interval between checks of the whole status
-ASLEEP_SUPERVISE_S = 2.0  # the same while the bus is silent, to save the battery of a parked vehicle
-ASLEEP_LOOK_S = 5.0
-BUS_WITHIN_S = 2.0  # for the bus reader during a stop
-PIPELINE_WITHIN_S = 10.0  # for the pipeline: a full inbox contains several windows
-FLUSH_WITHIN_S = 8.0  # for writing to the disk
+SUPERVISE_S = 0.25  # chosen: interval between checks for dead parts
+LOOK_S = 1.0  # chosen: interval between checks of the whole status
+ASLEEP_SUPERVISE_S = 2.0  # chosen: the same two while the bus is silent, to save the battery of a parked vehicle
+ASLEEP_LOOK_S = 5.0  # chosen
+BUS_WITHIN_S = 2.0  # chosen: for the bus reader during a stop
+PIPELINE_WITHIN_S = 10.0  # chosen: for the pipeline: a full inbox contains several windows
+FLUSH_WITHIN_S = 8.0  # chosen: for writing to the disk
 
-Sending = Broadcaster | Uplink | Webhook
 OnStarted = Callable[["Gateway"], None]
 
 
@@ -172,49 +167,16 @@ class Gateway:
         self._failure: str | None = None
         self._web_fault: str | None = None
         self._reloading: asyncio.Task[None] | None = None
-        self._vital, self._beside = self._parts()
+        self._vital = (self.store, self.pipeline, self.source)  # each tuple in the order of the start
+        beside = (self.commissioning, self.keeper, self.trend, self.ring_log, self.broadcaster, self.uplink, self.webhook)
+        self._beside = (*(part for part in beside if part is not None), self.bus_survey)
         self.needs_restart = False  # with the calibration that was made meanwhile; see life.py
-
-    def _parts(self) -> tuple[tuple[ServicePart, ...], tuple[ServicePart, ...]]:
-        """The vital parts and the other parts, each in the order of their start."""
-        vital = (
-            ServicePart(
-                "database writer", lambda: None, self.store.close, death=lambda: _ended(self.store), is_vital=True
-            ),
-            ServicePart(
-                "pipeline",
-                self.pipeline.start,
-                self.pipeline.stop,
-                lambda: self.pipeline.sensor_fault,
-                lambda: _died(self.pipeline.failure) or _ended(self.pipeline),
-                is_vital=True,
-            ),
-            ServicePart(
-                "bus reader",
-                self.source.start,
-                self.source.stop,
-                death=lambda: _died(self.source.failure),
-                is_vital=True,
-            ),
-        )
-        beside = [
-            ServicePart(
-                "commissioning", self.commissioning.start, self.commissioning.stop, lambda: self.commissioning.fault
-            ),
-            ServicePart("batch keeper", self.keeper.start, self.keeper.stop, lambda: self.keeper.fault),
-            ServicePart("trend", self.trend.start, self.trend.stop, lambda: self.trend.fault),
-        ]
-        if (ring_log := self.ring_log) is not None:
-            beside.append(ServicePart("recorder", ring_log.start, ring_log.stop, lambda: ring_log.fault))
-        beside += [_sender_part(one) for one in (self.broadcaster, self.uplink, self.webhook) if one is not None]
-        beside.append(ServicePart("survey of the bus", lambda: None, self.bus_survey.stop))
-        return vital, tuple(beside)
 
     def _warnings(self) -> tuple[str, ...]:
         """Faults that do not stop the weighing, as sentences for people."""
         faults = [self._tokens.fault, self._reload.fault, self._web_fault, self.known_weights.fault]
         faults.append(self.verification.fault)
-        faults += [part.shown_fault() for part in (*self._vital, *self._beside)]
+        faults += [*(part.fault for part in self._vital), *(part.shown_fault() for part in self._beside)]
         return tuple(fault for fault in faults if fault)
 
     @property
@@ -315,7 +277,7 @@ class Gateway:
         """Which vital part died, and why; None while all work."""
         for part in self._vital:
             if (death := part.death()) is not None:
-                return f"the {part.name} {death}"
+                return f"the {part.NAME} {death}"
         if serving.done() and not self._server.started:
             return f"the web server could not run on {self._settings.web.host}:{self._settings.web.port}: is it taken?"
         if serving.done() and self._web_fault is None:
@@ -361,21 +323,3 @@ class PeriodicCheck:
         if self._task is None and now_s - self._begun_s >= every_s:
             self._begun_s = now_s
             self._task = asyncio.create_task(in_own_thread(lambda: self._gateway.look(self._log_state)))
-
-
-def _died(failure: BaseException | None) -> str | None:
-    return None if failure is None else f"died: {failure!r}"
-
-
-def _ended(part: Store | Pipeline | Sending) -> str | None:
-    return None if part.is_alive() else "died"
-
-
-def _sender_part(sender: Sending) -> ServicePart:
-    return ServicePart(
-        sender.NAME,
-        sender.start,
-        sender.stop,
-        fault=lambda: sender.fault,
-        death=lambda: None if sender.is_alive() else f"the {sender.NAME} died",
-    )

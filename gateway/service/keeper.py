@@ -2,7 +2,6 @@
 
 import logging
 import queue
-import threading
 import time
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,11 +12,11 @@ from gateway.calibration.kept.batch_file import kept_batch_of
 from gateway.calibration.kept.shelf import Shelf
 from gateway.estimate import Estimate
 from gateway.log import Event, log_event
+from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.records import Batch, Motion
 from gateway.service.commissioning.session import Commissioning
 
 MOST_WAITING: Final = 4  # batches in the queue; each has some megabytes of rows, and one comes every few minutes
-STOP_WITHIN_S: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,23 +26,22 @@ class _Handed:
     rows: Motion
 
 
-class BatchKeeper:
+class BatchKeeper(ThreadPart):
     """Stores every batch that an estimator could use on ``shelf``, and passes all batches to ``listener``.
 
     ``fault`` is the last fault of the disk, if any.
     """
 
+    NAME = "batch keeper"
+    fault: str | None = None
+
     def __init__(self, shelf: Shelf, signal_map: SignalMap) -> None:
+        super().__init__("batch-keeper")
         self.shelf = shelf
         self.listener: Commissioning | None = None
-        self.fault: str | None = None
         self.n_lost = 0  # batches that should have been kept and were not
         self._signal_map = signal_map
         self._waiting: queue.Queue[_Handed | None] = queue.Queue(MOST_WAITING)
-        self._thread = threading.Thread(target=self._run, name="batch-keeper", daemon=True)
-
-    def start(self) -> None:
-        self._thread.start()
 
     def keep(self, batch: Batch, found: Estimate, rows: Motion) -> None:
         """Queue a batch, from the pipeline's thread; if the queue is full the batch is lost and counted."""
@@ -59,12 +57,12 @@ class BatchKeeper:
         """Wait until every queued batch is stored or lost."""
         self._waiting.join()
 
-    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
+    def stop(self, within_s: float = STOP_WITHIN_S) -> None:
         """Store the queued batches, then end; those not stored in time are lost and counted."""
-        end_s = time.monotonic() + timeout_s
+        end_s = time.monotonic() + within_s
         with suppress(queue.Full):
-            self._waiting.put(None, timeout=timeout_s)
-        self._thread.join(max(0.0, end_s - time.monotonic()))
+            self._waiting.put(None, timeout=within_s)
+        super().stop(max(0.0, end_s - time.monotonic()))
         with suppress(queue.Empty):
             while True:
                 handed = self._waiting.get_nowait()

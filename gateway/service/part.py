@@ -1,4 +1,4 @@
-"""The common interface of the service's parts, and stopping them within one deadline."""
+"""Stopping the parts of the service within one deadline, and work beside its event loop."""
 
 import asyncio
 import logging
@@ -7,36 +7,14 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Final
 
 from gateway.log import Event, log_event
+from gateway.part import ServicePart
 
-STOP_WITHIN_S: Final = 25.0  # for all parts together: less than systemd waits before it kills the process
-PART_WITHIN_S: Final = 5.0  # for one part, after the pipeline and the store
-CLOSE_WITHIN_S: Final = 3.0  # reserved for the last records of the stop itself
-
-
-@dataclass(frozen=True)
-class ServicePart:
-    """One part of the service.
-
-    ``stop`` receives the seconds it may take. ``fault`` describes a fault for people; ``death`` says why the part has
-    ended, None while it works. The death of a vital part ends the process, so that systemd restarts it. The death of
-    another part is shown, and the weighing goes on.
-    """
-
-    name: str
-    start: Callable[[], object]
-    stop: Callable[[float], object]
-    fault: Callable[[], str | None] = lambda: None
-    death: Callable[[], str | None] = lambda: None
-    is_vital: bool = False
-
-    def shown_fault(self) -> str | None:
-        """The fault to show in the status: the death of a part that is not vital, else its fault."""
-        death = None if self.is_vital else self.death()
-        return self.fault() if death is None else f"{death}; weighing goes on, a restart brings it back"
+STOP_WITHIN_S: Final = 25.0  # chosen: for all parts together: less than systemd waits before it kills the process
+PART_WITHIN_S: Final = 5.0  # chosen: for one part, after the pipeline and the store
+CLOSE_WITHIN_S: Final = 3.0  # chosen: reserved for the last records of the stop itself
 
 
 class Deadline:
@@ -93,10 +71,10 @@ def stop_in_turn(parts: Sequence[ServicePart], deadline: Deadline) -> list[str]:
     late = []
     for part in reversed(parts):
         left_s = deadline.left_s(PART_WITHIN_S, keep_s=CLOSE_WITHIN_S)
-        thread = threading.Thread(target=part.stop, args=(left_s,), name=f"stop {part.name}", daemon=True)
+        thread = threading.Thread(target=part.stop, args=(left_s,), name=f"stop {part.NAME}", daemon=True)
         thread.start()
         thread.join(left_s)
         if thread.is_alive():
-            late.append(part.name)
-            log_event(Event.PART_LATE, level=logging.ERROR, part=part.name)
+            late.append(part.NAME)
+            log_event(Event.PART_LATE, level=logging.ERROR, part=part.NAME)
     return late

@@ -18,6 +18,7 @@ from gateway.core.fusion import WeighedLoad
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.log import Event, log_event
+from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.records import Frames, Why
 from gateway.service.signal_watch import SignalWatch, StandingWatch
 from gateway.store import Store
@@ -35,11 +36,12 @@ NOISY: Final = (
     "or range in the device; weighing goes on where possible"
 )
 LATE_S: Final = 1.0  # longest delay between the stamp of a frame and its arrival here
-STOP_WITHIN_S: Final = 6.0  # a full inbox holds several windows
 
 
-class Pipeline:
-    """Runs until :meth:`stop`; an exception that ends it is kept in ``failure``."""
+class Pipeline(ThreadPart):
+    """Runs until :meth:`stop`."""
+
+    NAME = "pipeline"
 
     def __init__(
         self,
@@ -52,6 +54,7 @@ class Pipeline:
         on_frames: Callable[[Frames], None] = lambda frames: None,
     ) -> None:
         """``on_batch`` receives every estimate once it is stored and shown, ``on_frames`` all decoded frames."""
+        super().__init__("pipeline")
         self.decoder = decoder
         self.flow = flow
         self.watch = SignalWatch(decoder.signals)
@@ -60,7 +63,6 @@ class Pipeline:
         self.rejected_by_reason: Counter[str] = Counter()
         self.roll_rate_fault: str | None = None  # of the last batch, as people read it
         self.noise_fault: str | None = None  # likewise
-        self.failure: BaseException | None = None
         self.n_frames = 0  # frames whose estimates, if any, are handed over
         self.progress = 0  # increases with every turn of the loop; the watchdog checks it
         self._silent_s = 0.0
@@ -70,17 +72,11 @@ class Pipeline:
         self._board = board
         self._on_batch = on_batch
         self._on_frames = on_frames
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="pipeline", daemon=True)
 
-    def start(self) -> None:
-        self._thread.start()
-
-    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
+    def stop(self, within_s: float = STOP_WITHIN_S) -> None:
         """Process the rest of the inbox, close the open window, and end."""
-        self._stop.set()
-        self._thread.join(timeout_s)
-        if self._thread.is_alive():
+        super().stop(within_s)
+        if self.is_alive():
             log_event(Event.PIPELINE_LATE, level=logging.ERROR, n_frames_waiting=len(self._inbox))
 
     def weighed_age_s(self) -> float | None:
@@ -93,13 +89,10 @@ class Pipeline:
         newest_s = max(self.watch.last_heard.values(), default=0.0)
         return self.flow.scheduler.drive_start_ns is None or time.monotonic() - newest_s > silence_s
 
-    def is_alive(self) -> bool:
-        return self._thread.is_alive()
-
     def _run(self) -> None:
         _name_this_thread("pipeline")
         try:
-            while not self._stop.is_set():
+            while not self._stopping.is_set():
                 self._turn(ASLEEP_DRAIN_S if self.flow.scheduler.drive_start_ns is None else DRAIN_S)
             while self._turn(0.0):
                 pass
@@ -148,7 +141,7 @@ class Pipeline:
             self._on_batch(found)
 
     @property
-    def sensor_fault(self) -> str | None:
+    def fault(self) -> str | None:
         """Faults of sensors that do not stop the weighing, for people."""
         return "; ".join(fault for fault in (self.roll_rate_fault, self.noise_fault) if fault) or None
 

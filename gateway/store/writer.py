@@ -13,6 +13,7 @@ from typing import Any, Final
 from gateway.errors import StoreError
 from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, REMAINDER, SERVICE, Delivery
 from gateway.log import Event, log_event
+from gateway.part import STOP_WITHIN_S, ServicePart
 from gateway.records import json_line
 from gateway.status import StoreState, StoreStatus
 from gateway.store.database import FILE_NAME, Database, is_damaged
@@ -24,17 +25,18 @@ from gateway.store.write_buffer import WriteBuffer
 IDLE_S: Final = 900.0  # without new rows: how often age is looked at
 RETRY_FIRST_S: Final = 0.5
 RETRY_LAST_S: Final = 30.0
-STOP_WITHIN_S: Final = 3.0
 BOOT_ID: Final = Path("/proc/sys/kernel/random/boot_id")
 PAGE_OF_BAD: Final = 1000  # numbers of bad records that wait to be set aside; readers name them again
 
 
-class Store:
+class Store(ServicePart):
     """Estimates, events and calibrations in one directory. Every method may be called from any thread.
 
     If the disk is full, read-only or gone, the store keeps records in memory and says so in ``health`` and in the log.
     It retries by itself and then writes the records it kept.
     """
+
+    NAME = "database writer"
 
     def __init__(self, directory: Path, retention: Retention, clock_ns: Callable[[], int]) -> None:
         self.path = directory / FILE_NAME
@@ -143,6 +145,9 @@ class Store:
     def is_alive(self) -> bool:
         """False once the writer has ended, whether closed or dead."""
         return self._thread.is_alive()
+
+    def death(self) -> str | None:
+        return None if self.is_alive() else "died"
 
     def close(self, timeout_s: float = STOP_WITHIN_S) -> int:
         """Write the rows in memory and end the writer -> number of rows that could not be stored."""

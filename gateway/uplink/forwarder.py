@@ -1,15 +1,15 @@
 """Base class of the senders: one thread that takes messages from an outbox, back-off, and a status report."""
 
 import random
-import threading
 import time
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from contextlib import suppress
 from dataclasses import replace
-from typing import ClassVar, Final, Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 from gateway.errors import StoreError
 from gateway.history import Delivery
+from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.status import UplinkStatus, WebhookStatus
 from gateway.units import NS_PER_S
 from gateway.uplink.outbox import Outbox
@@ -37,40 +37,31 @@ class BackOff:
         self._ceiling_s = self._first_s
 
 
-LOOK_S: Final = 5.0  # how often the backlog is counted
-PAGE: Final = 100  # messages asked for at once
-FIRST_PAUSE_S: Final = 1.0
-STOP_WITHIN_S: Final = 1.0
+LOOK_S: Final = 5.0  # chosen: how often the backlog is counted
+PAGE: Final = 100  # chosen: messages asked for at once
+FIRST_PAUSE_S: Final = 1.0  # chosen: ceiling of the first pause
 
 Report = TypeVar("Report", UplinkStatus, WebhookStatus)
 
 
-class Forwarder(ABC, Generic[Report]):
-    """Owns the thread, which alone writes the report; a sender implements ``_deliver`` and ``_note``."""
+class Forwarder(ThreadPart, Generic[Report]):
+    """Owns the thread, which alone writes the report; a sender implements ``_deliver`` and ``_note``.
 
-    NAME: ClassVar[str]
+    Messages that are undelivered at a stop are sent after the next start. Failures are in the report, none in ``fault``.
+    """
 
     def __init__(self, outbox: Outbox, report: Report, back_off: BackOff | None, back_off_max_s: float) -> None:
         """``back_off`` gives the pauses; without it they grow to ``back_off_max_s``."""
+        super().__init__(self.NAME)
         self._outbox = outbox
         self._report: Report = report
         self._back_off = back_off or BackOff(FIRST_PAUSE_S, back_off_max_s)
-        self._stop = threading.Event()
         self._looked_s = -LOOK_S
-        self._thread = threading.Thread(target=self._run, name=self.NAME, daemon=True)
 
-    def start(self) -> None:
-        self._thread.start()
-
-    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
-        """Stop; undelivered messages are sent after the next start."""
-        self._stop.set()
+    def stop(self, within_s: float = STOP_WITHIN_S) -> None:
+        self._stopping.set()
         self._outbox.tell_news()
-        if self._thread.ident is not None:
-            self._thread.join(timeout_s)
-
-    def is_alive(self) -> bool:
-        return self._thread.is_alive()
+        super().stop(within_s)
 
     def report(self) -> Report:
         """The present report; safe from any thread. Its counts of waiting and pruned records are a few seconds old."""
@@ -78,18 +69,13 @@ class Forwarder(ABC, Generic[Report]):
 
     def _run(self) -> None:
         """Deliver until stopped. Every failure goes into the report and is retried."""
-        while not self._stop.is_set():
+        while not self._stopping.is_set():
             try:
                 self._deliver()
             except Exception as fault:  # noqa: BLE001 - no record, disk or receiver may end the thread
                 self._note(str(fault) or repr(fault))
                 self._outbox.rewind()
                 self._pause(self._back_off.next_s())
-
-    @property
-    def fault(self) -> str | None:
-        """None: failures are in the report."""
-        return None
 
     @abstractmethod
     def _deliver(self) -> None:
@@ -106,13 +92,13 @@ class Forwarder(ABC, Generic[Report]):
     def _pause(self, pause_s: float) -> None:
         """Wait before the next attempt, or until stopped, and keep counting the waiting records."""
         end_s = time.monotonic() + pause_s
-        while not self._stop.is_set():
+        while not self._stopping.is_set():
             with suppress(StoreError, TimeoutError, OSError):  # told where messages are asked for
                 self._look()
             left_s = end_s - time.monotonic()
             if left_s <= 0.0:
                 return
-            self._stop.wait(min(left_s, LOOK_S))
+            self._stopping.wait(min(left_s, LOOK_S))
 
     def _look(self) -> None:
         """Count the waiting records, at most every LOOK_S."""

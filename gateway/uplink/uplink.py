@@ -63,7 +63,7 @@ class Uplink(Forwarder[UplinkStatus]):
     def _deliver_in_turn(self, link: MqttLink) -> None:
         """Send one message at a time and wait for the broker's acknowledgement, which keeps the order."""
         waiting: deque[OutboxMessage] = deque()
-        while not self._stop.is_set():
+        while not self._stopping.is_set():
             if not waiting:
                 waiting.extend(self._outbox.next_messages(PAGE))
                 self._look()
@@ -93,7 +93,7 @@ class Uplink(Forwarder[UplinkStatus]):
     def _answer_for(self, link: MqttLink, mid: int) -> BrokerAnswer | None:
         """The broker's answer; None if the service was stopped meanwhile. Raises LinkError after ANSWER_TIMEOUT_S."""
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
-        while not self._stop.is_set():
+        while not self._stopping.is_set():
             for answer in link.turn(TURN_S):
                 if answer.mid == mid:
                     return answer

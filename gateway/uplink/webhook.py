@@ -199,7 +199,7 @@ class Webhook(Forwarder[WebhookStatus]):
         self._clock_s = clock_s
 
     def _deliver(self) -> None:
-        while not self._stop.is_set():
+        while not self._stopping.is_set():
             messages = self._outbox.next_messages(PAGE)
             self._look()
             for message in messages:
@@ -213,7 +213,7 @@ class Webhook(Forwarder[WebhookStatus]):
         """Try until the message is accepted or dead; False if the service was stopped before."""
         n_unwanted = 0
         refused_since_s: float | None = None
-        while not self._stop.is_set():
+        while not self._stopping.is_set():
             answer = self._posted(message)
             if answer.verdict is PostVerdict.TAKEN:
                 self._took()

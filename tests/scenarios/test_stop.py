@@ -10,7 +10,6 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import httpx
 import pytest
@@ -21,8 +20,9 @@ from support.ports import first_answer, free_port
 
 from gateway.config import load_settings
 from gateway.log import Event
+from gateway.part import ServicePart
 from gateway.service import gateway
-from gateway.service.part import CLOSE_WITHIN_S, STOP_WITHIN_S, Deadline, ServicePart, stop_in_turn
+from gateway.service.part import CLOSE_WITHIN_S, STOP_WITHIN_S, Deadline, stop_in_turn
 from gateway.setup import setup_of
 from gateway.web.access import serving
 
@@ -80,11 +80,21 @@ def test_parts_stop_in_the_reverse_of_their_start_and_one_that_hangs_holds_nobod
     monkeypatch.setattr("gateway.service.part.PART_WITHIN_S", 0.05)
     stopped: list[str] = []
     for_ever = threading.Event()
-    parts = [
-        ServicePart(name, lambda: None, lambda left_s, name=name: stopped.append(name)) for name in ("first", "last")
-    ]
-    parts.insert(1, ServicePart("stuck", lambda: None, lambda left_s: for_ever.wait()))
-    assert stop_in_turn(parts, Deadline()) == ["stuck"]
+
+    class Named(ServicePart):
+        def __init__(self, name: str) -> None:
+            self.NAME = name  # type: ignore[misc]  # two of one class
+
+        def stop(self, within_s: float = 0.0) -> None:
+            stopped.append(self.NAME)
+
+    class Stuck(ServicePart):
+        NAME = "stuck"
+
+        def stop(self, within_s: float = 0.0) -> None:
+            for_ever.wait()
+
+    assert stop_in_turn([Named("first"), Stuck(), Named("last")], Deadline()) == ["stuck"]
     assert stopped == ["last", "first"]
     assert names(caplog) == [Event.PART_LATE]
     for_ever.set()
@@ -123,15 +133,17 @@ def test_the_death_of_a_sender_is_shown_and_the_weighing_goes_on(
 ) -> None:
     """It ended the process."""
     settings = load_settings(config)
-    dead = SimpleNamespace(
-        NAME=name,
-        fault=None,
-        start=lambda: None,
-        stop=lambda left_s: None,
-        is_alive=lambda: False,
-        report=lambda: None,
-    )
-    monkeypatch.setattr(gateway, f"{name}_of", lambda *known, **named: dead)
+
+    class Dead(ServicePart):
+        NAME = name
+
+        def death(self) -> str:
+            return "died"
+
+        def report(self) -> None:
+            return None
+
+    monkeypatch.setattr(gateway, f"{name}_of", lambda *known, **named: Dead())
     told: list[tuple[str, ...]] = []
 
     def on_started(running: gateway.Gateway) -> None:

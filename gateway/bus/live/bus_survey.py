@@ -16,15 +16,17 @@ from gateway.bus.heard import Heard, counted, heard_on
 from gateway.bus.live.source import OpenReceiver, opener_of
 from gateway.bus.signals import CAN_FD_BYTES, EVERY_IDENTIFIER
 from gateway.errors import BusError
+from gateway.part import STOP_WITHIN_S, ServicePart
 
-LOOK_S: Final = 2.0
-EVERY_S: Final = 60.0
-POLL_S: Final = 0.1
-STOP_WITHIN_S: Final = 1.0
+LOOK_S: Final = 2.0  # chosen: every periodic message of a vehicle comes within that
+EVERY_S: Final = 60.0  # chosen: from one survey to the next
+POLL_S: Final = 0.1  # chosen: how soon a stop is heeded
 
 
-class BusSurvey:
+class BusSurvey(ServicePart):
     """Surveys the bus in a thread that lives as long as one survey; never sends."""
+
+    NAME = "survey of the bus"
 
     def __init__(self, open_receiver: OpenReceiver | None) -> None:
         """``open_receiver`` opens the channel once more, unfiltered; None if that would disturb the first."""

@@ -22,13 +22,13 @@ from gateway.bus.live.receiver import BUS_OFF, Burst, Inbox, Receiver
 from gateway.bus.live.socketcan import open_socketcan, packets_received
 from gateway.bus.signals import IdFilter, SignalMap
 from gateway.log import Event, log_event
+from gateway.part import STOP_WITHIN_S, ThreadPart
 
 POLL_S: Final = 0.3  # longest wait inside a receiver: how soon a stop is heeded
 ASLEEP_POLL_S: Final = 1.0  # likewise while the bus is silent; a frame ends the wait at once
-FIRST_PAUSE_S: Final = 0.25
-LONGEST_PAUSE_S: Final = 5.0
-START_WAIT_S: Final = 2.0
-STOP_WITHIN_S: Final = 2.0
+FIRST_PAUSE_S: Final = 0.25  # chosen: before a channel that failed is opened again; doubles up to the longest
+LONGEST_PAUSE_S: Final = 5.0  # chosen: how late a channel that came back is noticed
+START_WAIT_S: Final = 2.0  # chosen: for the first attempt to open the channel
 
 OpenReceiver = Callable[[], Receiver]
 
@@ -74,12 +74,14 @@ class SourceCounts:
     stamped_at_receipt: int
 
 
-class LiveSource:
+class LiveSource(ThreadPart):
     """Listens to one channel in a thread of its own until stopped; never sends.
 
     A channel that is down, removed, or not there yet is tried again and again with growing pauses; meanwhile the state
-    and its reason say so. An exception that ends the thread all the same is kept in ``failure``.
+    and its reason say so.
     """
+
+    NAME = "bus reader"
 
     def __init__(
         self,
@@ -93,6 +95,7 @@ class LiveSource:
         open_receiver: OpenReceiver | None = None,
     ) -> None:
         """``open_receiver`` replaces the interface (tests). Raises BusError if it cannot be used here."""
+        super().__init__("can-receiver")
         require_usable_interface(interface)
         self._interface, self._channel = interface, channel
         self._silence_s = silence_s
@@ -106,11 +109,8 @@ class LiveSource:
         self._receiver: Receiver | None = None
         self._state = SourceState.STOPPED
         self._reason: str | None = None
-        self._failure: BaseException | None = None
         self._seen_at_silence = 0
-        self._stopping = threading.Event()
         self._has_tried = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="can-receiver", daemon=True)
 
     @property
     def state(self) -> SourceState:
@@ -121,23 +121,16 @@ class LiveSource:
         """Why the bus is silent or the reader at fault, for people."""
         return self._reason
 
-    @property
-    def failure(self) -> BaseException | None:
-        """The exception that ended the receive thread; None while it lives or after a proper stop."""
-        return self._failure
-
     def start(self) -> None:
         """Begin to listen; returns once the first attempt to open the channel has succeeded or failed."""
         self._state = SourceState.STARTING
-        self._thread.start()
+        super().start()
         self._has_tried.wait(START_WAIT_S)
 
-    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
+    def stop(self, within_s: float = STOP_WITHIN_S) -> None:
         """End the thread and close the channel. The frames in the inbox can still be drained."""
-        self._stopping.set()
         self.inbox.close()
-        if self._thread.ident is not None:
-            self._thread.join(timeout_s)
+        super().stop(within_s)
 
     def counts(self) -> SourceCounts:
         receiver = self._receiver
@@ -156,7 +149,7 @@ class LiveSource:
         try:
             self._listen_until_stopped()
         except BaseException as failure:  # noqa: BLE001 # every failure of the thread must be reported
-            self._failure = failure
+            self.failure = failure
             self._enter(SourceState.READER_FAULT, f"the receive thread died: {failure!r}")
         else:
             self._enter(SourceState.STOPPED, None)

@@ -12,17 +12,19 @@ from gateway.bus.live.source import LiveSource
 from gateway.bus.ring.folder import RingFolder, RingLimits
 from gateway.bus.ring.segment import Segment, head_of, packed_block
 from gateway.log import Event, log_event
+from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.records import Frames
 from gateway.status import RecordStatus
 
 BLOCK_FRAMES: Final = 131_072  # so many frames are written before the time of a block is over
 HELD_FRAMES: Final = 2 * BLOCK_FRAMES  # most frames in memory while the disk fails: some MB
-RETRY_S: Final = 30.0
-STOP_WITHIN_S: Final = 5.0
+RETRY_S: Final = 30.0  # chosen: pause after a fault of the disk
 
 
-class RingLog:
+class RingLog(ThreadPart):
     """The ring log. One thread hands frames over, its own thread writes them, any thread lists and opens segments."""
+
+    NAME = "recorder"
 
     def __init__(
         self,
@@ -34,6 +36,7 @@ class RingLog:
         retry_s: float = RETRY_S,
     ) -> None:
         """``channel`` is the frames' channel name in the log, as far as a candump line allows it."""
+        super().__init__("ring-log")
         self._folder = RingFolder(directory, limits, clock_s)
         self._channel = "".join("_" if char.isspace() or not char.isprintable() else char for char in channel) or "can"
         self._block_s = limits.block_s
@@ -42,21 +45,16 @@ class RingLog:
         self._held: list[Frames] = []
         self._n_held = 0
         self._held_since_s = 0.0
-        self._is_stopping = False
         self._n_written = self._n_dropped = self._n_bytes = 0
         self._fault: str | None = None
-        self._thread = threading.Thread(target=self._run, name="ring-log", daemon=True)
 
-    def start(self) -> None:
-        self._thread.start()
-
-    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
+    def stop(self, within_s: float = STOP_WITHIN_S) -> None:
         """Write the frames in memory, if the disk accepts them, and end."""
         with self._changed:
-            self._is_stopping = True
+            self._stopping.set()
             self._changed.notify_all()
-        self._thread.join(timeout_s)
-        if self._thread.is_alive():
+        super().stop(within_s)
+        if self.is_alive():
             fault = "the disk was too slow for the stop"
             log_event(Event.RECORD_REFUSED, level=logging.WARNING, fault=fault, n_frames_held=self._n_held)
 
@@ -122,7 +120,7 @@ class RingLog:
     def _wait_for_block(self) -> bool:
         """Wait until a block is due or it is time to stop; False if nothing is left to do."""
         with self._changed:
-            while not self._is_stopping and self._n_held < BLOCK_FRAMES:
+            while not self._stopping.is_set() and self._n_held < BLOCK_FRAMES:
                 left_s = self._held_since_s + self._block_s - time.monotonic() if self._held else None
                 if left_s is not None and left_s <= 0.0:
                     break
@@ -139,8 +137,8 @@ class RingLog:
         except OSError as refusal:
             self._tell(self._told(refusal))
             with self._changed:
-                if not self._is_stopping:
-                    self._changed.wait_for(lambda: self._is_stopping, self._retry_s)
+                if not self._stopping.is_set():
+                    self._changed.wait_for(self._stopping.is_set, self._retry_s)
                     return
             is_written = False
         with self._changed:

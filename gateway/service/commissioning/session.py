@@ -11,6 +11,7 @@ from gateway.core.scheduler import Scheduler
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CampaignError, CommissioningRefusedError
 from gateway.log import Event, OnEvent
+from gateway.part import STOP_WITHIN_S, ServicePart
 from gateway.records import json_line
 from gateway.service.commissioning.empty_drive import EmptyDrive, Jobs, MakeWorker, ServiceVehicle
 from gateway.service.commissioning.lines import Lines, require_alike
@@ -24,8 +25,10 @@ from gateway.units import NS_PER_S
 UPLOADED: Final = "uploaded"
 
 
-class Commissioning:
+class Commissioning(ServicePart):
     """Thread-safe; a call may wait for the disk. A power cut does not undo an answered step."""
+
+    NAME = "commissioning"
 
     def __init__(
         self,
@@ -77,7 +80,7 @@ class Commissioning:
         """Ignore batches from now on. Never waits."""
         self._drive.is_over = True
 
-    def stop(self, _within_s: float = 0.0) -> None:
+    def stop(self, within_s: float = STOP_WITHIN_S) -> None:
         """Stop; the next start resumes from the disk. May wait for a hanging disk."""
         self._drive.stop()
 

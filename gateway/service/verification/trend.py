@@ -2,7 +2,6 @@
 
 import json
 import logging
-import threading
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -11,41 +10,37 @@ from typing import Final
 from gateway.calibration.trend import FILE_NAME, Trend, TrendHistory, trends_of
 from gateway.estimate_json import estimate_from_json
 from gateway.log import Event, log_event
+from gateway.part import ThreadPart
 from gateway.records import json_line
 from gateway.service.record_file import RecordFile
 from gateway.service.verification.epochs import Ask
 from gateway.setup import Subject
 
-FIRST_S: Final = 30.0  # first run after the start
-EVERY_S: Final = 3600.0
-PAGE: Final = 200
-PAUSE_S: Final = 0.2  # between two pages
-STOP_WITHIN_S: Final = 2.0
+FIRST_S: Final = 30.0  # chosen: after the start, which has more urgent work
+EVERY_S: Final = 3600.0  # chosen: a drift takes weeks
+PAGE: Final = 200  # chosen: batches read at a time
+PAUSE_S: Final = 0.2  # chosen: between two pages, so that a long history does not occupy a core
 
 Zeros = Callable[[], Sequence[tuple[str, float]]]
 
 
-class TrendService:
-    """Adds new batches to trend.json. After a failure of the store or the disk it tries again in an hour."""
+class TrendService(ThreadPart):
+    """Adds new batches to trend.json. After a failure of the store or the disk it tries again in an hour.
+
+    Batches that are unread at a stop are read after the next start.
+    """
+
+    NAME = "trend"
 
     def __init__(self, directory: Path, subject: Subject, ask: Ask, zeros: Zeros) -> None:
         """``zeros`` gives times of the empty vehicle with the estimate by the calibration alone (kg), oldest first."""
+        super().__init__("trend")
         self._subject = subject
         self._ask = ask
         self._zeros = zeros
         self._file = RecordFile(directory / FILE_NAME, TrendHistory())
         self._trends: tuple[Trend, ...] = ()
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="trend", daemon=True)
         self._judge()
-
-    def start(self) -> None:
-        self._thread.start()
-
-    def stop(self, timeout_s: float = STOP_WITHIN_S) -> None:
-        """Stop; unread batches are read after the next start."""
-        self._stop.set()
-        self._thread.join(timeout_s)
 
     @property
     def fault(self) -> str | None:
@@ -67,13 +62,13 @@ class TrendService:
     def catch_up(self) -> None:
         """Read all new batches, and judge. Raises StoreError, TimeoutError or OSError."""
         history = before = self._file.record
-        while not self._stop.is_set():
+        while not self._stopping.is_set():
             page = self._ask(limit=PAGE, cursor=history.cursor, with_spectra=False)
             estimates = [estimate_from_json(json.loads(item)) for item in page.items]
             history = history.with_batches(estimates, page.last_cursor)
             if page.next_cursor is None:
                 break
-            self._stop.wait(PAUSE_S)
+            self._stopping.wait(PAUSE_S)
         if history != before:
             self._file.keep(history)
         self._judge()
@@ -85,7 +80,7 @@ class TrendService:
 
     def _run(self) -> None:
         wait_s = FIRST_S
-        while not self._stop.wait(wait_s):
+        while not self._stopping.wait(wait_s):
             wait_s = EVERY_S
             try:
                 self.catch_up()

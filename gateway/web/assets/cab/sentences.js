@@ -1,6 +1,6 @@
 // The cab page's sentences, from the answer of /api/v1/cab.
 
-import { ago, between, capital, clock, duration, figure, number, reasons, words } from "/assets/dashboard/words.js";
+import { ago, alarmName, between, capital, clock, duration, figure, number, placeName, reasons } from "/assets/dashboard/words.js";
 import { speaker } from "/assets/language.js";
 import { CAB } from "/assets/words/cab.js";
 import { COMMON } from "/assets/words/common.js";
@@ -11,7 +11,6 @@ const SILENT_S = 30;
 
 export const phrase = speaker(COMMON, CAB);
 
-const placeName = (place) => phrase.named("place", place);
 const intervalText = (bounds) => (bounds === null ? "" : phrase("interval", { between: between(bounds, 0, "kg") }));
 
 const down = (kg) => Math.floor(kg / STEP_KG) * STEP_KG;
@@ -77,17 +76,10 @@ export function notSeen(cab) {
   return cab.load === "not_weighed_yet" ? phrase("changed") : "";
 }
 
-function alarmName(name) {
-  const [kind, where = ""] = name.split(".");
-  if (kind === "overload") return phrase("alarm.overload", { place: placeName(where) });
-  if (kind === "drift") return phrase("alarm.drift", { where: words(where) });
-  return phrase.named("alarm", name);
-}
-
 /** Active alarms, the confirmed ones first, without those that the red light shows already. */
 export function alarmText(cab) {
   const isSaid = (name) => cab.light === "over" && cab.light_about.some((place) => name === `overload.${place}`);
-  const told = (level) => Object.keys(cab.alarms).filter((name) => cab.alarms[name] === level && !isSaid(name)).map(alarmName);
+  const told = (level) => Object.keys(cab.alarms).filter((name) => cab.alarms[name] === level && !isSaid(name)).map((name) => alarmName(...name.split(".")));
   const [sure, early] = [told("final"), told("early")];
   return [sure.length ? phrase("alarms", { names: sure.join(", ") }) : "", early.length ? phrase("first_signs", { names: early.join(", ") }) : ""].filter(Boolean).join(" ");
 }

@@ -1,8 +1,9 @@
 // Alarms: active ones come first on the page, each with a button to acknowledge it; ended ones are below.
 
-import { ALARMS, change, hasToken } from "/assets/dashboard/gateway.js";
+import { dialog } from "/assets/dashboard/dialog.js";
+import { ALARMS, change } from "/assets/dashboard/gateway.js";
 import { learn, show } from "/assets/dashboard/known.js";
-import { element, made, say, write } from "/assets/dashboard/page.js";
+import { button, element, made, write } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
 import { capital, clock, number, reasons, span, withStd, words } from "/assets/dashboard/words.js";
 
@@ -39,17 +40,9 @@ const sentence = (alarm) => `${phrase(`alarm_${alarm.state}`)}: ${plain(alarm)}.
 
 function item(alarm, canBeSeen) {
   const parts = [made("strong", phrase(`alarm_${alarm.state}`)), made("span", `: ${plain(alarm)}. `), made("span", `${when(alarm)}${seen(alarm)} `)];
-  if (canBeSeen) parts.push(button(alarm));
+  if (canBeSeen) parts.push(button(`${phrase("acknowledge")} …`, `${phrase("acknowledge")}: ${plain(alarm)}`, () => open(alarm)));
   const built = made("li", parts, alarm.is_active ? (alarm.state === "final" ? "alarm" : "warning") : "");
   built.dataset.id = alarm.id;
-  return built;
-}
-
-function button(alarm) {
-  const built = made("button", `${phrase("acknowledge")} …`);
-  built.type = "button";
-  built.setAttribute("aria-label", `${phrase("acknowledge")}: ${plain(alarm)}`);
-  built.addEventListener("click", () => open(alarm));
   return built;
 }
 
@@ -70,33 +63,19 @@ show(({ alarms }) => {
 
 let chosen = null;
 
-function open(alarm) {
-  chosen = alarm;
-  element("alarm-form").reset();
-  write("alarm-sentence", sentence(alarm));
-  element("alarm-token").hidden = !hasToken();
-  say("alarm-refusal", "");
-  element("alarm-dialog").showModal();
-}
-
-async function confirm(event) {
-  event.preventDefault();
-  element("alarm-confirm").disabled = true;
-  try {
-    const note = element("alarm-note").value;
+const openDialog = dialog(
+  "alarm",
+  async (token, note) => {
     const path = `${ALARMS.split("?")[0]}/${chosen.id}/acknowledgement`;
-    const told = await change("POST", path, element("alarm-token-text").value.trim(), note ? { note } : {}, ALARMS);
-    element("alarm-dialog").close();
-    learn({ alarms: alarmsOf(told) });
+    learn({ alarms: alarmsOf(await change("POST", path, token, note, ALARMS)) });
+  },
+  () => {
     write("alarms-said", phrase("alarm_noted"));
     element(chosen.is_active ? "alarms-title" : "alarms-past-title").focus();
-  } catch (error) {
-    say("alarm-refusal", error.message);
-  } finally {
-    element("alarm-confirm").disabled = false;
-  }
-}
+  },
+);
 
-element("alarm-form").addEventListener("submit", confirm);
-element("alarm-cancel").addEventListener("click", () => element("alarm-dialog").close());
-element("alarm-dialog").addEventListener("close", () => element("alarm-form").reset()); // no token stays behind
+function open(alarm) {
+  chosen = alarm;
+  openDialog(() => write("alarm-sentence", sentence(alarm)));
+}

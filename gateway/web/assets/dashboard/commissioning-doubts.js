@@ -1,7 +1,7 @@
 // The gateway's doubts about stated facts, in the reader's language, and the answers that were probably meant.
 
 import { phrase } from "/assets/dashboard/phrases.js";
-import { figure, number } from "/assets/dashboard/words.js";
+import { capital, figure, number } from "/assets/dashboard/words.js";
 
 const ADVICE = {
   wheelbase: "measure", mass: "scales", front_share: "scales", line_mass: "line", line_axles: "line", line_track: "place",
@@ -18,8 +18,6 @@ function written(name, x) {
   if (name.endsWith("_pct")) return figure(x, 0, "%");
   return name.endsWith("_kg") ? figure(x, x < 10 ? 1 : 0, "kg") : figure(x, 2, "m");
 }
-
-const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** One doubt: what is unlikely, and what to do. */
 export function asked({ kind, numbers }) {

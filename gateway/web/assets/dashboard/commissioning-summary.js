@@ -1,7 +1,7 @@
 // The answers so far, each with a link back to it.
 
 import { asked } from "/assets/dashboard/commissioning-doubts.js";
-import { made, pair } from "/assets/dashboard/page.js";
+import { button, made, pair } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
 import { UNKNOWN, clock, figure } from "/assets/dashboard/words.js";
 
@@ -39,14 +39,6 @@ function entered({ line, vehicle, empty }) {
   return rows;
 }
 
-function changeButton(step, what, goTo) {
-  const button = made("button", phrase("com_change"), "link");
-  button.type = "button";
-  button.setAttribute("aria-label", phrase("com_change_of", { what }));
-  button.addEventListener("click", () => goTo(step));
-  return button;
-}
-
 /** Terms and descriptions for a <dl class="pairs">; `goTo` shows a step again, null: nothing can be changed now. */
 export function summary(underway, goTo) {
   const steps = new Set();
@@ -54,7 +46,7 @@ export function summary(underway, goTo) {
     const row = pair(phrase(key), text);
     if (goTo !== null && step !== null && !steps.has(step)) {
       steps.add(step); // one way back to each step
-      row.lastChild.append(" ", changeButton(step, phrase(key), goTo));
+      row.lastChild.append(" ", button(phrase("com_change"), phrase("com_change_of", { what: phrase(key) }), () => goTo(step), "link"));
     }
     return row;
   });

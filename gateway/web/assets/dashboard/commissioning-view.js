@@ -6,7 +6,7 @@ import { summary } from "/assets/dashboard/commissioning-summary.js";
 import { unfold } from "/assets/dashboard/fold.js";
 import { COMMISSIONING, change, hasToken, load } from "/assets/dashboard/gateway.js";
 import { known, learn, show } from "/assets/dashboard/known.js";
-import { element, made, say, write } from "/assets/dashboard/page.js";
+import { button, element, made, say, write } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
 import { Z95, clock, duration, figure } from "/assets/dashboard/words.js";
 
@@ -71,11 +71,7 @@ function drawSteps(wanted, current) {
     const item = made("li", "", isDone ? "done" : "");
     if (isCurrent) item.setAttribute("aria-current", "step");
     if ((isDone || name === wanted) && !isCurrent && wanted !== "fit") {
-      const back = made("button", name_, "link");
-      back.type = "button";
-      back.setAttribute("aria-label", phrase("com_step_back", { step: name_ }));
-      back.addEventListener("click", () => goTo(name));
-      item.append(back);
+      item.append(button(name_, phrase("com_step_back", { step: name_ }), () => goTo(name), "link"));
     } else item.textContent = name_;
     return item;
   });
@@ -152,7 +148,7 @@ function draw({ commissioning: state }) {
     element("commissioning-progress").value = underway.learned?.share ?? 0;
     const isFit = underway.step === "fit";
     element("commissioning-fit").disabled = underway.n_batches === 0 || isFit;
-    for (const button of element("commissioning-drive").querySelectorAll("button")) button.hidden = isFit;
+    for (const one of element("commissioning-drive").querySelectorAll("button")) one.hidden = isFit;
   }
   drawDone(state);
   say("commissioning-fault", underway?.fault ?? "");
@@ -222,7 +218,7 @@ form.addEventListener("input", () => {
 /** One request to the gateway: shows its own words if it refuses, and disables the button meanwhile. */
 async function step(place, path, claim, method = "POST") {
   const buttons = [...place.querySelectorAll("button")];
-  for (const button of buttons) button.disabled = true;
+  for (const one of buttons) one.disabled = true;
   say("commissioning-refusal", "");
   try {
     const token = element("commissioning-token-text").value.trim();
@@ -234,7 +230,7 @@ async function step(place, path, claim, method = "POST") {
     say("commissioning-refusal", error.message);
     return false;
   } finally {
-    for (const button of buttons) button.disabled = false;
+    for (const one of buttons) one.disabled = false;
     element("commissioning-fit").disabled = !known.commissioning.underway?.n_batches;
   }
 }

@@ -1,7 +1,7 @@
 // The last day: what was loaded and unloaded where, and the trips between; as bars over time, and as a list in words.
 
 import { known, show } from "/assets/dashboard/known.js";
-import { element, made, write } from "/assets/dashboard/page.js";
+import { element, made, shape, write } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
 import { clock, figure, number, span, withStd } from "/assets/dashboard/words.js";
 
@@ -13,7 +13,6 @@ const CEILING = 20;
 const LEAST_WIDTH = 3;
 const LETTER_PX = 10; // of a label, on average: a bold sign is wider than a digit
 const SURE = 0.99;
-const SVG = "http://www.w3.org/2000/svg";
 
 const at = (iso) => new Date(iso).getTime();
 
@@ -53,18 +52,11 @@ function summary(entries) {
   });
 }
 
-function drawn(name, attributes, text = "") {
-  const built = document.createElementNS(SVG, name);
-  for (const [key, x] of Object.entries(attributes)) built.setAttribute(key, x);
-  built.textContent = text;
-  return built;
-}
-
 function tripBar(trip, x, y) {
   const [left, right] = [x(trip.t_start), x(trip.t_end)];
   const top = trip.payload_kg == null ? FLOOR - 6 : Math.min(y(trip.payload_kg), FLOOR - 2);
   const kind = trip.payload_kg == null ? "unknown" : trip.overloaded_share > 0 ? "over" : "known";
-  return drawn("rect", { class: `day-${kind}`, x: left, y: top, width: Math.max(right - left, LEAST_WIDTH), height: FLOOR - top });
+  return shape("rect", { class: `day-${kind}`, x: left, y: top, width: Math.max(right - left, LEAST_WIDTH), height: FLOOR - top });
 }
 
 /** Places labels that overlap no earlier one, and omits those without room; the list below is complete. */
@@ -76,7 +68,7 @@ function labels(wanted, width) {
     const isFree = taken.every((other) => Math.abs(other.x - label.x) > other.half + half || Math.abs(other.y - label.y) > 14);
     if (isFree) taken.push({ ...label, half });
     return isFree;
-  }).map(({ text, x, y, kind }) => drawn("text", { class: kind, x, y }, text));
+  }).map(({ text, x, y, kind }) => shape("text", { class: kind, x, y }, text));
 }
 
 function changeLabel(event, x, y) {
@@ -92,8 +84,8 @@ function timeline(entries, width) {
   const most = Math.max(...loads, 1);
   const x = (iso) => (width * (at(iso) - first)) / Math.max(last - first, 1);
   const y = (kg) => FLOOR - ((FLOOR - CEILING) * Math.max(kg, 0)) / most;
-  const picture = drawn("svg", { viewBox: `0 0 ${width} ${HEIGHT}`, width, height: HEIGHT, "aria-hidden": "true" });
-  picture.append(drawn("line", { class: "day-floor", x1: 0, x2: width, y1: FLOOR, y2: FLOOR }));
+  const picture = shape("svg", { viewBox: `0 0 ${width} ${HEIGHT}`, width, height: HEIGHT, "aria-hidden": "true" });
+  picture.append(shape("line", { class: "day-floor", x1: 0, x2: width, y1: FLOOR, y2: FLOOR }));
   picture.append(...entries.filter(isTrip).map((trip) => tripBar(trip, x, y)));
   const changes = entries.filter((entry) => !isTrip(entry)).map((event) => changeLabel(event, x, y)).sort((a, b) => b.size - a.size);
   const ends = [[first, 0], [last, width]].map(([ms, where]) => ({ text: clock(ms), kind: "day-hour", x: where, y: HEIGHT - 6 }));

@@ -1,8 +1,9 @@
 // Known weights: those in use, those that wait for a confirmation, and the forms to state one or take it back.
 
-import { KNOWN_WEIGHTS, change, hasToken } from "/assets/dashboard/gateway.js";
+import { dialog } from "/assets/dashboard/dialog.js";
+import { KNOWN_WEIGHTS, change } from "/assets/dashboard/gateway.js";
 import { known, learn, show } from "/assets/dashboard/known.js";
-import { element, made, say, write } from "/assets/dashboard/page.js";
+import { button, element, made, write } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
 import { clock, signed, span as spanOf, withStd } from "/assets/dashboard/words.js";
 
@@ -27,12 +28,9 @@ function stateText(one) {
   return phrase(one.ended.why === "withdrawn" ? "taken_back" : "all_taken_back", { time: clock(one.ended.at), by: one.ended.by });
 }
 
-function button(text, one, name) {
-  const pressed = made("button", `${text} …`);
-  pressed.type = "button";
-  pressed.setAttribute("aria-label", phrase("button_of", { button: text, kind: phrase.named("kind", one.kind), time: clock(one.t_start) }));
-  pressed.addEventListener("click", () => open(name, one));
-  return pressed;
+function opener(text, one, name) {
+  const label = phrase("button_of", { button: text, kind: phrase.named("kind", one.kind), time: clock(one.t_start) });
+  return button(`${text} …`, label, () => open(name, one));
 }
 
 function entry(one) {
@@ -41,8 +39,8 @@ function entry(one) {
     note: one.note ? ` (${one.note})` : "", state: stateText(one),
   });
   const parts = [made("span", said)];
-  if (one.state === "held") parts.push(button(phrase("confirm_weight"), one, "confirm"), made("span", " "));
-  if (one.ended === null) parts.push(button(phrase("take_back"), one, "back"));
+  if (one.state === "held") parts.push(opener(phrase("confirm_weight"), one, "confirm"), made("span", " "));
+  if (one.ended === null) parts.push(opener(phrase("take_back"), one, "back"));
   return made("li", parts, one.state === "held" ? "warning" : "");
 }
 
@@ -86,36 +84,22 @@ const CHOICES = {
 
 let chosen = null, subject = null;
 
+const openDialog = dialog(
+  "weights",
+  async (token, note) => learn({ knownWeights: await chosen.ask(token, note, subject) }),
+  () => write("weights-said", chosen.done),
+);
+
 function open(name, one = null) {
   [chosen, subject] = [CHOICES[name], one];
-  element("weights-form").reset();
-  write("weights-question", chosen.question(one));
-  write("weights-effect", chosen.effect(one));
-  write("weights-confirm", chosen.confirm);
-  element("weights-claim").hidden = name !== "empty";
-  element("weights-claimed").disabled = name !== "empty"; // what is hidden must not be required
-  if (name === "empty") write("weights-claim-text", phrase("empty_claim", { span: span(known.knownWeights.offer.load) }));
-  element("weights-token").hidden = !hasToken();
-  say("weights-refusal", "");
-  element("weights-dialog").showModal();
-}
-
-async function confirm(event) {
-  event.preventDefault();
-  element("weights-confirm").disabled = true;
-  try {
-    const note = element("weights-note").value;
-    learn({ knownWeights: await chosen.ask(element("weights-token-text").value.trim(), note ? { note } : {}, subject) });
-    element("weights-dialog").close();
-    write("weights-said", chosen.done);
-  } catch (error) {
-    say("weights-refusal", error.message);
-  } finally {
-    element("weights-confirm").disabled = false;
-  }
+  openDialog(() => {
+    write("weights-question", chosen.question(one));
+    write("weights-effect", chosen.effect(one));
+    write("weights-confirm", chosen.confirm);
+    element("weights-claim").hidden = name !== "empty";
+    element("weights-claimed").disabled = name !== "empty"; // what is hidden must not be required
+    if (name === "empty") write("weights-claim-text", phrase("empty_claim", { span: span(known.knownWeights.offer.load) }));
+  });
 }
 
 element("weights-empty").addEventListener("click", () => open("empty"));
-element("weights-form").addEventListener("submit", confirm);
-element("weights-cancel").addEventListener("click", () => element("weights-dialog").close());
-element("weights-dialog").addEventListener("close", () => element("weights-form").reset()); // no token stays behind

@@ -16,7 +16,7 @@ import "/assets/dashboard/commissioning-view.js";
 import "/assets/dashboard/verification-view.js";
 
 import { feed, lookBack } from "/assets/dashboard/feed.js";
-import { ask, setToken } from "/assets/dashboard/gateway.js";
+import { download, setToken } from "/assets/dashboard/gateway.js";
 import { element } from "/assets/dashboard/page.js";
 
 element("token").addEventListener("submit", (event) => {
@@ -25,14 +25,9 @@ element("token").addEventListener("submit", (event) => {
   location.reload();
 });
 
-/** A link cannot carry the token; a question can. */
-element("export").addEventListener("click", async (event) => {
+element("export").addEventListener("click", (event) => {
   event.preventDefault();
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(await (await ask(element("export").href)).blob());
-  link.download = "springscale.csv";
-  link.click();
-  URL.revokeObjectURL(link.href);
+  download(element("export").href, "springscale.csv");
 });
 
 element("span").addEventListener("change", (event) => lookBack(Number(event.target.value)));

@@ -15,6 +15,23 @@ export function made(name, content = "", className = "") {
   return built;
 }
 
+/** A button that sends no form; `label` says more than `text` to a screen reader. */
+export function button(text, label, onClick, className = "") {
+  const built = made("button", text, className);
+  built.type = "button";
+  built.setAttribute("aria-label", label);
+  built.addEventListener("click", onClick);
+  return built;
+}
+
+/** A new element of a drawing. */
+export function shape(name, attributes, text = "") {
+  const built = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, content] of Object.entries(attributes)) built.setAttribute(key, content);
+  built.textContent = text;
+  return built;
+}
+
 /** One term and its description, for a <dl class="pairs">. */
 export const pair = (term, text, className = "") => made("div", [made("dt", term), made("dd", text, className)]);
 

@@ -1,13 +1,13 @@
 // The van from above, front to the left: the load on each axle and wheel, and the load's centre of gravity.
 // To scale along by the wheelbase and across by the track width.
 
+import { shape } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
-import { capital, figure, number, withStd } from "/assets/dashboard/words.js";
+import { Z95, capital, figure, number, withStd } from "/assets/dashboard/words.js";
 
-const SVG = "http://www.w3.org/2000/svg";
 const FRONT_X = 96, REAR_X = 290, MIDDLE_Y = 96, HALF_TRACK = 58;
 const LARGEST_RADIUS = 30, LARGEST_REACH = 200;
-const Z95 = 1.96, Z95_OF_TWO = 2.448; // 95 % of one normal number, and of two: the root of chi-squared of two, 5.991
+const Z95_OF_TWO = 2.448; // 95 % of two normal numbers: the root of chi-squared of two, 5.991
 const AXLES = ["front_axle", "rear_axle"];
 const WHEELS = [
   ["front_left", FRONT_X, 1], // the vehicle's left is below
@@ -15,13 +15,6 @@ const WHEELS = [
   ["rear_left", REAR_X, 1],
   ["rear_right", REAR_X, -1],
 ];
-
-function shape(name, attributes, text = "") {
-  const built = document.createElementNS(SVG, name);
-  for (const [key, content] of Object.entries(attributes)) built.setAttribute(key, content);
-  built.textContent = text;
-  return built;
-}
 
 const overOf = (weight) => (weight?.is_over_limit ? "over" : "");
 

@@ -1,8 +1,9 @@
 // Known loads: their last comparison with the estimates, the drift since then, and the form that states one.
 
-import { KNOWN_WEIGHTS, VERIFICATIONS, ask, change, hasToken } from "/assets/dashboard/gateway.js";
+import { dialog } from "/assets/dashboard/dialog.js";
+import { KNOWN_WEIGHTS, VERIFICATIONS, change, download } from "/assets/dashboard/gateway.js";
 import { learn, show } from "/assets/dashboard/known.js";
-import { element, made, say, write } from "/assets/dashboard/page.js";
+import { button, element, made, write } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
 import { capital, clock, figure, signed } from "/assets/dashboard/words.js";
 
@@ -28,22 +29,14 @@ function trendText({ name, unit, change, interval99, is_drifting, level, level99
   return phrase(is_drifting ? "trend_drifts" : "trend_line", { name: what, course });
 }
 
-/** A link cannot carry the token; a question can. The page opens on its own, to be printed. */
-async function print(record) {
-  const page = await (await ask(`${VERIFICATIONS}/${record.id}`)).blob();
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(page);
-  link.download = `verification-${record.at.slice(0, 10)}.html`;
-  link.click();
-  URL.revokeObjectURL(link.href);
+/** The page of a record opens on its own, to be printed. */
+function print(record) {
+  download(`${VERIFICATIONS}/${record.id}`, `verification-${record.at.slice(0, 10)}.html`).catch((error) => write("known-said", error.message));
 }
 
 function entry(record) {
-  const button = made("button", phrase("save_page"));
-  button.type = "button";
-  button.setAttribute("aria-label", phrase("save_page_of", { time: clock(record.at) }));
-  button.addEventListener("click", () => print(record).catch((error) => write("known-said", error.message)));
-  return made("li", [made("span", `${recordText(record)} `), button]);
+  const save = button(phrase("save_page"), phrase("save_page_of", { time: clock(record.at) }), () => print(record));
+  return made("li", [made("span", `${recordText(record)} `), save]);
 }
 
 show(({ verifications }) => {
@@ -110,36 +103,26 @@ function list() {
   write("known-listed", listed.length === 0 ? "" : phrase("listed", { n: listed.length }));
 }
 
+const openDialog = dialog(
+  "known",
+  async (token, note) => {
+    const claim = { ...purpose.claim([...listed, typed()]), ...note };
+    learn({ [purpose.part]: await change("POST", purpose.path, token, claim, purpose.path) });
+  },
+  () => write(purpose === PURPOSES.teach ? "weights-said" : "known-said", purpose.done),
+);
+
 function open(name) {
   listed = [];
   purpose = PURPOSES[name];
-  write("known-effect", purpose.effect);
-  write("known-confirm", purpose.confirm);
-  element("known-more").hidden = name !== "verify";
-  element("known-kinds").hidden = name !== "teach";
-  element("known-form").reset();
-  element("known-token").hidden = !hasToken();
-  say("known-refusal", "");
-  list();
-  fit();
-  element("known-dialog").showModal();
-}
-
-async function confirm(event) {
-  event.preventDefault();
-  element("known-confirm").disabled = true;
-  say("known-refusal", "");
-  try {
-    const note = element("known-note").value;
-    const claim = { ...purpose.claim([...listed, typed()]), ...(note ? { note } : {}) };
-    learn({ [purpose.part]: await change("POST", purpose.path, element("known-token-text").value.trim(), claim, purpose.path) });
-    element("known-dialog").close();
-    write(purpose === PURPOSES.teach ? "weights-said" : "known-said", purpose.done);
-  } catch (error) {
-    say("known-refusal", error.message);
-  } finally {
-    element("known-confirm").disabled = false;
-  }
+  openDialog(() => {
+    write("known-effect", purpose.effect);
+    write("known-confirm", purpose.confirm);
+    element("known-more").hidden = name !== "verify";
+    element("known-kinds").hidden = name !== "teach";
+    list();
+    fit();
+  });
 }
 
 element("known-add").addEventListener("click", () => open("verify"));
@@ -151,6 +134,3 @@ element("known-more").addEventListener("click", () => {
   for (const name of Object.values(FIELDS).flat()) element("known-form").elements[name].value = "";
   list();
 });
-element("known-form").addEventListener("submit", confirm);
-element("known-cancel").addEventListener("click", () => element("known-dialog").close());
-element("known-dialog").addEventListener("close", () => element("known-form").reset()); // no token stays behind

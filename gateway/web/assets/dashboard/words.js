@@ -57,6 +57,14 @@ export const words = (name) => name.replaceAll("_", " ");
 
 export const reasons = (names) => names.map((name) => common.named("reason", name)).join(", ");
 
+export const placeName = (place) => common.named("place", place);
+
+export function alarmName(kind, where) {
+  if (kind === "overload") return common("alarm.overload", { place: placeName(where) });
+  if (kind === "drift") return common("alarm.drift", { where: words(where) });
+  return common.named("alarm", where ? `${kind}.${where}` : kind);
+}
+
 export function capital(text) {
   return text.charAt(0).toUpperCase() + text.slice(1);
 }

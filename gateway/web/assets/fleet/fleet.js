@@ -1,7 +1,7 @@
 // The fleet: fetches every few seconds, shows a line per vehicle, alarms first; the search keeps matching lines.
 
 import { element, made, write } from "/assets/dashboard/page.js";
-import { UNKNOWN, ago, capital, clock, figure, withStd, words } from "/assets/dashboard/words.js";
+import { UNKNOWN, ago, alarmName, capital, clock, figure, placeName, withStd } from "/assets/dashboard/words.js";
 import { fill, speaker } from "/assets/language.js";
 import { COMMON } from "/assets/words/common.js";
 import { FLEET } from "/assets/words/fleet.js";
@@ -12,13 +12,8 @@ const phrase = speaker(COMMON, FLEET);
 
 let vehicles = null;
 
-const placeName = (place) => phrase.named("place", place);
-
-function alarmName({ kind, where, state }) {
-  const name =
-    kind === "overload" ? phrase("alarm.overload", { place: placeName(where) })
-    : kind === "drift" ? phrase("alarm.drift", { where: words(where ?? "") })
-    : phrase.named("alarm", where ? `${kind}.${where}` : kind);
+function alarmText({ kind, where, state }) {
+  const name = alarmName(kind, where);
   return capital(state === "early" ? phrase("early", { name }) : name);
 }
 
@@ -31,7 +26,7 @@ function loadCell(one) {
 }
 
 function alarmItem(alarm) {
-  return made("li", [made("span", alarmName(alarm), "alarmed"), made("small", phrase("since", { time: clock(alarm.t_start) }))]);
+  return made("li", [made("span", alarmText(alarm), "alarmed"), made("small", phrase("since", { time: clock(alarm.t_start) }))]);
 }
 
 function line(one) {
@@ -51,7 +46,7 @@ const urgency = (one) => 2 * one.alarms.length + one.over.length;
 function draw() {
   if (vehicles === null) return;
   const sought = element("search").value.trim().toLowerCase();
-  const shown = vehicles.filter((one) => `${one.vehicle_id} ${one.vin ?? ""} ${one.alarms.map(alarmName).join(" ")}`.toLowerCase().includes(sought));
+  const shown = vehicles.filter((one) => `${one.vehicle_id} ${one.vin ?? ""} ${one.alarms.map(alarmText).join(" ")}`.toLowerCase().includes(sought));
   shown.sort((a, b) => urgency(b) - urgency(a) || a.vehicle_id.localeCompare(b.vehicle_id, undefined, { numeric: true }));
   const count = (is) => vehicles.filter(is).length;
   const said = { n: vehicles.length, over: count((one) => one.over.length), alarmed: count((one) => one.alarms.length) };

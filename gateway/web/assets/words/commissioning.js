@@ -41,7 +41,6 @@ export const COMMISSIONING_WORDS = {
   com_rear: ["Under the rear axle [kg]", "Unter der Hinterachse [kg]"],
   com_wheelbase: ["Wheelbase: from axle to axle [m]", "Radstand: von Achse zu Achse [m]"],
   com_sensor: ["Sensor behind the front axle [m], negative: ahead of it", "Sensor hinter der Vorderachse [m], negativ: davor"],
-  com_more: ["More about the vehicle and its loads", "Mehr zum Fahrzeug und seinen Ladungen"],
   com_sensor_left: ["Sensor left of the centre line [m], negative: right of it; empty: not known", "Sensor links der Mittellinie [m], negativ: rechts; leer: unbekannt"],
   com_track: ["Track: between the middles of left and right tyres [m], if known", "Spurweite: zwischen den Mitten linker und rechter Reifen [m], falls bekannt"],
   com_payload: ["Maximum payload [kg]; empty: as its line, else 450", "Höchste Zuladung [kg]; leer: wie die Baureihe, sonst 450"],
