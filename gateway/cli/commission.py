@@ -9,7 +9,7 @@ import click
 
 from gateway.cli.options import FILE, NUMBER, as_json
 from gateway.cli.progress import StatusLine
-from gateway.cli.service import Service, asks_service
+from gateway.cli.service import Answer, Service, asks_service, prints_answer
 from gateway.core.vehicle import Carries
 from gateway.errors import ConfigurationError, SpringscaleError
 from gateway.files.signed import signature_path
@@ -25,7 +25,7 @@ STEPS: Final = {
 }
 
 
-def state_text(state: dict[str, Any]) -> str:
+def state_text(state: Answer) -> str:
     """The commissioning under way, the calibration in use, and earlier ones."""
     lines = [f"in use: {_made_text(state['active']) if state['active'] else 'the calibration of the settings, if any'}"]
     if state["is_pending"]:
@@ -40,7 +40,7 @@ def state_text(state: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def underway_text(underway: dict[str, Any]) -> str:
+def underway_text(underway: Answer) -> str:
     """The next step, the findings of inspection, the progress."""
     lines = [f"next: {STEPS[underway['step']]}"]
     if underway["n_batches"] or underway["driven_s"]:
@@ -57,7 +57,7 @@ def underway_text(underway: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def doubts_text(doubts: list[dict[str, Any]]) -> str:
+def doubts_text(doubts: list[Answer]) -> str:
     """The doubts, one line each, and the answers that were probably meant."""
     lines = [f"is this right? {one['text']}: {one['advice']}" for one in doubts]
     meant = doubts[0]["meant"]
@@ -65,7 +65,7 @@ def doubts_text(doubts: list[dict[str, Any]]) -> str:
     return "\n".join([*lines, *([f"did you mean {said}?"] if said else [])])
 
 
-def progress_text(underway: dict[str, Any]) -> str:
+def progress_text(underway: Answer) -> str:
     driven = f"{underway['driven_s'] / 60.0:.0f} min driven, {one_or_more(underway['n_batches'], 'window', 'windows')}"
     learned, next_s = underway["learned"], underway["next_window_s"]
     if next_s is not None:
@@ -78,7 +78,7 @@ def progress_text(underway: dict[str, Any]) -> str:
     )
 
 
-def lines_text(items: list[dict[str, Any]]) -> str:
+def lines_text(items: list[Answer]) -> str:
     """The lines with numbers to choose from."""
     if not items:
         return "there is no line: `springscale commission upload FILE` adds one, or continue without"
@@ -88,25 +88,25 @@ def lines_text(items: list[dict[str, Any]]) -> str:
     )
 
 
-def _line_text(vehicle: dict[str, Any]) -> str:
+def _line_text(vehicle: Answer) -> str:
     return f"{vehicle['name']}, wheelbase {vehicle['wheelbase_m']:g} m"
 
 
-def _made_text(made: dict[str, Any]) -> str:
+def _made_text(made: Answer) -> str:
     line = f"of the line {made['line']['name']}" if made["line"]["name"] else "without a line"
     note = f" ({made['note']})" if made["note"] else ""
     windows = one_or_more(made["n_batches"], "window", "windows")
     return f"{made['id'][:19]} {made['vehicle_name']} {line}, {windows}, made {made['at'][:19]}Z by {made['by']}{note}"
 
 
-def end_text(ended: dict[str, Any] | None) -> str:
+def end_text(ended: Answer | None) -> str:
     """When and why a calibration went out of use, and who said so; empty for the one in use."""
     return "" if ended is None else f", {ended['why']} {ended['at'][:19]}Z by {ended['by']}"
 
 
 PATH: Final = "/api/v1/calibration/commissioning"
-LOOK_EVERY_S: Final = 5.0
-MOST_UNANSWERED: Final = 6
+LOOK_EVERY_S: Final = 5.0  # chosen: seconds between two looks at the progress
+MOST_UNANSWERED: Final = 6  # chosen: looks, half a minute: a restart with another calibration takes seconds
 NO_LINE: Final = "none"
 MOST_PAYLOAD: Final = "payload_range_kg"
 SAID: Final = {  # option: key of the vehicle, question, whether it must be answered
@@ -193,42 +193,36 @@ def start(
 
 
 @commission.command("show")
-@asks_service
-@as_json
-def show(service: Service, as_json: bool) -> None:
+@prints_answer(state_text)
+def show(service: Service) -> Answer:
     """The commissioning under way, the findings of inspection, the progress, and earlier calibrations."""
-    _print_state(service.ask(PATH), as_json=as_json)
+    return service.ask(PATH)
 
 
 @commission.command("lines")
-@asks_service
-@as_json
-def lines(service: Service, as_json: bool) -> None:
+@prints_answer(lambda told: lines_text(told["items"]))
+def lines(service: Service) -> Answer:
     """The available lines."""
-    told = service.ask(f"{PATH}/lines")
-    click.echo(json_line(told) if as_json else lines_text(told["items"]))
+    return service.ask(f"{PATH}/lines")
 
 
 @commission.command("upload")
 @click.argument("file", type=FILE)
-@asks_service
-@as_json
-def upload(service: Service, file: Path, as_json: bool) -> None:
+@prints_answer(lambda told: lines_text(told["items"]))
+def upload(service: Service, file: Path) -> Answer:
     """Upload the calibration of a vehicle of the same model or a line file to the service, and FILE.sig if there is
     one.
     """
-    told = _upload(service, file)
-    click.echo(json_line(told) if as_json else lines_text(told["items"]))
+    return _upload(service, file)
 
 
-def _add_step(name: str, words: str, method: str, step: str = "", body: dict[str, Any] | None = None) -> None:
+def _add_step(name: str, words: str, method: str, step: str = "", body: Answer | None = None) -> None:
     """A command without options of its own: one request, which answers with the new state."""
 
     @commission.command(name, help=words)
-    @asks_service
-    @as_json
-    def request(service: Service, as_json: bool) -> None:
-        _print_state(service.ask(PATH + step, method, body), as_json=as_json)
+    @prints_answer(state_text)
+    def request(service: Service) -> Answer:
+        return service.ask(PATH + step, method, body)
 
 
 _add_step("fit", "Calibrate with the data so far, whether sufficient or not.", "POST", "/fit", {})
@@ -251,15 +245,10 @@ _add_step("cancel", "Discard the commissioning under way; earlier calibrations s
 
 @commission.command("undo")
 @click.option("--factory", is_flag=True, help="all that were made here: back to the calibration of the settings")
-@asks_service
-@as_json
-def undo(service: Service, factory: bool, as_json: bool) -> None:
+@prints_answer(state_text)
+def undo(service: Service, factory: bool) -> Answer:
     """Take the last calibration made here out of use; the one before it counts from the next drive on."""
-    _print_state(service.ask(f"{PATH}/undo" + ("?to=factory" if factory else ""), "POST", {}), as_json=as_json)
-
-
-def _print_state(state: dict[str, Any], *, as_json: bool) -> None:
-    click.echo(json_line(state) if as_json else state_text(state))
+    return service.ask(f"{PATH}/undo" + ("?to=factory" if factory else ""), "POST", {})
 
 
 def _is_at_terminal() -> bool:
@@ -289,11 +278,11 @@ def _line(service: Service, said: str | None) -> dict[str, str] | None:
     return _named(known[-1])
 
 
-def _named(item: dict[str, Any]) -> dict[str, str]:
+def _named(item: Answer) -> dict[str, str]:
     return {"name": item["name"], "source": item["source"]}
 
 
-def _upload(service: Service, file: Path) -> dict[str, Any]:
+def _upload(service: Service, file: Path) -> Answer:
     try:
         body = {"name": file.name, "content": file.read_text(encoding="utf-8")}
         signature = signature_path(file)
@@ -304,7 +293,7 @@ def _upload(service: Service, file: Path) -> dict[str, Any]:
     return service.ask(f"{PATH}/lines", "POST", body)
 
 
-def _vehicle(said: dict[str, Any]) -> dict[str, Any]:
+def _vehicle(said: Answer) -> Answer:
     """The answers; missing ones that are needed are asked for."""
     vehicle = {}
     for option, (key, question, is_needed) in SAID.items():

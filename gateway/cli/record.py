@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import click
 
@@ -16,14 +16,14 @@ from gateway.bus.signals import load_signal_map
 from gateway.cli import options
 from gateway.cli.options import FILE, NumberRange, as_json
 from gateway.cli.progress import StatusLine
-from gateway.cli.service import Service, asks_service
+from gateway.cli.service import Answer, Service, asks_service, prints_answer
 from gateway.errors import SpringscaleError
 from gateway.files.whole import refusal_told, written_whole
 from gateway.records import json_line
 from gateway.words import counted
 
 PATH: Final = "/api/v1/record"
-PIECE_BYTES: Final = 65_536
+PIECE_BYTES: Final = 65_536  # chosen: read and written at a time
 _MOMENT: Final = click.DateTime(
     ("%Y-%m-%dT%H:%M:%SZ", "%Y-%m-%dT%H:%M:%S", "%Y-%m-%dT%H:%MZ", "%Y-%m-%dT%H:%M", "%Y-%m-%d")
 )
@@ -35,12 +35,10 @@ def record() -> None:
 
 
 @record.command("list")
-@asks_service
-@as_json
-def list_segments(service: Service, as_json: bool) -> None:
+@prints_answer(lambda told: _list_text(told["items"]))
+def list_segments(service: Service) -> Answer:
     """The files of the service's ring log, oldest first."""
-    told = service.ask(PATH)
-    click.echo(json_line(told) if as_json else _list_text(told["items"]))
+    return service.ask(PATH)
 
 
 @record.command("fetch")
@@ -135,12 +133,12 @@ def _pieces(service: Service, name: str, n_bytes: int) -> Iterator[bytes]:
             raise SpringscaleError(f"{name}: the service sent {n_got} of its {n_bytes} bytes")
 
 
-def _overlaps(item: dict[str, Any], since: datetime | None, until: datetime | None) -> bool:
+def _overlaps(item: Answer, since: datetime | None, until: datetime | None) -> bool:
     begin, end = (datetime.fromisoformat(item[key]) for key in ("t_start", "t_end"))
     return (since is None or end >= since.replace(tzinfo=UTC)) and (until is None or begin < until.replace(tzinfo=UTC))
 
 
-def _list_text(items: list[dict[str, Any]]) -> str:
+def _list_text(items: list[Answer]) -> str:
     if not items:
         return "nothing is recorded: is [record] enabled, and has a block's time passed?"
     lines = [f"{item['name']}  {item['n_bytes']:>11} bytes  {_span_text([item])}" for item in items]
@@ -148,5 +146,5 @@ def _list_text(items: list[dict[str, Any]]) -> str:
     return "\n".join([*lines, f"{counted(len(items), 'file')}, {n_bytes / 1e6:.1f} MB"])
 
 
-def _span_text(items: list[dict[str, Any]]) -> str:
+def _span_text(items: list[Answer]) -> str:
     return f"{min(item['t_start'] for item in items)[:19]}Z to {max(item['t_end'] for item in items)[:19]}Z"

@@ -15,15 +15,16 @@ from typing import Any, Final
 
 import click
 
-from gateway.cli.options import FILE, config
+from gateway.cli.options import FILE, as_json, config
 from gateway.config import load_settings
 from gateway.errors import ConfigurationError, SpringscaleError
 from gateway.records import json_line
 
-TIMEOUT_S: Final = 15.0
+TIMEOUT_S: Final = 15.0  # chosen: for an answer, behind a slow link
 EVERYWHERE: Final = frozenset({"0.0.0.0", "::"})
 
-Command = Callable[..., None]
+Command = Callable[..., Any]
+Answer = dict[str, Any]  # of the service, as JSON gives it
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,11 +49,11 @@ class Service:
             raise click.UsageError(f"{url!r} is not an address such as http://127.0.0.1:8000")
         return url.rstrip("/") + path
 
-    def ask(self, path: str, method: str = "GET", body: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    def ask(self, path: str, method: str = "GET", body: Mapping[str, Any] | None = None) -> Answer:
         """The service's answer as JSON. Raises SpringscaleError with its message if it refuses or cannot be reached."""
         content = None if body is None else json_line(body).encode()
         with self.opened(path, method, content) as answer:
-            record: dict[str, Any] = json.load(answer)
+            record: Answer = json.load(answer)
             return record
 
     @contextmanager
@@ -127,6 +128,20 @@ def asks_service(command: Command) -> Command:
     ):
         decorated = option(decorated)
     return decorated
+
+
+def prints_answer(text: Callable[[Answer], str]) -> Callable[[Command], Command]:
+    """The options of ``asks_service`` and --json; prints the answer that the command returns, as ``text`` or as JSON."""
+
+    def decorate(command: Command) -> Command:
+        @functools.wraps(command)
+        def printing(service: Service, as_json: bool, **options: Any) -> None:
+            answer = command(service, **options)
+            click.echo(json_line(answer) if as_json else text(answer))
+
+        return asks_service(as_json(printing))
+
+    return decorate
 
 
 def _configured_address(config_path: Path) -> str:

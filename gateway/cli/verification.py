@@ -5,15 +5,40 @@ from typing import Any, Final
 
 import click
 
-from gateway.cli.options import FILE, LoadArgument, as_json
-from gateway.cli.service import Service, asks_service, only_one
+from gateway.cli.options import FILE, LoadArgument
+from gateway.cli.service import Answer, Service, asks_service, only_one, prints_answer
 from gateway.errors import SpringscaleError
 from gateway.estimate import Z95
 from gateway.files.whole import refusal_told, written_whole
-from gateway.records import json_line
 from gateway.words import one_or_more
 
 PATH: Final = "/api/v1/calibration/verifications"
+
+
+def _state_text(state: Answer) -> str:
+    rule, due = state["rule"], state["due"]
+    loads = one_or_more(rule["loads"], "load", "loads")
+    lines = [f"rule: error at most {rule['permitted_error_pct']:g} % of the gross weight, {loads} or more"]
+    if due["due_at"] is not None:
+        lines.append(f"due {'since' if due['is_due'] else 'on'} {due['due_at'][:10]}")
+    return "\n".join([*lines, *(_record_text(entry) for entry in state["history"])])
+
+
+def _record_text(entry: Answer) -> str:
+    note = f" ({entry['note']})" if entry["note"] else ""
+    lines = [f"{entry['id'][:19]} {entry['at'][:19]}Z by {entry['by']}{note}: {entry['verdict']}"]
+    return "\n".join([*lines, *(f"  {_load_text(load)}" for load in entry["loads"])])
+
+
+def _load_text(load: Answer) -> str:
+    weighed = f"{load['payload_kg']:.1f} ± {Z95 * load['payload_std_kg']:.1f} kg (95 %)"
+    error = f"{load['error_kg']:+.1f} kg, {load['error_pct']:+.2f} % of the gross weight"
+    axles = [
+        f"{name} axle {axle['error_kg']:+.1f} kg, {axle['error_pct']:+.2f} %"
+        for name, axle in (("front", load["front_axle"]), ("rear", load["rear_axle"]))
+        if axle
+    ]
+    return "; ".join([f"payload {load['known_payload_kg']:.1f} kg known, {weighed} weighed: {error}", *axles])
 
 
 @click.group("verification")
@@ -22,12 +47,10 @@ def verification() -> None:
 
 
 @verification.command("show")
-@asks_service
-@as_json
-def show(service: Service, as_json: bool) -> None:
+@prints_answer(_state_text)
+def show(service: Service) -> Answer:
     """The requirements, when a verification is due, and the records."""
-    state = service.ask(PATH)
-    click.echo(json_line(state) if as_json else _state_text(state))
+    return service.ask(PATH)
 
 
 @verification.command("record")
@@ -40,12 +63,10 @@ def show(service: Service, as_json: bool) -> None:
     help="a known load, such as gross_kg=1890,at=2026-11-21T04:10:00Z,drive=before; once for each",
 )
 @click.option("--note", default=None, help="kept with the record: scales used, place")
-@asks_service
-@as_json
-def record(service: Service, loads: tuple[dict[str, Any], ...], note: str | None, as_json: bool) -> None:
+@prints_answer(_record_text)
+def record(service: Service, loads: tuple[dict[str, Any], ...], note: str | None) -> Answer:
     """Compare known loads with their estimates, and keep the record. The calibration does not change."""
-    made = service.ask(PATH, "POST", {"loads": list(loads)} | ({} if note is None else {"note": note}))
-    click.echo(json_line(made) if as_json else _record_text(made))
+    return service.ask(PATH, "POST", {"loads": list(loads)} | ({} if note is None else {"note": note}))
 
 
 @verification.command("export")
@@ -61,29 +82,3 @@ def export(service: Service, record_id: str, output: Path) -> None:
     with refusal_told(output, SpringscaleError), written_whole(output) as file:
         file.write(page)
     click.echo(f"{output}: record {found[:19]}")
-
-
-def _state_text(state: dict[str, Any]) -> str:
-    rule, due = state["rule"], state["due"]
-    loads = one_or_more(rule["loads"], "load", "loads")
-    lines = [f"rule: error at most {rule['permitted_error_pct']:g} % of the gross weight, {loads} or more"]
-    if due["due_at"] is not None:
-        lines.append(f"due {'since' if due['is_due'] else 'on'} {due['due_at'][:10]}")
-    return "\n".join([*lines, *(_record_text(entry) for entry in state["history"])])
-
-
-def _record_text(entry: dict[str, Any]) -> str:
-    note = f" ({entry['note']})" if entry["note"] else ""
-    lines = [f"{entry['id'][:19]} {entry['at'][:19]}Z by {entry['by']}{note}: {entry['verdict']}"]
-    return "\n".join([*lines, *(f"  {_load_text(load)}" for load in entry["loads"])])
-
-
-def _load_text(load: dict[str, Any]) -> str:
-    weighed = f"{load['payload_kg']:.1f} ± {Z95 * load['payload_std_kg']:.1f} kg (95 %)"
-    error = f"{load['error_kg']:+.1f} kg, {load['error_pct']:+.2f} % of the gross weight"
-    axles = [
-        f"{name} axle {axle['error_kg']:+.1f} kg, {axle['error_pct']:+.2f} %"
-        for name, axle in (("front", load["front_axle"]), ("rear", load["rear_axle"]))
-        if axle
-    ]
-    return "; ".join([f"payload {load['known_payload_kg']:.1f} kg known, {weighed} weighed: {error}", *axles])
