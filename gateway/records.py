@@ -286,6 +286,11 @@ def ns_of(text: str) -> int:
     return (datetime.fromisoformat(text) - _START) // timedelta(microseconds=1) * 1000
 
 
+def rounded(x: float | None, digits: int) -> float | None:
+    """A number for JSON: None if it is unknown (None, NaN or infinite)."""
+    return None if x is None or not math.isfinite(x) else round(x, digits) + 0.0
+
+
 def json_line(record: Mapping[str, Any]) -> str:
     """The record as compact JSON on one line: the text that is printed, stored and sent."""
     return json.dumps(record, separators=(",", ":"), ensure_ascii=False, allow_nan=False)

@@ -8,6 +8,9 @@ from gateway.errors import SignalMapError
 STANDARD_GRAVITY_MPS2: Final = 9.80665  # CGPM 1901
 
 NS_PER_S: Final = 1_000_000_000  # SI
+S_PER_DAY: Final = 86_400  # SI
+NS_PER_DAY: Final = S_PER_DAY * NS_PER_S
+BYTES_PER_MB: Final = 1_000_000  # SI
 
 TO_SI: Final[dict[str, dict[str, float]]] = {
     "acceleration": {

@@ -25,7 +25,7 @@ from gateway.records import EXTENDED_ID, Frames
 DATABASE: Final = "j1939_weights.dbc"
 WHOLE_AXLE: Final = 0xF  # where four bits would name a tyre
 UNWEIGHED: Final = Weights()
-_PRIORITY_SHIFT: Final = 26
+_PRIORITY_SHIFT: Final = 26  # SAE J1939-21, 5.2: bits 26 to 28
 _GROUP: Final = 0x3FFFF00  # the bits of an identifier that name the parameter group
 
 

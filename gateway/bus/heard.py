@@ -14,7 +14,7 @@ from gateway.bus.signals import CAN_FD_BYTES, MappedMessage, SignalMap, id_name
 from gateway.records import EXTENDED_ID, Frames
 from gateway.units import NS_PER_S
 
-KEPT_FRAMES: Final = 100_000  # stored of one identifier: a quarter of an hour at 100 Hz; counts cover all frames
+KEPT_FRAMES: Final = 100_000  # chosen: of one identifier: a quarter of an hour at 100 Hz; counts cover all frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +83,8 @@ def heard_on(channel: str | None, counts: Counts) -> tuple[Heard, ...]:
     )
 
 
-NEAR: Final = 0x20  # devices that are set to other identifiers mostly keep them together
-MOST_SIMILAR: Final = 3
+NEAR: Final = 0x20  # chosen: devices that are set to other identifiers mostly keep them together
+MOST_SIMILAR: Final = 3  # chosen: what a person looks through
 
 
 def similar_to(message: MappedMessage, signal_map: SignalMap, heard: Sequence[Heard]) -> tuple[str, ...]:

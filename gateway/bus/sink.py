@@ -19,9 +19,9 @@ from gateway.errors import BusError
 from gateway.records import Frames
 from gateway.units import NS_PER_S
 
-SEND_TIMEOUT_S: Final = 5.0  # a full transmit queue, or an in-process receiver that is busy, gets this long
-LONGEST_SLEEP_S: Final = 0.1  # how soon a stop is heeded
-PIECE_FRAMES: Final = 512  # between two reports of progress at full speed
+SEND_TIMEOUT_S: Final = 5.0  # chosen: for a full transmit queue, or an in-process receiver that is busy
+LONGEST_SLEEP_S: Final = 0.1  # chosen: how soon a stop is heeded
+PIECE_FRAMES: Final = 512  # chosen: between two reports of progress at full speed
 
 Speed = float | Literal["max"]
 

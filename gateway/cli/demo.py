@@ -29,19 +29,19 @@ from gateway.core.settings import BatchSettings
 from gateway.estimate_json import estimate_to_json
 from gateway.fleet import FleetPage, Message, SqliteBook, fleet_app
 from gateway.log import set_up_log
-from gateway.records import json_line
+from gateway.records import iso_utc, json_line
 from gateway.service.gateway import Gateway
 from gateway.setup import Setup, setup_of
 from gateway.sim.scenario import START_NS, Truth
 from gateway.store import Store
 from gateway.units import NS_PER_S
-from gateway.web.routes.weights import KnownLoad
+from gateway.web.routes.weights import KnownLoadTold
 from gateway.workbench.simulate import demo_drive, frames_of
 
 BRANCH: Final = "springscale/+"
-ROUND_S: Final = 1800.0  # from the start of one drive to the start of the next
-APART_S: Final = 240.0  # one van starts that much before the next
-PAUSE_S: Final = 0.2
+ROUND_S: Final = 1800.0  # chosen: from the start of one drive to the start of the next
+APART_S: Final = 240.0  # chosen: one van starts that much before the next
+PAUSE_S: Final = 0.2  # chosen: between two looks for records that are due
 
 
 def fleet_demo(n_vans: int, setup: Setup, port: int, speed: float, *, once: bool) -> None:
@@ -114,8 +114,8 @@ class _Van:
 
 
 CHANNEL: Final = "springscale-demo"
-ROUND_NS: Final = 1800 * NS_PER_S  # from the start of one drive to the start of the next
-N_QUICK_ROUNDS: Final = 1  # driven at full speed, so that there is a history to look at
+ROUND_NS: Final = round(ROUND_S * NS_PER_S)
+N_QUICK_ROUNDS: Final = 1  # chosen: driven at full speed, so that there is a history to look at
 
 
 VAN: Final = VehicleSection(
@@ -167,10 +167,10 @@ class _Driver:
         self._is_endless = is_endless
         self._thread: threading.Thread | None = None
         self._n_sent = 0
-        self._known_loads: tuple[KnownLoad, ...] = ()
+        self._known_loads: tuple[KnownLoadTold, ...] = ()
         self.fault: Exception | None = None  # what ended the driving
 
-    def known_loads(self) -> tuple[KnownLoad, ...]:
+    def known_loads(self) -> tuple[KnownLoadTold, ...]:
         """The actual loads so far, for the dashboard to compare with; from any thread."""
         return self._known_loads
 
@@ -216,9 +216,9 @@ class _Driver:
                 return
 
 
-def _told(truth: Truth) -> tuple[KnownLoad, ...]:
+def _told(truth: Truth) -> tuple[KnownLoadTold, ...]:
     steps = zip(truth.t_ns.tolist(), truth.payload_kg.tolist(), truth.front_share_pct.tolist(), strict=True)
-    return tuple(KnownLoad(*step) for step in steps)
+    return tuple(KnownLoadTold(t_start=iso_utc(t_ns), payload_kg=kg, front_share_pct=pct) for t_ns, kg, pct in steps)
 
 
 def _print_estimates(folder: Path, as_json: bool) -> None:

@@ -42,7 +42,7 @@ def events(
         click.echo(json_line(entry.record) if as_json else entry_sentence(entry))
 
 
-SURE = 0.99
+SURE = 0.99  # chosen: below it the probability is printed
 
 
 def entry_sentence(entry: Entry) -> str:

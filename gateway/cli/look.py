@@ -39,8 +39,8 @@ def look(log: Path, databases: tuple[Path, ...], output: Path | None, as_json: b
         click.echo(f"Written: {path}")
 
 
-MOST_UNKNOWN = 12  # lines of identifiers that nothing describes
-MOST_FITS = 4
+MOST_UNKNOWN = 12  # chosen: lines of identifiers that nothing describes
+MOST_FITS = 4  # chosen: signal maps that are listed, the best
 
 
 def look_text(seen: Look) -> str:

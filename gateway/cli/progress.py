@@ -9,7 +9,7 @@ from typing import Final, Protocol
 
 import click
 
-SHOWN_EVERY_S: Final = 0.2
+SHOWN_EVERY_S: Final = 0.2  # chosen: as fast as a person reads
 
 
 class StatusLine(AbstractContextManager["StatusLine"]):

@@ -23,7 +23,7 @@ from gateway.files.signed import pinned_by
 from gateway.records import json_line
 from gateway.words import counted
 
-TOLD_EVERY_S: Final = 5.0
+TOLD_EVERY_S: Final = 5.0  # chosen: between two lines of progress
 
 
 @click.command("reprocess")
@@ -95,7 +95,7 @@ def _workers(scheduler: str | None, n_workers: int | None) -> Iterator[Workers]:
     workers.shutdown()
 
 
-MOST_TOLD: Final = 10  # failures, one line each; the data set has them all
+MOST_TOLD: Final = 10  # chosen: failures, one line each; the data set has them all
 
 
 def how_far(progress: Progress) -> str:

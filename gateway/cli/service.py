@@ -131,7 +131,7 @@ def asks_service(command: Command) -> Command:
 
 
 def prints_answer(text: Callable[[Answer], str]) -> Callable[[Command], Command]:
-    """The options of ``asks_service`` and --json; prints the answer that the command returns, as ``text`` or as JSON."""
+    """The options of ``asks_service``, and --json; what the command returns is printed by ``text`` or as JSON."""
 
     def decorate(command: Command) -> Command:
         @functools.wraps(command)

@@ -8,9 +8,8 @@ import click
 from gateway.cli.options import NumberRange
 from gateway.config import load_settings
 from gateway.files.kept import become_owner_of
+from gateway.units import S_PER_DAY
 from gateway.web.access.tokens import Scope, TokenFile
-
-SECONDS_PER_DAY = 86_400.0
 
 _config = click.option(
     "--config", "config_path", type=click.Path(path_type=Path), required=True, help="springscale.toml of the service"
@@ -45,7 +44,7 @@ def token() -> None:
 @_config
 def create(name: str, scope: str, days: float | None, config_path: Path) -> None:
     """Make a token called NAME and print it, this once."""
-    lifetime_s = None if days is None else days * SECONDS_PER_DAY
+    lifetime_s = None if days is None else days * S_PER_DAY
     click.echo(token_file(config_path).create(name, Scope(scope), lifetime_s))
 
 

@@ -86,9 +86,9 @@ def drift_says(trends: Sequence[Trend]) -> Iterator[Says]:
             yield Says(cause, AlarmVerdict.FINAL, AlarmFigure(number, unit=trend.unit, detail=told))
 
 
-REMEMBERED: Final = 1000  # alarms read at the start to find the active ones
-DRIVEN: Final = 300  # batches (a day of driving) read at the start to find when one last counted
-ON_DISK_WITHIN_S: Final = 2.0
+REMEMBERED: Final = 1000  # chosen: alarms read at the start to find the active ones
+DRIVEN: Final = 300  # chosen: batches (a day of driving) read at the start to find when one last counted
+ON_DISK_WITHIN_S: Final = 2.0  # chosen: for an acknowledgement to reach the disk before it is answered
 _EVENTS: Final = {
     AlarmState.EARLY: (Event.ALARM_EARLY, logging.WARNING),
     AlarmState.FINAL: (Event.ALARM_FINAL, logging.WARNING),

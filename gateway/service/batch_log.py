@@ -2,7 +2,6 @@
 
 import json
 import logging
-import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
@@ -14,7 +13,7 @@ from gateway.estimate import PLACES, Estimate
 from gateway.estimate_json import INSTANT, estimate_from_json
 from gateway.history import BATCHES, REMAINDER
 from gateway.log import Event, log_event
-from gateway.records import Why, json_line
+from gateway.records import Why, json_line, rounded
 from gateway.setup import Setup
 from gateway.status import State, Status
 from gateway.store import Store, StoreReader
@@ -40,9 +39,9 @@ class BatchLog:
             event,
             level=logging.INFO if is_answer else logging.DEBUG,
             batch=found.id,
-            payload_kg=_or_none(found.payload.number),
-            payload_std_kg=_or_none(found.payload.std),
-            front_share_pct=_or_none(found.front_share.number),
+            payload_kg=rounded(found.payload.number, 3),
+            payload_std_kg=rounded(found.payload.std, 3),
+            front_share_pct=rounded(found.front_share.number, 3),
             rejected=found.rejected,
         )
         if not found.is_provisional:
@@ -101,11 +100,7 @@ class StateLog:
             self._is_stale = is_stale
 
 
-def _or_none(x: float) -> float | None:
-    return round(x, 3) if math.isfinite(x) else None
-
-
-MOST: Final = 2 * HORIZON  # entries that so many batches can produce
+MOST: Final = 2 * HORIZON  # chosen: entries that so many batches can produce
 
 
 class LoadEventLog:

@@ -168,8 +168,9 @@ class Gateway:
         self._web_fault: str | None = None
         self._reloading: asyncio.Task[None] | None = None
         self._vital = (self.store, self.pipeline, self.source)  # each tuple in the order of the start
-        beside = (self.commissioning, self.keeper, self.trend, self.ring_log, self.broadcaster, self.uplink, self.webhook)
-        self._beside = (*(part for part in beside if part is not None), self.bus_survey)
+        optional = (self.ring_log, self.broadcaster, self.uplink, self.webhook)
+        present = (part for part in optional if part is not None)
+        self._beside = (self.commissioning, self.keeper, self.trend, *present, self.bus_survey)
         self.needs_restart = False  # with the calibration that was made meanwhile; see life.py
 
     def _warnings(self) -> tuple[str, ...]:

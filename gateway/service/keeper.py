@@ -16,7 +16,7 @@ from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.records import Batch, Motion
 from gateway.service.commissioning.session import Commissioning
 
-MOST_WAITING: Final = 4  # batches in the queue; each has some megabytes of rows, and one comes every few minutes
+MOST_WAITING: Final = 4  # chosen: batches in the queue; each has some megabytes of rows, one comes every few minutes
 
 
 @dataclass(frozen=True, slots=True)

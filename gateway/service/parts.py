@@ -21,15 +21,13 @@ from gateway.service.commissioning.session import Commissioning
 from gateway.service.keeper import BatchKeeper
 from gateway.setup import Setup
 from gateway.store import Retention, Store
+from gateway.units import BYTES_PER_MB, S_PER_DAY
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings, WebhookSettings, uplink_settings, webhook_settings
 from gateway.uplink.uplink import Uplink
 from gateway.uplink.webhook import Webhook
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import Scales
-
-SECONDS_PER_DAY = 86_400.0
-BYTES_PER_MB = 1_000_000
 
 
 def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with_places: bool) -> Uplink | None:
@@ -83,7 +81,7 @@ def webhook_of(wanted: WebhookSettings | None, store: Store, *, with_places: boo
 
 def store_of(wanted: StoreSection, undelivered_to: tuple[str, ...]) -> Store:
     keep = Retention(
-        max_age_s=wanted.max_age_days * SECONDS_PER_DAY,
+        max_age_s=wanted.max_age_days * S_PER_DAY,
         max_bytes=round(wanted.max_size_mb * BYTES_PER_MB),
         undelivered_to=undelivered_to,
     )

@@ -24,9 +24,9 @@ from gateway.service.signal_watch import SignalWatch, StandingWatch
 from gateway.store import Store
 from gateway.web.live.board import Board, boot_clock_s
 
-DRAIN_S = 0.5  # longest wait for frames, and so the delay with which the end of a drive is noticed
-ASLEEP_DRAIN_S = 2.0  # the same between drives
-ROLL_RATE_KNOWN_SHARE: Final = 0.9  # of a batch's usable samples; with fewer the sensor is at fault
+DRAIN_S = 0.5  # chosen: longest wait for frames, and so the delay with which the end of a drive is noticed
+ASLEEP_DRAIN_S = 2.0  # chosen: the same between drives
+ROLL_RATE_KNOWN_SHARE: Final = 0.9  # chosen: of a batch's usable samples; with fewer the sensor is at fault
 ROLL_RATE_LOST: Final = (
     "the roll rate is known in only {:.0%} of the last batch (silent, stuck, at the end of its range or too slow): "
     "check the sensor and the signal map; payload and front share go on"
@@ -35,7 +35,7 @@ NOISY: Final = (
     "{} {:.1f} times as noisy as expected in the last batch: look for a loose mount, a bad supply or a changed filter "
     "or range in the device; weighing goes on where possible"
 )
-LATE_S: Final = 1.0  # longest delay between the stamp of a frame and its arrival here
+LATE_S: Final = 1.0  # chosen: longest delay between the stamp of a frame and its arrival here
 
 
 class Pipeline(ThreadPart):

@@ -43,8 +43,8 @@ class SignalWatch:
             self._window[signal] = (first_ns, n)
 
 
-STANDS_AFTER_S: Final = 10.0  # shorter stops are traffic, as in core.journey
-CLOCK_PUT_BACK_S: Final = 1.0  # after a larger step back the length of the stop is unknown
+STANDS_AFTER_S: Final = 10.0  # chosen: shorter stops are traffic, as in core.journey
+CLOCK_PUT_BACK_S: Final = 1.0  # chosen: after a larger step back the length of the stop is unknown
 
 
 @dataclass(frozen=True, slots=True)

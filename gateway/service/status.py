@@ -32,14 +32,14 @@ from gateway.uplink.uplink import Uplink
 from gateway.uplink.webhook import Webhook
 from gateway.web.live.board import Board
 
-SENSOR_LOST_S = 10.0  # a sensor silent for this long on a bus that is alive is at fault
+SENSOR_LOST_S = 10.0  # chosen: a sensor silent for this long on a bus that is alive is at fault
 NEEDED_SENSORS = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
 READ_IN: Final = {
     Signal.AXLE_WEIGHT: ("kg", 1.0),
     Signal.AIR_SPRING_PRESSURE: ("kPa", 1e3),
     Signal.RIDE_HEIGHT: ("mm", 1e-3),
 }
-SPEED_LOST_S = 10.0  # without a valid speed for this long the service waits for one
+SPEED_LOST_S = 10.0  # chosen: without a valid speed for this long the service waits for one
 
 
 @dataclass

@@ -24,8 +24,8 @@ T = TypeVar("T")
 FILE_NAME: Final = "springscale.db"
 LOCK_NAME: Final = "springscale.lock"
 _DAMAGED: Final = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
-MOST_SET_ASIDE: Final = 3  # damaged databases that are kept, the newest
-MOST_BAD_RECORDS: Final = 1000  # likewise records
+MOST_SET_ASIDE: Final = 3  # chosen: damaged databases that are kept, the newest
+MOST_BAD_RECORDS: Final = 1000  # chosen: likewise records
 
 
 @dataclass(frozen=True, slots=True)

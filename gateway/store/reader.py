@@ -19,8 +19,8 @@ from gateway.units import NS_PER_S
 if TYPE_CHECKING:
     from gateway.store.writer import Store
 
-QUERY_LIMIT_S: Final = 2.0
-_STEPS_PER_LOOK: Final = 10_000  # SQLite instructions between two looks at the clock
+QUERY_LIMIT_S: Final = 2.0  # chosen: of one page; a client is to ask for less at a time
+_STEPS_PER_LOOK: Final = 10_000  # chosen: SQLite instructions between two looks at the clock
 
 
 @dataclass(frozen=True, slots=True)

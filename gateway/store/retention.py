@@ -9,7 +9,6 @@ garage for a season therefore keeps its old records a little longer.
 import logging
 import sqlite3
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,9 +16,9 @@ from gateway.errors import StoreError
 from gateway.history import SERVICE
 from gateway.log import Event, log_event
 from gateway.store.queries import count_pruned
-from gateway.units import NS_PER_S
+from gateway.units import NS_PER_DAY, NS_PER_S, S_PER_DAY
 
-_SHARE: Final = 0.05  # of the rows, removed at a time until the size fits
+_SHARE: Final = 0.05  # chosen: of the rows, removed at a time until the size fits
 _LAST: Final = 1 << 62  # above every number of a row
 
 
@@ -32,7 +31,7 @@ class Retention:
     ``undelivered_to`` still has to deliver is not removed for its age alone.
     """
 
-    max_age_s: float = 400 * 86_400.0
+    max_age_s: float = 400.0 * S_PER_DAY
     max_bytes: int = 1_000_000_000
     max_held: int = 2048
     undelivered_to: tuple[str, ...] = ()
@@ -82,23 +81,22 @@ def _last_delivered(connection: sqlite3.Connection, uplinks: tuple[str, ...]) ->
     return min((-1 if row is None else int(row[0]) for row in known), default=_LAST)
 
 
-CLOCK_UNSET_NS: Final = 1_577_836_800 * NS_PER_S  # 2020: an earlier clock was never set (no RTC battery)
-NS_PER_DAY: Final = 86_400 * NS_PER_S
-LEAP_NS: Final = 30 * NS_PER_DAY
-BELIEVED_AFTER_NS: Final = 30 * NS_PER_DAY
+CLOCK_UNSET_NS: Final = 1_577_836_800 * NS_PER_S  # chosen: 2020; an earlier clock was never set (no RTC battery)
+LEAP_NS: Final = 30 * NS_PER_DAY  # chosen: further ahead the wall clock is doubted
+BELIEVED_AFTER_NS: Final = 30 * NS_PER_DAY  # chosen: time without another leap after which it is believed again
 
 
-def _boot_ns() -> int:
+def boot_ns() -> int:
+    """Nanoseconds since the machine's boot, including sleep."""
     return time.clock_gettime_ns(time.CLOCK_BOOTTIME)
 
 
 class AgeClock:
     """Decides for one open database whether the wall clock is plausible; the table ``clock`` stores the distrust."""
 
-    def __init__(self, connection: sqlite3.Connection, boot_ns: Callable[[], int] = _boot_ns) -> None:
+    def __init__(self, connection: sqlite3.Connection) -> None:
         """Reads the newest stamp; create the clock before any row is added."""
         self._connection = connection
-        self._boot_ns = boot_ns
         self._read_ns = boot_ns()
         self._newest_ns = _newest_stamp_ns(connection)
         found = connection.execute("SELECT doubted_since_ns FROM clock").fetchone()
@@ -108,8 +106,8 @@ class AgeClock:
         """Whether ``now_ns`` is plausible. Raises sqlite3.Error if the distrust cannot be stored."""
         if now_ns < CLOCK_UNSET_NS:
             return False
-        boot_ns = self._boot_ns()
-        expected_ns = now_ns if self._newest_ns is None else self._newest_ns + boot_ns - self._read_ns
+        passed_ns = boot_ns()
+        expected_ns = now_ns if self._newest_ns is None else self._newest_ns + passed_ns - self._read_ns
         newest_ns, since_ns = max(now_ns, expected_ns), self._doubted_since_ns
         if now_ns - expected_ns > LEAP_NS:
             self._keep(now_ns)
@@ -120,7 +118,7 @@ class AgeClock:
             log_event(Event.CLOCK_BELIEVED)
             if now_ns < since_ns:  # the clock was set back: its stamps in between are no evidence
                 newest_ns = now_ns
-        self._newest_ns, self._read_ns = newest_ns, boot_ns
+        self._newest_ns, self._read_ns = newest_ns, passed_ns
         return self._doubted_since_ns is None
 
     def _keep(self, since_ns: int | None) -> None:

@@ -12,7 +12,7 @@ from typing import Any, Final
 from gateway.errors import StoreRefusedError
 
 APPLICATION_ID: Final = 0x53505253  # "SPRS" in the file's header
-VERSION: Final = 7
+VERSION: Final = 7  # of the tables; a file of another version is refused
 
 _TABLES: Final = f"""
 BEGIN IMMEDIATE;

@@ -9,8 +9,8 @@ from typing import Final
 from gateway.history import KINDS
 from gateway.store.schema import DeliveryRow, DocumentRow, JournalRow, Row
 
-SEQ_STRIDE: Final = 1 << 20  # each opening of a database begins a new stride
-RECENT: Final = 16  # records on disk that stay in memory: whoever follows closely needs no disk
+SEQ_STRIDE: Final = 1 << 20  # chosen: each opening of a database begins a new stride
+RECENT: Final = 16  # chosen: records on disk that stay in memory: whoever follows closely needs no disk
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,15 +18,15 @@ from gateway.records import json_line
 from gateway.status import StoreState, StoreStatus
 from gateway.store.database import FILE_NAME, Database, is_damaged
 from gateway.store.reader import Follower, StoreReader
-from gateway.store.retention import Retention
+from gateway.store.retention import Retention, boot_ns
 from gateway.store.schema import Chain, DocumentRow, JournalRow
 from gateway.store.write_buffer import WriteBuffer
 
-IDLE_S: Final = 900.0  # without new rows: how often age is looked at
-RETRY_FIRST_S: Final = 0.5
-RETRY_LAST_S: Final = 30.0
+IDLE_S: Final = 900.0  # chosen: without new rows: how often age is looked at
+RETRY_FIRST_S: Final = 0.5  # chosen: pause after a fault of the disk; doubles up to the last
+RETRY_LAST_S: Final = 30.0  # chosen: how late a disk that works again is noticed
 BOOT_ID: Final = Path("/proc/sys/kernel/random/boot_id")
-PAGE_OF_BAD: Final = 1000  # numbers of bad records that wait to be set aside; readers name them again
+PAGE_OF_BAD: Final = 1000  # chosen: numbers of bad records that wait to be set aside; readers name them again
 
 
 class Store(ServicePart):
@@ -166,7 +166,7 @@ class Store(ServicePart):
 
     def boot(self) -> tuple[str, int]:
         """Identifier of the machine's boot, and the nanoseconds since then, including sleep."""
-        return self._boot_id, _boot_ns()
+        return self._boot_id, boot_ns()
 
     def suspect_damage(self) -> None:
         """A reader found the file damaged."""
@@ -184,7 +184,7 @@ class Store(ServicePart):
         self._buffer.wake()
 
     def _append(self, kind: str, record_id: str, t_end_ns: int, text: str, revision: int = 1) -> str:
-        row = JournalRow(0, kind, record_id, revision, t_end_ns, 0, self._clock_ns(), text, _boot_ns())
+        row = JournalRow(0, kind, record_id, revision, t_end_ns, 0, self._clock_ns(), text, boot_ns())
         return self._buffer.append(row)
 
     def _linked(self, rows: Sequence[JournalRow]) -> tuple[JournalRow, ...]:
@@ -280,10 +280,6 @@ class Store(ServicePart):
         fault = f"{self.path} is damaged ({error})"
         log_event(Event.STORE_DAMAGED, level=logging.ERROR, fault=fault, set_aside=self._set_aside)
         return self._degrade(f"{self.path} was damaged and set aside as {self._set_aside}; a new one is being created")
-
-
-def _boot_ns() -> int:
-    return time.clock_gettime_ns(time.CLOCK_BOOTTIME)
 
 
 def _boot_id() -> str:

@@ -47,7 +47,7 @@ Report = TypeVar("Report", UplinkStatus, WebhookStatus)
 class Forwarder(ThreadPart, Generic[Report]):
     """Owns the thread, which alone writes the report; a sender implements ``_deliver`` and ``_note``.
 
-    Messages that are undelivered at a stop are sent after the next start. Failures are in the report, none in ``fault``.
+    Messages that are undelivered at a stop are sent after the next start. Failures are in the report, not ``fault``.
     """
 
     def __init__(self, outbox: Outbox, report: Report, back_off: BackOff | None, back_off_max_s: float) -> None:

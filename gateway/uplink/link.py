@@ -19,9 +19,9 @@ from gateway.uplink.home_assistant import discovery
 from gateway.uplink.outbox import OutboxMessage
 from gateway.uplink.settings import UplinkSettings
 
-CONNECT_TIMEOUT_S: Final = 10.0
-WILL_DELAY_S: Final = 30  # a cut that is mended within this is not announced as an absence
-_TURN_S: Final = 0.1
+CONNECT_TIMEOUT_S: Final = 10.0  # chosen: for the connection, and for the broker's answer to it
+WILL_DELAY_S: Final = 30  # chosen: a cut that is mended within this is not announced as an absence
+_TURN_S: Final = 0.1  # chosen: one look at the socket while an answer is awaited
 
 
 class LinkError(Exception):
@@ -40,7 +40,7 @@ class BrokerAnswer:
 
 _TOO_LARGE: Final = 0x95  # MQTT 5, table 2-6
 _HOPELESS: Final = frozenset({_TOO_LARGE, 0x99})  # and payload format invalid
-_NOBODY: Final = 0x10  # no matching subscribers: taken, and forgotten at once
+_NOBODY: Final = 0x10  # likewise; no matching subscribers: taken, and forgotten at once
 _NOTHING: Final = 0  # no packet has this number
 
 # mosquitto answers a message over its limit with 0x95, which MQTT 5 has not among those of PUBACK, and so neither paho

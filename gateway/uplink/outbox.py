@@ -14,7 +14,7 @@ from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.store import Store
 
-SETTLES_S: Final = 30.0  # a record is on disk after that, or the disk refuses
+SETTLES_S: Final = 30.0  # chosen: a record is on disk after that, or the disk refuses
 LATEST: Final = "latest"  # topic of the newest estimate, retained
 
 

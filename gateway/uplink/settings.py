@@ -13,7 +13,7 @@ from gateway.config import VehicleSection
 from gateway.config.sections import UplinkSection, WebhookSection
 from gateway.errors import ConfigurationError
 
-MOST_NAME_BYTES: Final = 65_535
+MOST_NAME_BYTES: Final = 65_535  # MQTT 5, 1.5.4: the length has two bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,8 +206,8 @@ def webhook_settings(section: WebhookSection, vehicle: VehicleSection) -> Webhoo
 
 
 PREFIX: Final = "whsec_"
-LEAST_BYTES: Final = 24
-MOST_BYTES: Final = 64
+LEAST_BYTES: Final = 24  # Standard Webhooks 1.0.0: 24 to 64 bytes
+MOST_BYTES: Final = 64  # likewise
 
 
 class SecretError(ValueError):

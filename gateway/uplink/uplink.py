@@ -14,9 +14,9 @@ from gateway.uplink.link import BrokerAnswer, LinkError, MqttLink
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import UplinkSettings
 
-IDLE_S: Final = 5.0  # a turn with nothing to do; a new record ends it
-TURN_S: Final = 0.5  # likewise while an answer is awaited
-ANSWER_TIMEOUT_S: Final = 30.0  # a broker that takes longer is as good as gone
+IDLE_S: Final = 5.0  # chosen: a turn with nothing to do; a new record ends it
+TURN_S: Final = 0.5  # chosen: likewise while an answer is awaited
+ANSWER_TIMEOUT_S: Final = 30.0  # chosen: a broker that takes longer is as good as gone
 
 
 class Uplink(Forwarder[UplinkStatus]):

@@ -29,10 +29,10 @@ from gateway.uplink.forwarder import PAGE, BackOff, Forwarder
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import WebhookSettings
 
-MOST_PAUSE_S: Final = 3600.0  # whatever Retry-After says
-_READ: Final = 2048  # bytes read of an answer; its body is not used
+MOST_PAUSE_S: Final = 3600.0  # chosen: whatever Retry-After says
+_READ: Final = 2048  # chosen: bytes read of an answer; its body is not used
 _OF_THE_MESSAGE: Final = frozenset({410, 413})  # gone for good, too large: everything else may pass
-_BUSY: Final = frozenset({408, 425, 429, 502, 503, 504})
+_BUSY: Final = frozenset({408, 425, 429, 502, 503, 504})  # RFC 9110, 8470 and 6585: a later attempt may succeed
 
 
 class PostVerdict(StrEnum):
@@ -167,9 +167,9 @@ def _cut_off_after(limit_s: float, connection: http.client.HTTPConnection) -> It
         timer.cancel()
 
 
-IDLE_S: Final = 5.0  # how often what waits is counted; a new message is seen at once
-TRIES: Final = 3  # attempts for a message that the receiver reports as never acceptable
-SHOWN: Final = 20  # dead letters
+IDLE_S: Final = 5.0  # chosen: how often what waits is counted; a new message is seen at once
+TRIES: Final = 3  # chosen: attempts for a message that the receiver reports as never acceptable
+SHOWN: Final = 20  # chosen: dead letters
 DEAD_LETTER: Final = "webhook_dead_letter"  # as the store keeps it
 
 

@@ -79,7 +79,8 @@ def create_app(
     (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the estimates if
     there are any.
 
-    Call ``board.close()`` before the server stops: it ends the streams.
+    There are no routes to a part of the service that is None, but those of the ring log: it may be switched off. Call
+    ``board.close()`` before the server stops: it ends the streams.
     """
     chosen = settings or WebSettings()
     responses: Counter[int] = Counter()
@@ -110,21 +111,20 @@ def create_app(
         reasons_router(),
         vehicle_router(status, calibrated),
         spectra_router(board, calibrated),
-        known_weights_router(known_weights or service.NO_KNOWN_WEIGHTS),
-        verification_router(verification or service.NO_VERIFICATION),
-        trend_router(trend or service.NO_TREND),
-        commissioning_router(commissioning or service.NO_COMMISSIONING),
+        *([known_weights_router(known_weights)] if known_weights else ()),
+        *([verification_router(verification)] if verification else ()),
+        *([trend_router(trend)] if trend else ()),
+        *([commissioning_router(commissioning)] if commissioning else ()),
         export_router(reader),
         events_router(reader),
-        alarms_router(reader, alarms or service.NO_ALARMS),
-        record_router(record or service.NO_RECORD),
+        *([alarms_router(reader, alarms)] if alarms else ()),
+        record_router(record),
         weights_router(board, scales),
         cab_router(board, reader, status, scales),
         standards_router(board, scales, draws_trailers=draws_trailers),
         health_router(status, metrics),
+        *([known_loads_router(known_loads)] if known_loads else ()),
     ]
-    if known_loads is not None:
-        routers.append(known_loads_router(known_loads))
     for router in routers:
         app.include_router(router)
     pages.install(app, KNOWN_LOADS_PATH if known_loads else "")

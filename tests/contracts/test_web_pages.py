@@ -9,12 +9,16 @@ import pytest
 from support.web import Client, Gateway
 
 from gateway.reasons import EXPLANATIONS, REMEDIES, SOURCES
+from gateway.records import iso_utc
 from gateway.web.pages import LIBRARY, LIBRARY_URL
-from gateway.web.routes.weights import KnownLoad
+from gateway.web.routes.weights import KnownLoadTold
 
 NAMED = re.compile(r"(?:<link[^>]* href=|src=|from )\"(/[^\"]*)\"")
 ROW = re.compile(r"^  (\S+): \[\s*\"(.*?)\",\s*\"(.*?)\",?\s*\],$", re.MULTILINE)
-TRUTH = (KnownLoad(0, 0.0, 50.0), KnownLoad(900 * 10**9, 270.0, 50.6))
+TRUTH = tuple(
+    KnownLoadTold(t_start=iso_utc(t_ns), payload_kg=kg, front_share_pct=pct)
+    for t_ns, kg, pct in ((0, 0.0, 50.0), (900 * 10**9, 270.0, 50.6))
+)
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.absent import of_no_vehicle
 from support.alarms import LIMIT_KG, AlarmBench, of_load
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
 from support.web import serving
@@ -36,7 +37,8 @@ def bench(tmp_path: Path) -> Iterator[AlarmBench]:
 
 def app_of(bench: AlarmBench, tokens: TokenFile | None = None) -> Any:
     status = STATUS.model_copy(update={"webhook": WEBHOOK})
-    return create_app(bench.board, bench.store.reader(), lambda: status, tokens=tokens, alarms=bench.desk)
+    parts = of_no_vehicle(bench.store.path.parent, bench.store) | {"alarms": bench.desk}
+    return create_app(bench.board, bench.store.reader(), lambda: status, tokens=tokens, **parts)
 
 
 def test_an_alarm_comes_by_the_stream_and_is_acknowledged_by_keyboard(bench: AlarmBench, watched: Watched) -> None:

@@ -11,9 +11,9 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.fusion import epoch_of
 from gateway.core.spectrum import spectra_of
 from gateway.estimate import Estimate
-from gateway.records import Why
+from gateway.records import Why, iso_utc
 from gateway.status import BusStatus, SignalHealth, State, Status, StoreStatus, UplinkStatus
-from gateway.web.routes.weights import KnownLoad
+from gateway.web.routes.weights import KnownLoadTold
 from support.estimates import WINDOW_NS, make_estimate, posterior_of
 from support.half_car_road import batch_over_road
 from support.patience import PATIENCE_S
@@ -37,7 +37,10 @@ STATUS = Status(
     store=StoreStatus(),
     uplink=UplinkStatus(broker="fleet.example:8883", is_connected=True, n_waiting=31, waiting_age_s=9300.0),
 )
-TRUTH = (KnownLoad(0, 0.0, 50.0), KnownLoad(2 * WINDOW_NS, 270.0, 48.0))
+TRUTH = tuple(
+    KnownLoadTold(t_start=iso_utc(t_ns), payload_kg=kg, front_share_pct=pct)
+    for t_ns, kg, pct in ((0, 0.0, 50.0), (2 * WINDOW_NS, 270.0, 48.0))
+)
 
 
 def demo_calibration() -> CalibratedVehicle:

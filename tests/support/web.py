@@ -24,6 +24,7 @@ from gateway.web.app import WebSettings, create_app
 from gateway.web.live.board import Board
 from gateway.web.routes.service_calls import CommissioningBackend, FrameLog, KnownWeightBackend, VerificationBackend
 from gateway.web.routes.weights import KnownLoads
+from support.absent import of_no_vehicle
 from support.patience import PATIENCE_S
 
 
@@ -49,13 +50,13 @@ class Gateway:
         self._settings = settings
         self._known: dict[str, Any] = {
             "tokens": tokens,
-            "known_weights": known_weights,
-            "commissioning": commissioning,
             "calibrated": calibrated,
             "known_loads": known_loads,
             "record": record,
-            "verification": verification,
+            **of_no_vehicle(directory, self.store),
         }
+        known = {"known_weights": known_weights, "commissioning": commissioning, "verification": verification}
+        self._known |= {name: part for name, part in known.items() if part is not None}
         self.app = self._make_app()
 
     def publish(self, *estimates: Estimate) -> list[str]:

@@ -171,7 +171,7 @@ def test_within_one_start_of_the_machine_the_age_is_right_whatever_the_clock_say
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     boot_ns = [5_000 * 10**9]
-    monkeypatch.setattr(writer, "_boot_ns", lambda: boot_ns[0])
+    monkeypatch.setattr(writer, "boot_ns", lambda: boot_ns[0])
     with closing(Store.open(tmp_path, clock_ns=lambda: 7)) as store:
         store.write_estimate(make_record(1))
         boot_ns[0] += 10 * 10**9

@@ -24,7 +24,7 @@ class Box:
     def __init__(self, directory: Path, kept: Retention, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now_ns, self.boot_ns, self.n = TODAY_NS, 0, 0
         self._directory, self._kept = directory, kept
-        monkeypatch.setattr(retention, "_boot_ns", lambda: self.boot_ns)
+        monkeypatch.setattr(retention, "boot_ns", lambda: self.boot_ns)
 
     def drive(self, n: int, days_between: int = 0) -> int:
         """One start of the service, n records; how many the store then holds."""

@@ -20,13 +20,13 @@ from gateway.errors import BusError
 from gateway.records import F64, I64, Frames
 
 MAP: Final = f"{SHIPPED_PREFIX}reference"
-MODULUS: Final = 256  # of the counters
-QUEUE: Final = 500  # bursts: ten seconds of two sensors
-READ_S: Final = 0.5
-HEAP_S: Final = 0.04  # samples are sent in bursts of this length: a fifth of the work; the counter restores their times
-RETRY_S: Final = 2.0
-HOLE: Final = 2.5  # periods without a sample after which samples count as lost, not late
-USUAL_OF: Final = 101
+MODULUS: Final = 256  # of the counters, which have eight bits in the database
+QUEUE: Final = 500  # chosen: bursts: ten seconds of two sensors
+READ_S: Final = 0.5  # chosen: longest wait for a sensor: how soon a stop is heeded
+HEAP_S: Final = 0.04  # chosen: length of a burst: a fifth of the work; the counter restores the samples' times
+RETRY_S: Final = 2.0  # chosen: pause after a fault of the bus or of gpsd
+HOLE: Final = 2.5  # chosen: periods without a sample after which samples count as lost, not late
+USUAL_OF: Final = 101  # chosen: pauses whose median is the usual one: a second at 100 Hz
 NO_PLACE_DEG: Final = -214.7483648  # value of the database for a position without a fix
 _DEG: Final = np.pi / 180.0
 _MESSAGES: Final = {

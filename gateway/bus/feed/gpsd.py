@@ -13,8 +13,8 @@ from typing import Any, Final
 from gateway.errors import BusError
 
 WATCH: Final = b'?WATCH={"enable":true,"json":true}\n'
-LONGEST_LINE: Final = 1 << 16
-CONNECT_S: Final = 3.0
+LONGEST_LINE: Final = 1 << 16  # chosen: far longer than a report of gpsd
+CONNECT_S: Final = 3.0  # chosen: gpsd is on this computer or near
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,8 +22,8 @@ from gateway.records import F64, I64
 
 SYSFS: Final = Path("/sys/bus/iio/devices")
 NODES: Final = Path("/dev")
-BUFFER_SCANS: Final = 512  # five seconds at 100 Hz: longer than a computer stalls
-MOST_SCANS: Final = 256  # of one read
+BUFFER_SCANS: Final = 512  # chosen: five seconds at 100 Hz: longer than a computer stalls
+MOST_SCANS: Final = 256  # chosen: of one read
 AXES: Final = {
     f"{sign}{axis}": (-1.0 if sign else 1.0) * np.eye(3)[i] for sign in ("", "-") for i, axis in enumerate("xyz")
 }

@@ -15,8 +15,8 @@ from gateway.bus.signals import IdFilter
 from gateway.errors import BusError
 from gateway.records import EXTENDED_ID
 
-BURST_FRAMES: Final = 1024
-VIRTUAL_QUEUE_FRAMES: Final = 4096  # an in-process sender waits when it is full
+BURST_FRAMES: Final = 1024  # chosen: taken before they are handed on
+VIRTUAL_QUEUE_FRAMES: Final = 4096  # chosen: an in-process sender waits when it is full
 
 # The options that make an interface acknowledge nothing and send nothing, if python-can has a name for it
 _LISTEN_ONLY: Final[Mapping[str, Mapping[str, Any]]] = {

@@ -22,16 +22,16 @@ from gateway.errors import BusError
 from gateway.records import I64, U32, Frames
 from gateway.units import NS_PER_S
 
-GATHER_S: Final = 0.05  # frames are left to gather this long: few wake-ups, little work
-BURST_FRAMES: Final = 4096
-RECEIVE_BUFFER_BYTES: Final = 4 << 20
+GATHER_S: Final = 0.05  # chosen: frames are left to gather this long: few wake-ups, little work
+BURST_FRAMES: Final = 4096  # chosen: a fully loaded bus sends a tenth of them in GATHER_S
+RECEIVE_BUFFER_BYTES: Final = 4 << 20  # chosen: for what comes while this process does not get the processor
 
-_REMOTE_FLAG: Final = 0x4000_0000
+_REMOTE_FLAG: Final = 0x4000_0000  # CAN_RTR_FLAG of linux/can.h, as the next two: CAN_ERR_FLAG, CAN_ERR_MASK
 _ERROR_FLAG: Final = 0x2000_0000
 _NO_DATA_FLAGS: Final = np.uint32(_REMOTE_FLAG | _ERROR_FLAG)
 _ALL_ERROR_CLASSES: Final = 0x1FFF_FFFF
 _CAN_RAW_ERR_FILTER: Final = 2  # linux/can/raw.h; the socket module names neither this nor those below
-_SO_RCVBUFFORCE: Final = 33  # linux/asm-generic/socket.h
+_SO_RCVBUFFORCE: Final = 33  # linux/asm-generic/socket.h, as the next two
 _SO_TIMESTAMPNS: Final = 35
 _SO_RXQ_OVFL: Final = 40
 _TIMESPEC: Final = np.dtype([("seconds", np.long), ("nanoseconds", np.long)])

@@ -21,9 +21,9 @@ from gateway.errors import LogUnreadableError
 from gateway.records import I64, U8, Bool, Frames
 from gateway.units import NS_PER_S
 
-CHUNK_FRAMES: Final = 32_768
-MOST_BYTES: Final = 64 << 20  # of one container; Vector's tools fill containers with 128 kB
-MOST_OBJECT_BYTES: Final = 1 << 20  # of one inside a container; what says more is damaged
+CHUNK_FRAMES: Final = 32_768  # chosen: as in candump.py
+MOST_BYTES: Final = 64 << 20  # chosen: of one container; Vector's tools fill containers with 128 kB
+MOST_OBJECT_BYTES: Final = 1 << 20  # chosen: of one inside a container; what says more is damaged
 _IsalError = cast(type[Exception], isal_zlib.error)
 
 _SIGNATURE: Final = b"LOBJ"
@@ -46,8 +46,8 @@ _OBJECT: Final = np.dtype(
 _BASE_BYTES: Final = 16  # of an object's header without flags and stamp, all that a container has of it
 _HEADER_BYTES: Final = {1: 32, 2: 40}  # by version
 _TEN_MICROSECONDS: Final = 1  # flags: the stamp's unit; nanoseconds otherwise
-_CONTAINER: Final = 10
-_ERROR_KINDS: Final = (2, 73, 104)
+_CONTAINER: Final = 10  # kinds of objects, as Vector numbers them, and so below
+_ERROR_KINDS: Final = (2, 73, 104)  # CAN_ERROR, CAN_ERROR_EXT, CAN_FD_ERROR_64
 _STORED, _DEFLATED = 0, 2
 
 

@@ -19,10 +19,10 @@ from gateway.bus.logs.report import LogReject, LogReport, passing
 from gateway.bus.signals import CLASSIC_BYTES, IdFilter
 from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 
-CHUNK_FRAMES: Final = 32_768  # what is handed on at once: large enough that the decoder's own steps cost little
-KEPT_SHAPES: Final = 32
-LONGEST_LINE: Final = 4096  # bytes examined by an exact read
-_LOWER_CASE: Final = np.uint64(0x2020_2020_2020_2020)
+CHUNK_FRAMES: Final = 32_768  # chosen: what is handed on at once: large enough that the decoder's own steps cost little
+KEPT_SHAPES: Final = 32  # chosen: shapes of lines that are remembered
+LONGEST_LINE: Final = 4096  # chosen: bytes examined by an exact read
+_LOWER_CASE: Final = np.uint64(0x2020_2020_2020_2020)  # the bit of each byte that makes an ASCII letter a small one
 _ERROR_FRAME_TEXT: Final = "20000???"  # SocketCAN's error flag and the classes that exist
 
 

@@ -20,9 +20,9 @@ _LINE = re.compile(
     rb"#(?P<fd>#[0-9A-Fa-f])?(?P<payload>[^\s_]*)(?:_[0-9A-Fa-f])?(?:\s+[RT])?"
 )
 _REMOTE = re.compile(rb"[Rr][0-9A-Fa-f]?")
-_ERROR_FLAG: Final = 0x2000_0000
-_LAST_EXTENDED: Final = 0x1FFF_FFFF
-_LAST_STANDARD: Final = 0x7FF
+_ERROR_FLAG: Final = 0x2000_0000  # CAN_ERR_FLAG of linux/can.h
+_LAST_EXTENDED: Final = 0x1FFF_FFFF  # ISO 11898-1: 29 bits
+_LAST_STANDARD: Final = 0x7FF  # likewise 11 bits
 
 
 class NotData(Enum):
@@ -98,7 +98,7 @@ _SHAPE = re.compile(
     rb"\((\d{1,15})\.(\d{1,9})\) ([!-~]{1,32}) ([0-9A-Fa-f]{8}|[0-9A-Fa-f]{3})(#|##[0-9A-Fa-f])"
     rb"((?:[0-9A-Fa-f]{2})*)((?: [RT])?\r?\n)"
 )
-_NOT_HEX: Final = 0xFF
+_NOT_HEX: Final = 0xFF  # no digit has so much
 _NIBBLES: Final = np.full(256, _NOT_HEX, np.uint8)
 for _digit in b"0123456789abcdefABCDEF":
     _NIBBLES[_digit] = int(chr(_digit), 16)

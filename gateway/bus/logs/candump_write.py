@@ -12,8 +12,8 @@ from gateway.records import EXTENDED_ID, I64, U8, Frames
 from gateway.units import NS_PER_S
 
 BEST_COMPRESSION: Final = 3  # of isal's 0 to 3
-CHUNK_FRAMES: Final = 65_536
-MICROSECOND_DIGITS: Final = 6
+CHUNK_FRAMES: Final = 65_536  # chosen: text of so many in memory, some megabytes
+MICROSECOND_DIGITS: Final = 6  # as candump -L writes them
 NANOSECOND_DIGITS: Final = 9
 _HEX: Final = np.frombuffer(b"0123456789ABCDEF", np.uint8)
 

@@ -15,7 +15,7 @@ from gateway.bus.logs.packed import open_log_file, unpacked_path
 from gateway.bus.logs.report import LogReject, LogReport, Selection, is_same_channel
 from gateway.records import Frames
 
-CHUNK_FRAMES: Final = 4096
+CHUNK_FRAMES: Final = 4096  # chosen: messages of python-can in memory
 
 # The header for a python-can reader that is restarted in the middle of a file
 _TEXT_READERS: Final[Mapping[str, tuple[Callable[[TextIO], MessageReader], tuple[str, ...]]]] = {

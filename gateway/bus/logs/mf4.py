@@ -20,8 +20,8 @@ from gateway.units import NS_PER_S
 if TYPE_CHECKING:
     from asammdf import MDF
 
-CHUNK_RECORDS: Final = 262_144  # of all groups together: what asammdf reads at once, its own cost being per call
-LEAST_RECORDS: Final = 16_384
+CHUNK_RECORDS: Final = 262_144  # chosen: of all groups together, read at once: asammdf's own cost is per call
+LEAST_RECORDS: Final = 16_384  # chosen: of each group, however many there are
 DATA, REMOTE, ERROR = "CAN_DataFrame", "CAN_RemoteFrame", "CAN_ErrorFrame"  # ASAM MDF bus logging, 2.1
 _LENGTHS: Final = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64], np.uint8)  # by DLC, ISO 11898-1
 

@@ -30,9 +30,9 @@ else:
 
 __all__ = ["BUFFER_BYTES", "PACKED_SUFFIXES", "open_log_file", "packing_of", "unpacked_path", "unpacked_suffix", "zstd"]
 
-PACKED_BYTES: Final = 1 << 18
-INFLATED_BYTES: Final = 1 << 17  # at most this much before a damage is lost
-BUFFER_BYTES: Final = 2 << 20
+PACKED_BYTES: Final = 1 << 18  # chosen: read of the file at a time
+INFLATED_BYTES: Final = 1 << 17  # chosen: at most this much before a damage is lost
+BUFFER_BYTES: Final = 2 << 20  # measured best; reading a file whole costs three times the decode in page faults
 PACKED_SUFFIXES: Final = (".gz", ".zst", ".xz")
 
 
@@ -170,8 +170,8 @@ def unpacked_suffix(path: Path) -> str:
     return name.suffix.lower()
 
 
-BLOCK_BYTES: Final = BUFFER_BYTES  # measured best; reading a file whole costs three times the decode in page faults
-MARGIN: Final = 512  # lets a reader look this far around any byte of a block
+BLOCK_BYTES: Final = BUFFER_BYTES
+MARGIN: Final = 512  # chosen: lets a reader look this far around any byte of a block
 
 
 @dataclass(frozen=True, slots=True)

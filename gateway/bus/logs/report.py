@@ -14,8 +14,8 @@ from gateway.bus.signals import IdFilter
 from gateway.errors import LogUnreadableError
 from gateway.records import I64, U32, Bool
 
-KEPT_LINE_NUMBERS: Final = 5
-NAMED_CHANNELS: Final = 8
+KEPT_LINE_NUMBERS: Final = 5  # chosen: what a person looks at
+NAMED_CHANNELS: Final = 8  # chosen: likewise
 
 
 class LogReject(StrEnum):

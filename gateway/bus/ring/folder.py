@@ -12,10 +12,10 @@ from typing import BinaryIO, Final
 from gateway.bus.ring.segment import BlockHead, Segment, create_segment, mended_segment, name_of, names_in, open_segment
 from gateway.files.kept import opened_folder
 from gateway.log import Event, log_event
+from gateway.units import S_PER_DAY
 
-SEGMENT_S: Final = 3600.0
-SEGMENT_SHARE: Final = 1 / 8  # of the ring at most in one segment, and so in one removal
-SECONDS_PER_DAY: Final = 86_400
+SEGMENT_S: Final = 3600.0  # chosen: of frames in one file to fetch
+SEGMENT_SHARE: Final = 1 / 8  # chosen: of the ring at most in one segment, and so in one removal
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ class RingFolder:
 
     def is_over_day(self, n_bytes: int) -> bool:
         """Whether so many bytes more are too many for this day."""
-        today = int(self._clock_s() // SECONDS_PER_DAY)
+        today = int(self._clock_s() // S_PER_DAY)
         if today != self._day:
             self._day, self.n_bytes_today = today, 0
         return self.n_bytes_today + n_bytes > self._limits.max_daily_bytes
@@ -114,7 +114,7 @@ class RingFolder:
     def _found(self, folder: int) -> tuple[Segment, ...]:
         names = names_in(folder)
         if self._day is None:
-            self._day = int(self._clock_s() // SECONDS_PER_DAY)
+            self._day = int(self._clock_s() // S_PER_DAY)
             self.n_bytes_today = sum(_size_if_of_day(folder, name, self._day) for name in names)
         found = []
         for name in names:
@@ -166,4 +166,4 @@ def _write_all(file: BinaryIO, block: bytes) -> None:
 def _size_if_of_day(folder: int, name: str, day: int) -> int:
     """Bytes of a segment that was last written on this day, 0 for others."""
     status = os.stat(name, dir_fd=folder, follow_symlinks=False)
-    return status.st_size if status.st_mtime // SECONDS_PER_DAY == day else 0
+    return status.st_size if status.st_mtime // S_PER_DAY == day else 0

@@ -16,8 +16,8 @@ from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.records import Frames
 from gateway.status import RecordStatus
 
-BLOCK_FRAMES: Final = 131_072  # so many frames are written before the time of a block is over
-HELD_FRAMES: Final = 2 * BLOCK_FRAMES  # most frames in memory while the disk fails: some MB
+BLOCK_FRAMES: Final = 131_072  # chosen: so many frames are written before the time of a block is over
+HELD_FRAMES: Final = 2 * BLOCK_FRAMES  # chosen: most frames in memory while the disk fails: some MB
 RETRY_S: Final = 30.0  # chosen: pause after a fault of the disk
 
 
@@ -170,9 +170,9 @@ class RingLog(ThreadPart):
         self._fault = fault
 
 
-FILE_BLOCK_S: Final = 10.0
-FILE_BLOCK_FRAMES: Final = 65_536
-DRAIN_S: Final = 0.2
+FILE_BLOCK_S: Final = 10.0  # chosen: a killed recording loses as much
+FILE_BLOCK_FRAMES: Final = 65_536  # chosen: likewise of a busy bus
+DRAIN_S: Final = 0.2  # chosen: how soon a stop is heeded
 
 OnFrames = Callable[[int], None]
 

@@ -24,9 +24,9 @@ from gateway.bus.logs.candump_write import append_candump
 from gateway.records import Frames
 from gateway.units import NS_PER_S
 
-PIECE_FRAMES: Final = 8192  # are text at a time
-_LEVEL: Final = 2  # of isal's 0 to 3
-_RAW_DEFLATE: Final = -15
+PIECE_FRAMES: Final = 8192  # chosen: are text at a time
+_LEVEL: Final = 2  # chosen, of isal's 0 to 3
+_RAW_DEFLATE: Final = -15  # wbits of zlib: a window of 2^15 bytes, no header
 
 _FIXED: Final = b"\x1f\x8b\x08\x04\0\0\0\0\0\xff"  # deflate, an extra field, no time, no system
 _FIELD: Final = b"SF"

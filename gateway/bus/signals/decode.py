@@ -16,7 +16,7 @@ from gateway.bus.signals.mapping import Condition, IdFilter, MappedMessage, Mapp
 from gateway.records import ASIDE, F64, I64, U8, Bool, Frames, Motion, Signal
 
 J1939_LAST_VALID_BYTE: Final = 0xFA  # SAE J1939-71: a most significant byte above this is no measurement
-RANGE_TOLERANCE_STEPS: Final = 0.01  # the limits of a DBC are decimals; a raw number on a limit must pass
+RANGE_TOLERANCE_STEPS: Final = 0.01  # chosen: the limits of a DBC are decimals; a raw number on a limit must pass
 
 
 class Rejected(StrEnum):

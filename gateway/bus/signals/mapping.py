@@ -14,8 +14,8 @@ import numpy as np
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.records import EXTENDED_ID, U32, Bool, SensorTraits, Signal
 
-CLASSIC_BYTES = 8
-CAN_FD_BYTES = 64
+CLASSIC_BYTES = 8  # ISO 11898-1, the longest payload
+CAN_FD_BYTES = 64  # likewise of CAN FD
 
 
 @dataclass(frozen=True, slots=True)

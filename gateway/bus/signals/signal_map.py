@@ -38,8 +38,8 @@ QUANTITIES: Final[Mapping[Signal, str]] = {
     Signal.TRAILER: "state",
 }
 LONGEST_BYTES = 64  # of a CAN FD frame
-FEWEST_COUNTER_BITS: Final = 2
-MOST_COUNTER_BITS: Final = 32  # and no frames are lost round a longer one
+FEWEST_COUNTER_BITS: Final = 2  # chosen: one bit cannot tell a lost frame from two
+MOST_COUNTER_BITS: Final = 32  # chosen: no frames are lost round a longer one
 _EXACT_INTEGERS: Final = 1 << 53  # a double holds every integer up to here
 
 Accepted = int | float | str

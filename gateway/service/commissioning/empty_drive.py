@@ -69,7 +69,7 @@ class Jobs:
 
 
 OWNER: Final = "commissioning"  # of the batches that the shelf must not give away
-LEAST_BATCHES: Final = 2  # a single batch may be an outlier; a requested fit may use one
+LEAST_BATCHES: Final = 2  # chosen: a single batch may be an outlier; a requested fit may use one
 LOOKED_AT: Final = "looked-at.batch"
 
 MakeWorker = Callable[[Callable[[Job, Result], None]], Worker]

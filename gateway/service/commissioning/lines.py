@@ -20,8 +20,8 @@ from gateway.files.signed import SUFFIX, Trust
 from gateway.service.commissioning.record import LineChoice, Source
 
 FOLDER: Final = "lines"
-MOST_UPLOADED: Final = 20
-MOST_BYTES: Final = 1_000_000
+MOST_UPLOADED: Final = 20  # chosen: files that anybody with a token may leave on the disk
+MOST_BYTES: Final = 1_000_000  # chosen: of a file
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,58}\.json")
 
 

@@ -23,7 +23,7 @@ from gateway.stated.facts import VehicleAnswers
 
 FILE_NAME: Final = "commissioning.json"
 MADE: Final = "commissioned-"  # the names of calibrations begin so
-MOST_MADE: Final = 20  # calibrations; the oldest beyond are forgotten, and their files removed
+MOST_MADE: Final = 20  # chosen: calibrations; the oldest beyond are forgotten, and their files removed
 
 Source = Literal["package", "administrator", "uploaded"]
 

@@ -18,8 +18,8 @@ from gateway.calibration.commissioning.job import JOB, RESULT, Job, Result, to_f
 FOLDER: Final = "commissioning"
 MODULE: Final = "gateway.calibration.commissioning.work"
 SAID: Final = "said.txt"
-WITHIN_S: Final = 1800.0  # a small computer takes some minutes
-MOST_SAID: Final = 2000  # bytes of what a process that failed wrote
+WITHIN_S: Final = 1800.0  # chosen: a small computer takes some minutes
+MOST_SAID: Final = 2000  # chosen: bytes of what a process that failed wrote
 
 OnResult = Callable[[Job, Result], None]
 

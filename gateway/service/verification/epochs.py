@@ -15,9 +15,9 @@ from gateway.records import iso_utc
 from gateway.stated.facts import Drive
 from gateway.units import NS_PER_S
 
-NEAR_NS: Final = 12 * 3600 * NS_PER_S  # a drive further away in time may have carried another load
-BATCH_IDS: Final = 20
-_PAGE: Final = 500
+NEAR_NS: Final = 12 * 3600 * NS_PER_S  # chosen: a drive further away in time may have carried another load
+BATCH_IDS: Final = 20  # chosen: ids kept of one load, the newest
+_PAGE: Final = 500  # chosen: batches read at a time
 
 Ask = Callable[..., HistoryPage]
 

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from gateway.calibration.known_weight import WeightRefusal, load_of
 from gateway.calibration.verification_file import (
@@ -28,9 +28,7 @@ from gateway.service.verification.epochs import Ask, WeighedEpoch, epoch_at, epo
 from gateway.setup import Subject
 from gateway.stated.facts import StatedWeight
 from gateway.status import VerificationStatus
-from gateway.units import NS_PER_S
-
-NS_PER_DAY: Final = 86_400 * NS_PER_S
+from gateway.units import NS_PER_DAY
 
 
 class VerificationService:

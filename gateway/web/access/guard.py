@@ -25,8 +25,8 @@ _FORWARDED: Final = frozenset(
 _LOCAL_NAMES: Final = frozenset({"localhost", "127.0.0.1", "[::1]"})
 
 HOW_TO_MAKE_ONE: Final = "`springscale token create NAME --config springscale.toml` on the gateway"
-WITHIN_S: Final = 60.0
-_ADDRESSES: Final = 1024
+WITHIN_S: Final = 60.0  # chosen: the minute of ``n_wrong_tokens_per_min``
+_ADDRESSES: Final = 1024  # chosen: remembered; the longest quiet is forgotten first
 
 
 class WrongTokens:

@@ -88,11 +88,11 @@ class HeadAsGet:
         await self._app({**scope, "method": "GET"}, gone, send_head)
 
 
-ANSWERS: Final = 48  # from the history that are under way at a time
-ANSWERS_PER_CLIENT: Final = 16  # of one token, or of one address if there are none
-STREAMS_PER_CLIENT: Final = 32
-WAIT_S: Final = 5.0  # for a turn
-PIECE_BYTES: Final = 16_384
+ANSWERS: Final = 48  # chosen: from the history that are under way at a time
+ANSWERS_PER_CLIENT: Final = 16  # chosen: of one token, or of one address if there are none
+STREAMS_PER_CLIENT: Final = 32  # chosen: tabs and programs of one client
+WAIT_S: Final = 5.0  # chosen: for a turn
+PIECE_BYTES: Final = 16_384  # chosen: a slow client holds little more than this in memory
 
 _HISTORY: Final = (
     "/api/v1/estimates",
@@ -103,7 +103,7 @@ _HISTORY: Final = (
     "/api/v1/record",
 )
 _STREAM: Final = "/api/v1/stream"
-_LOOK_S: Final = 0.05
+_LOOK_S: Final = 0.05  # chosen: between two looks whether it is the client's turn
 
 
 class ConcurrencyLimit:

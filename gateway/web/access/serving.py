@@ -20,19 +20,19 @@ from uvicorn.protocols.utils import get_remote_addr
 
 from gateway.errors import ConfigurationError
 from gateway.web.access.guard import is_loopback
-from gateway.web.access.middleware import SECURITY_HEADERS
+from gateway.web.access.middleware import ANSWERS_PER_CLIENT, SECURITY_HEADERS, STREAMS_PER_CLIENT
 from gateway.web.access.problems import problem_response
 
-REQUEST_S: Final = 10.0  # from a connection's or a request's first byte to its last
-HEAD_BYTES: Final = 32_768  # request line and headers
-BODY_BYTES: Final = 32_768  # no route needs a tenth of it
+REQUEST_S: Final = 10.0  # chosen: from a connection's or a request's first byte to its last
+HEAD_BYTES: Final = 32_768  # chosen: request line and headers
+BODY_BYTES: Final = 32_768  # chosen: no route needs a tenth of it
 UPLOADS: Final = frozenset({b"/api/v1/calibration/commissioning/lines"})  # but this one: whole files come
-UPLOAD_BYTES: Final = 1_572_864  # of JSON, in which a file's line ends and quotes take two bytes
-LINGER_S: Final = 1.0  # for a refused client to read why; closed at once, its unread bytes would reset the answer away
-UNREAD_S: Final = 20.0  # in which a client must read some more of what waits for it
-UNREAD_BYTES: Final = 16_384  # that wait for one client before the answer itself has to
-CONNECTIONS: Final = 256  # some are left where four addresses have all that one may have
-CONNECTIONS_PER_ADDRESS: Final = 48  # its answers from the history and its streams (turns.py)
+UPLOAD_BYTES: Final = 1_572_864  # chosen: of JSON, in which a file's line ends and quotes take two bytes
+LINGER_S: Final = 1.0  # chosen: for a refused client to read why; closed at once, unread bytes would reset the answer
+UNREAD_S: Final = 20.0  # chosen: in which a client must read some more of what waits for it
+UNREAD_BYTES: Final = 16_384  # chosen: that wait for one client before the answer itself has to
+CONNECTIONS: Final = 256  # chosen: some are left where four addresses have all that one may have
+CONNECTIONS_PER_ADDRESS: Final = ANSWERS_PER_CLIENT + STREAMS_PER_CLIENT
 
 _log = logging.getLogger(__name__)
 _log.setLevel(logging.ERROR)  # uvicorn warns of each request it cannot read: strangers could fill the log with them
@@ -257,7 +257,7 @@ class TlsHandshake(asyncio.Protocol):
             self._connection.connection_made(encrypted)
 
 
-STOP_WITHIN_S: Final = 1  # for answers under way
+STOP_WITHIN_S: Final = 1  # chosen: for answers under way
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,7 +328,7 @@ def _tls_settings(tls: Tls) -> dict[str, Any]:
     return wanted | {"ssl_ca_certs": str(tls.client_ca), "ssl_cert_reqs": ssl.CERT_REQUIRED}
 
 
-TICK_S: Final = 1.0  # how often the Date of the answers is written anew
+TICK_S: Final = 1.0  # chosen: how often the Date of the answers is written anew, whose unit is the second
 
 
 class WebServer(uvicorn.Server):

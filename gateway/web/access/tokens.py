@@ -20,7 +20,7 @@ from gateway.files.kept import KeptFiles
 from gateway.log import Event, log_event
 
 _PREFIX: Final = "spr"  # lets secret scanners recognise a token that leaked
-MOST_NAME: Final = 64
+MOST_NAME: Final = 64  # chosen: characters
 
 
 def _named(name: str) -> str:

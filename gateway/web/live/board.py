@@ -17,7 +17,7 @@ from gateway.history import ESTIMATE, REJECTION
 from gateway.records import Why, json_line
 from gateway.web.live.stream import Fanout, StreamEvent
 
-RECENT: Final = 100
+RECENT: Final = 100  # chosen: good estimates for the warnings, which look back over eight hours of driving
 PROVISIONAL: Final = "provisional"
 _NOT_CALIBRATED: Final = Weights()
 

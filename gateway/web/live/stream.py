@@ -17,7 +17,7 @@ from gateway.errors import StoreError
 from gateway.history import KINDS, JournalRecord
 from gateway.store import Follower, StoreReader
 
-MOST_UNREAD: Final = 64  # events that may come while a client takes none: hours of batches
+MOST_UNREAD: Final = 64  # chosen: events that may come while a client takes none: hours of batches
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,9 +140,9 @@ class Fanout:
                 subscription.end()
 
 
-GRACE_S: Final = 0.2  # for the last words of a stream that ends
-RETRY_MS: Final = 3000
-_PAGE: Final = 5  # records in memory for each client
+GRACE_S: Final = 0.2  # chosen: for the last words of a stream that ends
+RETRY_MS: Final = 3000  # chosen: pause of a browser before it connects again
+_PAGE: Final = 5  # chosen: records in memory for each client
 
 EVENT_SCHEMA: Final[dict[str, Any]] = {
     "type": "object",

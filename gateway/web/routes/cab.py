@@ -15,7 +15,7 @@ from gateway.core.events.entry import EntryKind
 from gateway.core.weights.limits import Light, Room, nearness, rooms_of
 from gateway.estimate import Estimate, Lack, Quantity
 from gateway.reasons import EXPLANATIONS, Cause
-from gateway.records import Why, iso_utc
+from gateway.records import Why, iso_utc, rounded
 from gateway.status import OwnReading, State, Status
 from gateway.store import StoreReader
 from gateway.web.live.board import Board
@@ -96,7 +96,7 @@ class Cab(BaseModel):
 
 
 _DOUBTING: Final = {Cause.SENSORS, Cause.ANSWER}  # roads and driving say nothing against an earlier weight
-_EVENTS: Final = 20  # a corrected one comes again behind newer ones
+_EVENTS: Final = 20  # chosen: looked through; a corrected one comes again behind newer ones
 
 
 def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], scales: Scales) -> APIRouter:
@@ -115,19 +115,19 @@ def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
             vehicle_id=now.vehicle_id,
             state=now.state,
             load=_known(load, now),
-            stood_s=_or_none(now.standing.stood_s, 1),
+            stood_s=rounded(now.standing.stood_s, 1),
             t_end=None if load is None else iso_utc(load.t_end_ns),
             age_s=shown.age_s,
             is_stale=shown.is_stale,
             is_early=load is not None and load.is_provisional,
             light=Light.UNKNOWN if is_doubted else near.light,
             light_about=[] if is_doubted else list(near.places()),
-            over_limit_probability=_or_none(max(near.probabilities.values(), default=None), 4),
+            over_limit_probability=rounded(max(near.probabilities.values(), default=None), 4),
             room=[] if is_doubted else [_room(room) for room in rooms_of(weights)],
             is_doubted=is_doubted,
             has_limits=any(getattr(weights, place).limit_kg is not None for place in get_args(RoomPlace)),
             lacks=weights.gross.lacks,
-            payload_kg=None if load is None else _or_none(load.payload.number, 1),
+            payload_kg=None if load is None else rounded(load.payload.number, 1),
             payload_interval95_kg=None if load is None else _interval(load.payload),
             alarms=now.alarms.standing,
             rejected=[str(why) for why in rejected],
@@ -150,7 +150,7 @@ def _room(room: Room) -> RoomLeft:
     return RoomLeft(
         place=room.place,
         kg=round(room.left.number, 1),
-        std_kg=_or_none(room.left.std, 1),
+        std_kg=rounded(room.left.std, 1),
         interval95_kg=_interval(room.left),
         limit_kg=room.limit_kg,
     )
@@ -179,7 +179,3 @@ def _interval(quantity: Quantity) -> list[float] | None:
     has_own = math.isfinite(quantity.interval95[0])
     low, high = (quantity if has_own else Quantity.normal(quantity.number, quantity.std)).interval95
     return [round(low, 1), round(high, 1)] if math.isfinite(low) and math.isfinite(high) else None
-
-
-def _or_none(x: float | None, digits: int) -> float | None:
-    return None if x is None or not math.isfinite(x) else round(x, digits)

@@ -26,9 +26,9 @@ from gateway.web.live.stream import EVENT_SCHEMA, EventStream
 from gateway.web.schemas import EstimatesPage, Instant, Latest, problem_responses
 
 JSON: Final = "application/json"
-PAGE_LIMIT: Final = 1000  # records in one answer; part of the described API, therefore no setting
-BATCHES_AT_A_TIME: Final = 10  # in memory for each answer that is being sent: with spectra they are large
-ENTRIES_AT_A_TIME: Final = 100
+PAGE_LIMIT: Final = 1000  # chosen: records in one answer; part of the described API, therefore no setting
+BATCHES_AT_A_TIME: Final = 10  # chosen: in memory for each answer that is being sent: with spectra they are large
+ENTRIES_AT_A_TIME: Final = 100  # chosen: likewise of load events and trips, which are small
 _CURSOR: Final = r"^[0-9a-z]{1,32}-[0-9]{1,18}$"
 
 

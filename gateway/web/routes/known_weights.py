@@ -16,7 +16,7 @@ from gateway.stated.facts import Drive, KnownWeightFields, StatedWeight
 from gateway.web.routes.service_calls import REFUSALS, KnownWeightBackend, call_service, token_name
 from gateway.web.schemas import Body, Instant, problem_responses
 
-_LAST_NS: Final = 9_223_372_036_000_000_000
+_LAST_NS: Final = 9_223_372_036_000_000_000  # the last whole second that 64 bits of nanoseconds hold
 Kilograms = Annotated[float, Field(ge=0.0, le=100_000.0, allow_inf_nan=False)]
 
 

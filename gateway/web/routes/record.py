@@ -16,7 +16,7 @@ from gateway.web.access.problems import problem_response
 from gateway.web.routes.service_calls import FrameLog, KeptSegment
 from gateway.web.schemas import problem_responses
 
-PIECE_BYTES: Final = 65_536
+PIECE_BYTES: Final = 65_536  # chosen: of a file in memory for each client
 _MEDIA_TYPE: Final = "application/gzip"
 _RANGE: Final = re.compile(r"bytes=(?:([0-9]{1,18})-([0-9]{0,18})|-([0-9]{1,18}))")
 
@@ -37,13 +37,13 @@ class SegmentsTold(BaseModel):
     items: list[SegmentTold]
 
 
-def record_router(log: FrameLog) -> APIRouter:
+def record_router(log: FrameLog | None) -> APIRouter:
     router = APIRouter(tags=["record"])
 
     @router.get(RECORD_PATH)
     async def recorded_segments() -> SegmentsTold:
         """The files of the ring log that can be fetched, oldest first; none if it is off ([record] enabled)."""
-        return SegmentsTold(items=[_told(segment) for segment in log.segments()])
+        return SegmentsTold(items=[_told(segment) for segment in log.segments()] if log else [])
 
     @router.get(RECORD_PATH + "/{name}", response_class=Response, responses=_answers())
     async def recorded_segment(
@@ -55,7 +55,7 @@ def record_router(log: FrameLog) -> APIRouter:
     ) -> Response:
         """One file, as candump text in gzip: for `springscale estimate`, `springscale replay`, or zcat."""
         try:
-            opened = await asyncio.to_thread(log.open, name)
+            opened = await asyncio.to_thread(log.open, name) if log else None
         except OSError as refusal:
             return problem_response(503, f"the ring log cannot be read: {refusal}", request.url.path)
         if opened is None:

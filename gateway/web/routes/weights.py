@@ -5,7 +5,7 @@ load where it is known.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any, Final
 
 from fastapi import APIRouter
@@ -18,7 +18,7 @@ from gateway.core.weights.on_the_road import NOT_CALIBRATED, PayloadPlace, place
 from gateway.estimate import Estimate, Weight, Weights
 from gateway.j1939 import NOT_AVAILABLE, POWERED_WEIGHT, counts_of
 from gateway.quantities import QUANTITIES
-from gateway.records import iso_utc
+from gateway.records import iso_utc, rounded
 from gateway.web.live.board import Board, Shown
 from gateway.web.schemas import WeightFigure, WeightFigures
 
@@ -119,8 +119,8 @@ def _when(shown: Shown) -> dict[str, Any]:
 
 def _figure(now: Weight, history_kg: Sequence[float]) -> WeightFigure:
     return WeightFigure(
-        kg=_or_none(now.kg),
-        std_kg=_or_none(now.std_kg),
+        kg=rounded(now.kg, 3),
+        std_kg=rounded(now.std_kg, 3),
         limit_kg=now.limit_kg,
         is_over_limit=is_over_limit(history_kg, now.limit_kg),
         lacks=now.lacks,
@@ -129,11 +129,7 @@ def _figure(now: Weight, history_kg: Sequence[float]) -> WeightFigure:
 
 
 def _place(place: PayloadPlace | None) -> LoadPlace | None:
-    return None if place is None else LoadPlace(**{name: _or_none(x) for name, x in asdict(place).items()})
-
-
-def _or_none(x: float) -> float | None:
-    return round(x, 3) if math.isfinite(x) else None
+    return None if place is None else LoadPlace(**{name: rounded(x, 3) for name, x in asdict(place).items()})
 
 
 class J1939Weight(BaseModel):
@@ -154,7 +150,7 @@ class J1939Weights(WeighedWhen):
     parameters: list[J1939Weight]
 
 
-_UINT16_LAST: Final = 65_535
+_UINT16_LAST: Final = 65_535  # the greatest number of 16 bits
 
 
 class VssPoint(BaseModel):
@@ -228,24 +224,15 @@ def _uint16(kg: float | None) -> int | None:
 KNOWN_LOADS_PATH: Final = "/api/v1/known-loads"
 
 
-@dataclass(frozen=True, slots=True)
-class KnownLoad:
-    """From t_start_ns on, until the next: payload and front share of the sprung mass."""
-
-    t_start_ns: int
-    payload_kg: float
-    front_share_pct: float
-
-
-KnownLoads = Callable[[], Sequence[KnownLoad]]
-
-
 class KnownLoadTold(BaseModel):
     """From ``t_start`` on, until the next."""
 
     t_start: str = Field(json_schema_extra={"format": "date-time"})
     payload_kg: float
     front_share_pct: float
+
+
+KnownLoads = Callable[[], Sequence[KnownLoadTold]]
 
 
 class KnownLoadsTold(BaseModel):
@@ -261,8 +248,6 @@ def known_loads_router(known_loads: KnownLoads) -> APIRouter:
     @router.get(KNOWN_LOADS_PATH)
     async def told() -> KnownLoadsTold:
         """The actual load, as the simulator of the demonstration knows it."""
-        return KnownLoadsTold(
-            items=[KnownLoadTold(t_start=iso_utc(load.t_start_ns), **asdict(load)) for load in known_loads()]
-        )
+        return KnownLoadsTold(items=list(known_loads()))
 
     return router
