@@ -260,7 +260,6 @@ def test_a_broken_gzip_of_any_text_log_ends_with_what_was_readable(suffix, fault
     (tmp_path / f"drive{suffix}.gz").write_bytes(packed)
     motion, report = read(tmp_path / f"drive{suffix}.gz", signal_map)
     assert len(motion) < 410
-    assert report.ended_early is not None
     assert report.ended_early.startswith("the gzip stream is")
 
 

@@ -39,7 +39,6 @@ def client(tmp_path_factory: pytest.TempPathFactory, ring: RingLog) -> Iterator[
 def content(ring: RingLog) -> tuple[str, bytes]:
     """Name and bytes of the first file."""
     opened = ring.open(ring.segments()[0].name)
-    assert opened is not None
     with opened[0] as file:
         return ring.segments()[0].name, file.read()
 

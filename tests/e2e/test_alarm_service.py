@@ -62,7 +62,6 @@ class Service:
         return told
 
     def stop(self) -> int:
-        assert self.process.stdin is not None
         self.process.stdin.close()
         self.reading.join()
         return self.process.wait()

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from support.commissioned import Running, serve
+from support.configured import service_config
 from support.half_car_road import VAN
 from support.known_load_logs import write_known_loads
 
@@ -39,26 +40,8 @@ ANSWERS = {
 @pytest.fixture
 def config(tmp_path: Path) -> Path:
     """A service without a calibration on a bus of the test's own."""
-    path = tmp_path / "springscale.toml"
-    path.write_text(
-        f"""
-        signals = "springscale:reference"
-        [vehicle]
-        id = "van-17"
-        [bus]
-        interface = "virtual"
-        channel = "{tmp_path.name}"
-        [batch]
-        window_s = {WINDOW_S}
-        provisional_every_s = 0.0
-        silence_s = 2.0
-        [web]
-        port = 0
-        [store]
-        directory = "state"
-        """
-    )
-    return path
+    batch = {"batch__window_s": WINDOW_S, "batch__provisional_every_s": 0.0, "batch__silence_s": 2.0}
+    return service_config(tmp_path, vehicle__id="van-17", **batch)
 
 
 def a_sister(folder: Path) -> CalibrationFile:

@@ -131,7 +131,6 @@ def test_check_config_looks_at_known_weights_too(config: Path, logs: list[Path],
     good = CliRunner().invoke(springscale, ["check-config", str(config), "--json"], catch_exceptions=False)
     held = load_known_weights(tmp_path / "state" / "known_weights.json")
     knowledge = held.knowledge(held.entries[0].calibration_id, "ratio_index")
-    assert knowledge is not None
     assert json.loads(good.output)["known_weights_id"] == knowledge.id
     (tmp_path / "state" / "known_weights.json").write_text("{")
     fault = CliRunner().invoke(springscale, ["check-config", str(config)]).exception

@@ -11,6 +11,7 @@ import httpx
 import pytest
 from support.bus_drive import START_NS, white_noise
 from support.calibrated import calibration_text
+from support.configured import service_config
 from support.patience import wait_until
 
 from gateway.bus.logs import write_candump
@@ -33,32 +34,19 @@ unit = "t"
 @pytest.fixture
 def config(tmp_path: Path) -> Path:
     """A calibration that always answers 200 kg of a vehicle of 1400 kg, and a limit below that."""
-    (tmp_path / "vehicle.json").write_text(calibration_text(unsprung_front_kg=80.0, unsprung_rear_kg=80.0))
     shipped = shipped_map("reference")
     text = shipped.read_text().replace('dbc = ["', f'dbc = ["{shipped.parent}/')
     (tmp_path / "signals.toml").write_text(text + SATELLITES)
-    path = tmp_path / "springscale.toml"
-    path.write_text(
-        f"""
-        signals = "signals.toml"
-        calibration = "vehicle.json"
-        estimator = "ratio_index"
-        [vehicle]
-        id = "van-17"
-        gross_limit_kg = 1550.0
-        rear_axle_limit_kg = 1000.0
-        [bus]
-        interface = "virtual"
-        channel = "{tmp_path.name}"
-        [batch]
-        window_s = 20.0
-        [web]
-        port = 0
-        [store]
-        directory = "state"
-        """
+    return service_config(
+        tmp_path,
+        calibration_text(unsprung_front_kg=80.0, unsprung_rear_kg=80.0),
+        signals="signals.toml",
+        estimator="ratio_index",
+        vehicle__id="van-17",
+        vehicle__gross_limit_kg=1550.0,
+        vehicle__rear_axle_limit_kg=1000.0,
+        batch__window_s=20.0,
     )
-    return path
 
 
 class Cab:

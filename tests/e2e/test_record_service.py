@@ -42,7 +42,6 @@ def test_what_was_recorded_is_weighed_as_it_was_live(tmp_path: Path, log: Path) 
     def play(service: Running) -> None:
         service.play(log)
         written = service.gateway.ring_log
-        assert written is not None
         assert wait_until(lambda: not written.status().n_frames_held)
         listed = service.told("record", "list")
         assert [item["n_frames"] for item in listed["items"]] == [service.gateway.pipeline.n_frames]
@@ -91,7 +90,6 @@ def test_a_disk_that_takes_no_frames_costs_no_estimate(tmp_path: Path, log: Path
     def meet(service: Running) -> None:
         service.play(log)
         ring = service.gateway.ring_log
-        assert ring is not None
         assert wait_until(lambda: ring.fault is not None)
         told = first_answer(f"{service.gateway.url}/api/v1/status").json()
         assert any("frames are not being recorded" in one for one in told["warnings"])

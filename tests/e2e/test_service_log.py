@@ -77,7 +77,6 @@ class Journal:
 
     def stop(self) -> int:
         """Tell it to end -> its exit code."""
-        assert self.process.stdin is not None
         self.process.stdin.write("\n")
         self.process.stdin.close()
         self.reading.join()

@@ -9,32 +9,20 @@ from pathlib import Path
 
 import pytest
 from support.calibrated import calibration_file
+from support.configured import service_config
 from support.patience import PATIENCE_S, wait_until
 from support.ports import first_answer, free_port
 from support.process import running_service
 from support.signing import Signer
 
 GARAGE, STRANGER = Signer("garage"), Signer("stranger")
-CONFIG = """\
-signals = "springscale:reference"
-calibration = "vehicle.json"
-estimator = "ratio_index"
-[bus]
-interface = "virtual"
-[store]
-directory = "state"
-[web]
-port = {port}
-"""
 
 
 @pytest.fixture
 def config(tmp_path: Path) -> Path:
     """Settings and calibration, both signed by the garage, whose key lies elsewhere."""
-    (tmp_path / "vehicle.json").write_text(calibration_file().to_json())
     (tmp_path / "trusted.pub").write_text(GARAGE.public_line)
-    path = tmp_path / "springscale.toml"
-    path.write_text(CONFIG.format(port=free_port()))
+    path = service_config(tmp_path, calibration_file().to_json(), estimator="ratio_index", web__port=free_port())
     GARAGE.sign(path, tmp_path / "vehicle.json")
     return path
 

@@ -93,7 +93,6 @@ def test_the_ellipse_is_that_of_the_covariance(site: str, watched: Watched) -> N
     vehicle, found = tracked().vehicle, leaning(1, tracked())
     assert found.posterior is not None
     place = weights.place_of(vehicle, found.posterior)
-    assert place is not None
     along, across = place.std_m * ALONG, place.left_std_m * ACROSS
     common = place.correlation * along * across
     variances, axes = np.linalg.eigh([[along**2, common], [common, across**2]])

@@ -119,7 +119,6 @@ def test_what_an_early_version_stored_is_read_too(estimate: Estimate) -> None:
 @given(posteriors())
 def test_a_posterior_is_read_back_to_seven_digits(posterior: Posterior) -> None:
     again = read_back(estimate_to_json(Estimate(0, 1, "x", posterior=posterior))).posterior
-    assert again is not None
     assert again.mean == pytest.approx(posterior.mean, rel=1e-8)
     std = np.sqrt(np.diag(posterior.covariance))  # a covariance may cancel: its digits are those of the deviations
     assert np.diag(again.covariance) == pytest.approx(std**2, rel=1e-5, abs=1e-5)

@@ -80,7 +80,6 @@ def test_how_fast_springs_usually_move_is_found(calibration: CrossSpectrumCalibr
 def test_the_friction_of_each_axle_is_found(axle: int, end: str, calibration: CrossSpectrumCalibration) -> None:
     entry = INDEX[f"damper_friction_{end}"]
     std = calibration.covariance[entry, entry] ** 0.5
-    assert calibration.usual_stroke_mps is not None
     usually = SHARE * MOVED_MPS[axle] / calibration.usual_stroke_mps[axle]
     assert std < 0.15
     assert calibration.parameters[entry] == pytest.approx(usually / (1.0 - SHARE + usually), abs=3.0 * std)

@@ -26,7 +26,6 @@ STEPS = (1.0, 1e-4, 1e-4)  # of payload in kg, front share, lateral place in m
 @pytest.fixture(scope="module")
 def spectra() -> CrossSpectra:
     found = cross_spectra_of([batch_over_two_tracks(150.0, 49.0, 0.04, 1, duration_s=60.0)], READING)
-    assert found is not None
     assert found.n_sensors == 3
     return found
 
@@ -100,7 +99,6 @@ def test_the_roads_level_does_not_matter(gain: float, spectra: CrossSpectra) -> 
 
 
 def test_mirrored_spectra_cost_what_a_mirrored_load_does(spectra: CrossSpectra) -> None:
-    assert spectra.roll is not None
     mirrored = replace(
         spectra,
         roll=replace(

@@ -14,7 +14,7 @@ from gateway.calibration.file.calibration_file import load_calibration
 from gateway.core.cross_spectrum.model.parameters import INDEX
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung, weighed, weights_of
-from gateway.estimate import PLACES, Estimate, Lack, Quantity, Weights
+from gateway.estimate import Estimate, Lack, Quantity, Weights
 from gateway.estimate_json import estimate_from_json, estimate_to_json
 from gateway.posterior import Posterior, exactly
 
@@ -36,8 +36,6 @@ CORRELATIONS = np.array([[1.0, -0.6, 0.3], [-0.6, 1.0, -0.4], [0.3, -0.4, 1.0]])
 AXLES = ("front_axle", "rear_axle")
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
 
-LOAD = np.array([[64.0, -1.92, 0.0], [-1.92, 0.16, 0.0], [0.0, 0.0, 0.0]])
-
 payloads = st.floats(0.0, 800.0)
 shares = st.floats(20.0, 80.0)
 masses = st.floats(20.0, 400.0)
@@ -55,10 +53,6 @@ def of(vehicle: Vehicle, unsprung: Unsprung, payload_kg: float = 270.0, share_pc
 
 def kilograms(weights: Weights) -> list[float]:
     return [weight.kg for _, weight in weights.items()]
-
-
-def deviations_of(weights: Weights) -> list[float]:
-    return [weight.std_kg for _, weight in weights.items()]
 
 
 @given(found_masses, payloads, shares, st.sampled_from([STATED, KERB]))
@@ -87,25 +81,7 @@ def test_its_error_joins_the_others(found: Unsprung, payload_kg: float, share_pc
     own |= {wheel: 0.5 * own["front_axle" if wheel.startswith("front") else "rear_axle"] for wheel in WHEELS}
     for place, std_kg in own.items():
         assert getattr(told, place).std_kg == pytest.approx(math.hypot(getattr(exact, place).std_kg, std_kg))
-    least, most = abs(found.front.std - found.rear.std), found.front.std + found.rear.std
-    of_both = math.sqrt(max(0.0, told.gross.std_kg**2 - exact.gross.std_kg**2))
-    assert least - 1e-3 <= of_both <= most + 1e-3
-
-
-@pytest.mark.parametrize("name", PLACES)
-def test_deviations_are_those_of_many_draws(name: str) -> None:
-    covariance = np.array([[25.0, 24.0], [24.0, 36.0]])
-    rng = np.random.default_rng(5)
-    loads = rng.multivariate_normal([270.0, 48.0], LOAD[:2, :2], 6000)
-    roll_share = Quantity(0.58, 0.0)
-    drawn_kg = []
-    both_kg = rng.multivariate_normal([75.0, 85.0], covariance, 6000)
-    for (kg, pct), (front_kg, rear_kg) in zip(loads, both_kg, strict=True):
-        masses_kg = Unsprung(Quantity(front_kg, 0.0), Quantity(rear_kg, 0.0))
-        weights = weights_of(UNSTATED, exactly(kg, pct, 0.08), roll_share, masses_kg)
-        drawn_kg.append(getattr(weights, name).kg)
-    told = weights_of(UNSTATED, Posterior(np.array([270.0, 48.0, 0.08]), LOAD), roll_share, FOUND)
-    assert getattr(told, name).std_kg == pytest.approx(float(np.std(drawn_kg)), rel=0.04)
+    assert told.gross.std_kg == pytest.approx(math.hypot(exact.gross.std_kg, found.both.std))
 
 
 @pytest.mark.parametrize("correlation", [-1.0, -0.3, 0.0, 0.8, 1.0])
@@ -135,7 +111,6 @@ def test_an_unknown_wheel_has_nothing_estimated_in_it() -> None:
 
 def test_a_calibration_tells_masses_as_sure_as_their_logarithms() -> None:
     calibrated = load_calibration(PAPER_VAN).for_core()
-    assert calibrated.cross_spectrum is not None
     entries = [INDEX["unsprung_front_kg"], INDEX["unsprung_rear_kg"]]
     parameters, covariance = calibrated.cross_spectrum.parameters.copy(), calibrated.cross_spectrum.covariance.copy()
     parameters[entries] = np.log([75.0, 85.0])

@@ -1,6 +1,5 @@
 """Campaigns gone wrong, from log files through the command line: each is told what is wrong and how to mend it."""
 
-import gzip
 import json
 import re
 from collections.abc import Sequence
@@ -125,11 +124,7 @@ def test_one_load_only_is_a_zero_point_and_nothing_for_the_ratio_index(folder: P
 
 WRONG_MAPS = {
     "turned": ('signal = "PitchRate"\nsign = 1', 'signal = "PitchRate"\nsign = -1', "fault:pitch_rate_sign"),
-    "upside-down": ('signal = "AccelZ"\nsign = 1', 'signal = "AccelZ"\nsign = -1', "fault:acceleration_sign"),
-    "level": ('signal = "AccelZ"', 'signal = "AccelY"', "fault:acceleration_axis"),
-    "rolled": ('signal = "PitchRate"', 'signal = "RollRate"', "fault:pitch_rate_axis"),
     "in-g": ('signal = "AccelZ"', 'signal = "AccelZ"\nunit = "g"', "fault:acceleration_unit"),
-    "in-radians": ('signal = "PitchRate"', 'signal = "PitchRate"\nunit = "rad/s"', "fault:pitch_rate_unit"),
     "no-fix": ("valid_when = { Fix = 3 }", "valid_when = { Fix = 2 }", "fault:speed_missing"),
 }
 
@@ -206,8 +201,8 @@ def test_faults_that_leave_one_load_of_several_are_refused(folder: Path) -> None
     assert found["refusal"] == "faults leave only runs with 0 kg, which is no scale"
 
 
-@pytest.mark.parametrize(("one", "other"), [(4, 8), (1, 10)])
-def test_two_loads_swapped_in_the_file_are_found(one: int, other: int, folder: Path) -> None:
+def test_two_loads_swapped_in_the_file_are_found(folder: Path) -> None:
+    one, other = 1, 10
     loads = {number: table_of(folder, number).split("\n", 2)[2] for number in (one, other)}
     logs = {number: "\n".join(table_of(folder, number).split("\n", 2)[:2]) for number in (one, other)}
     runs = {f"run{one}": f"{logs[one]}\n{loads[other]}", f"run{other}": f"{logs[other]}\n{loads[one]}"}
@@ -218,30 +213,24 @@ def test_two_loads_swapped_in_the_file_are_found(one: int, other: int, folder: P
     assert f"exchanging the loads of runs {places[0]} and {places[1]}" in json.dumps(found)
 
 
-@pytest.mark.parametrize(("stated", "expected"), [("2.6", "warning:sensor_position"), ("0.0", "fault:sensor_position")])
-def test_a_wrong_sensor_position_is_told(stated: str, expected: str, folder: Path) -> None:
-    head = head_with(folder, "sensor_position_m = 3.2", f"sensor_position_m = {stated}")
-    _, found = check(altered(folder, f"place-{stated}", [1], head=head))
-    assert kinds(found)[1] == [expected]
+def test_a_wrong_sensor_position_is_told(folder: Path) -> None:
+    head = head_with(folder, "sensor_position_m = 3.2", "sensor_position_m = 0.0")
+    _, found = check(altered(folder, "place", [1], head=head))
+    assert kinds(found)[1] == ["fault:sensor_position"]
 
 
-@pytest.mark.parametrize("suffix", [".log", ".asc", ".blf", ".csv", ".trc"])
-def test_a_campaign_may_hold_logs_of_any_kind(suffix: str, folder: Path) -> None:
-    name = f"kind{suffix}"
-    source = next(folder.glob("01_*/can.log.gz"))
-    if suffix == ".log":
-        (folder / name).write_bytes(gzip.decompress(source.read_bytes()))
-    else:
-        with can.Logger(folder / name) as writer:
-            chunks, _ = open_whole_log(source)
-            for frames in chunks:
-                for row in range(len(frames)):
-                    message = message_of(frames, row)
-                    message.channel = 0
-                    message.timestamp = float(message.timestamp)
-                    writer.on_message_received(message)
-    table = f'\nlog = "{name}"\npayload_kg = 0.0\nfront_share_pct = 50.0\nstart_s = 10.0\nend_s = 150.0\n'
-    exit_code, found = check(altered(folder, f"log{suffix}", [1], run1=table))
+def test_a_campaign_may_hold_logs_of_another_kind(folder: Path) -> None:
+    """Every kind gives the same motion: tests/contracts."""
+    with can.Logger(folder / "kind.blf") as writer:
+        chunks, _ = open_whole_log(next(folder.glob("01_*/can.log.gz")))
+        for frames in chunks:
+            for row in range(len(frames)):
+                message = message_of(frames, row)
+                message.channel = 0
+                message.timestamp = float(message.timestamp)
+                writer.on_message_received(message)
+    table = '\nlog = "kind.blf"\npayload_kg = 0.0\nfront_share_pct = 50.0\nstart_s = 10.0\nend_s = 150.0\n'
+    exit_code, found = check(altered(folder, "blf", [1], run1=table))
     assert (exit_code, kinds(found)) == (0, {0: ["warning:one_load_only", UNTOLD], 1: []})
 
 

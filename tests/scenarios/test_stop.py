@@ -37,7 +37,6 @@ def config(tmp_path: Path) -> Path:
 def told_until_stopped(module: str, config: Path, before: Callable[[str], object] = lambda url: None) -> str:
     """Run the service of a module of support, stop it by SIGTERM after ``before``: it ends with 0 -> its output."""
     port = re.search(r"port = (\d+)", config.read_text())
-    assert port is not None
     url = f"http://127.0.0.1:{port[1]}"
     with subprocess.Popen(
         [sys.executable, "-m", f"support.{module}", "run", "--config", str(config)],
@@ -67,7 +66,6 @@ def test_a_pipeline_that_does_not_end_is_left_behind_without_an_abort(config: Pa
 def test_all_parts_together_may_take_no_longer_than_systemd_waits() -> None:
     unit = (ROOT / "deploy/springscale.service").read_text()
     systemd_waits_s = re.search(r"^TimeoutStopSec=(\d+)$", unit, re.MULTILINE)
-    assert systemd_waits_s is not None
     assert float(systemd_waits_s[1]) > STOP_WITHIN_S + serving.STOP_WITHIN_S
     first_s = gateway.BUS_WITHIN_S + gateway.PIPELINE_WITHIN_S + gateway.FLUSH_WITHIN_S
     assert first_s + CLOSE_WITHIN_S < STOP_WITHIN_S

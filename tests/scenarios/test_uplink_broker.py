@@ -133,7 +133,6 @@ def _deliverer(state: Path, port: int) -> "subprocess.Popen[str]":
     process = subprocess.Popen(
         [sys.executable, "-c", DELIVERER, str(state), str(port)], stdout=subprocess.PIPE, text=True, cwd=tests
     )
-    assert process.stdout is not None
     assert process.stdout.readline() == "started\n"
     process.stdout.close()
     return process

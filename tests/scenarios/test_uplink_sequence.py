@@ -196,7 +196,6 @@ def test_kills_leave_no_gap_and_what_is_lost_afterwards_does(tmp_path: Path) -> 
             text=True,
             cwd=ROOT / "tests",
         )
-        assert process.stdout is not None
         for _ in range(dice.randint(1, 40)):
             begin = int(process.stdout.readline()) + 1
         process.kill()

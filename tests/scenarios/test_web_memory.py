@@ -74,14 +74,12 @@ def driven(config: Path, log: Path) -> Iterator["subprocess.Popen[str]"]:
 
 
 def tell(process: "subprocess.Popen[str]") -> None:
-    assert process.stdin is not None
     process.stdin.write("go on\n")
     process.stdin.flush()
 
 
 def most_mb(process: "subprocess.Popen[str]") -> float:
     found = re.search(r"VmHWM:\s+(\d+) kB", Path(f"/proc/{process.pid}/status").read_text())
-    assert found is not None
     return int(found[1]) / 1024
 
 

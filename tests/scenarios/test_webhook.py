@@ -147,7 +147,6 @@ def _sender(state: Path, port: int, secret_file: Path) -> "subprocess.Popen[str]
     process = subprocess.Popen(
         [sys.executable, "-c", SENDER, str(state), str(port), str(secret_file)], stdout=subprocess.PIPE, text=True
     )
-    assert process.stdout is not None
     assert process.stdout.readline() == "started\n"
     process.stdout.close()
     return process

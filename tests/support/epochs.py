@@ -35,7 +35,6 @@ def drive_of(
             calibration_id=calibration_id,
         ).answered(posterior_of(payload_kg, share_pct, 5.0, 0.3))
         epoch = fused_epoch(epoch, batch, Rules())
-        assert epoch is not None
         found.append(replace(batch, epoch=epoch_of(epoch.posterior, epoch.n_batches)))
     return found
 

@@ -79,7 +79,6 @@ class FleetBroker:
 
     def reload(self) -> None:
         """Read passwords and access list anew."""
-        assert self._process is not None
         self._process.send_signal(signal.SIGHUP)
 
     def kill(self) -> None:
@@ -136,7 +135,6 @@ class Subscriber:
 
     def stop(self) -> None:
         """As systemd does; returns when it has gone."""
-        assert self._process is not None
         self._process.terminate()
         assert self._process.wait(PATIENCE_S) == 0
         self._process = None
@@ -172,7 +170,6 @@ class FleetView:
     def count(self, table: str) -> int:
         with self.database.connect() as connection:
             row = connection.execute(f"SELECT count(*) FROM {table}").fetchone()  # type: ignore[arg-type]  # a test's
-        assert row is not None
         return int(str(row[0]))
 
     @property

@@ -85,7 +85,6 @@ class HomeAssistant:
         assert wait_until(self._answers), self.log
 
     def _answers(self) -> bool:
-        assert self._process is not None
         assert self._process.poll() is None, self.log
         try:
             urllib.request.urlopen(f"{self.url}/api/", timeout=2.0).close()

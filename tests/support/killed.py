@@ -17,7 +17,6 @@ def told_before_kill(program: str, *arguments: object, after_s: float, ready: st
         text=True,
         cwd=Path(__file__).parents[1],
     )
-    assert process.stdout is not None
     if ready is not None:
         assert process.stdout.readline() == ready
     told = [process.stdout.readline()]

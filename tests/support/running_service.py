@@ -15,33 +15,14 @@ from gateway.config import load_settings
 from gateway.service.gateway import Gateway
 from gateway.setup import setup_of
 from gateway.store import Store
+from support.configured import service_config
 from support.patience import wait_until
-
-CONFIGURATION = """
-signals = "springscale:reference"
-calibration = "vehicle.json"
-estimator = "ratio_index"
-[vehicle]
-id = "van-17"
-[bus]
-interface = "virtual"
-channel = "{channel}"
-[batch]
-window_s = 20.0
-provisional_every_s = 0.0
-[web]
-port = 0
-[store]
-directory = "state"
-"""
 
 
 def configuration(folder: Path, calibration: str, more: str = "") -> Path:
     """Settings of a service on a bus of the test's own, weighing with ``calibration``; ``more`` is appended."""
-    (folder / "vehicle.json").write_text(calibration)
-    path = folder / "springscale.toml"
-    path.write_text(CONFIGURATION.format(channel=folder.name) + more)
-    return path
+    batch = {"batch__window_s": 20.0, "batch__provisional_every_s": 0.0}
+    return service_config(folder, calibration, more, estimator="ratio_index", vehicle__id="van-17", **batch)
 
 
 class Running:

@@ -54,7 +54,6 @@ class SimulatedVehicle:
         self.n_estimates = self.n_entries = 0
         self._begun_ns = time.time_ns() // NS_PER_S * NS_PER_S - 86_400 * NS_PER_S
         wanted = uplink_settings(settings.uplink, settings.vehicle)
-        assert wanted is not None
         outbox = Outbox(self.store, "fleet", repeat_s=wanted.repeat_s)
         birth = {"vehicle_id": self.id, "vin": settings.vehicle.vin, "version": "test", "calibration_id": "sha256:ab"}
         self.uplink = Uplink(wanted, outbox, birth, back_off=BackOff(0.05, 0.5))

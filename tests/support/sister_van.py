@@ -13,6 +13,7 @@ from gateway.core.vehicle import Vehicle
 from gateway.stated.facts import VehicleAnswers
 from gateway.store import Store
 from support.commissioned import Running, serve
+from support.configured import service_config
 from support.recordings import recordings
 
 WINDOW_S = 300.0
@@ -73,24 +74,7 @@ def commissioned(name: str, line: Path, folder: Path, n_logs: int) -> Commission
 
 def _settings(folder: Path, signals: Path) -> Path:
     """A service without a calibration on a bus of the test's own; all else as it comes, but for the patience."""
-    path = folder / "springscale.toml"
-    path.write_text(
-        f"""
-        signals = "{signals}"
-        [vehicle]
-        id = "{folder.name}"
-        [bus]
-        interface = "virtual"
-        channel = "{folder.name}"
-        [batch]
-        silence_s = 2.0
-        [web]
-        port = 0
-        [store]
-        directory = "state"
-        """
-    )
-    return path
+    return service_config(folder, signals=str(signals), vehicle__id=folder.name, batch__silence_s=2.0)
 
 
 def _typed(vehicle: Vehicle) -> dict[str, Any]:

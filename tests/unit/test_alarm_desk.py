@@ -152,8 +152,3 @@ def test_settings_are_the_cores() -> None:
     """Names and defaults stand in both: settings are read where the core would load too much."""
     assert set(settings.CAUSE_NAMES) == set(CAUSE_NAMES)
     assert rules_of(settings.AlarmsSection()) == AlarmRules()
-
-
-def test_an_alarm_that_there_is_not_cannot_be_switched_off() -> None:
-    with pytest.raises(ValueError, match="is no alarm; known are overload, "):
-        settings.AlarmsSection(off=("overlaod",))

@@ -163,12 +163,6 @@ def test_without_a_calibration_there_is_no_alarm_for_want_of_estimates() -> None
     assert told(watching(no_estimate_s=600.0), *[refused(n, Why.NO_CALIBRATION) for n in range(20)]) == []
 
 
-def test_a_restart_remembers_how_long_it_has_been() -> None:
-    slow = [refused(n, Why.TOO_SLOW) for n in range(6)]
-    watch = AlarmWatch(replace(RULES, no_estimate_s=1800.0), "van", recent=[of_load(0, 300.0), *slow[:5]])
-    assert told(watch, slow[5]) == [("no_estimate", "early")]
-
-
 @pytest.mark.parametrize("off", ["overload", "overload.gross"])
 def test_what_is_switched_off_is_not_told_and_ends(off: str) -> None:
     assert off in CAUSE_NAMES

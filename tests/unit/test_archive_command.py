@@ -167,9 +167,3 @@ def test_a_bounded_number_of_tasks_is_under_way(workers: Processes) -> None:
         assert answer.result() == task.hex()
         assert taken <= n + 2 * workers.n_workers
     assert taken == 20
-
-
-def test_progress_tells_rate_and_what_is_left() -> None:
-    assert Progress("weighing", 0, 100, 0, 4, 0.0).remaining_s is None
-    half = Progress("weighing", 50, 100, 2, 4, 10.0)
-    assert (half.rate, half.remaining_s) == (5.0, 10.0)

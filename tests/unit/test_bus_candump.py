@@ -1,7 +1,5 @@
 """The bulk reader on logs as they are found: what is read, what is counted, and that nothing ends a run."""
 
-import gzip
-
 import numpy as np
 import pytest
 
@@ -209,31 +207,6 @@ def test_blocks_cut_no_line(n, read):
     frames, report = read(text, block_bytes=n)
     assert frames.payload[:, 0].tolist() == list(range(100))
     assert (report.lines, report.n_rejected) == (100, 0)
-
-
-def test_gzip_is_known_by_its_content_not_its_name(read):
-    assert len(read(gzip.compress(GOOD * 10), name="a.log")[0]) == 10
-    assert len(read(gzip.compress(GOOD) + gzip.compress(GOOD), name="a.log.gz")[0]) == 2
-
-
-def test_a_cut_gzip_gives_what_was_readable_and_says_so(read):
-    rng = np.random.default_rng(3)
-    text = b"".join(b"(1.0) can1 120#%s\n" % rng.bytes(8).hex().encode() for _ in range(20_000))
-    packed = gzip.compress(text)
-    frames, report = read(packed[: len(packed) // 2], name="a.log.gz")
-    assert 5_000 < len(frames) < 20_000
-    assert report.ended_early == "the gzip stream is cut off"
-
-
-def test_a_gzip_damaged_inside_ends_there(read):
-    rng = np.random.default_rng(4)
-    text = b"".join(b"(1.0) can1 120#%s\n" % rng.bytes(8).hex().encode() for _ in range(20_000))
-    packed = bytearray(gzip.compress(text))
-    packed[len(packed) // 2 : len(packed) // 2 + 400] = bytes(400)
-    frames, report = read(bytes(packed), name="a.log.gz")
-    assert len(frames) < 20_000
-    assert report.ended_early is not None
-    assert "damaged" in report.ended_early
 
 
 def test_random_bytes_end_no_run(read):

@@ -127,7 +127,6 @@ def test_a_file_damaged_in_the_middle_gives_what_lies_before(tmp_path, frames):
     found, report = read(tmp_path / "a.mf4")
     assert 100_000 < len(found) < len(many)
     assert_same(found, take(many, slice(0, len(found))))
-    assert report.ended_early is not None
     assert report.ended_early.startswith("the file is damaged: ")
 
 

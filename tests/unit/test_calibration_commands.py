@@ -60,12 +60,10 @@ def test_show_json_is_the_file(tmp_path: Path) -> None:
 
 def test_half_car_parameters_are_shown_in_their_units() -> None:
     part = load_calibration(SHIPPED).for_core().cross_spectrum
-    assert part is not None
     at = part.names.index("spring_front_npm")
     spring_npm = math.exp(part.parameters[at])
     std_npm = spring_npm * math.sqrt(part.covariance[at, at])
     shown = re.search(r"spring_front_npm +(\S+) ± (\S+)", run("show", SHIPPED).output)
-    assert shown is not None
     assert [float(number) for number in shown.groups()] == pytest.approx([spring_npm, std_npm], rel=0.05)
 
 
@@ -108,7 +106,6 @@ def test_diff_tells_figures_in_combined_standard_deviations() -> None:
 def test_the_figures_of_a_regression_predict_what_it_predicts(ra: float, rg: float) -> None:
     """Constant plus coefficients times the terms as they are: the model's own answer, whatever its scaling."""
     file = load_calibration(SHIPPED)
-    assert file.ratio_index is not None
     assert file.ratio_index.payload is not None
     model = file.ratio_index.payload
     constant, *slopes = (figure.centre for figure in figures_of(file)["ratio_index.payload"])

@@ -79,9 +79,6 @@ def test_pure_roll_is_no_motion_of_the_centre_line(lever_m: float) -> None:
     seen = acceleration_spectrum(batch, N_SEGMENT, "amplitude", 0.0)
     moved = acceleration_spectrum(batch, N_SEGMENT, "amplitude", lever_m)
     wrong = acceleration_spectrum(batch, N_SEGMENT, "amplitude", -lever_m)
-    assert seen is not None
-    assert moved is not None
-    assert wrong is not None
     shaken = (seen[0] > 1.0) & (seen[0] < 9.5)
     left_over = moved[1][shaken] / seen[1][shaken]
     assert np.max(left_over * seen[0][shaken]) < 0.15  # falls as 1/f
@@ -93,8 +90,6 @@ def test_with_roll_taken_out_what_is_left_is_heave() -> None:
     (_, heave), (rate, roll) = moving(2), moving(3)
     on_line = acceleration_spectrum(batch_of(heave, None), N_SEGMENT, "power", 0.0)
     moved = acceleration_spectrum(batch_of(heave + 0.3 * roll, rate), N_SEGMENT, "power", 0.3)
-    assert on_line is not None
-    assert moved is not None
     shaken = (moved[0] > 1.0) & (moved[0] < 9.5)
     assert moved[1][shaken] == pytest.approx(on_line[1][shaken], rel=0.05)
 
@@ -107,10 +102,8 @@ def test_without_a_roll_rate_or_without_a_lever_nothing_changes(seed: int, lever
     silent = batch_of(acceleration, np.full(N, np.nan))
     told = batch_of(acceleration, rate)
     as_it_was = mean_spectrum(acceleration, plain.usable, N_SEGMENT, RATE_HZ, "amplitude")
-    assert as_it_was is not None
     for batch, lever in ((plain, lever_m), (silent, lever_m), (told, 0.0)):
         found = acceleration_spectrum(batch, N_SEGMENT, "amplitude", lever)
-        assert found is not None
         np.testing.assert_array_equal(found[1], as_it_was[1])
         assert indexes_of(batch, calibration(lever)) == indexes_of(plain, calibration(0.0))
 
@@ -123,9 +116,6 @@ def test_segments_without_a_roll_rate_are_left_out_while_enough_are_left() -> No
     few = acceleration_spectrum(
         batch_of(0.4 * acceleration, np.where(np.arange(N) < 3000, rate, np.nan)), N_SEGMENT, "amplitude", 0.4
     )
-    assert moved is not None
-    assert seen is not None
-    assert few is not None
     assert np.sum(moved[1]) < 0.1 * np.sum(seen[1])
     np.testing.assert_array_equal(few[1], seen[1])
 
@@ -163,7 +153,6 @@ def test_through_the_bus_a_sensor_far_left_tells_what_one_in_the_middle_does() -
         "power",
         0.4,
     )
-    assert wanted is not None
     assert seen is not None
     assert moved is not None
     assert turned is not None

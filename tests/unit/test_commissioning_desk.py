@@ -137,7 +137,6 @@ def test_batches_count_from_the_claim_on_and_each_is_fitted(bench: Bench) -> Non
     assert underway(bench)["n_batches"] == 0
     bench.drive(2)
     assert (underway(bench)["n_batches"], underway(bench)["driven_s"]) == (1, WINDOW_S)
-    assert bench.worker.job is not None
     assert bench.worker.job.is_fit
     assert len(bench.worker.job.drives[0].batches) == 1
     bench.drive(3)
@@ -148,7 +147,6 @@ def test_batches_count_from_the_claim_on_and_each_is_fitted(bench: Bench) -> Non
 def test_rejected_batches_count_for_nothing_but_are_looked_at(driving: Bench) -> None:
     driving.drive(0, WINDOW_S, Why.GRAVITY_MISSING)
     assert underway(driving)["n_batches"] == 0
-    assert driving.worker.job is not None
     assert not driving.worker.job.is_fit
     driving.worker.finish(Result(findings=(FAULT,)))
     assert underway(driving)["inspection"] == {
@@ -224,7 +222,6 @@ def test_a_calibration_that_does_not_hold_its_own_hash_is_not_used(driving: Benc
     driving.drive(0)
     driving.drive(1)
     good = fitted()
-    assert good.calibration is not None
     changed = good.calibration.replace('"van"', '"vam"')
     assert changed != good.calibration
     driving.worker.finish(good.model_copy(update={"calibration": changed}))
@@ -552,7 +549,6 @@ def test_a_service_starts_with_what_was_made_here(driving: Bench) -> None:
         driving.drive(n)
     driving.worker.finish(fitted())
     active = load_record(driving.directory / FILE_NAME, CommissioningRecord()).active
-    assert active is not None
     chosen = with_commissioned(settings)
     assert chosen.calibration == driving.directory / active.file_name
     forbidden = settings.model_copy(update={"commissioning": CommissioningSection(is_allowed=False)})

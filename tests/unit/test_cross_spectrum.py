@@ -107,7 +107,6 @@ def model_variances(found: Estimate) -> F64:
     """Of payload (kg) and front share (%): what the model itself adds, the same at any speed and on any road but for
     how far these are from what calibration saw.
     """
-    assert found.posterior is not None
     variances: F64 = np.diag(found.posterior.sources[Source.MODEL][:2, :2]) ** 2
     return variances
 
@@ -141,7 +140,6 @@ def test_another_roughness_widens_the_interval(calibration: CrossSpectrumCalibra
 def roughness_ratio(calibration: CrossSpectrumCalibration) -> float:
     """The square of the road's distance from those of calibration, in its scale."""
     spectra = cross_spectra_of([batch_over_road(200.0, 50.0, seed=3)], calibration.reading)
-    assert spectra is not None
     distance = np.log(spectra.acceleration_rms_mps2 / calibration.acceleration_rms_mps2)
     return float((distance / UNSEEN_ROUGHNESS_SCALE) ** 2)
 

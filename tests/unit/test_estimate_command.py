@@ -57,7 +57,6 @@ def test_another_vehicles_calibration_is_named_as_the_likely_cause(monkeypatch: 
     """Where most batches moved as another vehicle does."""
     unlike = (make_estimate(0, Why.MODEL_MISFIT), make_estimate(1, Why.OUT_OF_RANGE), make_estimate(2, Why.TOO_SLOW))
     fault = said(monkeypatch, log, *unlike)
-    assert fault is not None
     assert fault.exit_code == 1
     assert "model_misfit (1 batch): no payload and front share explain these spectra" in str(fault)
     assert "What to do: make sure that the calibration is this vehicle's" in str(fault)

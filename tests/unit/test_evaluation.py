@@ -135,7 +135,6 @@ def test_sideways_errors_by_hand() -> None:
     expected = {"mean_abs_m": 0.013, "bias_m": -0.007, "std_m": 0.013, "max_abs_m": 0.02, "coverage95": 0.5}
     expected |= {"half_width_m": 0.01, "interval_score_m": 0.02 + 40.0 * 0.01 / 2.0}  # the second lies 10 mm outside
     assert told == pytest.approx(expected)
-    assert errors.wheels is not None
     # 1440 kg of sprung mass 6 and 20 mm beside: moments of 8.64 and 28.8 kgm over 1.5 m, of which the front takes 0.6
     gross_kg = 1240.0 + 200.0 + 60.0 + 100.0
     off_kg = np.array([0.6, 0.4]) * 1440.0 * np.array([[0.006], [0.02]]) / 1.5
@@ -199,7 +198,6 @@ def test_what_is_judged_names_the_main_cause_of_its_width() -> None:
     table = error_table(judge([run], calibration_file().for_core(), "ratio_index"), VAN, "ratio_index")
     assert table.to_json()["batches"][0]["error_budget"]
     width = width_of(table.judged, table.errors.payload, "payload")
-    assert width is not None
     assert width.cause is not None
     assert "Mostly due to" in width.sentence
 
@@ -242,7 +240,6 @@ def test_without_calibration_there_are_spectra_and_a_reason() -> None:
     found = estimate(BATCH, None, "cross_spectrum")
     assert found.rejected == (Why.NO_CALIBRATION,)
     assert found.calibration_id is None
-    assert found.spectra is not None
     shown = estimate_to_json(found)
     assert shown["payload_kg"] is None
     assert len(shown["spectra"]["freq_hz"]) == len(found.spectra.freq_hz)

@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 from support.bus_drive import white_noise
 from support.calibrated import calibration_file
+from support.configured import service_config
 from support.known_weights import SUBJECT, KnownWeightBench
 
 from gateway.bus.logs import write_candump
@@ -25,11 +26,8 @@ HOUR_NS = 3600 * NS_PER_S
 @pytest.fixture
 def drives(tmp_path: Path) -> tuple[str, str]:
     """Two of one batch each, an hour apart, and the service's configuration; the calibration always answers 200 kg."""
-    (tmp_path / "vehicle.json").write_text(calibration_file().to_json())
-    (tmp_path / "springscale.toml").write_text(
-        'signals = "springscale:reference"\ncalibration = "vehicle.json"\nestimator = "ratio_index"\n'
-        '[batch]\nwindow_s = 20.0\n[store]\ndirectory = "state"\n[vehicle]\nid = "van-17"\n'
-    )
+    keys = {"estimator": "ratio_index", "batch__window_s": 20.0, "vehicle__id": "van-17"}
+    service_config(tmp_path, calibration_file().to_json(), **keys)
     logs = tmp_path / "1.log", tmp_path / "2.log"
     for n, log in enumerate(logs):
         write_candump(white_noise(21.0, T0_NS + n * HOUR_NS, seed=n), "can0", log)

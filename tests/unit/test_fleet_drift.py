@@ -54,7 +54,6 @@ def test_what_one_vehicle_does_alone_is_believed_and_what_all_do_is_not() -> Non
     believed = [name for name, found in drifts.items() if found["damper_front_ratio"].is_believed]
     assert believed == ["van-0"]
     beyond = drifts["van-0"]["damper_front_ratio"].beyond
-    assert beyond is not None
     assert beyond.low <= 0.05 <= beyond.high
     assert beyond.n == len(WEEKS)
 
@@ -168,7 +167,6 @@ def repeating(alike: float, n_series: int, seed: int) -> list[F64]:
 def test_the_slope_is_the_one_of_scipy(numbers: list[float]) -> None:
     y = np.array(numbers)
     trend = trend_of(np.arange(float(len(y))), y)
-    assert trend is not None
     assert trend.slope == pytest.approx(theilslopes(y).slope, abs=1e-12)
     assert trend.low <= trend.slope <= trend.high
     assert 0.0 <= trend.p <= 1.0
@@ -187,7 +185,6 @@ def test_a_ramp_a_shift_and_another_unit_do_what_they_must(seed: int, ramp: floa
 def test_independent_points_are_judged_as_by_kendall() -> None:
     y = np.array([3.0, 1.0, 4.0, 1.5, 9.0, 2.0, 6.0, 5.0, 3.5, 8.0, 9.5, 7.0])  # a rise; neighbours unlike beside it
     trend = trend_of(np.arange(12.0), y)
-    assert trend is not None
     expected = kendalltau(np.arange(12.0), y, method="exact").pvalue
     assert trend.p == pytest.approx(expected, abs=0.01)
 
@@ -195,7 +192,6 @@ def test_independent_points_are_judged_as_by_kendall() -> None:
 def test_too_few_points_tell_nothing_and_equal_ones_no_slope() -> None:
     assert trend_of(X[: LEAST_POINTS - 1], X[: LEAST_POINTS - 1]) is None
     level = trend_of(X, np.zeros(len(X)))
-    assert level is not None
     assert (level.slope, level.low, level.high, level.p) == (0.0, 0.0, 0.0, 1.0)
 
 
@@ -203,7 +199,6 @@ def test_one_wild_week_moves_the_slope_little() -> None:
     y = 0.2 * X
     y[7] = 1e6
     trend = trend_of(X, y)
-    assert trend is not None
     assert trend.slope == pytest.approx(0.2)
 
 

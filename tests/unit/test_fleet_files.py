@@ -100,7 +100,6 @@ def test_each_vehicle_gets_settings_that_the_service_takes(fleet: Path) -> None:
         assert (settings.vehicle.id, settings.vehicle.vin) == (name, f"WVWZZZ1KZAW{n:06}")
         assert settings.vehicle.gross_limit_kg == 2000.0
         link = uplink_settings(settings.uplink, settings.vehicle)
-        assert link is not None
         assert (link.broker, link.topic, link.username) == ("broker.fleet.example:8884", f"springscale/{name}", name)
         assert link.tls
         assert len(link.password() or "") >= 40

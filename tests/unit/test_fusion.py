@@ -80,7 +80,6 @@ def test_a_moved_load_is_a_change_too() -> None:
 
 def test_a_stop_opens_a_new_epoch_whatever_the_numbers() -> None:
     epoch = fused_epoch(together(batch(100.0)), batch(100.0, n=5), RULES, could_have_changed=True)
-    assert epoch is not None
     assert (epoch.n_batches, epoch.t_start_ns, epoch.is_change) == (1, 5, False)
 
 
@@ -132,14 +131,12 @@ def test_a_weighed_load_names_its_newest_batches_and_outlives_a_stop() -> None:
     for one in found:
         epoch = fused_epoch(epoch, one, RULES)
         weighed = remembered(weighed, epoch, one, drive_start_ns=0)
-    assert weighed is not None
     assert weighed.epoch.n_batches == 30
     assert weighed.batch_ids == tuple(one.id for one in found[-20:])
     assert remembered(weighed, None, found[0], drive_start_ns=9) is weighed
     assert remembered(weighed, weighed.epoch, replace(found[0], rejected=(Why.GAP,)), drive_start_ns=0) is weighed
     later = batch(0.0, n=99)
     other = remembered(weighed, fused_epoch(None, later, RULES), later, drive_start_ns=9)
-    assert other is not None
     assert (other.epoch.n_batches, other.batch_ids, other.drive_start_ns) == (1, (later.id,), 9)
 
 

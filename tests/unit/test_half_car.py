@@ -44,16 +44,6 @@ def test_slowly_the_body_follows_the_road() -> None:
     assert (r.pitch_rate_rear / (1j * omega)).real == pytest.approx(1.0 / CAR.wheelbase_m, rel=1e-3)
 
 
-def test_the_heave_resonance_is_that_of_mass_on_springs() -> None:
-    """Equal ends, no damping, rigid tyres: sqrt(2 k / m) / 2 pi."""
-    axle = Axle(30e3, 0.0, (), (), 1.0, STIFF, STIFF, 1e-6)
-    car = replace(CAR, empty_mass_kg=1000.0, empty_front_share=0.5, front=axle, rear=axle, sensor_position_m=1.4)
-    freq_hz = np.arange(0.5, 3.0, 1e-4)
-    r = frequency_response(car, 200.0, 0.5, freq_hz)
-    peak_hz = freq_hz[np.argmax(np.abs(r.acceleration_front + r.acceleration_rear))]
-    assert peak_hz == pytest.approx(np.sqrt(2 * 30e3 / 1200.0) / (2 * np.pi), rel=1e-3)
-
-
 @given(payload_kg=st.floats(-60.0, 500.0), position=st.floats(0.1, 0.9))
 def test_both_axles_lifted_alike_lift_without_pitch_where_the_vehicle_is_symmetric(
     payload_kg: float, position: float

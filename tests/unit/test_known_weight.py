@@ -110,7 +110,6 @@ def test_epochs_are_those_that_fusion_made(batches: list[tuple[float, bool, str]
         batch = batch if outcome == "counts" else batch.refused(Why.GAP)
         epoch = fused_epoch(epoch, batch, Rules(), is_stop)
         if outcome == "counts":
-            assert epoch is not None
             told = (epoch.t_start_ns, epoch.n_batches, float(epoch.posterior.mean[PAYLOAD]))
             truth = [*truth[:-1], told] if truth and truth[-1][0] == told[0] else [*truth, told]
             batch = replace(batch, epoch=epoch_of(epoch.posterior, epoch.n_batches))

@@ -281,6 +281,9 @@ SPOILT: list[tuple[Callable[[str], str], str]] = [
     (lambda text: text.replace('"payload_kg": 280.0', '"payload_kg": 281.0'), "was changed after it was written"),
     (lambda text: text.replace('"version": 1', '"version": 2'), "version"),
     (lambda text: text[: len(text) // 2], "JSON"),
+    (lambda text: "", "JSON"),
+    (lambda text: "[" * 5000, "JSON"),
+    (lambda text: '{"note": "\\ud83d"}', "JSON"),
     (lambda text: text.replace('"payload_std_kg": 5.0', '"payload_std_kg": NaN'), "payload_std_kg"),
 ]
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from support.calibrated import calibration_file
+from support.configured import service_config
 from support.web import Gateway as Web
 
 from gateway.config import Settings, load_settings
@@ -29,14 +30,9 @@ def _log_level() -> Iterator[None]:
 
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
-    (tmp_path / "vehicle.json").write_text(calibration_file().to_json())
     (tmp_path / "map.toml").write_text(_map(tmp_path))
-    config = tmp_path / "springscale.toml"
-    config.write_text(
-        'signals = "map.toml"\ncalibration = "vehicle.json"\nestimator = "ratio_index"\n'
-        '[bus]\ninterface = "virtual"\n[web]\nport = 0\n[store]\ndirectory = "state"\n'
-    )
-    return load_settings(config)
+    calibration = calibration_file().to_json()
+    return load_settings(service_config(tmp_path, calibration, signals="map.toml", estimator="ratio_index"))
 
 
 def _map(folder: Path) -> str:
@@ -61,13 +57,11 @@ def test_a_start_with_a_broken_file_takes_the_last_good_copy_and_says_so(
 ) -> None:
     good, fault = setup_or_last_good(settings)
     assert fault is None
-    assert good.calibration is not None
     keep_copy(settings, good.calibration)
     spoil(tmp_path, how)
     with pytest.raises(CalibrationFileError):
         setup_of(settings)  # what check-config and the offline tools say stays as it was
     setup, fault = setup_or_last_good(settings)
-    assert setup.calibration is not None
     assert setup.calibration.id == good.calibration.id
     assert "vehicle.json" in str(fault)
     assert "last good copy" in str(fault)

@@ -109,9 +109,7 @@ def test_a_trial_is_given_its_own_identification_parts_alone(fits: Fits) -> None
     split = campaign()
     trial = trial_of(split, VAN, (1, 3, 4), "ratio_index")
     assert fits.given == [tuple(split[i].identification for i in (0, 2, 3))]
-    assert trial.left_out is not None
     assert trial.left_out.n_batches == 2  # run 2: both its parts
-    assert trial.validation is not None
     assert trial.validation.n_batches == 4
     assert trial.left_out.payload_mean_abs_pct == pytest.approx(0.0)  # run 2 carries 200 kg
     assert trial.validation.payload_mean_abs_pct == pytest.approx(100.0 * (200 + 0 + 100 + 200) / 4 / 450)
@@ -142,7 +140,6 @@ def test_two_runs_make_no_curve() -> None:
 
 def test_a_real_trial_weighs_what_it_never_saw() -> None:
     trial = trial_of(campaign(), VAN, (1, 2, 4), "cross_spectrum")
-    assert trial.left_out is not None
     assert trial.left_out.n_rejected == 0
     assert trial.left_out.payload_mean_abs_pct is not None
     assert trial.left_out.payload_mean_abs_pct < 6.0

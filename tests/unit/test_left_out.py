@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.special import ndtri, stdtrit
+from scipy.special import stdtrit
 from support.known_load_logs import write_known_loads
 
 from gateway.calibration.calibrate import Outcome
@@ -67,8 +67,6 @@ def test_where_no_choice_can_be_made_anew_bands_and_terms_stay(tmp_path: Path) -
     campaign = load_campaign(write_known_loads(tmp_path, FEW, duration_s=150.0))
     few = calibrate(campaign, BatchSettings(window_s=100.0), estimators=("ratio_index",))
     fit = few.ratio_index
-    assert fit is not None
-    assert fit.calibration.payload is not None
     rows = index_rows([one.identification for one in few.split], fit.calibration)
     again = fit_regression(fit.calibration.payload.terms, rows.ra, rows.rg, rows.payload_kg, rows.run)
     assert errors_kg(few) == pytest.approx(again.held_out_errors, rel=1e-4, abs=1e-3)
@@ -85,10 +83,6 @@ def test_the_logs_are_of_the_campaign(outcome: Outcome) -> None:
 
 
 STATED_RATE = 1e-3
-
-
-def test_the_quantile_is_that_of_the_stated_rate() -> None:
-    assert pytest.approx(float(ndtri(1.0 - STATED_RATE)), abs=0.005) == MISFIT_QUANTILE
 
 
 def test_a_healthy_vehicle_exceeds_it_at_the_stated_rate() -> None:

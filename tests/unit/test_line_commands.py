@@ -54,7 +54,6 @@ def test_one_empty_drive_and_a_sister_make_a_calibration(drives: Path, sisters: 
     assert "one_load_only" not in made.stdout
     assert "warning: ratio_index: " in made.stdout
     file, sister = load_calibration(output), load_calibration(sisters[0])
-    assert file.line is not None
     assert file.line.members == (sister.id,)
     assert file.estimators == ("cross_spectrum",)
     assert f"--like {sister.id}" in file.provenance.command
@@ -83,7 +82,6 @@ def test_a_line_is_built_shown_and_inherited_from(drives: Path, sisters: list[Pa
     made = run("calibrate", drives, "--runs", "1", "--like", line, "--output", output, *FAST)
     assert made.exit_code == 0, made.output
     held = load_calibration(output).line
-    assert held is not None
     assert list(held.members) == record["members"]
     assert held.n_siblings == 3
 

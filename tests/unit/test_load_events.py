@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from support.days import (
     OWN_KG,
-    OWN_PCT,
     RULES,
     T0_NS,
     assert_a_restart_changes_nothing,
@@ -23,12 +22,11 @@ from support.days import (
     trips,
 )
 
-from gateway.core.change import change_of, probability
+from gateway.core.change import change_of
 from gateway.core.events import ledger
 from gateway.core.events import ledger as of_ledger
 from gateway.core.events.entry import Entry
 from gateway.core.events.ledger import Ledger
-from gateway.core.loads import weighings_of
 from gateway.estimate import Estimate, Place, Stop, Watched
 from gateway.posterior import Posterior, Source
 
@@ -62,27 +60,6 @@ def test_a_change_is_the_less_sure_the_less_alike_the_loads_are():
 
 def test_nothing_loaded_is_nothing_told():
     assert not events(day(300.0, 305.0, 297.0, 300.0, batches=2))
-
-
-def test_the_shared_error_hides_no_change_and_makes_none():
-    loads = [weighings_of(day(100.0, kg))[i].measured for kg in (100.0, 160.0) for i in (0, 1)]
-    same, other = probability(loads[0], loads[1], 0.5, RULES), probability(loads[2], loads[3], 0.5, RULES)
-    assert same < 0.1
-    assert other > 0.99
-
-
-def test_the_probability_is_bayes_own():
-    """By brute force: the same prior drawn, the same densities averaged."""
-    weighings = weighings_of(day(100.0, 128.0))
-    before, after = (one.measured for one in weighings)
-    rng = np.random.default_rng(1)
-    d = RULES.spread_kg * rng.standard_normal(2_000_000)
-    x_var, f_var = 2 * OWN_KG**2, 2 * OWN_PCT**2
-    share_var = f_var + (100.0 * 0.3 / RULES.mass_kg * d) ** 2
-    with_change = np.mean(np.exp(-0.5 * (28.0 - d) ** 2 / x_var) / np.sqrt(x_var) / np.sqrt(share_var))
-    without = np.exp(-0.5 * 28.0**2 / x_var) / np.sqrt(x_var) / np.sqrt(f_var)
-    factor = float(with_change / without)
-    assert probability(before, after, 0.5, RULES) == pytest.approx(factor / (1 + factor), abs=0.01)
 
 
 @pytest.mark.parametrize("kg", [300.0, 900.0])
@@ -169,7 +146,6 @@ def test_a_jump_without_a_stop_must_be_plain():
 
 def learned(one: Estimate, off_kg: float) -> Estimate:
     """As it is shown once a known weight has said that the vehicle weighs so much too heavy."""
-    assert one.posterior is not None
     shown = posterior(float(one.posterior.mean[0]) - off_kg)
     return replace(one.answered(shown), measured=one.posterior, known_weights_id="cd")
 

@@ -54,37 +54,19 @@ def test_the_covariance_is_that_of_own_and_of_every_column(one: Posterior) -> No
     assert variance == pytest.approx([one.std(i) ** 2 for i in range(one.size)])
 
 
-def test_draws_scatter_as_the_posterior_says() -> None:
-    rng = np.random.default_rng(1)
-    one = drawn(5)
-    z = {name: rng.standard_normal((200_000, len(columns))) for name, columns in one.sources.items()}
-    found = np.cov(samples(one, z, rng, 200_000).T)
-    scale = np.sqrt(np.diag(one.covariance))
-    assert found / np.outer(scale, scale) == pytest.approx(one.covariance / np.outer(scale, scale), abs=0.01)
+SLOPES = st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=2)
 
 
-@given(posteriors, st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=2), st.floats(0.0, 20.0))
-def test_a_linear_function_has_the_error_of_its_slopes(one: Posterior, slopes: list[float], beside: float) -> None:
+@given(posteriors, SLOPES, SLOPES, st.floats(0.0, 20.0))
+def test_a_linear_function_has_the_error_of_its_slopes(
+    one: Posterior, slopes: list[float], others: list[float], beside: float
+) -> None:
     found = one.linear(7.0, slopes, beside)
-    whole = np.r_[slopes, np.zeros(one.size - 2)]
+    whole, across = (np.r_[each, np.zeros(one.size - len(each))] for each in (slopes, others))
     assert found.number == 7.0
     assert found.std == pytest.approx(np.sqrt(whole @ one.covariance @ whole + beside**2), abs=1e-9)
     assert found.interval95 == pytest.approx((7.0 - Z95 * found.std, 7.0 + Z95 * found.std), abs=1e-6)
-    assert one.covariance_of(slopes, slopes) == pytest.approx(whole @ one.covariance @ whole, abs=1e-9)
-
-
-def test_a_linear_function_against_monte_carlo() -> None:
-    """The gross and the front axle weight of 1500 kg: L + M and (D / 100) (L + M)."""
-    rng = np.random.default_rng(2)
-    one = Posterior(
-        np.array([300.0, 48.0]), np.diag([36.0, 0.04]), {Source.DAY: np.array([[8.0, -0.2]]), Source.MODEL: np.eye(2)}
-    )
-    z = {name: rng.standard_normal((400_000, len(columns))) for name, columns in one.sources.items()}
-    payload, share = samples(one, z, rng, 400_000).T
-    front = one.linear(0.48 * 1500.0, [0.48, 15.0])
-    assert front.std == pytest.approx(np.std((1200.0 + payload) * share / 100.0), rel=0.01)
-    both = np.cov(1200.0 + payload, (1200.0 + payload) * share / 100.0)
-    assert one.covariance_of([1.0], [0.48, 15.0]) == pytest.approx(both[0, 1], rel=0.02)
+    assert one.covariance_of(slopes, others) == pytest.approx(whole @ one.covariance @ across, abs=1e-9)
 
 
 def test_what_hangs_on_an_unknown_place_is_unknown() -> None:
@@ -193,13 +175,6 @@ def test_a_batch_without_a_place_narrows_the_others_through_their_correlation() 
 def of_sources(payload_kg: float, own_kg: float, **columns: float) -> Posterior:
     by_source = {Source[name]: np.array([[kg, 0.0]]) for name, kg in columns.items()}
     return Posterior(np.array([payload_kg, 50.0]), np.diag([own_kg**2, 0.01]), by_source)
-
-
-def test_what_is_common_cancels_in_a_difference_and_own_errors_add() -> None:
-    one, other = (of_sources(kg, 6.0, CALIBRATION=30.0, MODEL=8.0) for kg in (200.0, 200.0))
-    mean, covariance = difference(one, other, is_one_load=True)
-    assert mean.tolist() == [0.0, 0.0]
-    assert np.sqrt(covariance[0, 0]) == pytest.approx(np.hypot(6.0, 6.0))
 
 
 def test_what_grows_with_the_load_stays_in_proportion_to_the_change() -> None:

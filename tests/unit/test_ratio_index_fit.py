@@ -77,8 +77,6 @@ def fit() -> RatioIndexFit:
 def test_unseen_loads_are_told_within_the_stated_spread(fit: RatioIndexFit) -> None:
     assert (fit.table.n_runs, len(fit.table.run)) == (7, 14)
     model, shares = fit.calibration.payload, fit.calibration.front_share
-    assert model is not None
-    assert shares is not None
     assert model.residual_std < 60.0  # the loads themselves spread by 160 kg
     n_covered = 0
     for i, (kg, pct) in enumerate([(50.0, 51.5), (225.0, 48.0), (320.0, 50.0), (425.0, 51.0)]):
@@ -144,7 +142,6 @@ def test_without_pitch_rate_the_payload_alone_is_told() -> None:
     ]
     for structure, terms in (("single", {"cbrt_ra"}), ("auto", {name for name in TERMS if "rg" not in name})):
         calibration = fit_ratio_index(silent, VAN, structure=structure).calibration
-        assert calibration.payload is not None
         assert set(calibration.payload.terms) <= terms
         assert (calibration.front_share, calibration.pitch_rate_bands) == (None, None)
 
@@ -181,9 +178,7 @@ def test_nested_errors_of_a_run_come_from_a_choice_made_without_it(fit: RatioInd
     out = RUNS[2]
     family = fit.chosen.choice.family
     without = fit_ratio_index([run for run in RUNS if run is not out], VAN, structure=family).calibration
-    assert without.payload is not None
     found = [without.payload.predict(*indexes_of(batch, without))[0] - out.payload_kg for batch in out.batches]
-    assert fit.payload_errors_kg is not None
     is_of_run = fit.table.number == out.number
     np.testing.assert_allclose(fit.payload_errors_kg[is_of_run], found, rtol=1e-9, atol=1e-7)
 

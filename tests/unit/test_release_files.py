@@ -103,7 +103,6 @@ def test_the_image_starts_a_command_that_exists_and_asks_an_address_that_answers
 @pytest.mark.parametrize("stage", of("FROM"))
 def test_the_image_has_the_python_that_the_locks_are_for(stage: str) -> None:
     found = re.match(r"python:(3\.\d+)-slim", stage)
-    assert found is not None
     assert found[1] == re.search(r"Python (3\.\d+)", (ROOT / "requirements.txt").read_text())[1]  # type: ignore[index]
 
 
@@ -161,7 +160,6 @@ def test_the_sandbox_scores_below_one_and_a_half_and_what_remains_is_explained()
         check=True,
     ).stdout
     score = re.search(r"exposure level for springscale.service: ([\d.]+)", report)
-    assert score is not None
     assert float(score[1]) <= 1.5
     explained = UNIT.partition("still counts, and why it stays:")[2]
     remaining = re.findall(r"^✗ (?:RootDirectory|\w+)", report, re.MULTILINE)

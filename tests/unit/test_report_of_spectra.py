@@ -37,8 +37,6 @@ def test_white_noise_has_the_density_of_its_variance() -> None:
     """Variance 1 over 25 Hz: 0.2 m/s2 per root hertz; a tenth of it for the pitch rate (Parseval)."""
     level = (1.0 / (RATE_HZ / 2.0)) ** 0.5
     a, g = density_of([white(1)], ACCELERATION), density_of([white(1)], PITCH_RATE)
-    assert a is not None
-    assert g is not None
     assert np.sqrt(np.mean(a.amplitude**2)) == pytest.approx(level, rel=0.02)
     assert np.sqrt(np.mean(g.amplitude**2)) == pytest.approx(0.1 * level, rel=0.02)
 
@@ -48,15 +46,12 @@ def test_limits_hold_the_true_density_95_times_in_100() -> None:
     held = []
     for seed in range(40):
         found = density_of([white(seed, 10_000)], ACCELERATION)
-        assert found is not None
         held.append(np.mean((found.low <= level) & (level <= found.high)))
     assert np.mean(held) == pytest.approx(0.95, abs=0.015)
 
 
 def test_batches_of_a_load_are_joined_and_none_is_none() -> None:
     one, two = density_of([white(1)], ACCELERATION), density_of([white(1), white(2)], ACCELERATION)
-    assert one is not None
-    assert two is not None
     assert two.n_segments == 2 * one.n_segments
     assert np.all(two.high / two.low < one.high / one.low)
     assert density_of([white(1, N_SEGMENT - 1)], ACCELERATION) is None
@@ -72,7 +67,6 @@ def known(number: int, payload_kg: float, share_pct: float) -> KnownRun:
 def test_a_curve_for_every_load_and_the_bands_where_they_are() -> None:
     runs = [known(1, 0.0, 52.0), known(2, 200.0, 50.0), known(3, 200.0, 47.0)]
     section = spectra_section(runs, ratio_index_calibration())
-    assert section is not None
     of_load, of_share = (chart.panels[0] for chart in section.charts)
     assert [mark.label for mark in of_load.marks if isinstance(mark, LineMark)] == ["0 kg", "200 kg"]
     assert [mark.label for mark in of_share.marks if isinstance(mark, LineMark)] == ["47.0 %", "50.0 %", "52.0 %"]
@@ -208,7 +202,6 @@ def test_varied_speeds_blur_the_wheelbase(seen: Spectra, calibration: CrossSpect
 def test_the_delays_of_a_batch_are_those_of_its_speed() -> None:
     batch = batch_over_road(0.0, 52.0, seed=4, duration_s=60.0, speed_mps=SPEED_MPS)
     spectra = cross_spectra_of([batch], Reading(VAN.wheelbase_m, (1.1, 14.0), 256))
-    assert spectra is not None
     assert spectra.delay_mean_s == pytest.approx(DELAY_S)
     assert spectra.delay_std_s == pytest.approx(0.0, abs=1e-9)
 

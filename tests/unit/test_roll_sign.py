@@ -55,7 +55,6 @@ def runs(
 
 def told(vehicle: Vehicle, split: list[SplitRun]) -> int:
     found = roll_sign_of([one.identification for one in split], vehicle)
-    assert found is not None
     assert found.why
     return found.sign
 
@@ -88,7 +87,6 @@ def test_it_is_not_guessed() -> None:
 def test_a_place_stated_on_the_wrong_side_contradicts_the_loads() -> None:
     other_side = replace(PLACED, sensor_offset_left_m=-0.35)
     found = roll_sign_of([one.identification for one in runs(PLACED, *LOADS)], other_side)
-    assert found is not None
     assert found.sign == 0
     assert "one of them is stated wrong" in found.why
 

@@ -9,13 +9,11 @@ from hypothesis import strategies as st
 from support.half_car_road import CAR
 from support.rolling_car import HALF_TRACK_M, ROLLING_CAR
 
-from gateway.core.cross_spectrum.model.half_car import Axle, frequency_response
+from gateway.core.cross_spectrum.model.half_car import frequency_response
 from gateway.core.cross_spectrum.model.rolling_car import (
-    Against,
     RollingCar,
     RollingResponse,
     SidewaysLoad,
-    roll_share_front,
     rolling_response,
 )
 from gateway.records import C128
@@ -92,24 +90,6 @@ def test_on_the_centre_line_it_is_the_half_car_and_roll_stands_apart(payload_kg:
         assert np.all(np.abs(against[2]) > 0.0)
 
 
-def test_against_each_other_tracks_drive_one_oscillator() -> None:
-    """Wheels without mass on rigid tyres: phi = k h / (k h^2 - Ix w^2), with k the springs, bars and dampers of both
-    axles.
-    """
-    front = Axle(60e3, 0.0, (), (), 3e3, STIFF, STIFF, 0.0)
-    rear = replace(front, spring_npm=50e3, damper_nspm=2e3)
-    body = replace(CAR, front=front, rear=rear)
-    car = square(replace(ROLLING_CAR, half_car=body, empty_left_m=0.0))
-    r = rolling_response(car, SidewaysLoad(0.0, CAR.empty_front_share, 0.0), FREQ_HZ)
-    bars = ROLLING_CAR.front.anti_roll_npm + ROLLING_CAR.rear.anti_roll_npm
-    rate = 60e3 + 50e3 + bars + 1j * OMEGA * (0.9 * 3e3 + 1.1 * 2e3)
-    roll = rate * HALF_TRACK_M / (rate * HALF_TRACK_M**2 - ROLLING_CAR.roll_inertia_kgm2 * OMEGA**2)
-    both = r.against_front + r.against_rear
-    np.testing.assert_allclose(both[2], 1j * OMEGA * roll, rtol=1e-6)
-    np.testing.assert_allclose(both[0], -(OMEGA**2) * ROLLING_CAR.sensor_left_m * roll, rtol=1e-6)
-    np.testing.assert_allclose(both[1], 0.0, atol=1e-9)
-
-
 @given(further_left_m=st.floats(-1.0, 1.0))
 def test_a_sensor_further_left_reads_so_much_more_of_the_roll_acceleration(further_left_m: float) -> None:
     car = square(ROLLING_CAR)
@@ -131,21 +111,3 @@ def test_the_side_that_carries_more_moves_more() -> None:
     np.testing.assert_allclose(lifted[2], -other[2])
     roll_per_heave = (lifted[2] / (1j * 2.0 * np.pi)) / (lifted[0] / -((2.0 * np.pi) ** 2))
     assert roll_per_heave[0].real > 0.0
-
-
-def test_axles_alike_share_a_moment_and_a_bar_takes_more() -> None:
-    alike = replace(ROLLING_CAR, half_car=replace(CAR, rear=CAR.front), rear=ROLLING_CAR.front)
-    empty = SidewaysLoad(0.0, CAR.empty_front_share, 0.02)
-    assert roll_share_front(alike, empty) == pytest.approx(0.5, rel=1e-12)
-    rigid = replace(CAR.front, tyre_npm=STIFF)
-    on_rigid = replace(alike, half_car=replace(CAR, front=rigid, rear=rigid), front=Against(31e3), rear=Against(0.0))
-    spring_npm = CAR.front.spring_npm
-    expected = (spring_npm + 31e3) / (2.0 * spring_npm + 31e3)
-    assert roll_share_front(on_rigid, empty) == pytest.approx(expected, rel=1e-6)
-
-
-def test_a_moment_lies_on_whichever_axle_has_springs() -> None:
-    """However stiff its bar, an axle on soft tyres takes no more than these let it."""
-    soft = replace(CAR.rear, tyre_npm=1e-3)
-    car = replace(ROLLING_CAR, half_car=replace(CAR, rear=soft), rear=Against(STIFF))
-    assert roll_share_front(car, LEFT) == pytest.approx(1.0, abs=1e-6)

@@ -167,7 +167,6 @@ def test_half_of_a_tls_configuration_is_refused(half: str, tmp_path: Path) -> No
 
 def test_tls_files_are_found_beside_the_configuration(tmp_path: Path) -> None:
     tls = tls_of(settings_of(tmp_path, TLS))
-    assert tls is not None
     assert (tls.certificate, tls.key, tls.client_ca) == (tmp_path / "web.pem", tmp_path / "web.key", None)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 from support.calibrated import calibration_file
+from support.configured import service_config
 from support.signing import Signer
 
 from gateway.cli import springscale
@@ -145,13 +146,8 @@ def config(tmp_path: Path) -> Path:
     dbc = Path(__file__).parents[2] / "dbc"
     shutil.copy(dbc / "springscale_reference.dbc", tmp_path)
     shutil.copy(dbc / "reference.toml", tmp_path / "map.toml")
-    (tmp_path / "vehicle.json").write_text(calibration_file().to_json())
-    path = tmp_path / "springscale.toml"
-    path.write_text(
-        'signals = "map.toml"\ncalibration = "vehicle.json"\nestimator = "ratio_index"\n'
-        '[bus]\ninterface = "virtual"\n[web]\nport = 0\n[store]\ndirectory = "state"\n'
-        f'[trust]\npublic_keys = ["{GARAGE.public_line}"]\n'
-    )
+    trust = f'[trust]\npublic_keys = ["{GARAGE.public_line}"]'
+    path = service_config(tmp_path, calibration_file().to_json(), trust, signals="map.toml", estimator="ratio_index")
     GARAGE.sign(path, *deciding(tmp_path))
     return path
 
@@ -226,12 +222,10 @@ def test_a_key_that_is_none_is_named(config: Path) -> None:
 def test_a_start_with_an_unsigned_calibration_takes_the_last_good_signed_copy(config: Path) -> None:
     settings = load_settings(config)
     good = setup_of(settings).calibration
-    assert good is not None
     keep_copy(settings, good)
     other = calibration_file(payload_kg=12.0)
     (config.parent / "vehicle.json").write_text(other.to_json())
     setup, fault = setup_or_last_good(settings)
-    assert setup.calibration is not None
     assert setup.calibration.id == good.id
     assert "vehicle.json: changed after it was signed" in str(fault)
     assert "last good copy" in str(fault)

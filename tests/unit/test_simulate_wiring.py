@@ -6,7 +6,7 @@ import cantools.database
 import numpy as np
 import pytest
 
-from gateway.bus.logs import motion_of_log, write_candump
+from gateway.bus.logs import write_candump
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
@@ -49,22 +49,6 @@ def test_what_goes_onto_the_bus_comes_back(name: str, recording: Recording) -> N
         assert len(decoded) == len(samples)
         assert np.max(np.abs(decoded - samples)) <= 0.5001 * signal_map.traits[signal].resolution
         assert np.all((decoded_t_ns - t_ns >= -1000) & (decoded_t_ns - t_ns < 1_000_000))
-
-
-@pytest.mark.parametrize("name", WIRED_MAPS)
-def test_a_candump_log_loses_nothing_on_the_way(name: str, recording: Recording, tmp_path: Path) -> None:
-    signal_map = load_signal_map(f"springscale:{name}")
-    frames = Wiring(name).frames_of(recording)
-    write_candump(frames, "can0", tmp_path / "can.log.gz")
-    chunks, report, _ = motion_of_log(tmp_path / "can.log.gz", signal_map)
-    parts = list(chunks)
-    read = Motion(
-        parts[0].signals, *(np.concatenate(c) for c in zip(*((p.t_ns, p.columns) for p in parts), strict=True))
-    )
-    direct = Decoder(signal_map).decode(frames)
-    assert report.wanted == len(frames)
-    assert np.array_equal(read.t_ns, direct.t_ns)
-    assert np.array_equal(read.columns, direct.columns, equal_nan=True)
 
 
 def test_cantools_reads_every_axis_as_it_was_recorded(recording: Recording) -> None:

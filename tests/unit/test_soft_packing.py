@@ -26,7 +26,6 @@ def calibration() -> CrossSpectrumCalibration:
 
 def of_model(found: Estimate) -> float:
     """Standard deviation of the payload by the model's own error."""
-    assert found.posterior is not None
     return float(np.linalg.norm(found.posterior.sources[Source.MODEL][:, 0]))
 
 

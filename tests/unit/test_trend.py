@@ -73,7 +73,6 @@ def test_a_damper_that_wears_is_told_with_how_much_and_since_when() -> None:
     wears = -0.5 * np.arange(26) + np.random.default_rng(1).normal(0.0, 1.0, 26)
     is_drifting, sentence = rear_of(wears)
     assert is_drifting
-    assert sentence is not None
     assert sentence.startswith("damper rear has drifted by -1")
     assert "since 2026-09-2" in sentence
 
@@ -108,7 +107,6 @@ def test_dampers_that_are_worn_are_told_after_two_hours() -> None:
     worn = -43.0 + np.random.default_rng(1).normal(0.0, 7.0, 24)
     is_off, sentence = level_of(worn)
     assert is_off
-    assert sentence is not None
     assert sentence.startswith("the rear dampers are 3")
     assert "% weaker than at calibration (" in sentence
     assert level_of(worn[:23]) == (False, None)
@@ -183,7 +181,6 @@ def test_what_found_nothing_is_passed_over() -> None:
     assert found_pct(replace(batch(0), diagnostics={})) is None
     assert found_pct(batch(0, float("nan"))) == {"damper_rear": 0.0, "delay": 0.0}
     misfit = found_pct(batch(0, 1.1, 1.0, Why.MODEL_MISFIT))  # a vehicle that drifted far is refused so
-    assert misfit is not None
     assert misfit["damper_front"] == pytest.approx(100.0 * math.log(1.1))
 
 

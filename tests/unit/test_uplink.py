@@ -260,7 +260,6 @@ def test_the_back_off_grows_to_its_ceiling_and_begins_anew() -> None:
 
 def test_settings_name_the_vehicle(tmp_path: Path) -> None:
     settings = uplink_settings(UplinkSection(host="fleet.example"), VehicleSection(id="van-17"))
-    assert settings is not None
     assert (settings.port, settings.topic, settings.client_id) == (8883, "springscale/van-17", "springscale-van-17")
     assert uplink_settings(UplinkSection(), VehicleSection()) is None
 

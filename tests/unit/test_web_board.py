@@ -163,7 +163,6 @@ def test_what_is_shown_is_the_same_before_and_after_a_restart(board: Board, cloc
     clock.now_s += 12.34
     before = board.shown()
     assert (before.estimate.payload.number, before.age_s, before.is_stale) == (333.333333, 12.3, False)
-    assert before.estimate is not None
     assert before.estimate.id == thirds.id
     again = Board(stale_after_s=900.0, clock=clock)
     again.restore(json.dumps(estimate_to_json(thirds)), None, age_s=12.34)

@@ -33,7 +33,6 @@ def path(tmp_path: Path) -> Path:
 def test_a_token_is_recognised_and_its_secret_is_not_kept(path: Path) -> None:
     text = TokenFile(path).create("fleet", Scope.READ)
     found = TokenFile(path).verify(text)
-    assert found is not None
     assert (found.name, found.scope) == ("fleet", Scope.READ)
     kept = path.read_text()
     assert text.split("_", 2)[2] not in kept
@@ -96,7 +95,9 @@ def test_names_are_unique_and_unknown_ones_are_said(path: Path) -> None:
         tokens.revoke("flet")
 
 
-@pytest.mark.parametrize("content", ["", "{", "[]", '{"format": "other", "version": 1}'])
+@pytest.mark.parametrize(
+    "content", ["", "{", "[]", "[" * 5000, '{"note": "\\ud83d"}', '{"format": "other", "version": 1}']
+)
 def test_a_file_that_cannot_be_read_lets_nobody_in(path: Path, content: str) -> None:
     tokens = TokenFile(path)
     text = tokens.create("fleet", Scope.READ)
@@ -214,7 +215,6 @@ def test_a_token_is_made_listed_and_revoked(config: Path) -> None:
     made = run(config, "create", "fleet", "--scope", "operate", "--days", "30")
     text = made.output.strip()
     token = TokenFile(config.parent / "state" / "tokens.json").verify(text)
-    assert token is not None
     assert token.expires_s == token.created_s + 30 * 86_400
 
     listed = json.loads(run(config, "list", "--json").output)

@@ -108,13 +108,11 @@ def secret_file(tmp_path: Path) -> Path:
 def test_an_address_in_its_parts(secret_file: Path) -> None:
     section = WebhookSection(url="https://fleet.example:8443/hooks/van?key=abc", secret_file=secret_file)
     settings = webhook_settings(section, VAN)
-    assert settings is not None
     assert (settings.receiver, settings.path) == ("https://fleet.example:8443", "/hooks/van?key=abc")
     assert settings.kinds == ("alarm", "event")
     assert "abc" not in settings.queue
     assert webhook_settings(WebhookSection(), VAN) is None
     elsewhere = webhook_settings(section.model_copy(update={"url": "https://fleet.example:8443/other"}), VAN)
-    assert elsewhere is not None
     assert elsewhere.queue != settings.queue
 
 

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from support.archive import write_manifest
 from support.calibrated import calibration_text
+from support.configured import service_config
 from support.estimates import make_estimate, posterior_of
 from support.web import Client, Gateway
 
@@ -87,14 +88,8 @@ def test_what_is_stated_stands_before_the_vehicles_own() -> None:
 def configured(folder: Path, vehicle: str = "") -> Path:
     """springscale.toml beside a calibration that allows 2000 kg, and nothing else."""
     folder.mkdir(exist_ok=True)
-    (folder / "vehicle.json").write_text(calibration_text(rear_axle_limit_kg=1100.0, **UNSPRUNG))
-    state = f'[store]\ndirectory = "{folder / "state"}"\n'
-    path = folder / "springscale.toml"
-    path.write_text(
-        'signals = "springscale:reference"\ncalibration = "vehicle.json"\nestimator = "ratio_index"\n'
-        f'{state}[bus]\ninterface = "virtual"\n[vehicle]\nid = "van-17"\n{vehicle}'
-    )
-    return path
+    calibration = calibration_text(rear_axle_limit_kg=1100.0, **UNSPRUNG)
+    return service_config(folder, calibration, f'[vehicle]\nid = "van-17"\n{vehicle}', estimator="ratio_index")
 
 
 def loaded(folder: Path, vehicle: str = "") -> Setup:
@@ -103,16 +98,13 @@ def loaded(folder: Path, vehicle: str = "") -> Setup:
 
 def batch(setup: Setup) -> Estimate:
     """500 kg aboard, a little more of all on the rear axle: 1900 kg gross, 940 kg on the rear axle."""
-    assert setup.calibrated is not None
     return weighed(make_estimate(1).answered(posterior_of(500.0, 50.575, 6.0, 0.1)), setup.calibrated.vehicle)
 
 
 def test_settings_stand_before_the_calibration_which_stands_where_they_say_nothing(tmp_path: Path) -> None:
     as_calibrated = loaded(tmp_path / "a")
-    assert as_calibrated.calibrated is not None
     assert Limits.of(as_calibrated.calibrated.vehicle) == Limits(gross_limit_kg=2000.0, rear_axle_limit_kg=1100.0)
     as_set = loaded(tmp_path / "b", "gross_limit_kg = 1850.0\nfront_wheel_limit_kg = 500.0")
-    assert as_set.calibrated is not None
     assert Limits.of(as_set.calibrated.vehicle) == Limits(
         gross_limit_kg=1850.0, rear_axle_limit_kg=1100.0, front_wheel_limit_kg=500.0
     )
@@ -188,7 +180,6 @@ def test_an_archive_is_judged_by_its_manifests_limits(tmp_path: Path) -> None:
     one, other = load_manifest(str(path)).assignments
     assert one.setup.limits == Limits(gross_limit_kg=1850.0)
     assert other.setup.limits == Limits(gross_limit_kg=1850.0, rear_axle_limit_kg=900.0)
-    assert other.setup.calibrated is not None
     assert other.setup.calibrated.vehicle.rear_axle_limit_kg == 900.0
 
 
@@ -196,7 +187,6 @@ def test_in_python_limits_are_given_by_name(tmp_path: Path) -> None:
     configured(tmp_path)
     limits = Limits(gross_limit_kg=1850.0)
     setup = load_setup("springscale:reference", tmp_path / "vehicle.json", "ratio_index", limits=limits)
-    assert setup.calibrated is not None
     assert setup.calibrated.vehicle.gross_limit_kg == 1850.0
 
 
@@ -340,7 +330,9 @@ def errors(of: Callable[[State], tuple[float, ...]]) -> NDArray[np.float64]:
 @pytest.mark.parametrize("name", PLACES)
 def test_a_weight_is_as_sure_as_what_it_hangs_on(name: str) -> None:
     [[variance]] = errors(lambda state: (getattr(weights(state), name).kg,))
-    assert getattr(weights(State()), name).std_kg == pytest.approx(math.sqrt(variance), rel=1e-6)
+    found, std_kg = getattr(weights(State()), name), math.sqrt(variance)
+    assert found.std_kg == pytest.approx(std_kg, rel=1e-6)
+    assert found.interval95_kg == pytest.approx((found.kg - Z95 * std_kg, found.kg + Z95 * std_kg), rel=1e-6)
 
 
 def test_a_place_is_as_sure_as_what_it_hangs_on_along_across_and_together() -> None:
