@@ -18,7 +18,6 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.late import special
 from gateway.core.vehicle import Vehicle
 from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, difference
 from gateway.quantity import Quantity
@@ -57,7 +56,9 @@ def probability(before: Posterior, after: Posterior, prior: float, rules: Rules)
 
     It adds logarithms of odds: after several short stops the prior rounds to 1, and its odds are infinite.
     """
-    return float(special.expit(special.logit(prior) + _log_bayes_factor(before, after, rules)))
+    with np.errstate(divide="ignore"):
+        log_odds = np.log(prior) - np.log1p(-prior) + _log_bayes_factor(before, after, rules)
+    return float(np.exp(-np.logaddexp(0.0, -log_odds)))
 
 
 def change_of(before: Posterior, after: Posterior) -> Quantity:

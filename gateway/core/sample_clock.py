@@ -19,7 +19,6 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.late import ndimage
 from gateway.records import F64, I64, Bool
 from gateway.units import NS_PER_S
 
@@ -167,8 +166,8 @@ def _numbered(t_s: F64, period_s: float) -> I64 | None:
     for _ in range(ROUNDS):
         least_s = _least_ahead(t_s - place * period_s)
         turn = np.exp(2j * np.pi / period_s * least_s)  # whole periods do not turn it
-        slow = ndimage.uniform_filter1d(turn.real, SLOWLY) + 1j * ndimage.uniform_filter1d(turn.imag, SLOWLY)
-        drift_s = np.unwrap(np.angle(slow)) * (period_s / (2.0 * np.pi))
+        sums = np.cumsum(np.pad(turn, (SLOWLY // 2 + 1, SLOWLY // 2 - 1), mode="symmetric"))
+        drift_s = np.unwrap(np.angle(sums[SLOWLY:] - sums[:-SLOWLY])) * (period_s / (2.0 * np.pi))
         lost = (least_s - drift_s) / period_s
         whole = np.rint(lost)
         period_s += float(np.polyfit(place, drift_s, 1)[0])
@@ -180,7 +179,12 @@ def _numbered(t_s: F64, period_s: float) -> I64 | None:
 
 def _least_ahead(late_s: F64) -> F64:
     """(n,) the minimum over each sample and those after it, AHEAD in all."""
-    return np.asarray(ndimage.minimum_filter1d(late_s, AHEAD, mode="nearest", origin=-(AHEAD // 2)), float)
+    least_s, reach = np.concatenate([late_s, np.full(AHEAD - 1, np.inf)]), 1
+    while reach < AHEAD:
+        step = min(reach, AHEAD - reach)
+        least_s = np.minimum(least_s[:-step], least_s[step:])
+        reach += step
+    return least_s
 
 
 def _timing_by(counter: I64, modulus: int, t_ns: I64, mean_s: float) -> Timing | None:

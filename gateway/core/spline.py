@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.late import linalg
+from gateway.core.tridiagonal import solve_tridiagonal
 from gateway.records import F64
 
 MOST_END_SLOPE: Final = (
@@ -37,14 +37,15 @@ def smooth_slopes(t: F64, x: F64) -> F64:
     """
     step, chord = np.diff(t), np.diff(x) / np.diff(t)
     first, last = t[2] - t[0], t[-1] - t[-3]
-    bands, right = np.zeros((3, len(t))), np.empty(len(t))
-    bands[0, 1], bands[0, 2:] = first, step[:-1]
-    bands[1, 0], bands[1, 1:-1], bands[1, -1] = step[1], 2.0 * (step[:-1] + step[1:]), step[-2]
-    bands[2, :-2], bands[2, -2] = step[1:], last
-    right[1:-1] = 3.0 * (step[1:] * chord[:-1] + step[:-1] * chord[1:])
-    right[0] = ((step[0] + 2.0 * first) * step[1] * chord[0] + step[0] ** 2 * chord[1]) / first
-    right[-1] = (step[-1] ** 2 * chord[-2] + (2.0 * last + step[-1]) * step[-2] * chord[-1]) / last
-    return np.asarray(linalg.solve_banded((1, 1), bands, right, overwrite_ab=True, overwrite_b=True), float)
+    diagonal, right = 2.0 * (step[:-1] + step[1:]), 3.0 * (step[1:] * chord[:-1] + step[:-1] * chord[1:])
+    # The outermost two equations, step[1] s[0] + first s[1] = begin and likewise at the end, put into their neighbours.
+    begin = ((step[0] + 2.0 * first) * step[1] * chord[0] + step[0] ** 2 * chord[1]) / first
+    end = (step[-1] ** 2 * chord[-2] + (2.0 * last + step[-1]) * step[-2] * chord[-1]) / last
+    diagonal[[0, -1]] -= first, last
+    right[[0, -1]] -= begin, end
+    inner = solve_tridiagonal(np.r_[0.0, step[2:]], diagonal, np.r_[step[:-2], 0.0], right)
+    outer = (begin - first * inner[0]) / step[1], (end - last * inner[-1]) / step[-2]
+    return np.concatenate([outer[:1], inner, outer[1:]])
 
 
 def monotone_slopes(t: F64, x: F64) -> F64:

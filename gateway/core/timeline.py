@@ -4,7 +4,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from gateway.core.late import ndimage
 from gateway.core.spline import between, smooth_slopes
 from gateway.records import F64, I64, Bool
 from gateway.units import NS_PER_S
@@ -96,7 +95,8 @@ def _low_pass(fine: F64, step: int, rate_hz: float) -> F64:
     known = np.where(unknown, 0.0, fine)
     padded = np.concatenate([2 * known[0] - known[half:0:-1], known, 2 * known[-1] - known[-2 : -half - 2 : -1]])
     smooth = np.convolve(padded, taps, mode="valid")
-    touched = ndimage.maximum_filter1d(unknown.astype(np.uint8), 2 * half + 1, mode="constant")
+    n_before = np.cumsum(np.pad(unknown, (half + 1, half)))
+    touched = n_before[2 * half + 1 :] > n_before[: -2 * half - 1]
     return np.where(touched, np.nan, smooth)
 
 

@@ -100,6 +100,30 @@ def test_the_service_starts_without_what_it_does_not_need():
     assert not set(HEAVY) & set(loaded)
 
 
+WEIGHED = """
+import sys
+from benchmarks.speed.meter import CALIBRATION
+from gateway.bus.signals import Decoder
+from gateway.core.settings import BatchSettings
+from gateway.setup import load_setup
+from gateway.workbench.simulate import demo_drive, frames_of
+
+setup, frames = load_setup("springscale:reference", CALIBRATION), frames_of(demo_drive())
+for name in [name for name in sys.modules if name.partition(".")[0] == "scipy"]:
+    sys.modules[name] = None  # what the simulator took; from now on an import fails
+flow = setup.flow(BatchSettings())
+found = [*flow.feed(Decoder(setup.signal_map).decode(frames)), *flow.flush()]
+print(sum(one.counted for one in found))
+"""
+
+
+def test_weighing_needs_no_scipy() -> None:
+    """It held a fifth of a service's memory."""
+    command = [sys.executable, "-c", WEIGHED]
+    said = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=True).stdout
+    assert int(said) > 3
+
+
 FITTING = ("gateway.calibration.half_car", "gateway.calibration.ratio_index", "gateway.calibration.line")
 
 

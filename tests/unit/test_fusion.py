@@ -172,6 +172,15 @@ def test_equal_loads_are_no_change(kg: float, share_pct: float, correlation: flo
     assert probability(one, one, ROLLING, RULES) < 0.001
 
 
+@pytest.mark.parametrize("prior", [0.0, 1.0])
+def test_what_is_certain_before_stays_certain(prior: float) -> None:
+    assert (
+        probability(load(300.0), load(900.0), prior, RULES)
+        == probability(load(300.0), load(300.0), prior, RULES)
+        == prior
+    )
+
+
 @given(st.floats(-150.0, 150.0), st.floats(0.001, 0.999))
 def test_more_prior_is_more_posterior(change_kg: float, prior: float) -> None:
     pair = load(300.0), load(300.0 + change_kg)

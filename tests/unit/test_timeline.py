@@ -5,10 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.linalg import solve_banded
 
 from gateway.core.memoized import memoized
 from gateway.core.spline import between, monotone_slopes, smooth_slopes
 from gateway.core.timeline import onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
+from gateway.core.tridiagonal import solve_tridiagonal
 from gateway.records import F64, I64
 
 T0_NS = 1_790_000_000_000_000_000
@@ -144,6 +146,17 @@ def test_a_smooth_curve_is_the_cubic_spline(n: int, seed: int) -> None:
     t, x = np.cumsum(rng.uniform(0.5, 2.0, n)), rng.standard_normal(n)
     at = rng.uniform(t[0], t[-1], 50)
     np.testing.assert_allclose(between(at, t, x, smooth_slopes(t, x)), CubicSpline(t, x)(at), rtol=1e-9, atol=1e-9)
+
+
+@given(n=st.one_of(st.integers(1, 40), st.just(3000)), seed=seeds)
+def test_a_tridiagonal_system_is_solved_as_scipy_does(n: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    below, above, right = rng.uniform(-1.0, 1.0, (3, n))
+    below[0] = above[-1] = 0.0
+    diagonal = rng.choice([-1.0, 1.0], n) * (np.abs(below) + np.abs(above) + rng.uniform(0.01, 1.0, n))
+    bands = np.array([np.roll(above, 1), diagonal, np.roll(below, -1)])
+    expected = solve_banded((1, 1), bands, right)
+    np.testing.assert_allclose(solve_tridiagonal(below, diagonal, above, right), expected, rtol=1e-9, atol=1e-9)
 
 
 @given(n=st.integers(2, 12), seed=seeds)

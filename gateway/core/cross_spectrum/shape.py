@@ -5,6 +5,7 @@ than their statistics suggest, because the half-car has errors too: the evidence
 distribution of the payload, because a load can be much longer than a compact one but hardly shorter.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -12,7 +13,6 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cargo import ShapePrior
-from gateway.core.late import special
 from gateway.core.spline import between, monotone_slopes
 from gateway.posterior import NORMAL_TAILS
 from gateway.records import F64
@@ -32,6 +32,7 @@ EVIDENCE_DOF: Final = 4.0
 contradicts stays possible (K. L. Lange, R. J. A. Little and J. M. G. Taylor, J. Am. Stat. Assoc. 84 (1989) 881-896).
 """
 LEAST_PROBABILITY: Final = 1e-3  # chosen: of a shape worth weighing, in prior and posterior
+LEAST_ERFC: Final = -37.0  # chosen: erfc of a number further below is 0 in a double
 POINTS: Final = (0.025, 0.5, 0.975)  # a 95 % interval and the median
 
 
@@ -59,7 +60,7 @@ class Node:
     @property
     def improbable(self) -> float:
         """Minus the logarithm of how probable a load of this mass is: one that is less than nothing has no shape."""
-        return -float(special.log_ndtr(self.x[-2] / self.own_std_kg + 2.0))
+        return -log_normal_probability(self.x[-2] / self.own_std_kg + 2.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,6 +122,13 @@ def shaped(
     is_converged = founds[best].is_converged
     [x] = between(np.array([mean_log_s]), nodes, answers, slopes)
     return Shaped(mean_log_s, x, load, column, tails, goods_part, likeliest, is_converged)
+
+
+def log_normal_probability(z: float) -> float:
+    """Logarithm of the standard normal distribution function; far below 0 by its asymptotic series (DLMF 7.12.1)."""
+    if z > LEAST_ERFC:
+        return math.log(0.5 * math.erfc(-z / math.sqrt(2.0)))
+    return -0.5 * z**2 - math.log(-z * math.sqrt(2.0 * math.pi)) + math.log1p(-(z**-2.0) + 3.0 * z**-4.0)
 
 
 def _profile(

@@ -29,8 +29,7 @@ from gateway.core.cross_spectrum.model.parameters import (
     value_of,
 )
 from gateway.core.cross_spectrum.model.rolling_car import SidewaysLoad, rolling_numbers
-from gateway.core.late import special
-from gateway.core.memoized import memoized
+from gateway.core.cross_spectrum.model.tracks import coherence_of
 from gateway.records import C128, F64
 
 Paths = tuple[C128, ...]
@@ -156,22 +155,6 @@ def along(apart_m: F64, model: SpectralModel, spectra: CrossSpectra) -> F64:
     per_metre = spectra.freq_hz * spectra.delay_s / model.wheelbase_m
     x: F64 = 2.0 * np.pi * per_metre * apart_m[..., None, :]
     return x
-
-
-@memoized
-def coherence_of(x: F64) -> F64:
-    """Of two parallel tracks that lie ``x`` apart (:func:`along`), on a road that is alike in all directions, of
-    displacement density n^-2: x K1(x) (K. M. A. Kamash and J. D. Robson, J. Sound Vib. 57, 1978).
-    """
-    coherence: F64 = x * special.k1(x)
-    return coherence
-
-
-@memoized
-def coherence_slope_of(x: F64) -> F64:
-    """Its derivative by log x, -x^2 K0(x)."""
-    slope: F64 = -(x**2) * special.k0(x)
-    return slope
 
 
 def _twist(model: SpectralModel, spectra: CrossSpectra) -> F64 | None:

@@ -12,8 +12,6 @@ from gateway.core.cross_spectrum.model.driven import (
     SpectralModel,
     along,
     are_in_motion,
-    coherence_of,
-    coherence_slope_of,
     driven,
     numbers_about,
     spectral_model,
@@ -29,6 +27,7 @@ from gateway.core.cross_spectrum.model.parameters import (
     Ground,
     slack_weights,
 )
+from gateway.core.cross_spectrum.model.tracks import coherence_of, coherence_slope_of
 from gateway.records import C128, F64
 
 _OF_ROAD: Final = frozenset(
