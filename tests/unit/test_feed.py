@@ -22,8 +22,6 @@ from gateway.bus.feed.feeder import Numbering
 from gateway.bus.frames import frames_of
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.cli import springscale
-from gateway.cli.feed import SILENT_S
-from gateway.cli.feed import feed as feed_command
 from gateway.core.sample_clock import sample_times
 from gateway.errors import BusError, ConfigurationError
 from gateway.records import Motion, Signal
@@ -298,15 +296,3 @@ def test_the_command_tells_what_it_did_and_that_the_wrong_axis_is_up(tmp_path: P
     assert "name it by --up" in result.stderr
     empty = CliRunner().invoke(springscale, ["feed", *options[:6], "--sysfs", str(tmp_path / "none")])
     assert "nothing to send" in str(empty.exception)
-
-
-def test_the_unit_calls_the_command_as_it_is() -> None:
-    unit = (Path(__file__).parents[2] / "deploy/springscale-feed.service").read_text()
-    started = next(line for line in unit.splitlines() if line.startswith("ExecStart="))
-    filled = started.replace("${FEED_INTERFACE}", "socketcan").replace("${FEED_CHANNEL}", "vcan0")
-    program, name, *options = filled.removeprefix("ExecStart=").replace("$FEED_OPTIONS", "--forward -y --up z").split()
-    assert (program, name) == ("/usr/bin/springscale", "feed")
-    parsed = feed_command.make_context("feed", options)
-    assert parsed.params["forward"] == "-y"
-    assert "Type=notify" in unit
-    assert f"WatchdogSec={int(3 * SILENT_S)}" in unit

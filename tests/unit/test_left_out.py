@@ -1,4 +1,4 @@
-"""Runs left out of a fit: the errors of the calibration file, the error of the model, and the limit of the misfit."""
+"""Runs left out of a fit: errors of the file and of the model, the limit of the misfit, how far a load lies beyond."""
 
 import math
 from dataclasses import replace
@@ -29,7 +29,9 @@ from gateway.calibration.judgement.assessment import judged_left_out
 from gateway.calibration.ratio_index.regression import fit_regression
 from gateway.calibration.ratio_index.table import index_rows
 from gateway.core.cross_spectrum.estimator import MISFIT_ON_OTHER_ROADS, MISFIT_QUANTILE, most_misfit_at
+from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Load
 from gateway.offline.campaigns import calibrate
 from gateway.quantity import Z95
 
@@ -182,3 +184,42 @@ def test_stated_intervals_hold_new_errors_of_the_same_vehicle() -> None:
         found = model_error([RunError(error, np.zeros(3), 0.0) for error in errors[1:]], EMPTY_KG)
         held.append(abs(errors[0, 0]) <= Z95 * found.std[0])
     assert np.mean(held) == pytest.approx(0.95, abs=0.015)
+
+
+ROUND_KG = 1000.0
+
+
+def placed(front_kg: float, rear_kg: float) -> Load:
+    """The load of a vehicle that presses so on its axles."""
+    whole_kg = front_kg + rear_kg
+    return Load(whole_kg - ROUND_KG, 100.0 * front_kg / whole_kg)
+
+
+TRIANGLE = [placed(500, 500), placed(500, 900), placed(900, 500)]
+
+
+@given(st.tuples(*[st.floats(0.02, 1.0)] * 3))
+def test_a_mixture_of_known_loads_is_not_beyond_them(parts: tuple[float, float, float]) -> None:
+    share = np.array(parts) / sum(parts)
+    front_kg = float(share @ [500, 500, 900])
+    rear_kg = float(share @ [500, 900, 500])
+    assert beyond(placed(front_kg, rear_kg), TRIANGLE, ROUND_KG) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("load", "distance"),
+    [
+        (placed(400, 500), 0.1),  # 100 kg off the edge of 1000
+        (placed(500, 1000), 0.1),
+        (placed(900, 900), 0.4 / np.sqrt(2.0)),  # off the hypotenuse
+        (placed(470, 460), 0.05),  # off the corner: 30 and 40 kg
+    ],
+)
+def test_the_distance_is_that_in_the_plane_of_axle_loads(load: Load, distance: float) -> None:
+    assert beyond(load, TRIANGLE, ROUND_KG) == pytest.approx(distance, rel=1e-3)
+
+
+def test_a_single_load_and_loads_in_a_row_have_distances_too() -> None:
+    assert beyond(placed(530, 540), TRIANGLE[:1], ROUND_KG) == pytest.approx(0.05, rel=1e-3)
+    assert beyond(placed(600, 700), TRIANGLE[:2], ROUND_KG) == pytest.approx(0.1, rel=1e-3)
+    assert beyond(placed(530, 540), [], ROUND_KG) == 0.0

@@ -24,7 +24,6 @@ from support.days import (
 
 from gateway.core.change import change_of
 from gateway.core.events import ledger
-from gateway.core.events import ledger as of_ledger
 from gateway.core.events.entry import Entry
 from gateway.core.events.ledger import Ledger
 from gateway.estimate import Estimate, Place, Stop, Watched
@@ -169,19 +168,6 @@ def test_a_refused_batch_takes_no_known_weight_back():
 def test_another_calibration_is_compared_with_none():
     first, second = day(300.0, 100.0)
     assert not events([first, replace(second, calibration_id="sha256:2")])
-
-
-def test_a_restart_in_the_middle_goes_on_as_if_it_had_not_been():
-    assert_a_restart_changes_nothing(day(0.0, 500.0, 500.0, 320.0, 200.0, batches=2))
-
-
-def test_what_is_old_stays_as_it_was_told(monkeypatch):
-    monkeypatch.setattr(of_ledger, "SETTLED", 30)
-    whole = day(400.0, 300.0, *[300.0] * 60)
-    ledger = Ledger(RULES)
-    revisions = [(n, e) for n, one in enumerate(whole) for e in ledger.add(one) if e.kind == "event"]
-    assert len({e.id for _, e in revisions}) == 1
-    assert max(n for n, _ in revisions) <= 31
 
 
 def test_a_load_after_a_long_rest_is_told_and_the_trip_before_it_is_over():

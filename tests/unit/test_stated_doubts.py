@@ -1,12 +1,16 @@
 """Answers that are unlikely, or that a drive contradicts: asked about, with what was probably meant."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic import TypeAdapter, ValidationError
 from support.half_car_road import CAR, VAN
 from support.known_runs import SIBLING, calibrated_on_loads, known_run
 
+from benchmarks.accuracy.false_facts import FALSE, Fact
 from gateway.calibration.commissioning.answers import LineFacts, doubts_of
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.half_car.fit import fit_cross_spectrum
@@ -198,3 +202,39 @@ def test_a_sensor_elsewhere_is_found(line: Line, empty: KnownRun) -> None:
 def test_another_model_is_not_of_the_line(line: Line) -> None:
     found = kinds(doubted(known_run(1, 0.0, None, seed=9, car=OTHER_MODEL), line))
     assert set(found) & {DoubtKind.DRIVEN_LINE, DoubtKind.DRIVEN_WEIGHT}
+
+
+DOCS = Path(__file__).parents[2] / "docs"
+TRUTH = {
+    "kerb_front_axle_kg": 860.0,
+    "kerb_rear_axle_kg": 540.0,
+    "wheelbase_m": 2.75,
+    "sensor_position_m": 3.2,
+    "sensor_offset_left_m": 0.2,
+    "track_width_m": 1.5,
+}
+BY_DRIVING = ("aboard", "of another model", "exchanged", "laden", "15 %", "10 %", "half a metre")
+
+
+def is_asked_about(fact: Fact) -> bool:
+    try:
+        return bool(doubts_of(TypeAdapter(VehicleAnswers).validate_python(fact.falsify(dict(TRUTH)))))
+    except ValidationError:
+        return True
+
+
+def test_there_are_twenty_and_the_truth_is_none_of_them() -> None:
+    assert len({fact.words for fact in FALSE}) == 20
+    assert not is_asked_about(Fact("true"))
+
+
+@pytest.mark.parametrize(
+    "fact", [fact for fact in FALSE if not any(word in fact.words for word in BY_DRIVING)], ids=lambda fact: fact.words
+)
+def test_what_no_vehicle_is_like_is_caught_before_any_drive(fact: Fact) -> None:
+    assert is_asked_about(fact)
+
+
+def test_the_study_tried_each_of_them() -> None:
+    found = json.loads((DOCS / "false-facts.json").read_text())
+    assert [row["words"] for row in found["rows"]] == [fact.words for fact in FALSE]
