@@ -12,6 +12,7 @@ within ROAD_RIPPLE.
 """
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -124,6 +125,14 @@ class Whittle:
         self._searched: tuple[int, ...] = ()  # a search's few entries: those for which slopes will be asked again
         self._curvatures: dict[tuple[bytes, tuple[float, ...], tuple[int, ...]], Curvature] = {}
 
+    def showing(self, spectra: CrossSpectra) -> "Whittle":
+        """The likelihood of other measurements of the same drive. It shares the model as last solved."""
+        other = copy(self)
+        other.spectra, other._seen, other._curvatures = spectra, spectra.matrix, {}
+        if (last := self._last) is not None:
+            other._last = _Whitened(last.point, last.solved, last.by, last.by(other._seen))
+        return other
+
     def cost(self, point: Point) -> float:
         """Negative log-likelihood, up to a constant."""
         whitened = self._whitened(point)
@@ -166,15 +175,16 @@ class Whittle:
             self._curvatures[key] = self._curvature(point, free)
         return self._curvatures[key]
 
-    def curvature_beside(self, point: Point, free: Sequence[int], by_level: Callable[[Motion], C128]) -> Curvature:
-        """Derivatives by the ``free`` entries, then by further causes of which ``by_level`` gives the derivatives of
-        the paths (5, k, p, s, m).
+    def curvature_beside(
+        self, point: Point, free: Sequence[int], by_level: Callable[[Motion], C128]
+    ) -> tuple[Curvature, F64]:
+        """Derivatives by further causes of which ``by_level`` gives the derivatives of the paths (5, k, p, s, m), and
+        their information (k, n) together with the ``free`` entries.
         """
         z = self._whitened(point)
-        rows = self._rows(z, free)
-        asked = [z.known.index(entry) for entry in free]
-        slopes = slopes_of_paths(z.solved, self.spectra, by_level(z.solved.model.motion))
-        return self._curvature_of(z, np.concatenate([rows[:, asked], self._whitened_rows(z, slopes)], axis=1))
+        rows, asked = self._rows(z, free), [z.known.index(entry) for entry in free]
+        beside = self._whitened_rows(z, slopes_of_paths(z.solved, self.spectra, by_level(z.solved.model.motion)))
+        return self._curvature_of(z, beside), self._information(beside, rows)[:, asked]
 
     def _curvature(self, point: Point, free: Sequence[int]) -> Curvature:
         z = self._whitened(point)
@@ -184,14 +194,21 @@ class Whittle:
 
     def _curvature_of(self, z: _Whitened, rows: F64) -> Curvature:
         """From the slopes (b m p^2, k) of the residuals."""
+        return Curvature(self._residual(z) @ rows, self._information(rows, rows))
+
+    def _residual(self, z: _Whitened) -> F64:
+        """(b m p^2,)"""
         level, x = self._root_level_weight * _centred(np.log(z.trace / self._p)), self._root_level_weight * self._slope
         shape = _traceless(z.seen) * (-self._p / z.trace * np.sqrt(self._n))
-        residual = np.stack([*shape, level], axis=-1)
-        along = float(np.sum(x * level)) / self._level_stiffness
-        residual[..., -1] -= along * x
-        d_along = np.tensordot(x, rows.reshape(*residual.shape, -1)[:, :, -1], 2)
-        information = rows.T @ rows - np.outer(d_along, d_along) / self._level_stiffness
-        return Curvature(residual.ravel() @ rows, information)
+        level -= float(np.sum(x * level)) / self._level_stiffness * x
+        return np.stack([*shape, level], axis=-1).ravel()
+
+    def _information(self, rows: F64, others: F64) -> F64:
+        """(k, l) from two sets of slopes (b m p^2, k) and (b m p^2, l) of the residuals."""
+        x = (self._root_level_weight * self._slope).ravel()
+        along, other = (x @ some[self._p**2 - 1 :: self._p**2] for some in (rows, others))
+        information: F64 = rows.T @ others - np.outer(along, other) / self._level_stiffness
+        return information
 
     def _rows(self, z: _Whitened, free: Sequence[int]) -> F64:
         """(b m p^2, k) the residuals' slopes at a point, extended by those of ``free``.

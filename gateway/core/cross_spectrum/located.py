@@ -215,9 +215,9 @@ def answer_at(
     narrowing = np.eye(len(t)) + evidence * nature @ information
     posterior = np.linalg.solve(narrowing, nature)
     step = -evidence * posterior @ gradient
-    steady = np.zeros((len(along), len(STEADY)))
-    steady[:, free] = along @ np.linalg.inv(narrowing)  # S_posterior S^-1
     by_noise = along @ posterior * evidence
+    steady = np.zeros((len(along), len(STEADY)))
+    steady[:, free] = along - by_noise @ information  # along S_posterior S^-1
     to_peak = -covariance @ pull
     at_peak = whittle.cost(point) + 0.5 * float(off @ prior.precision @ off + pull @ to_peak)
     return Answer(
@@ -303,8 +303,9 @@ def _located(
     if shape is None:
         x = x + np.r_[np.zeros(len(DRIFTING)), at.shift[-2:]]
         point = _point(x, calibration, cg_left_m)
-    whole, found = at.whole, at.covariance
+    found = at.covariance
     day = day_columns(found, at.steady, prior.precision)
+    moved_by_gain = gain_moves(at.whole, whittle, point, found)
     columns = {
         Source.DAY: day[:, -2:],
         Source.LOAD_LENGTH: packing_columns(found, prior.precision)[:, -2:],
@@ -327,7 +328,7 @@ def _located(
         columns=columns,
         drifted=day[:, :-2],
         tails=NORMAL_TAILS if shape is None else shape.tails,
-        gain_moves=gain_moves(whole, whittle, point, found)[-2:],
+        gain_moves=moved_by_gain[-2:],
         rival_covariance=peak.rivals,
         misfit=misfit,
         tension=min(
@@ -360,12 +361,13 @@ def _is_reversed(whittle: Whittle, point: Point, misfit: float, calibration: Cro
 
     Spectra with the wrong sign may lead the search to a load where neither sign fits.
     """
-    reverse = Whittle(whittle.spectra.with_pitch_reversed(), calibration.ground)
-    tried = [point]
+    reverse = whittle.showing(whittle.spectra.with_pitch_reversed())
+    least = reverse.cost(point)
     if not misfit <= calibration.misfit_limit:
-        usual = calibration.parameters[DRIFTING]
-        tried += [_point(np.r_[usual, load], calibration, point.cg_left_m) for load in _starting_loads(calibration)]
-    return float(reverse.costs(tried).min()) < whittle.cost(point)
+        usual, loads = calibration.parameters[DRIFTING], _starting_loads(calibration)
+        starts = [_point(np.r_[usual, load], calibration, point.cg_left_m) for load in loads]
+        least = min(least, float(reverse.costs(starts).min()))
+    return least < whittle.cost(point)
 
 
 def _point(x: F64, calibration: CrossSpectrumCalibration, cg_left_m: float) -> Point:

@@ -113,7 +113,7 @@ def scores_of(
 
 def gain_moves(whole: Curvature, whittle: Whittle, point: Point, covariance: F64) -> F64:
     """(k,) derivative of drifting parameters and load by the logarithm of the accelerometer's gain."""
-    stronger = Whittle(whittle.spectra.with_acceleration_times(1.0 + STEP), whittle.ground)
+    stronger = whittle.showing(whittle.spectra.with_acceleration_times(1.0 + STEP))
     there = stronger.curvature(point, weighed(point)).gradient
     moves: F64 = -covariance @ (there - whole.gradient[FITTED]) / np.log1p(STEP)
     return moves

@@ -68,18 +68,19 @@ def soft_mass_of(whittle: Whittle, point: Point, calibration: CrossSpectrumCalib
     def by_level(motion: Motion) -> C128:
         return motion.by_suspended_mass(calibration.wheelbase_m + TOW_BAR_BEHIND_AXLE_M, _felt(whittle.spectra.freq_hz))
 
-    found = whittle.curvature_beside(point, [*range(len(PARAMETERS)), n, n + 1], by_level)
-    gradient, information = found.gradient, found.information
+    entries = [*range(len(PARAMETERS)), n, n + 1]
+    known = whittle.curvature(point, entries)
+    found, across = whittle.curvature_beside(point, entries, by_level)
     precision = np.zeros((n_known, n_known))
     precision[np.ix_(DRIFTING, DRIFTING)] = packing.precision
     precision[_GYRATION, _GYRATION] = GYRATION_STD**-2
-    pull = gradient[_FOLLOWING]
+    pull = known.gradient[_FOLLOWING]
     pull[: len(DRIFTING)] += packing.precision @ (point.theta[DRIFTING] - packing.drifting)
-    covariance = np.linalg.inv((information[:n_known, :n_known] + precision)[np.ix_(_FOLLOWING, _FOLLOWING)])
-    along = information[n_known:, _FOLLOWING] @ covariance
-    slope = gradient[n_known:] - along @ pull
-    own = np.diag(information)[n_known:] - np.sum(along * information[n_known:, _FOLLOWING], axis=1)
-    by_open = information[n_known:, _OPEN] - along @ information[np.ix_(_FOLLOWING, _OPEN)]
+    covariance = np.linalg.inv((known.information + precision)[np.ix_(_FOLLOWING, _FOLLOWING)])
+    along = across[:, _FOLLOWING] @ covariance
+    slope = found.gradient - along @ pull
+    own = np.diag(found.information) - np.sum(along * across[:, _FOLLOWING], axis=1)
+    by_open = across[:, _OPEN] - along @ known.information[np.ix_(_FOLLOWING, _OPEN)]
     left_open = calibration.covariance[np.ix_(_OPEN, _OPEN)] + _NATURE
     scores = -slope / np.sqrt(own + np.sum((by_open @ left_open) * by_open, axis=1))
     best = int(np.argmax(scores))
