@@ -24,7 +24,7 @@ from gateway.core.cross_spectrum.model.expected import expected_of_driven, with_
 from gateway.core.cross_spectrum.model.matrix import SpectralMatrix, Whitener
 from gateway.core.cross_spectrum.model.motion import Motion
 from gateway.core.cross_spectrum.model.parameters import Ground, has_roll
-from gateway.core.cross_spectrum.model.slopes import Solved, slopes_of_paths, solved_at, spectral_slopes
+from gateway.core.cross_spectrum.model.slopes import Solved, beside, slopes_of_paths, solved_at, spectral_slopes
 from gateway.core.vehicle import Load
 from gateway.records import C128, F64
 
@@ -89,8 +89,8 @@ class Curvature:
 class _Whitened:
     """The model solved at a point, and L^-1 S L^-H for its M = L L^H, with what whitens other matrices alike.
 
-    The trace is (b, m). rows (b m p^2, k) are the slopes of the residuals by the ``known`` entries, those that have
-    been asked for so far.
+    The trace is (b, m). rows (b m p^2, r) are slopes of the residuals, and rows @ by_known (r, k) are those by the
+    ``known`` entries, those that have been asked for so far.
     """
 
     point: Point
@@ -100,6 +100,7 @@ class _Whitened:
     by_part: F64 | None = None
     known: list[int] = field(default_factory=list)
     rows: F64 | None = None
+    by_known: F64 = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def trace(self) -> F64:
@@ -182,15 +183,15 @@ class Whittle:
         their information (k, n) together with the ``free`` entries.
         """
         z = self._whitened(point)
-        rows, asked = self._rows(z, free), [z.known.index(entry) for entry in free]
-        beside = self._whitened_rows(z, slopes_of_paths(z.solved, self.spectra, by_level(z.solved.model.motion)))
-        return self._curvature_of(z, beside), self._information(beside, rows)[:, asked]
+        rows, by_free = self._rows(z, free)
+        further = self._whitened_rows(z, slopes_of_paths(z.solved, self.spectra, by_level(z.solved.model.motion)))
+        return self._curvature_of(z, further), self._information(further, rows) @ by_free
 
     def _curvature(self, point: Point, free: Sequence[int]) -> Curvature:
         z = self._whitened(point)
-        whole = self._curvature_of(z, self._rows(z, free))
-        asked = [z.known.index(entry) for entry in free]
-        return Curvature(whole.gradient[asked], whole.information[np.ix_(asked, asked)])
+        rows, by_free = self._rows(z, free)
+        whole = self._curvature_of(z, rows)
+        return Curvature(whole.gradient @ by_free, by_free.T @ whole.information @ by_free)
 
     def _curvature_of(self, z: _Whitened, rows: F64) -> Curvature:
         """From the slopes (b m p^2, k) of the residuals."""
@@ -210,8 +211,8 @@ class Whittle:
         information: F64 = rows.T @ others - np.outer(along, other) / self._level_stiffness
         return information
 
-    def _rows(self, z: _Whitened, free: Sequence[int]) -> F64:
-        """(b m p^2, k) the residuals' slopes at a point, extended by those of ``free``.
+    def _rows(self, z: _Whitened, free: Sequence[int]) -> tuple[F64, F64]:
+        """(b m p^2, r) slopes of the residuals at a point, and (r, k) the combinations of them by the ``free`` entries.
 
         An answer asks for every parameter after its search asked for some.
         """
@@ -219,11 +220,13 @@ class Whittle:
         in_motion = are_in_motion(missing, len(z.point.theta))
         missing = [*in_motion, *(entry for entry in missing if entry not in in_motion)]
         if missing:
-            rows = self._whitened_rows(z, spectral_slopes(z.solved, self.spectra, missing))
+            slopes, by_missing = spectral_slopes(z.solved, self.spectra, missing)
+            rows = self._whitened_rows(z, slopes)
             z.rows = rows if z.rows is None else np.concatenate([z.rows, rows], axis=1)
+            z.by_known = beside(z.by_known, by_missing)
             z.known += missing
         assert z.rows is not None
-        return z.rows
+        return z.rows, z.by_known[:, [z.known.index(entry) for entry in free]]
 
     def _whitened_rows(self, z: _Whitened, slopes: F64) -> F64:
         """(b m p^2, k) the residuals' slopes, from those of the expected spectra (b, m, p^2, k)."""

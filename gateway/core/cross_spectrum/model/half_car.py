@@ -134,9 +134,8 @@ def spring_npm(axle: Axle, added_kg: Real) -> Real:
     """Rate of both springs under ``added_kg`` on the axle."""
     added_kn = added_kg * (STANDARD_GRAVITY_MPS2 / 1000.0)
     beyond_kn = np.maximum(added_kn - np.asarray(axle.bend_loads_kn), 0.0)
-    bent = np.sum(axle.spring_bends_per_kn * beyond_kn, axis=-1, keepdims=True)
-    log_stiffening = axle.spring_slope_per_kn * added_kn + bent
-    stiffened: Real = axle.spring_npm * np.exp(log_stiffening)
+    bent = np.asarray(axle.spring_bends_per_kn * beyond_kn).sum(axis=-1, keepdims=True)
+    stiffened: Real = axle.spring_npm * np.exp(axle.spring_slope_per_kn * added_kn + bent)
     return stiffened
 
 

@@ -12,6 +12,7 @@ which needs no second solution. half_car and rolling_car give the numbers of a v
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,12 @@ from gateway.records import C128, F64
 
 PAIRS: Final = ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2), (2, 2))
 """Pairs of coordinates, in the order of ``rigid_kg`` and ``carried_kg``. Without roll the first three."""
+
+
+_OF_AXLES: Final = [
+    [PAIRS.index(pair) for pair in pairs] for pairs in (((0, 0), (1, 1)), ((2, 2), (2, 2)), ((0, 2), (1, 2)))
+]
+"""Where the stiffnesses of front and rear axle are among PAIRS: of both wheels together, against, and coupled."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,27 +92,6 @@ _UPRIGHT: Final = _slices(5, 5, 3, 3, 2, 2)
 _ROLLING: Final = _slices(8, 8, 6, 6, 2, 4)
 
 
-class _Suspension:
-    """Springs in parallel with dampers on their elastic mounts: ``rate``, and its slopes by damper and mount."""
-
-    def __init__(self, spring: F64, damper: F64, mount: F64, omega: F64) -> None:
-        self._mount = mount
-        self._turn: C128 = np.multiply(1j, omega)
-        self._damped: C128 = self._turn * damper
-        self._yields: C128 = 1.0 / (1.0 + self._damped / mount)
-        self.rate = spring + self._damped * self._yields
-
-    @property
-    def by_damper(self) -> C128:
-        slope: C128 = self._turn * self._yields**2
-        return slope
-
-    @property
-    def by_mount(self) -> C128:
-        root: C128 = self._damped * self._yields / self._mount
-        return root * root
-
-
 class _Axles:
     """Stiffness of front and rear axle on the body, and the force of the road on it.
 
@@ -113,72 +99,64 @@ class _Axles:
     the other, and for the coupling of both. With K, K' the suspension together and against, D the left spring's rate
     minus the right one's, T the wheels on their tyres k, and the wheels' own movement eliminated, the stiffness is K T
     / (K + T), K' T / (K' + T) and, to first order in D, D / 2 T / (K + T) T / (K' + T); the force has k in place of one
-    T.
+    T. A suspension is a spring in parallel with a damper on its elastic mount.
     """
 
     def __init__(self, numbers: F64, omega: F64) -> None:
-        spring, damper, mount, self._tyre, unsprung, *self._rolls = numbers
-        self._damper, self._omega2 = damper, omega**2
-        self._wheel = self._tyre - self._omega2 * unsprung
-        self._ways = [_Suspension(spring, damper, mount, omega)]
+        spring, self._damper, self._mount, self.tyre, unsprung, *self._rolls = numbers
+        spring, damper = spring[None], self._damper[None]
         if self._rolls:
             _, factor, bar = self._rolls
-            self._ways.append(_Suspension(spring + bar, damper * factor, mount, omega))
-        self._softs = [1.0 / (way.rate + self._wheel) for way in self._ways]
-        per_tyre = [way.rate * soft for way, soft in zip(self._ways, self._softs, strict=True)]
+            spring, damper = np.concatenate([spring, spring + bar]), np.concatenate([damper, damper * factor])
+        self._turn: C128 = np.multiply(1j, omega)
+        self._omega2 = omega**2
+        self.wheel = self.tyre - self._omega2 * unsprung
+        self._damped = self._turn * damper
+        self._yields = 1.0 / (1.0 + self._damped / self._mount)
+        self._rates = spring + self._damped * self._yields
+        self._softs = 1.0 / (self._rates + self.wheel)
+        self.per_tyre = self._rates * self._softs
         if self._rolls:
-            self._both = 0.5 * self._softs[0] * self._softs[1] * self._wheel
-            per_tyre.append(self._rolls[0] * self._both)
-        self._per_tyre = np.stack(per_tyre)
-        self.stiffness = self._per_tyre * self._wheel
-        self.force = self._per_tyre * self._tyre
+            self._both = 0.5 * self._softs[0] * self._softs[1] * self.wheel
+            self.per_tyre = np.concatenate([self.per_tyre, (self._rolls[0] * self._both)[None]])
+        self.stiffness = self.per_tyre * self.wheel
+        self.force = self.per_tyre * self.tyre
 
-    def slopes(self, rows: Sequence[int]) -> tuple[C128, C128]:
-        """(k, 1 or 3, 2, ..., m) derivatives of stiffness and force by an axle's numbers."""
-        per_tyre = np.zeros((len(rows), *self._per_tyre.shape), np.complex128)
-        by_rate = [self._by_rate(i) for i in range(len(self._ways))]
-        by_wheel = self._by_wheel()
-        for into, row in zip(per_tyre, rows, strict=True):
-            if row == SPRING:
-                into[:] = sum(by_rate)
-            elif row == DAMPER:
-                factors = (1.0, *self._rolls[1:2])
-                parts = zip(self._ways, by_rate, factors, strict=True)
-                into[:] = sum(by * (way.by_damper * factor) for way, by, factor in parts)
-            elif row == MOUNT:
-                into[:] = sum(by * way.by_mount for way, by in zip(self._ways, by_rate, strict=True))
-            elif row in (TYRE, UNSPRUNG):
-                into[:] = by_wheel if row == TYRE else -self._omega2 * by_wheel
+    def slopes(self, rows: Sequence[int]) -> C128:
+        """(k, 1 or 3, 2, ..., m) derivatives by an axle's numbers of the stiffness per wheel: over T."""
+        found = np.zeros((len(rows), *self.per_tyre.shape), np.complex128)
+        for into, row in zip(found, rows, strict=True):
+            if row in (TYRE, UNSPRUNG):
+                self._fill_in_by_wheel(into, -self._omega2 if row == UNSPRUNG else 1.0)
             elif row == UNEVEN:
                 into[2] = self._both
             else:
-                into[:] = by_rate[1] * (self._ways[1].by_damper * self._damper if row == FACTOR else 1.0)
-        stiffness, force = per_tyre * self._wheel, per_tyre * self._tyre
-        for i, row in enumerate(rows):
-            if row == TYRE:
-                stiffness[i] += self._per_tyre
-                force[i] += self._per_tyre
-            elif row == UNSPRUNG:
-                stiffness[i] -= self._omega2 * self._per_tyre
-        return stiffness, force
-
-    def _by_rate(self, i: int) -> C128:
-        """Derivative of the stiffness per wheel by the rate of one suspension."""
-        found = np.zeros_like(self._per_tyre)
-        found[i] = self._wheel * self._softs[i] ** 2
-        if self._rolls:
-            found[2] = -self._per_tyre[2] * self._softs[i]
+                by_rate = self._rates_by(row)
+                np.multiply(self.wheel * self._softs**2, by_rate, out=into[: len(self._softs)])
+                if self._rolls:
+                    np.multiply(-self.per_tyre[2], (self._softs * by_rate).sum(axis=0), out=into[2])
         return found
 
-    def _by_wheel(self) -> C128:
-        """Derivative of the stiffness per wheel by T."""
-        found = np.empty_like(self._per_tyre)
-        for i, (way, soft) in enumerate(zip(self._ways, self._softs, strict=True)):
-            found[i] = -way.rate * soft**2
+    def _rates_by(self, row: int) -> C128 | float:
+        """(1 or 2, 2, ..., m) derivatives of the suspensions' rates; one for all by the spring's."""
+        if row == SPRING:
+            return 1.0
+        if row == MOUNT:
+            return np.asarray((self._damped * self._yields / self._mount) ** 2)
+        by_damper: C128 = self._turn * self._yields**2
+        if row == DAMPER and self._rolls:
+            by_damper[1] *= self._rolls[1]
+        elif row in (FACTOR, BAR):
+            by_damper[0] = 0.0
+            by_damper[1] = 1.0 if row == BAR else by_damper[1] * self._damper
+        return by_damper
+
+    def _fill_in_by_wheel(self, into: C128, change: F64 | float) -> None:
+        """Derivative of the stiffness per wheel by what changes T by ``change``."""
+        np.multiply(-self._rates, change * self._softs**2, out=into[: len(self._rates)])
         if self._rolls:
             one, other = self._softs
-            found[2] = self._rolls[0] * (0.5 * one * other - self._both * (one + other))
-        return found
+            into[2] = change * self._rolls[0] * (0.5 * one * other - self._both * (one + other))
 
 
 class Motion:
@@ -212,22 +190,15 @@ class Motion:
         p, s, *several, m = self.paths.shape
         found = np.empty((*several, len(wanted), p, s, m), np.complex128)
         by_number = np.moveaxis(found, range(len(several)), range(3, 3 + len(several)))
-        moved, omega2 = self._moved(), self._omega**2
         groups = [[i - one.start for i in wanted if one.start <= i < one.stop] for one in self._numbers.groups]
-        of_axles = sorted({*groups[FRONT], *groups[REAR]})
-        stiffness, force = self._axles.slopes(of_axles)
-        start = 0
-        for group, rows in enumerate(groups):
-            into, start = by_number[start : start + len(rows)], start + len(rows)
-            if group in (FRONT, REAR):
-                at = [of_axles.index(row) for row in rows]
-                self._by_axle(into, group, stiffness[at, :, None, None, group], force[at, :, None, group], moved)
-            elif group in (RIGID, CARRIED):
-                np.multiply(moved[rows], omega2 if group == RIGID else omega2 * self._felt, out=into)
-            elif group == PAYLOAD and rows:
-                into[:] = self._by_felt(moved)[rows]
-            elif group == SENSOR:
-                into[:] = self._by_sensor()[rows]
+        ends = np.cumsum([len(rows) for rows in groups])
+        parts = [by_number[end - len(rows) : end] for rows, end in zip(groups, ends, strict=True)]
+        self._fill_in_by_axles(parts[FRONT], groups[FRONT], parts[REAR], groups[REAR])
+        omega2 = self._omega**2
+        np.multiply(self._moved[groups[RIGID]], omega2, out=parts[RIGID])
+        np.multiply(self._moved[groups[CARRIED]], omega2 * self._felt, out=parts[CARRIED])
+        self._fill_in_by_felt(parts[PAYLOAD], groups[PAYLOAD])
+        self._fill_in_by_sensor(parts[SENSOR], groups[SENSOR])
         return found
 
     def by_suspended_mass(self, behind_m: float, felt: C128) -> C128:
@@ -236,7 +207,7 @@ class Motion:
         """
         rear = behind_m / self._frame.wheelbase_m
         front = 1.0 - rear
-        on_front, on_rear, on_both = self._moved()[:3]
+        on_front, on_rear, on_both = self._moved[:3]
         at_place = front**2 * on_front + rear**2 * on_rear + front * rear * on_both
         per_kg = np.moveaxis(at_place * self._omega**2, (0, 1), (-3, -2))
         slopes: C128 = per_kg[..., None, :, :, :] * felt[:, None, None]
@@ -298,6 +269,7 @@ class Motion:
                 coordinate[...] = one
         return found
 
+    @cached_property
     def _moved(self) -> C128:
         """(q, p, s, ..., m) what less stiffness between each of PAIRS does to the paths."""
         one, other = (list(each) for each in zip(*self._pairs, strict=True))
@@ -307,33 +279,66 @@ class Motion:
         moved[apart] += by_force[[other[pair] for pair in apart]] * self.body[[one[pair] for pair in apart]][:, None]
         return moved
 
-    def _by_axle(self, into: C128, i: int, stiffness: C128, force: C128, moved: C128) -> None:
-        """Slopes by some numbers of an axle, from those of its stiffness and force."""
-        np.multiply(stiffness[:, 0], -moved[PAIRS.index((i, i))], out=into)
-        into[:, :, i] += force[:, 0] * self._by_force[:, i]
-        if stiffness.shape[1] > 1:
-            into -= stiffness[:, 1] * moved[PAIRS.index((2, 2))]
-            into -= stiffness[:, 2] * moved[PAIRS.index((i, 2))]
-            into[:, :, i] += force[:, 2] * self._by_force[:, 2]
-            into[:, :, i + 2] += force[:, 2] * self._by_force[:, i] + force[:, 1] * self._by_force[:, 2]
-
-    def _by_felt(self, moved: C128) -> C128:
-        """By frequency and damping ratio of the payload on its floor."""
-        carried = sum(kg * one for kg, one in zip(self._carried_kg, moved, strict=True))
-        felt = -(self._ratio**2) * self._below**2 * self._omega**2
-        return np.stack([carried * (felt * (2.0 + self._damping) / self._mode_hz), carried * (felt * 2j * self._ratio)])
-
-    def _by_sensor(self) -> C128:
-        found = np.zeros((len(self._numbers.group(SENSOR)), *self.paths.shape), np.complex128)
-        pitch = (self.body[1] - self.body[0]) / self._frame.wheelbase_m
-        found[0, 0] = -(self._omega**2) * pitch
-        found[1, 1:] = -1j * self._omega * self.paths[1:]
-        if self._frame.half_track_m is not None:
-            roll, late = self.body[2] / self._frame.half_track_m, self._late()
-            found[2, 0] = -(self._omega**2) * roll
-            found[3, 1] = -late * roll
-            found[3, 2:] = late * pitch
+    @cached_property
+    def _by_per_tyre(self) -> C128:
+        """(1 or 3, 2, p, s, ..., m) derivatives of the paths by the stiffness of front and rear axle per wheel: by the
+        road's force, less by the body's movement.
+        """
+        found: C128 = -self._axles.wheel[:, None, None] * self._moved[_OF_AXLES[: len(self._axles.force)]]
+        for i, tyre in enumerate(self._axles.tyre):
+            own = tyre * self._by_force[:, i]
+            found[0, i, :, i] += own
+            if len(found) > 1:
+                roll = tyre * self._by_force[:, 2]
+                found[1, i, :, i + 2] += roll
+                found[2, i, :, i] += roll
+                found[2, i, :, i + 2] += own
         return found
+
+    def _fill_in_by_axles(self, front: C128, of_front: Sequence[int], rear: C128, of_rear: Sequence[int]) -> None:
+        """Slopes by some numbers of both axles."""
+        axles, by = self._axles, self._by_per_tyre
+        rows = sorted({*of_front, *of_rear})
+        per_tyre = axles.slopes(rows)
+        for i, (into, of) in enumerate(((front, of_front), (rear, of_rear))):
+            slopes = per_tyre[[rows.index(row) for row in of], :, i, None, None]
+            np.multiply(slopes[:, 0], by[0, i], out=into)
+            for t in range(1, len(by)):
+                np.add(into, slopes[:, t] * by[t, i], out=into)
+            still = axles.per_tyre[:, i, None, None]
+            if UNSPRUNG in of or TYRE in of:
+                inert = self._omega**2 * (still * self._moved[[pairs[i] for pairs in _OF_AXLES[: len(by)]]]).sum(axis=0)
+            if UNSPRUNG in of:
+                into[of.index(UNSPRUNG)] += inert
+            if TYRE in of:
+                unsprung = (axles.tyre[i] - axles.wheel[i]) / self._omega**2
+                into[of.index(TYRE)] += ((still * by[:, i]).sum(axis=0) - unsprung * inert) / axles.tyre[i]
+
+    def _fill_in_by_felt(self, into: C128, rows: Sequence[int]) -> None:
+        """By frequency and damping ratio of the payload on its floor."""
+        if not rows:
+            return
+        carried = (self._carried_kg[:, None, None] * self._moved).sum(axis=0)
+        felt = -(self._ratio**2) * self._below**2 * self._omega**2
+        for one, row in zip(into, rows, strict=True):
+            by = felt * (2.0 + self._damping) / self._mode_hz if row == 0 else felt * 2j * self._ratio
+            np.multiply(carried, by, out=one)
+
+    def _fill_in_by_sensor(self, into: C128, rows: Sequence[int]) -> None:
+        """By its position, the gyro's lag and, with roll, its place left of the centre line and the gyro's yaw."""
+        for one, row in zip(into, rows, strict=True):
+            one[...] = 0.0
+            if row == 0:
+                one[0] = -(self._omega**2) / self._frame.wheelbase_m * (self.body[1] - self.body[0])
+            elif row == 1:
+                np.multiply(-1j * self._omega, self.paths[1:], out=one[1:])
+            elif self._frame.half_track_m is not None:
+                roll, late = self.body[2] / self._frame.half_track_m, self._late()
+                if row == 2:
+                    one[0] = -(self._omega**2) * roll
+                else:
+                    one[1] = -late * roll
+                    one[2:] = late / self._frame.wheelbase_m * (self.body[1] - self.body[0])
 
 
 def _product(rows: C128, columns: C128) -> C128:

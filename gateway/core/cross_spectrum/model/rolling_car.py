@@ -7,13 +7,11 @@ Newton's law for a rigid body on four wheels, written out in docs/method.md. Lat
 roll centres, are neglected: the free rates against roll absorb their effect at the frequencies of the body.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from gateway.core.cross_spectrum.model.half_car import (
     INVERSE_PAYLOAD_KG,
-    Axle,
     HalfCar,
     Real,
     added_axle_masses_kg,
@@ -107,40 +105,42 @@ def rolling_numbers(car: RollingCar, load: SidewaysLoad) -> Numbers:
 def _axle_numbers(car: RollingCar, load: SidewaysLoad) -> list[tuple[Real, ...]]:
     """Numbers of front and rear axle: each wheel's spring is as stiff as under an axle with twice the wheel's load."""
     body = car.half_car
+    added_kg = added_axle_masses_kg(body, load.payload_kg, load.front_share)
+    springs = [spring_npm(axle, kg) for axle, kg in zip((body.front, body.rear), added_kg, strict=True)]
+    share = _roll_share_front(car, springs)
+    moved_kg = (body.empty_mass_kg + load.payload_kg) * load.cg_left_m / car.half_track_m  # to the left from the right
     found = []
-    for axle, against, added_kg, moved_kg in zip(
+    for axle, against, spring, kg, moved in zip(
         (body.front, body.rear),
         (car.front, car.rear),
-        added_axle_masses_kg(body, load.payload_kg, load.front_share),
-        _moved_kg(car, load),
+        springs,
+        added_kg,
+        (share * moved_kg, (1.0 - share) * moved_kg),
         strict=True,
     ):
-        sides = np.stack(np.broadcast_arrays(added_kg, added_kg + 2.0 * moved_kg, added_kg - 2.0 * moved_kg))
-        spring, left, right = np.asarray(spring_npm(axle, sides))
-        found.append((*axle_numbers(axle, spring), left - right, against.damper, against.anti_roll_npm))
+        uneven = spring_npm(axle, kg + moved) - spring_npm(axle, kg - moved)
+        found.append((*axle_numbers(axle, spring), uneven, against.damper, against.anti_roll_npm))
     return found
-
-
-def _moved_kg(car: RollingCar, load: SidewaysLoad) -> tuple[Real, Real]:
-    """Load on the left wheel of the front and of the rear axle in excess of half the axle's load."""
-    moment_kgm = (car.half_car.empty_mass_kg + load.payload_kg) * load.cg_left_m
-    share = roll_share_front(car, load)
-    moved_kg = moment_kgm / (2.0 * car.half_track_m)
-    return share * moved_kg, (1.0 - share) * moved_kg
 
 
 def roll_share_front(car: RollingCar, load: SidewaysLoad) -> Real:
     """The front axle's part of a steady roll moment, 0..1, from springs, bars and tyres."""
     body = car.half_car
-    added_front_kg, added_rear_kg = added_axle_masses_kg(body, load.payload_kg, load.front_share)
-    front = _still_npm(body.front, added_front_kg, car.front)
-    rear = _still_npm(body.rear, added_rear_kg, car.rear)
+    added_kg = added_axle_masses_kg(body, load.payload_kg, load.front_share)
+    return _roll_share_front(
+        car, [spring_npm(axle, kg) for axle, kg in zip((body.front, body.rear), added_kg, strict=True)]
+    )
+
+
+def _roll_share_front(car: RollingCar, springs_npm: Sequence[Real]) -> Real:
+    front, rear = springs_npm
+    front = _still_npm(front + car.front.anti_roll_npm, car.half_car.front.tyre_npm)
+    rear = _still_npm(rear + car.rear.anti_roll_npm, car.half_car.rear.tyre_npm)
     return front / (front + rear)
 
 
-def _still_npm(axle: Axle, added_kg: Real, against: Against) -> Real:
-    suspension, tyre_npm = spring_npm(axle, added_kg) + against.anti_roll_npm, axle.tyre_npm
-    return suspension * tyre_npm / (suspension + tyre_npm)
+def _still_npm(suspension_npm: Real, tyre_npm: Real) -> Real:
+    return suspension_npm * tyre_npm / (suspension_npm + tyre_npm)
 
 
 def _roll_masses(car: RollingCar, load: SidewaysLoad) -> tuple[tuple[Real, Real, Real], tuple[Real, Real, Real]]:

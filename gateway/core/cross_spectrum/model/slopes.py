@@ -30,6 +30,8 @@ from gateway.core.cross_spectrum.model.parameters import (
 from gateway.core.cross_spectrum.model.tracks import coherence_of, coherence_slope_of
 from gateway.records import C128, F64
 
+FEW: Final = 12  # chosen: among as many entries none is hardly worth a search for parallel ones
+PARALLEL: Final = 1e-12  # chosen: least squared sine between two changes of the numbers that differ
 _OF_ROAD: Final = frozenset(
     INDEX[name] for name in ("delay_scale", "rear_lag_s", "track_offset_m", "tracks_apart_m", "twist_level")
 )
@@ -73,26 +75,56 @@ class Solved:
         return numbers_about(self.theta, self.load, self.ground, entries)[1]
 
 
-def spectral_slopes(solved: Solved, spectra: CrossSpectra, free: Sequence[int]) -> F64:
-    """Derivatives (b, m, p^2, k) of the expected spectra, in the order of SpectralMatrix.parts, by the ``free`` entries
-    of theta (n,) and of the load.
+def spectral_slopes(solved: Solved, spectra: CrossSpectra, free: Sequence[int]) -> tuple[F64, F64]:
+    """Derivatives (b, m, p^2, r) of the expected spectra, in the order of SpectralMatrix.parts, and the combinations
+    (r, k) of them by the ``free`` entries of theta (n,) and of the load.
 
     The entries in the equations of motion come first, then the others in rising order. The chain rule leads from
     parameters to the numbers in the equations of motion, to the responses and to the spectra, in closed forms and real
-    matrix products.
+    matrix products. Entries that move the numbers alike share a column.
     """
     model, by = solved.model, solved.driven
-    slopes = np.zeros((*by.phase.shape, spectra.n_sensors**2, len(free)))
     of_vehicle = are_in_motion(free, len(solved.theta))
-    if of_vehicle:
-        by_level = _by_level(solved.numbers_by(of_vehicle), model.motion)
-        slopes[..., : len(of_vehicle)] = _of_paths(by_level, len(of_vehicle), solved, spectra)
-    _fill_in_slack(slopes, free, by, model, spectra)
-    if not _OF_ROAD.isdisjoint(free):
-        _fill_in_road(slopes, free, by, model, spectra)
+    others = free[len(of_vehicle) :]
+    by_direction, by_vehicle = solved.numbers_by(of_vehicle), np.eye(len(of_vehicle))
+    if len(of_vehicle) > FEW:
+        by_direction, by_vehicle = _directions(by_direction)
+    r = len(by_vehicle)
+    slopes = np.zeros((*by.phase.shape, spectra.n_sensors**2, r + len(others)))
+    if r:
+        slopes[..., :r] = _of_paths(_by_level(by_direction, model.motion), r, solved, spectra)
+    of_others = slopes[..., r:]
+    _fill_in_slack(of_others, others, by, model, spectra)
+    if not _OF_ROAD.isdisjoint(others):
+        _fill_in_road(of_others, others, by, model, spectra)
     slopes = tapered_parts(slopes, spectra)
-    _add_noise(slopes, solved.noiseless, model, spectra, free)
-    return slopes
+    _add_noise(slopes, solved.noiseless, model, spectra)
+    _fill_in_noise(slopes[..., r:], others, solved.noiseless, model, spectra)
+    return slopes, beside(by_vehicle, np.eye(len(others)))
+
+
+def beside(one: F64, other: F64) -> F64:
+    """The block-diagonal matrix of two matrices."""
+    (r, k), both = one.shape, np.zeros(np.add(one.shape, other.shape))
+    both[:r, :k], both[r:, k:] = one, other
+    return both
+
+
+def _directions(by_entry: F64) -> tuple[F64, F64]:
+    """The r columns of by_entry (5, q, k) that are no multiple of an earlier one, and the multiples (r, k) by entry.
+
+    A spring's rate has many parameters, and bends beyond the load do not act.
+    """
+    columns = by_entry.reshape(-1, by_entry.shape[-1])
+    acting = np.flatnonzero(columns.any(axis=0))
+    columns = columns[:, acting] / np.maximum(np.abs(columns).max(axis=1, keepdims=True), np.finfo(float).tiny)
+    products = columns.T @ columns
+    squares = np.diag(products)
+    first = np.argmax(products**2 >= (1.0 - PARALLEL) * np.outer(squares, squares), axis=0)
+    chosen, row = np.unique(first, return_inverse=True)
+    multiples = np.zeros((len(chosen), by_entry.shape[-1]))
+    multiples[row, acting] = products[first, range(len(first))] / squares[first]
+    return by_entry[..., acting[chosen]], multiples
 
 
 def slopes_of_paths(solved: Solved, spectra: CrossSpectra, by_level: C128) -> F64:
@@ -101,7 +133,7 @@ def slopes_of_paths(solved: Solved, spectra: CrossSpectra, by_level: C128) -> F6
     """
     k = by_level.shape[1]
     slopes = tapered_parts(_of_paths(_by_frequency(by_level), k, solved, spectra), spectra)
-    _add_noise(slopes, solved.noiseless, solved.model, spectra, ())
+    _add_noise(slopes, solved.noiseless, solved.model, spectra)
     return slopes
 
 
@@ -235,17 +267,23 @@ def _by_twist(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectr
     return SpectralMatrix(d_twist * against.auto, d_twist * against.cross)
 
 
-def _add_noise(
-    slopes: F64, matrix: SpectralMatrix, model: SpectralModel, spectra: CrossSpectra, free: Sequence[int]
+def _fill_in_noise(
+    slopes: F64, free: Sequence[int], matrix: SpectralMatrix, model: SpectralModel, spectra: CrossSpectra
 ) -> None:
+    """Derivatives by the density of each sensor's noise."""
+    scale = noise_scale(matrix, spectra)
+    for sensor, density in enumerate(model.noise):
+        entry = INDEX[NOISES[sensor]]
+        if entry in free:
+            slopes[:, :, sensor, free.index(entry)] += density * scale
+
+
+def _add_noise(slopes: F64, matrix: SpectralMatrix, model: SpectralModel, spectra: CrossSpectra) -> None:
     """Derivatives of the noise (expected.noise) of ``matrix``, which grows with the power of acceleration and pitch
     rate.
     """
-    sensed, scale = noise(model, matrix, spectra), noise_scale(matrix, spectra)
+    sensed = noise(model, matrix, spectra)
     levels = matrix.auto[:2].mean(axis=-1).T
     grown = 0.5 * (slopes[:, :, :2].mean(axis=1) / levels[..., None]).sum(axis=1)
     for sensor, one in enumerate(sensed):
         slopes[:, :, sensor] += one[:, :, None] * grown[:, None]
-        for row, entry in enumerate(free):
-            if entry == INDEX[NOISES[sensor]]:
-                slopes[:, :, sensor, row] += model.noise[sensor] * scale
