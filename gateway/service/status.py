@@ -34,7 +34,7 @@ from gateway.web.live.board import Board
 
 SENSOR_LOST_S = 10.0  # chosen: a sensor silent for this long on a bus that is alive is at fault
 NEEDED_SENSORS = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
-READ_IN: Final = {
+READ_IN: Final = {  # customary units
     Signal.AXLE_WEIGHT: ("kg", 1.0),
     Signal.AIR_SPRING_PRESSURE: ("kPa", 1e3),
     Signal.RIDE_HEIGHT: ("mm", 1e-3),

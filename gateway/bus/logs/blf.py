@@ -48,7 +48,7 @@ _HEADER_BYTES: Final = {1: 32, 2: 40}  # by version
 _TEN_MICROSECONDS: Final = 1  # flags: the stamp's unit; nanoseconds otherwise
 _CONTAINER: Final = 10  # kinds of objects, as Vector numbers them, and so below
 _ERROR_KINDS: Final = (2, 73, 104)  # CAN_ERROR, CAN_ERROR_EXT, CAN_FD_ERROR_64
-_STORED, _DEFLATED = 0, 2
+_STORED, _DEFLATED = 0, 2  # methods of a container
 
 
 @dataclass(frozen=True, slots=True)

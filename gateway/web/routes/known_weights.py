@@ -17,7 +17,7 @@ from gateway.web.routes.service_calls import REFUSALS, KnownWeightBackend, call_
 from gateway.web.schemas import Body, Instant, problem_responses
 
 _LAST_NS: Final = 9_223_372_036_000_000_000  # the last whole second that 64 bits of nanoseconds hold
-Kilograms = Annotated[float, Field(ge=0.0, le=100_000.0, allow_inf_nan=False)]
+Kilograms = Annotated[float, Field(ge=0.0, le=100_000.0, allow_inf_nan=False)]  # chosen: no vehicle has more
 
 
 class _When(BaseModel):

@@ -7,9 +7,9 @@ import { element, made, pair, say, write } from "/assets/dashboard/page.js";
 import { number } from "/assets/dashboard/words.js";
 import { fill } from "/assets/language.js";
 
-const ASK_EVERY_MS = 5000;
-const ANSWER_WITHIN_MS = 4000;
-const GONE_AFTER_S = 15;
+const ASK_EVERY_MS = 5000; // chosen: as long as a glance may wait
+const ANSWER_WITHIN_MS = 4000; // chosen: less than until the next question
+const GONE_AFTER_S = 15; // chosen: three questions without an answer
 const UNIT = 1.5; // characters that the small unit is as wide as
 
 const opened = now();

@@ -1,13 +1,12 @@
 // The cab page's sentences, from the answer of /api/v1/cab.
 
-import { ago, alarmName, between, capital, clock, duration, figure, number, placeName, reasons } from "/assets/dashboard/words.js";
+import { SURE, ago, alarmName, between, capital, clock, duration, figure, number, placeName, reasons } from "/assets/dashboard/words.js";
 import { speaker } from "/assets/language.js";
 import { CAB } from "/assets/words/cab.js";
 import { COMMON } from "/assets/words/common.js";
 
-const STEP_KG = 5; // finer than that nothing is loaded
-const SURE = 0.99;
-const SILENT_S = 30;
+const STEP_KG = 5; // chosen: finer than that nothing is loaded
+const SILENT_S = 30; // chosen: such sensors report every few seconds, also at a standstill
 
 export const phrase = speaker(COMMON, CAB);
 

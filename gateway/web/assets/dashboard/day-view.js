@@ -3,16 +3,15 @@
 import { known, show } from "/assets/dashboard/known.js";
 import { element, made, shape, write } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
-import { clock, figure, number, span, withStd } from "/assets/dashboard/words.js";
+import { SURE, clock, figure, number, span, withStd } from "/assets/dashboard/words.js";
 
 const DAY_MS = 24 * 3600 * 1000;
-const N_SHOWN = 10;
-const HEIGHT = 130;
+const N_SHOWN = 10; // chosen: entries before the fold
+const HEIGHT = 130; // chosen, as the next three: pixels of the drawing
 const FLOOR = 108; // of the bars
 const CEILING = 20;
 const LEAST_WIDTH = 3;
-const LETTER_PX = 10; // of a label, on average: a bold sign is wider than a digit
-const SURE = 0.99;
+const LETTER_PX = 10; // chosen: of a label, on average: a bold sign is wider than a digit
 
 const at = (iso) => new Date(iso).getTime();
 

@@ -2,8 +2,8 @@
 
 import { ask } from "/assets/dashboard/gateway.js";
 
-const FIRST_PAUSE_MS = 1000;
-const LAST_PAUSE_MS = 30000;
+const FIRST_PAUSE_MS = 1000; // chosen: doubles up to the last
+const LAST_PAUSE_MS = 30000; // chosen: how late a gateway that came back is noticed
 
 /** Calls `onEvent(kind, record)` for each event and `onLink(isLive)` when the connection comes or goes; never ends. */
 export async function follow(url, lastEventId, onEvent, onLink) {

@@ -7,9 +7,9 @@ import { ALARMS, COMMISSIONING, KNOWN_WEIGHTS, Refused, TREND, VERIFICATIONS, lo
 import { known, learn } from "/assets/dashboard/known.js";
 import { explained } from "/assets/dashboard/phrases.js";
 
-const ASK_EVERY_MS = 5000;
-const GATHER_MS = 50;
-const MOST_BATCHES = 1000;
+const ASK_EVERY_MS = 5000; // chosen: as the cab page
+const GATHER_MS = 50; // chosen: shorter than a person notices
+const MOST_BATCHES = 1000; // the limit of a page of the API
 const BATCHES_BY_HOURS = { 3: 300, 24: 300, 168: MOST_BATCHES };
 
 async function askNow() {

@@ -106,7 +106,7 @@ function withCode(text) {
   return text.split("`").map((part, n) => (n % 2 ? made("code", part) : part));
 }
 
-const N_SHOWN = 3;
+const N_SHOWN = 3; // chosen: refused batches, the newest
 const USUAL = "The drive"; // a cause that asks nobody for anything
 
 /** What to do about a reason; a vehicle without calibration is calibrated on this page where that is allowed. */

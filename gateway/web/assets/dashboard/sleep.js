@@ -2,7 +2,7 @@
 
 import { phrase } from "/assets/dashboard/phrases.js";
 
-const SILENT_AFTER_S = 5;
+const SILENT_AFTER_S = 5; // as gateway/status.py
 
 export const isSilent = (signal) => signal.last_age_s == null || signal.last_age_s > SILENT_AFTER_S;
 

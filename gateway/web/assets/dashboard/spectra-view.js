@@ -14,7 +14,7 @@ const PANELS = [
 ];
 
 const TICKS = [0.00001, 0.00003, 0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10]; // evenly apart on a log scale
-const RESONANCE_BELOW_HZ = 4; // spectra are high there: names of bands stand at the foot, elsewhere at the head
+const RESONANCE_BELOW_HZ = 4; // chosen: spectra are high there: names of bands stand at the foot, elsewhere at the head
 
 function panel({ name, title }) {
   const place = made("div", "", "chart");

@@ -5,8 +5,8 @@ import { shape } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
 import { Z95, capital, figure, number, withStd } from "/assets/dashboard/words.js";
 
-const FRONT_X = 96, REAR_X = 290, MIDDLE_Y = 96, HALF_TRACK = 58;
-const LARGEST_RADIUS = 30, LARGEST_REACH = 200;
+const FRONT_X = 96, REAR_X = 290, MIDDLE_Y = 96, HALF_TRACK = 58; // chosen: units of the drawing
+const LARGEST_RADIUS = 30, LARGEST_REACH = 200; // chosen likewise
 const Z95_OF_TWO = 2.448; // 95 % of two normal numbers: the root of chi-squared of two, 5.991
 const AXLES = ["front_axle", "rear_axle"];
 const WHEELS = [

@@ -6,8 +6,8 @@ import { fill, speaker } from "/assets/language.js";
 import { COMMON } from "/assets/words/common.js";
 import { FLEET } from "/assets/words/fleet.js";
 
-const ASK_EVERY_MS = 5000;
-const OLD_AFTER_S = 24 * 3600;
+const ASK_EVERY_MS = 5000; // chosen: as the other pages
+const OLD_AFTER_S = 24 * 3600; // chosen: not weighed today
 const phrase = speaker(COMMON, FLEET);
 
 let vehicles = null;
