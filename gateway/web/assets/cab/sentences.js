@@ -6,7 +6,7 @@ import { CAB } from "/assets/words/cab.js";
 import { COMMON } from "/assets/words/common.js";
 
 const STEP_KG = 5; // chosen: finer than that nothing is loaded
-const SILENT_S = 30; // chosen: such sensors report every few seconds, also at a standstill
+const SILENT_S = 30; // chosen: after that the age of a reading is shown
 
 export const phrase = speaker(COMMON, CAB);
 
