@@ -15,7 +15,7 @@ from gateway.errors import StoreError
 from gateway.estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.service.calibration_in_use import why_not_allowed
-from gateway.service.commissioning.empty_drive import Jobs, ServiceVehicle
+from gateway.service.commissioning.empty_drive import ServiceVehicle
 from gateway.service.commissioning.lines import Lines
 from gateway.service.commissioning.session import Commissioning
 from gateway.service.keeper import BatchKeeper
@@ -111,7 +111,9 @@ def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow
     own_name = settings.vehicle.calibrated_as
     directory = settings.store.directory
     desk = Commissioning(
-        Jobs(directory, settings.commissioning, settings.batch.for_core()),
+        directory,
+        settings.commissioning,
+        settings.batch.for_core(),
         Lines(directory, settings.commissioning.lines, settings.trust.for_reading()),
         keeper.shelf,
         flow.scheduler,

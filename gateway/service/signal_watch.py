@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -47,14 +46,6 @@ STANDS_AFTER_S: Final = 10.0  # chosen: shorter stops are traffic, as in core.jo
 CLOCK_PUT_BACK_S: Final = 1.0  # chosen: after a larger step back the length of the stop is unknown
 
 
-@dataclass(frozen=True, slots=True)
-class Standstill:
-    """From the last moving sample to the next one, by the frames' time."""
-
-    begin_ns: int
-    end_ns: int
-
-
 class StandingWatch:
     """How long the vehicle stands, and when it last stood long enough to load. Written by one thread, read by any.
 
@@ -68,7 +59,7 @@ class StandingWatch:
         self._moved_ns: int | None = None  # last sample that moved, by the frames' time
         self._moved_s: float | None = None  # likewise by ours
         self._newest_ns: int | None = None
-        self.last_stop: Standstill | None = None  # None: it has not moved yet
+        self.last_stop_ns: int | None = None  # its begin, by the frames' time; None: it has not moved yet
 
     def saw(self, motion: Motion) -> None:
         """Process rows, in order of arrival."""
@@ -86,11 +77,11 @@ class StandingWatch:
         before_ns = np.r_[self._moved_ns, moving_ns[:-1]]
         paused_s = (moving_ns - before_ns) / NS_PER_S
         is_long = (paused_s >= STOP_THAT_ENDS_EPOCH_S) | (paused_s < -CLOCK_PUT_BACK_S)
-        if self.last_stop is None:
-            self.last_stop = Standstill(self._moved_ns, int(moving_ns[0]))
+        if self.last_stop_ns is None:
+            self.last_stop_ns = self._moved_ns
         if is_long.any():
             last = int(np.flatnonzero(is_long)[-1])
-            self.last_stop = Standstill(int(min(before_ns[last], moving_ns[last])), int(moving_ns[last]))
+            self.last_stop_ns = int(min(before_ns[last], moving_ns[last]))
         self._moved_ns, self._moved_s = int(moving_ns[-1]), self._clock_s()
 
     def stood_s(self) -> float | None:
@@ -104,7 +95,7 @@ class StandingWatch:
 
     def is_of_this_load(self, estimate: Estimate) -> bool:
         """Whether the whole estimate is from after the last stop that was long enough to load or unload."""
-        return self.last_stop is not None and estimate.t_start_ns >= self.last_stop.begin_ns
+        return self.last_stop_ns is not None and estimate.t_start_ns >= self.last_stop_ns
 
 
 def _speed_of(motion: Motion) -> tuple[I64, F64]:

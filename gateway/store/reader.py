@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, TypedDict, Unpack
 
 from gateway.errors import StoreError
-from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, SERVICE, Delivery, HistoryPage, JournalRecord
+from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, Delivery, HistoryPage, JournalRecord
 from gateway.store import queries
 from gateway.store.database import is_damaged
 from gateway.store.queries import LAST, JournalQuery, without_spectra
@@ -34,15 +34,6 @@ class Latest:
     estimate: str | None
     rejection: str | None
     age_s: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class ServiceEvent:
-    """Something that happened to the service; ``detail`` is JSON."""
-
-    t_ns: int
-    kind: str
-    detail: str
 
 
 class PageQuery(TypedDict, total=False):
@@ -143,29 +134,14 @@ class StoreReader:
             age_s=age_s,
         )
 
-    def events(self, limit: int = 100) -> list[ServiceEvent]:
-        """The last events of the service itself, newest first."""
-        _, held = self._store.held()
-        window = JournalQuery((SERVICE,), newest_first=True)
-        with self._connection() as connection:
-            stored = self._stored(connection, window, limit)
-        rows = {row.seq: row for row in (*stored, *held) if row.kind == SERVICE}
-        return [
-            ServiceEvent(row.received_ns, *row.text.split("\n", 1))
-            for row in (rows[seq] for seq in sorted(rows, reverse=True)[:limit])
-        ]
-
-    def document(self, name: str) -> str | None:
-        """A document by its name; None if there is none with a valid checksum."""
+    def calibration(self, calibration_id: str) -> str | None:
+        """A stored calibration; None if there is none with a valid checksum."""
         with self._connection() as connection:
             if connection is None:
                 return None
             sql = "SELECT CAST(name AS BLOB), received_ns, CAST(text AS BLOB), crc FROM documents WHERE name = ?"
-            found = connection.execute(sql, (name,)).fetchone()
+            found = connection.execute(sql, (f"calibration {calibration_id}",)).fetchone()
         return found[2].decode() if found and checksum(found[:3]) == found[3] else None
-
-    def calibration(self, calibration_id: str) -> str | None:
-        return self.document(f"calibration {calibration_id}")
 
     def delivery(self, uplink: str, kinds: Sequence[str] = (*BATCHES, *ENTRIES)) -> Delivery:
         """The position up to which ``uplink`` has delivered, as on disk; the cursor is None before its first delivery.

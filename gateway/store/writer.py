@@ -93,13 +93,9 @@ class Store(ServicePart):
     def write_event(self, kind: str, detail: Mapping[str, Any]) -> None:
         self._append(SERVICE, "", self._clock_ns(), f"{kind}\n{json_line(detail)}")
 
-    def write_document(self, name: str, text: str) -> None:
-        """Store a text under a name, replacing the earlier one."""
-        self._buffer.add(DocumentRow(name, self._clock_ns(), text))
-
     def write_calibration(self, calibration_id: str, text: str) -> None:
         """Store the calibration that later estimates refer to."""
-        self.write_document(f"calibration {calibration_id}", text)
+        self._buffer.add(DocumentRow(f"calibration {calibration_id}", self._clock_ns(), text))
 
     def write_delivery(self, uplink: str, cursor: str) -> bool:
         """Store that ``uplink`` has delivered everything up to ``cursor``.

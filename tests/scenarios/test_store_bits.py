@@ -12,7 +12,7 @@ from support.patience import PATIENCE_S, wait_until
 from support.sequence import without_sequence
 
 from gateway.errors import StoreError
-from gateway.history import BATCHES
+from gateway.history import BATCHES, SERVICE
 from gateway.log import Event
 from gateway.records import Why, json_line
 from gateway.store import Store, queries, schema
@@ -64,7 +64,7 @@ def ask(store: Store) -> set[str]:
     told |= {text for text in (latest.estimate, latest.rejection) if text is not None}
     messages = Outbox(store, "fleet").next_messages(1000)
     reader.delivery("fleet")
-    reader.events()
+    reader.page((SERVICE,))
     assert {without_sequence(message.text) for message in messages} <= set(PLAIN)
     return told
 

@@ -15,7 +15,7 @@ from gateway.config.sections import CommissioningSection
 from gateway.core.settings import BatchSettings
 from gateway.files.signed import Trust
 from gateway.records import Batch, Why
-from gateway.service.commissioning.empty_drive import Jobs, ServiceVehicle
+from gateway.service.commissioning.empty_drive import ServiceVehicle
 from gateway.service.commissioning.lines import Lines
 from gateway.service.commissioning.session import Commissioning
 from gateway.stated.facts import VehicleAnswers
@@ -89,7 +89,9 @@ class Bench:
         self.shelf = Shelf(directory / "batches", ShelfLimits())
         self.settings = CommissioningSection(**settings)
         self.desk = Commissioning(
-            Jobs(directory, self.settings, BatchSettings(window_s=WINDOW_S)),
+            directory,
+            self.settings,
+            BatchSettings(window_s=WINDOW_S),
             Lines(directory, lines, trust or Trust(())),
             self.shelf,
             self.drives,

@@ -12,6 +12,7 @@ from click.testing import CliRunner, Result
 from gateway.bus.sink import replay
 from gateway.cli import springscale
 from gateway.config import load_settings
+from gateway.history import SERVICE
 from gateway.service.gateway import Gateway
 from gateway.setup import setup_of
 from gateway.store import Store
@@ -86,7 +87,7 @@ def events(config: Path) -> list[str]:
     """What happened to the service, newest first."""
     store = Store.open(load_settings(config).store.directory)
     try:
-        return [event.kind for event in store.reader().events()]
+        return [event.partition("\n")[0] for event in store.reader().page((SERVICE,), newest_first=True).items]
     finally:
         store.close()
 

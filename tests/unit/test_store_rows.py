@@ -9,6 +9,7 @@ from support.estimates import WINDOW_NS, make_record, texts
 from support.patience import PATIENCE_S
 
 from gateway.errors import StoreError
+from gateway.history import SERVICE
 from gateway.records import Why
 from gateway.status import StoreState
 from gateway.store import Retention, Store
@@ -102,7 +103,8 @@ def test_events_and_calibrations_are_kept(store: Store) -> None:
     store.write_calibration("sha256:ab", '{"a":1}')
     store.write_calibration("sha256:ab", '{"a":1}')
     assert store.flush(PATIENCE_S)
-    assert [event.kind for event in store.reader().events()] == ["bus_lost", "started"]
+    events = store.reader().page((SERVICE,), newest_first=True).items
+    assert [event.partition("\n")[0] for event in events] == ["bus_lost", "started"]
     assert store.reader().calibration("sha256:ab") == '{"a":1}'
     assert store.reader().calibration("sha256:cd") is None
 

@@ -1,13 +1,13 @@
 """The empty drive: batches are counted, inspected and fitted, until the accuracy is sufficient."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from gateway.calibration.commissioning.answers import vehicle_table
-from gateway.calibration.commissioning.job import Drive, Job, Result
+from gateway.calibration.commissioning.job import Drive, Found, Job, Result
 from gateway.calibration.kept.batch_file import KeptBatch, packed
 from gateway.calibration.kept.shelf import Shelf
 from gateway.config.sections import CommissioningSection
@@ -17,57 +17,11 @@ from gateway.errors import CalibrationFileError, CommissioningRefusedError
 from gateway.log import Event
 from gateway.records import Why
 from gateway.service.commissioning.record import MADE, LineChoice, MadeCalibration, RecordStore, Underway
-from gateway.service.commissioning.steps import LastInspection
 from gateway.service.commissioning.worker import Worker
 from gateway.stated.facts import VehicleAnswers
-from gateway.units import NS_PER_S
 
 COMMAND: Final = "commissioned on the vehicle"
 EMPTY: Final = "empty drive"
-
-
-@dataclass(frozen=True, slots=True)
-class BatchFile:
-    """The file of a kept batch, and its time span."""
-
-    path: Path
-    t_start_ns: int
-    t_end_ns: int
-
-    @property
-    def duration_s(self) -> float:
-        return (self.t_end_ns - self.t_start_ns) / NS_PER_S
-
-
-@dataclass(frozen=True, slots=True)
-class Jobs:
-    """Creates the jobs of one service."""
-
-    directory: Path
-    settings: CommissioningSection
-    batch: BatchSettings
-
-    def job(self, vehicle: Vehicle, line: LineChoice, batches: Sequence[BatchFile], *, is_fit: bool) -> Job:
-        """The job for an empty drive. Its window length is at most that of the longest batch."""
-        window_s = min(self.batch.window_s, max(one.duration_s for one in batches))
-        return Job(
-            vehicle=vehicle,
-            drives=(
-                Drive(
-                    name=EMPTY,
-                    front_share_pct=front_share_pct(vehicle, 0.0, None),
-                    batches=tuple(one.path for one in batches),
-                ),
-            ),
-            settings=asdict(self.batch) | {"window_s": window_s},
-            like=() if line.copy_name is None else (self.directory / line.copy_name,),
-            is_fit=is_fit,
-            goal_std_share=self.settings.goal_pct / 100.0,
-            most_memory_mb=self.settings.memory_mb,
-            command=COMMAND,
-        )
-
-
 OWNER: Final = "commissioning"  # of the batches that the shelf must not give away
 LEAST_BATCHES: Final = 2  # chosen: a single batch may be an outlier; a requested fit may use one
 LOOKED_AT: Final = "looked-at.batch"
@@ -86,15 +40,34 @@ class ServiceVehicle:
     is_name_fixed: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class LastInspection:
+    """The last findings of inspection, and the seconds of driving they cover."""
+
+    findings: tuple[Found, ...]
+    seconds: float
+
+    @property
+    def has_fault(self) -> bool:
+        """Whether a finding must be mended first."""
+        return any(one.severity == "fault" for one in self.findings)
+
+
 class EmptyDrive:
     """Receives every batch, and the results of the process that fits. Thread-safe by the store's lock."""
 
     def __init__(
-        self, book: RecordStore, jobs: Jobs, shelf: Shelf, vehicle: ServiceVehicle, make_worker: MakeWorker
+        self,
+        book: RecordStore,
+        settings: CommissioningSection,
+        batch: BatchSettings,
+        shelf: Shelf,
+        vehicle: ServiceVehicle,
+        make_worker: MakeWorker,
     ) -> None:
         """Resumes a commissioning under way."""
         self.looked: LastInspection | None = None
-        self._book, self._jobs, self._shelf, self._vehicle = book, jobs, shelf, vehicle
+        self._book, self._settings, self._batch, self._shelf, self._vehicle = book, settings, batch, shelf, vehicle
         self._worker = make_worker(self._on_result)
         self._job: Job | None = None
         self.is_over = False
@@ -144,7 +117,8 @@ class EmptyDrive:
             elif (
                 not self._worker.is_busy and Why.TOO_SHORT not in batch.rejected
             ):  # where a drive ended: no fault of it
-                self._look(kept)
+                place = self._worker.folder / LOOKED_AT
+                self._start(underway, {place: kept.batch.duration_s}, {LOOKED_AT: packed(kept)}, is_fit=False)
 
     def _resume(self) -> None:
         """Resume after a start: close the open window; drop batches that are gone or have another signal map."""
@@ -186,35 +160,35 @@ class EmptyDrive:
     def fit(self) -> None:
         """Start the fit of the whole drive, if there are batches."""
         underway = self._book.record.underway
-        if underway is None or underway.vehicle is None or underway.line is None or not underway.batches:
-            return
-        if underway.is_vehicle_doubted:
+        if underway is None or underway.is_vehicle_doubted:
             return
         there = {entry.id: entry for entry in self._shelf.entries()}
-        files = [
-            BatchFile(self._shelf.path(there[one]), there[one].t_start_ns, there[one].t_end_ns)
-            for one in underway.batches
-            if one in there
-        ]
-        if files:
-            vehicle = self._table(underway.vehicle, underway.line)
-            self._start(self._jobs.job(vehicle, underway.line, files, is_fit=True))
+        kept = [there[one] for one in underway.batches if one in there]
+        if kept:
+            self._start(underway, {self._shelf.path(one): one.duration_s for one in kept}, {}, is_fit=True)
 
-    def _look(self, kept: KeptBatch) -> None:
-        underway = self._book.record.underway
-        if underway is None or underway.vehicle is None or underway.line is None:
+    def _start(
+        self, underway: Underway, durations_s: Mapping[Path, float], files: Mapping[str, bytes], *, is_fit: bool
+    ) -> None:
+        """Start a job on batches, by path. Its window is at most as long as the longest of them."""
+        line = underway.line
+        if self.is_over or underway.vehicle is None or line is None:
             return
-        file = BatchFile(self._worker.folder / LOOKED_AT, kept.batch.t_start_ns, kept.batch.t_end_ns)
-        vehicle = self._table(underway.vehicle, underway.line)
-        job = self._jobs.job(vehicle, underway.line, [file], is_fit=False)
-        self._start(job, {LOOKED_AT: packed(kept)})
-
-    def _start(self, job: Job, files: Mapping[str, bytes] | None = None) -> None:
-        if self.is_over:
-            return
-        self._job = job
+        vehicle = self._table(underway.vehicle, line)
+        window_s = min(self._batch.window_s, max(durations_s.values()))
+        share_pct = front_share_pct(vehicle, 0.0, None)
+        self._job = Job(
+            vehicle=vehicle,
+            drives=(Drive(name=EMPTY, front_share_pct=share_pct, batches=tuple(durations_s)),),
+            settings=asdict(self._batch) | {"window_s": window_s},
+            like=() if line.copy_name is None else (self._book.directory / line.copy_name,),
+            is_fit=is_fit,
+            goal_std_share=self._settings.goal_pct / 100.0,
+            most_memory_mb=self._settings.memory_mb,
+            command=COMMAND,
+        )
         try:
-            self._worker.start(job, files or {})
+            self._worker.start(self._job, files)
         except OSError as refusal:
             self._book.cannot_store(refusal)
 

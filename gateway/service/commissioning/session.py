@@ -2,21 +2,24 @@
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final
 
 from gateway.calibration.commissioning.answers import doubts_of, vehicle_table
 from gateway.calibration.kept.batch_file import KeptBatch
 from gateway.calibration.kept.shelf import Shelf
+from gateway.config.sections import CommissioningSection
 from gateway.core.scheduler import Scheduler
+from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CampaignError, CommissioningRefusedError
 from gateway.log import Event, OnEvent
 from gateway.part import STOP_WITHIN_S, ServicePart
 from gateway.records import json_line
-from gateway.service.commissioning.empty_drive import EmptyDrive, Jobs, MakeWorker, ServiceVehicle
+from gateway.service.commissioning.empty_drive import EmptyDrive, MakeWorker, ServiceVehicle
 from gateway.service.commissioning.lines import Lines, require_alike
 from gateway.service.commissioning.record import Confirmed, EmptyClaim, Ended, LineChoice, RecordStore, Source, Underway
-from gateway.service.commissioning.steps import CommissioningStep, OpenWindow, Present, lines_json, state_json, step_of
+from gateway.service.commissioning.steps import CommissioningStep, OpenWindow, lines_json, state_json, step_of
 from gateway.service.commissioning.worker import Worker
 from gateway.stated.doubt import OF_THE_DRIVE, meant_by
 from gateway.stated.facts import VehicleAnswers
@@ -32,7 +35,9 @@ class Commissioning(ServicePart):
 
     def __init__(
         self,
-        jobs: Jobs,
+        directory: Path,
+        settings: CommissioningSection,
+        batch: BatchSettings,
         lines: Lines,
         shelf: Shelf,
         drives: Scheduler,
@@ -44,13 +49,12 @@ class Commissioning(ServicePart):
     ) -> None:
         """Resumes a commissioning under way. ``make_worker`` replaces the process that fits (tests)."""
         self._lines, self._drives, self._vehicle = lines, drives, vehicle
-        self._window_s = jobs.batch.window_s
-        self._book = RecordStore(jobs.directory, on_event, clock_ns)
+        self._window_s = batch.window_s
+        self._book = RecordStore(directory, on_event, clock_ns)
         active = self._book.record.active
         self._started_with = active.id if active else None
-        self._drive = EmptyDrive(
-            self._book, jobs, shelf, vehicle, make_worker or (lambda on_result: Worker(jobs.directory, on_result))
-        )
+        make_worker = make_worker or (lambda on_result: Worker(directory, on_result))
+        self._drive = EmptyDrive(self._book, settings, batch, shelf, vehicle, make_worker)
 
     @property
     def book(self) -> RecordStore:
@@ -91,7 +95,8 @@ class Commissioning(ServicePart):
     def state(self) -> str:
         """JSON: a CommissioningState."""
         with self._book.lock:
-            return json_line(state_json(self._book.record, self._present()))
+            shown = state_json(self._book.record, self._vehicle, self._drive, self._window(), is_pending=self.is_due)
+            return json_line(shown)
 
     def lines(self) -> str:
         return json_line(lines_json(tuple(self._lines.found())))
@@ -224,17 +229,6 @@ class Commissioning(ServicePart):
         if underway.empty.covers(drive_start_ns, window_ns[0]):
             return OpenWindow(open_s, max(0.0, window_s - open_s))
         return OpenWindow(0.0, max(0.0, 2.0 * window_s - open_s))
-
-    def _present(self) -> Present:
-        return Present(
-            window=self._window(),
-            why_not_allowed=self._vehicle.why_not_allowed,
-            is_calibrated=self._vehicle.is_calibrated,
-            is_busy=self._drive.is_busy,
-            driven_s=self._drive.driven_s,
-            looked=self._drive.looked,
-            started_with=self._started_with,
-        )
 
     def _underway(self, least: CommissioningStep = CommissioningStep.LINE) -> Underway:
         """The commissioning under way. Raises CommissioningRefusedError unless it has reached ``least``."""

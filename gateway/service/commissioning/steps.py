@@ -5,7 +5,8 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-from gateway.calibration.commissioning.job import Found, Learned
+from gateway.calibration.commissioning.job import Learned
+from gateway.service.commissioning.empty_drive import EmptyDrive, ServiceVehicle
 from gateway.service.commissioning.lines import LineFound
 from gateway.service.commissioning.record import CommissioningRecord, MadeCalibration, Underway
 from gateway.stated.doubt import OF_THE_DRIVE, Doubt
@@ -33,19 +34,6 @@ def step_of(underway: Underway) -> CommissioningStep:
 
 
 @dataclass(frozen=True, slots=True)
-class LastInspection:
-    """The last findings of inspection, and the seconds of driving they cover."""
-
-    findings: tuple[Found, ...]
-    seconds: float
-
-    @property
-    def has_fault(self) -> bool:
-        """Whether a finding must be mended first."""
-        return any(one.severity == "fault" for one in self.findings)
-
-
-@dataclass(frozen=True, slots=True)
 class OpenWindow:
     """The open window: how much of it counts so far, and how long until the next one that counts."""
 
@@ -53,29 +41,22 @@ class OpenWindow:
     next_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Present:
-    """The part of the state that is not on disk."""
-
-    why_not_allowed: str | None
-    is_calibrated: bool
-    is_busy: bool
-    driven_s: float
-    looked: LastInspection | None
-    window: OpenWindow | None  # None between drives, and before the vehicle is called empty
-    started_with: str | None  # the calibration of ``CommissioningRecord.active`` at the service's start
-
-
-def state_json(record: CommissioningRecord, present: Present) -> dict[str, Any]:
-    """A CommissioningState of the web."""
+def state_json(
+    record: CommissioningRecord,
+    vehicle: ServiceVehicle,
+    drive: EmptyDrive,
+    window: OpenWindow | None,
+    *,
+    is_pending: bool,
+) -> dict[str, Any]:
+    """A CommissioningState of the web. There is no window between drives, nor before the vehicle is called empty."""
     underway, active = record.underway, record.active
-    is_pending = (active.id if active else None) != present.started_with
     return {
-        "is_allowed": present.why_not_allowed is None,
-        "why_not": present.why_not_allowed,
-        "is_offered": present.why_not_allowed is None and underway is None and active is None
-        and not present.is_calibrated,
-        "underway": None if underway is None else _underway(underway, present),
+        "is_allowed": vehicle.why_not_allowed is None,
+        "why_not": vehicle.why_not_allowed,
+        "is_offered": vehicle.why_not_allowed is None and underway is None and active is None
+        and not vehicle.is_calibrated,
+        "underway": None if underway is None else _underway(underway, drive, window),
         "is_pending": is_pending,
         "active": None if active is None else _made(active),
         "history": [_made(one) for one in reversed(record.made)],
@@ -87,8 +68,8 @@ def lines_json(found: Sequence[LineFound]) -> dict[str, Any]:
     return {"items": [asdict(one) for one in found]}
 
 
-def _underway(underway: Underway, present: Present) -> dict[str, Any]:
-    looked = present.looked
+def _underway(underway: Underway, drive: EmptyDrive, window: OpenWindow | None) -> dict[str, Any]:
+    looked = drive.looked
     return {
         "step": step_of(underway),
         "begun_at": underway.begun_at,
@@ -107,12 +88,12 @@ def _underway(underway: Underway, present: Present) -> dict[str, Any]:
             "findings": [found.model_dump() for found in looked.findings],
         },
         "n_batches": len(underway.batches),
-        "driven_s": present.driven_s + (present.window.counted_s if present.window else 0.0),
-        "next_window_s": present.window.next_s if present.window else None,
+        "driven_s": drive.driven_s + (window.counted_s if window else 0.0),
+        "next_window_s": window.next_s if window else None,
         "doubts": [_doubt(one) for one in underway.open_doubts],
         "confirmed": [_doubt(one) for one in underway.doubts if one not in underway.open_doubts],
         "learned": _learned(underway.learned),
-        "is_fitting": present.is_busy,
+        "is_fitting": drive.is_busy,
         "fault": underway.fault,
     }
 
