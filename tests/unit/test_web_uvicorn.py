@@ -8,6 +8,7 @@ import inspect
 import tomllib
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 import uvicorn
@@ -32,7 +33,19 @@ OVERRIDDEN = {
     "on_message_complete": ["self"],
     "send_400_response": ["self", "msg"],
 }
-OF_A_CONNECTION = ("loop", "transport", "scope", "cycle", "flow", "url", "headers", "connections", "client", "logger")
+OF_A_CONNECTION = (
+    "loop",
+    "transport",
+    "scope",
+    "cycle",
+    "flow",
+    "url",
+    "headers",
+    "connections",
+    "client",
+    "logger",
+    "server_state",
+)
 OF_A_CYCLE = ("response_started", "response_complete", "disconnected", "message_event")
 
 
@@ -69,8 +82,9 @@ def test_a_connection_and_its_cycle_have_what_is_looked_at() -> None:
 def test_the_server_and_its_settings_have_what_is_looked_at() -> None:
     assert hasattr(uvicorn.Server, "capture_signals")
     assert WebServer.capture_signals is not uvicorn.Server.capture_signals
-    assert list(inspect.signature(uvicorn.Server.on_tick).parameters) == ["self", "counter"]
     assert "self.on_tick(" in inspect.getsource(uvicorn.Server.main_loop)
+    dated = "default_headers=self.server_state.default_headers"
+    assert dated in inspect.getsource(HttpToolsProtocol.on_headers_complete)
     assert {"is_ssl", "get_loop_factory"} <= set(dir(uvicorn.Config))
     assert "self.ssl" in inspect.getsource(uvicorn.Config.load)
     assert TlsConfig.load is not uvicorn.Config.load
@@ -78,9 +92,7 @@ def test_the_server_and_its_settings_have_what_is_looked_at() -> None:
     assert (server.started, server.should_exit) == (False, False)
 
 
-def test_a_server_that_sleeps_ends_as_soon_as_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.web.access.serving.TICK_S", 3600.0)
-
+def test_a_server_that_sleeps_ends_as_soon_as_it_is_told() -> None:
     async def serve() -> None:
         config = uvicorn.Config(lambda: None)  # type: ignore[arg-type,return-value]  # no app: nobody asks
         server = WebServer(config)
@@ -89,5 +101,34 @@ def test_a_server_that_sleeps_ends_as_soon_as_it_is_told(monkeypatch: pytest.Mon
         assert not looping.done()
         server.end()
         await asyncio.wait_for(looping, 60.0)
+
+    asyncio.run(serve())
+
+
+def test_each_answer_has_the_date_of_its_request(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A server that nobody asks does not wake for it."""
+
+    async def answer(scope: Any, receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 204, "headers": []})
+        await send({"type": "http.response.body"})
+
+    async def date_at(server: WebServer, unix_s: float) -> bytes:
+        monkeypatch.setattr("gateway.web.access.serving.time.time", lambda: unix_s)
+        reader, writer = await asyncio.open_connection(*server.servers[0].sockets[0].getsockname())
+        writer.write(b"GET / HTTP/1.1\r\nHost: van\r\nConnection: close\r\n\r\n")
+        said = await asyncio.wait_for(reader.read(), 60.0)
+        writer.close()
+        [date] = [line for line in said.lower().split(b"\r\n") if line.startswith(b"date: ")]
+        return date.removeprefix(b"date: ")
+
+    async def serve() -> None:
+        server = WebServer(uvicorn.Config(answer, port=0, http=GuardedConnection, lifespan="off", log_config=None))
+        serving = asyncio.create_task(server.serve())
+        while not server.started:
+            await asyncio.sleep(0.01)
+        assert await date_at(server, 784_111_777.9) == b"sun, 06 nov 1994 08:49:37 gmt"  # RFC 9110's example
+        assert await date_at(server, 784_111_778.0) == b"sun, 06 nov 1994 08:49:38 gmt"
+        server.end()
+        await asyncio.wait_for(serving, 60.0)
 
     asyncio.run(serve())

@@ -7,8 +7,11 @@ import asyncio
 import contextlib
 import logging
 import ssl
+import time
 from collections.abc import Iterator, Set
 from dataclasses import dataclass
+from email.utils import formatdate
+from functools import lru_cache
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any, Final, cast
@@ -113,6 +116,7 @@ class GuardedConnection(HttpToolsProtocol):
         self._n_head_bytes = len(self.url) + sum(len(name) + len(text) for name, text in self.headers)
         self._refuse_long_head()
         if not self._is_refused:
+            self.server_state.default_headers = _date_headers(int(time.time()))
             super().on_headers_complete()
 
     def on_body(self, body: bytes) -> None:
@@ -191,6 +195,11 @@ def has_slot(newcomer: "GuardedConnection | TlsHandshake", connections: Set[Any]
     if idle:
         min(idle, key=lambda other: other.since_s).transport.abort()
     return bool(idle)
+
+
+@lru_cache(maxsize=1)
+def _date_headers(unix_s: int) -> list[tuple[bytes, bytes]]:
+    return [(b"date", formatdate(unix_s, usegmt=True).encode())]
 
 
 def _on_the_wire(status: int, detail: str) -> bytes:
@@ -328,9 +337,6 @@ def _tls_settings(tls: Tls) -> dict[str, Any]:
     return wanted | {"ssl_ca_certs": str(tls.client_ca), "ssl_cert_reqs": ssl.CERT_REQUIRED}
 
 
-TICK_S: Final = 1.0  # chosen: how often the Date of the answers is written anew, whose unit is the second
-
-
 class WebServer(uvicorn.Server):
     """uvicorn without its own signal handling, which would raise the signal again after stopping."""
 
@@ -349,7 +355,7 @@ class WebServer(uvicorn.Server):
         yield
 
     async def main_loop(self) -> None:
-        """Until :meth:`end`. uvicorn's own looks ten times a second whether it is to end, parked vehicle or not."""
-        while not await self.on_tick(0):  # 0: with what uvicorn does once a second
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._ending.wait(), TICK_S)
+        """Until :meth:`end`. uvicorn's own wakes ten times a second, parked vehicle or not, to see whether it is to
+        end and to set the Date of the answers; here each request sets it.
+        """
+        await self._ending.wait()
