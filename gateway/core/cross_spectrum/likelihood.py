@@ -89,7 +89,7 @@ class Curvature:
 class _Whitened:
     """The model solved at a point, and L^-1 S L^-H for its M = L L^H, with what whitens other matrices alike.
 
-    The trace is (b, m). rows (b m p^2, r) are slopes of the residuals, and rows @ by_known (r, k) are those by the
+    The trace is (b, m), residual (b m p^2,). rows (b m p^2, r) are slopes of the residuals, and rows @ by_known (r, k) are those by the
     ``known`` entries, those that have been asked for so far.
     """
 
@@ -97,14 +97,12 @@ class _Whitened:
     solved: Solved
     by: Whitener
     seen: SpectralMatrix
+    trace: F64
+    residual: F64
     by_part: F64 | None = None
     known: list[int] = field(default_factory=list)
     rows: F64 | None = None
     by_known: F64 = field(default_factory=lambda: np.empty((0, 0)))
-
-    @property
-    def trace(self) -> F64:
-        return _sum(self.seen.auto)
 
 
 class Whittle:
@@ -130,8 +128,8 @@ class Whittle:
         """The likelihood of other measurements of the same drive. It shares the model as last solved."""
         other = copy(self)
         other.spectra, other._seen, other._curvatures = spectra, spectra.matrix, {}
-        if (last := self._last) is not None:
-            other._last = _Whitened(last.point, last.solved, last.by, last.by(other._seen))
+        if self._last is not None:
+            other._last = other._seen_at(self._last.point, self._last.solved, self._last.by)
         return other
 
     def cost(self, point: Point) -> float:
@@ -195,14 +193,7 @@ class Whittle:
 
     def _curvature_of(self, z: _Whitened, rows: F64) -> Curvature:
         """From the slopes (b m p^2, k) of the residuals."""
-        return Curvature(self._residual(z) @ rows, self._information(rows, rows))
-
-    def _residual(self, z: _Whitened) -> F64:
-        """(b m p^2,)"""
-        level, x = self._root_level_weight * _centred(np.log(z.trace / self._p)), self._root_level_weight * self._slope
-        shape = _traceless(z.seen) * (-self._p / z.trace * np.sqrt(self._n))
-        level -= float(np.sum(x * level)) / self._level_stiffness * x
-        return np.stack([*shape, level], axis=-1).ravel()
+        return Curvature(z.residual @ rows, self._information(rows, rows))
 
     def _information(self, rows: F64, others: F64) -> F64:
         """(k, l) from two sets of slopes (b m p^2, k) and (b m p^2, l) of the residuals."""
@@ -252,8 +243,17 @@ class Whittle:
         if self._last is None or not self._last.point.is_at(point):
             solved = Solved.at(point.theta, point.loaded, self.ground, self.spectra, self._searched)
             by = Whitener.of(with_noise(solved.noiseless, solved.model, self.spectra))
-            self._last = _Whitened(point, solved, by, by(self._seen))
+            self._last = self._seen_at(point, solved, by)
         return self._last
+
+    def _seen_at(self, point: Point, solved: Solved, by: Whitener) -> _Whitened:
+        """The spectra as the model sees them that is solved at a point."""
+        seen = by(self._seen)
+        trace = _sum(seen.auto)
+        level, x = self._root_level_weight * _centred(np.log(trace / self._p)), self._root_level_weight * self._slope
+        level -= float(np.sum(x * level)) / self._level_stiffness * x
+        shape = _traceless(seen) * (-self._p / trace * np.sqrt(self._n))
+        return _Whitened(point, solved, by, seen, trace, np.stack([*shape, level], axis=-1).ravel())
 
     def _cost(self, by: Whitener, trace: F64) -> F64:
         """(...) cost of whitened spectra with this trace (..., b, m): that of their shape plus that of the road's

@@ -9,7 +9,7 @@ two tracks of one axle, meet roads that are less alike at shorter waves;
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -32,8 +32,7 @@ from gateway.core.cross_spectrum.model.rolling_car import SidewaysLoad, rolling_
 from gateway.core.cross_spectrum.model.tracks import coherence_of
 from gateway.records import C128, F64
 
-Paths = tuple[C128, ...]
-"""Responses (p, ..., m) of p sensors by front and rear axle, both tracks alike; then one against the other."""
+Spectra = TypeVar("Spectra", F64, C128)
 
 IMAGINARY_STEP: Final = 1e-30  # its square vanishes beside any number here
 
@@ -61,13 +60,31 @@ class SpectralModel:
 
 @dataclass(frozen=True, slots=True)
 class Driven:
-    """The responses for each group: paths (p, ..., b, m); the rear axle's phase times its coherence with the front; and
+    """The responses of p sensors for each group.
+
+    paths (p, s, ..., b, m) are by front and rear axle with both tracks alike, then with one against the other; late (p,
+    s / 2, ..., b, m) are those by the rear axle times ``phase``, its phase times its coherence with the front. twist is
     the power of the tracks' difference relative to their mean (None: no roll).
     """
 
-    paths: Paths
+    paths: C128
+    late: C128
     phase: C128
     twist: F64 | None
+
+    @property
+    def front(self) -> C128:
+        """(p, s / 2, ..., b, m) the paths by the front axle."""
+        return self.paths[:, ::2]
+
+    @property
+    def rear(self) -> C128:
+        """(p, s / 2, ..., b, m) the paths by the rear axle."""
+        return self.paths[:, 1::2]
+
+    def of_tracks(self, x: Spectra) -> Spectra:
+        """Sum of x (p, s / 2, ..., b, m) over both tracks alike, and one against the other."""
+        return x[:, 0] if self.twist is None else x[:, 0] + self.twist * x[:, 1]
 
 
 def spectral_model(
@@ -136,18 +153,9 @@ def driven(model: SpectralModel, spectra: CrossSpectra) -> Driven:
     weights = level_weights(spectra.log_movement)
     later_s = spectra.delay_s * model.delay_scale[..., None, :] + model.rear_lag_s[..., None, :]
     phase = spectra.delay_phase * np.exp(-2j * np.pi * spectra.freq_hz * later_s)
-    coherence = coherence_of(along(model.track_offset_m, model, spectra))
-    paths = _mixed(weights, model.motion.paths)
-    return Driven(tuple(np.moveaxis(paths, 1, 0)), phase * coherence, _twist(model, spectra))
-
-
-def _mixed(weights: F64, paths: C128) -> C128:
-    """(p, s, ..., b, m) weighted sum of paths (p, s, ..., 5, m); the weights (b, 5) are real, so the product is taken
-    in reals.
-    """
-    parts = np.ascontiguousarray(np.moveaxis(paths, -2, 0)).view(float)
-    mixed: C128 = (weights @ parts.reshape(len(parts), -1)).view(complex)
-    return np.moveaxis(mixed.reshape(len(weights), *paths.shape[:-2], paths.shape[-1]), 0, -2)
+    phase = phase * coherence_of(along(model.track_offset_m, model, spectra))
+    paths: C128 = (weights @ model.motion.paths.view(float)).view(complex)  # the weights are real
+    return Driven(paths, phase * paths[:, 1::2], phase, _twist(model, spectra))
 
 
 def along(apart_m: F64, model: SpectralModel, spectra: CrossSpectra) -> F64:

@@ -4,16 +4,14 @@ Both axles meet one road, so the matrix is that of two coherent paths (with roll
 difference of the tracks); the incoherent part is added.
 """
 
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 
 from gateway.core.cross_spectrum.measured import CrossSpectra
-from gateway.core.cross_spectrum.model.driven import Driven, SpectralModel, driven
+from gateway.core.cross_spectrum.model.driven import Driven, Spectra, SpectralModel, driven
 from gateway.core.cross_spectrum.model.matrix import PAIRS, SpectralMatrix
 from gateway.records import C128, F64
-
-_Spectra = TypeVar("_Spectra", F64, C128)
 
 ROAD_EXPONENT: Final = -2.0  # displacement density of a road falls about as frequency squared (ISO 8608)
 
@@ -38,23 +36,21 @@ def with_noise(matrix: SpectralMatrix, model: SpectralModel, spectra: CrossSpect
 
 def without_noise(by: Driven, model: SpectralModel) -> SpectralMatrix:
     """The matrix (p, ..., b, m) per unit of road."""
-    slack = 1.0 + model.slack[..., None, :]
-    matrix = _of_two_paths(by.paths[0], by.paths[1], by.phase, slack)
-    if by.twist is None:
-        return matrix
-    against = _of_two_paths(by.paths[2], by.paths[3], by.phase, slack)
-    return SpectralMatrix(matrix.auto + by.twist * against.auto, matrix.cross + by.twist * against.cross)
+    matrix = by_tracks(by, model)
+    return SpectralMatrix(by.of_tracks(matrix.auto), by.of_tracks(matrix.cross))
 
 
-def _of_two_paths(front: C128, rear: C128, phase: C128, slack: F64) -> SpectralMatrix:
-    """|front|^2 + |rear|^2 + phase rear conj(front) + its conjugate; slack multiplies the squares."""
-    auto = slack * (power(front) + power(rear)) + 2.0 * np.real(phase * rear * np.conj(front))
-    late = phase * rear
-    cross = [
-        front[i] * np.conj(front[j] + late[j]) + rear[i] * np.conj(rear[j]) + late[i] * np.conj(front[j])
-        for i, j in PAIRS[: len(front) * (len(front) - 1) // 2]
-    ]
-    return SpectralMatrix(auto, np.stack(cross))
+def by_tracks(by: Driven, model: SpectralModel) -> SpectralMatrix:
+    """The same (p, s / 2, ..., b, m) for both tracks alike, and for one against the other: |front|^2 + |rear|^2 + late
+    conj(front) + its conjugate; slack multiplies the squares.
+    """
+    front, rear, late = by.front, by.rear, by.late
+    slack = 1.0 + model.slack[:, None, ..., None, :]
+    auto = slack * (power(front) + power(rear)) + 2.0 * (late.real * front.real + late.imag * front.imag)
+    one, other = (list(each) for each in zip(*PAIRS[: len(front) * (len(front) - 1) // 2], strict=True))
+    cross = front[one] * np.conj(front[other] + late[other]) + rear[one] * np.conj(rear[other])
+    cross += late[one] * np.conj(front[other])
+    return SpectralMatrix(auto, cross)
 
 
 def power(x: C128) -> F64:
@@ -83,9 +79,9 @@ def _road(spectra: CrossSpectra) -> F64:
     return road
 
 
-def _mixed(x: _Spectra) -> _Spectra:
+def _mixed(x: Spectra) -> Spectra:
     """Each value (..., m) mixed with its neighbours by weights 1:4:1."""
-    mixed: _Spectra = 4.0 * x[..., 1:-1]
+    mixed: Spectra = 4.0 * x[..., 1:-1]
     mixed += x[..., :-2]
     mixed += x[..., 2:]
     return mixed

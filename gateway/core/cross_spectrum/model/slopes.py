@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -16,7 +17,7 @@ from gateway.core.cross_spectrum.model.driven import (
     numbers_about,
     spectral_model,
 )
-from gateway.core.cross_spectrum.model.expected import noise, noise_scale, power, tapered, tapered_parts, without_noise
+from gateway.core.cross_spectrum.model.expected import by_tracks, noise, noise_scale, power, tapered, tapered_parts, without_noise
 from gateway.core.cross_spectrum.model.friction import level_weights
 from gateway.core.cross_spectrum.model.matrix import PAIRS, SpectralMatrix
 from gateway.core.cross_spectrum.model.motion import Motion
@@ -37,7 +38,7 @@ _OF_ROAD: Final = frozenset(
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Solved:
     """A vehicle with its load, theta (n,): its model, its evaluation for the spectra's groups, and the matrix without
     noise.
@@ -73,6 +74,12 @@ class Solved:
         if set(entries) <= set(self.moving):
             return self.by_entry[..., [self.moving.index(entry) for entry in entries]]
         return numbers_about(self.theta, self.load, self.ground, entries)[1]
+
+
+    @cached_property
+    def by_response(self) -> F64:
+        """(b, m, p^2, 2 p s) derivative of the matrix by the responses, both in real and imaginary parts."""
+        return _by_response(self.driven, self.model)
 
 
 def spectral_slopes(solved: Solved, spectra: CrossSpectra, free: Sequence[int]) -> tuple[F64, F64]:
@@ -141,7 +148,7 @@ def _of_paths(by_level: F64, k: int, solved: Solved, spectra: CrossSpectra) -> F
     """(b, m, p^2, k) derivatives of the matrix without taper and noise, from ``by_level`` (5, m 2 p s k)."""
     by = solved.driven
     moved = (level_weights(spectra.log_movement) @ by_level).reshape(*by.phase.shape, -1, k)
-    slopes: F64 = _by_response(by, solved.model) @ moved
+    slopes: F64 = solved.by_response @ moved
     return slopes
 
 
@@ -180,27 +187,27 @@ def _in_order_of_frequency(parts: F64) -> F64:
 
 
 def _by_response(by: Driven, model: SpectralModel) -> F64:
-    """(b, m, p^2, 2 p s) derivative of the matrix by the responses, both in real and imaginary parts.
-
-    An auto-spectrum is F^* (slack F + phase R) plus terms without F, so a change d of the response F moves it by 2
+    """An auto-spectrum is F^* (slack F + phase R) plus terms without F, so a change d of the response F moves it by 2
     Re(conj(slack F + phase R) d), and likewise the others: each is the real part of a product with conj(z), or Re(z)
     Re(d) + Im(z) Im(d).
     """
-    p, s = len(model.slack), len(by.paths)
-    slack = 1.0 + model.slack[:, None]
-    twist = 1.0 if by.twist is None else by.twist
-    z = np.zeros((*by.phase.shape, p * p, p, s), np.complex128)
-    for way, own in enumerate(by.paths):
-        other = by.phase * by.paths[way + 1] if way % 2 == 0 else np.conj(by.phase) * by.paths[way - 1]
-        share = 1.0 if way < 2 else twist
-        power_by, whole = 2.0 * share * (slack * own + other), share * (own + other)
-        for i in range(p):
-            z[:, :, i, i, way] = power_by[i]
-        for row, (i, j) in enumerate(PAIRS[: p * (p - 1) // 2]):
-            re, im = p + 2 * row, p + 2 * row + 1
-            z[:, :, re, i, way], z[:, :, re, j, way] = whole[j], whole[i]
-            z[:, :, im, i, way], z[:, :, im, j, way] = 1j * whole[j], -1j * whole[i]
-    return z.reshape(*z.shape[:3], -1).view(float)
+    p, s, b, m = by.paths.shape
+    whole = by.paths.copy()
+    whole[:, ::2] += by.late
+    whole[:, 1::2] += np.conj(by.phase) * by.front
+    power_by = 2.0 * (whole + model.slack[:, None, None] * by.paths)
+    if by.twist is not None:
+        whole[:, 2:] *= by.twist
+        power_by[:, 2:] *= by.twist
+    turned = 1j * whole
+    z = np.zeros((p * p, p, s, b, m), np.complex128)
+    for i in range(p):
+        z[i, i] = power_by[i]
+    for row, (i, j) in enumerate(PAIRS[: p * (p - 1) // 2]):
+        re, im = p + 2 * row, p + 2 * row + 1
+        z[re, i], z[re, j] = whole[j], whole[i]
+        z[im, i], z[im, j] = turned[j], -turned[i]
+    return np.ascontiguousarray(z.reshape(-1, b * m).T).view(float).reshape(b, m, p * p, -1)
 
 
 def _fill_in_slack(slopes: F64, free: Sequence[int], by: Driven, model: SpectralModel, spectra: CrossSpectra) -> None:
@@ -209,9 +216,7 @@ def _fill_in_slack(slopes: F64, free: Sequence[int], by: Driven, model: Spectral
         rows = [row for row, entry in enumerate(free) if entry in knots]
         if not rows:
             continue
-        own = power(by.paths[0][sensor]) + power(by.paths[1][sensor])
-        if by.twist is not None:
-            own = own + by.twist * (power(by.paths[2][sensor]) + power(by.paths[3][sensor]))
+        own = by.of_tracks(power(by.front) + power(by.rear))[sensor]
         shares = slack_weights(spectra.freq_hz)[[free[row] - knots.start for row in rows]]
         changed = ((model.slack[sensor] - model.least_slack) * own)[..., None] * shares.T
         slopes[:, :, sensor, rows[0] : rows[-1] + 1] = changed
@@ -240,10 +245,7 @@ def _fill_in_road(slopes: F64, free: Sequence[int], by: Driven, model: SpectralM
 
 def _late(by: Driven) -> C128:
     """(p, p, b, m) rear axle's reading of one sensor times the conjugate of the front's reading of another."""
-    late: C128 = by.paths[1][:, None] * np.conj(by.paths[0])
-    if by.twist is not None:
-        late = late + by.twist * (by.paths[3][:, None] * np.conj(by.paths[2]))
-    return np.asarray(by.phase * late, np.complex128)
+    return np.stack([by.of_tracks(late * np.conj(by.front)) for late in by.late])
 
 
 def _with_conjugate(x: C128) -> SpectralMatrix:
@@ -258,8 +260,8 @@ def _by_twist(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectr
     assert by.twist is not None
     assert model.tracks_apart_m is not None
     assert model.twist_level is not None
-    one = Driven(by.paths[2:], by.phase, None)
-    against = without_noise(one, model)
+    both = by_tracks(by, model)
+    against = SpectralMatrix(both.auto[:, 1], both.cross[:, 1])
     d_twist = by.twist
     if entry == INDEX["tracks_apart_m"]:
         x = along(model.tracks_apart_m, model, spectra)
