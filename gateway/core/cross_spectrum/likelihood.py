@@ -58,7 +58,7 @@ class Point:
 
     def is_at(self, other: "Point") -> bool:
         """Whether both points are equal."""
-        return self.loaded == other.loaded and np.array_equal(self.theta, other.theta)
+        return self.loaded == other.loaded and bool((self.theta == other.theta).all())
 
     @property
     def loaded(self) -> tuple[float, ...]:
@@ -89,8 +89,8 @@ class Curvature:
 class _Whitened:
     """The model solved at a point, and L^-1 S L^-H for its M = L L^H, with what whitens other matrices alike.
 
-    The trace is (b, m), residual (b m p^2,). rows (b m p^2, r) are slopes of the residuals, and rows @ by_known (r, k) are those by the
-    ``known`` entries, those that have been asked for so far.
+    The trace is (b, m), residual (b m p^2,). rows (b m p^2, r) are slopes of the residual; rows @ by_known (r, k) are
+    those by the ``known`` entries, those that have been asked for so far.
     """
 
     point: Point
@@ -198,8 +198,9 @@ class Whittle:
     def _information(self, rows: F64, others: F64) -> F64:
         """(k, l) from two sets of slopes (b m p^2, k) and (b m p^2, l) of the residuals."""
         x = (self._root_level_weight * self._slope).ravel()
-        along, other = (x @ some[self._p**2 - 1 :: self._p**2] for some in (rows, others))
-        information: F64 = rows.T @ others - np.outer(along, other) / self._level_stiffness
+        along = x @ rows[self._p**2 - 1 :: self._p**2]
+        other = along if others is rows else x @ others[self._p**2 - 1 :: self._p**2]
+        information: F64 = rows.T @ others - along[:, None] * (other / self._level_stiffness)
         return information
 
     def _rows(self, z: _Whitened, free: Sequence[int]) -> tuple[F64, F64]:
@@ -223,8 +224,9 @@ class Whittle:
         """(b m p^2, k) the residuals' slopes, from those of the expected spectra (b, m, p^2, k)."""
         z.by_part = self._by_part(z) if z.by_part is None else z.by_part
         d = z.by_part @ slopes
-        d[:, :, -1] -= d[:, :, -1].mean(axis=1, keepdims=True)
-        d[:, :, -1] *= self._root_level_weight[:, None]
+        level = d[:, :, -1]
+        level -= level.sum(axis=1, keepdims=True) / level.shape[1]
+        level *= self._root_level_weight[:, None]
         return d.reshape(-1, slopes.shape[-1])
 
     def _by_part(self, z: _Whitened) -> F64:
@@ -236,7 +238,7 @@ class Whittle:
         together = _sum(units.auto * z.seen.auto[:, None])
         together = together + 2.0 * _sum(np.real(units.cross * np.conj(z.seen.cross)[:, None]))
         rows = np.concatenate([_traceless(units) * np.sqrt(self._n), -together[None] / z.trace])
-        return np.ascontiguousarray(rows.transpose(2, 3, 0, 1))
+        return np.ascontiguousarray(rows.reshape(self._p**4, -1).T).reshape(*z.trace.shape, self._p**2, self._p**2)
 
     def _whitened(self, point: Point) -> _Whitened:
         """The solution at a point, cached: a search asks for the cost and then for the slopes."""
@@ -253,7 +255,7 @@ class Whittle:
         level, x = self._root_level_weight * _centred(np.log(trace / self._p)), self._root_level_weight * self._slope
         level -= float(np.sum(x * level)) / self._level_stiffness * x
         shape = _traceless(seen) * (-self._p / trace * np.sqrt(self._n))
-        return _Whitened(point, solved, by, seen, trace, np.stack([*shape, level], axis=-1).ravel())
+        return _Whitened(point, solved, by, seen, trace, np.array([*shape, level]).reshape(self._p**2, -1).T.ravel())
 
     def _cost(self, by: Whitener, trace: F64) -> F64:
         """(...) cost of whitened spectra with this trace (..., b, m): that of their shape plus that of the road's
@@ -287,7 +289,7 @@ def _traceless(matrix: SpectralMatrix) -> F64:
         parts.append((auto[0] + auto[1] - 2.0 * auto[2]) / np.sqrt(6))
     for one in cross:
         parts += [np.sqrt(2) * one.real, np.sqrt(2) * one.imag]
-    return np.stack(parts)
+    return np.array(parts)
 
 
 def _determinant(matrix: SpectralMatrix) -> F64:
@@ -302,5 +304,5 @@ def _determinant(matrix: SpectralMatrix) -> F64:
 
 def _centred(level: F64) -> F64:
     """``level`` minus its mean over frequency, because every group of segments has its own road level."""
-    centred: F64 = level - level.mean(axis=-1, keepdims=True)
+    centred: F64 = level - level.sum(axis=-1, keepdims=True) / level.shape[-1]
     return centred

@@ -104,9 +104,9 @@ def spectral_model(
     frame = Frame(ground.wheelbase_m, ground.half_track_m if with_roll else None)
     return SpectralModel(
         motion=Motion(numbers_of(theta, load, ground) if numbers is None else numbers, frame, freq_hz, n_sensors),
-        slack=ground.least_slack + np.stack([_slack(theta, knots, freq_hz) for knots in SLACK_KNOTS[:n_sensors]]),
+        slack=ground.least_slack + np.array([_slack(theta, knots, freq_hz) for knots in SLACK_KNOTS[:n_sensors]]),
         least_slack=ground.least_slack,
-        noise=np.stack([value_of(theta, name) for name in NOISES[:n_sensors]]),
+        noise=np.array([value_of(theta, name) for name in NOISES[:n_sensors]]),
         track_offset_m=value_of(theta, "track_offset_m"),
         delay_scale=value_of(theta, "delay_scale"),
         rear_lag_s=value_of(theta, "rear_lag_s"),

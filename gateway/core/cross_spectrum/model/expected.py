@@ -104,6 +104,6 @@ def noise_scale(matrix: SpectralMatrix, spectra: CrossSpectra) -> F64:
 
     That power is the geometric mean of acceleration's and pitch rate's; it is estimated as if they were ``matrix``.
     """
-    size = np.sqrt(matrix.auto[0].mean(axis=-1, keepdims=True) * matrix.auto[1].mean(axis=-1, keepdims=True))
-    per_density: F64 = spectra.inverse_power * size
+    acceleration, pitch_rate = matrix.auto[:2].sum(axis=-1, keepdims=True) / matrix.auto.shape[-1]
+    per_density: F64 = spectra.inverse_power * np.sqrt(acceleration * pitch_rate)
     return per_density

@@ -66,25 +66,25 @@ class Whitener:
             below[2] = (cross[2] - below[1] * np.conj(cross[0])) / pivots[1]
             left = auto[2] - np.abs(below[1]) ** 2 * pivots[0] - np.abs(below[2]) ** 2 * pivots[1]
             pivots.append(_kept_off_zero(left, auto[2]))
-        return cls(np.sqrt(np.stack(pivots)), below)
+        return cls(np.sqrt(np.array(pivots)), below)
 
     def __call__(self, matrix: SpectralMatrix) -> SpectralMatrix:
         """L^-1 X L^-H of matrices X with arrays (p, ..., m) like the whitener's, or (p, k, ..., m)."""
         auto, cross = matrix.auto, matrix.cross
-        below, root = self.below, self.roots
+        below, scale = self.below, 1.0 / self.roots
         lower = cross[0] - below[0] * auto[0]
         second = auto[1] - 2.0 * np.real(cross[0] * np.conj(below[0])) + np.abs(below[0]) ** 2 * auto[0]
-        whitened_auto = [auto[0] / root[0] ** 2, second / root[1] ** 2]
-        whitened_cross = [lower / (root[0] * root[1])]
+        whitened_auto = [auto[0] * scale[0] ** 2, second * scale[1] ** 2]
+        whitened_cross = [lower * (scale[0] * scale[1])]
         if len(auto) > 2:
             last_first = cross[1] - below[1] * auto[0] - below[2] * lower
             unmixed = cross[2] - cross[1] * np.conj(below[0])
             last_second = unmixed - below[1] * np.conj(lower) - below[2] * second
             last = np.conj(below[1]) * cross[1] + np.conj(below[2]) * unmixed
             last += below[1] * np.conj(last_first) + below[2] * np.conj(last_second)
-            whitened_auto.append((auto[2] - last.real) / root[2] ** 2)
-            whitened_cross += [last_first / (root[2] * root[0]), last_second / (root[2] * root[1])]
-        return SpectralMatrix(np.stack(whitened_auto), np.stack(whitened_cross))
+            whitened_auto.append((auto[2] - last.real) * scale[2] ** 2)
+            whitened_cross += [last_first * (scale[2] * scale[0]), last_second * (scale[2] * scale[1])]
+        return SpectralMatrix(np.array(whitened_auto), np.array(whitened_cross))
 
 
 def _kept_off_zero(pivot: F64, auto: F64) -> F64:

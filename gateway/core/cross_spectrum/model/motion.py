@@ -76,7 +76,7 @@ class Numbers:
     @property
     def axles(self) -> F64:
         """(n, 2, ..., 1) front and rear."""
-        return np.stack([self.group(FRONT), self.group(REAR)], axis=1)
+        return np.array([self.group(FRONT), self.group(REAR)]).swapaxes(0, 1)
 
 
 FRONT, REAR, RIGID, CARRIED, PAYLOAD, SENSOR = range(6)  # the groups
@@ -220,7 +220,7 @@ class Motion:
         d_ff, d_rr, d_fr = stiffness[0, 0] - inertia[0], stiffness[0, 1] - inertia[1], -inertia[2]
         if len(inertia) == 3:
             per_determinant = 1.0 / (d_ff * d_rr - d_fr**2)
-            solved: C128 = np.stack([d_rr, -d_fr, -d_fr, d_ff]).reshape(2, 2, *d_ff.shape) * per_determinant
+            solved: C128 = np.array([[d_rr, -d_fr], [-d_fr, d_ff]]) * per_determinant
             return solved
         d_pp = stiffness[1, 0] + stiffness[1, 1] - inertia[5]
         coupled = stiffness[2] - inertia[3:5]
@@ -230,8 +230,7 @@ class Motion:
         e_ff, e_rr, e_fr = d_rr * per_determinant, d_ff * per_determinant, -d_fr * per_determinant
         e_fp, e_rp = -by_f * e_ff - by_r * e_fr, -by_f * e_fr - by_r * e_rr
         e_pp = 1.0 / d_pp - by_f * e_fp - by_r * e_rp
-        rows = [e_ff, e_fr, e_fp, e_fr, e_rr, e_rp, e_fp, e_rp, e_pp]
-        return np.reshape(np.stack(rows), (3, 3, *e_ff.shape))
+        return np.array([[e_ff, e_fr, e_fp], [e_fr, e_rr, e_rp], [e_fp, e_rp, e_pp]])
 
     def _body(self, compliance: C128) -> C128:
         """(c, s, ..., m)."""
@@ -302,9 +301,10 @@ class Motion:
         per_tyre = axles.slopes(rows)
         for i, (into, of) in enumerate(((front, of_front), (rear, of_rear))):
             slopes = per_tyre[[rows.index(row) for row in of], :, i, None, None]
-            np.multiply(slopes[:, 0], by[0, i], out=into)
+            found = slopes[:, 0] * by[0, i]
             for t in range(1, len(by)):
-                np.add(into, slopes[:, t] * by[t, i], out=into)
+                found += slopes[:, t] * by[t, i]
+            into[...] = found
             still = axles.per_tyre[:, i, None, None]
             if UNSPRUNG in of or TYRE in of:
                 inert = self._omega**2 * (still * self._moved[[pairs[i] for pairs in _OF_AXLES[: len(by)]]]).sum(axis=0)

@@ -17,7 +17,15 @@ from gateway.core.cross_spectrum.model.driven import (
     numbers_about,
     spectral_model,
 )
-from gateway.core.cross_spectrum.model.expected import by_tracks, noise, noise_scale, power, tapered, tapered_parts, without_noise
+from gateway.core.cross_spectrum.model.expected import (
+    by_tracks,
+    noise,
+    noise_scale,
+    power,
+    tapered,
+    tapered_parts,
+    without_noise,
+)
 from gateway.core.cross_spectrum.model.friction import level_weights
 from gateway.core.cross_spectrum.model.matrix import PAIRS, SpectralMatrix
 from gateway.core.cross_spectrum.model.motion import Motion
@@ -74,7 +82,6 @@ class Solved:
         if set(entries) <= set(self.moving):
             return self.by_entry[..., [self.moving.index(entry) for entry in entries]]
         return numbers_about(self.theta, self.load, self.ground, entries)[1]
-
 
     @cached_property
     def by_response(self) -> F64:
@@ -245,7 +252,8 @@ def _fill_in_road(slopes: F64, free: Sequence[int], by: Driven, model: SpectralM
 
 def _late(by: Driven) -> C128:
     """(p, p, b, m) rear axle's reading of one sensor times the conjugate of the front's reading of another."""
-    return np.stack([by.of_tracks(late * np.conj(by.front)) for late in by.late])
+    late: C128 = np.moveaxis(by.late, 1, 0)[:, :, None] * np.conj(np.moveaxis(by.front, 1, 0))[:, None]
+    return late[0] if by.twist is None else np.asarray(late[0] + by.twist * late[1])
 
 
 def _with_conjugate(x: C128) -> SpectralMatrix:
@@ -284,8 +292,7 @@ def _add_noise(slopes: F64, matrix: SpectralMatrix, model: SpectralModel, spectr
     """Derivatives of the noise (expected.noise) of ``matrix``, which grows with the power of acceleration and pitch
     rate.
     """
-    sensed = noise(model, matrix, spectra)
-    levels = matrix.auto[:2].mean(axis=-1).T
-    grown = 0.5 * (slopes[:, :, :2].mean(axis=1) / levels[..., None]).sum(axis=1)
-    for sensor, one in enumerate(sensed):
-        slopes[:, :, sensor] += one[:, :, None] * grown[:, None]
+    sums = matrix.auto[:2].sum(axis=-1).T
+    grown = (0.5 / sums)[:, None] @ slopes[:, :, :2].sum(axis=1)  # of the noise, over it
+    for sensor, one in enumerate(noise(model, matrix, spectra)):
+        slopes[:, :, sensor] += one[:, :, None] * grown
