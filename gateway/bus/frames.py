@@ -19,7 +19,11 @@ def empty_frames(width: int) -> Frames:
 
 def take(frames: Frames, rows: I64 | Bool | slice) -> Frames:
     """The chosen rows: indices in the desired order, a mask (n,), or a slice."""
-    return Frames(frames.t_ns[rows], frames.can_id[rows], frames.length[rows], frames.payload[rows])
+    if isinstance(rows, slice):
+        return Frames(frames.t_ns[rows], frames.can_id[rows], frames.length[rows], frames.payload[rows])
+    at = np.flatnonzero(rows) if rows.dtype == np.bool_ else rows
+    payload = frames.payload.take(at, axis=0)  # ten times as fast as by brackets
+    return Frames(frames.t_ns[at], frames.can_id[at], frames.length[at], payload)
 
 
 def join(parts: Sequence[Frames], width: int) -> Frames:

@@ -22,7 +22,9 @@ from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 CHUNK_FRAMES: Final = 32_768  # chosen: what is handed on at once: large enough that the decoder's own steps cost little
 KEPT_SHAPES: Final = 32  # chosen: shapes of lines that are remembered
 LONGEST_LINE: Final = 4096  # chosen: bytes examined by an exact read
-_LOWER_CASE: Final = np.uint64(0x2020_2020_2020_2020)  # the bit of each byte that makes an ASCII letter a small one
+_LOWER_CASE_BIT: Final = np.uint8(0x20)  # makes an ASCII letter a small one
+_LOWER_CASE: Final = np.uint64(0x2020_2020_2020_2020)  # the same of each byte of a word
+_PLACES: Final = np.uint64(0x0001_0203_0405_0607)
 _ERROR_FRAME_TEXT: Final = "20000???"  # SocketCAN's error flag and the classes that exist
 
 
@@ -51,6 +53,7 @@ class IdPattern:
     def __init__(self, text: str) -> None:
         """``text`` is matched at the end of the eight bytes, case ignored; ``?`` stands for any byte."""
         padded = text.lower().rjust(8, "?")
+        self.last_digit = padded[-1]
         mask = bytes(0 if byte == "?" else 0xFF for byte in padded)
         self._mask = np.frombuffer(mask, np.uint64)[0]
         self._text = (np.frombuffer(padded.encode(), np.uint64)[0] | _LOWER_CASE) & self._mask
@@ -79,6 +82,7 @@ class _CandumpReader:
         self._filters = filters
         self._patterns = [IdPattern.of_filter(id_filter) for id_filter in filters]
         self._error_pattern = IdPattern(_ERROR_FRAME_TEXT)
+        self._last_digits = {pattern.last_digit for pattern in self._patterns}
         self._channel = None if channel is None else channel.encode()
         self._width = width
         self._report = report
@@ -102,6 +106,7 @@ class _CandumpReader:
 
     def _hits(self, block: LineBlock, hashes: I64) -> I64:
         """The marks (m,) whose identifier text may be a wanted one."""
+        hashes = self._likely(block.text, hashes)
         words = np.ndarray(len(block.text) - 7, np.uint64, buffer=block.text, strides=(1,))[hashes - 8] | _LOWER_CASE
         is_error = self._error_pattern.matches(words)
         n_errors = int(np.count_nonzero(is_error))
@@ -110,7 +115,17 @@ class _CandumpReader:
         is_hit = np.zeros(len(hashes), np.bool_)
         for pattern in self._patterns:
             is_hit |= pattern.matches(words)
-        return hashes[is_hit & ~is_error] if n_errors else hashes[is_hit]
+        return hashes.compress(is_hit & ~is_error if n_errors else is_hit)
+
+    def _likely(self, text: U8, hashes: I64) -> I64:
+        """The marks behind the last digit of a wanted identifier, or eight bytes behind the first of an error's."""
+        if "?" in self._last_digits:
+            return hashes
+        last = text.take(hashes - 1) | _LOWER_CASE_BIT
+        is_likely = text.take(hashes - 8) == ord(_ERROR_FRAME_TEXT[0])
+        for digit in self._last_digits:
+            is_likely |= last == ord(digit)
+        return hashes.compress(is_likely)
 
     def _wanted(self, block: LineBlock, hits: I64) -> Frames:
         """The frames of the hits: by every known shape, then, line by line, by new shapes or exactly."""
@@ -194,7 +209,8 @@ class _Finder:
     def marks(self, lines: U8) -> I64:
         """Positions of the marks between identifier and payload; the two characters of a CAN FD ## are one.
 
-        Eight bytes are compared as one number: if exactly one of them is a mark, its logarithm says which.
+        Eight bytes are compared as one number: if exactly one of them is a mark, the number is 256 to the power of its
+        place, and the highest byte of its product with _PLACES is the place.
         """
         is_mark = self.are(lines, "#")
         self._is_found[len(lines) : len(lines) + 8] = False
@@ -203,8 +219,7 @@ class _Finder:
         found = words[at]
         if (found & (found - np.uint64(1))).any():
             return _apart(np.flatnonzero(is_mark))
-        place = (found.astype(np.float64).view(np.int64) >> 55) - 127  # exponent 1023 + 8 x place, of which a 1/8
-        return _apart(8 * at + place)
+        return _apart(8 * at + ((found * _PLACES) >> np.uint64(56)).view(np.int64))
 
 
 def _apart(hashes: I64) -> I64:

@@ -148,7 +148,7 @@ class LineShape:
         starts = np.ndarray(len(text) - n_columns + 1, f"V{n_columns}", buffer=text, strides=(1,))
         rows = starts[hashes - self.hash_at].view(np.uint8).reshape(-1, n_columns)
         fits = (rows[:, self.literals] == self.template[self.literals]).all(axis=1)
-        rows = rows if fits.all() else rows[fits]
+        rows = rows if fits.all() else rows.compress(fits, axis=0)
         lines = np.ascontiguousarray(rows.T)  # one row a column of the line: every step below runs along one
         t_ns, has_stamp = self._stamps(lines)
         can_id, has_id = self._identifiers(lines)

@@ -133,8 +133,9 @@ class Decoder:
         for i, message in enumerate(self._messages):
             ours = np.flatnonzero(message_of == i)
             if len(ours):
-                message.fill(columns, ours, frames, rows[ours])
-                message.count(counters, ours, frames, rows[ours])
+                payload = frames.payload.take(rows[ours], axis=0)
+                message.count(counters, ours, payload)
+                message.fill(columns, ours, payload, frames.length[rows[ours]])
         aside = self._is_aside[message_of] if self._is_aside.any() else None
         return Motion(self.signals, frames.t_ns[rows], columns, counters, aside)
 
@@ -147,7 +148,8 @@ class _MessageReader:
         self.is_aside = all(m.signal in ASIDE for m in message.signals)
         self._length = message.length
         self._readers = [(m.signal, signals.index(m.signal), SampleReader(m)) for m in message.signals]
-        self._counters = {m.signal: m.counter for m in message.signals if m.counter is not None}
+        counters = [(m.counter, m.signal) for m in message.signals if m.counter is not None]
+        self._counters = {field: [signal for of, signal in counters if of == field] for field, _ in counters}
         self._n_frames = 0
         self._rejected: dict[Signal, Counter[Rejected]] = {m.signal: Counter() for m in message.signals}
 
@@ -156,25 +158,28 @@ class _MessageReader:
         rejected = self._rejected.items()
         return [(signal, SignalCounts(self._n_frames - n.total(), dict(n))) for signal, n in rejected]
 
-    def fill(self, columns: F64, ours: I64, frames: Frames, rows: I64) -> None:
-        """Decode the frames ``rows`` (m,), all of this message, into the rows ``ours`` (m,) of ``columns``."""
-        self._n_frames += len(rows)
-        has_length = frames.length[rows] == self._length
-        n_wrong = len(rows) - int(np.count_nonzero(has_length))
+    def fill(self, columns: F64, ours: I64, payload: U8, length: U8) -> None:
+        """Decode payloads (m, width) and their lengths (m,), all of this message, into the rows ``ours`` (m,) of
+        ``columns``.
+        """
+        self._n_frames += len(ours)
+        has_length = length == self._length
+        n_wrong = len(ours) - int(np.count_nonzero(has_length))
         if n_wrong:
-            rows, ours = rows[has_length], ours[has_length]
+            payload, ours = payload[has_length], ours[has_length]
             for rejected in self._rejected.values():
                 rejected[Rejected.WRONG_LENGTH] += n_wrong
-        if not len(rows):
+        if not len(ours):
             return
-        payload = frames.payload[rows]
         for signal, column, reader in self._readers:
             columns[ours, column], refused = reader.read(payload)
             self._rejected[signal].update(refused)
 
-    def count(self, counters: Mapping[Signal, F64], ours: I64, frames: Frames, rows: I64) -> None:
+    def count(self, counters: Mapping[Signal, F64], ours: I64, payload: U8) -> None:
         """Message counters of the same frames into the same rows; a frame too short for its counter gives no sample
         either.
         """
-        for signal, field in self._counters.items():
-            counters[signal][ours] = field.bits(frames.payload[rows])
+        for field, signals in self._counters.items():
+            bits = field.bits(payload)
+            for signal in signals:
+                counters[signal][ours] = bits
