@@ -23,7 +23,7 @@ from gateway.calibration.file.comparison import (
 )
 from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart
 from gateway.cli.known_weights import tare_commands, ticket_commands
-from gateway.cli.options import FILE, NumberRange, as_json
+from gateway.cli.options import FILE, NumberRange, Told, as_json, prints
 from gateway.records import json_line
 from gateway.stated.facts import DIVISION_KG
 
@@ -39,28 +39,25 @@ calibration.add_command(ticket_commands)
 
 @calibration.command("show")
 @click.argument("file", type=FILE)
-@as_json
-def show(file: Path, as_json: bool) -> None:
+@prints
+def show(file: Path) -> Told:
     """The content of FILE: vehicle, ranges, parameters with their standard deviations, expected errors, provenance."""
     held = load_calibration(file)
-    click.echo(json_line({"id": held.id, **held.model_dump(mode="json")}) if as_json else calibration_text(held))
+    return {"id": held.id, **held.model_dump(mode="json")}, calibration_text(held)
 
 
 @calibration.command("diff")
 @click.argument("one", type=FILE)
 @click.argument("other", type=FILE)
-@as_json
-def diff(one: Path, other: Path, as_json: bool) -> None:
+@prints
+def diff(one: Path, other: Path) -> Told:
     """The differences between two files; fitted figures in combined standard deviations, the most different first."""
     ours, theirs = load_calibration(one), load_calibration(other)
     changes = differences(ours, theirs)
-    if as_json:
-        listed = [asdict(each) | {"n_std": None if each.n_std == math.inf else each.n_std} for each in changes]
-        click.echo(json_line({"ids": [ours.id, theirs.id], "is_identical": not changes, "differences": listed}))
-    elif not changes:
-        click.echo(f"identical: {ours.id}" if ours.id == theirs.id else "identical but for the ids")
-    else:
-        click.echo("\n".join(map(_difference, changes)))
+    listed = [asdict(each) | {"n_std": None if each.n_std == math.inf else each.n_std} for each in changes]
+    identical = f"identical: {ours.id}" if ours.id == theirs.id else "identical but for the ids"
+    record = {"ids": [ours.id, theirs.id], "is_identical": not changes, "differences": listed}
+    return record, "\n".join(map(_difference, changes)) or identical
 
 
 @calibration.command("verify")
@@ -92,27 +89,23 @@ KILOGRAMS = NumberRange(0.0, 100_000.0, min_open=True)  # chosen: no road vehicl
 @click.option("--unsprung-front-kg", type=KILOGRAMS, default=None, help="axle, wheels, brakes [default: estimated]")
 @click.option("--unsprung-rear-kg", type=KILOGRAMS, default=None, help="the same at the rear [default: estimated]")
 @click.option("--division-kg", type=KILOGRAMS, default=DIVISION_KG, show_default=True, help="step of the scales")
-@as_json
+@prints
 def sprung(
     front_axle_kg: float,
     rear_axle_kg: float,
     unsprung_front_kg: float | None,
     unsprung_rear_kg: float | None,
     division_kg: float,
-    as_json: bool,
-) -> None:
+) -> Told:
     """Sprung mass and front share from axle weights: a [vehicle] block for the campaign file.
 
     Weigh each axle of the empty vehicle, on level ground, with driver and tank as in service. docs/campaign.md has
     the formula.
     """
     body = sprung_of(AxleWeights(front_axle_kg, rear_axle_kg, unsprung_front_kg, unsprung_rear_kg), division_kg)
-    if as_json:
-        record = asdict(body)
-        del record["weights"]
-        click.echo(json_line({"vehicle": body.vehicle_keys(), **record}))
-    else:
-        click.echo(vehicle_block(body))
+    record = {"vehicle": body.vehicle_keys(), **asdict(body)}
+    del record["weights"]
+    return record, vehicle_block(body)
 
 
 def _own_checks(held: CalibrationFile) -> tuple[Check, ...]:

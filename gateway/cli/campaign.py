@@ -4,10 +4,9 @@ from pathlib import Path
 
 import click
 
-from gateway.cli.options import FILE, as_json
+from gateway.cli.options import FILE, Told, prints
 from gateway.cli.progress import counted
 from gateway.offline.bundle import pack as pack_into
-from gateway.records import json_line
 
 
 @click.group("campaign")
@@ -19,8 +18,8 @@ def campaign() -> None:
 @click.argument("folder", type=FILE)
 @click.option("--output", type=FILE, required=True, help="archive to write (.zip)")
 @click.option("--with-position", is_flag=True, help="keep latitude and longitude [default: left out]")
-@as_json
-def pack(folder: Path, output: Path, with_position: bool, as_json: bool) -> None:
+@prints
+def pack(folder: Path, output: Path, with_position: bool) -> Told:
     """Pack FOLDER's campaign.toml, signal map, logs and contribution.toml into one archive.
 
     Only the frames that the signal map names are packed, nothing else of the bus. `calibrate` and `evaluate` take the
@@ -28,10 +27,6 @@ def pack(folder: Path, output: Path, with_position: bool, as_json: bool) -> None
     """
     with counted("reading drives") as on_run:
         packed = pack_into(folder, output, with_position=with_position, on_run=on_run)
-    if as_json:
-        click.echo(json_line(packed.to_json()))
-        return
-    for run in packed.runs:
-        click.echo(f"{run.log}: {run.payload_kg:g} kg, {run.duration_s:.0f} s, {run.n_frames} frames")
+    runs = [f"{run.log}: {run.payload_kg:g} kg, {run.duration_s:.0f} s, {run.n_frames} frames" for run in packed.runs]
     permission = packed.contribution.permission
-    click.echo(f"Written: {output}, {permission.licence} by {permission.given_by}")
+    return packed.to_json(), "\n".join([*runs, f"Written: {output}, {permission.licence} by {permission.given_by}"])

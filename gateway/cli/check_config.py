@@ -1,16 +1,16 @@
 """springscale check-config: everything that can be checked without the bus."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
 
 from gateway.calibration.known_weights_file import FILE_NAME
-from gateway.cli.options import FILE, as_json, trusted_keys
-from gateway.config import load_settings
+from gateway.cli.options import FILE, Told, prints, trusted_keys
+from gateway.config import Settings, load_settings
 from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError, UntrustedFileError
-from gateway.records import json_line
 from gateway.service.calibration_in_use import with_commissioned
 from gateway.service.lifecycle import startable_faults
 from gateway.setup import Setup, setup_of
@@ -20,8 +20,8 @@ from gateway.uplink.settings import uplink_settings, webhook_settings
 @click.command("check-config")
 @click.argument("config", type=FILE)
 @trusted_keys
-@as_json
-def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None:
+@prints
+def check_config(config: Path, trusted_keys: Path | None) -> Told:
     """Check CONFIG, its signal map, its DBC files, its calibration and its known weights; name every fault."""
     settings = load_settings(config, trusted_keys)
     trust, untrusted = settings.trust.for_reading(), dict[Path, str]()
@@ -45,7 +45,7 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
         raise ConfigurationError("\n".join(f"{config}: {fault}" for fault in faults))
     forwarding = uplink_settings(settings.uplink, settings.vehicle)
     pushing = webhook_settings(settings.webhook, settings.vehicle)
-    sends_on = settings.broadcast.channel  # None with its interface
+    keys = [key.fingerprint for key in trust.keys]
     summary = {
         "config": str(config),
         "signals": [str(signal) for signal in setup.signal_map.signals],
@@ -54,31 +54,33 @@ def check_config(config: Path, trusted_keys: Path | None, as_json: bool) -> None
         "estimator": setup.estimator,
         "interface": settings.bus.interface,
         "channel": settings.bus.channel,
-        "trusted_keys": [key.fingerprint for key in trust.keys],
+        "trusted_keys": keys,
         "limits": limits_in_force(setup),
         "uplink": forwarding.broker if forwarding else None,
-        "broadcast": sends_on,
+        "broadcast": settings.broadcast.channel,  # None with its interface
         "webhook": pushing.receiver if pushing else None,
     }
-    if as_json:
-        click.echo(json_line(summary))
-        return
-    click.echo(f"{config}: good. Reads {', '.join(setup.signal_map.signals)} from {settings.bus.channel}.")
+    return summary, "\n".join(_sentences(config, settings, setup, keys))
+
+
+def _sentences(config: Path, settings: Settings, setup: Setup, keys: list[str]) -> Iterator[str]:
+    channel, sends_on = settings.bus.channel, settings.broadcast.channel
+    yield f"{config}: good. Reads {', '.join(setup.signal_map.signals)} from {channel}."
     if sends_on is not None:
-        click.echo(f"Sends weights on {sends_on}, which must not be the bus of {settings.bus.channel} by another name.")
-    if trust.keys:
-        click.echo(f"Its files are signed as required, by {' or '.join(key.fingerprint for key in trust.keys)}.")
+        yield f"Sends weights on {sends_on}, which must not be the bus of {channel} by another name."
+    if keys:
+        yield f"Its files are signed as required, by {' or '.join(keys)}."
     if (commissioned := with_commissioned(settings)) is not settings:
-        click.echo(f"The service weighs with the calibration that was made on the vehicle: {commissioned.calibration}.")
+        yield f"The service weighs with the calibration that was made on the vehicle: {commissioned.calibration}."
     elif setup.calibration is None:
-        click.echo(
+        yield (
             "No calibration is configured: batches will carry spectra and rejected = no_calibration, until one is made "
             "on the vehicle (springscale commission)."
         )
     elif limits := limits_in_force(setup):
-        click.echo(f"It may weigh: {', '.join(f'{name} {kg:g} kg' for name, kg in limits.items())}.")
+        yield f"It may weigh: {', '.join(f'{name} {kg:g} kg' for name, kg in limits.items())}."
     else:
-        click.echo("No limit is known, so no overload can be reported. See [vehicle] gross_limit_kg.")
+        yield "No limit is known, so no overload can be reported. See [vehicle] gross_limit_kg."
 
 
 def limits_in_force(setup: Setup) -> dict[str, float]:

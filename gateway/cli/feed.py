@@ -11,11 +11,10 @@ import click
 
 from gateway.bus.feed import AXES, Feeder, FeedState, Gpsd, IioDevice, find_devices, turned
 from gateway.cli import options
-from gateway.cli.options import NumberRange, as_json
+from gateway.cli.options import NumberRange, Told, prints
 from gateway.cli.progress import StatusLine
 from gateway.errors import ConfigurationError
 from gateway.notify import Notifier
-from gateway.records import json_line
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 GPSD: Final = "127.0.0.1:2947"
@@ -40,7 +39,7 @@ SILENT_S: Final = 10.0  # chosen: without a sample the watchdog is no longer fed
 @click.option("--for-s", type=NumberRange(0.1), default=None, help="so many seconds [default: until Ctrl-C]")
 @click.option("--sysfs", type=options.FILE, default=Path("/sys/bus/iio/devices"), hidden=True)
 @click.option("--nodes", type=options.FILE, default=Path("/dev"), hidden=True)
-@as_json
+@prints
 def feed(
     interface: str,
     channel: str,
@@ -52,8 +51,7 @@ def feed(
     for_s: float | None,
     sysfs: Path,
     nodes: Path,
-    as_json: bool,
-) -> None:
+) -> Told:
     """Send an inertial unit of Linux IIO and a satellite receiver behind gpsd onto a CAN interface.
 
     The frames are those of the signal map springscale:reference, with a sample counter in each of the IMU's, so that
@@ -74,11 +72,7 @@ def feed(
     ticker = _Ticker(devices)
     with StatusLine() as ticker.status:
         feeder.run(ticker.tick)
-    told = feeder.state
-    if as_json:
-        click.echo(json_line(_json(told)))
-    else:
-        click.echo(_sentence(told))
+    return _json(feeder.state), _sentence(feeder.state)
 
 
 def _gpsd(told: str) -> Gpsd | None:

@@ -6,17 +6,16 @@ import click
 
 from gateway.archive import place_of
 from gateway.archive.fleet.fleet import fleet_of
-from gateway.cli.options import FILE, as_json
+from gateway.cli.options import FILE, Told, prints
 from gateway.cli.progress import counted
-from gateway.records import json_line
 from gateway.reports.fleet.report import write_fleet_report
 
 
 @click.command("fleet-report")
 @click.argument("dataset")
 @click.option("--output", type=FILE, required=True, help="directory to write; an earlier report is written over")
-@as_json
-def fleet_report(dataset: str, output: Path, as_json: bool) -> None:
+@prints
+def fleet_report(dataset: str, output: Path) -> Told:
     """A report on each vehicle of DATASET, the output of `springscale reprocess`.
 
     Loads over time with intervals, refused batches by reason, drifts beyond the fleet's seasons and beyond chance,
@@ -28,5 +27,4 @@ def fleet_report(dataset: str, output: Path, as_json: bool) -> None:
         report = write_fleet_report(
             output, fleet, dataset, lambda done, of: on_step(of - 1 + done, 2 * of - 1, "pages")
         )
-    written = {"report": report, "numbers": output / "report.json"}
-    click.echo(json_line({name: str(path) for name, path in written.items()}) if as_json else str(report))
+    return {"report": str(report), "numbers": str(output / "report.json")}, str(report)

@@ -7,10 +7,9 @@ from pathlib import Path
 import click
 
 from gateway.bus.feed.iio import AXES
-from gateway.cli.options import FILE, as_json
+from gateway.cli.options import FILE, Told, prints
 from gateway.offline.phone import Imported
 from gateway.offline.phone import import_recording as import_from
-from gateway.records import json_line
 
 
 @click.command("import")
@@ -23,22 +22,16 @@ from gateway.records import json_line
     help="the phone's axis that points ahead; y is its top edge [default: found from braking and bends]",
 )
 @click.option("--no-position", "is_without_position", is_flag=True, help="leave latitude and longitude out")
-@as_json
-def import_recording(
-    recording: Path, output: Path, forward: str | None, is_without_position: bool, as_json: bool
-) -> None:
+@prints
+def import_recording(recording: Path, output: Path, forward: str | None, is_without_position: bool) -> Told:
     """Make a log OUTPUT (.log or .log.gz) of RECORDING, a zip or folder that Sensor Logger or phyphox exported.
 
     Turns the phone's axes to the vehicle's, and writes the signal map and database of the log beside it. Prints faults
     of the phone's recording, and how to mend them.
     """
     found, written = import_from(recording, output, forward, with_position=not is_without_position)
-    if as_json:
-        click.echo(json_line({**found.to_json(), "written": [str(path) for path in written]}))
-        return
-    click.echo("\n".join(_text(found)))
-    for path in written:
-        click.echo(f"Written: {path}")
+    record = {**found.to_json(), "written": [str(path) for path in written]}
+    return record, "\n".join([*_text(found), *(f"Written: {path}" for path in written)])
 
 
 def _text(found: Imported) -> Iterator[str]:

@@ -11,13 +11,12 @@ from gateway.calibration.file.line_file import LineFile, load_like
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.line.scatter import SCATTER_STD
 from gateway.calibration.line_files import build_line
-from gateway.cli.options import FILE, as_json, batch_settings, require_output_place
+from gateway.cli.options import FILE, Told, batch_settings, prints, require_output_place
 from gateway.cli.progress import Steps, counted
 from gateway.core.cross_spectrum.model.parameters import is_positive
 from gateway.errors import CampaignError, ConfigurationError
 from gateway.files.whole import refusal_told, write_whole
 from gateway.offline.campaigns import inspect
-from gateway.records import json_line
 
 
 @click.group("line")
@@ -35,8 +34,8 @@ def line() -> None:
     multiple=True,
     help="campaign that one of FILES was calibrated from; repeatable; each such vehicle is left out in turn",
 )
-@as_json
-def build(files: tuple[Path, ...], output: Path, campaigns: tuple[Path, ...], as_json: bool) -> None:
+@prints
+def build(files: tuple[Path, ...], output: Path, campaigns: tuple[Path, ...]) -> Told:
     """Make the line of the calibrations FILES, sisters of one model.
 
     From three on, the scatter between vehicles is estimated. With --logs each vehicle of these campaigns is calibrated
@@ -50,24 +49,26 @@ def build(files: tuple[Path, ...], output: Path, campaigns: tuple[Path, ...], as
     built = _build(calibrations, runs)
     with refusal_told(output, ConfigurationError):
         write_whole(output, built.to_json())
-    if as_json:
-        left_out = built.expected_errors.model_dump(mode="json") if built.expected_errors else None
-        record: dict[str, object] = {"line_id": built.id, "output": str(output), "members": list(built.line.members)}
-        record |= {"n_siblings": built.line.n_siblings, "expected_errors": left_out, "warnings": list(built.warnings)}
-        click.echo(json_line(record))
-    else:
-        click.echo(f"{output}: {len(built.siblings)} vehicles\n{line_text(built)}")
+    record = {
+        "line_id": built.id,
+        "output": str(output),
+        "members": list(built.line.members),
+        "n_siblings": built.line.n_siblings,
+        "expected_errors": built.expected_errors.model_dump(mode="json") if built.expected_errors else None,
+        "warnings": list(built.warnings),
+    }
+    return record, f"{output}: {len(built.siblings)} vehicles\n{line_text(built)}"
 
 
 @line.command("show")
 @click.argument("file", type=FILE)
-@as_json
-def show(file: Path, as_json: bool) -> None:
+@prints
+def show(file: Path) -> Told:
     """The content of the line FILE: its vehicles, the scatter between them, and how far intervals are widened."""
     held = load_like(file)
     if not isinstance(held, LineFile):
         raise ConfigurationError(f"{file}: is the calibration of one vehicle: see `springscale calibration show`")
-    click.echo(json_line({"id": held.id, **held.model_dump(mode="json")}) if as_json else line_text(held))
+    return {"id": held.id, **held.model_dump(mode="json")}, line_text(held)
 
 
 def _build(calibrations: Sequence[CalibrationFile], runs: dict[str, tuple[KnownRun, ...]]) -> LineFile:

@@ -8,12 +8,12 @@ from typing import Any
 import click
 
 from gateway.bus.heard import Heard
-from gateway.cli.options import FILE, as_json
+from gateway.cli.options import FILE, Told, prints
 from gateway.offline.look.draft import write_draft
 from gateway.offline.look.look import Look, MapFit
 from gateway.offline.look.look import look as look_at
 from gateway.offline.look.readings import Described
-from gateway.records import EXTENDED_ID, JOURNEY, json_line
+from gateway.records import EXTENDED_ID, JOURNEY
 
 
 @click.command("look")
@@ -22,8 +22,8 @@ from gateway.records import EXTENDED_ID, JOURNEY, json_line
     "--dbc", "databases", type=FILE, multiple=True, help="database of a device, repeatable [default: those beside LOG]"
 )
 @click.option("--output", type=FILE, default=None, help="write a first signal map here")
-@as_json
-def look(log: Path, databases: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
+@prints
+def look(log: Path, databases: tuple[Path, ...], output: Path | None) -> Told:
     """The content of LOG: identifiers, the signal maps that fit, the axis that shows gravity, and whether that can
     work.
 
@@ -31,12 +31,8 @@ def look(log: Path, databases: tuple[Path, ...], output: Path | None, as_json: b
     """
     seen = look_at(log, databases)
     written = write_draft(seen, output) if output else ()
-    if as_json:
-        click.echo(json_line({**look_json(seen), "written": [str(path) for path in written]}))
-        return
-    click.echo(look_text(seen))
-    for path in written:
-        click.echo(f"Written: {path}")
+    record = {**look_json(seen), "written": [str(path) for path in written]}
+    return record, "\n".join([look_text(seen), *(f"Written: {path}" for path in written)])
 
 
 MOST_UNKNOWN = 12  # chosen: lines of identifiers that nothing describes

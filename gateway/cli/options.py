@@ -1,6 +1,8 @@
 """Options and arguments that several commands share."""
 
+import functools
 import math
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -11,6 +13,7 @@ from gateway.bus.live.python_can import usable_interfaces
 from gateway.bus.sink import Speed
 from gateway.config import ESTIMATOR_NAMES, BatchSection
 from gateway.core.settings import BatchSettings
+from gateway.records import json_line
 
 FILE = click.Path(path_type=Path)
 
@@ -52,6 +55,21 @@ class CampaignFile(click.Path):
 CAMPAIGN = CampaignFile()
 
 as_json = click.option("--json", "as_json", is_flag=True, help="machine-readable output")
+
+Told = tuple[Mapping[str, Any], str]  # the same for programs and in words
+
+
+def prints(command: Callable[..., Told]) -> Callable[..., None]:
+    """Print what the command returns: in words, or with --json the object on one line."""
+
+    @functools.wraps(command)
+    def printing(*services: Any, as_json: bool, **options: Any) -> None:
+        record, text = command(*services, **options)
+        click.echo(json_line(record) if as_json else text)
+
+    return as_json(printing)
+
+
 trusted_keys = click.option(
     "--trusted-keys",
     type=FILE,

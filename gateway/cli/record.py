@@ -14,12 +14,11 @@ from gateway.bus.live.source import LiveSource
 from gateway.bus.ring.ring_log import record_to_file
 from gateway.bus.signals import load_signal_map
 from gateway.cli import options
-from gateway.cli.options import FILE, NumberRange, as_json
+from gateway.cli.options import FILE, NumberRange, Told, prints
 from gateway.cli.progress import StatusLine
 from gateway.cli.service import Answer, Service, asks_service, prints_answer
 from gateway.errors import SpringscaleError
 from gateway.files.whole import refusal_told, written_whole
-from gateway.records import json_line
 from gateway.words import counted
 
 PATH: Final = "/api/v1/record"
@@ -47,15 +46,14 @@ def list_segments(service: Service) -> Answer:
 @click.option("--since", type=_MOMENT, default=None, help="files with frames at or after this, UTC")
 @click.option("--until", type=_MOMENT, default=None, help="files with frames before this, UTC")
 @asks_service
-@as_json
+@prints
 def fetch(
     service: Service,
     names: tuple[str, ...],
     output: Path,
     since: datetime | None,
     until: datetime | None,
-    as_json: bool,
-) -> None:
+) -> Told:
     """Fetch files of the ring log as one log: NAMES, those of a time, or all.
 
     Batches are counted from the first frame of a drive: to get the very batches of the service, begin with the file in
@@ -74,7 +72,7 @@ def fetch(
                 status.show(f"{item['name']}: {file.tell()} bytes so far")
     told = {"output": str(output), "n_bytes": output.stat().st_size, "items": chosen}
     n_frames = sum(item["n_frames"] for item in chosen)
-    click.echo(json_line(told) if as_json else f"{output}: {n_frames} frames, {_span_text(chosen)}")
+    return told, f"{output}: {n_frames} frames, {_span_text(chosen)}"
 
 
 @record.command("bus")
@@ -83,8 +81,8 @@ def fetch(
 @options.interface
 @options.channel
 @click.option("--for-s", type=NumberRange(0.1), default=None, help="so many seconds [default: until Ctrl-C]")
-@as_json
-def from_bus(log: Path, signals: str, interface: str, channel: str, for_s: float | None, as_json: bool) -> None:
+@prints
+def from_bus(log: Path, signals: str, interface: str, channel: str, for_s: float | None) -> Told:
     """Record the mapped frames of a bus into LOG (gzip-compressed candump), without a service."""
     signal_map = load_signal_map(signals)
     source = LiveSource(interface, channel, signal_map)
@@ -102,7 +100,7 @@ def from_bus(log: Path, signals: str, interface: str, channel: str, for_s: float
     if not n_frames:
         raise SpringscaleError(f"{log}: no mapped frame came ({source.reason or 'the bus was silent'})")
     told = {"output": str(log), "n_frames": n_frames, "n_dropped": n_dropped}
-    click.echo(json_line(told) if as_json else f"{log}: {n_frames} frames, {n_dropped} lost")
+    return told, f"{log}: {n_frames} frames, {n_dropped} lost"
 
 
 @contextlib.contextmanager

@@ -8,10 +8,9 @@ from gateway.bus.logs import LogReport
 from gateway.bus.sink import Speed
 from gateway.bus.sink import replay as send_log
 from gateway.cli import options
-from gateway.cli.options import FILE, as_json
+from gateway.cli.options import FILE, Told, prints
 from gateway.cli.progress import StatusLine
 from gateway.errors import LogUnreadableError
-from gateway.records import json_line
 
 
 @click.command("replay")
@@ -20,8 +19,8 @@ from gateway.records import json_line
 @options.channel
 @click.option("--from-channel", default=None, help="send the frames of this channel of the log only [default: all]")
 @options.speed
-@as_json
-def replay(log: Path, interface: str, channel: str, from_channel: str | None, speed: Speed, as_json: bool) -> None:
+@prints
+def replay(log: Path, interface: str, channel: str, from_channel: str | None, speed: Speed) -> Told:
     """Send every data frame of LOG to a bus, paced by its time stamps."""
     with StatusLine() as status:
         report = send_log(
@@ -33,7 +32,7 @@ def replay(log: Path, interface: str, channel: str, from_channel: str | None, sp
             on_progress=lambda sent: status.show(f"{sent.recorded_s:.0f} s of the log, {sent.n_sent} frames sent"),
         )
     _require_sent(report, from_channel)
-    click.echo(json_line({"sent": report.wanted, **report.to_json()}) if as_json else _sentences(report))
+    return {"sent": report.wanted, **report.to_json()}, _sentences(report)
 
 
 def _require_sent(report: LogReport, from_channel: str | None) -> None:

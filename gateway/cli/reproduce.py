@@ -5,9 +5,8 @@ from typing import Final
 
 import click
 
-from gateway.cli.options import FILE, as_json
+from gateway.cli.options import FILE, Told, prints
 from gateway.cli.progress import counted
-from gateway.records import json_line
 from gateway.reports.paper.experiments import N_STEPS, Extent
 from gateway.reports.paper.reproduce import reproduce as write_report
 
@@ -24,8 +23,8 @@ QUICK_LONGEST_S: Final = 155.0  # chosen: two thirds of it, which identify, hold
     "--quick", is_flag=True, help="a quarter of the driving and batches of 100 s: to try it out, not to judge"
 )
 @click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes that simulate")
-@as_json
-def reproduce(output: Path, seed: int, quick: bool, workers: int, as_json: bool) -> None:
+@prints
+def reproduce(output: Path, seed: int, quick: bool, workers: int) -> Told:
     """The paper's figures and tables, its numbers beside ours, as report.html with all its files."""
     whole = Extent(seed, workers=workers)
     extent = Extent(seed, QUICK_WINDOW_S, QUICK_LONGEST_S, workers) if quick else whole
@@ -33,4 +32,4 @@ def reproduce(output: Path, seed: int, quick: bool, workers: int, as_json: bool)
         report = write_report(output, extent, lambda what, done, of: on_step(done, of, what))
         on_step(N_STEPS, N_STEPS)
     written = {"report": report, "results": output / "results.json", "accuracy": output / "accuracy.md"}
-    click.echo(json_line({name: str(path) for name, path in written.items()}) if as_json else str(report))
+    return {name: str(path) for name, path in written.items()}, str(report)

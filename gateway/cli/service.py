@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import click
 
-from gateway.cli.options import FILE, as_json, config
+from gateway.cli.options import FILE, Told, config, prints
 from gateway.config import load_settings
 from gateway.errors import ConfigurationError, SpringscaleError
 from gateway.records import json_line
@@ -135,11 +135,11 @@ def prints_answer(text: Callable[[Answer], str]) -> Callable[[Command], Command]
 
     def decorate(command: Command) -> Command:
         @functools.wraps(command)
-        def printing(service: Service, as_json: bool, **options: Any) -> None:
-            answer = command(service, **options)
-            click.echo(json_line(answer) if as_json else text(answer))
+        def told(service: Service, **options: Any) -> Told:
+            answer: Answer = command(service, **options)
+            return answer, text(answer)
 
-        return asks_service(as_json(printing))
+        return asks_service(prints(told))
 
     return decorate
 

@@ -9,9 +9,8 @@ import click
 
 from gateway.bus.sink import Speed
 from gateway.cli import options
-from gateway.cli.options import FILE, NumberRange, as_json
+from gateway.cli.options import FILE, NumberRange, Told, prints
 from gateway.cli.progress import StatusLine, counted
-from gateway.records import json_line
 from gateway.sim.vans import VANS
 from gateway.workbench.campaigns import PLANS
 from gateway.workbench.simulate import SENSORS_OF_MAP, bench_of, write_campaign
@@ -73,14 +72,13 @@ def simulate() -> None:
 @_takes_bench
 @click.argument("directory", type=FILE)
 @click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes that simulate")
-@as_json
-def campaign(directory: Path, workers: int, as_json: bool, **bench_options: Any) -> None:
+@prints
+def campaign(directory: Path, workers: int, **bench_options: Any) -> Told:
     """Write a campaign of this KIND to DIRECTORY: campaign.toml, signal map, one log a drive, truth.csv."""
     bench = bench_of(**bench_options)
     with counted("driving") as on_drive:
         path = write_campaign(bench, directory, workers=workers, on_drive=on_drive)
-    n_drives = len(bench.plan().drives)
-    click.echo(json_line({"campaign": str(path), "n_drives": n_drives}) if as_json else str(path))
+    return {"campaign": str(path), "n_drives": len(bench.plan().drives)}, str(path)
 
 
 @simulate.command("stream")
@@ -88,8 +86,8 @@ def campaign(directory: Path, workers: int, as_json: bool, **bench_options: Any)
 @options.interface
 @options.channel
 @options.speed
-@as_json
-def stream(interface: str, channel: str, speed: Speed, as_json: bool, **bench_options: Any) -> None:
+@prints
+def stream(interface: str, channel: str, speed: Speed, **bench_options: Any) -> Told:
     """Send the drives of this KIND to a bus, one after the other."""
     with StatusLine() as status:
         n_sent = send_drives(
@@ -99,4 +97,4 @@ def stream(interface: str, channel: str, speed: Speed, as_json: bool, **bench_op
             speed=speed,
             on_progress=lambda sent: status.show(f"{sent.recorded_s:.0f} s driven, {sent.n_sent} frames sent"),
         )
-    click.echo(json_line({"sent": n_sent}) if as_json else f"{n_sent} frames sent")
+    return {"sent": n_sent}, f"{n_sent} frames sent"

@@ -6,6 +6,7 @@ from collections import OrderedDict, deque
 from collections.abc import Callable
 from typing import Any, Final
 
+from starlette.datastructures import Headers
 from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Send
 from starlette.types import Scope as AsgiScope
@@ -19,9 +20,7 @@ PUBLIC_PATHS: Final = frozenset({"/", "/cab", "/docs", "/openapi.json", "/health
 # Raw frames may contain the vehicle's position: reading them needs more than reading a weight.
 RECORD_PATH: Final = "/api/v1/record"
 _SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
-_FORWARDED: Final = frozenset(
-    {b"forwarded", b"via", b"x-forwarded-for", b"x-forwarded-host", b"x-forwarded-proto", b"x-real-ip"}
-)
+_FORWARDED: Final = ("forwarded", "via", "x-forwarded-for", "x-forwarded-host", "x-forwarded-proto", "x-real-ip")
 _LOCAL_NAMES: Final = frozenset({"localhost", "127.0.0.1", "[::1]"})
 
 HOW_TO_MAKE_ONE: Final = "`springscale token create NAME --config springscale.toml` on the gateway"
@@ -71,7 +70,7 @@ class Guard:
         return self._refuse_without_token(scope, self._tokens)
 
     def _refuse_without_token(self, scope: AsgiScope, tokens: TokenFile) -> Response | None:
-        shown = _header(scope, b"authorization")
+        shown = Headers(scope=scope).get("authorization")
         kind, _, text = (shown or "").partition(" ")
         token = tokens.verify(text.strip()) if kind.lower() == "bearer" else None
         is_reading = scope["method"] in _SAFE_METHODS and not f"{scope['path']}/".startswith(f"{RECORD_PATH}/")
@@ -92,13 +91,14 @@ def _refuse_strangers(scope: AsgiScope) -> Response | None:
     client = scope.get("client")
     if client is not None and not is_loopback(client[0]):
         return _problem(scope, 403, f"without tokens only this machine is answered: {HOW_TO_MAKE_ONE} makes one")
-    if any(name in _FORWARDED for name, _ in scope["headers"]):  # the proxy is local, its clients are not
+    headers = Headers(scope=scope)
+    if any(name in headers for name in _FORWARDED):  # the proxy is local, its clients are not
         return _problem(scope, 403, f"without tokens nobody is answered through a proxy: {HOW_TO_MAKE_ONE} makes one")
-    host = (_header(scope, b"host") or "").lower()
+    host = headers.get("host", "").lower()
     name = host if host.endswith("]") else host.rpartition(":")[0] or host
     if name not in _LOCAL_NAMES:
         return _problem(scope, 421, f"without tokens only {', '.join(sorted(_LOCAL_NAMES))} are answered for")
-    origin = _header(scope, b"origin")
+    origin = headers.get("origin")
     if origin is not None and scope["method"] not in _SAFE_METHODS and origin.lower().partition("://")[2] != host:
         return _problem(scope, 403, "without tokens a page from elsewhere may not change anything")
     return None
@@ -126,14 +126,6 @@ def describe_guard(schema: dict[str, Any]) -> None:
                 continue
             for code, text in (("401", "No valid token"), ("403", "Not for this token"), ("429", "Too many failures")):
                 operation["responses"][code] = {"description": text, "content": problem}
-
-
-def _header(scope: AsgiScope, wanted: bytes) -> str | None:
-    for name, content in scope["headers"]:
-        if name == wanted:
-            text: str = content.decode("latin-1")
-            return text
-    return None
 
 
 def _unauthorised(scope: AsgiScope, detail: str, why: str) -> Response:
