@@ -25,7 +25,7 @@ from gateway.core.alarms.alarm import (
 )
 from gateway.core.alarms.rules import AlarmRules, AlarmVerdict, Says
 from gateway.core.alarms.watch import AlarmWatch
-from gateway.errors import AlarmRefusedError, StoreError
+from gateway.errors import AlarmRefusedError
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json
 from gateway.log import Event, log_event
@@ -33,7 +33,7 @@ from gateway.records import json_line
 from gateway.service.status import NEEDED_SENSORS
 from gateway.setup import Subject
 from gateway.status import AlarmsStatus, State, Status
-from gateway.store import Store, StoreReader
+from gateway.store import Store, StoreReader, restored
 
 _AT_FAULT: Final = frozenset({State.SENSOR_FAULT, State.READER_FAULT})
 _HEARD: Final = frozenset({State.WAITING_FOR_SPEED, State.COLLECTING, State.ESTIMATING, State.STALE})
@@ -122,7 +122,9 @@ class AlarmService:
         self._trends: Sequence[Trend] | None = None
         self._lock = threading.Lock()
         self._n_told = 0
-        self._watch = self._restored()
+        nothing: tuple[list[Alarm], list[Estimate]] = ([], [])
+        known, recent = restored(lambda: remembered(store.reader()), nothing)
+        self._watch = AlarmWatch(rules, subject.vehicle_id, known, recent)
         self._tell(self._watch.end_switched_off(clock_ns()))
 
     def __call__(self, found: Estimate) -> None:
@@ -174,15 +176,6 @@ class AlarmService:
                 n_told=self._n_told,
                 watched=tuple(cause.name for cause in CAUSES if self._rules.is_on(cause)),
             )
-
-    def _restored(self) -> AlarmWatch:
-        vehicle_id = self._subject.vehicle_id
-        try:
-            known, recent = remembered(self._store.reader())
-        except (StoreError, TimeoutError, ValueError, KeyError) as fault:  # the last two: another version's batches
-            log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
-            return AlarmWatch(self._rules, vehicle_id)
-        return AlarmWatch(self._rules, vehicle_id, known, recent)
 
     def _tell(self, changed: Iterable[Alarm]) -> None:
         for alarm in changed:

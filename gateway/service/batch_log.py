@@ -8,7 +8,6 @@ from typing import Any, Final
 from gateway.core.change import Rules
 from gateway.core.events.entry import Entry, EntryKind
 from gateway.core.events.ledger import HORIZON, Ledger
-from gateway.errors import StoreError
 from gateway.estimate import PLACES, Estimate
 from gateway.estimate_json import INSTANT, estimate_from_json
 from gateway.history import BATCHES, REMAINDER
@@ -16,7 +15,7 @@ from gateway.log import Event, log_event
 from gateway.records import Why, json_line, rounded
 from gateway.setup import Setup
 from gateway.status import State, Status
-from gateway.store import Store, StoreReader
+from gateway.store import Store, StoreReader, restored
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import LatestWeights
 
@@ -110,11 +109,7 @@ class LoadEventLog:
         """Resumes from the stored batches."""
         self._store = store
         rules = Rules.of(setup.calibrated.vehicle) if setup.calibrated else Rules()
-        try:
-            self._ledger = ledger_of(store.reader(), rules)
-        except (StoreError, TimeoutError, ValueError, KeyError) as fault:  # the last two: another version's records
-            log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
-            self._ledger = Ledger(rules)
+        self._ledger = restored(lambda: ledger_of(store.reader(), rules), Ledger(rules))
 
     def __call__(self, found: Estimate) -> None:
         """Write the entries of this batch."""

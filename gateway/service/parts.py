@@ -1,6 +1,5 @@
 """The parts of a service, each built from its section of the settings."""
 
-import logging
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 
@@ -11,7 +10,6 @@ from gateway.calibration.kept.shelf import FOLDER, Shelf, ShelfLimits
 from gateway.config import BusSection, Settings, StoreSection
 from gateway.config.sections import BroadcastSection, KeepSection
 from gateway.core.flow import Flow
-from gateway.errors import StoreError
 from gateway.estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.service.calibration_in_use import why_not_allowed
@@ -20,7 +18,7 @@ from gateway.service.commissioning.lines import Lines
 from gateway.service.commissioning.session import Commissioning
 from gateway.service.keeper import BatchKeeper
 from gateway.setup import Setup
-from gateway.store import Retention, Store
+from gateway.store import Retention, Store, restored
 from gateway.units import BYTES_PER_MB, S_PER_DAY
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings, WebhookSettings, uplink_settings, webhook_settings
@@ -91,10 +89,7 @@ def store_of(wanted: StoreSection, undelivered_to: tuple[str, ...]) -> Store:
 def board_of(stale_after_s: float, store: Store, setup: Setup) -> Board:
     """The board with the last stored estimates; an unreadable disk does not prevent the start."""
     board = Board(stale_after_s=stale_after_s, unweighed=Scales(setup.calibrated).weigh(None))
-    try:
-        board.restore(**asdict(store.reader().latest()))
-    except (StoreError, TimeoutError, ValueError, KeyError) as fault:  # the last two: another version's record
-        log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
+    restored(lambda: board.restore(**asdict(store.reader().latest())), None)
     heard = board.heard()
     if heard is not None and heard.calibration_id != setup.calibration_id:
         log_event(Event.CALIBRATION_CHANGED, calibration_id=setup.calibration_id, before=heard.calibration_id)

@@ -1,14 +1,16 @@
 """Reading the journal: read-only queries, limited in time, and followers that receive each record as it is accepted."""
 
+import logging
 import sqlite3
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, TypedDict, Unpack
+from typing import TYPE_CHECKING, Final, TypedDict, TypeVar, Unpack
 
 from gateway.errors import StoreError
 from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, Delivery, HistoryPage, JournalRecord
+from gateway.log import Event, log_event
 from gateway.store import queries
 from gateway.store.database import is_damaged
 from gateway.store.queries import LAST, JournalQuery, without_spectra
@@ -18,6 +20,8 @@ from gateway.units import NS_PER_S
 
 if TYPE_CHECKING:
     from gateway.store.writer import Store
+
+T = TypeVar("T")
 
 QUERY_LIMIT_S: Final = 2.0  # chosen: of one page; a client is to ask for less at a time
 _STEPS_PER_LOOK: Final = 10_000  # chosen: SQLite instructions between two looks at the clock
@@ -202,6 +206,18 @@ class StoreReader:
         else:
             self._store.suspect_loss()
         return StoreError(f"{self._store.path} cannot be read: {error}")
+
+
+def restored(read: Callable[[], T], otherwise: T) -> T:
+    """What ``read`` takes from the journal at a start.
+
+    If the journal cannot be read, or another version of the program wrote it, ``otherwise``, with a line in the log.
+    """
+    try:
+        return read()
+    except (StoreError, TimeoutError, ValueError, KeyError) as fault:
+        log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
+        return otherwise
 
 
 def seq_after(cursor: str | None, epoch: str) -> int | None:
