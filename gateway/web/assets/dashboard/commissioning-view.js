@@ -294,42 +294,33 @@ function before({ history, active }) {
   return activeText(history.find((one) => one.ended === null && one.id !== active.id) ?? null);
 }
 
+const undoing = () => ({ made: madeText(known.commissioning.active), before: before(known.commissioning) });
+
+/** Asks the gateway to end something; `words` say so if it does. */
+async function end(words, path, claim, method) {
+  told = words;
+  if (!(await step(card, path, claim, method))) told = "";
+}
+
+/** What is done after a question; the words `com_NAME_question` and `com_NAME_effect` go with each. */
 const SURE = {
-  cancel: [
-    () => phrase("com_cancel_question"),
-    () => phrase("com_cancel_effect"),
-    async () => {
-      told = phrase("com_cancelled");
-      if (!(await step(card, "", undefined, "DELETE"))) told = "";
-    },
-  ],
-  undo: [
-    () => phrase("com_undo_question"),
-    () => phrase("com_undo_effect", { made: madeText(known.commissioning.active), before: before(known.commissioning) }),
-    async () => {
-      told = phrase("com_undone", { made: madeText(known.commissioning.active), before: before(known.commissioning) });
-      if (!(await step(card, "/undo", {}))) told = "";
-    },
-  ],
-  again: [
-    () => phrase("com_again_question"),
-    () => phrase("com_again_effect"),
-    () => step(element("commissioning-drive"), "/empty", { is_empty: true, again: true }),
-  ],
+  cancel: () => end(phrase("com_cancelled"), "", undefined, "DELETE"),
+  undo: () => end(phrase("com_undone", undoing()), "/undo", {}),
+  again: () => step(element("commissioning-drive"), "/empty", { is_empty: true, again: true }),
 };
 let sure = null;
 
 for (const name of Object.keys(SURE)) {
   element(`commissioning-${name}`).addEventListener("click", () => {
     sure = SURE[name];
-    write("commissioning-question", sure[0]());
-    write("commissioning-effect", sure[1]());
+    write("commissioning-question", phrase(`com_${name}_question`));
+    write("commissioning-effect", phrase(`com_${name}_effect`, name === "undo" ? undoing() : {}));
     element("commissioning-dialog").showModal();
   });
 }
 element("commissioning-yes").addEventListener("click", () => {
   element("commissioning-dialog").close();
-  sure[2]();
+  sure();
 });
 element("commissioning-no").addEventListener("click", () => element("commissioning-dialog").close());
 element("commissioning-begin").addEventListener("click", () => step(card, "", {}));

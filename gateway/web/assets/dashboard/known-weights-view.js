@@ -57,48 +57,31 @@ show(({ knownWeights }) => {
   element("weights-entries").replaceChildren(...history.filter((one) => one.state !== "held").map(entry));
 }, "knownWeights");
 
-/** The possible requests: the question, its effect, and the request to the gateway. */
-const CHOICES = {
-  empty: {
-    question: () => phrase("empty_question"),
-    effect: () => phrase("empty_effect", { kg: payload(known.knownWeights.offer.load) }),
-    confirm: phrase("empty_confirm"),
-    ask: (token, note) => change("POST", KNOWN_WEIGHTS, token, { kind: "empty", ...note }, KNOWN_WEIGHTS),
-    done: phrase("empty_done"),
-  },
-  confirm: {
-    question: (one) => phrase("held_question", { kg: payload(one) }),
-    effect: (one) => phrase("held_effect", { kg: estimated(one) }),
-    confirm: phrase("held_confirm"),
-    ask: (token, note, one) => change("POST", `${KNOWN_WEIGHTS}/${one.id}/confirm`, token, undefined, KNOWN_WEIGHTS),
-    done: phrase("held_done"),
-  },
-  back: {
-    question: (one) => phrase("back_question", { kg: payload(one) }),
-    effect: () => phrase("back_effect"),
-    confirm: phrase("back_confirm"),
-    ask: (token, note, one) => change("DELETE", `${KNOWN_WEIGHTS}/${one.id}`, token, undefined, KNOWN_WEIGHTS),
-    done: phrase("back_done"),
-  },
+/** The possible requests; the words `NAME_question`, `NAME_effect`, `NAME_confirm` and `NAME_done` go with each. */
+const REQUESTS = {
+  empty: (token, note) => change("POST", KNOWN_WEIGHTS, token, { kind: "empty", ...note }, KNOWN_WEIGHTS),
+  confirm: (token, note, { id }) => change("POST", `${KNOWN_WEIGHTS}/${id}/confirm`, token, undefined, KNOWN_WEIGHTS),
+  back: (token, note, { id }) => change("DELETE", `${KNOWN_WEIGHTS}/${id}`, token, undefined, KNOWN_WEIGHTS),
 };
 
-let chosen = null, subject = null;
+let chosen = "empty", subject = null;
 
 const openDialog = dialog(
   "weights",
-  async (token, note) => learn({ knownWeights: await chosen.ask(token, note, subject) }),
-  () => write("weights-said", chosen.done),
+  async (token, note) => learn({ knownWeights: await REQUESTS[chosen](token, note, subject) }),
+  () => write("weights-said", phrase(`${chosen}_done`)),
 );
 
 function open(name, one = null) {
-  [chosen, subject] = [CHOICES[name], one];
+  [chosen, subject] = [name, one];
   openDialog(() => {
-    write("weights-question", chosen.question(one));
-    write("weights-effect", chosen.effect(one));
-    write("weights-confirm", chosen.confirm);
-    element("weights-claim").hidden = name !== "empty";
-    element("weights-claimed").disabled = name !== "empty"; // what is hidden must not be required
-    if (name === "empty") write("weights-claim-text", phrase("empty_claim", { span: span(known.knownWeights.offer.load) }));
+    const { load } = known.knownWeights.offer;
+    write("weights-question", phrase(`${name}_question`, { kg: one && payload(one) }));
+    write("weights-effect", phrase(`${name}_effect`, { kg: one ? estimated(one) : payload(load) }));
+    write("weights-confirm", phrase(`${name}_confirm`));
+    element("weights-claim").hidden = one !== null;
+    element("weights-claimed").disabled = one !== null; // what is hidden must not be required
+    if (one === null) write("weights-claim-text", phrase("empty_claim", { span: span(load) }));
   });
 }
 

@@ -54,27 +54,13 @@ show(({ trend }) => {
   element("drift").replaceChildren(...trend.parameters.map((one) => made("li", trendText(one), one.is_drifting || one.is_off ? "warning" : "")));
 }, "trend");
 
-/** The uses of a known load: the dialog's text, and the request to the gateway. */
+/** The uses of a known load; the words `NAME_effect`, `NAME_confirm` and `NAME_done` go with each. */
 const PURPOSES = {
-  verify: {
-    effect: phrase("verify_effect"),
-    confirm: phrase("verify_confirm"),
-    path: VERIFICATIONS,
-    part: "verifications",
-    claim: (loads) => ({ loads }),
-    done: phrase("verify_done"),
-  },
-  teach: {
-    effect: phrase("teach_effect"),
-    confirm: phrase("teach_confirm"),
-    path: KNOWN_WEIGHTS,
-    part: "knownWeights",
-    claim: ([weight]) => ({ kind: element("known-kind").value, weight }),
-    done: phrase("teach_done"),
-  },
+  verify: { path: VERIFICATIONS, part: "verifications", claim: (loads) => ({ loads }) },
+  teach: { path: KNOWN_WEIGHTS, part: "knownWeights", claim: ([weight]) => ({ kind: element("known-kind").value, weight }) },
 };
 
-let listed = [], purpose = PURPOSES.verify;
+let listed = [], purpose = "verify";
 
 /** The fields of the kind of weight that was chosen, and no others. */
 function fit() {
@@ -106,18 +92,18 @@ function list() {
 const openDialog = dialog(
   "known",
   async (token, note) => {
-    const claim = { ...purpose.claim([...listed, typed()]), ...note };
-    learn({ [purpose.part]: await change("POST", purpose.path, token, claim, purpose.path) });
+    const { path, part, claim } = PURPOSES[purpose];
+    learn({ [part]: await change("POST", path, token, { ...claim([...listed, typed()]), ...note }, path) });
   },
-  () => write(purpose === PURPOSES.teach ? "weights-said" : "known-said", purpose.done),
+  () => write(purpose === "teach" ? "weights-said" : "known-said", phrase(`${purpose}_done`)),
 );
 
 function open(name) {
   listed = [];
-  purpose = PURPOSES[name];
+  purpose = name;
   openDialog(() => {
-    write("known-effect", purpose.effect);
-    write("known-confirm", purpose.confirm);
+    write("known-effect", phrase(`${name}_effect`));
+    write("known-confirm", phrase(`${name}_confirm`));
     element("known-more").hidden = name !== "verify";
     element("known-kinds").hidden = name !== "teach";
     list();

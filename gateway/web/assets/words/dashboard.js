@@ -312,13 +312,13 @@ export const DASHBOARD = {
   empty_confirm: ["It is empty", "Es ist leer"],
   empty_claim: ["The vehicle is empty, and was empty while it was weighed, {span}.", "Das Fahrzeug ist leer und war leer, als es gewogen wurde, {span}."],
   empty_done: ["Kept. It counts from the next batch on.", "Gespeichert. Es zählt ab dem nächsten Abschnitt."],
-  held_question: ["Is it really {kg}?", "Sind es wirklich {kg}?"],
-  held_effect: [
+  confirm_question: ["Is it really {kg}?", "Sind es wirklich {kg}?"],
+  confirm_effect: [
     "The load was weighed as {kg}: one of these numbers is wrong. A confirmed known weight changes every later estimate.",
     "Die Ladung wurde mit {kg} gewogen: Eine der Zahlen ist falsch. Bestätigt verschiebt das bekannte Gewicht jede spätere Schätzung.",
   ],
-  held_confirm: ["The known weight is right", "Das bekannte Gewicht stimmt"],
-  held_done: ["Confirmed. It counts from the next batch on.", "Bestätigt. Es zählt ab dem nächsten Abschnitt."],
+  confirm_confirm: ["The known weight is right", "Das bekannte Gewicht stimmt"],
+  confirm_done: ["Confirmed. It counts from the next batch on.", "Bestätigt. Es zählt ab dem nächsten Abschnitt."],
   back_question: ["Take back the known weight of {kg}?", "Das bekannte Gewicht von {kg} zurücknehmen?"],
   back_effect: ["From the next batch on all numbers are as if it had never been stated.", "Ab dem nächsten Abschnitt sind alle Zahlen so, als wäre es nie angegeben worden."],
   back_confirm: ["Take it back", "Zurücknehmen"],
