@@ -42,12 +42,13 @@ def fit_vehicle(
     found = min(tried, key=lambda one: one.cost)
     if not has_roll(prior.mean):
         return found
-    rolling = fit_roll(known, found, prior.roll, starts[0][len(PARAMETERS) :])
+    seen = known
+    rolling = fit_roll(seen, found, prior.roll, starts[0][_N:])
     for _ in range(TURNS - 1):
-        seen = seen_by(known, rolling.x)
+        seen = seen_by(known, np.r_[found.x, rolling.x[: -len(known)]])
         found = fit_half_car(seen, prior.upright, found.x)
-        rolling = fit_roll(seen, found, prior.roll, rolling.x[len(PARAMETERS) :])
-    return rolling
+        rolling = fit_roll(seen, found, prior.roll, rolling.x[: -len(known)])
+    return _together(seen, found, rolling)
 
 
 def seen_by(known: Sequence[KnownSpectra], theta: F64) -> Sequence[KnownSpectra]:
@@ -91,10 +92,11 @@ _N: Final = len(PARAMETERS)
 
 
 def fit_roll(known: Sequence[KnownSpectra], upright: Found, prior: Prior, start: F64) -> Found:
-    """The most probable parameters (n,) of a vehicle that rolls, its half-car as ``upright`` has it.
+    """The most probable roll parameters of a vehicle, its half-car as ``upright`` has it, and behind them the error of
+    each run's moment.
 
-    ``prior`` and ``start`` (n - p,) are of the roll parameters alone. Each run's payload also has a moment about the
-    centre line that is known only roughly (kg m), which is estimated and discarded.
+    ``prior`` and ``start`` (n - p,) are of the roll parameters alone. Each run's payload has a moment about the centre
+    line that is known only roughly (kg m).
     """
     m, r = len(start), len(known)
     seen = [(one, one.rolling) for one in known]
@@ -116,13 +118,18 @@ def fit_roll(known: Sequence[KnownSpectra], upright: Found, prior: Prior, start:
             information[np.ix_(at, at)] += part.information
         return Curvature(gradient, information)
 
-    found = most_probable(np.r_[start, np.zeros(r)], mean, precision, cost, curvature, tolerance=0.05)
-    theta = np.r_[upright.x, found.x[:m]]
-    moves = _moves(seen, theta, found)
-    own = found.covariance[:m, :m]
+    return most_probable(np.r_[start, np.zeros(r)], mean, precision, cost, curvature, tolerance=0.05)
+
+
+def _together(known: Sequence[KnownSpectra], upright: Found, rolling: Found) -> Found:
+    """All parameters (n,) of a vehicle that rolls, from its half-car and from fit_roll to the same runs."""
+    m = len(rolling.x) - len(known)
+    theta = np.r_[upright.x, rolling.x[:m]]
+    moves = _moves([(one, one.rolling) for one in known], theta, rolling)
+    own = rolling.covariance[:m, :m]
     beside = moves @ upright.covariance
     covariance = np.block([[upright.covariance, beside.T], [beside, own + beside @ moves.T]])
-    return replace(found, x=theta, covariance=covariance)
+    return replace(rolling, x=theta, covariance=covariance)
 
 
 def _moves(seen: Sequence[tuple[KnownSpectra, Whittle]], theta: F64, found: Found) -> F64:

@@ -90,7 +90,7 @@ class _Whitened:
     """The model solved at a point, and L^-1 S L^-H for its M = L L^H, with what whitens other matrices alike.
 
     The trace is (b, m), residual (b m p^2,). rows (b m p^2, r) are slopes of the residual; rows @ by_known (r, k) are
-    those by the ``known`` entries, those that have been asked for so far.
+    those by the ``known`` entries, those that have been asked for so far, each with its column.
     """
 
     point: Point
@@ -100,7 +100,7 @@ class _Whitened:
     trace: F64
     residual: F64
     by_part: F64 | None = None
-    known: list[int] = field(default_factory=list)
+    known: dict[int, int] = field(default_factory=dict)
     rows: F64 | None = None
     by_known: F64 = field(default_factory=lambda: np.empty((0, 0)))
 
@@ -139,7 +139,8 @@ class Whittle:
 
     def costs(self, points: Sequence[Point]) -> F64:
         """(k,) costs of several points, solved at once."""
-        theta = np.stack([point.theta for point in points])
+        theta = np.array([point.theta for point in points])
+        theta = theta[:1] if (theta == theta[0]).all() else theta
         loads = np.array([point.loaded for point in points]).T
         model, driven = solved_at(theta, tuple(loads), self.ground, self.spectra)
         by = Whitener.of(expected_of_driven(driven, model, self.spectra))
@@ -216,9 +217,9 @@ class Whittle:
             rows = self._whitened_rows(z, slopes)
             z.rows = rows if z.rows is None else np.concatenate([z.rows, rows], axis=1)
             z.by_known = beside(z.by_known, by_missing)
-            z.known += missing
+            z.known |= {entry: len(z.known) + i for i, entry in enumerate(missing)}
         assert z.rows is not None
-        return z.rows, z.by_known[:, [z.known.index(entry) for entry in free]]
+        return z.rows, z.by_known[:, [z.known[entry] for entry in free]]
 
     def _whitened_rows(self, z: _Whitened, slopes: F64) -> F64:
         """(b m p^2, k) the residuals' slopes, from those of the expected spectra (b, m, p^2, k)."""

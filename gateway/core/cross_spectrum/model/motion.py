@@ -58,7 +58,8 @@ class Numbers:
         Each a number or (..., 1); they broadcast.
         """
         flat = [one for group in groups for one in group]
-        shape = np.broadcast_shapes(*{np.shape(one) for one in flat}) or (1,)
+        shapes = {one.shape for one in flat if isinstance(one, np.ndarray)}
+        shape = np.broadcast_shapes(*shapes) or (1,)
         every = np.empty((len(flat), *shape), np.result_type(*flat))
         for row, one in zip(every, flat, strict=True):
             row[...] = one
@@ -271,11 +272,13 @@ class Motion:
     @cached_property
     def _moved(self) -> C128:
         """(q, p, s, ..., m) what less stiffness between each of PAIRS does to the paths."""
-        one, other = (list(each) for each in zip(*self._pairs, strict=True))
-        by_force = self._by_force.swapaxes(0, 1)[:, :, None]
-        moved: C128 = by_force[one] * self.body[other][:, None]
-        apart = [pair for pair, (a, b) in enumerate(self._pairs) if a != b]
-        moved[apart] += by_force[[other[pair] for pair in apart]] * self.body[[one[pair] for pair in apart]][:, None]
+        by_both = self._by_force.swapaxes(0, 1)[:, None, :, None] * self.body[:, None]
+        moved = np.empty((len(self._pairs), *self.paths.shape), np.complex128)
+        for into, (a, b) in zip(moved, self._pairs, strict=True):
+            if a == b:
+                into[...] = by_both[a, a]
+            else:
+                np.add(by_both[a, b], by_both[b, a], out=into)
         return moved
 
     @cached_property
@@ -318,7 +321,7 @@ class Motion:
         """By frequency and damping ratio of the payload on its floor."""
         if not rows:
             return
-        carried = (self._carried_kg[:, None, None] * self._moved).sum(axis=0)
+        carried = sum(kg * one for kg, one in zip(self._carried_kg, self._moved, strict=True))
         felt = -(self._ratio**2) * self._below**2 * self._omega**2
         for one, row in zip(into, rows, strict=True):
             by = felt * (2.0 + self._damping) / self._mode_hz if row == 0 else felt * 2j * self._ratio
