@@ -7,7 +7,7 @@ observed shifts over the stated variance.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, TypeGuard
 
 import numpy as np
 
@@ -144,11 +144,19 @@ class _Bench:
         return [Why.TOO_SHORT if batch.rejected else weigh(batch, self.known, prior) for batch in batches]
 
     def pairs(self, batches: Sequence[Batch], prior: ShapePrior | None) -> Iterator[tuple[int, Weighed, Weighed]]:
-        """Batches, by their number, answered in both drives: with the cause, and as calibrated."""
+        """Batches, by their number, answered in both drives: with the cause, and as calibrated.
+
+        Where two loads compete as the answer, it may jump between them. That is a source of its own, so these are left
+        out.
+        """
         both = zip(self.weighed(batches, prior), self.reference, strict=False)
         for i, (one, usual) in enumerate(both):
-            if isinstance(one, Weighed) and isinstance(usual, Weighed):
+            if _is_plain(one) and _is_plain(usual):
                 yield i, one, usual
+
+
+def _is_plain(one: Weighed | Why) -> TypeGuard[Weighed]:
+    return isinstance(one, Weighed) and not one.located.is_ambiguous
 
 
 def _shape_of(load: Load, van: Vehicle) -> float:
@@ -223,7 +231,7 @@ def _empty_share(bench: _Bench, runs: list[Any]) -> Iterator[Shift]:
     assert wrong is not None
     for batch, usual in zip(bench.usual, bench.reference, strict=True):
         one = Why.TOO_SHORT if batch.rejected else weigh(batch, wrong, exactly_known(bench.as_known))
-        if isinstance(one, Weighed) and isinstance(usual, Weighed):
+        if _is_plain(one) and _is_plain(usual):
             part = vehicle.empty_mass_kg / (vehicle.empty_mass_kg + float(usual.posterior.mean[PAYLOAD]))
             column = np.array([0.0, vehicle.empty_front_share_std_pct * part])
             yield _shifted("empty_share", one, usual, np.array([0.0, off_pct * part]), column**2)

@@ -60,12 +60,13 @@ def budget_page(found: Mapping[str, Any]) -> str:
         "",
         f"{n_vans} simulated vans, calibrated on six known loads without a roll rate, drive once with a load like "
         "the calibrated ones and once more, on the same road in the same way, for each source with that alone "
-        "drawn from the distribution that the estimator states of it: springs, tyres and dampers of another day; "
-        "another temperature of the sensors; an undeclared load of another length and height; "
+        "drawn from the distribution that the estimator states of it: springs, tyres, dampers and friction of "
+        "another day; another temperature of the sensors; an undeclared load of another length and height; "
         "one that stands beside the centre line; a calibration by a fitter who was wrong about the empty front "
         "share. Stated and found are root mean squares: of the standard deviations that the columns of a source "
         "state, and of the shifts found. The slope is that of the shifts found over those predicted for what was "
         "drawn; for the load's shape predicted is by how much the answer differs from that under the true shape. "
+        "Batches in which two loads compete as the answer are left out: it may jump between them. "
         "z squared is the mean square of the shifts over the variances stated. Right are slopes from "
         f"{SLOPE[0]:g} to {SLOPE[1]:g} and z squared from {Z2_ALONE[0]:g} to {Z2_ALONE[1]:g}.",
         "",
