@@ -50,7 +50,7 @@ def evaluate(
             on_run=on_run,
         )
     table = error_table(judged, loaded.vehicle, chosen)
-    click.echo(json_line(table.to_json()) if as_json else _text(table))
+    click.echo(json_line(table.to_json()) if as_json else text_of(table))
     if report is not None:
         _report(report, loaded, held, split, table)
 
@@ -64,7 +64,8 @@ def _report(directory: Path, campaign: Campaign, held: CalibrationFile, split: S
     click.echo(str(written), err=True)
 
 
-def _text(table: ErrorTable) -> str:
+def text_of(table: ErrorTable) -> str:
+    """The table as a person reads it."""
     errors = table.errors
     lines = [
         f"{table.estimator}: {errors.n_batches} batches, {errors.n_rejected} rejected "

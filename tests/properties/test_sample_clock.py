@@ -75,6 +75,16 @@ def test_delays_are_taken_off(stamping: str, period_s: float, error_ppm: float) 
         assert float(np.quantile(np.abs(off), 0.99)) < 1.5e-3
 
 
+def test_a_clock_that_warms_up_is_followed() -> None:
+    """It runs 300 ppm slow at first and as much too fast at last: one straight line misses its times by 4 ms."""
+    t_s = taken(0.01)
+    t_s = t_s + 300e-6 * DURATION_S / np.pi * np.sin(np.pi * t_s / DURATION_S)
+    timing = sample_times(ns(jittered(0.001)(t_s, np.random.default_rng(7))))
+    straight = np.polyval(np.polyfit(np.arange(len(t_s)), t_s, 1), np.arange(len(t_s)))
+    assert float(np.max(np.abs(t_s - straight))) > 0.004
+    assert float(np.sqrt(np.mean(off_s(timing.t_ns, t_s) ** 2))) < 0.0005
+
+
 @pytest.mark.parametrize("lost", [0.02, 0.1, 0.3])
 @pytest.mark.parametrize("mean_s", [0.0, 0.001])
 def test_lost_frames_are_told_from_late_ones(lost: float, mean_s: float) -> None:

@@ -11,6 +11,7 @@ from support.patience import PATIENCE_S
 
 import gateway.cli
 from gateway.cli import INTERRUPTED, springscale
+from gateway.cli.options import LoadArgument
 from gateway.errors import BusError
 
 
@@ -71,6 +72,21 @@ def test_a_known_weight_that_is_no_number_is_a_usage_error(command: tuple[str, .
     said = CliRunner().invoke(springscale, [*command, f"gross_kg={text}", *NOWHERE])
     assert said.exit_code == 2
     assert f"gross_kg = {text!r} is no number" in said.output
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            "gross_kg=1890,at=2026-11-21T04:10Z,drive=before",
+            {"by": "gross", "gross_kg": 1890.0, "at": "2026-11-21T04:10Z", "drive": "before"},
+        ),
+        ("front_axle_kg=900.5, rear_axle_kg=1000", {"by": "axles", "front_axle_kg": 900.5, "rear_axle_kg": 1000.0}),
+        ("payload_kg=200,position_m=-1.9", {"by": "payload", "payload_kg": 200.0, "position_m": -1.9}),
+    ],
+)
+def test_a_known_weight_is_told_as_the_service_takes_it(text: str, told: dict[str, object]) -> None:
+    assert LoadArgument().convert(text, None, None) == told
 
 
 def test_a_drive_that_fails_ends_the_command_with_what_it_was(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,6 +12,7 @@ from support.drives import T0_NS, drive, joined, later
 from gateway.calibration.judgement.evaluation import Comparison, Judged, error_table, errors_of, judge
 from gateway.calibration.judgement.verdict import width_of
 from gateway.calibration.known_run import KnownRun
+from gateway.cli.evaluate import text_of
 from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.estimator import estimate
@@ -140,6 +141,20 @@ def test_sideways_errors_by_hand() -> None:
     off_kg = np.array([0.6, 0.4]) * 1440.0 * np.array([[0.006], [0.02]]) / 1.5
     assert errors.wheels.mean_abs_pct_of_gross == pytest.approx(100.0 * np.mean(off_kg) / gross_kg)
     assert errors.wheels.max_abs_pct_of_gross == pytest.approx(100.0 * np.max(off_kg) / gross_kg)
+
+
+def test_the_table_is_shown_with_what_lies_sideways() -> None:
+    shown = text_of(error_table([placed(0.05, 0.056), placed(-0.03, -0.05)], ROLLING, "x")).splitlines()
+    assert shown[4:7] == [
+        "c.g. left                           -7.0 mm  13.0 mm  20.0 mm     13.0 mm   50.00 %    10.0 mm 220.0 mm",
+        "each wheel        0.39 %                               0.72 %      of gross weight",
+        "",
+    ]
+    assert shown[7].startswith("95 % intervals of payload are ± 10 kg on average, 2 % of the range: fit")
+    assert shown[8].startswith("95 % intervals of front share are ± 1 pp on average, 5 % of the range: fit")
+    assert shown[-1] == (
+        "   1    200 kg at 50.0 %        2         0            0.00 kg   0.00 kg          0.00 pp   0.00 pp"
+    )
 
 
 def test_wheels_are_judged_by_unsprung_masses_that_calibration_found() -> None:

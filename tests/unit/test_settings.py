@@ -83,6 +83,7 @@ FAULTS = [
     (LEAST + "[batch]\nusable_share_min = 60", "batch.usable_share_min: "),
     (LEAST + "[batch]\nspeed_min_mps = 50.0", "batch: speed_min_mps must be below speed_max_mps"),
     (LEAST + "[batch]\nsilence_s = 300.0", "batch: silence_s must be below window_s"),
+    (LEAST + "[batch]\nprovisional_every_s = 0.5", "batch: provisional_every_s must be 0 or at least 1"),
     (LEAST + "[web]\nport = 70000", "web.port: "),
     (LEAST + '[vehicle]\nvin = "TOO-SHORT"', "vehicle.vin: "),
     (LEAST + '[log]\nlevel = "loud"', "log.level: "),
@@ -104,6 +105,12 @@ def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match=r"absent\.toml: no such file"):
         load_settings(tmp_path / "absent.toml")
+
+
+def test_an_early_look_may_come_every_second_or_never(tmp_path: Path) -> None:
+    for every_s in (0.0, 1.0):
+        batch = loaded(tmp_path, f"{LEAST}[batch]\nprovisional_every_s = {every_s}").batch
+        assert batch.for_core(is_live=True).provisional_every_s == every_s
 
 
 def test_only_the_live_service_looks_early(tmp_path: Path) -> None:
