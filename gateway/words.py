@@ -1,4 +1,6 @@
-"""Numbers with their nouns, for people."""
+"""Numbers with their nouns, and texts in sections, for people."""
+
+from collections.abc import Iterable, Mapping, Sequence
 
 
 def counted(n: int, noun: str) -> str:
@@ -9,3 +11,11 @@ def counted(n: int, noun: str) -> str:
 def one_or_more(n: int, one: str, more: str) -> str:
     """ "one batch", "2 batches"."""
     return f"one {one}" if n == 1 else f"{n} {more}"
+
+
+def in_sections(head: Sequence[str], sections: Mapping[str, Iterable[str]]) -> str:
+    """The lines of ``head``, then each section: its title with its rows below it, indented."""
+    lines = list(head)
+    for title, rows in sections.items():
+        lines += ["", title, *(f"  {row}" for row in rows)]
+    return "\n".join(lines)

@@ -2,7 +2,7 @@
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from gateway.cli.known_weights import tare_commands, ticket_commands
 from gateway.cli.options import FILE, NumberRange, Told, as_json, prints
 from gateway.records import json_line
 from gateway.stated.facts import DIVISION_KG
+from gateway.words import in_sections
 
 
 @click.group("calibration")
@@ -149,7 +150,7 @@ def _unsprung(kg: float, given_kg: float | None) -> str:
 
 def calibration_text(held: CalibrationFile) -> str:
     """The whole file but its arrays, in lines."""
-    sections = {
+    sections: dict[str, Iterable[str]] = {
         "vehicle (as the campaign stated it)": _vehicle(held),
         "calibrated for": _ranges(held),
         "expected errors (runs left out of the fit)": _expected(held),
@@ -158,14 +159,11 @@ def calibration_text(held: CalibrationFile) -> str:
             f"{part}: {len(figures)} parameters ± their standard deviations": _figures(figures, held.line)
             for part, figures in figures_of(held).items()
         },
-        "warnings": iter(held.warnings or ("none",)),
+        "warnings": held.warnings or ("none",),
         "made by": _provenance(held),
     }
-    lines = [held.id, f"version {held.version}"]
-    lines.append(f"estimators: {', '.join(held.estimators) or 'none'}")
-    for title, rows in sections.items():
-        lines += ["", title, *(f"  {row}" for row in rows)]
-    return "\n".join(lines)
+    estimators = ", ".join(held.estimators) or "none"
+    return in_sections([held.id, f"version {held.version}", f"estimators: {estimators}"], sections)
 
 
 def _vehicle(held: CalibrationFile) -> Iterator[str]:

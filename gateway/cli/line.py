@@ -1,6 +1,6 @@
 """springscale line: a prior for the next vehicle from several vehicles of one line."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import click
@@ -17,6 +17,7 @@ from gateway.core.cross_spectrum.model.parameters import is_positive
 from gateway.errors import CampaignError, ConfigurationError
 from gateway.files.whole import refusal_told, write_whole
 from gateway.offline.campaigns import inspect
+from gateway.words import in_sections
 
 
 @click.group("line")
@@ -113,16 +114,13 @@ def line_text(held: LineFile) -> str:
     """The whole file but its arrays, in lines."""
     n = held.line.n_siblings
     scatter = f"estimated from {n} of them (default in brackets)" if n else "the defaults"
-    sections = {
+    sections: dict[str, Iterable[str]] = {
         "vehicles": _vehicles(held),
         "intervals": _limits(held),
         f"differences between two vehicles, standard deviations: {scatter}": _scatter(held),
-        "warnings": iter(held.warnings or ("none",)),
+        "warnings": held.warnings or ("none",),
     }
-    lines = [f"id {held.id}"]
-    for title, rows in sections.items():
-        lines += ["", title, *(f"  {row}" for row in rows)]
-    return "\n".join(lines)
+    return in_sections([f"id {held.id}"], sections)
 
 
 def _vehicles(held: LineFile) -> Iterator[str]:

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 
 MOST_BYTES: Final = 16_000_000  # chosen: many times a file of known weights or a campaign
 LOCK_TIMEOUT_S: Final = 10.0  # chosen: many times what a writer holds it
@@ -29,13 +29,8 @@ class KeptFiles:
 
     def read(self, name: str) -> bytes:
         """The content of a plain file. Raises FileNotFoundError if there is none."""
-        with opened_folder(self.directory) as folder:
-            file = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
-            if not stat.S_ISREG(os.fstat(file).st_mode):
-                os.close(file)
-                raise OSError(errno.EINVAL, "is no plain file", name)
-            with os.fdopen(file, "rb") as opened:
-                content = opened.read(MOST_BYTES + 1)
+        with opened_folder(self.directory) as folder, open_plain(folder, name) as opened:
+            content = opened.read(MOST_BYTES + 1)
         if len(content) > MOST_BYTES:
             raise OSError(errno.EFBIG, f"is longer than {MOST_BYTES} bytes", name)
         return content
@@ -47,13 +42,11 @@ class KeptFiles:
         with opened_folder(self.directory) as folder:
             with suppress(FileNotFoundError):  # left by a kill
                 os.unlink(fresh, dir_fd=folder)
-            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-            with os.fdopen(os.open(fresh, flags, 0o600, dir_fd=folder), "wb") as file:
+            with create_plain(folder, fresh, 0o600) as file:
                 if os.geteuid() == 0:  # the file is new, so nobody else owns it
                     owner = os.fstat(folder)
                     os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
-                file.write(content)
-                file.flush()
+                write_all(file, content)
                 os.fsync(file.fileno())
             os.rename(fresh, name, src_dir_fd=folder, dst_dir_fd=folder)
             os.fsync(folder)  # so that the new name survives a power cut
@@ -108,6 +101,29 @@ def opened_folder(directory: Path) -> Iterator[int]:
         yield folder
     finally:
         os.close(folder)
+
+
+def open_plain(folder: int, name: str, *, for_writing: bool = False) -> BinaryIO:
+    """A plain file in an open directory; no link is followed. Raises OSError, FileNotFoundError if there is none."""
+    flags = os.O_RDWR if for_writing else os.O_RDONLY
+    file = os.open(name, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise OSError(errno.EINVAL, "is no plain file", name)
+    return os.fdopen(file, "r+b" if for_writing else "rb")
+
+
+def create_plain(folder: int, name: str, mode: int) -> BinaryIO:
+    """A new file in an open directory, unbuffered. Raises OSError, also if the name exists already."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+    return os.fdopen(os.open(name, flags, mode, dir_fd=folder), "wb", buffering=0)
+
+
+def write_all(file: BinaryIO, content: bytes) -> None:
+    """Write the whole content, since an unbuffered file may write less at a time. Raises OSError."""
+    rest = memoryview(content)
+    while rest:
+        rest = rest[file.write(rest) :]
 
 
 def _names(folder: int) -> set[str]:

@@ -200,5 +200,4 @@ class StatusReport:
         if not heard or (age_s is not None and age_s < SENSOR_LOST_S):
             return ()
         signal_map = self.setup.signal_map
-        message = next(m for m in signal_map.messages if any(mapped.signal is signal for mapped in m.signals))
-        return similar_to(message, signal_map, heard)
+        return similar_to(signal_map.message_of(signal), signal_map, heard)

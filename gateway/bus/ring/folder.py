@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from gateway.bus.ring.segment import BlockHead, Segment, create_segment, mended_segment, name_of, names_in, open_segment
-from gateway.files.kept import opened_folder
+from gateway.bus.ring.segment import BlockHead, Segment, mended_segment, name_of, names_in
+from gateway.files.kept import create_plain, open_plain, opened_folder, write_all
 from gateway.log import Event, log_event
 from gateway.units import S_PER_DAY
 
@@ -66,7 +66,7 @@ class RingFolder:
             return None
         with opened_folder(self.directory) as folder:
             try:
-                return open_segment(folder, segment.name), segment.n_bytes
+                return open_plain(folder, segment.name), segment.n_bytes
             except FileNotFoundError:  # removed just now
                 return None
 
@@ -96,7 +96,7 @@ class RingFolder:
                 self._let_go(folder, self._limits.max_bytes - len(block))
                 growing = self._to_grow(folder, len(block), head.first_ns)
                 self.n_bytes_today += len(block)
-                _write_all(growing.file, block)
+                write_all(growing.file, block)
                 os.fdatasync(growing.file.fileno())
         except OSError:
             self.close()
@@ -150,17 +150,10 @@ class RingFolder:
                 return self._growing
             self.close()
         name = name_of(1 + (kept[-1].number if kept else 0), first_ns)
-        self._growing = _Growing(name, create_segment(folder, name), time.monotonic())
+        self._growing = _Growing(name, create_plain(folder, name, 0o640), time.monotonic())
         self._segments = (*kept, Segment(name))
         os.fsync(folder)  # the new name, too, outlives a power cut
         return self._growing
-
-
-def _write_all(file: BinaryIO, block: bytes) -> None:
-    """Write the whole block, since an unbuffered file may write less at a time. Raises OSError."""
-    rest = memoryview(block)
-    while rest:
-        rest = rest[file.write(rest) :]
 
 
 def _size_if_of_day(folder: int, name: str, day: int) -> int:

@@ -8,7 +8,6 @@ distinguished from one that a power cut left unfinished, without inflating anyth
 import io
 import os
 import re
-import stat
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
@@ -21,6 +20,7 @@ from isal import isal_zlib
 
 from gateway.bus.frames import take, widened
 from gateway.bus.logs.candump_write import append_candump
+from gateway.files.kept import open_plain
 from gateway.records import Frames
 from gateway.units import NS_PER_S
 
@@ -139,35 +139,19 @@ def names_in(folder: int) -> list[str]:
     return [name for _, name in sorted(numbered)]
 
 
-def open_segment(folder: int, name: str, *, for_writing: bool = False) -> BinaryIO:
-    """A plain file in an open directory; no link is followed. Raises OSError."""
-    flags = os.O_RDWR if for_writing else os.O_RDONLY
-    file = os.open(name, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
-    if not stat.S_ISREG(os.fstat(file).st_mode):
-        os.close(file)
-        raise FileNotFoundError(f"{name} is no plain file")
-    return os.fdopen(file, "r+b" if for_writing else "rb")
-
-
-def create_segment(folder: int, name: str) -> BinaryIO:
-    """A new file in an open directory, unbuffered. Raises OSError, also if the file exists already."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-    return os.fdopen(os.open(name, flags, 0o640, dir_fd=folder), "wb", buffering=0)
-
-
 def mended_segment(folder: int, name: str, *, is_newest: bool) -> tuple[Segment, int]:
     """Read the heads of a segment's blocks and cut off what follows the last complete one -> (segment, bytes removed).
 
     In the newest segment, which a power cut may have damaged, the last block is checked completely. Raises OSError.
     """
-    with open_segment(folder, name) as file:
+    with open_plain(folder, name) as file:
         heads = list(_heads(file))
         if is_newest and heads and not _is_last_sound(file, heads):
             del heads[-1]
         segment = reduce(Segment.with_block, heads, Segment(name))
         n_left = os.fstat(file.fileno()).st_size - segment.n_bytes
     if n_left:
-        with open_segment(folder, name, for_writing=True) as file:
+        with open_plain(folder, name, for_writing=True) as file:
             file.truncate(segment.n_bytes)
             os.fsync(file.fileno())
     return segment, n_left

@@ -113,6 +113,10 @@ class SignalMap:
         mapped = {m.signal for message in self.messages for m in message.signals}
         return tuple(signal for signal in Signal if signal in mapped)
 
+    def message_of(self, signal: Signal) -> MappedMessage:
+        """The message that carries a mapped signal."""
+        return next(m for m in self.messages if any(mapped.signal is signal for mapped in m.signals))
+
     @cached_property
     def traits(self) -> Mapping[Signal, SensorTraits]:
         """Latency, valid range and resolution of every mapped signal."""

@@ -132,7 +132,7 @@ def _is_angle(x: F64, most_deg: float) -> bool:
 
 def why_silent(log: Path, signal_map: SignalMap, signal: Signal) -> str:
     """The reason in words. Reads the log once or twice more; raises LogUnreadableError as every reader does."""
-    message = next(m for m in signal_map.messages if any(mapped.signal is signal for mapped in m.signals))
+    message = signal_map.message_of(signal)
     motions, _, decoder = motion_of_log(log, signal_map)
     for _ in motions:
         pass

@@ -27,7 +27,7 @@ SECURITY_HEADERS: Final = (
     (b"permissions-policy", b"camera=(), geolocation=(), microphone=()"),
     (b"content-security-policy", content_security_policy().encode()),
 )
-_NO_STORE: Final = (b"cache-control", b"no-store")
+NO_STORE: Final = (b"cache-control", b"no-store")
 _NO_CACHE: Final = (b"cache-control", b"no-cache")  # may be cached, but must be revalidated
 
 
@@ -52,7 +52,7 @@ class SecurityHeaders:
                 names = {name for name, _ in message["headers"]}
                 headers = [*message["headers"], *(more for more in SECURITY_HEADERS if more[0] not in names)]
                 if b"cache-control" not in names:
-                    headers.append(_NO_CACHE if b"etag" in names else _NO_STORE)
+                    headers.append(_NO_CACHE if b"etag" in names else NO_STORE)
                 message["headers"] = headers
             await send(message)
 

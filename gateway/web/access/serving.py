@@ -23,7 +23,7 @@ from uvicorn.protocols.utils import get_remote_addr
 
 from gateway.errors import ConfigurationError
 from gateway.web.access.guard import is_loopback
-from gateway.web.access.middleware import ANSWERS_PER_CLIENT, SECURITY_HEADERS, STREAMS_PER_CLIENT
+from gateway.web.access.middleware import ANSWERS_PER_CLIENT, NO_STORE, SECURITY_HEADERS, STREAMS_PER_CLIENT
 from gateway.web.access.problems import problem_response
 
 REQUEST_S: Final = 10.0  # chosen: from a connection's or a request's first byte to its last
@@ -140,7 +140,7 @@ class GuardedConnection(HttpToolsProtocol):
 
     def _refuse_long_head(self) -> None:
         if self._n_head_bytes > HEAD_BYTES:
-            self._refuse(431, "the head of a request may not be longer than 32 KiB")
+            self._refuse(431, f"the head of a request may not be longer than {HEAD_BYTES // 1024} KiB")
 
     def _refuse(self, status: int, detail: str) -> None:
         """Answer once, unless the application has begun to, and close."""
@@ -205,7 +205,7 @@ def _date_headers(unix_s: int) -> list[tuple[bytes, bytes]]:
 def _on_the_wire(status: int, detail: str) -> bytes:
     """A whole answer without the application: problem details with the headers that all answers have."""
     problem = problem_response(status, detail)
-    head = [*problem.raw_headers, *SECURITY_HEADERS, (b"cache-control", b"no-store"), (b"connection", b"close")]
+    head = [*problem.raw_headers, *SECURITY_HEADERS, NO_STORE, (b"connection", b"close")]
     lines = [b"HTTP/1.1 %d %s" % (status, HTTPStatus(status).phrase.encode()), *(b": ".join(pair) for pair in head)]
     return b"\r\n".join(lines) + b"\r\n\r\n" + bytes(problem.body)
 
