@@ -13,7 +13,6 @@ LAST_SECOND: Final = 9_223_372_035  # int64 nanoseconds reach no further
 
 
 def empty_frames(width: int) -> Frames:
-    """An empty table of frames with payload rows of ``width`` bytes."""
     return Frames(np.empty(0, np.int64), np.empty(0, np.uint32), np.empty(0, np.uint8), np.empty((0, width), np.uint8))
 
 

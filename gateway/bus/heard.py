@@ -67,7 +67,6 @@ Counts = dict[int, _Count]
 
 
 def counted(chunks: Iterable[Frames]) -> Counts:
-    """Count the frames of each identifier."""
     counts: Counts = {}
     for frames in chunks:
         for can_id in np.unique(frames.can_id):

@@ -88,7 +88,6 @@ def _build(calibrations: Sequence[CalibrationFile], runs: dict[str, tuple[KnownR
 def _runs(
     calibrations: Sequence[CalibrationFile], campaigns: Sequence[Campaign], on_step: Steps
 ) -> dict[str, tuple[KnownRun, ...]]:
-    """The drives of each calibration."""
     runs = {}
     for done, campaign in enumerate(campaigns):
         made = _made_from(campaign, calibrations)

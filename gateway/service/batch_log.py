@@ -112,7 +112,6 @@ class LoadEventLog:
         self._ledger = restored(lambda: ledger_of(store.reader(), rules), Ledger(rules))
 
     def __call__(self, found: Estimate) -> None:
-        """Write the entries of this batch."""
         for entry in self._ledger.add(found):
             text = json_line(entry.record)
             self._store.write_entry(entry.kind, entry.id, entry.t_end_ns, text, entry.revision)

@@ -43,7 +43,6 @@ class JournalQuery:
 
 
 def is_good(row: Stored) -> bool:
-    """Whether a row matches its checksum."""
     *columns, crc = row
     return bool(checksum(columns) == crc)
 

@@ -122,7 +122,6 @@ class _Fields:
         self._names = frozenset(records.dtype.names or ())
 
     def get(self, field: str) -> NDArray[Any] | None:
-        """One column, None if there is none."""
         full = f"{self._name}.{field}"
         return self._records[full] if full in self._names else None
 
@@ -139,7 +138,6 @@ class _Fields:
 
     @property
     def channel(self) -> I64 | None:
-        """The bus each frame was on."""
         column = self.get("BusChannel")
         return None if column is None else column.astype(np.int64)
 
@@ -192,5 +190,4 @@ def _in_order_of_time(sources: Sequence[Iterator[Frames]], width: int) -> Iterat
 
 
 def _next_frames(source: Iterator[Frames]) -> Frames | None:
-    """The next piece with any frame."""
     return next((frames for frames in source if len(frames)), None)

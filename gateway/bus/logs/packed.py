@@ -65,7 +65,6 @@ class Packing:
     fault: type[Exception]
 
     def begins(self, content: bytes) -> bool:
-        """Whether ``content`` is the beginning of a member."""
         return content.startswith(self.magics)
 
 

@@ -81,7 +81,6 @@ class RingLog(ThreadPart):
         return self._folder.open(name)
 
     def status(self) -> RecordStatus:
-        """The present state; from any thread."""
         segments = self.segments()
         return RecordStatus(
             n_frames_written=self._n_written,

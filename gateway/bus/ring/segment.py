@@ -76,7 +76,6 @@ def read_head(file: BinaryIO) -> BlockHead | None:
 
 
 def head_of(block: bytes) -> BlockHead:
-    """The head of a block that was just packed."""
     return BlockHead(*_CONTENT.unpack_from(block, HEAD_BYTES - _CONTENT.size))
 
 

@@ -115,7 +115,6 @@ class Decoder:
 
     @property
     def counts(self) -> dict[Signal, SignalCounts]:
-        """Samples and rejections of every mapped signal so far."""
         return {signal: counts for message in self._messages for signal, counts in message.counts()}
 
     def decode(self, frames: Frames) -> Motion:
@@ -154,7 +153,6 @@ class _MessageReader:
         self._rejected: dict[Signal, Counter[Rejected]] = {m.signal: Counter() for m in message.signals}
 
     def counts(self) -> list[tuple[Signal, SignalCounts]]:
-        """Samples and rejections of each signal so far."""
         rejected = self._rejected.items()
         return [(signal, SignalCounts(self._n_frames - n.total(), dict(n))) for signal, n in rejected]
 

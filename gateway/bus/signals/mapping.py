@@ -114,7 +114,6 @@ class SignalMap:
         return tuple(signal for signal in Signal if signal in mapped)
 
     def message_of(self, signal: Signal) -> MappedMessage:
-        """The message that carries a mapped signal."""
         return next(m for m in self.messages if any(mapped.signal is signal for mapped in m.signals))
 
     @cached_property

@@ -201,8 +201,6 @@ SHIPPED_PREFIX: Final = "springscale:"
 
 
 class SignalMapFile(BaseModel):
-    """The signal map as written in its file."""
-
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     dbc: list[str] = Field(min_length=1, description="databases (DBC, KCD, ARXML, SYM), relative to this file")

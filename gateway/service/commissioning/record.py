@@ -142,7 +142,6 @@ class CommissioningRecord(Part):
         return self.model_copy(update={"underway": None, "made": (*self.made, one)[-MOST_MADE:]})
 
     def ended(self, chosen: tuple[MadeCalibration, ...], end: Ended) -> "CommissioningRecord":
-        """The record with these calibrations ended."""
         made = tuple(one.model_copy(update={"ended": end}) if one in chosen else one for one in self.made)
         return self.model_copy(update={"made": made})
 

@@ -37,7 +37,6 @@ class Worker:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a job is under way."""
         with self._lock:
             return self._process is not None
 

@@ -98,7 +98,6 @@ class VerificationService:
         )
 
     def record(self, record_id: str) -> Mapping[str, Any] | None:
-        """One record by its id; None if there is none."""
         found = next((entry for entry in self._file.record.entries if entry.id == record_id), None)
         return None if found is None else found.model_dump(mode="json")
 

@@ -31,8 +31,6 @@ def _named(name: str) -> str:
 
 
 class Scope(StrEnum):
-    """The scope of a token."""
-
     READ = "read"
     OPERATE = "operate"
 
