@@ -189,6 +189,18 @@ class WebhookStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class Segment:
+    """One file of the ring log as far as its whole blocks reach; stamps of its first and its last frame."""
+
+    name: str
+    n_bytes: int = 0
+    n_blocks: int = 0
+    n_frames: int = 0
+    first_ns: int = 0
+    last_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class RecordStatus:
     """State of the ring log; counts begin at the start of the service."""
 

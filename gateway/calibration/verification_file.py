@@ -1,6 +1,6 @@
 """verifications.json: known loads weighed for verification, with their errors and a verdict."""
 
-from typing import Annotated, Final, Literal
+from typing import Final, Literal
 
 from pydantic import Field
 
@@ -8,67 +8,35 @@ from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.file.parts import Part
 from gateway.calibration.known_weight import StatedLoad
 from gateway.core.vehicle import Vehicle
-from gateway.stated.facts import StatedWeight
+from gateway.stated.facts import AxleErrorTold, LoadTold, Rule, VerificationRecord
 
 FILE_NAME: Final = "verifications.json"
 MOST_ENTRIES: Final = 500  # chosen: beyond it the oldest are dropped
 MOST_LOADS: Final = 10  # chosen: of one verification
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Verdict = Literal["passed", "failed"]
 
 
-class VerificationRule(Part):
-    """The requirements of a verification: permitted errors of the gross weight and of each axle, and the number of
-    loads.
-    """
-
-    permitted_error_pct: float
-    permitted_axle_error_pct: float | None
-    loads: int
+class VerificationRule(Part, Rule):
+    """The requirements of a verification, as its record keeps them."""
 
 
-class AxleError(Part):
+class AxleError(Part, AxleErrorTold):
     """The error of an axle load: weighed minus known, in kg and in percent of the known load."""
 
-    known_kg: Finite
-    error_kg: Finite
-    error_pct: Finite
 
+class VerifiedLoad(Part, LoadTold):
+    """One known load, as its record keeps it."""
 
-class VerifiedLoad(Part):
-    """One known load: as stated, as weighed, and the errors."""
-
-    stated: StatedWeight
-    t_start: str = Field(description="of the load epoch that was weighed")
-    t_end: str
-    n_batches: int
-    batch_ids: tuple[str, ...] = Field(description="the newest of its batches")
-    known_payload_kg: Finite
-    known_reference_kg: Finite = Field(description="the known gross weight; without unsprung masses the sprung mass")
-    payload_kg: Finite = Field(description="as weighed")
-    payload_std_kg: Finite
-    error_kg: Finite = Field(description="weighed less known")
-    error_pct: Finite = Field(description="of known_reference_kg")
     front_axle: AxleError | None
     rear_axle: AxleError | None
-    is_within: bool = Field(description="every error that is judged is within what is permitted")
 
 
-class Verification(Part):
+class Verification(Part, VerificationRecord):
     """A dated record of some known loads; ``id`` is the hash of everything else."""
 
-    id: str
-    at: str
-    by: str
-    note: str | None
-    vehicle_id: str | None
-    calibration_id: str
-    estimator: str
-    known_weights_id: str | None
     rule: VerificationRule
     loads: tuple[VerifiedLoad, ...] = Field(min_length=1, max_length=MOST_LOADS)
-    verdict: Verdict
 
     def content_id(self) -> str:
         """The id that the content should have."""

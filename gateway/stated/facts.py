@@ -123,3 +123,58 @@ class KnownWeightFields(_Record):
     is_contradicted: bool = Field(description="that estimate speaks against it by more than three standard deviations")
     confirmed: Confirmation | None = None
     ended: Ending | None = None
+
+
+class _Told(BaseModel):
+    model_config = ConfigDict(frozen=True)
+
+
+class Rule(_Told):
+    """The requirements ([verification] in the settings)."""
+
+    permitted_error_pct: float = Field(description="of the known gross weight")
+    permitted_axle_error_pct: float | None = Field(description="of each axle's known weight; null: not judged")
+    loads: int
+
+
+class AxleErrorTold(_Told):
+    """Weighed less known."""
+
+    known_kg: Finite
+    error_kg: Finite
+    error_pct: Finite
+
+
+class LoadTold(_Told):
+    """One load: stated, weighed, and the errors."""
+
+    stated: StatedWeight
+    t_start: str
+    t_end: str
+    n_batches: int
+    batch_ids: tuple[str, ...]
+    known_payload_kg: Finite
+    known_reference_kg: Finite = Field(description="gross; without unsprung masses the sprung mass alone")
+    payload_kg: Finite
+    payload_std_kg: Finite
+    error_kg: Finite
+    error_pct: Finite = Field(description="of known_reference_kg")
+    front_axle: AxleErrorTold | None
+    rear_axle: AxleErrorTold | None
+    is_within: bool
+
+
+class VerificationRecord(_Told):
+    """A dated record; it is never changed."""
+
+    id: str = Field(examples=["sha256:9f86d081"])
+    at: Instant
+    by: str = Field(description="name of the token; `local` if none are in use")
+    note: str | None
+    vehicle_id: str | None
+    calibration_id: str
+    estimator: str
+    known_weights_id: str | None = Field(description="known weights that the estimate used; null: none")
+    rule: Rule
+    loads: tuple[LoadTold, ...]
+    verdict: Literal["passed", "failed"]

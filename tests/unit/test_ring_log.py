@@ -18,7 +18,7 @@ from gateway.bus.frames import take
 from gateway.bus.logs import open_whole_log
 from gateway.bus.logs.open import open_log
 from gateway.bus.ring import RingLimits, RingLog
-from gateway.bus.ring.segment import packed_block
+from gateway.bus.ring.segment import number_of, packed_block
 from gateway.bus.signals import load_signal_map
 from gateway.log import Event
 from gateway.records import Frames
@@ -121,14 +121,14 @@ def test_the_oldest_give_way(tmp_path: Path) -> None:
     n_bytes = len(packed_block(DRIVE, "can0"))
     limits = RingLimits(max_bytes=3 * n_bytes, max_daily_bytes=10**9, free_bytes=0, block_s=3600.0)
     log = recorded(tmp_path, *[DRIVE] * 7, limits=limits)
-    assert [segment.number for segment in log.segments()] == [5, 6, 7]
+    assert [number_of(segment.name) for segment in log.segments()] == [5, 6, 7]
     assert sum(path.stat().st_size for path in files(tmp_path)) <= limits.max_bytes
 
 
 def test_a_clock_that_steps_back_changes_no_order(tmp_path: Path) -> None:
     early = Frames(DRIVE.t_ns - DRIVE.t_ns[0], *(getattr(DRIVE, name) for name in Frames.__slots__[1:]))
     log = recorded(tmp_path, DRIVE, early, DRIVE)
-    assert [segment.number for segment in log.segments()] == [1, 2, 3]
+    assert [number_of(segment.name) for segment in log.segments()] == [1, 2, 3]
     assert log.segments()[1].name == "00000002-19700101T000000Z.log.gz"
 
 

@@ -6,6 +6,5 @@ limited in size and in bytes written per day, and can be fetched by name. A disk
 
 from gateway.bus.ring.folder import RingLimits
 from gateway.bus.ring.ring_log import RingLog
-from gateway.bus.ring.segment import Segment
 
-__all__ = ["RingLimits", "RingLog", "Segment"]
+__all__ = ["RingLimits", "RingLog"]

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from gateway.bus.ring.segment import BlockHead, Segment, mended_segment, name_of, names_in
+from gateway.bus.ring.segment import BlockHead, mended_segment, name_of, names_in, number_of, with_block
 from gateway.files.kept import create_plain, open_plain, opened_folder, write_all
 from gateway.log import Event, log_event
+from gateway.status import Segment
 from gateway.units import S_PER_DAY
 
 SEGMENT_S: Final = 3600.0  # chosen: of frames in one file to fetch
@@ -103,7 +104,7 @@ class RingFolder:
             self._segments = None
             raise
         *older, newest = self._segments or ()
-        self._segments = (*older, newest.with_block(head))
+        self._segments = (*older, with_block(newest, head))
 
     def close(self) -> None:
         if self._growing is not None:
@@ -149,7 +150,8 @@ class RingFolder:
             if is_young and kept[-1].n_bytes + n_bytes <= SEGMENT_SHARE * self._limits.max_bytes:
                 return self._growing
             self.close()
-        name = name_of(1 + (kept[-1].number if kept else 0), first_ns)
+        last = number_of(kept[-1].name) if kept else None
+        name = name_of(1 + (last or 0), first_ns)
         self._growing = _Growing(name, create_plain(folder, name, 0o640), time.monotonic())
         self._segments = (*kept, Segment(name))
         os.fsync(folder)  # the new name, too, outlives a power cut

@@ -10,11 +10,11 @@ from typing import BinaryIO, Final
 from gateway.bus.frames import join
 from gateway.bus.live.source import LiveSource
 from gateway.bus.ring.folder import RingFolder, RingLimits
-from gateway.bus.ring.segment import Segment, head_of, packed_block
+from gateway.bus.ring.segment import head_of, packed_block
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.records import Frames
-from gateway.status import RecordStatus
+from gateway.status import RecordStatus, Segment
 
 BLOCK_FRAMES: Final = 131_072  # chosen: so many frames are written before the time of a block is over
 HELD_FRAMES: Final = 2 * BLOCK_FRAMES  # chosen: most frames in memory while the disk fails: some MB

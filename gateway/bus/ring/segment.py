@@ -22,6 +22,7 @@ from gateway.bus.frames import take, widened
 from gateway.bus.logs.candump_write import append_candump
 from gateway.files.kept import open_plain
 from gateway.records import Frames
+from gateway.status import Segment
 from gateway.units import NS_PER_S
 
 PIECE_FRAMES: Final = 8192  # chosen: are text at a time
@@ -91,32 +92,16 @@ def is_sound(block: bytes) -> bool:
 _NAME: Final = re.compile(r"([0-9]{8,18})-[0-9]{8}T[0-9]{6}Z\.log\.gz")
 
 
-@dataclass(frozen=True, slots=True)
-class Segment:
-    """One file as far as its whole blocks reach; stamps of its first and its last frame."""
-
-    name: str
-    n_bytes: int = 0
-    n_blocks: int = 0
-    n_frames: int = 0
-    first_ns: int = 0
-    last_ns: int = 0
-
-    @property
-    def number(self) -> int:
-        """Its place in the order."""
-        return number_of(self.name) or 0
-
-    def with_block(self, head: BlockHead) -> "Segment":
-        is_first = self.n_blocks == 0
-        return Segment(
-            self.name,
-            self.n_bytes + head.n_bytes,
-            self.n_blocks + 1,
-            self.n_frames + head.n_frames,
-            head.first_ns if is_first else min(self.first_ns, head.first_ns),
-            head.last_ns if is_first else max(self.last_ns, head.last_ns),
-        )
+def with_block(segment: Segment, head: BlockHead) -> Segment:
+    is_first = segment.n_blocks == 0
+    return Segment(
+        segment.name,
+        segment.n_bytes + head.n_bytes,
+        segment.n_blocks + 1,
+        segment.n_frames + head.n_frames,
+        head.first_ns if is_first else min(segment.first_ns, head.first_ns),
+        head.last_ns if is_first else max(segment.last_ns, head.last_ns),
+    )
 
 
 def name_of(number: int, first_ns: int) -> str:
@@ -147,7 +132,7 @@ def mended_segment(folder: int, name: str, *, is_newest: bool) -> tuple[Segment,
         heads = list(_heads(file))
         if is_newest and heads and not _is_last_sound(file, heads):
             del heads[-1]
-        segment = reduce(Segment.with_block, heads, Segment(name))
+        segment = reduce(with_block, heads, Segment(name))
         n_left = os.fstat(file.fileno()).st_size - segment.n_bytes
     if n_left:
         with open_plain(folder, name, for_writing=True) as file:

@@ -11,9 +11,10 @@ from starlette.responses import Response, StreamingResponse
 from starlette.types import Receive, Scope, Send
 
 from gateway.records import iso_utc
+from gateway.status import Segment
 from gateway.web.access.guard import RECORD_PATH
 from gateway.web.access.problems import problem_response
-from gateway.web.routes.service_calls import FrameLog, KeptSegment
+from gateway.web.routes.service_calls import FrameLog
 from gateway.web.schemas import problem_responses
 
 PIECE_BYTES: Final = 65_536  # chosen: of a file in memory for each client
@@ -71,7 +72,7 @@ def record_router(log: FrameLog | None) -> APIRouter:
     return router
 
 
-def _told(segment: KeptSegment) -> SegmentTold:
+def _told(segment: Segment) -> SegmentTold:
     return SegmentTold(
         name=segment.name,
         n_bytes=segment.n_bytes,

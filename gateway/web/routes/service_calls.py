@@ -14,6 +14,7 @@ from starlette.responses import Response
 from gateway.core.known_weights import KnownWeightKind
 from gateway.errors import AlarmRefusedError, CommissioningRefusedError, WeightRefusedError
 from gateway.stated.facts import StatedWeight, VehicleAnswers
+from gateway.status import Segment
 from gateway.web.access.problems import problem_response
 from gateway.web.schemas import problem_responses
 
@@ -70,27 +71,12 @@ class CommissioningBackend(Protocol):
     def undo(self, by: str, *, to_factory: bool) -> str: ...
 
 
-class KeptSegment(Protocol):
-    """A file of the ring log, as far as it can be fetched."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def n_bytes(self) -> int: ...
-    @property
-    def n_frames(self) -> int: ...
-    @property
-    def first_ns(self) -> int: ...
-    @property
-    def last_ns(self) -> int: ...
-
-
 class FrameLog(Protocol):
     """The ring log, oldest segment first. ``open`` gives a segment and the number of its bytes, None for an unknown
     name, and raises OSError if the disk fails.
     """
 
-    def segments(self) -> Sequence[KeptSegment]: ...
+    def segments(self) -> Sequence[Segment]: ...
     def open(self, name: str) -> tuple[BinaryIO, int] | None: ...
 
 

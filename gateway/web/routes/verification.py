@@ -12,7 +12,7 @@ from fastapi import APIRouter, Path, Request
 from pydantic import BaseModel, Field
 from starlette.responses import HTMLResponse, Response
 
-from gateway.stated.facts import StatedWeight
+from gateway.stated.facts import Rule, VerificationRecord
 from gateway.status import VerificationStatus
 from gateway.web.access.middleware import content_security_policy
 from gateway.web.access.problems import problem_response
@@ -32,57 +32,6 @@ class VerificationRequest(Body):
 
     loads: list[Stated] = Field(min_length=1, max_length=10)
     note: str = Field("", max_length=200, description="kept with the record: scales used, place, weather")
-
-
-class Rule(BaseModel):
-    """The requirements ([verification] in the settings)."""
-
-    permitted_error_pct: float = Field(description="of the known gross weight")
-    permitted_axle_error_pct: float | None = Field(description="of each axle's known weight; null: not judged")
-    loads: int
-
-
-class AxleErrorTold(BaseModel):
-    """Weighed less known."""
-
-    known_kg: float
-    error_kg: float
-    error_pct: float
-
-
-class LoadTold(BaseModel):
-    """One load: stated, weighed, and the errors."""
-
-    stated: StatedWeight
-    t_start: str
-    t_end: str
-    n_batches: int
-    batch_ids: list[str]
-    known_payload_kg: float
-    known_reference_kg: float = Field(description="gross; without unsprung masses the sprung mass alone")
-    payload_kg: float
-    payload_std_kg: float
-    error_kg: float
-    error_pct: float = Field(description="of known_reference_kg")
-    front_axle: AxleErrorTold | None
-    rear_axle: AxleErrorTold | None
-    is_within: bool
-
-
-class VerificationRecord(BaseModel):
-    """A dated record; it is never changed."""
-
-    id: str = Field(examples=["sha256:9f86d081"])
-    at: str = Field(json_schema_extra={"format": "date-time"})
-    by: str = Field(description="name of the token; `local` if none are in use")
-    note: str | None
-    vehicle_id: str | None
-    calibration_id: str
-    estimator: str
-    known_weights_id: str | None = Field(description="known weights that the estimate used; null: none")
-    rule: Rule
-    loads: list[LoadTold]
-    verdict: Literal["passed", "failed"]
 
 
 class VerificationState(BaseModel):
