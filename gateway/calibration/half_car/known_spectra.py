@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
-from functools import lru_cache, partial
 from typing import Final
 
 import numpy as np
@@ -12,7 +11,7 @@ from gateway.calibration.inheritance import Usual
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.lateral import ROLL_BAND_HZ
 from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT, Point, Whittle
-from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of
+from gateway.core.cross_spectrum.measured import CrossSpectra, Segments, grouped, segments_of
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, Ground, level, mount_of
 from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.cross_spectrum.model.strokes import log_stroke_speeds, with_strokes
@@ -22,7 +21,6 @@ from gateway.records import F64
 
 BAND_HZ: Final = (1.1, 14.0)  # chosen: body and wheel resonances
 N_SEGMENT: Final = 256  # chosen: 5 s at 50 Hz, short enough for town traffic
-READINGS_KEPT: Final = 8  # chosen: fits with one run left out start from the same two places of the sensor
 LEAST_MOMENT_STD_KGM: Final = 0.5  # chosen: about the centre line, also of an empty vehicle with its loose items
 
 
@@ -30,16 +28,18 @@ class KnownSpectra:
     """A run's spectra and likelihood with its true load.
 
     ``whittle`` is of vertical acceleration and pitch rate. With a roll rate, ``rolling`` is of all three sensors,
-    :meth:`brought` makes ``whittle`` that of a sensor on the centre line, and :meth:`stroking` makes friction depend on
-    each axle's stroke speed.
+    :meth:`brought` makes ``whittle`` that of a sensor on the centre line, from the ``segments``, and :meth:`stroking`
+    makes friction depend on each axle's stroke speed.
     """
 
-    def __init__(self, run: KnownRun, vehicle: Vehicle, spectra: CrossSpectra) -> None:
+    def __init__(
+        self, run: KnownRun, vehicle: Vehicle, spectra: CrossSpectra, segments: Segments | None = None
+    ) -> None:
         self.run = run
         self.spectra = spectra
+        self._segments = segments
         self._vehicle = vehicle
         self._roll: F64 = np.empty(0)
-        self._read_as = lru_cache(maxsize=READINGS_KEPT)(partial(_spectra_of, run))
         self.whittle = self._whittle(spectra.without_roll)
 
     @property
@@ -52,8 +52,8 @@ class KnownSpectra:
         rolls.
         """
         one = copy(self)
-        spectra = self._read_as(replace(self.spectra.reading, mount=mount_of(theta)))
-        if spectra is not None:
+        if self._segments is not None:
+            spectra = grouped(self._segments, replace(self.spectra.reading, mount=mount_of(theta)))
             one.whittle = self._whittle(spectra.without_roll)
         one._roll = level(theta)[len(PARAMETERS) :]
         return one
@@ -118,24 +118,28 @@ def known_spectra(
     ``with_roll`` reads the roll rate too, if every run has one. Raises CalibrationImpossibleError if no run has enough.
     """
     reading = Reading(vehicle.wheelbase_m, BAND_HZ, N_SEGMENT, with_roll=with_roll)
-    read = [(run, spectra) for run in runs if (spectra := _spectra_of(run, reading)) is not None]
+    read = _read(runs, reading)
     if not read:
         raise CalibrationImpossibleError(
             "no run has enough steady driving with both sensors for the cross-spectral estimator: drive at least a "
             "minute at speed, and map both"
         )
     if usual is None:
-        usual = Usual(float(np.median([spectra.reading.usual_log_amplitude for _, spectra in read])))
-    with_roll = all(spectra.roll is not None for _, spectra in read)
+        usual = Usual(
+            float(np.median([grouped(segments, reading).reading.usual_log_amplitude for _, segments in read]))
+        )
+    if with_roll and any(len(segments.sensed) < 3 for _, segments in read):
+        with_roll, reading = False, replace(reading, with_roll=False)
+        read = _read([run for run, _ in read], reading)
     reading = replace(
         reading,
         usual_log_amplitude=usual.log_amplitude,
         usual_stroke_mps=usual.stroke_mps if with_roll else None,
-        with_roll=with_roll,
     )
-    again = [(run, _spectra_of(run, reading)) for run, _ in read]
-    return [KnownSpectra(run, vehicle, spectra) for run, spectra in again if spectra is not None]
+    return [KnownSpectra(run, vehicle, grouped(segments, reading), segments) for run, segments in read]
 
 
-def _spectra_of(run: KnownRun, reading: Reading) -> CrossSpectra | None:
-    return cross_spectra_of([batch for batch in run.batches if not batch.rejected], reading)
+def _read(runs: Sequence[KnownRun], reading: Reading) -> list[tuple[KnownRun, Segments]]:
+    """Those of the runs with enough segments."""
+    read = [(run, segments_of([batch for batch in run.batches if not batch.rejected], reading)) for run in runs]
+    return [(run, segments) for run, segments in read if segments is not None]

@@ -150,11 +150,15 @@ class CrossSpectra:
 
 
 @dataclass(frozen=True, slots=True)
-class _Segments:
-    """Transforms (k, m + 2) of k segments, by sensor, and their wheelbase delays (k, t)."""
+class Segments:
+    """k segments: their transforms (k, m + 2) at freq_hz (m + 2,) by sensor, as measured; their mean wheelbase delays
+    (k,), and the mean phases of these delays (k, m + 2).
+    """
 
+    freq_hz: F64
     sensed: tuple[C128, ...]
-    delays_s: F64
+    delay_s: F64
+    delay_phase: C128
 
 
 def cross_spectra_of(batches: Iterable[Batch], reading: Reading) -> CrossSpectra | None:
@@ -162,6 +166,12 @@ def cross_spectra_of(batches: Iterable[Batch], reading: Reading) -> CrossSpectra
 
     If the roll rate is requested and most segments lack it, it is left out.
     """
+    segments = segments_of(batches, reading)
+    return None if segments is None else grouped(segments, reading)
+
+
+def segments_of(batches: Iterable[Batch], reading: Reading) -> Segments | None:
+    """The segments of cross_spectra_of. They do not depend on the sensor's mount and on what is usual."""
     batches = tuple(batches)
     chosen = [_steady_starts(batch, reading, with_roll=False) for batch in batches]
     with_roll = reading.with_roll and all(batch.roll_rate_radps is not None for batch in batches)
@@ -174,10 +184,18 @@ def cross_spectra_of(batches: Iterable[Batch], reading: Reading) -> CrossSpectra
     every_hz = frequencies_hz(reading.n_segment, batches[0].rate_hz)
     low_hz, high_hz = reading.band_hz
     kept = np.flatnonzero((every_hz >= low_hz - every_hz[1]) & (every_hz <= high_hz + every_hz[1]))
-    parts = [_segments(*pair, reading, kept, with_roll=with_roll) for pair in zip(batches, chosen, strict=True)]
-    sensed = tuple(np.concatenate(of_one) for of_one in zip(*(part.sensed for part in parts), strict=True))
-    joined = _Segments(sensed, np.concatenate([part.delays_s for part in parts]))
-    return _grouped(joined, every_hz[kept], reading)
+    parts = [_sensed_in(*pair, kept, reading, with_roll=with_roll) for pair in zip(batches, chosen, strict=True)]
+    sampled = np.arange(0, reading.n_segment, SPEED_SAMPLE_STEP)
+    speeds_mps = [one.speed_mps[starts[:, None] + sampled] for one, starts in zip(batches, chosen, strict=True)]
+    delays_s = reading.wheelbase_m / np.concatenate(speeds_mps)
+    weight = np.hanning(reading.n_segment + 1)[:-1:SPEED_SAMPLE_STEP] ** 2
+    weight = weight / weight.sum()
+    return Segments(
+        freq_hz=every_hz[kept],
+        sensed=tuple(np.concatenate(of_one) for of_one in zip(*parts, strict=True)),
+        delay_s=delays_s @ weight,
+        delay_phase=_mean_phase(delays_s, weight, every_hz[kept]),
+    )
 
 
 def _n(starts: Sequence[I64]) -> int:
@@ -233,25 +251,22 @@ def _steady_starts(batch: Batch, reading: Reading, *, with_roll: bool) -> I64:
     return steady
 
 
-def _segments(batch: Batch, starts: I64, reading: Reading, kept: I64, *, with_roll: bool) -> _Segments:
-    """The segments that begin at ``starts`` (k,), at the frequencies ``kept``."""
-    n_segment = reading.n_segment
-    sampled = starts[:, None] + np.arange(0, n_segment, SPEED_SAMPLE_STEP)
-    sensed = [
-        segment_transforms(one, starts, n_segment, batch.rate_hz)[:, kept]
+def _sensed_in(batch: Batch, starts: I64, kept: I64, reading: Reading, *, with_roll: bool) -> list[C128]:
+    """Transforms (k, m + 2) by sensor of the segments that begin at ``starts`` (k,), at the frequencies ``kept``."""
+    return [
+        segment_transforms(one, starts, reading.n_segment, batch.rate_hz)[:, kept]
         for one in _sensed(batch, with_roll=with_roll)
     ]
+
+
+def grouped(segments: Segments, reading: Reading) -> CrossSpectra:
+    """The cross-spectra of these segments, on the centre line if ``reading`` has the sensor's mount."""
+    freq_hz, mean_delay_s = segments.freq_hz, segments.delay_s
+    sensed: Sequence[C128] = [one[:, 1:-1] for one in segments.sensed]
     if len(sensed) > 2 and reading.mount is not None:
         a, g, roll = sensed
-        sensed = list(reading.mount.levelled((a, g, roll), frequencies_hz(n_segment, batch.rate_hz)[kept]))
-    return _Segments(tuple(sensed), reading.wheelbase_m / batch.speed_mps[sampled])
-
-
-def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectra:
-    weight = np.hanning(reading.n_segment + 1)[:-1:SPEED_SAMPLE_STEP] ** 2
-    weight = weight / weight.sum()
-    mean_delay_s = segments.delays_s @ weight
-    a, g, *rolling = (one[:, 1:-1] for one in segments.sensed)
+        sensed = reading.mount.levelled((a, g, roll), freq_hz[1:-1])
+    a, g, *rolling = sensed
     power_a, power_g = np.mean(np.abs(a) ** 2, axis=1), np.mean(np.abs(g) ** 2, axis=1)
     divisor = np.maximum(np.sqrt(power_a * power_g), np.finfo(float).tiny)[:, None]
     width_hz = float(freq_hz[-2] - freq_hz[1])
@@ -279,7 +294,7 @@ def _grouped(segments: _Segments, freq_hz: F64, reading: Reading) -> CrossSpectr
         acceleration=np.real(mean(np.abs(a) ** 2 / divisor)),
         pitch_rate=np.real(mean(np.abs(g) ** 2 / divisor)),
         cross=mean(g * np.conj(a) / divisor),
-        delay_phase=mean(_mean_phase(segments.delays_s, weight, freq_hz)),
+        delay_phase=mean(segments.delay_phase),
         delay_s=np.real(mean(mean_delay_s[:, None])),
         n_segments=n_segments,
         inverse_power=np.real(mean(1.0 / divisor)),

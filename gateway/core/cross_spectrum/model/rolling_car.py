@@ -10,6 +10,8 @@ roll centres, are neglected: the free rates against roll absorb their effect at 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from gateway.core.cross_spectrum.model.half_car import (
     INVERSE_PAYLOAD_KG,
     HalfCar,
@@ -118,8 +120,8 @@ def _axle_numbers(car: RollingCar, load: SidewaysLoad) -> list[tuple[Real, ...]]
         (share * moved_kg, (1.0 - share) * moved_kg),
         strict=True,
     ):
-        uneven = spring_npm(axle, kg + moved) - spring_npm(axle, kg - moved)
-        found.append((*axle_numbers(axle, spring), uneven, against.damper, against.anti_roll_npm))
+        left, right = np.asarray(spring_npm(axle, np.array([kg + moved, kg - moved])))
+        found.append((*axle_numbers(axle, spring), left - right, against.damper, against.anti_roll_npm))
     return found
 
 
