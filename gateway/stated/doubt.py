@@ -99,9 +99,6 @@ class DoubtKind(StrEnum):
     # fmt: on
 
 
-OF_THE_DRIVE: Final = frozenset(kind for kind in DoubtKind if kind.startswith("driven_"))
-
-
 class Doubt(BaseModel):
     """One question. ``numbers`` are those of its words, in the units their names end in."""
 
@@ -115,6 +112,11 @@ class Doubt(BaseModel):
     def of(cls, kind: DoubtKind, **numbers: float) -> Self:
         """The doubt with its numbers rounded to what people read."""
         return cls(kind=kind, numbers={name: round(number, 4) for name, number in numbers.items()})
+
+    @property
+    def is_of_drive(self) -> bool:
+        """Whether the drive contradicts the stated facts; else a stated fact is unusual."""
+        return self.kind.startswith("driven_")
 
     @property
     def text(self) -> str:

@@ -14,8 +14,8 @@ from support.commissioning import ANSWERS, WINDOW_S, Bench, fitted
 from gateway.calibration.commissioning.job import Result
 from gateway.errors import CommissioningRefusedError
 from gateway.records import Why
+from gateway.stated.commissioning import CommissioningState
 from gateway.stated.facts import VehicleAnswers
-from gateway.web.routes.commissioning import CommissioningState
 
 ORDER = [None, "line", "vehicle", "empty", "drive", "fit"]
 

@@ -28,10 +28,10 @@ from gateway.records import Why
 from gateway.service.calibration_in_use import commissioned, with_commissioned
 from gateway.service.commissioning.record import FILE_NAME, MOST_MADE, CommissioningRecord
 from gateway.service.record_file import RecordFile, load_record
+from gateway.stated.commissioning import CommissioningState
 from gateway.stated.doubt import Doubt, DoubtKind
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
-from gateway.web.routes.commissioning import CommissioningState
 
 FAULT = Found(kind="pitch_rate_sign", severity="fault", text="turned over", advice="set sign = -1")
 

@@ -1,11 +1,12 @@
 """The service's jobs for the process that fits, and their results: two JSON files in a folder of their own."""
 
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from gateway.core.vehicle import Vehicle
+from gateway.stated.commissioning import FindingTold
 from gateway.stated.doubt import Doubt
 
 JOB: Final = "job.json"
@@ -42,13 +43,8 @@ class Job(_JobTable):
     command: str
 
 
-class Found(_JobTable):
+class Found(_JobTable, FindingTold):
     """One finding of the inspection, in words."""
-
-    kind: str
-    severity: Literal["fault", "warning", "note"]
-    text: str
-    advice: str
 
 
 class Learned(_JobTable):

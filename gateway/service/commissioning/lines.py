@@ -17,7 +17,8 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, CommissioningRefusedError, ConfigurationError, LineError
 from gateway.files.kept import KeptFiles
 from gateway.files.signed import SUFFIX, Trust
-from gateway.service.commissioning.record import LineChoice, Source
+from gateway.service.commissioning.record import LineChoice
+from gateway.stated.commissioning import LineSource
 
 FOLDER: Final = "lines"
 MOST_UPLOADED: Final = 20  # chosen: files that anybody with a token may leave on the disk
@@ -30,7 +31,7 @@ class LineFound:
     """One file: its content, or why it cannot be used."""
 
     name: str
-    source: Source
+    source: LineSource
     id: str | None = None
     vehicle: Mapping[str, object] | None = None
     fault: str | None = None
@@ -42,7 +43,7 @@ class Lines:
     def __init__(self, directory: Path, administrator: Path | None, trust: Trust) -> None:
         """``directory`` is the service's folder; uploaded files lie in a folder below it."""
         self._uploaded = directory / FOLDER
-        self._folders: tuple[tuple[Source, Path | None], ...] = (
+        self._folders: tuple[tuple[LineSource, Path | None], ...] = (
             ("package", Path(str(files("gateway"))) / FOLDER),
             ("administrator", administrator),
             ("uploaded", self._uploaded),
@@ -60,7 +61,7 @@ class Lines:
                 else:
                     yield LineFound(path.name, source, held.id, _figures(held))
 
-    def choose(self, name: str, source: Source) -> tuple[LineChoice, bytes]:
+    def choose(self, name: str, source: LineSource) -> tuple[LineChoice, bytes]:
         """The choice and the file's content. Raises CommissioningRefusedError."""
         path = next((folder / name for one, folder in self._folders if one == source and folder is not None), None)
         if path is None or _NAME.fullmatch(name) is None or not path.is_file():
@@ -120,7 +121,7 @@ class Lines:
         if name not in there and len(there) >= MOST_UPLOADED:
             raise CommissioningRefusedError("too_many", f"{MOST_UPLOADED} lines were uploaded already")
 
-    def _load(self, source: Source, path: Path) -> tuple[LikeFile, bytes]:
+    def _load(self, source: LineSource, path: Path) -> tuple[LikeFile, bytes]:
         """The file and its content. Raises ConfigurationError."""
         read = Path.read_bytes if source == "package" else self._trust.read
         try:

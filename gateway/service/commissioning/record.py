@@ -18,14 +18,13 @@ from gateway.files.kept import KeptFiles
 from gateway.log import Event, OnEvent, log_event, tell_event
 from gateway.records import iso_utc
 from gateway.service.record_file import RecordFile
-from gateway.stated.doubt import OF_THE_DRIVE, Doubt, DoubtKind
+from gateway.stated.commissioning import LineSource, MadeEnd
+from gateway.stated.doubt import Doubt, DoubtKind
 from gateway.stated.facts import VehicleAnswers
 
 FILE_NAME: Final = "commissioning.json"
 MADE: Final = "commissioned-"  # the names of calibrations begin so
 MOST_MADE: Final = 20  # chosen: calibrations; the oldest beyond are forgotten, and their files removed
-
-Source = Literal["package", "administrator", "uploaded"]
 
 
 class LineChoice(Part):
@@ -37,11 +36,16 @@ class LineChoice(Part):
 
     name: str
     id: str | None = None
-    source: Source | None = None
+    source: LineSource | None = None
     copy_name: str | None = None
     shared: dict[str, Any] = Field(default_factory=dict)
     facts: LineFacts = NO_LINE
     figures: dict[str, Any] = Field(default_factory=dict)
+
+    @property
+    def vehicle(self) -> dict[str, Any]:
+        """The figures, as the web names them."""
+        return self.figures
 
 
 class EmptyClaim(Part):
@@ -93,19 +97,15 @@ class Underway(Part):
     @property
     def is_vehicle_doubted(self) -> bool:
         """Whether a typed answer is still in doubt."""
-        return any(one.kind not in OF_THE_DRIVE for one in self.open_doubts)
+        return any(not one.is_of_drive for one in self.open_doubts)
 
     def with_doubts_of_drive(self, found: tuple[Doubt, ...]) -> tuple[Doubt, ...]:
         """The doubts about typed answers, with ``found`` in place of those from an earlier fit."""
-        return (*(one for one in self.doubts if one.kind not in OF_THE_DRIVE), *found)
+        return (*(one for one in self.doubts if not one.is_of_drive), *found)
 
 
-class Ended(Part):
+class Ended(Part, MadeEnd):
     """When, by whom and why a calibration went out of use."""
-
-    at: str
-    by: str
-    why: Literal["undone", "back_to_factory"]
 
 
 class MadeCalibration(Part):
@@ -122,6 +122,14 @@ class MadeCalibration(Part):
     learned: Learned | None
     warnings: tuple[str, ...]
     ended: Ended | None = None
+
+    @property
+    def vehicle_name(self) -> str:
+        return self.vehicle.name
+
+    @property
+    def n_batches(self) -> int:
+        return len(self.batches)
 
 
 class CommissioningRecord(Part):

@@ -15,13 +15,13 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import CampaignError, CommissioningRefusedError
 from gateway.log import Event, OnEvent
 from gateway.part import STOP_WITHIN_S, ServicePart
-from gateway.records import json_line
 from gateway.service.commissioning.empty_drive import EmptyDrive, MakeWorker, ServiceVehicle
 from gateway.service.commissioning.lines import Lines, require_alike
-from gateway.service.commissioning.record import Confirmed, EmptyClaim, Ended, LineChoice, RecordStore, Source, Underway
-from gateway.service.commissioning.steps import CommissioningStep, OpenWindow, lines_json, state_json, step_of
+from gateway.service.commissioning.record import Confirmed, EmptyClaim, Ended, LineChoice, RecordStore, Underway
+from gateway.service.commissioning.steps import CommissioningStep, OpenWindow, state_of, step_of
 from gateway.service.commissioning.worker import Worker
-from gateway.stated.doubt import OF_THE_DRIVE, meant_by
+from gateway.stated.commissioning import LinesFound, LineSource
+from gateway.stated.doubt import meant_by
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
 
@@ -95,11 +95,11 @@ class Commissioning(ServicePart):
     def state(self) -> str:
         """JSON: a CommissioningState."""
         with self._book.lock:
-            shown = state_json(self._book.record, self._vehicle, self._drive, self._window(), is_pending=self.is_due)
-            return json_line(shown)
+            shown = state_of(self._book.record, self._vehicle, self._drive, self._window(), is_pending=self.is_due)
+            return shown.model_dump_json()
 
     def lines(self) -> str:
-        return json_line(lines_json(tuple(self._lines.found())))
+        return LinesFound.model_validate({"items": list(self._lines.found())}).model_dump_json()
 
     def upload(self, name: str, content: str, signature: str | None) -> str:
         """Keep a line's file -> the LinesFound with it. Raises CommissioningRefusedError."""
@@ -122,7 +122,7 @@ class Commissioning(ServicePart):
             self._book.tell(Event.COMMISSIONING, {"step": CommissioningStep.LINE, "by": by})
             return self.state()
 
-    def choose_line(self, name: str | None, source: Source | None) -> str:
+    def choose_line(self, name: str | None, source: LineSource | None) -> str:
         """Choose one of ``lines``; None for no line, with the prior of any vehicle."""
         with self._book.lock:
             underway = self._underway()
@@ -156,7 +156,7 @@ class Commissioning(ServicePart):
                 require_alike(self._book.directory, underway.line, self._table(underway.vehicle, underway.line))
             kinds = tuple(dict.fromkeys(one.kind for one in doubts))
             confirmed = Confirmed(at=self._book.now(), by=by, kinds=kinds)
-            is_of_drive = any(kind in OF_THE_DRIVE for kind in kinds)
+            is_of_drive = any(one.is_of_drive for one in doubts)
             change = {"confirmed": (*underway.confirmed, confirmed), "is_fit_asked": is_of_drive}
             self._book.keep_underway(underway.model_copy(update=change))
             self._book.tell(Event.COMMISSIONING_CONFIRMED, {"doubts": list(kinds), "by": by})

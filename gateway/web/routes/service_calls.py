@@ -6,19 +6,18 @@ that change something raise a refusal (gateway.errors), which becomes problem de
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, BinaryIO, Final, Literal, Protocol
+from typing import Any, BinaryIO, Final, Protocol
 
 from fastapi import Request
 from starlette.responses import Response
 
 from gateway.core.known_weights import KnownWeightKind
 from gateway.errors import AlarmRefusedError, CommissioningRefusedError, WeightRefusedError
+from gateway.stated.commissioning import LineSource
 from gateway.stated.facts import StatedWeight, VehicleAnswers
 from gateway.status import Segment
 from gateway.web.access.problems import problem_response
 from gateway.web.schemas import problem_responses
-
-Source = Literal["package", "administrator", "uploaded"]
 
 
 class AlarmBackend(Protocol):
@@ -62,7 +61,7 @@ class CommissioningBackend(Protocol):
     def lines(self) -> str: ...
     def begin(self, by: str, note: str | None) -> str: ...
     def upload(self, name: str, content: str, signature: str | None) -> str: ...
-    def choose_line(self, name: str | None, source: Source | None) -> str: ...
+    def choose_line(self, name: str | None, source: LineSource | None) -> str: ...
     def state_vehicle(self, answers: VehicleAnswers) -> str: ...
     def confirm(self, by: str) -> str: ...
     def is_empty(self, by: str, *, again: bool = False) -> str: ...

@@ -1,0 +1,148 @@
+"""The state of a commissioning as the web shows it; the service fills it from its record."""
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from gateway.stated.doubt import DoubtKind
+from gateway.stated.facts import Instant, VehicleAnswers
+
+LineSource = Literal["package", "administrator", "uploaded"]
+
+
+class _Told(BaseModel):
+    model_config = ConfigDict(from_attributes=True)
+
+
+class LineTold(_Told):
+    """The chosen line; no name: none."""
+
+    name: str
+    id: str | None
+    source: LineSource | None
+
+
+class ChosenLine(LineTold):
+    """The same with those of its figures that prefill the form."""
+
+    vehicle: dict[str, object]
+
+
+class DoubtTold(_Told):
+    """A fact that is unlikely to be true: it must be corrected or confirmed before the next step.
+
+    ``numbers`` are those of the text, ``meant`` the answers that would leave no doubt, if one slip explains it.
+    """
+
+    kind: DoubtKind
+    numbers: dict[str, float]
+    meant: dict[str, float | tuple[float, float]]
+    is_of_drive: bool = Field(description="the drive contradicts the stated facts; false: a stated fact is unusual")
+    text: str
+    advice: str
+
+
+class EmptyTold(_Told):
+    """Who said that the vehicle is empty, and when."""
+
+    at: Instant
+    by: str
+
+
+class FindingTold(_Told):
+    """What inspection found."""
+
+    kind: str = Field(examples=["pitch_rate_sign"])
+    severity: Literal["fault", "warning", "note"]
+    text: str
+    advice: str
+
+
+class InspectionTold(_Told):
+    """What the last minutes of driving show about axes, signs, units and rates; a fault must be mended first."""
+
+    seconds: float
+    has_fault: bool
+    findings: list[FindingTold]
+
+
+class LearnedTold(_Told):
+    """The accuracy reached so far and the accuracy needed: standard deviations."""
+
+    payload_std_kg: float
+    front_share_std_pct: float
+    needed_std_kg: float
+    share: float = Field(description="0 to 1 of the goal")
+    is_enough: bool
+
+
+class UnderwayTold(_Told):
+    """The commissioning under way, and its next step."""
+
+    step: Literal["line", "vehicle", "empty", "drive", "fit"]
+    begun_at: Instant
+    by: str
+    note: str | None
+    line: ChosenLine | None
+    vehicle: VehicleAnswers | None
+    empty: EmptyTold | None = Field(description="null: nobody has said that it is empty")
+    doubts: list[DoubtTold] = Field(description="what is asked still")
+    confirmed: list[DoubtTold] = Field(description="doubts that were confirmed")
+    inspection: InspectionTold | None = Field(description="null: no driving yet")
+    n_batches: int = Field(description="of the empty drive that count")
+    driven_s: float = Field(description="seconds in them, including the open one")
+    next_window_s: float | None = Field(description="until the next one counts; null: the vehicle stands")
+    learned: LearnedTold | None = Field(description="null: before the first batch is fitted")
+    is_fitting: bool
+    fault: str | None = Field(description="why the last fit made no calibration")
+
+
+class MadeEnd(_Told):
+    """How a calibration was replaced."""
+
+    at: Instant
+    by: str
+    why: Literal["undone", "back_to_factory"]
+
+
+class MadeTold(_Told):
+    """A calibration that was made on the vehicle."""
+
+    id: str
+    at: Instant
+    by: str
+    note: str | None
+    line: LineTold
+    vehicle_name: str
+    n_batches: int
+    learned: LearnedTold | None
+    warnings: list[str]
+    ended: MadeEnd | None
+
+
+class CommissioningState(_Told):
+    """State of the commissioning, and earlier calibrations, newest first."""
+
+    is_allowed: bool
+    why_not: str | None
+    is_offered: bool = Field(description="the service has no calibration, and none is pending")
+    underway: UnderwayTold | None
+    is_pending: bool = Field(description="another calibration than the one at work counts from the next drive on")
+    active: MadeTold | None = Field(description="null: the calibration that the settings name, if any")
+    history: list[MadeTold]
+
+
+class LineFoundTold(_Told):
+    """A file to choose; a fault says why it cannot be used. ``vehicle`` are its figures, to fill a form with."""
+
+    name: str
+    source: LineSource
+    id: str | None
+    vehicle: dict[str, object] | None
+    fault: str | None
+
+
+class LinesFound(_Told):
+    """Every line there is."""
+
+    items: list[LineFoundTold]
