@@ -16,7 +16,7 @@ from gateway.workbench import simulate
 from gateway.workbench.campaigns import Plan, plan_of
 
 SMALL = Extent(seed=3, window_s=80.0, longest_s=125.0)  # two thirds of an experiment's drive make one batch
-THINNED = ("load-sweep", "share-sweep", "ident", "speeds")
+THINNED = ("load-sweep", "share-sweep", "ident", "experiment", "speeds")
 
 
 @pytest.fixture(scope="module")
