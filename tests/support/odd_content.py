@@ -1,8 +1,16 @@
-"""JSON objects with one odd thing in one place."""
+"""JSON objects with one odd thing in one place, and files of them whose hash is right."""
 
 import copy
-from collections.abc import Iterator
+import json
+import random
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
+
+from gateway.calibration.file.calibration_file import content_id
+from gateway.errors import CalibrationFileError
+
+N_TRIALS = 120
 
 ODD: tuple[Any, ...] = (
     *(None, True, False, "", "x", "\ud83d", "0", [], {}, [[]], [None], {"a": 1}, [1.0, [2.0]], [[1.0], [2.0, 3.0]]),
@@ -32,3 +40,20 @@ def changed(good: dict[str, Any], path: tuple[Any, ...], odd: Any) -> dict[str, 
     else:
         inner[path[-1]] = odd
     return content
+
+
+def tried(good: dict[str, Any], path: Path, use: Callable[[Path], object]) -> tuple[int, list[str]]:
+    """How many of N_TRIALS changed contents could be used, and what was said of the others, which name the file."""
+    dice, all_places = random.Random(58), list(places(good))
+    n_used, refusals = 0, []
+    for _ in range(N_TRIALS):
+        content = changed(good, dice.choice(all_places), dice.choice((*ODD, GONE)))
+        content["id"] = content_id(content)
+        path.write_text(json.dumps(content))
+        try:
+            use(path)
+            n_used += 1
+        except CalibrationFileError as fault:
+            refusals.append(str(fault))
+    assert all(str(path) in refusal for refusal in refusals)
+    return n_used, refusals

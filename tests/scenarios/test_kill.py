@@ -1,0 +1,140 @@
+"""kill -9 at any moment: what was answered or told is there afterwards, none of it twice, and every file is whole."""
+
+import json
+import random
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from support.alarms import AlarmBench
+from support.killed import told_before_kill
+from support.patience import PATIENCE_S
+
+from gateway.bus.logs.open import open_log
+from gateway.bus.ring import RingLimits, RingLog
+from gateway.bus.signals import load_signal_map
+from gateway.calibration.known_weights_file import FILE_NAME, MOST_KNOWN_WEIGHTS, load_known_weights
+from gateway.store import Store
+
+WRITER = """
+import itertools, pathlib, sys
+from gateway.store import Store
+from support.estimates import make_record
+from support.patience import PATIENCE_S
+
+store = Store.open(pathlib.Path(sys.argv[1]))
+first = int(sys.argv[2])
+for n in itertools.count(first):
+    record = make_record(n, with_spectra=True)
+    store.write_estimate(record)
+    if n % 3 == 0 and store.flush(PATIENCE_S):  # groups of three: a kill also falls between accept and commit
+        print(n, flush=True)
+"""
+
+
+def write_until_killed(directory: Path, first: int, after_s: float) -> list[int]:
+    """Numbers known to be committed when the writer was killed ``after_s`` after its first commit."""
+    return [int(line) for line in told_before_kill(WRITER, directory, first, after_s=after_s)]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_kill_loses_no_committed_estimate(tmp_path: Path, seed: int) -> None:
+    moments = random.Random(seed)
+    first, known = 0, set[int]()
+    for _ in range(3):
+        committed = write_until_killed(tmp_path, first, moments.uniform(0.0, 0.08))
+        known |= set(range(first, committed[-1] + 1))
+        first = committed[-1] + 1
+    with closing(sqlite3.connect(tmp_path / "springscale.db")) as database:
+        assert database.execute("PRAGMA integrity_check").fetchone()[0] == "ok"
+    store = Store.open(tmp_path)
+    assert store.health().set_aside is None
+    stored = [round(json.loads(text)["payload_kg"]) - 100 for text in store.reader().estimates(limit=100_000).items]
+    store.close()
+    assert stored == sorted(set(stored))
+    assert known <= set(stored)
+
+
+RECORDER = """
+import itertools, pathlib, sys
+from gateway.bus.ring import RingLimits, RingLog
+from support.bus_drive import white_noise
+
+log = RingLog(pathlib.Path(sys.argv[1]), "can0", RingLimits(10**9, 10**9, 0, block_s=0.0))
+log.start()
+drive = white_noise(20.0, 1_790_000_000_000_000_000, seed=1)
+for n in itertools.count(1):
+    log.put(drive)
+    while log.status().n_frames_written < n * len(drive):
+        pass
+    print(n * len(drive), flush=True)
+"""
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_kill_loses_no_block_that_was_told_of(tmp_path: Path, seed: int) -> None:
+    told = told_before_kill(RECORDER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.2))
+
+    log = RingLog(tmp_path, "can0", RingLimits(10**9, 10**9, 0, block_s=3600.0))
+    log.start()
+    log.stop(PATIENCE_S)
+    n_kept = sum(segment.n_frames for segment in log.segments())
+    assert n_kept >= int(told[-1])
+    n_read = 0
+    for path in sorted(tmp_path.glob("*.log.gz")):
+        chunks, report = open_log(path, load_signal_map("springscale:reference"))
+        n_read += sum(map(len, chunks))
+        assert report.ended_early is None
+    assert n_read == n_kept
+
+
+WATCHER = """
+import pathlib, sys
+from support.alarms import LIMIT_KG, AlarmBench, of_load
+
+bench = AlarmBench(pathlib.Path(sys.argv[1]))
+print("ready", flush=True)
+for n in range(2000):
+    bench.weigh(of_load(3 * n, LIMIT_KG + 60.0))
+    alarm = bench.standing()[0]["id"]
+    bench.desk.acknowledge(alarm, "yard", str(n))
+    print(alarm, flush=True)
+    bench.weigh(of_load(3 * n + 1, LIMIT_KG + 60.0, n_batches=2))
+    bench.weigh(of_load(3 * n + 2, 100.0))
+"""
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_kill_loses_no_acknowledgement_that_was_answered(tmp_path: Path, seed: int) -> None:
+    answered = told_before_kill(WATCHER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.3), ready="ready\n")
+    bench = AlarmBench(tmp_path)
+    history = bench.history()
+    seen = {alarm["id"]: alarm["acknowledged"]["by"] for alarm in history if alarm["acknowledged"]}
+    assert {line.strip(): "yard" for line in answered}.items() <= seen.items()
+    assert len({alarm["id"] for alarm in history}) == len(history)
+    assert len(bench.standing()) <= 1
+    bench.store.close()
+
+
+STATER = """
+import itertools, pathlib, sys
+from support.known_weights import KnownWeightBench
+
+bench = KnownWeightBench(pathlib.Path(sys.argv[1]))
+print("ready", flush=True)
+for n in itertools.count():
+    bench.pipeline.weigh(n % 60)
+    made = bench.empty()["id"]
+    print(made, flush=True)
+    if n % 3 == 2:
+        bench.service.take_back("b", made)
+"""
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_kill_loses_no_known_weight_that_was_answered(tmp_path: Path, seed: int) -> None:
+    answered = told_before_kill(STATER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.3), ready="ready\n")
+    kept = [entry.id for entry in load_known_weights(tmp_path / FILE_NAME).entries]
+    known = [line.strip() for line in answered][1 - MOST_KNOWN_WEIGHTS :]  # one more may have been kept, unanswered
+    assert set(known) <= set(kept)
