@@ -204,13 +204,14 @@ def answer_at(
     pull[: len(DRIFTING)] += prior.precision @ off
     free = [i for i in range(len(STEADY)) if is_shape_known or STEADY[i] != _GYRATION]
     t = [STEADY[i] for i in free]
-    along = -covariance @ whole.information[np.ix_(FITTED, t)]  # the fitted parameters move by -C I_xt with each t
+    across = whole.information[FITTED][:, t]
+    along = -covariance @ across  # the fitted parameters move by -C I_xt with each t
     gradient = whole.gradient[t] + along.T @ pull
-    information = whole.information[np.ix_(t, t)] + along.T @ whole.information[np.ix_(FITTED, t)]
-    nature = NATURE_OF_STEADY[np.ix_(free, free)]
-    left_open = np.eye(len(t)) + evidence * (calibration.covariance[np.ix_(t, t)] + nature) @ information
-    pulled = (calibration.covariance[np.ix_(t, t)] + nature) @ gradient
-    gained = -0.5 * evidence * float(gradient @ np.linalg.solve(left_open, pulled))
+    information = whole.information[t][:, t] + along.T @ across
+    nature = NATURE_OF_STEADY[free][:, free]
+    unknown = calibration.covariance[t][:, t] + nature
+    left_open = np.eye(len(t)) + evidence * unknown @ information
+    gained = -0.5 * evidence * float(gradient @ np.linalg.solve(left_open, unknown @ gradient))
     narrowed = 0.5 * float(np.linalg.slogdet(left_open)[1]) / evidence
     narrowing = np.eye(len(t)) + evidence * nature @ information
     posterior = np.linalg.solve(narrowing, nature)
@@ -232,8 +233,15 @@ def answer_at(
 
 def _of_fitted(whole: Curvature, precision: F64) -> F64:
     """Information on the fitted parameters, prior included."""
-    information: F64 = whole.information[np.ix_(FITTED, FITTED)] + np.pad(precision, (0, 2))
+    information: F64 = whole.information[FITTED][:, FITTED] + _flat_in_load(precision)
     return information
+
+
+def _flat_in_load(precision: F64) -> F64:
+    """(k + 2, k + 2) prior precision of the fitted parameters, from that of the drifting ones."""
+    flat = np.zeros(np.add(precision.shape, 2))
+    flat[:-2, :-2] = precision
+    return flat
 
 
 def raw_moves(whittle: Whittle, point: Point) -> tuple[F64, F64]:
@@ -433,8 +441,7 @@ def _search(
 ) -> Found:
     """Drift parameters, then payload (kg) and front share (0..1), of the peak reached from ``start``."""
     prior_mean = np.r_[packing.drifting, 0.0, 0.0]
-    prior_precision = np.pad(packing.precision, (0, 2))  # flat in payload and share
-
+    prior_precision = _flat_in_load(packing.precision)
     most_kg = MOST_LOAD_SHARE * calibration.empty_mass_kg
 
     def cost(x: F64) -> float:

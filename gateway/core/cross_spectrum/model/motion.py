@@ -303,7 +303,7 @@ class Motion:
         rows = sorted({*of_front, *of_rear})
         per_tyre = axles.slopes(rows)
         for i, (into, of) in enumerate(((front, of_front), (rear, of_rear))):
-            slopes = per_tyre[[rows.index(row) for row in of], :, i, None, None]
+            slopes = (per_tyre if rows == of else per_tyre[[rows.index(row) for row in of]])[:, :, i, None, None]
             found = slopes[:, 0] * by[0, i]
             for t in range(1, len(by)):
                 found += slopes[:, t] * by[t, i]

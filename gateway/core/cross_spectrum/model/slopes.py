@@ -41,9 +41,8 @@ from gateway.records import C128, F64
 
 FEW: Final = 12  # chosen: among as many entries none is hardly worth a search for parallel ones
 PARALLEL: Final = 1e-12  # chosen: least squared sine between two changes of the numbers that differ
-_OF_ROAD: Final = frozenset(
-    INDEX[name] for name in ("delay_scale", "rear_lag_s", "track_offset_m", "tracks_apart_m", "twist_level")
-)
+_OF_TWIST: Final = frozenset(INDEX[name] for name in ("tracks_apart_m", "twist_level"))
+_OF_AXLES: Final = frozenset(INDEX[name] for name in ("delay_scale", "rear_lag_s", "track_offset_m"))
 
 
 @dataclass(frozen=True)
@@ -109,8 +108,10 @@ def spectral_slopes(solved: Solved, spectra: CrossSpectra, free: Sequence[int]) 
         slopes[..., :r] = _of_paths(_by_level(by_direction, model.motion), r, solved, spectra)
     of_others = slopes[..., r:]
     _fill_in_slack(of_others, others, by, model, spectra)
-    if not _OF_ROAD.isdisjoint(others):
-        _fill_in_road(of_others, others, by, model, spectra)
+    if not _OF_AXLES.isdisjoint(others):
+        _fill_in_axles(of_others, others, by, model, spectra)
+    if not _OF_TWIST.isdisjoint(others):
+        _fill_in_twist(of_others, others, by, model, spectra)
     slopes = tapered_parts(slopes, spectra)
     _add_noise(slopes, solved.noiseless, model, spectra)
     _fill_in_noise(slopes[..., r:], others, solved.noiseless, model, spectra)
@@ -229,25 +230,39 @@ def _fill_in_slack(slopes: F64, free: Sequence[int], by: Driven, model: Spectral
         slopes[:, :, sensor, rows[0] : rows[-1] + 1] = changed
 
 
-def _fill_in_road(slopes: F64, free: Sequence[int], by: Driven, model: SpectralModel, spectra: CrossSpectra) -> None:
-    """Derivatives by the parameters of axles, tracks and road.
-
-    Delays turn the rear axle's phase, and the distance of tracks reduces it, each entry by a real factor.
+def _fill_in_axles(slopes: F64, free: Sequence[int], by: Driven, model: SpectralModel, spectra: CrossSpectra) -> None:
+    """Derivatives by the delay of the rear axle, which turns its phase, and by the distance of its track from the
+    front's, which reduces it: each by a real factor.
     """
-    rows = {entry: row for row, entry in enumerate(free) if entry in _OF_ROAD}
     late = _late(by)
-    turns = {INDEX["delay_scale"]: spectra.delay_s, INDEX["rear_lag_s"]: np.ones(1)}
-    if not rows.keys().isdisjoint(turns):
-        turned = _with_conjugate(-2j * np.pi * spectra.freq_hz * late).parts
-        for entry, delay_s in turns.items():
-            if entry in rows:
-                slopes[..., rows[entry]] = turned * delay_s[..., None]
-    if INDEX["track_offset_m"] in rows:
-        x = along(model.track_offset_m, model, spectra)
-        shrunk = coherence_slope_of(x) / coherence_of(x)
-        slopes[..., rows[INDEX["track_offset_m"]]] = _with_conjugate(shrunk * late).parts
-    for entry in rows.keys() & {INDEX["tracks_apart_m"], INDEX["twist_level"]}:
-        slopes[..., rows[entry]] = _by_twist(entry, by, model, spectra).parts
+    turned = _with_conjugate(-2j * np.pi * spectra.freq_hz * late).parts
+    for row, entry in enumerate(free):
+        if entry == INDEX["delay_scale"]:
+            slopes[..., row] = turned * spectra.delay_s[..., None]
+        elif entry == INDEX["rear_lag_s"]:
+            slopes[..., row] = turned
+        elif entry == INDEX["track_offset_m"]:
+            x = along(model.track_offset_m, model, spectra)
+            slopes[..., row] = _with_conjugate(coherence_slope_of(x) / coherence_of(x) * late).parts
+
+
+def _fill_in_twist(slopes: F64, free: Sequence[int], by: Driven, model: SpectralModel, spectra: CrossSpectra) -> None:
+    """Derivatives by the distance of the tracks and by the level of their difference.
+
+    With c = x K1(x), d((1 - c)/(1 + c))/dc = -2 / (1 + c)^2.
+    """
+    assert by.twist is not None
+    assert model.tracks_apart_m is not None
+    assert model.twist_level is not None
+    both = by_tracks(by, model)
+    against = SpectralMatrix(both.auto[:, 1], both.cross[:, 1]).parts
+    for row, entry in enumerate(free):
+        if entry == INDEX["twist_level"]:
+            slopes[..., row] = by.twist[..., None] * against
+        elif entry == INDEX["tracks_apart_m"]:
+            x = along(model.tracks_apart_m, model, spectra)
+            d_twist = model.twist_level[..., None, :] * -2.0 * coherence_slope_of(x) / (1.0 + coherence_of(x)) ** 2
+            slopes[..., row] = d_twist[..., None] * against
 
 
 def _late(by: Driven) -> C128:
@@ -261,20 +276,6 @@ def _with_conjugate(x: C128) -> SpectralMatrix:
     p = len(x)
     auto = 2.0 * np.real(x[range(p), range(p)])
     return SpectralMatrix(auto, np.stack([x[i, j] + np.conj(x[j, i]) for i, j in PAIRS[: p * (p - 1) // 2]]))
-
-
-def _by_twist(entry: int, by: Driven, model: SpectralModel, spectra: CrossSpectra) -> SpectralMatrix:
-    """With c = x K1(x), d((1 - c)/(1 + c))/dc = -2 / (1 + c)^2."""
-    assert by.twist is not None
-    assert model.tracks_apart_m is not None
-    assert model.twist_level is not None
-    both = by_tracks(by, model)
-    against = SpectralMatrix(both.auto[:, 1], both.cross[:, 1])
-    d_twist = by.twist
-    if entry == INDEX["tracks_apart_m"]:
-        x = along(model.tracks_apart_m, model, spectra)
-        d_twist = model.twist_level[..., None, :] * -2.0 * coherence_slope_of(x) / (1.0 + coherence_of(x)) ** 2
-    return SpectralMatrix(d_twist * against.auto, d_twist * against.cross)
 
 
 def _fill_in_noise(
