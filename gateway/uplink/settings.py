@@ -16,30 +16,17 @@ from gateway.errors import ConfigurationError
 MOST_NAME_BYTES: Final = 65_535  # MQTT 5, 1.5.4: the length has two bytes
 
 
-@dataclass(frozen=True, slots=True)
-class UplinkSettings:
-    """A broker and how to reach it.
+class UplinkSettings(UplinkSection):
+    """A broker and how to reach it: the section for this vehicle, with what it left to be chosen.
 
     ``topic`` is the branch of this vehicle: estimates go to ``topic/estimates``, presence is retained at
-    ``topic/status``. ``ca`` is the authority that must have signed the broker's certificate; None: those of the system.
-    ``certificate`` and ``key`` are the client's, if the broker requires them.
+    ``topic/status``.
     """
 
     host: str
     port: int
     topic: str
     client_id: str
-    tls: bool = True
-    ca: Path | None = None
-    certificate: Path | None = None
-    key: Path | None = None
-    username: str | None = None
-    password_file: Path | None = None
-    keep_alive_s: int = 60
-    back_off_max_s: float = 300.0
-    repeat_s: float = 0.0
-    wait_for_listener: bool = False
-    home_assistant: str | None = None
 
     @property
     def broker(self) -> str:

@@ -36,7 +36,8 @@ from gateway.uplink.uplink import Uplink
 from gateway.uplink.forwarder import BackOff
 
 store = Store.open(pathlib.Path(sys.argv[1]))
-settings = UplinkSettings("127.0.0.1", int(sys.argv[2]), "springscale/van-17", "springscale-van-17", tls=False)
+broker = {"host": "127.0.0.1", "port": int(sys.argv[2]), "tls": False}
+settings = UplinkSettings(**broker, topic="springscale/van-17", client_id="springscale-van-17")
 Uplink(settings, Outbox(store, "fleet"), {}, back_off=BackOff(0.01, 0.1)).start()
 print("started", flush=True)
 time.sleep(600)

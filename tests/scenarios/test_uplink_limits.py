@@ -31,7 +31,9 @@ def test_a_record_over_the_brokers_limit_is_counted_and_passed_over(
     with closing(Store.open(tmp_path)) as store, SmallBroker(3000, refusal, is_announced=is_announced) as broker:
         for record in records:
             store.write_estimate(record)
-        settings = UplinkSettings("127.0.0.1", broker.port, "springscale/van-17", "van-17", tls=False)
+        settings = UplinkSettings(
+            host="127.0.0.1", port=broker.port, topic="springscale/van-17", client_id="van-17", tls=False
+        )
         uplink = Uplink(settings, Outbox(store, "fleet"), {}, back_off=BackOff(0.001, 0.002))
         uplink.start()
         assert wait_until(lambda: uplink.report().n_delivered == len(records) - len(LARGE)), uplink.report()

@@ -26,7 +26,7 @@ from gateway.uplink.settings import UplinkSettings, uplink_settings
 from gateway.uplink.uplink import Uplink
 
 KNOWN = dict(UplinkSection(host="fleet.example"))
-SETTINGS = UplinkSettings("broker.example", 8883, "springscale/van-17", "springscale-van-17")
+SETTINGS = UplinkSettings(host="broker.example", port=8883, topic="springscale/van-17", client_id="springscale-van-17")
 
 
 class FakeBroker:

@@ -14,7 +14,6 @@ import threading
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -71,8 +70,8 @@ def _connections(folder: Path) -> dict[str, float]:
         cpu_s, memory_bytes = broker.cpu_s(), broker.memory_bytes()
         links = []
         for n in range(N_CONNECTIONS):
-            plain = _settings(broker.port, f"van-{n}")
-            links.append(MqttLink(replace(plain, host="localhost", tls=True, ca=folder / "ca.pem"), {}))
+            encrypted = {"host": "localhost", "tls": True, "ca": folder / "ca.pem"}
+            links.append(MqttLink(_settings(broker.port, f"van-{n}").model_copy(update=encrypted), {}))
         found = {
             "n": N_CONNECTIONS,
             "cpu_ms_each": 1e3 * (broker.cpu_s() - cpu_s) / N_CONNECTIONS,
@@ -196,5 +195,10 @@ def _deliver(links: Sequence[MqttLink], message: OutboxMessage) -> None:
 
 
 def _settings(port: int, vehicle_id: str) -> UplinkSettings:
-    plain = UplinkSettings("127.0.0.1", port, f"springscale/{vehicle_id}", f"springscale-{vehicle_id}")
-    return replace(plain, tls=False)
+    return UplinkSettings(
+        host="127.0.0.1",
+        port=port,
+        topic=f"springscale/{vehicle_id}",
+        client_id=f"springscale-{vehicle_id}",
+        tls=False,
+    )
