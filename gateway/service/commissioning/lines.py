@@ -2,9 +2,9 @@
 
 import hashlib
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
 from typing import Final
@@ -18,23 +18,12 @@ from gateway.errors import CalibrationFileError, CommissioningRefusedError, Conf
 from gateway.files.kept import KeptFiles
 from gateway.files.signed import SUFFIX, Trust
 from gateway.service.commissioning.record import LineChoice
-from gateway.stated.commissioning import LineSource
+from gateway.stated.commissioning import LineFoundTold, LineSource
 
 FOLDER: Final = "lines"
 MOST_UPLOADED: Final = 20  # chosen: files that anybody with a token may leave on the disk
 MOST_BYTES: Final = 1_000_000  # chosen: of a file
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,58}\.json")
-
-
-@dataclass(frozen=True, slots=True)
-class LineFound:
-    """One file: its content, or why it cannot be used."""
-
-    name: str
-    source: LineSource
-    id: str | None = None
-    vehicle: Mapping[str, object] | None = None
-    fault: str | None = None
 
 
 class Lines:
@@ -50,16 +39,16 @@ class Lines:
         )
         self._trust = trust
 
-    def found(self) -> Iterator[LineFound]:
+    def found(self) -> Iterator[LineFoundTold]:
         """Every file that could be one, by source and name."""
         for source, folder in self._folders:
             for path in sorted(folder.glob("*.json")) if folder is not None and folder.is_dir() else ():
                 try:
                     held, _ = self._load(source, path)
                 except ConfigurationError as fault:
-                    yield LineFound(path.name, source, fault=str(fault))
+                    yield LineFoundTold(name=path.name, source=source, id=None, vehicle=None, fault=str(fault))
                 else:
-                    yield LineFound(path.name, source, held.id, _figures(held))
+                    yield LineFoundTold(name=path.name, source=source, id=held.id, vehicle=_figures(held), fault=None)
 
     def choose(self, name: str, source: LineSource) -> tuple[LineChoice, bytes]:
         """The choice and the file's content. Raises CommissioningRefusedError."""
@@ -84,7 +73,7 @@ class Lines:
         )
         return choice, content
 
-    def upload(self, name: str, content: str, signature: str | None) -> LineFound:
+    def upload(self, name: str, content: str, signature: str | None) -> None:
         """Keep a file under this name; on disk when this returns. Raises CommissioningRefusedError."""
         if _NAME.fullmatch(name) is None:
             raise CommissioningRefusedError(
@@ -99,7 +88,7 @@ class Lines:
             kept.write(fresh, written)
             if signature is not None:
                 kept.write(fresh + SUFFIX, signature.encode())
-            held, _ = self._load("uploaded", self._uploaded / fresh)
+            self._load("uploaded", self._uploaded / fresh)
             if signature is not None:
                 kept.write(name + SUFFIX, signature.encode())
             kept.write(name, written)
@@ -112,7 +101,6 @@ class Lines:
             for leftover in (fresh, fresh + SUFFIX):
                 with suppress(OSError):
                     (self._uploaded / leftover).unlink()
-        return LineFound(name, "uploaded", held.id, _figures(held))
 
     def _require_place(self, name: str, written: bytes) -> None:
         there = {path.name for path in self._uploaded.glob("*.json")} if self._uploaded.is_dir() else set()

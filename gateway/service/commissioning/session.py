@@ -99,7 +99,7 @@ class Commissioning(ServicePart):
             return shown.model_dump_json()
 
     def lines(self) -> str:
-        return LinesFound.model_validate({"items": list(self._lines.found())}).model_dump_json()
+        return LinesFound(items=list(self._lines.found())).model_dump_json()
 
     def upload(self, name: str, content: str, signature: str | None) -> str:
         """Keep a line's file -> the LinesFound with it. Raises CommissioningRefusedError."""
