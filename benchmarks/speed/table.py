@@ -14,7 +14,20 @@ HELD_BY: Final = {
     ),
     "calibration": "5,000 curvatures by all parameters, most of them in fits that leave a run out",
     "day": "its batches",
-    "import": "FastAPI, pydantic and cantools",
+    "import": (
+        "FastAPI (a seventh), 216 dataclasses (a sixth) and 108 pydantic models (a seventh) of our own, python-can, "
+        "numpy and cantools (a seventh)"
+    ),
+    "decode": (
+        "finding line ends and marks (30 %), our twelfth of the lines (23 %) and their signals (14 %), reading the file "
+        "(13 %), comparing identifiers (12 %)"
+    ),
+    ".blf": (
+        "inflating (30 %) and gathering unaligned fields (20 %); container by container, numpy's cost of a call is as "
+        "much again"
+    ),
+    "memory": "what is imported (83 MB before the service starts); weighing takes 12 MB",
+    "idle": "three wake-ups a second of 0.2 ms: bus reader 1, event loop 0.9, pipeline 0.5, both senders 0.4",
 }
 """What keeps a figure from its goal, as profiles of these benchmarks showed it."""
 
@@ -68,7 +81,7 @@ def _decode(found: Mapping[str, Any]) -> Iterator[Line]:
             continue
         times = row["ns_per_frame"] / ours["ns_per_frame"]
         if row is ours:
-            yield _below(section, name, row["ns_per_frame"], "ns a frame", 25, 0)
+            yield _below(section, name, row["ns_per_frame"], "ns a frame", 25, 0, HELD_BY["decode"])
             continue
         yield Line(section, name, f"{row['ns_per_frame']:,.0f} ns a frame, {_times(times)} ours")
     yield _below(section, "memory", ours["peak_mb"], "MB", 150, 0)
@@ -87,7 +100,8 @@ def _formats(found: Mapping[str, Any]) -> Iterator[Line]:
         times = peer["ns_per_frame"] / ours["ns_per_frame"]
         least = LEAST_TIMES.get(suffix)
         goal = f"at least {least} x" if least else ""
-        yield Line("every format", suffix, f"{told}, {_times(times)} python-can's reader", goal, times >= (least or 0))
+        told = f"{told}, {_times(times)} python-can's reader"
+        yield Line("every format", suffix, told, goal, times >= (least or 0), HELD_BY.get(suffix, ""))
 
 
 def _day(found: Mapping[str, Any]) -> Iterator[Line]:
@@ -131,7 +145,7 @@ def _live(found: Mapping[str, Any]) -> Iterator[Line]:
 def _service(found: Mapping[str, Any]) -> Iterator[Line]:
     section = "the whole service, with roll"
     yield _below(section, "a filtered bus of 2500 frames/s", found["cpu_pct"], "% of a core", 3, 2)
-    yield _below(section, "memory", found["peak_mb"], "MB", 120, 0)
+    yield _below(section, "memory", found["peak_mb"], "MB", 120, 0, HELD_BY["memory"])
     yield _below(section, "frames lost", found["lost"], "frames", 0, 0)
 
 
@@ -140,7 +154,8 @@ def _idle(found: Mapping[str, Any]) -> Iterator[Line]:
     if "skipped" in found:
         yield Line(section, "the whole service", f"left out: {found['skipped']}")
         return
-    yield _below(section, "processor time", found["processor_s_per_hour"], "s an hour", 3.6)  # 0.1 % of a core
+    most_s = 3.6  # 0.1 % of a core
+    yield _below(section, "processor time", found["processor_s_per_hour"], "s an hour", most_s, 1, HELD_BY["idle"])
     yield _below(section, "written to disk", found["disk_kb_per_hour"], "kB an hour", 0, 0)
 
 

@@ -1,9 +1,11 @@
 """The command line: springscale. Commands are imported when they are called, so that --help is quick."""
 
+import gc
 import os
 import sys
 import threading
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import version
@@ -50,6 +52,16 @@ _WORKBENCH = frozenset({"matplotlib", "numba", "plotly"})
 _DEBIAN_TREE = Path("/usr/lib/springscale")
 
 
+@contextmanager
+def _without_collections() -> Iterator[None]:
+    """Pause the search for cyclic garbage: imports make hardly any, and a seventh of a start goes into it."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
 class _Lazy(click.Group):
     """A group that imports a command's module only when the command is called."""
 
@@ -61,7 +73,8 @@ class _Lazy(click.Group):
         if cmd_name not in _COMMANDS:
             return None
         name = _NAMES.get(cmd_name, cmd_name.replace("-", "_"))
-        command: click.Command = getattr(import_module(f"gateway.cli.{name}"), name)
+        with _without_collections():
+            command: click.Command = getattr(import_module(f"gateway.cli.{name}"), name)
         return command
 
     def resolve_command(

@@ -1,6 +1,7 @@
 """springscale run: the service."""
 
 import faulthandler
+import gc
 import os
 from functools import partial
 from pathlib import Path
@@ -18,6 +19,7 @@ from gateway.service.lifecycle import live, restart
 @trusted_keys
 def run(config_path: Path, trusted_keys: Path | None) -> None:
     """Read the bus, estimate, store and serve until SIGTERM."""
+    gc.freeze()  # what is imported by now stays: later searches for garbage pass it over
     load = partial(load_settings, config_path, trusted_keys)
     settings = load()
     faulthandler.enable()  # systemd's watchdog ends a hung process with SIGABRT: every stack goes to the journal
