@@ -24,9 +24,11 @@ from gateway.units import NS_PER_S
 CHUNK_FRAMES: Final = 32_768  # chosen: as in candump.py
 MOST_BYTES: Final = 64 << 20  # chosen: of one container; Vector's tools fill containers with 128 kB
 MOST_OBJECT_BYTES: Final = 1 << 20  # chosen: of one inside a container; what says more is damaged
+JOINED_BYTES: Final = 1 << 20  # chosen: some 20,000 objects
 _IsalError = cast(type[Exception], isal_zlib.error)
 
 _SIGNATURE: Final = b"LOBJ"
+_SIGNATURE_NUMBER: Final = int.from_bytes(_SIGNATURE, "little")
 _PADDING: Final = 4  # at most so many bytes stand between an object and the next
 _FILE_HEADER: Final = np.dtype(
     {
@@ -97,7 +99,7 @@ def read_blf(path: Path, selection: Selection, width: int) -> Iterator[Frames]:
     with open_log_file(path) as file:
         header = _header(path, file)
         reader = _BlfReader(_start_ns(header), selection, width)
-        contents = _contents(file, header, selection.report)
+        contents = _joined(_contents(file, header, selection.report))
         for frames in gathered(map(reader.read, contents), CHUNK_FRAMES, width):
             selection.report.hand_on(frames.t_ns)
             yield frames
@@ -139,6 +141,22 @@ def _contents(file: BinaryIO, header: np.void, report: LogReport) -> Iterator[by
             report.ended_early = "the file is cut off: shorter than its header says"
     except (EOFError, OSError) as fault:
         report.ended_early = str(fault)
+
+
+def _joined(contents: Iterator[bytes | None]) -> Iterator[bytes | None]:
+    """The same in pieces of at least JOINED_BYTES or up to a damaged one; calls of numpy cost as much for few objects
+    as for many.
+    """
+    waiting: list[bytes] = []
+    for content in contents:
+        if content is not None:
+            waiting.append(content)
+        if content is None or sum(map(len, waiting)) >= JOINED_BYTES:
+            yield b"".join(waiting)
+            waiting = []
+        if content is None:
+            yield None
+    yield b"".join(waiting)
 
 
 def _inflated(body: bytes, report: LogReport) -> bytes | None:
@@ -191,7 +209,7 @@ class _BlfReader:
         codes = _column(text, at + 12, "<u4") << np.uint32(16) | _column(text, at + 6, "<u2")
         places: list[I64] = []
         parts: list[Frames] = []
-        for code in set(codes.tolist()):
+        for code in np.unique(codes).tolist() if (codes != codes[:1]).any() else codes[:1].tolist():
             number, version = code >> 16, code & 0xFFFF
             rows = np.flatnonzero(codes == code)
             if number in _ERROR_KINDS:
@@ -236,12 +254,23 @@ class _BlfReader:
 
 
 def _objects(text: U8, n: int) -> tuple[I64, I64]:
-    """Begin and end of the objects of ``text[:n]``, in order. The last may end beyond ``n``."""
+    """Begin and end of the objects of ``text[:n]``, in order. The last may end beyond ``n``.
+
+    Objects usually follow one another at multiples of four bytes; only where they do not, every byte is looked at.
+    """
+    begins, ends = _apart(text, n, 4 * np.flatnonzero(text[: n // 4 * 4].view("<u4") == _SIGNATURE_NUMBER))
+    gaps = np.append(begins, n) - np.insert(ends, 0, 0)
+    if (gaps[:-1] < _PADDING).all() and gaps[-1] < _BASE_BYTES:
+        return begins, ends
     begins = np.flatnonzero(text[:n] == _SIGNATURE[0])
-    begins = begins[_column(text, begins, "<u4") == int.from_bytes(_SIGNATURE, "little")]
+    return _apart(text, n, begins.compress(_column(text, begins, "<u4") == _SIGNATURE_NUMBER))
+
+
+def _apart(text: U8, n: int, begins: I64) -> tuple[I64, I64]:
+    """Begin and end of the objects whose signatures stand at ``begins``, without those within another object."""
     n_bytes = _column(text, begins + 8, "<u4").astype(np.int64)
     is_one = (n_bytes >= _BASE_BYTES) & (n_bytes <= MOST_OBJECT_BYTES) & (begins + _BASE_BYTES <= n)
-    begins, n_bytes = begins[is_one], n_bytes[is_one]
+    begins, n_bytes = begins.compress(is_one), n_bytes.compress(is_one)
     ends = begins + n_bytes
     if (begins[1:] < ends[:-1]).any():  # a signature within an object is payload
         steps, path, at = np.searchsorted(begins, ends).tolist(), [], 0
