@@ -1,1 +1,1 @@
-"""What people state of a vehicle and of a load, as the web takes and shows it and calibration uses it."""
+"""What people state of a vehicle and of a load, and what follows, as the web takes and shows it and files keep it."""

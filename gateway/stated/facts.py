@@ -1,4 +1,6 @@
-"""What people state: a fitter about a vehicle, a person about a weighed load, and the known weight that follows."""
+"""What people state: a fitter about a vehicle, a person about a weighed load, and the known weights and verifications
+that follow.
+"""
 
 from dataclasses import dataclass, field
 from enum import StrEnum

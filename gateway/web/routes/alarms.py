@@ -8,6 +8,7 @@ from pydantic import BaseModel, Field
 from starlette.responses import Response
 
 from gateway.history import ALARM
+from gateway.stated.facts import Instant
 from gateway.store import StoreReader
 from gateway.web.routes.history import HistoryQuery, entries_of
 from gateway.web.routes.service_calls import AlarmBackend, call_service, token_name
@@ -18,7 +19,7 @@ class AlarmStep(BaseModel):
     """When an alarm reached a state, and the cause; null is unknown, or not applicable."""
 
     state: Literal["early", "final", "cleared"]
-    t: str = Field(json_schema_extra={"format": "date-time"})
+    t: Instant
     probability: float | None = Field(description="that the limit is passed, 0 to 1", examples=[0.971])
     found: float | None = Field(examples=[2561.3])
     std: float | None = Field(examples=[14.2])
@@ -31,7 +32,7 @@ class AlarmSeen(BaseModel):
     """Who has seen it."""
 
     by: str = Field(description="name of the token; `local` if none are in use", examples=["yard"])
-    at: str = Field(json_schema_extra={"format": "date-time"})
+    at: Instant
     note: str | None
 
 
@@ -45,7 +46,7 @@ class Alarm(BaseModel):
     where: str | None = Field(description="on the vehicle, or the part concerned", examples=["rear_axle"])
     state: Literal["early", "final", "cleared"]
     is_active: bool
-    t_start: str = Field(json_schema_extra={"format": "date-time"})
+    t_start: Instant
     t_end: str | None = Field(description="null: it stands")
     sentence: str = Field(examples=["The vehicle weighs 2561 +- 28 kg, limit 2500 kg (confirmed)"])
     steps: list[AlarmStep] = Field(description="its steps, oldest first")

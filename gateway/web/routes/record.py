@@ -11,6 +11,7 @@ from starlette.responses import Response, StreamingResponse
 from starlette.types import Receive, Scope, Send
 
 from gateway.records import iso_utc
+from gateway.stated.facts import Instant
 from gateway.status import Segment
 from gateway.web.access.guard import RECORD_PATH
 from gateway.web.access.problems import problem_response
@@ -28,8 +29,8 @@ class SegmentTold(BaseModel):
     name: str = Field(examples=["00000042-20261121T035000Z.log.gz"])
     n_bytes: int = Field(description="bytes available now; the newest file grows", examples=[1_204_113])
     n_frames: int = Field(examples=[731_002])
-    t_start: str = Field(json_schema_extra={"format": "date-time"}, description="stamp of the first frame")
-    t_end: str = Field(json_schema_extra={"format": "date-time"}, description="stamp of the last")
+    t_start: Instant = Field(description="stamp of the first frame")
+    t_end: Instant = Field(description="stamp of the last")
 
 
 class SegmentsTold(BaseModel):

@@ -19,6 +19,7 @@ from gateway.estimate import Estimate, Weight, Weights
 from gateway.j1939 import NOT_AVAILABLE, POWERED_WEIGHT, counts_of
 from gateway.quantities import QUANTITIES
 from gateway.records import iso_utc, rounded
+from gateway.stated.facts import Instant
 from gateway.web.live.board import Board, Shown
 from gateway.web.schemas import WeightFigure, WeightFigures
 
@@ -227,7 +228,7 @@ KNOWN_LOADS_PATH: Final = "/api/v1/known-loads"
 class KnownLoadTold(BaseModel):
     """From ``t_start`` on, until the next."""
 
-    t_start: str = Field(json_schema_extra={"format": "date-time"})
+    t_start: Instant
     payload_kg: float
     front_share_pct: float
 
