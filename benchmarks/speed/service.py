@@ -20,6 +20,7 @@ from typing import Any, Final
 from benchmarks.speed.live import listening_socket
 from benchmarks.speed.meter import CALIBRATION, ENVIRONMENT, command_of, cpu_of_s, in_own_process, peak_mb
 from benchmarks.speed.start import SETTINGS
+from gateway.allocator import keep_freed_memory
 from gateway.bus.live.socketcan import SocketCanReceiver
 from gateway.config import load_settings
 from gateway.service.gateway import Gateway
@@ -31,6 +32,7 @@ BEGIN_S: Final = 60.0  # chosen: of the drive, which is at speed by then
 
 def serve(folder: str) -> None:
     """The service in a process of its own; prints where its bus and its web are."""
+    keep_freed_memory()  # as the command does
     settings = load_settings(Path(folder) / "springscale.toml")
     wire = listening_socket()
 
