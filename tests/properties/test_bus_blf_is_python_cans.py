@@ -12,6 +12,7 @@ from support.blf import CLASSIC, CLASSIC2, ERROR_EXT, FD, FD64, TEXT, blf_object
 
 from gateway.bus.frames import frames_of, join
 from gateway.bus.logs import open_whole_log
+from gateway.bus.logs.blf import _apart, _objects
 
 SIGNATURE = b"LOBJ"  # what begins an object may also stand in a payload
 identifiers = st.one_of(st.integers(0, 0x7FF), st.integers(0, 0x1FFF_FFFF).map(lambda number: number | 0x8000_0000))
@@ -84,3 +85,20 @@ def test_no_damage_ends_a_run_or_makes_up_a_frame_elsewhere(objects, draws):
     np.testing.assert_array_equal(found.can_id[:n], before.can_id)
     np.testing.assert_array_equal(found.payload[:n], before.payload)
     assert len(found) <= sum(1 for _ in pairwise(begins))
+
+
+pieces = st.one_of(
+    st.builds(blf_object, st.sampled_from([CLASSIC, TEXT]), st.just(0), st.binary(max_size=20)),
+    st.just(blf_object(TEXT, 0, b"..LOBJ" + bytes(16))),  # what looks like an object is payload
+    st.binary(max_size=6),
+)
+
+
+@given(st.lists(pieces, max_size=12).map(b"".join), st.integers(0, 60))
+def test_objects_are_found_wherever_they_begin(content, n_missing):
+    """At multiples of four bytes, where they usually do, or elsewhere."""
+    n = max(0, len(content) - n_missing)
+    text = np.frombuffer(content + bytes(200), np.uint8)
+    everywhere = np.array([at for at in range(n) if content.startswith(b"LOBJ", at)], np.int64)
+    for found, expected in zip(_objects(text, n), _apart(text, n, everywhere), strict=True):
+        assert found.tolist() == expected.tolist()
