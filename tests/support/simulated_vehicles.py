@@ -150,7 +150,7 @@ class VehicleProcesses:
         self._ask("drive", n)
 
     def state(self) -> list[Told]:
-        return [one for each in self._ask("told") for one in each]
+        return [one for each in self._ask("state") for one in each]
 
     def kept(self) -> list[Kept]:
         return [one for each in self._ask("kept") for one in each]
