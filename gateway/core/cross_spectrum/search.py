@@ -45,10 +45,11 @@ def most_probable(
         return cost(x) + 0.5 * float((x - prior_mean) @ prior_precision @ (x - prior_mean))
 
     x = near = start
+    here = curvature(x)  # before the cost: whoever solves the model then knows which slopes are sought
     best, damping, is_converged = total(x), 1e-3, False
     information = prior_precision
     for _ in range(MOST_STEPS):
-        here, near = curvature(x), x
+        near = x
         gradient = here.gradient + prior_precision @ (x - prior_mean)
         information = here.information + prior_precision
         step = np.linalg.solve(information, -gradient)
@@ -64,6 +65,7 @@ def most_probable(
         if gain < tolerance:
             is_converged = True
             break
+        here = curvature(x)
     return Found(x, best, np.asarray(np.linalg.inv(information), float), is_converged, near)
 
 
