@@ -67,7 +67,8 @@ def budget_page(found: Mapping[str, Any]) -> str:
         "state, and of the shifts found. The slope is that of the shifts found over those predicted for what was "
         "drawn; for the load's shape predicted is by how much the answer differs from that under the true shape. "
         "Batches in which two loads compete as the answer are left out: it may jump between them. "
-        "z squared is the mean square of the shifts over the variances stated. Right are slopes from "
+        "z squared is the mean square of the shifts over the variances stated; where a column nearly vanishes, a small "
+        "shift makes it large, and the root mean squares say how much that is. Right are slopes from "
         f"{SLOPE[0]:g} to {SLOPE[1]:g} and z squared from {Z2_ALONE[0]:g} to {Z2_ALONE[1]:g}.",
         "",
         *table_of(ALONE, found["alone"]),
