@@ -78,6 +78,7 @@ def test_what_the_road_or_a_sensor_did_is_not_laid_on_the_calibration(
     assert fault is not None
     assert "nothing was weighed" in str(fault)
     assert "likely cause" not in str(fault)
+    assert "likely cause" not in str(said(monkeypatch, log, *slow[1:]))  # a half is not most
 
 
 def test_one_batch_that_was_weighed_is_enough(monkeypatch: pytest.MonkeyPatch, log: Path) -> None:
