@@ -8,21 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from support.commands import run
 from support.html_page import Page
 from support.known_load_logs import write_known_loads
 
 from gateway.calibration.file.calibration_file import load_calibration
-from gateway.cli import main, springscale
+from gateway.cli import main
 from gateway.reports.calibration.text import decimal, percent
 
 WINDOW = ("--window-s", "100")
-
-
-def run(*arguments: str) -> Result:
-    done = CliRunner().invoke(springscale, list(arguments), catch_exceptions=False)
-    assert done.exit_code == 0, done.output
-    return done
 
 
 @pytest.fixture(scope="module")

@@ -2,14 +2,11 @@
 
 import json
 
-from click.testing import CliRunner
-
-from gateway.cli import springscale
+from support.commands import run
 
 
 def test_the_demo_weighs_the_van_before_and_after_loading() -> None:
-    found = CliRunner().invoke(springscale, ["demo", "--once", "--json"], catch_exceptions=False)
-    assert found.exit_code == 0, found.output
+    found = run("demo", "--once", "--json")
     records = [json.loads(line) for line in found.stdout.splitlines()]
     counted = [record for record in records if not record["rejected"]]
     payloads = [record["payload_kg"] for record in counted]
@@ -22,8 +19,7 @@ def test_the_demo_weighs_the_van_before_and_after_loading() -> None:
 
 def test_a_fleet_is_shown_by_one_command() -> None:
     """Two vans, one of them too heavy: what the page would show."""
-    found = CliRunner().invoke(springscale, ["demo", "--fleet", "2", "--once"], catch_exceptions=False)
-    assert found.exit_code == 0, found.output
+    found = run("demo", "--fleet", "2", "--once")
     light, heavy = [json.loads(line) for line in found.stdout.splitlines()]
     assert (light["vehicle_id"], heavy["vehicle_id"]) == ("van-1", "van-2")
     assert abs(light["payload_kg"] - 270.0) < 60.0

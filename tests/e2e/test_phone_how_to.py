@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from support.commands import printed
 
-from gateway.cli import springscale
 from gateway.sim.drive import rural, urban
 from gateway.sim.obstacles import UnevenRoad
 from gateway.sim.road import iso_road
@@ -32,12 +31,6 @@ def record(path: Path, loads: tuple[Load, ...], seed: int) -> None:
     rng = np.random.default_rng(seed)
     drive = urban(DRIVE_S[0], rng).then(rural(DRIVE_S[1], rng))
     write_export(simulate_drive(SMALL_VAN, loads, ROAD, drive, PHONE, seed).recording, path, "phyphox", Lying(), seed)
-
-
-def run(*arguments: str) -> str:
-    result = CliRunner().invoke(springscale, list(arguments), catch_exceptions=False)
-    assert result.exit_code == 0, result.output
-    return result.stdout
 
 
 @pytest.fixture
@@ -64,8 +57,8 @@ def test_every_command_of_the_page_works_in_turn(tmp_path: Path, drives: dict[st
     with contextlib.chdir(tmp_path):
         *before, last = COMMANDS
         for command in before:
-            run(*command.split())
-        estimates = [json.loads(line) for line in run(*last.split(), "--json").splitlines()]
+            printed(*command.split())
+        estimates = [json.loads(line) for line in printed(*last.split(), "--json").splitlines()]
     assert len(COMMANDS) == 6
     whole = [one for one in estimates if not one["rejected"]]
     assert whole

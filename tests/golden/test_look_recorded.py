@@ -4,11 +4,10 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from support.commands import run
 from support.recordings import recordings
 
 from gateway.bus.signals import load_signal_map
-from gateway.cli import springscale
 from gateway.records import Signal
 
 
@@ -16,8 +15,7 @@ from gateway.records import Signal
 def test_the_map_of_a_real_car_is_found_from_its_log(trip: str, tmp_path: Path) -> None:
     folder = recordings() / "real_drive"
     arguments = ["look", str(folder / f"candump_trip{trip}.log.gz"), "--output", str(tmp_path / "s.toml"), "--json"]
-    found = CliRunner().invoke(springscale, arguments, catch_exceptions=False)
-    assert found.exit_code == 0, found.output
+    found = run(*arguments)
     told = json.loads(found.stdout)
     assert told["can_work"]
     assert not any(one["fits"] for one in told["maps"])  # mounted otherwise than canmod_gps.toml says

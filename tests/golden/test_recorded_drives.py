@@ -11,25 +11,17 @@ from statistics import fmean, stdev
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
+from support.commands import printed
 from support.recordings import recordings
 
-from gateway.cli import springscale
-
 CROSS = ("--estimator", "cross_spectrum")
-
-
-def run(*arguments: str | Path) -> str:
-    found = CliRunner().invoke(springscale, [str(argument) for argument in arguments], catch_exceptions=False)
-    assert found.exit_code == 0, found.output
-    return found.stdout
 
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     """The file calibrated on the identification parts of all ten known loads, and what was told meanwhile."""
     output = tmp_path_factory.mktemp("vehicle") / "vehicle.json"
-    told = run("calibrate", recordings() / "known_loads/campaign.toml", "--output", output, "--json")
+    told = printed("calibrate", recordings() / "known_loads/campaign.toml", "--output", output, "--json")
     return output, json.loads(told)
 
 
@@ -45,7 +37,7 @@ def test_ten_sound_runs_are_sound(calibrated: tuple[Path, dict[str, Any]]) -> No
 
 @cache
 def table(campaign: str, calibration: Path, *arguments: str) -> dict[str, Any]:
-    text = run("evaluate", recordings() / campaign, "--calibration", calibration, "--json", *arguments)
+    text = printed("evaluate", recordings() / campaign, "--calibration", calibration, "--json", *arguments)
     found: dict[str, Any] = json.loads(text)
     return found
 
@@ -100,7 +92,7 @@ def test_without_a_roll_rate_payload_intervals_still_hold(
 
 def test_three_known_loads_are_enough(tmp_path: Path) -> None:
     output = tmp_path / "three.json"
-    run("calibrate", recordings() / "known_loads/campaign.toml", "--output", output, "--runs", "1,6,10", *CROSS)
+    printed("calibrate", recordings() / "known_loads/campaign.toml", "--output", output, "--runs", "1,6,10", *CROSS)
     found = table("known_loads/campaign.toml", output, *CROSS)
     assert found["payload"]["mean_abs_pct"] <= 6.0
     assert found["front_share"]["mean_abs_pct"] <= 3.0
@@ -109,7 +101,7 @@ def test_three_known_loads_are_enough(tmp_path: Path) -> None:
 @pytest.mark.parametrize("trip", ["A", "B"])
 def test_a_real_drive_gives_one_line_per_batch_and_says_why_not(trip: str) -> None:
     folder = recordings() / "real_drive"
-    text = run("estimate", folder / f"candump_trip{trip}.log.gz", "--signals", folder / "signals.toml", "--json")
+    text = printed("estimate", folder / f"candump_trip{trip}.log.gz", "--signals", folder / "signals.toml", "--json")
     records = [json.loads(line) for line in text.splitlines()]
     whole = [record for record in records if "too_short" not in record["rejected"]]
     assert len(whole) >= 6
@@ -140,10 +132,10 @@ def test_two_trips_of_a_real_car_weigh_alike_and_a_declared_load_moves_them(
     found = {}
     for declared_kg in (0.0, 100.0):
         output = tmp_path / f"{declared_kg:.0f}.json"
-        run("calibrate", real_campaign(tmp_path, known, declared_kg), "--output", output, *CROSS)
+        printed("calibrate", real_campaign(tmp_path, known, declared_kg), "--output", output, *CROSS)
         assert json.loads(output.read_text(encoding="utf-8"))["cross_spectrum"]["warnings"][0] == "springs_from_priors"
         campaign = real_campaign(tmp_path, weighed, 0.0)
-        told = json.loads(run("evaluate", campaign, "--calibration", output, "--split", "all", "--json"))
+        told = json.loads(printed("evaluate", campaign, "--calibration", output, "--split", "all", "--json"))
         found[declared_kg] = [b["payload_kg"] for b in told["batches"] if b["payload_kg"] is not None]
     assert len(found[0.0]) >= 6
     assert abs(fmean(found[0.0])) <= 25.0
@@ -153,14 +145,16 @@ def test_two_trips_of_a_real_car_weigh_alike_and_a_declared_load_moves_them(
 
 def test_the_file_says_what_to_expect_and_can_be_held_against_its_logs(calibration: Path) -> None:
     """Errors on runs left out of the fit, of both estimators, and the roads they were made over."""
-    shown = json.loads(run("calibration", "show", calibration, "--json"))
+    shown = json.loads(printed("calibration", "show", calibration, "--json"))
     assert set(shown["expected_errors"]) == {"cross_spectrum", "ratio_index"}
     for errors in shown["expected_errors"].values():
         assert 0.0 < errors["payload_rms_kg"] < 100.0
         assert 0.0 < errors["front_share_rms_pct"] < 5.0
     smooth, rough = shown["seen"]["roughness_mps2"]
     assert 0.0 < smooth < rough
-    verified = run("calibration", "verify", calibration, "--logs", recordings() / "known_loads/campaign.toml", "--json")
+    verified = printed(
+        "calibration", "verify", calibration, "--logs", recordings() / "known_loads/campaign.toml", "--json"
+    )
     checks = json.loads(verified)["checks"]
     assert {check["verdict"] for check in checks} == {"good"}
     assert len(checks) == 3 + 1 + 10

@@ -13,11 +13,9 @@ from statistics import fmean
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
+from support.commands import printed
 from support.recordings import calibrated_with_roll_rate, recordings
 from support.sister_van import Commissioned, commissioned
-
-from gateway.cli import springscale
 
 CROSS = ("--estimator", "cross_spectrum")
 QUANTITIES = ("payload", "front_share", "cg_left")
@@ -32,12 +30,6 @@ NUMBERS = (
 )
 VANS = ("van_1", "van_2")
 N_LOGS = int(os.environ.get("SPRINGSCALE_SISTER_LOGS", "1"))  # of each van's six loads are replayed into the service
-
-
-def run(*arguments: str | Path) -> str:
-    found = CliRunner().invoke(springscale, [str(argument) for argument in arguments], catch_exceptions=False)
-    assert found.exit_code == 0, found.output
-    return found.stdout
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +59,7 @@ def test_errors_stay_small_and_intervals_true(
 ) -> None:
     campaign = recordings() / drives / "campaign_roll.toml"
     found: dict[str, Any] = json.loads(
-        run("evaluate", campaign, "--calibration", calibration, "--json", *CROSS, *arguments)
+        printed("evaluate", campaign, "--calibration", calibration, "--json", *CROSS, *arguments)
     )
     assert found["n_batches"] == n_batches
     assert found["n_rejected"] <= 0.1 * n_batches
@@ -89,7 +81,7 @@ def test_a_lost_roll_rate_leaves_true_intervals(
 ) -> None:
     """By the map without it: the sensor sits 0.3 m off the centre line, and reads roll whether it is told or not."""
     campaign = recordings() / drives / "campaign.toml"
-    found: dict[str, Any] = json.loads(run("evaluate", campaign, "--calibration", calibration, "--json", *CROSS))
+    found: dict[str, Any] = json.loads(printed("evaluate", campaign, "--calibration", calibration, "--json", *CROSS))
     assert found["n_batches"] == n_batches
     assert found["n_rejected"] <= most_refused
     assert found["payload"]["coverage95"] >= 0.9
@@ -122,12 +114,12 @@ def test_commissioned_at_a_service_a_sister_weighs_as_calibrated_at_a_desk(
 ) -> None:
     """Over HTTP and a bus, provisional estimates and all, or from logs: the same numbers, to the last bit."""
     van = commissioned_vans(name)
-    run("calibrate", van.desk_campaign, "--like", calibration, "--output", tmp_path / "desk.json", "--json", *CROSS)
+    printed("calibrate", van.desk_campaign, "--like", calibration, "--output", tmp_path / "desk.json", "--json", *CROSS)
     desk, box = (json.loads(path.read_text()) for path in (tmp_path / "desk.json", van.calibration))
     assert box["cross_spectrum"] == desk["cross_spectrum"]
     assert box["line"] == desk["line"]
     maps = ("--signals", van.signals, "--calibration", tmp_path / "desk.json", "--json", *CROSS)
-    told = [json.loads(line) for line in run("estimate", *van.logs, *maps).splitlines()]
+    told = [json.loads(line) for line in printed("estimate", *van.logs, *maps).splitlines()]
     counted = [[one[key] for key in NUMBERS] for one in told if not one["rejected"]]
     assert len(counted) == 3 * len(van.logs)
     assert [[one[key] for key in NUMBERS] for one in van.weighed if not one["rejected"]] == counted
@@ -157,12 +149,12 @@ def _require_true(judged: list[dict[str, Any]], payload_pct: float, front_share_
 def _sister(calibration: Path, output: Path, name: str) -> dict[str, Any]:
     drives = recordings() / "siblings" / name
     like = ("--like", calibration, "--output", output, "--json", *CROSS)
-    run("calibrate", drives / "empty" / "campaign_roll.toml", *like)
+    printed("calibrate", drives / "empty" / "campaign_roll.toml", *like)
     return _evaluated(output, name)
 
 
 def _evaluated(calibration: Path, name: str) -> dict[str, Any]:
     """On her drives with loads."""
     tests = recordings() / "siblings" / name / "test" / "campaign_roll.toml"
-    found: dict[str, Any] = json.loads(run("evaluate", tests, "--calibration", calibration, "--json", *CROSS))
+    found: dict[str, Any] = json.loads(printed("evaluate", tests, "--calibration", calibration, "--json", *CROSS))
     return found

@@ -10,13 +10,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
+from support.commands import called, run
 from support.known_load_logs import SIGNALS, write_known_loads
 
 from gateway.calibration.calibrate import calibrate_inspected
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
-from gateway.cli import springscale
 from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.ratio_index.index import PAPER_BANDS
@@ -37,7 +37,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def calibrate(campaign: Path, output: Path, *options: str) -> Result:
     asked = ["calibrate", str(campaign), "--output", str(output), *WINDOW, "--estimator", "ratio_index"]
-    return CliRunner().invoke(springscale, [*asked, *options])
+    return called(*asked, *options)
 
 
 def bands_of(held: CalibrationFile) -> list[tuple[float, float]]:
@@ -71,12 +71,6 @@ def test_an_unknown_name_is_a_usage_error(option: tuple[str, str], campaign: Pat
     refused = calibrate(campaign, tmp_path / "none.json", *option)
     assert refused.exit_code == 2
     assert "is not one of" in refused.output
-
-
-def run(*arguments: str) -> Result:
-    done = CliRunner().invoke(springscale, list(arguments), catch_exceptions=False)
-    assert done.exit_code == 0, done.output
-    return done
 
 
 def test_an_id_does_not_depend_on_where_files_lie(
@@ -122,7 +116,7 @@ def test_a_table_has_a_row_a_batch_and_the_columns_of_the_history(campaign: Path
     assert [row["payload_kg"] for row in rows] == [str(record["payload_kg"] or "") for record in records]
     (head, *_) = run("estimate", logs[0], *asked, "--csv").stdout.splitlines()
     assert head == ",".join(COLUMNS)
-    both = CliRunner().invoke(springscale, ["estimate", *logs, *asked, "--csv", "--json"])
+    both = called("estimate", *logs, *asked, "--csv", "--json")
     assert both.exit_code == 2
     assert "not both" in both.output
 

@@ -4,9 +4,8 @@ import os
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from gateway.cli import springscale
+from support.commands import run
 from support.kept import kept_file
 
 FOLDER = Path(os.environ.get("SPRINGSCALE_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -24,8 +23,6 @@ def calibrated_with_roll_rate() -> Path:
     campaign = recordings() / "known_loads/campaign_roll.toml"
 
     def calibrate(output: Path) -> None:
-        asked = ["calibrate", str(campaign), "--output", str(output), "--estimator", "cross_spectrum"]
-        done = CliRunner().invoke(springscale, asked, catch_exceptions=False)
-        assert done.exit_code == 0, done.output
+        run("calibrate", campaign, "--output", output, "--estimator", "cross_spectrum")
 
     return kept_file("calibrated_with_roll_rate.json", calibrate)

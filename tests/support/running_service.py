@@ -7,15 +7,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 from gateway.bus.sink import replay
-from gateway.cli import springscale
 from gateway.config import load_settings
 from gateway.history import SERVICE
 from gateway.service.gateway import Gateway
 from gateway.setup import setup_of
 from gateway.store import Store
+from support.commands import called, printed
 from support.configured import service_config
 from support.patience import wait_until
 
@@ -43,7 +43,7 @@ class Running:
 
     def ask(self, *arguments: str) -> Result:
         """springscale ... against this service."""
-        return CliRunner().invoke(springscale, [*arguments, "--url", self.gateway.url])
+        return called(*arguments, "--url", self.gateway.url)
 
     def told(self, *arguments: str) -> dict[str, Any]:
         """What it answers with --json."""
@@ -100,8 +100,5 @@ def estimated(config: Path, *logs: Path, options: tuple[str, ...] = ()) -> list[
     """Each log by itself: of several at once, every line would also say of which it is."""
     lines: list[str] = []
     for log in logs:
-        arguments = ["estimate", str(log), "--config", str(config), "--json", *options]
-        found = CliRunner().invoke(springscale, arguments, catch_exceptions=False)
-        assert found.exit_code == 0, found.output
-        lines += found.stdout.splitlines()
+        lines += printed("estimate", log, "--config", config, "--json", *options).splitlines()
     return lines

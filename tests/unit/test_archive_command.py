@@ -8,14 +8,15 @@ from operator import truediv
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from support.archive import MIDNIGHT_NS, die, write_drive, write_manifest
+from support.commands import called
 
 from gateway.archive.receipts import Slot
 from gateway.archive.reprocess import Progress, Summary, done_by
 from gateway.archive.run import JobOutcome, JobStatus
 from gateway.archive.workers import Processes, WorkerKilledError
-from gateway.cli import main, springscale
+from gateway.cli import main
 from gateway.cli.reprocess import duration, how_far, size, summary_in_words
 
 SLOT = Slot("van-1", "2026-11", "abc")
@@ -28,37 +29,36 @@ def _archive(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def called(archive: Path, *options: str) -> Result:
-    command = ["reprocess", str(archive), "--output", str(archive / "dataset"), "--workers", "1", *options]
-    return CliRunner().invoke(springscale, command)
+def reprocessed(archive: Path, *options: str) -> Result:
+    return called("reprocess", archive, "--output", archive / "dataset", "--workers", 1, *options)
 
 
 def test_it_tells_what_there_is_what_was_done_and_that_nothing_is_left(archive: Path) -> None:
-    ahead = called(archive, "--dry-run")
+    ahead = reprocessed(archive, "--dry-run")
     assert ahead.exit_code == 0, ahead.output
     first_line, *_ = ahead.stdout.splitlines()
     assert first_line.startswith("1 vehicle, 1 log, ")
     assert "not scanned yet: 1 log;" in ahead.stdout
     assert "on 1 worker, each reading" in ahead.stdout
     assert not (archive / "dataset").exists()
-    first, second = called(archive), called(archive, "--json")
+    first, second = reprocessed(archive), reprocessed(archive, "--json")
     assert first.exit_code == second.exit_code == 0, first.output
     assert "done now: 1, 1 batches, of which 1 weighed; done before: 0" in first.stdout
     assert json.loads(second.stdout)["jobs"] == {"done": 0, "already": 1, "failed": 0, "failed_before": 0, "lost": 0}
-    later = json.loads(called(archive, "--dry-run", "--json").stdout)
+    later = json.loads(reprocessed(archive, "--dry-run", "--json").stdout)
     assert (later["n_jobs"], later["n_done"], later["bytes_to_do"], later["remaining_s"]) == (1, 1, 0, 0.0)
 
 
 def test_what_failed_ends_it_with_1_and_its_reason(archive: Path) -> None:
     (archive / "van-1" / "2.log").write_bytes(b"nothing\n")
-    result = called(archive)
+    result = reprocessed(archive)
     assert result.exit_code == 1
     assert "failed: 0 jobs, 1 log:\n  van-1/2.log: holds no CAN frame" in result.stdout
 
 
 def test_who_keeps_going_ends_with_0_and_a_scheduler_hears_how_far_it_is(archive: Path) -> None:
     (archive / "van-1" / "2.log").write_bytes(b"nothing\n")
-    result = called(archive, "--keep-going", "--json")
+    result = reprocessed(archive, "--keep-going", "--json")
     assert result.exit_code == 0, result.output
     last = [json.loads(line) for line in result.stderr.splitlines()][-1]
     assert last["n_done"] == last["n_total"] > 0

@@ -6,23 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from support.commands import printed
 from support.known_load_logs import write_known_loads
 
 from gateway.bus.frames import merge_frames
 from gateway.bus.logs import open_whole_log, write_candump
 from gateway.bus.signals import Encoder, load_signal_map
-from gateway.cli import springscale
 from gateway.errors import CampaignError, ConfigurationError
 from gateway.offline.bundle import CONTRIBUTION, MANIFEST, TEMPLATE, pack, unpacked
 from gateway.records import Frames
 from gateway.workbench.simulate import bench_of, write_campaign
-
-
-def run(*arguments: str) -> str:
-    result = CliRunner().invoke(springscale, list(arguments), catch_exceptions=False)
-    assert result.exit_code == 0, result.output
-    return result.stdout
 
 
 def with_strangers(log: Path) -> None:
@@ -54,7 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def bundle(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     output = tmp_path_factory.mktemp("packed") / "van.zip"
-    told = json.loads(run("campaign", "pack", str(folder), "--output", str(output), "--json"))
+    told = json.loads(printed("campaign", "pack", str(folder), "--output", str(output), "--json"))
     assert len(told["runs"]) == 10
     return output
 
@@ -64,9 +57,9 @@ def test_calibrate_and_evaluate_take_the_archive_as_the_folder(folder: Path, bun
     for name, campaign in (("folder", folder / "campaign.toml"), ("bundle", bundle)):
         calibration = tmp_path / f"{name}.json"
         options = ["--estimator", "cross_spectrum", "--runs", "1,5,10", "--window-s", "40"]
-        run("calibrate", str(campaign), "--output", str(calibration), *options)
+        printed("calibrate", str(campaign), "--output", str(calibration), *options)
         told = json.loads(
-            run("evaluate", str(campaign), "--calibration", str(calibration), "--window-s", "40", "--json")
+            printed("evaluate", str(campaign), "--calibration", str(calibration), "--window-s", "40", "--json")
         )
         answers.append([(one["payload_kg"], one["true_payload_kg"], one["rejected"]) for one in told["batches"]])
     assert len(answers[0]) >= 10

@@ -4,25 +4,20 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 from support.calibrated import calibration_file
+from support.commands import called, run
 from support.known_load_logs import write_known_loads
 
 from gateway.calibration.file.calibration_file import content_id, load_calibration
 from gateway.calibration.file.line_file import load_like
-from gateway.cli import springscale
 from gateway.errors import ConfigurationError
 
 FAST = ("--estimator", "cross_spectrum", "--window-s", "100")
 
 
-def run(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(springscale, [str(argument) for argument in arguments])
-
-
 def refused(*arguments: str | Path) -> str:
     """What a person is told who made a mistake."""
-    ended = run(*arguments)
+    ended = called(*arguments)
     if isinstance(ended.exception, ConfigurationError):
         return str(ended.exception)
     assert ended.exit_code == 2
@@ -41,15 +36,13 @@ def sisters(drives: Path) -> list[Path]:
     files = []
     for loaded in ("2", "3", "4"):
         files.append(drives.parent / f"sister_{loaded}.json")
-        made = run("calibrate", drives, "--runs", f"1,{loaded}", "--output", files[-1], *FAST)
-        assert made.exit_code == 0, made.output
+        run("calibrate", drives, "--runs", f"1,{loaded}", "--output", files[-1], *FAST)
     return files
 
 
 def test_one_empty_drive_and_a_sister_make_a_calibration(drives: Path, sisters: list[Path], tmp_path: Path) -> None:
     output = tmp_path / "van.json"
     made = run("calibrate", drives, "--runs", "1", "--like", sisters[0], "--output", output, "--window-s", "100")
-    assert made.exit_code == 0, made.output
     assert "inherited from 1 of its line" in made.stdout
     assert "one_load_only" not in made.stdout
     assert "warning: ratio_index: " in made.stdout
@@ -62,7 +55,6 @@ def test_one_empty_drive_and_a_sister_make_a_calibration(drives: Path, sisters: 
     assert sister.id in shown
     assert {"inherited", "its own"} <= {row[52:].strip() for row in shown.splitlines() if "±" in row}
     verified = run("calibration", "verify", output, "--logs", drives)
-    assert verified.exit_code == 0
     assert f"inherited from {sister.id}" in verified.stdout
     told = run("calibration", "diff", sisters[0], output)
     assert "line.members: absent -> " in told.stdout
@@ -71,7 +63,6 @@ def test_one_empty_drive_and_a_sister_make_a_calibration(drives: Path, sisters: 
 def test_a_line_is_built_shown_and_inherited_from(drives: Path, sisters: list[Path], tmp_path: Path) -> None:
     line, output = tmp_path / "line.json", tmp_path / "van.json"
     built = run("line", "build", *sisters, "--output", line, "--json")
-    assert built.exit_code == 0, built.output
     record = json.loads(built.stdout)
     assert record["members"] == sorted(load_calibration(path).id for path in sisters)
     assert (record["n_siblings"], record["warnings"]) == (3, ["siblings_not_left_out"])
@@ -79,8 +70,7 @@ def test_a_line_is_built_shown_and_inherited_from(drives: Path, sisters: list[Pa
     shown = run("line", "show", line).stdout
     assert "estimated from 3 of them" in shown
     assert "spring_front_npm" in shown
-    made = run("calibrate", drives, "--runs", "1", "--like", line, "--output", output, *FAST)
-    assert made.exit_code == 0, made.output
+    run("calibrate", drives, "--runs", "1", "--like", line, "--output", output, *FAST)
     held = load_calibration(output).line
     assert list(held.members) == record["members"]
     assert held.n_siblings == 3
@@ -88,7 +78,7 @@ def test_a_line_is_built_shown_and_inherited_from(drives: Path, sisters: list[Pa
 
 def test_the_order_of_files_does_not_change_the_line(sisters: list[Path], tmp_path: Path) -> None:
     for name, files in (("one", sisters), ("other", sisters[::-1])):
-        assert run("line", "build", *files, "--output", tmp_path / name).exit_code == 0
+        run("line", "build", *files, "--output", tmp_path / name)
     assert (tmp_path / "one").read_bytes() == (tmp_path / "other").read_bytes()
 
 
@@ -103,7 +93,7 @@ def test_what_is_no_line_is_refused_with_what_to_do(sisters: list[Path], tmp_pat
     ratio_index = tmp_path / "ratio_index.json"
     ratio_index.write_text(calibration_file().to_json())
     line, broken, newer = (tmp_path / name for name in ("line.json", "broken.json", "newer.json"))
-    assert run("line", "build", *sisters, "--output", line).exit_code == 0
+    run("line", "build", *sisters, "--output", line)
     content = json.loads(line.read_text())
     broken.write_text(json.dumps(content | {"software": "another"}))
     content["version"] = 2
@@ -131,18 +121,17 @@ def test_logs_that_no_calibration_was_made_from_are_refused(sisters: list[Path],
 def test_two_line_files_are_refused(drives: Path, sisters: list[Path], tmp_path: Path) -> None:
     lines = [tmp_path / "a.json", tmp_path / "b.json"]
     for path, members in zip(lines, (sisters[:1], sisters[1:]), strict=True):
-        assert run("line", "build", *members, "--output", path).exit_code == 0
+        run("line", "build", *members, "--output", path)
     likes = [word for path in lines for word in ("--like", str(path))]
     said = refused("calibrate", drives, "--runs", "1", *likes, "--output", tmp_path / "van.json", *FAST)
     assert "two line files" in said
 
 
 def test_the_report_says_what_was_inherited(drives: Path, sisters: list[Path], tmp_path: Path) -> None:
-    made = run(
+    run(
         *("calibrate", drives, "--runs", "1", "--like", sisters[0]),
         *("--output", tmp_path / "van.json", "--report", tmp_path / "report", *FAST),
     )
-    assert made.exit_code == 0, made.output
     page = (tmp_path / "report" / "report.html").read_text()
     for said in (
         "Calibrated on 1 run and what 1 vehicle of its line told",
@@ -161,7 +150,6 @@ def test_a_plan_before_any_drive_knows_the_line(drives: Path, sisters: list[Path
     expected = []
     for like in ((), ("--like", sisters[0])):
         planned = run("calibrate", empty, "--plan", *like, "--json")
-        assert planned.exit_code == 0, planned.output
         expected.append(json.loads(planned.stdout)["plan"]["advice"][0]["expected"]["payload_std_kg"])
     any_vehicle, of_its_line = expected
     assert of_its_line**2 < 0.65 * any_vehicle**2  # what no known load narrows is in both

@@ -8,8 +8,8 @@ from pathlib import Path
 import can
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from support.bus_drive import bus_drive
+from support.commands import called, printed
 from support.encoded import encode_signals
 
 from gateway.bus.frames import merge_frames, message_of
@@ -19,7 +19,6 @@ from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.signals.database import DatabaseSignal
 from gateway.calibration.inspection.finding import Severity
 from gateway.calibration.inspection.rows import rate_findings, row_facts
-from gateway.cli import springscale
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.offline.campaigns import read_whole_log
@@ -51,9 +50,7 @@ N = 12_000
 
 
 def run(*arguments: object) -> str:
-    found = CliRunner().invoke(springscale, ["look", *map(str, arguments)], catch_exceptions=False)
-    assert found.exit_code == 0, found.output
-    return found.stdout
+    return printed("look", *arguments)
 
 
 def seen(*arguments: object) -> dict[str, object]:
@@ -156,7 +153,7 @@ def test_of_many_identifiers_that_nothing_describes_a_dozen_are_shown(
 def test_a_map_is_not_written_over(box: Path) -> None:
     mine = box.parent / "mine.toml"
     mine.write_text("mine")
-    found = CliRunner().invoke(springscale, ["look", str(box), "--output", str(mine)])
+    found = called("look", box, "--output", mine)
     assert isinstance(found.exception, Exception)
     assert "is there already" in str(found.exception)
     assert mine.read_text() == "mine"
@@ -173,7 +170,7 @@ def test_a_disk_that_is_full_leaves_no_half_draft(shipped: bool, box: Path, tmp_
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
     try:
-        found = CliRunner().invoke(springscale, ["look", str(log), "--output", str(output)])
+        found = called("look", log, "--output", output)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert isinstance(found.exception, ConfigurationError)
