@@ -56,7 +56,7 @@ def test_calibrate_and_evaluate_take_the_archive_as_the_folder(folder: Path, bun
     answers = []
     for name, campaign in (("folder", folder / "campaign.toml"), ("bundle", bundle)):
         calibration = tmp_path / f"{name}.json"
-        options = ["--estimator", "cross_spectrum", "--runs", "1,5,10", "--window-s", "40"]
+        options = ["--estimator", "cross_spectrum", "--runs", "1,10", "--window-s", "40"]
         printed("calibrate", str(campaign), "--output", str(calibration), *options)
         told = json.loads(
             printed("evaluate", str(campaign), "--calibration", str(calibration), "--window-s", "40", "--json")

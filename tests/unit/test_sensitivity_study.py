@@ -95,12 +95,14 @@ def test_every_setting_is_weighed_or_inspected(tmp_path: Path, monkeypatch: pyte
     calibration = calibrate_cross_spectrum(runs, VAN)
     calibrated = CalibratedVehicle("x", VAN, (0.0, 420.0), (41.5, 55.5), cross_spectrum=calibration)
     refitted: list[float] = []
+    asked: list[tuple[int, int]] = []
 
     def fit(runs: object, vehicle: Vehicle, estimator: str) -> CalibratedVehicle:
         refitted.append(1.0)
         return calibrated
 
     def fresh(scope: Scope, seed: int, number: int) -> drives.FreshVan:
+        asked.append((seed, number))
         seeds = np.random.SeedSequence([seed, number])
         van = drives.draw_van(number, np.random.default_rng(1))
         vehicle = replace(VAN, name=f"van {number}", payload_range_kg=(0.0, 420.0))
@@ -110,8 +112,10 @@ def test_every_setting_is_weighed_or_inspected(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(study, "fresh_van", fresh)
     monkeypatch.setattr(study, "driven", lambda *drive: runs[drive[5] % len(runs)])
     chosen = [next(one for one in CONSTANTS if one.acts is acts) for acts in Acts]
-    found = study.numbers(3, 2, [study.of_one_van(3, number, chosen) for number in range(2)], chosen)
-    assert len(refitted) == 2 * (1 + 2)  # as it is, and what acts in calibration halved and doubled
+    van = study.of_one_van(3, 1, chosen)
+    assert asked == [(3, 1)]
+    assert len(refitted) == 1 + 2  # as it is, and what acts in calibration halved and doubled
+    found = study.numbers(3, 2, [van, van], chosen)
     in_calibration, in_weighing, in_inspection = (one.name for one in chosen)
     assert {*found["weighing"]} == {
         "as it is", *(f"{name} x {by}" for name in (in_calibration, in_weighing) for by in ("0.5", "2"))
