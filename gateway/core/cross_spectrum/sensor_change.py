@@ -20,6 +20,7 @@ from gateway.core.cross_spectrum.drift import DRIFTING, STEADY
 from gateway.core.cross_spectrum.likelihood import Curvature, Point, Whittle
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.records import F64
+from gateway.units import STANDARD_GRAVITY_MPS2
 
 FITTED: Final = [*DRIFTING, len(PARAMETERS), len(PARAMETERS) + 1]  # of all parameters, then payload and front share
 
@@ -29,9 +30,6 @@ def weighed(point: Point) -> list[int]:
     return [*DRIFTING, len(point.theta), len(point.theta) + 1]
 
 
-MOST_GRAVITY_CHANGE_MPS2: Final = 0.35
-"""Chosen: a gain error of 3.6 %; offsets of such sensors change by 0.1 m/s2 (standard deviation) from day to day."""
-
 MOST_GYRO_GAIN_SCORE: Final = 3.5
 """Chosen: standard deviations; chance exceeds it once in two thousand batches."""
 
@@ -40,6 +38,10 @@ GAIN_PER_K: Final = 2e-4  # of each sensor (data sheets of MPU-6050, BMI160)
 OFFSET_PER_K_MPS2: Final = 0.01  # 1 mg (likewise)
 GAIN_STD: Final = TEMPERATURE_STD_K * GAIN_PER_K * 2.0**0.5
 """Standard deviation of the logarithm of the ratio of both sensors' gains."""
+MOST_GRAVITY_CHANGE_MPS2: Final = (
+    2.576 * TEMPERATURE_STD_K * float(np.hypot(OFFSET_PER_K_MPS2, GAIN_PER_K * STANDARD_GRAVITY_MPS2))
+)
+"""The temperature of one healthy day in a hundred changes gravity by more, 0.39 m/s2, by the three constants above."""
 
 MOST_GYRO_NOISE: Final = float(np.log(3.0))
 """Chosen: largest increase of the pitch rate's noise (logarithm of its power) while the floor above the vehicle's
