@@ -9,10 +9,10 @@ WHOLE_DAY_H: Final = 8.0  # a working day
 MOST_DAY_S: Final = {"cross_spectrum": 10.0}
 HELD_BY: Final = {
     "cross_spectrum": (
-        "60 solutions of the model and their slopes, one after the other, for each begins where another ended; half "
-        "the time of one is numpy's cost of a call"
+        "30 to 60 solutions of the model and as many slopes, one after the other, for each begins where another ended; "
+        "most of one is hundreds of calls on arrays of a few hundred to a few thousand numbers"
     ),
-    "calibration": "5,000 curvatures by all parameters, most of them in fits that leave a run out",
+    "calibration": "1,000 trial costs and 450 curvatures of all runs, one after the other",
     "day": "its batches",
     "import": (
         "FastAPI (a seventh), 216 dataclasses (a sixth) and 108 pydantic models (a seventh) of our own, python-can, "
