@@ -260,6 +260,11 @@ class Batch:
         return float(np.mean(self.usable)) if self.usable.size else 0.0
 
     @property
+    def usable_s(self) -> float:
+        """Duration (s) of the usable samples together."""
+        return float(np.count_nonzero(self.usable)) / self.rate_hz
+
+    @property
     def roll_usable_share(self) -> float | None:
         """Share of the usable samples whose roll rate is known: 0 if the sensor failed, None if there is none."""
         if self.roll_rate_radps is None:

@@ -20,7 +20,7 @@ from gateway.units import STANDARD_GRAVITY_MPS2
 GPSD: Final = "127.0.0.1:2947"
 MOST_OFF_MPS2: Final = 2.0  # chosen: of gravity: a mount tilted by 37 degrees, as batches allow
 SETTLED: Final = 1000  # chosen: samples after which the mean of gravity is believed
-SILENT_S: Final = 10.0  # chosen: without a sample the watchdog is no longer fed: systemd starts anew
+SILENT_S: Final = 10.0  # chosen: without a sample for so long systemd's watchdog is not fed, and the feeder restarts
 
 
 @click.command("feed")

@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
-import numpy as np
-
 from gateway.budget import budget_of
 from gateway.core.batch import Traits
 from gateway.core.calibrated import CalibratedVehicle
@@ -130,7 +128,7 @@ class Flow:
 
     def _early(self, window: Batch) -> Estimate:
         self._is_epoch_over |= window.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
-        self._open_s = float(np.count_nonzero(window.usable)) / window.rate_hz
+        self._open_s = window.usable_s
         parts = continued(self._pool, window)
         if parts and can_be_pooled(window, self.settings):
             window = spanned((*parts, Part(window, Way())), parts[0].batch.t_start_ns, window.t_end_ns)

@@ -45,11 +45,6 @@ class Part:
     way: Way
 
     @property
-    def usable_s(self) -> float:
-        """Usable driving (s)."""
-        return float(np.count_nonzero(self.batch.usable)) / self.batch.rate_hz
-
-    @property
     def driven_s(self) -> float:
         """Duration of the whole window, stops included."""
         return self.batch.duration_s
@@ -89,8 +84,8 @@ def _is_rest(parts: Parts, window: Batch, break_ns: int) -> bool:
     """True if the parts are too short for the change test, and the vehicle then stood long enough to load, while the
     window is long enough to do without them: mixed in, they would weigh as a part of the old load.
     """
-    is_short = sum(part.usable_s for part in parts) < LEAST_SIDE_S
-    return is_short and break_ns >= LONG_S * NS_PER_S and Part(window, Way()).usable_s >= LEAST_LOAD_S
+    is_short = sum(part.batch.usable_s for part in parts) < LEAST_SIDE_S
+    return is_short and break_ns >= LONG_S * NS_PER_S and window.usable_s >= LEAST_LOAD_S
 
 
 def is_batch(parts: Parts, settings: BatchSettings) -> bool:
@@ -105,7 +100,7 @@ def driven_s(parts: Parts) -> float:
 
 def missing_s(parts: Parts, settings: BatchSettings) -> float:
     """Usable driving (s) that a batch still lacks."""
-    return settings.usable_share_min * settings.window_s - sum(part.usable_s for part in parts)
+    return settings.usable_share_min * settings.window_s - sum(part.batch.usable_s for part in parts)
 
 
 def changes_of(parts: Parts, weigh: Weigh, rules: Rules) -> list[int]:

@@ -84,8 +84,8 @@ class DoubtKind(StrEnum):
     DRIVEN_WEIGHT = ("driven_weight",
         "by the way it moves the vehicle weighs {front_kg:.0f} ± {front_95_kg:.0f} kg in front and {rear_kg:.0f} ± "
         "{rear_95_kg:.0f} kg at the rear (95 %), not {said_front_kg:.0f} and {said_rear_kg:.0f}",
-        "look whether something is aboard, and read the axle weights again; then drive empty again. Where both are "
-        "right it is not of this line")
+        "check whether something is aboard and read the axle weights again; then drive empty again. If both are "
+        "right, it is not of this line")
     DRIVEN_LINE = ("driven_line",
         "springs, dampers and tyres differ from those of its line by more than vehicles of one line do",
         "choose another line, or none; worn dampers and a wrong tyre pressure look like this too")

@@ -1,4 +1,4 @@
-"""A day of fifteen vehicles in an object store, on a cluster of real processes of which one is killed midway."""
+"""A day of fifteen vehicles in an object store, on a cluster of real processes; one is killed midway."""
 
 import json
 import os

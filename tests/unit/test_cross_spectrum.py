@@ -258,9 +258,9 @@ def test_a_vehicle_without_a_pitch_rate_is_told_that_both_sensors_are_needed() -
 
 
 def test_a_run_left_out_teaches_the_others_nothing_by_its_label() -> None:
-    """What the others weigh it at must not have started from a fit that was told the answer.
+    """The fit without a run must not start from a fit that knew its load.
 
-    The last run: the fits without the runs before it were all told, and so could tell the fit without it.
+    The last run is tried: the fits before it knew its load and could pass it on.
     """
     *others, last = (run_over_road(i, *load) for i, load in enumerate(KNOWN[:3]))
     relabelled = replace(last, payload_kg=last.payload_kg + 80.0)

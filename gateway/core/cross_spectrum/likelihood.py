@@ -178,8 +178,9 @@ class Whittle:
     def curvature_beside(
         self, point: Point, free: Sequence[int], by_level: Callable[[Motion], C128]
     ) -> tuple[Curvature, F64]:
-        """Derivatives by further causes of which ``by_level`` gives the derivatives of the paths (5, k, p, s, m), and
-        their information (k, n) together with the ``free`` entries.
+        """Derivatives by k further causes, and their information (k, n) together with the ``free`` entries.
+
+        ``by_level`` gives the derivatives of the paths (5, k, p, s, m) by these causes.
         """
         z = self._whitened(point)
         rows, by_free = self._rows(z, free)

@@ -17,10 +17,10 @@ from gateway.core.cargo import TOW_BAR_BEHIND_AXLE_M
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import DRIFTING, NATURE_OF_STEADY, STEADY
 from gateway.core.cross_spectrum.likelihood import Point, Whittle
-from gateway.core.cross_spectrum.model.motion import Motion
+from gateway.core.cross_spectrum.model.motion import Motion, Supported
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.core.cross_spectrum.packing import Packing
-from gateway.records import C128, F64
+from gateway.records import C128
 
 RESONANCES_HZ: Final = (2.0, 2.5, 3.0, 3.6, 4.4, 5.5, 7.0)
 """Chosen: a fifth apart, about the width of a resonance of the damping ratio below."""
@@ -66,7 +66,8 @@ def soft_mass_of(whittle: Whittle, point: Point, calibration: CrossSpectrumCalib
     n, n_known = len(point.theta), len(PARAMETERS) + 2
 
     def by_level(motion: Motion) -> C128:
-        return motion.by_suspended_mass(calibration.wheelbase_m + TOW_BAR_BEHIND_AXLE_M, _felt(whittle.spectra.freq_hz))
+        mounted = Supported(whittle.spectra.freq_hz / np.array(RESONANCES_HZ)[:, None], DAMPING_RATIO)
+        return motion.by_suspended_mass(calibration.wheelbase_m + TOW_BAR_BEHIND_AXLE_M, mounted.felt)
 
     entries = [*range(len(PARAMETERS)), n, n + 1]
     known = whittle.curvature(point, entries)
@@ -85,11 +86,3 @@ def soft_mass_of(whittle: Whittle, point: Point, calibration: CrossSpectrumCalib
     scores = -slope / np.sqrt(own + np.sum((by_open @ left_open) * by_open, axis=1))
     best = int(np.argmax(scores))
     return SoftMass(float(-slope[best] / own[best]), RESONANCES_HZ[best], float(scores[best]))
-
-
-def _felt(freq_hz: F64) -> C128:
-    """(k, m) factor of the apparent mass of an oscillator at each of RESONANCES_HZ."""
-    ratio = freq_hz / np.array(RESONANCES_HZ)[:, None]
-    damping = 2j * DAMPING_RATIO * ratio
-    felt: C128 = (1.0 + damping) / (1.0 - ratio**2 + damping)
-    return felt

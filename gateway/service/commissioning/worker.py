@@ -19,7 +19,7 @@ FOLDER: Final = "commissioning"
 MODULE: Final = "gateway.calibration.commissioning.work"
 SAID: Final = "said.txt"
 WITHIN_S: Final = 1800.0  # chosen: a small computer takes some minutes
-MOST_SAID: Final = 2000  # chosen: bytes of what a process that failed wrote
+MOST_SAID: Final = 2000  # chosen: last bytes of a failed process's output that are kept
 
 OnResult = Callable[[Job, Result], None]
 

@@ -160,6 +160,19 @@ class _Axles:
             into[2] = change * self._rolls[0] * (0.5 * one * other - self._both * (one + other))
 
 
+class Supported:
+    """A mass on a spring with a damper on a moving support, at ``ratio`` times its own frequency.
+
+    It acts on the support like ``felt`` times itself; its movement is (1 + damping) ``below`` that of the support.
+    """
+
+    def __init__(self, ratio: F64, damping_ratio: float | F64) -> None:
+        self.ratio = ratio
+        self.damping: C128 = np.asarray(2j * damping_ratio * ratio)
+        self.below: C128 = 1.0 / (1.0 - ratio**2 + self.damping)
+        self.felt: C128 = (1.0 + self.damping) * self.below
+
+
 class Motion:
     """The equations of one or many vehicles, solved at frequencies (m,) > 0.
 
@@ -172,10 +185,7 @@ class Motion:
         self._numbers, self._frame, self._omega = numbers, frame, 2.0 * np.pi * freq_hz
         self._axles = _Axles(numbers.axles, self._omega)
         self._mode_hz, damping_ratio = numbers.group(PAYLOAD)
-        self._ratio = freq_hz / self._mode_hz
-        self._damping = 2j * damping_ratio * self._ratio
-        self._below = 1.0 / (1.0 - self._ratio**2 + self._damping)
-        self._felt = (1.0 + self._damping) * self._below  # factor of the payload's apparent mass
+        self._payload = Supported(freq_hz / self._mode_hz, damping_ratio)
         self._carried_kg = numbers.group(CARRIED)
         self._pairs = PAIRS[: len(self._carried_kg)]
         compliance = self._compliance()
@@ -197,7 +207,7 @@ class Motion:
         self._fill_in_by_axles(parts[FRONT], groups[FRONT], parts[REAR], groups[REAR])
         omega2 = self._omega**2
         np.multiply(self._moved[groups[RIGID]], omega2, out=parts[RIGID])
-        np.multiply(self._moved[groups[CARRIED]], omega2 * self._felt, out=parts[CARRIED])
+        np.multiply(self._moved[groups[CARRIED]], omega2 * self._payload.felt, out=parts[CARRIED])
         self._fill_in_by_felt(parts[PAYLOAD], groups[PAYLOAD])
         self._fill_in_by_sensor(parts[SENSOR], groups[SENSOR])
         return found
@@ -217,7 +227,7 @@ class Motion:
     def _compliance(self) -> C128:
         """(c, c, ..., m) the inverse of the stiffness; roll is eliminated first."""
         stiffness = self._axles.stiffness
-        inertia = self._omega**2 * (self._numbers.group(RIGID) + self._felt * self._carried_kg)
+        inertia = self._omega**2 * (self._numbers.group(RIGID) + self._payload.felt * self._carried_kg)
         d_ff, d_rr, d_fr = stiffness[0, 0] - inertia[0], stiffness[0, 1] - inertia[1], -inertia[2]
         if len(inertia) == 3:
             per_determinant = 1.0 / (d_ff * d_rr - d_fr**2)
@@ -263,7 +273,7 @@ class Motion:
             rows[0].append(heave * left_m / self._frame.half_track_m)
             rows[1].append(-yaw_rad * roll)
             rows.append([-yaw_rad * pitch, yaw_rad * pitch, roll])
-        found = np.empty((n_sensors, len(rows[0]), *self._felt.shape), np.complex128)
+        found = np.empty((n_sensors, len(rows[0]), *self._payload.felt.shape), np.complex128)
         for into, row in zip(found, rows, strict=False):
             for coordinate, one in zip(into, row, strict=True):
                 coordinate[...] = one
@@ -322,9 +332,10 @@ class Motion:
         if not rows:
             return
         carried = sum(kg * one for kg, one in zip(self._carried_kg, self._moved, strict=True))
-        felt = -(self._ratio**2) * self._below**2 * self._omega**2
+        on_floor = self._payload
+        felt = -(on_floor.ratio**2) * on_floor.below**2 * self._omega**2
         for one, row in zip(into, rows, strict=True):
-            by = felt * (2.0 + self._damping) / self._mode_hz if row == 0 else felt * 2j * self._ratio
+            by = felt * (2.0 + on_floor.damping) / self._mode_hz if row == 0 else felt * 2j * on_floor.ratio
             np.multiply(carried, by, out=one)
 
     def _fill_in_by_sensor(self, into: C128, rows: Sequence[int]) -> None:

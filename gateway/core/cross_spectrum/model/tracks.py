@@ -2,7 +2,7 @@
 
 It is x K1(x), x being 2 pi times the wavenumber n times the distance of the tracks (K. M. A. Kamash and J. D. Robson,
 J. Sound Vib. 57, 1978). The Bessel functions K are computed once, on a grid of log x, and are cubics between; those of
-scipy.special would cost a service twenty megabytes.
+scipy.special would cost a service 26 MB.
 """
 
 from functools import cache
