@@ -13,7 +13,7 @@ from gateway.core.cross_spectrum.likelihood import EVIDENCE_WEIGHT
 from gateway.core.cross_spectrum.model.motion import Frame, Motion, Numbers
 from gateway.core.cross_spectrum.packing import DECISIVE, SOFT_COST, Packing, packings
 from gateway.core.cross_spectrum.search import Found
-from gateway.core.cross_spectrum.soft_mass import DAMPING_RATIO, RESONANCES_HZ, SoftMass, _felt
+from gateway.core.cross_spectrum.soft_mass import DAMPING_RATIO, RESONANCES_HZ, SoftMass, mounted
 from gateway.estimate import Estimate, Quantity
 from gateway.posterior import Source
 
@@ -190,7 +190,7 @@ def test_its_slope_is_that_of_a_small_load_that_swings_there(which: int) -> None
     small_kg = 1e-4
     swinging = van(*(small_kg * np.array([front**2, rear**2, front * rear])), mode_hz=RESONANCES_HZ[which])
     empty = van(0.0, 0.0, 0.0)
-    slope = empty.by_suspended_mass(BEHIND_M, _felt(FREQ_HZ))[which]
+    slope = empty.by_suspended_mass(BEHIND_M, mounted(FREQ_HZ).felt)[which]
     moved = (swinging.paths - empty.paths) / small_kg
     assert np.abs(slope - moved).max() < 1e-5 * np.abs(moved).max()
 

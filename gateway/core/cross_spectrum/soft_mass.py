@@ -20,7 +20,7 @@ from gateway.core.cross_spectrum.likelihood import Point, Whittle
 from gateway.core.cross_spectrum.model.motion import Motion, Supported
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS
 from gateway.core.cross_spectrum.packing import Packing
-from gateway.records import C128
+from gateway.records import C128, F64
 
 RESONANCES_HZ: Final = (2.0, 2.5, 3.0, 3.6, 4.4, 5.5, 7.0)
 """Chosen: a fifth apart, about the width of a resonance of the damping ratio below."""
@@ -66,8 +66,8 @@ def soft_mass_of(whittle: Whittle, point: Point, calibration: CrossSpectrumCalib
     n, n_known = len(point.theta), len(PARAMETERS) + 2
 
     def by_level(motion: Motion) -> C128:
-        mounted = Supported(whittle.spectra.freq_hz / np.array(RESONANCES_HZ)[:, None], DAMPING_RATIO)
-        return motion.by_suspended_mass(calibration.wheelbase_m + TOW_BAR_BEHIND_AXLE_M, mounted.felt)
+        behind_m = calibration.wheelbase_m + TOW_BAR_BEHIND_AXLE_M
+        return motion.by_suspended_mass(behind_m, mounted(whittle.spectra.freq_hz).felt)
 
     entries = [*range(len(PARAMETERS)), n, n + 1]
     known = whittle.curvature(point, entries)
@@ -86,3 +86,8 @@ def soft_mass_of(whittle: Whittle, point: Point, calibration: CrossSpectrumCalib
     scores = -slope / np.sqrt(own + np.sum((by_open @ left_open) * by_open, axis=1))
     best = int(np.argmax(scores))
     return SoftMass(float(-slope[best] / own[best]), RESONANCES_HZ[best], float(scores[best]))
+
+
+def mounted(freq_hz: F64) -> Supported:
+    """Such a mass at frequencies (m,), for each of RESONANCES_HZ: (k, m)."""
+    return Supported(freq_hz / np.array(RESONANCES_HZ)[:, None], DAMPING_RATIO)
