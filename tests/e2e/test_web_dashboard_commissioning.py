@@ -217,12 +217,13 @@ def test_unlikely_answers_are_asked_about_and_nothing_typed_is_lost(
         page.locator("#commissioning-begin").click()
         page.locator("#commissioning-choice").select_option("0")
         page.locator("#commissioning-line .go").click()
-        expect(page.locator("[name=track_width_m]")).to_have_value("1.6")
+        sign = "," if locale.startswith("de") else "."
+        expect(page.locator("[name=track_width_m]")).to_have_value(f"1{sign}6")
         expect(page.locator("[name=payload_range_kg]")).to_have_value("900")
-        typed_into(page, kerb_front_axle_kg="71.3", kerb_rear_axle_kg="704", sensor_position_m="3.2")
+        typed_into(page, kerb_front_axle_kg=f"71{sign}3", kerb_rear_axle_kg="704", sensor_position_m="3.2")
         page.reload()  # what was typed and not sent is there again
-        expect(page.locator("[name=kerb_front_axle_kg]")).to_have_value("71.3")
-        expect(page.locator("[name=track_width_m]")).to_have_value("1.6")
+        expect(page.locator("[name=kerb_front_axle_kg]")).to_have_value(f"71{sign}3")
+        expect(page.locator("[name=track_width_m]")).to_have_value(f"1{sign}6")
         page.locator("#commissioning-vehicle .go").click()
         expect(page.locator("#commissioning-meant")).to_contain_text("713 kg")
         in_order(page, locale)

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
@@ -76,4 +77,28 @@ def test_a_known_load_is_judged_after_a_question(gateway: Gateway, desk: Verific
         assert (len(record["loads"]), record["note"]) == (2, "yard")
         refusals = [said for said in watched.complaints if "409" not in said]
         assert refusals == []
+        gateway.board.close()
+
+
+def test_a_decimal_comma_is_a_comma_in_german_and_refused_in_english(gateway: Gateway, browser: Any) -> None:
+    """A field of type "number" made 15 of a typed "1,5" where the browser itself is English."""
+    with serving(gateway.app) as server:
+        for locale, typed, is_valid in (
+            ("de-DE", "1240,5", True),
+            ("de-DE", "1240.5", True),
+            ("de-DE", "1.240,5", False),
+            ("en-GB", "1240.5", True),
+            ("en-GB", "1,240.5", False),
+        ):
+            page = browser.new_page(locale=locale)
+            page.goto(server.url)
+            page.locator("#known-add").click()
+            field = page.locator("[name=gross_kg]")
+            field.press_sequentially(typed)
+            assert field.evaluate("field => field.validity.valid") == is_valid
+            if is_valid:
+                with page.expect_request(lambda asked: asked.method == "POST") as sent:
+                    page.locator("#known-confirm").click()
+                assert sent.value.post_data_json["loads"][0]["gross_kg"] == 1240.5
+            page.close()
         gateway.board.close()

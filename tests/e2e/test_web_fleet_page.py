@@ -77,6 +77,10 @@ def test_in_german_on_a_phone_and_on_a_desk(url: str, browser: Any, width: int, 
     expect(page.locator("#said")).to_have_text("3 Fahrzeuge, 1 über einer Grenze, 1 mit Alarm.")
     expect(page.locator("#vehicles tr").first).to_contain_text("2.120\u00a0kg von 2.000\u00a0kg")
     assert not ENGLISH.search(page.locator("body").inner_text())
+    label = page.get_by_text("Suchen").bounding_box()
+    field = page.get_by_role("searchbox", name="Suchen").bounding_box()
+    assert label["x"] < field["x"]
+    assert abs(label["y"] - field["y"]) < 20.0  # on the same line
     assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     assert watched.complaints == []

@@ -6,7 +6,7 @@ import { summary } from "/assets/dashboard/commissioning-summary.js";
 import { unfold } from "/assets/dashboard/fold.js";
 import { COMMISSIONING, change, hasToken, load } from "/assets/dashboard/gateway.js";
 import { known, learn, show } from "/assets/dashboard/known.js";
-import { button, element, made, say, write } from "/assets/dashboard/page.js";
+import { button, element, made, numberText, say, typedNumber, write } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
 import { Z95, clock, duration, figure } from "/assets/dashboard/words.js";
 
@@ -189,8 +189,9 @@ async function askLines() {
 const fields = () => [...form.querySelectorAll("input, select")];
 
 function put(field, answer) {
+  const text = field.name === "payload_range_kg" && Array.isArray(answer) ? answer[1] : (answer ?? "");
   if (field.type === "checkbox") field.checked = answer === true;
-  else field.value = answer === null || answer === undefined ? "" : field.name === "payload_range_kg" && Array.isArray(answer) ? answer[1] : answer;
+  else field.value = typeof text === "number" ? numberText(text) : text;
 }
 
 function draft(begunAt) {
@@ -264,7 +265,7 @@ function stateVehicle() {
   const said = {};
   for (const field of fields()) {
     if (field.type === "checkbox") said[field.name] = field.checked;
-    else if (field.value !== "" || !OPTIONAL.has(field.name)) said[field.name] = field.type === "number" ? Number(field.value) : field.value;
+    else if (field.value !== "" || !OPTIONAL.has(field.name)) said[field.name] = "number" in field.dataset ? typedNumber(field.value) : field.value;
   }
   if (said.payload_range_kg) said.payload_range_kg = [0, said.payload_range_kg];
   return sendVehicle(said);

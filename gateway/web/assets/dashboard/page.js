@@ -1,5 +1,7 @@
 // Small pieces of the page.
 
+import { locale } from "/assets/language.js";
+
 export const element = (id) => document.getElementById(id);
 
 export const write = (id, text) => {
@@ -47,4 +49,24 @@ export function row(texts, className = "") {
 export function say(id, text) {
   write(id, text);
   element(id).hidden = text === "";
+}
+
+const DECIMAL_SIGN = (0.5).toLocaleString(locale).charAt(1);
+
+/** A number as a person types it in the page's language. */
+export const numberText = (x) => String(x).replace(".", DECIMAL_SIGN);
+
+/** The number in a field with `data-number`; its decimal sign is the language's or a point. */
+export const typedNumber = (text) => Number(text.trim().replace(DECIMAL_SIGN, ".").replace("−", "-"));
+
+/**
+ * Lets the fields with `data-number` accept numbers only, negative ones if it says "signed"; `hint` tells how one looks.
+ * A field of type "number" drops a comma without a word where the browser's own language writes a point.
+ */
+export function acceptNumbers(hint) {
+  const digits = `\\d+(${DECIMAL_SIGN === "," ? "[,.]" : "\\."}\\d*)?`;
+  for (const field of document.querySelectorAll("input[data-number]")) {
+    field.pattern = ` *${field.dataset.number === "signed" ? "(-|−)?" : ""}${digits} *`;
+    field.title = hint;
+  }
 }

@@ -1,5 +1,6 @@
 // The dashboard's words in the reader's language; loading this module translates those in the page itself.
 
+import { acceptNumbers, numberText } from "/assets/dashboard/page.js";
 import { fill, language, speaker } from "/assets/language.js";
 import { COMMISSIONING_WORDS } from "/assets/words/commissioning.js";
 import { COMMON } from "/assets/words/common.js";
@@ -29,3 +30,4 @@ export function calibratedHere(commissioning) {
 }
 
 fill(phrase);
+acceptNumbers(phrase("number_hint", { example: numberText(1.5) }));

@@ -3,7 +3,7 @@
 import { dialog } from "/assets/dashboard/dialog.js";
 import { KNOWN_WEIGHTS, VERIFICATIONS, change, download } from "/assets/dashboard/gateway.js";
 import { learn, show } from "/assets/dashboard/known.js";
-import { button, element, made, write } from "/assets/dashboard/page.js";
+import { button, element, made, typedNumber, write } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
 import { capital, clock, figure, signed } from "/assets/dashboard/words.js";
 
@@ -75,11 +75,10 @@ function fit() {
 /** The typed values, as the gateway expects them. */
 function typed() {
   const by = element("known-by").value, load = { by };
-  for (const name of FIELDS[by]) {
+  for (const name of [...FIELDS[by], "std_kg"]) {
     const text = element("known-form").elements[name].value;
-    if (text !== "") load[name] = Number(text);
+    if (text !== "") load[name] = typedNumber(text);
   }
-  if (element("known-form").elements.std_kg.value) load.std_kg = Number(element("known-form").elements.std_kg.value);
   if (element("known-at").value) load.at = new Date(element("known-at").value).toISOString();
   if (element("known-drive").value) load.drive = element("known-drive").value;
   return load;
