@@ -1,6 +1,9 @@
-"""Numbers with their nouns, and texts in sections, for people."""
+"""Numbers with their units and nouns, names, and texts in sections, for people."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Final
+
+NONE: Final = "–"
 
 
 def counted(n: int, noun: str) -> str:
@@ -19,3 +22,24 @@ def in_sections(head: Sequence[str], sections: Mapping[str, Iterable[str]]) -> s
     for title, rows in sections.items():
         lines += ["", title, *(f"  {row}" for row in rows)]
     return "\n".join(lines)
+
+
+def decimal(number: float | None, unit: str = "", digits: int = 2) -> str:
+    """A number with so many digits after the point; a dash for None."""
+    return NONE if number is None else f"{number:.{digits}f}{unit}"
+
+
+def percent(share: float | None) -> str:
+    """A share (0..1) in percent; a dash for None."""
+    return NONE if share is None else f"{100.0 * share:.0f} %"
+
+
+def span(low: float, high: float, unit: str, digits: int = 0) -> str:
+    """ "0 to 420 kg", or "0 kg" if both print alike."""
+    least, greatest = f"{low:.{digits}f}", f"{high:.{digits}f}"
+    return f"{least} {unit}" if least == greatest else f"{least} to {greatest} {unit}"
+
+
+def estimator_name(estimator: str) -> str:
+    """As people call it."""
+    return {"cross_spectrum": "cross-spectral estimator", "ratio_index": "ratio index"}.get(estimator, estimator)

@@ -14,25 +14,18 @@ from gateway.calibration.file.line_file import LikeFile, load_like
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
 from gateway.calibration.inspection.log import SplitRun
+from gateway.calibration.judgement.assessment import assess_calibration
 from gateway.calibration.judgement.learning_curve import LearningCurve, curve_of
+from gateway.calibration.judgement.verdict import summary_of, verdicts_of
 from gateway.calibration.line_files import line_of_files
-from gateway.calibration.plan.loads import PlacedLoad
-from gateway.calibration.plan.plan import (
-    Expected,
-    LoadPlan,
-    StatedWidths,
-    plan_first,
-    plan_next,
-    stated_widths,
-    usual_drive,
-)
+from gateway.calibration.plan.plan import LoadPlan, StatedWidths, plan_first, plan_next, stated_widths, usual_drive
+from gateway.calibration.plan.words import plan_sentences, widths_sentence
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.choice import StructureChoice
 from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, require_output_place, window
 from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import CalibrationImpossibleError, CampaignError, ConfigurationError
-from gateway.estimate import Z95
 from gateway.files.whole import refusal_told, write_whole
 from gateway.offline.campaigns import inspect
 from gateway.records import json_line
@@ -99,59 +92,6 @@ def inspection_json(inspection: Inspection) -> dict[str, object]:
         ],
         "campaign_findings": [finding.to_json() for finding in inspection.findings],
     }
-
-
-def plan_sentences(plan: LoadPlan) -> str:
-    """The present expectation, the runs to drive in order, and the gain of each."""
-    is_enough = plan.is_enough_driven
-    what = "most would bring" if is_enough else "drive next"
-    minutes, kmh = plan.drive.duration_s / 60.0, 3.6 * plan.drive.speed_mps
-    lines = [
-        f"{plan.vehicle}: nothing driven yet; expected from typical road vehicles"
-        if plan.now is None
-        else f"{plan.vehicle}, {plan.n_driven} runs driven: expected {_expected(plan.now)}",
-        *(["enough is driven: no further run would narrow answers by a tenth"] if is_enough else []),
-        f"{what}, each for {minutes:.0f} minutes near {kmh:.0f} km/h:",
-        *(f"{i}. {_load(step.load)}: then {_expected(step.expected)}" for i, step in enumerate(plan.advice, 1)),
-    ]
-    if plan.least is not None:
-        lines.append(f"least useful would be: {_load(plan.least.load)}: then {_expected(plan.least.expected)}")
-    if plan.sideways is not None:
-        load, left_m = plan.sideways.load, plan.sideways.payload_left_m
-        lines.append(
-            f"one run with a load to one side: {_load(load)}, {left_m:g} m left or right of the centre line "
-            f"(payload_left_m = {left_m:g} or -{left_m:g}): what such a load does then shows, and no longer follows "
-            "from springs and road alone; so do the signs of the roll rate and of sensor_offset_left_m"
-        )
-    return "\n".join(lines)
-
-
-def widths_sentence(widths: StatedWidths) -> str:
-    """The cost of not stating what the vehicle carries."""
-    kinds = ", ".join(
-        f"{one.unsaid.payload_kg:.0f} ± {one.unsaid.half_width_kg:.0f} kg with {kind} "
-        f"({one.said.payload_kg:.0f} ± {one.said.half_width_kg:.0f} once said)"
-        for kind, one in widths.carries.items()
-    )
-    return (
-        f"The campaign does not say what the vehicle carries. One batch would state a load of {widths.payload_kg:g} "
-        f"kg as {kinds}; "
-        "± values are 95 % intervals. State it in [vehicle]: carries, or payload_length_m and payload_height_m."
-    )
-
-
-def _load(load: PlacedLoad) -> str:
-    if load.position_m is None:
-        return "the empty vehicle"
-    return f"load {load.payload_kg:g} kg with its centre {load.position_m:g} m behind the front axle"
-
-
-def _expected(expected: Expected) -> str:
-    payload_kg, share_pct = Z95 * expected.payload_std_kg, Z95 * expected.front_share_std_pct
-    text = f"± {payload_kg:.0f} kg and ± {share_pct:.1f} percentage points (95 %)"
-    if expected.reach_share is None:
-        return text
-    return f"{text}, {100.0 * expected.reach_share:.0f} % of the loads it may carry within reach"
 
 
 @click.command("calibrate")
@@ -257,6 +197,8 @@ def calibrate(
         click.echo(json_line(record))
     else:
         click.echo(_sentences(outcome.file, output, plan, widths, said=inspection.warnings))
+        if report is None:  # its page says the same
+            click.echo(_verdict(loaded, outcome, plan))
 
 
 def _command(
@@ -326,6 +268,15 @@ def _report(directory: Path, campaign: Campaign, outcome: Outcome, curve: Learni
     with counted("judging and drawing") as on_chart:
         written = write_calibration_report(directory, campaign, outcome, on_chart, curve=curve)
     click.echo(str(written), err=True)
+
+
+def _verdict(campaign: Campaign, outcome: Outcome, printed: LoadPlan | None) -> str:
+    """How good the calibration is, and what would narrow its answers; without the advice of a plan that is printed."""
+    with counted("judging"):
+        plan = printed or (plan_next(outcome, campaign.vehicle) if outcome.cross_spectrum else None)
+        assessment = assess_calibration(campaign, outcome)
+        verdicts = verdicts_of(assessment, plan.now if plan else None)
+    return summary_of(assessment, verdicts, None if printed else plan).text
 
 
 def _record(

@@ -13,8 +13,9 @@ from support.html_page import Page
 from support.known_load_logs import write_known_loads
 
 from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.judgement.verdict import GRADE_TEXT
 from gateway.cli import main
-from gateway.reports.calibration.text import decimal, percent
+from gateway.words import decimal, percent
 
 WINDOW = ("--window-s", "100")
 
@@ -134,6 +135,17 @@ def test_the_budget_says_where_the_stated_error_comes_from(numbers: Mapping[str,
     assert drawn == [[f"{line['payload_kg']:.1f} kg" for line in budgets[name]] for name in numbers["errors"]]
     assert {line["source"] for line in budgets["cross_spectrum"]} >= {"own", "calibration", "day", "model"}
     assert {line["source"] for line in budgets["ratio_index"]} == {"own", "calibration"}  # a regression has no more
+
+
+def test_without_a_report_the_command_prints_the_verdict(made: Path, numbers: Mapping[str, Any]) -> None:
+    done = run("calibrate", str(made / "campaign.toml"), "--output", str(made / "again.json"), *WINDOW)
+    grade = next(text for grade, text in GRADE_TEXT.items() if grade == numbers["grade"])
+    said = done.stdout[
+        done.stdout.index(f"{grade}, by the cross-spectral estimator. Over the runs left out it weighs") :
+    ]
+    assert "What to drive next: " in said
+    reasons = numbers["verdicts"][0]["reasons"]
+    assert [one["text"] in said for one in reasons] == [one["grade"] != "fit" for one in reasons]
 
 
 def test_an_evaluation_has_a_report_of_its_own(made: Path) -> None:

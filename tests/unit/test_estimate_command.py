@@ -20,15 +20,15 @@ from gateway.bus.logs.packed import zstd
 from gateway.bus.signals import load_signal_map
 from gateway.calibration.plan.loads import PlacedLoad
 from gateway.calibration.plan.plan import Advice, Expected, LoadPlan
+from gateway.calibration.plan.words import best_next, plan_sentences
 from gateway.cli import springscale
-from gateway.cli.calibrate import plan_sentences
 from gateway.cli.estimate import sentence
 from gateway.core.cross_spectrum.predicted import Drive
 from gateway.errors import SpringscaleError
 from gateway.estimate import UNKNOWN, Estimate, Quantity, Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.records import F64, Signal, Why
-from gateway.reports.calibration.runs import best_next, plan_section
+from gateway.reports.calibration.runs import plan_section
 
 DEMO = str(files("gateway") / "demo" / "paper_van.json")
 

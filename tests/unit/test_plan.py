@@ -33,14 +33,14 @@ from gateway.calibration.plan.plan import (
     stated_widths,
     usual_drive,
 )
+from gateway.calibration.plan.words import best_next, plan_sentences, widths_sentence
 from gateway.cli import springscale
-from gateway.cli.calibrate import plan_sentences, widths_sentence
 from gateway.core.cross_spectrum.predicted import Drive
 from gateway.core.vehicle import Carries
 from gateway.core.weights.on_the_road import weights_of
 from gateway.errors import CalibrationImpossibleError, CampaignError
 from gateway.posterior import exactly
-from gateway.reports.calibration.runs import best_next, plan_section
+from gateway.reports.calibration.runs import plan_section
 
 DRAFT = """
 [vehicle]

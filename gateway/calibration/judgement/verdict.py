@@ -19,13 +19,14 @@ from gateway.calibration.inspection.finding import Kind, RunVerdict, Severity
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, BatchSet, Judgement
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, Target, TargetErrors
-from gateway.calibration.plan.plan import Expected
+from gateway.calibration.plan.plan import Expected, LoadPlan
+from gateway.calibration.plan.words import best_next
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Z95
 from gateway.posterior import FRONT_SHARE, PAYLOAD, Source
 from gateway.reasons import REMEDIES, SOURCES
-from gateway.words import counted
+from gateway.words import counted, decimal, estimator_name
 
 FIT_ERROR_PCT: Final = 10.0  # chosen: of the range (12)
 MOST_ERROR_PCT: Final = 20.0  # chosen: of the range; a guess at mid-range errs by 25 % over evenly spread loads
@@ -50,6 +51,13 @@ class Grade(StrEnum):
     def rank(self) -> int:
         """0 is best."""
         return list(Grade).index(self)
+
+
+GRADE_TEXT: Final[Mapping[Grade, str]] = {
+    Grade.FIT: "Fit for use",
+    Grade.RESERVED: "Fit for use with reservations",
+    Grade.UNFIT: "Not fit for use",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +152,49 @@ def verdicts_of(assessment: Assessment, expected: Expected | None = None) -> tup
     """
     in_order = sorted(assessment.judgements, key=lambda one: ESTIMATOR_NAMES.index(one.estimator))
     return tuple(_verdict(assessment, one, expected) for one in in_order)
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """The verdict for a fitter: how good the estimator is that the service runs, and what would narrow its answers.
+
+    ``next_run`` is None without a plan.
+    """
+
+    verdict: Verdict
+    accuracy: str
+    next_run: str | None
+
+    @property
+    def text(self) -> str:
+        """A few lines: the grade, the accuracy, the reasons for a grade below fit, and the run to drive next."""
+        reasons = [one.text for one in self.verdict.reasons if one.grade is not Grade.FIT]
+        return "\n".join(
+            [
+                f"{GRADE_TEXT[self.verdict.grade]}, by the {estimator_name(self.verdict.estimator)}. {self.accuracy}",
+                *(f"    {reason}" for reason in reasons),
+                *([f"What to drive next: {self.next_run}"] if self.next_run else []),
+            ]
+        )
+
+
+def summary_of(assessment: Assessment, verdicts: Sequence[Verdict], plan: LoadPlan | None) -> Summary:
+    """The first of ``verdicts_of`` in short."""
+    running = verdicts[0]
+    judgement = next(one for one in assessment.judgements if one.estimator == running.estimator)
+    return Summary(running, _accuracy(judgement), best_next(plan) if plan else None)
+
+
+def _accuracy(judgement: Judgement) -> str:
+    if judgement.unseen is None:
+        return "How well it weighs is not known: no data were kept aside to judge by."
+    errors = judgement.tables[judgement.unseen].errors
+    payload, share = errors.payload, errors.front_share
+    return (
+        f"Over the {PART_NAMES[judgement.unseen]} it weighs payloads to {decimal(payload.mean_abs, ' kg', 1)} on "
+        f"average and {decimal(payload.max_abs, ' kg', 1)} at worst, front shares to "
+        f"{decimal(share.mean_abs, ' pp')} and {decimal(share.max_abs, ' pp')}."
+    )
 
 
 def _verdict(assessment: Assessment, judgement: Judgement, expected: Expected | None) -> Verdict:

@@ -23,9 +23,8 @@ from gateway.calibration.judgement.evaluation import (
 from gateway.estimate import Z95
 from gateway.reasons import REMEDIES, SOURCES
 from gateway.records import F64, iso_utc
-from gateway.reports.calibration.text import NONE, decimal, estimator_name, percent
 from gateway.reports.charts import GREY, Axis, Chart, LineMark, Marker, Panel, Points, Rule, Section, Table
-from gateway.words import counted
+from gateway.words import NONE, counted, decimal, estimator_name, percent
 
 _MARKERS: Final[Mapping[BatchSet, Marker]] = {BatchSet.LEFT_OUT: "circle", BatchSet.VALIDATION: "diamond"}
 _COLOURS: Final[Mapping[BatchSet, int]] = {

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from gateway.calibration.judgement.learning_curve import LearningCurve, Rung, ScoreSpread
-from gateway.reports.calibration.text import NONE, decimal, estimator_name, percent
 from gateway.reports.charts import Axis, Chart, Marker, Panel, Points, Rule, Section, Table
+from gateway.words import NONE, decimal, estimator_name, percent
 
 _MARKERS: tuple[Marker, ...] = ("circle", "diamond", "square", "x")
 

@@ -12,8 +12,8 @@ from gateway.calibration.ratio_index.table import IndexRows, index_rows
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.records import F64
-from gateway.reports.calibration.text import NONE, decimal
 from gateway.reports.charts import Axis, Chart, LineMark, Mark, Marker, Panel, Points, Ribbon, Section, Table
+from gateway.words import NONE, decimal
 
 N_ALONG: Final = 60  # chosen: points of a curve
 INTERVAL: Final = "95 % interval of a new batch"

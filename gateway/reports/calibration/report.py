@@ -14,9 +14,9 @@ from typing import Any, Final
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import Campaign
-from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, assess_calibration, stated_budget
+from gateway.calibration.judgement.assessment import Assessment, assess_calibration, stated_budget
 from gateway.calibration.judgement.learning_curve import LearningCurve
-from gateway.calibration.judgement.verdict import Grade, Verdict, verdicts_of
+from gateway.calibration.judgement.verdict import GRADE_TEXT, Grade, Summary, Verdict, summary_of, verdicts_of
 from gateway.calibration.line_files import line_in
 from gateway.calibration.plan.plan import LoadPlan, plan_next
 from gateway.estimate_json.kinds import budget_to_json
@@ -24,9 +24,8 @@ from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.half_car import half_car_section
 from gateway.reports.calibration.learning import learning_section
 from gateway.reports.calibration.ratio_index import ratio_index_section
-from gateway.reports.calibration.runs import best_next, plan_section, provenance_section, runs_section
+from gateway.reports.calibration.runs import plan_section, provenance_section, runs_section
 from gateway.reports.calibration.spectra import spectra_section
-from gateway.reports.calibration.text import decimal, estimator_name, span
 from gateway.reports.charts import Section
 from gateway.reports.charts.html import (
     PLOTLY_FILE,
@@ -38,7 +37,7 @@ from gateway.reports.charts.html import (
     sections_html,
     write_report,
 )
-from gateway.words import counted
+from gateway.words import counted, estimator_name, span
 
 
 def write_calibration_report(
@@ -93,7 +92,7 @@ def _write(
 ) -> Path:
     made_folder(directory)
     verdicts = verdicts_of(assessment, plan.now if plan else None)
-    verdict = _verdict_html(verdicts, _in_short(assessment, verdicts[0]), best_next(plan) if plan else None)
+    verdict = _verdict_html(verdicts, summary_of(assessment, verdicts, plan))
     page = Page(
         assessment.title,
         f"<p>{prose(_subtitle(assessment))}</p>",
@@ -114,20 +113,6 @@ def _subtitle(assessment: Assessment) -> str:
         f"Calibrated on {counted(len(assessment.file.provenance.runs), 'run')}{inherited}: payloads of "
         f"{span(*seen.payload_kg, 'kg')}, front shares of {span(*seen.front_share_pct, '%', 1)}, {speeds}. "
         f"{assessment.file.id}"
-    )
-
-
-def _in_short(assessment: Assessment, running: Verdict) -> str:
-    """The result for a fitter in a sentence."""
-    judgement = next(one for one in assessment.judgements if one.estimator == running.estimator)
-    if judgement.unseen is None:
-        return "How well it weighs is not known: nothing was held back to judge by."
-    errors = judgement.tables[judgement.unseen].errors
-    payload, share = errors.payload, errors.front_share
-    return (
-        f"Over the {PART_NAMES[judgement.unseen]} it weighs payloads to {decimal(payload.mean_abs, ' kg', 1)} on "
-        f"average and {decimal(payload.max_abs, ' kg', 1)} at worst, front shares to "
-        f"{decimal(share.mean_abs, ' pp')} and {decimal(share.max_abs, ' pp')}."
     )
 
 
@@ -165,23 +150,18 @@ def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...], plan: Loa
     }
 
 
-GRADE_TEXT: Final = {
-    Grade.FIT: "Fit for use",
-    Grade.RESERVED: "Fit for use with reservations",
-    Grade.UNFIT: "Not fit for use",
-}
 _RULE_TEXT: Final = {Grade.FIT: "Fit", Grade.RESERVED: "With reservations", Grade.UNFIT: "Not fit"}
 _GRADE_MARK: Final = {Grade.FIT: "✓", Grade.RESERVED: "!", Grade.UNFIT: "✗"}
 
 
-def _verdict_html(verdicts: Sequence[Verdict], in_short: str, next_run: str | None) -> str:
+def _verdict_html(verdicts: Sequence[Verdict], summary: Summary) -> str:
     """The verdict on the estimator that the service runs, with the reasons of all."""
-    running = verdicts[0]
+    running = summary.verdict
     several = ", which the service runs by default" if len(verdicts) > 1 else ""
-    advice = f"<h3>What to drive next</h3><p>{prose(next_run)}</p>" if next_run else ""
+    advice = f"<h3>What to drive next</h3><p>{prose(summary.next_run)}</p>" if summary.next_run else ""
     return (
         f'<section id="verdict" class="{running.grade}"><h2>{_mark(running.grade)} {GRADE_TEXT[running.grade]}</h2>'
-        f"<p>By the {escape(estimator_name(running.estimator))}{several}. {prose(in_short)}</p>{advice}"
+        f"<p>By the {escape(estimator_name(running.estimator))}{several}. {prose(summary.accuracy)}</p>{advice}"
         f"{''.join(_reasons(verdict) for verdict in verdicts)}</section>"
     )
 

@@ -4,11 +4,12 @@ from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection.finding import Finding, RunVerdict
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.judgement.assessment import Assessment
-from gateway.calibration.plan.plan import Advice, Expected, LoadPlan, OffCentreLoad
+from gateway.calibration.plan.plan import Expected, LoadPlan, OffCentreLoad
+from gateway.calibration.plan.words import load_words
 from gateway.estimate import Z95
 from gateway.records import Why
-from gateway.reports.calibration.text import NONE, decimal, percent, span
 from gateway.reports.charts import Section, Table
+from gateway.words import NONE, decimal, percent, span
 
 
 def runs_section(outcome: Outcome) -> Section:
@@ -61,8 +62,10 @@ def plan_section(plan: LoadPlan) -> Section:
     """The runs that would teach most, in order."""
     minutes, kmh = plan.drive.duration_s / 60.0, 3.6 * plan.drive.speed_mps
     rows = [("now", *_expected(plan.now))] if plan.now else []
-    rows += [(f"{number}. {_load(step)}", *_expected(step.expected)) for number, step in enumerate(plan.advice, 1)]
-    rows += [(f"least useful: {_load(plan.least)}", *_expected(plan.least.expected))] if plan.least else []
+    rows += [
+        (f"{number}. {load_words(step.load)}", *_expected(step.expected)) for number, step in enumerate(plan.advice, 1)
+    ]
+    rows += [(f"least useful: {load_words(plan.least.load)}", *_expected(plan.least.expected))] if plan.least else []
     columns = ("After driving", "payload", "front share", "loads within reach")
     caption = f"Expected of a five-minute batch, ± spans 95 %; each run {minutes:.0f} minutes near {kmh:.0f} km/h"
     text = (
@@ -80,28 +83,6 @@ def _sideways(sideways: OffCentreLoad) -> str:
         f"(payload_left_m = {left_m:g}), would show what such a load does, which so far follows from springs and road "
         "alone, and the signs of the roll rate and of sensor_offset_left_m."
     )
-
-
-def best_next(plan: LoadPlan) -> str | None:
-    """The first advice in a sentence; None where there is none."""
-    if not plan.advice:
-        return None
-    first = plan.advice[0]
-    payload, share, reach = _expected(first.expected)
-    now = _expected(plan.now) if plan.now else None
-    before = f" (now {now[0]} and {now[1]})" if now else ""
-    load = _load(first)
-    after = f"expected {payload} and {share} (95 %) afterwards{before}, {reach} of the loads it may carry within reach."
-    if plan.is_enough_driven:
-        return f"Enough is driven: no further run would narrow answers by a tenth. Most would bring {load}: {after}"
-    return f"{load.capitalize()}: {after}"
-
-
-def _load(advice: Advice) -> str:
-    load = advice.load
-    if load.position_m is None:
-        return "the empty vehicle"
-    return f"{load.payload_kg:g} kg with its centre {load.position_m:g} m behind the front axle"
 
 
 def _expected(expected: Expected) -> tuple[str, str, str]:
