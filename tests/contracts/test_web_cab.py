@@ -23,8 +23,7 @@ def gateway(tmp_path: Path) -> Iterator[Gateway]:
 
 
 def told(gateway: Gateway) -> dict[str, Any]:
-    answer: dict[str, Any] = Client(gateway.app).get("/api/v1/cab").json()
-    return answer
+    return Client(gateway.app).get("/api/v1/cab").json()
 
 
 def test_it_tells_how_much_more_may_go_in_the_tightest_first(gateway: Gateway) -> None:

@@ -65,8 +65,7 @@ def client(tmp_path: Path, board: Board, calibrated: CalibratedVehicle) -> Itera
 
 
 def told(client: Client) -> dict[str, Any]:
-    answer: dict[str, Any] = client.get("/api/v1/spectra/latest").json()
-    return answer
+    return client.get("/api/v1/spectra/latest").json()
 
 
 def test_the_model_is_that_of_what_was_weighed(

@@ -58,8 +58,7 @@ class Service:
         self.reading.start()
 
     def get(self, path: str) -> dict[str, Any]:
-        told: dict[str, Any] = first_answer(self.url + path).json()
-        return told
+        return first_answer(self.url + path).json()
 
     def stop(self) -> int:
         self.process.stdin.close()

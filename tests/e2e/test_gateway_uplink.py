@@ -35,8 +35,7 @@ def test_the_service_forwards_its_history_and_tells_how_it_goes(tmp_path: Path) 
         with running_service(configuration(tmp_path, web_port, broker.port)) as service:
 
             def uplink_now() -> dict[str, int]:
-                told: dict[str, int] = first_answer(f"http://127.0.0.1:{web_port}/api/v1/status").json()["uplink"]
-                return told
+                return first_answer(f"http://127.0.0.1:{web_port}/api/v1/status").json()["uplink"]
 
             wait_until(lambda: uplink_now()["n_delivered"] == len(records))
             status = uplink_now()

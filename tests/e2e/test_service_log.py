@@ -64,7 +64,6 @@ class Journal:
         self.reading.start()
 
     def _read(self) -> None:
-        assert self.process.stderr is not None
         for line in self.process.stderr:
             self.lines.append(line)
 

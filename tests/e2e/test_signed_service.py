@@ -33,8 +33,7 @@ def trusting_service(config: Path) -> AbstractContextManager["subprocess.Popen[s
 
 def status_of(config: Path) -> dict[str, object]:
     port = tomllib.loads(config.read_text())["web"]["port"]
-    answer: dict[str, object] = first_answer(f"http://127.0.0.1:{port}/api/v1/status").json()
-    return answer
+    return first_answer(f"http://127.0.0.1:{port}/api/v1/status").json()
 
 
 def test_a_calibration_that_nobody_trusted_signed_is_told_and_the_last_good_one_weighs_on(config: Path) -> None:

@@ -43,8 +43,7 @@ PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
 
 
 def numbers(name: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((DOCS / f"{name}.json").read_text(encoding="utf-8"))
-    return found
+    return json.loads((DOCS / f"{name}.json").read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("name", PAGES)

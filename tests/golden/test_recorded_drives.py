@@ -38,8 +38,7 @@ def test_ten_sound_runs_are_sound(calibrated: tuple[Path, dict[str, Any]]) -> No
 @cache
 def table(campaign: str, calibration: Path, *arguments: str) -> dict[str, Any]:
     text = printed("evaluate", recordings() / campaign, "--calibration", calibration, "--json", *arguments)
-    found: dict[str, Any] = json.loads(text)
-    return found
+    return json.loads(text)
 
 
 @pytest.mark.parametrize(

@@ -156,5 +156,4 @@ def _sister(calibration: Path, output: Path, name: str) -> dict[str, Any]:
 def _evaluated(calibration: Path, name: str) -> dict[str, Any]:
     """On her drives with loads."""
     tests = recordings() / "siblings" / name / "test" / "campaign_roll.toml"
-    found: dict[str, Any] = json.loads(printed("evaluate", tests, "--calibration", calibration, "--json", *CROSS))
-    return found
+    return json.loads(printed("evaluate", tests, "--calibration", calibration, "--json", *CROSS))

@@ -30,8 +30,7 @@ SIGNAL_MAP, CAMPAIGN, ESTIMATE = (
 
 
 def examples_of(page: str) -> list[str]:
-    found: list[str] = re.findall(r"^```toml\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
-    return found
+    return re.findall(r"^```toml\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
 
 
 @pytest.mark.parametrize("table", [SignalMapFile, SignalEntry, CampaignTable, Vehicle, VehicleAnswers, RunTable])

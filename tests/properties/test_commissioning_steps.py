@@ -36,8 +36,7 @@ class Commissioned(RuleBasedStateMachine):
     def told(self) -> dict[str, Any]:
         text = self.bench.desk.state()
         CommissioningState.model_validate_json(text)
-        state: dict[str, Any] = json.loads(text)
-        return state
+        return json.loads(text)
 
     @property
     def step(self) -> str | None:

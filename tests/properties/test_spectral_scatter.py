@@ -22,8 +22,7 @@ def rectangle_weights(freq_hz: F64, centres_hz: F64, width_hz: float) -> F64:
     bin_hz = freq_hz[1] - freq_hz[0]
     low, high = centres_hz[:, None] - width_hz / 2.0, centres_hz[:, None] + width_hz / 2.0
     covered = np.minimum(high, freq_hz + bin_hz / 2.0) - np.maximum(low, freq_hz - bin_hz / 2.0)
-    weights: F64 = np.maximum(covered, 0.0) / width_hz
-    return weights
+    return np.maximum(covered, 0.0) / width_hz
 
 
 @cache

@@ -53,8 +53,7 @@ class Scraped:
 
     def values(self, expression: str) -> list[Any]:
         """What a query gives now, for this instance."""
-        found: list[Any] = self.asked("query", query=expression.replace("$instance", self.instance))["result"]
-        return found
+        return self.asked("query", query=expression.replace("$instance", self.instance))["result"]
 
 
 @pytest.fixture(scope="module")

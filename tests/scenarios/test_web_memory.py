@@ -131,5 +131,4 @@ def test_a_crowd_that_reads_nothing_is_bounded_and_keeps_nobody_from_the_scales(
 def stored(url: str) -> list[object]:
     """What was weighed since the year the made-up history ends in."""
     asked = {"since": "2000-01-01T00:00:00Z", "limit": 1000, "spectra": "false"}
-    items: list[object] = first_answer(f"{url}/api/v1/estimates?{urlencode(asked)}").json()["items"]
-    return items
+    return first_answer(f"{url}/api/v1/estimates?{urlencode(asked)}").json()["items"]

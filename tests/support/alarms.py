@@ -76,8 +76,7 @@ class AlarmBench:
         self.desk(found)
 
     def standing(self) -> list[dict[str, Any]]:
-        told: list[dict[str, Any]] = json.loads(self.desk.standing())
-        return told
+        return json.loads(self.desk.standing())
 
     def history(self) -> list[dict[str, Any]]:
         return [json.loads(text) for text in self.store.reader().entries(kind="alarm", limit=1000).items]

@@ -35,8 +35,7 @@ def iri_by_section(height_m: F64, step_m: float, section_m: float) -> F64:
     per_section = round(section_m / step_m)
     slopes = np.abs(_travel_slopes(height_m, step_m))
     k = len(slopes) // per_section
-    sections: F64 = slopes[: k * per_section].reshape(k, per_section).mean(axis=1) * 1000.0
-    return sections
+    return slopes[: k * per_section].reshape(k, per_section).mean(axis=1) * 1000.0
 
 
 def golden_car() -> tuple[F64, F64]:

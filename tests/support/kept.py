@@ -37,7 +37,6 @@ def kept(make: Callable[P, T]) -> Callable[P, T]:
         asked = hashlib.sha256(repr((args, sorted(kwargs.items()))).encode()).hexdigest()[:16]
         name = f"{make.__module__}.{make.__qualname__}-{asked}"
         path = kept_file(name, lambda path: path.write_bytes(pickle.dumps(make(*args, **kwargs))))
-        made: T = pickle.loads(path.read_bytes())
-        return made
+        return pickle.loads(path.read_bytes())
 
     return answer

@@ -145,11 +145,9 @@ class KnownWeightBench:
     def state(self) -> dict[str, Any]:
         text = self.service.state()
         KnownWeightState.model_validate_json(text)  # the shape that the API promises
-        state: dict[str, Any] = json.loads(text)
-        return state
+        return json.loads(text)
 
     @staticmethod
     def _entry(text: str) -> dict[str, Any]:
         KnownWeightEntry.model_validate_json(text)
-        entry: dict[str, Any] = json.loads(text)
-        return entry
+        return json.loads(text)

@@ -49,8 +49,7 @@ class Running:
         """What it answers with --json."""
         found = self.ask(*arguments, "--json")
         assert found.exit_code == 0, (found.output, found.exception)
-        state: dict[str, Any] = json.loads(found.stdout)
-        return state
+        return json.loads(found.stdout)
 
 
 def serve(config: Path, meet: Callable[[Running], None]) -> None:

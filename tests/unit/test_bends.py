@@ -48,7 +48,6 @@ def gain_of(bends: Bends) -> tuple[float, float] | None:
 @pytest.mark.parametrize("gain", [0.95, 1.0, 1.03])
 def test_a_winding_road_tells_the_gain(gain: float) -> None:
     found = gain_of(winding(gain=gain))
-    assert found is not None
     told, std = found
     assert std < 0.01
     assert told == pytest.approx(gain, abs=3.0 * std)

@@ -39,13 +39,11 @@ FAULT = Found(kind="pitch_rate_sign", severity="fault", text="turned over", advi
 def told(bench: Bench) -> dict[str, Any]:
     text = bench.desk.state()
     CommissioningState.model_validate_json(text)  # the shape that the API promises
-    state: dict[str, Any] = json.loads(text)
-    return state
+    return json.loads(text)
 
 
 def underway(bench: Bench) -> dict[str, Any]:
-    found: dict[str, Any] = told(bench)["underway"]
-    return found
+    return told(bench)["underway"]
 
 
 def reason(ask: Callable[[], Any]) -> str:

@@ -107,8 +107,7 @@ def model_variances(found: Estimate) -> F64:
     """Of payload (kg) and front share (%): what the model itself adds, the same at any speed and on any road but for
     how far these are from what calibration saw.
     """
-    variances: F64 = np.diag(found.posterior.sources[Source.MODEL][:2, :2]) ** 2
-    return variances
+    return np.diag(found.posterior.sources[Source.MODEL][:2, :2]) ** 2
 
 
 def test_an_unseen_speed_widens_the_interval(calibration: CrossSpectrumCalibration) -> None:

@@ -29,8 +29,7 @@ BIRTH = {"vehicle_id": "van-17", "vin": "WVWZZZ1KZAW000001", "version": "1.2.3",
 
 def told(**changed: Any) -> dict[str, Any]:
     _, text = discovery("homeassistant", "springscale/van-17", BIRTH | changed)
-    found: dict[str, Any] = json.loads(text)
-    return found
+    return json.loads(text)
 
 
 RETAINED = {"springscale/van-17/latest", "springscale/van-17/status"}

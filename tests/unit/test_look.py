@@ -54,8 +54,7 @@ def run(*arguments: object) -> str:
 
 
 def seen(*arguments: object) -> dict[str, object]:
-    found: dict[str, object] = json.loads(run(*arguments, "--json"))
-    return found
+    return json.loads(run(*arguments, "--json"))
 
 
 def packed(can_id: int, length: int, t_ns: np.ndarray, *fields: tuple[int, int, np.ndarray]) -> Frames:

@@ -27,8 +27,7 @@ def road(seed: int) -> F64:
     """(N,) forty sines from 0.5 to 12 Hz: what a van's body does, exact at any time."""
     rng = np.random.default_rng(seed)
     freq_hz, phase = rng.uniform(0.5, 12.0, 40), rng.uniform(0.0, 2.0 * np.pi, 40)
-    swings: F64 = np.sin(2.0 * np.pi * freq_hz * TAKEN_S[:, None] + phase).sum(axis=1)
-    return swings
+    return np.sin(2.0 * np.pi * freq_hz * TAKEN_S[:, None] + phase).sum(axis=1)
 
 
 def frames(stamped_s: F64, kept: Bool, counting: Counting) -> list[Frames]:

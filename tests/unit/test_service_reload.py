@@ -128,8 +128,7 @@ def reloaded(folder: Path, before: str, after: str, caplog: pytest.LogCaptureFix
         config = server_config(gateway.app, "127.0.0.1", 0, tls_of(settings))
         set_log_level("info")
         assert Reloader(settings, lambda: settings_of(folder, after), config)()
-    waiting: list[str] = caplog.records[-1].fields["waits_for_restart"]  # type: ignore[attr-defined]
-    return waiting
+    return caplog.records[-1].fields["waits_for_restart"]
 
 
 def test_the_log_level_changes_at_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -31,8 +31,7 @@ def store(tmp_path: Path) -> Iterator[Store]:
 
 
 def verified(tmp_path: Path, store: Store, *stated: StatedWeight, **options: Any) -> dict[str, Any]:
-    made: dict[str, Any] = json.loads(verification_desk(tmp_path, store, **options).verify("workshop", None, stated))
-    return made
+    return json.loads(verification_desk(tmp_path, store, **options).verify("workshop", None, stated))
 
 
 def test_an_error_is_weighed_less_known_and_judged_against_the_whole(tmp_path: Path, store: Store) -> None:

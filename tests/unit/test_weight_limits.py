@@ -323,8 +323,7 @@ def errors(of: Callable[[State], tuple[float, ...]]) -> NDArray[np.float64]:
     correlations = np.eye(4)
     for (one, other), shared in CORRELATIONS.items():
         correlations[one, other] = correlations[other, one] = shared
-    found: NDArray[np.float64] = np.array(slopes).T @ (correlations * np.outer(STDS, STDS)) @ np.array(slopes)
-    return found
+    return np.array(slopes).T @ (correlations * np.outer(STDS, STDS)) @ np.array(slopes)
 
 
 @pytest.mark.parametrize("name", PLACES)

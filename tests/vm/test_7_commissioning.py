@@ -42,8 +42,7 @@ class Fitter:
             timeout=30.0,
         )
         assert response.is_success, response.text
-        told: dict[str, Any] = response.json()
-        return told
+        return response.json()
 
 
 def state(vehicle: Vehicle) -> dict[str, Any]:

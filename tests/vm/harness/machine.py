@@ -137,5 +137,4 @@ class Machine:
             line = connection.makefile().readline()
         if not line:
             raise ConnectionError("the guest gave no answer")
-        answer: dict[str, object] = json.loads(line)
-        return answer
+        return json.loads(line)

@@ -107,8 +107,7 @@ class Vehicle:
             timeout=10.0,
         )
         response.raise_for_status()
-        answer: Answer = response.json()
-        return answer
+        return response.json()
 
     def status(self) -> Answer:
         """GET status."""
@@ -209,5 +208,4 @@ class Vehicle:
         )
         verdict, records = self.run(f'python3 -c "{script}"').strip().split("\n")
         assert verdict == "ok"
-        found: list[Answer] = json.loads(records)
-        return found
+        return json.loads(records)
