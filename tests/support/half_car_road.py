@@ -8,7 +8,7 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum import by_cross_spectrum
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar, frequency_response
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS, is_positive
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, has_roll, is_positive, names_of
 from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
@@ -54,6 +54,29 @@ def parameters_of(car: HalfCar) -> F64:
         }
     usual = dict.fromkeys(PARAMETERS, 0.0) | {name: 1e-30 for name in PARAMETERS if is_positive(name)}
     return np.array([np.log(x) if is_positive(name) else x for name, x in (usual | known).items()])
+
+
+def as_if_fitted(theta: F64, std: F64, vehicle: Vehicle = VAN) -> CrossSpectrumCalibration:
+    """As if a fit had ended with these parameters and standard deviations (n,)."""
+    return CrossSpectrumCalibration(
+        empty_mass_kg=vehicle.empty_mass_kg,
+        empty_front_share_pct=vehicle.empty_front_share_pct,
+        wheelbase_m=vehicle.wheelbase_m,
+        band_hz=(1.1, 14.0),
+        n_segment=256,
+        names=names_of(theta),
+        parameters=theta,
+        covariance=np.diag(std**2),
+        directions=np.zeros((len(theta), 0)),
+        model_std=(10.0, 0.2, 0.002),
+        misfit_limit=3.0,
+        acceleration_rms_mps2=0.5,
+        pitch_rate_rms_radps=0.05,
+        payload_seen_kg=(0.0, 420.0),
+        front_share_seen_pct=(40.0, 60.0),
+        speed_seen_mps=(12.0, 15.0),
+        track_width_m=vehicle.track_width_m if has_roll(theta) else None,
+    )
 
 
 def batch_over_road(

@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import half_car_road
+from support.calibrated import ratio_index_calibration
+from support.half_car_road import RATE_HZ
 
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.table import spectrum_table
-from gateway.core.ratio_index.index import (
-    PAPER_BANDS,
-    RatioIndexCalibration,
-    acceleration_spectrum,
-    indexes_of,
-    mean_spectrum,
-)
+from gateway.core.ratio_index.index import RatioIndexCalibration, acceleration_spectrum, indexes_of, mean_spectrum
 from gateway.core.settings import BatchSettings
 from gateway.offline.campaigns import batches_of_motion
 from gateway.records import F64, Batch
@@ -28,7 +25,7 @@ from gateway.sim.vans import PAPER_VAN
 from gateway.sim.vehicle import Load
 from gateway.workbench.wiring import Wiring
 
-N, RATE_HZ, N_SEGMENT = 9_000, 50.0, 1024
+N, N_SEGMENT = 9_000, 1024
 FREQ_HZ = np.fft.rfftfreq(N, 1.0 / RATE_HZ)
 
 
@@ -41,34 +38,12 @@ def moving(seed: int) -> tuple[F64, F64]:
 
 
 def batch_of(acceleration: F64, roll_rate: F64 | None) -> Batch:
-    return Batch(
-        t_start_ns=0,
-        t_end_ns=N * 20_000_000,
-        drive_start_ns=0,
-        rate_hz=RATE_HZ,
-        vertical_acceleration_mps2=acceleration,
-        pitch_rate_radps=acceleration[::-1].copy(),
-        speed_mps=np.full(N, 15.0),
-        usable=np.ones(N, bool),
-        gravity_mps2=9.81,
-        gap_share=0.0,
-        shares={},
-        roll_rate_radps=roll_rate,
-    )
+    batch = half_car_road.batch_of(acceleration, acceleration[::-1].copy(), np.full(N, 15.0))
+    return replace(batch, roll_rate_radps=roll_rate)
 
 
 def calibration(roll_lever_m: float) -> RatioIndexCalibration:
-    return RatioIndexCalibration(
-        "amplitude",
-        N_SEGMENT,
-        PAPER_BANDS["acceleration"],
-        PAPER_BANDS["pitch_rate"],
-        None,
-        None,
-        (14.0, 16.0),
-        1.0,
-        roll_lever_m,
-    )
+    return replace(ratio_index_calibration(), n_segment=N_SEGMENT, roll_lever_m=roll_lever_m)
 
 
 @pytest.mark.parametrize("lever_m", [0.4, -0.25])

@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
+from support.calibrated import ratio_index_calibration
+from support.half_car_road import batch_of
 
 from gateway.calibration.ratio_index.regression import fit_regression
 from gateway.core.ratio_index.index import (
     PAPER_BANDS,
     Band,
-    RatioIndexCalibration,
     band_pass_gain,
     indexes_of,
     mean_spectrum,
@@ -26,7 +27,7 @@ from gateway.core.ratio_index.regression import (
     scaled_columns,
     term_columns,
 )
-from gateway.records import F64, I64, Batch
+from gateway.records import F64, I64
 
 bands = st.builds(Band, st.floats(0.5, 9.5), st.floats(0.05, 2.0))
 
@@ -89,24 +90,9 @@ def test_spectrum_needs_six_unbroken_segments() -> None:
 
 
 def test_a_sensor_without_bands_or_without_samples_gives_no_index() -> None:
-    model = RegressionModel(("ra",), np.zeros(1), np.ones(1), np.zeros(2), np.eye(2), 1.0, 3.0)
-    calibration = RatioIndexCalibration(
-        "amplitude", 256, PAPER_BANDS["acceleration"], None, model, None, (14.0, 16.0), 1.0
-    )
+    calibration = replace(ratio_index_calibration(), pitch_rate_bands=None)
     rng, n = np.random.default_rng(2), 15_000
-    batch = Batch(
-        t_start_ns=0,
-        t_end_ns=300_000_000_000,
-        drive_start_ns=0,
-        rate_hz=50.0,
-        vertical_acceleration_mps2=rng.standard_normal(n),
-        pitch_rate_radps=rng.standard_normal(n),
-        speed_mps=np.full(n, 15.0),
-        usable=np.ones(n, bool),
-        gravity_mps2=9.81,
-        gap_share=0.0,
-        shares={},
-    )
+    batch = batch_of(rng.standard_normal(n), rng.standard_normal(n), np.full(n, 15.0))
     ra, rg = indexes_of(batch, calibration)
     assert np.isfinite(ra)
     assert np.isnan(rg)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 from scipy import signal
+from support import half_car_road
 
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import candidate_pairs, rank_correlations
@@ -44,19 +45,8 @@ def batch_of(payload_kg: float, front_share_pct: float, seed: int) -> Batch:
     rng = np.random.default_rng(seed)
     bounce_hz = 2.6 / np.sqrt(1.0 + payload_kg / VAN.empty_mass_kg)
     pitch_hz = 2.0 + 0.08 * (front_share_pct - 50.0)
-    return Batch(
-        t_start_ns=0,
-        t_end_ns=N * 20_000_000,
-        drive_start_ns=0,
-        rate_hz=50.0,
-        vertical_acceleration_mps2=resonance(bounce_hz, rng),
-        pitch_rate_radps=0.05 * resonance(pitch_hz, rng),
-        speed_mps=15.0 + 0.2 * rng.standard_normal(N),
-        usable=np.ones(N, bool),
-        gravity_mps2=9.81,
-        gap_share=0.0,
-        shares={},
-    )
+    acceleration_mps2, pitch_rate_radps = resonance(bounce_hz, rng), 0.05 * resonance(pitch_hz, rng)
+    return half_car_road.batch_of(acceleration_mps2, pitch_rate_radps, 15.0 + 0.2 * rng.standard_normal(N))
 
 
 def runs_of(loads: list[tuple[float, float]]) -> list[KnownRun]:

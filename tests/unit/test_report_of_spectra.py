@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.calibrated import ratio_index_calibration
 from support.estimates import make_estimate
-from support.half_car_road import CAR, RATE_HZ, VAN, batch_of, batch_over_road, parameters_of
+from support.half_car_road import CAR, RATE_HZ, VAN, as_if_fitted, batch_of, batch_over_road, parameters_of
 
 from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.half_car.prior import prior_of
@@ -16,12 +16,12 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.cross_spectrum.measured import cross_spectra_of
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS, has_roll, names_of
+from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS, names_of
 from gateway.core.cross_spectrum.model.reading import Reading
 from gateway.core.ratio_index.index import Band
 from gateway.core.spectrum import spectra_of
 from gateway.estimate import Quantity
-from gateway.records import F64, Batch, Spectra, Why
+from gateway.records import Batch, Spectra, Why
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.half_car import fits_of, knowledge_chart, knowledge_of, knowledge_table, told
 from gateway.reports.calibration.spectra import ACCELERATION, N_SEGMENT, PITCH_RATE, density_of, spectra_section
@@ -102,25 +102,7 @@ LOADED = Fitted(payload_kg=270.0, front_share_pct=47.0, delay_s=DELAY_S)
 
 @pytest.fixture(scope="module")
 def calibration() -> CrossSpectrumCalibration:
-    parameters = parameters_of(CAR)
-    return CrossSpectrumCalibration(
-        empty_mass_kg=VAN.empty_mass_kg,
-        empty_front_share_pct=VAN.empty_front_share_pct,
-        wheelbase_m=VAN.wheelbase_m,
-        band_hz=(1.1, 14.0),
-        n_segment=256,
-        names=PARAMETERS,
-        parameters=parameters,
-        covariance=np.zeros((len(parameters), len(parameters))),
-        directions=np.zeros((len(PARAMETERS), 0)),
-        model_std=(0.0, 0.0, 0.0),
-        misfit_limit=2.0,
-        acceleration_rms_mps2=1.0,
-        pitch_rate_rms_radps=0.05,
-        payload_seen_kg=(0.0, 400.0),
-        front_share_seen_pct=(40.0, 60.0),
-        speed_seen_mps=(5.0, 30.0),
-    )
+    return as_if_fitted(parameters_of(CAR), np.zeros(len(PARAMETERS)))
 
 
 @pytest.fixture(scope="module")
@@ -210,33 +192,10 @@ WIDE = replace(VAN, track_width_m=1.5, sensor_offset_left_m=0.3)
 ROLL_PRIOR = prior_of(WIDE, with_roll=True)
 
 
-def rolling_calibration(theta: F64, std: F64) -> CrossSpectrumCalibration:
-    """As if a fit had ended with these parameters and standard deviations (n,)."""
-    return CrossSpectrumCalibration(
-        empty_mass_kg=WIDE.empty_mass_kg,
-        empty_front_share_pct=WIDE.empty_front_share_pct,
-        wheelbase_m=WIDE.wheelbase_m,
-        band_hz=(1.1, 14.0),
-        n_segment=256,
-        names=names_of(theta),
-        parameters=theta,
-        covariance=np.diag(std**2),
-        directions=np.zeros((len(theta), 0)),
-        model_std=(10.0, 0.2, 0.002),
-        misfit_limit=3.0,
-        acceleration_rms_mps2=0.5,
-        pitch_rate_rms_radps=0.05,
-        payload_seen_kg=(0.0, 420.0),
-        front_share_seen_pct=(40.0, 60.0),
-        speed_seen_mps=(12.0, 15.0),
-        track_width_m=1.5 if has_roll(theta) else None,
-    )
-
-
 def test_what_the_drives_told_of_roll_is_in_the_report() -> None:
     std = ROLL_PRIOR.std.copy()
     std[-1] *= 0.25
-    known = knowledge_of(rolling_calibration(ROLL_PRIOR.mean, std), WIDE)
+    known = knowledge_of(as_if_fitted(ROLL_PRIOR.mean, std, WIDE), WIDE)
     assert [one.name for one in known] == [*PARAMETERS, *ROLL_PARAMETERS]
     assert known[-1].name == "empty_left_m"
     assert known[-1].left_over == pytest.approx(0.25)
@@ -252,7 +211,7 @@ def test_what_the_drives_told_of_roll_is_in_the_report() -> None:
 
 def test_a_calibration_without_a_roll_rate_says_nothing_of_roll() -> None:
     prior = prior_of(WIDE)
-    known = knowledge_of(rolling_calibration(prior.mean, prior.std), WIDE)
+    known = knowledge_of(as_if_fitted(prior.mean, prior.std, WIDE), WIDE)
     assert [one.name for one in known] == list(PARAMETERS)
     assert "roll" not in [panel.title for panel in knowledge_chart(known).panels]
 

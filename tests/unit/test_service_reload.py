@@ -18,13 +18,13 @@ import trustme
 import uvicorn
 from support.calibrated import calibration_file
 from support.commissioning import Bench, in_steps, learned
+from support.half_car_road import as_if_fitted
 from support.patience import PATIENCE_S
 from support.signing import Signer
 from support.web import Gateway, Server, serving
 
 from gateway.calibration.commissioning.job import Result
 from gateway.config import Settings, load_settings
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.errors import ConfigurationError
 from gateway.log import LOGGER, set_log_level
@@ -183,25 +183,7 @@ def test_systemd_is_told_when_a_reload_begins(tmp_path: Path) -> None:
 
 def with_half_car() -> Result:
     """A fit as a commissioning makes it; what the half-car's parameters are is no matter here."""
-    part = CrossSpectrumCalibration(
-        empty_mass_kg=1240.0,
-        empty_front_share_pct=50.0,
-        wheelbase_m=2.8,
-        band_hz=(1.0, 14.0),
-        n_segment=256,
-        names=PARAMETERS,
-        parameters=np.zeros(len(PARAMETERS)),
-        covariance=np.eye(len(PARAMETERS)),
-        directions=np.zeros((len(PARAMETERS), 0)),
-        model_std=(5.0, 0.1, 0.002),
-        model_per_reach=(1.0, 1.0),
-        misfit_limit=3.0,
-        acceleration_rms_mps2=0.5,
-        pitch_rate_rms_radps=0.05,
-        payload_seen_kg=(0.0, 0.0),
-        front_share_seen_pct=(50.0, 50.0),
-        speed_seen_mps=(12.0, 15.0),
-    )
+    part = as_if_fitted(np.zeros(len(PARAMETERS)), np.ones(len(PARAMETERS)))
     file = calibration_file().model_copy(update={"cross_spectrum": part})
     return Result(learned=learned(15.0), calibration=file.to_json(), calibration_id=file.id)
 

@@ -1,11 +1,13 @@
 """Spectra for people to look at, and the road's roughness."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support import half_car_road
 from support.drives import drive
 
 from gateway.core.estimator import estimate
@@ -17,20 +19,7 @@ from gateway.records import F64, Batch, Bool, Spectra
 
 
 def batch_of(acceleration: F64, pitch_rate: F64, usable: Bool) -> Batch:
-    n = len(acceleration)
-    return Batch(
-        t_start_ns=0,
-        t_end_ns=n * 20_000_000,
-        drive_start_ns=0,
-        rate_hz=50.0,
-        vertical_acceleration_mps2=acceleration,
-        pitch_rate_radps=pitch_rate,
-        speed_mps=np.full(n, 15.0),
-        usable=usable,
-        gravity_mps2=9.81,
-        gap_share=0.0,
-        shares={},
-    )
+    return replace(half_car_road.batch_of(acceleration, pitch_rate, np.full(len(usable), 15.0)), usable=usable)
 
 
 def noise(seed: int, n: int = 15_000) -> F64:
