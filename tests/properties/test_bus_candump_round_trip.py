@@ -13,6 +13,7 @@ from gateway.bus.frames import join
 from gateway.bus.logs import LogReport, write_candump
 from gateway.bus.logs.candump import _Finder, read_candump
 from gateway.bus.logs.candump_line import LineFrame, read_line
+from gateway.bus.logs.report import Selection
 from gateway.bus.signals import EVERY_IDENTIFIER
 from gateway.bus.signals.mapping import exact_filter
 from gateway.records import EXTENDED_ID, Frames
@@ -36,7 +37,7 @@ def table(rows) -> Frames:
 
 def read(path, block_bytes=1 << 16):
     report = LogReport(path)
-    chunks = read_candump(path, EVERY_IDENTIFIER, width=64, report=report, block_bytes=block_bytes)
+    chunks = read_candump(Selection(report, EVERY_IDENTIFIER, None, 64), block_bytes)
     return join(list(chunks), 64), report
 
 
@@ -104,7 +105,7 @@ def test_the_fast_path_reads_what_the_exact_path_reads(lines, block_bytes, has_f
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.log"
         path.write_bytes(gzip.compress(text) if block_bytes % 2 else text)
-        found = join(list(read_candump(path, filters, "can0", width=64, block_bytes=block_bytes)), 64)
+        found = join(list(read_candump(Selection(LogReport(path), filters, "can0", 64), block_bytes)), 64)
     assert_equal(found, table([row for line in text.split(b"\n") if (row := read_alone(line, filters))]))
 
 

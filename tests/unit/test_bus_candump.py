@@ -13,7 +13,7 @@ from gateway.bus.logs import LogReport
 from gateway.bus.logs.candump import read_candump
 from gateway.bus.logs.open import open_whole_log
 from gateway.bus.logs.packed import open_log_file, unpacked_suffix, zstd
-from gateway.bus.logs.report import LogReject
+from gateway.bus.logs.report import LogReject, Selection
 from gateway.bus.signals import IdFilter
 from gateway.bus.signals.mapping import exact_filter, j1939_filter
 from gateway.errors import LogUnreadableError
@@ -30,7 +30,7 @@ def read(tmp_path):
         path = tmp_path / name
         path.write_bytes(text)
         report = LogReport(path)
-        chunks = list(read_candump(path, filters, channel, width=width, report=report, **options))
+        chunks = list(read_candump(Selection(report, filters, channel, width), **options))
         return join(chunks, width), report
 
     return read
@@ -224,9 +224,9 @@ def test_random_bytes_end_no_run(read):
 
 def test_a_folder_or_a_missing_file_is_said_so(tmp_path):
     with pytest.raises(LogUnreadableError, match="Is a directory"):
-        list(read_candump(tmp_path, WANTED))
+        list(read_candump(Selection(LogReport(tmp_path), WANTED, None, 8)))
     with pytest.raises(LogUnreadableError, match="No such file"):
-        list(read_candump(tmp_path / "b.log", WANTED))
+        list(read_candump(Selection(LogReport(tmp_path / "b.log"), WANTED, None, 8)))
 
 
 @pytest.mark.parametrize(

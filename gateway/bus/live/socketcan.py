@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.bus.frames import empty_frames, take
+from gateway.bus.frames import empty_frames, payload_rows, take
 from gateway.bus.live.receiver import Burst, error_class_names
 from gateway.bus.signals import IdFilter
 from gateway.errors import BusError
@@ -106,7 +106,7 @@ class SocketCanReceiver:
         rows = np.frombuffer(b"".join(d.ljust(layout.itemsize, b"\0") for d in datagrams), layout)
         t_ns, n_unstamped = _stamps_ns(stamps)
         can_id = rows["id"].copy()
-        frames = Frames(t_ns, can_id, rows["length"].copy(), self._payloads(rows))
+        frames = Frames(t_ns, can_id, rows["length"].copy(), payload_rows(rows["payload"], rows["length"], self._width))
         if not np.any(can_id & _NO_DATA_FLAGS):
             return Burst(frames, stamped_at_receipt=n_unstamped)
         is_error = (can_id & _ERROR_FLAG) != 0
@@ -119,14 +119,6 @@ class SocketCanReceiver:
             remote_frames=int(np.count_nonzero(is_remote)),
             stamped_at_receipt=n_unstamped,
         )
-
-    def _payloads(self, rows: np.ndarray) -> np.ndarray:
-        """Payload bytes (n, width), zero beyond each frame's length."""
-        payload = np.zeros((len(rows), self._width), np.uint8)
-        kept = min(self._width, rows["payload"].shape[1])
-        payload[:, :kept] = rows["payload"][:, :kept]
-        payload[np.arange(self._width) >= rows["length"][:, None]] = 0
-        return payload
 
 
 def open_socketcan(channel: str, filters: Sequence[IdFilter], width: int) -> SocketCanReceiver:

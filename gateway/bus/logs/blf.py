@@ -14,14 +14,13 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
-from gateway.bus.frames import LAST_SECOND, empty_frames, gathered, in_order
+from gateway.bus.frames import LAST_SECOND, empty_frames, in_order, payload_rows
 from gateway.bus.logs.packed import open_log_file
 from gateway.bus.logs.report import LogReject, LogReport, Selection
 from gateway.errors import LogUnreadableError
 from gateway.records import I64, U8, Bool, Frames
 from gateway.units import NS_PER_S
 
-CHUNK_FRAMES: Final = 32_768  # chosen: as in candump.py
 MOST_BYTES: Final = 64 << 20  # chosen: of one container; Vector's tools fill containers with 128 kB
 MOST_OBJECT_BYTES: Final = 1 << 20  # chosen: of one inside a container; what says more is damaged
 JOINED_BYTES: Final = 1 << 20  # chosen: some 20,000 objects
@@ -90,19 +89,16 @@ _KINDS: Final = {1: _CLASSIC, 86: _CLASSIC, 100: _FD, 101: _FD64}
 _MARGIN: Final = _HEADER_BYTES[2] + max(kind.body.itemsize for kind in _KINDS.values())
 
 
-def read_blf(path: Path, selection: Selection, width: int) -> Iterator[Frames]:
+def read_blf(selection: Selection) -> Iterator[Frames]:
     """The selected frames in order of arrival, in chunks, stamps to the microsecond as every other format's.
 
     Damaged parts are skipped and counted; a truncated file is read as far as it goes. Raises LogUnreadableError if it
     is no BLF at all.
     """
-    with open_log_file(path) as file:
-        header = _header(path, file)
-        reader = _BlfReader(_start_ns(header), selection, width)
-        contents = _joined(_contents(file, header, selection.report))
-        for frames in gathered(map(reader.read, contents), CHUNK_FRAMES, width):
-            selection.report.hand_on(frames.t_ns)
-            yield frames
+    with open_log_file(selection.path) as file:
+        header = _header(selection.path, file)
+        reader = _BlfReader(_start_ns(header), selection)
+        yield from selection.given_out(map(reader.read, _joined(_contents(file, header, selection.report))))
 
 
 def _header(path: Path, file: BinaryIO) -> np.void:
@@ -175,10 +171,9 @@ def _inflated(body: bytes, report: LogReport) -> bytes | None:
 class _BlfReader:
     """Reads content after content; an object may begin in one and end in the next."""
 
-    def __init__(self, start_ns: int, selection: Selection, width: int) -> None:
+    def __init__(self, start_ns: int, selection: Selection) -> None:
         self._start_ns = start_ns
         self._selection = selection
-        self._width = width
         self._rest = b""
         self._is_torn = False  # what comes next may begin in the middle of an object
 
@@ -186,7 +181,7 @@ class _BlfReader:
         """The wanted frames of the objects that are complete by now."""
         if content is None:
             self._rest, self._is_torn = b"", True
-            return empty_frames(self._width)
+            return empty_frames(self._selection.width)
         content = self._rest + content
         text = np.frombuffer(content + bytes(_MARGIN), np.uint8)
         begins, ends = _objects(text, len(content))
@@ -220,7 +215,7 @@ class _BlfReader:
                 parts.append(frames)
             elif number in _KINDS:
                 self._selection.report.reject(LogReject.GARBLED, n=len(rows))
-        return in_order(places, parts, self._width)
+        return in_order(places, parts, self._selection.width)
 
     def _frames_of(self, kind: _Kind, text: U8, at: I64, header_bytes: int) -> tuple[I64, Frames]:
         """The wanted rows of objects of one kind, and their frames."""
@@ -238,10 +233,7 @@ class _BlfReader:
             n_there = np.where(bodies["extension_at"] == 0, n_there, bodies["extension_at"])
         n_there -= headers["header_bytes"] + np.int64(kind.body.itemsize - n_data)
         length = np.minimum(bodies["length"], n_data).astype(np.uint8)
-        is_data = np.arange(n_data) < np.minimum(length, n_there)[:, None]
-        payload = np.zeros((len(rows), self._width), np.uint8)
-        kept = min(n_data, self._width)
-        payload[:, :kept] = np.where(is_data, bodies["data"], 0)[:, :kept]
+        payload = payload_rows(bodies["data"], np.minimum(length, n_there), self._selection.width)
         return rows, Frames(t_ns[is_sound], can_id[rows], length, payload)
 
     def _stamps(self, headers: NDArray[np.void]) -> tuple[I64, Bool]:

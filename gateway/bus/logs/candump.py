@@ -5,21 +5,19 @@ then read by shape, all lines of a shape at once; lines without a common shape a
 if they contain no frame. Lines of other identifiers are passed over unread.
 """
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.bus.frames import gathered, in_order, take
+from gateway.bus.frames import in_order, payload_rows, take
 from gateway.bus.logs.candump_line import LineFrame, LineShape, NotData, learn_shape, read_line
 from gateway.bus.logs.packed import BLOCK_BYTES, LineBlock, line_blocks
-from gateway.bus.logs.report import LogReject, LogReport, passing
-from gateway.bus.signals import CLASSIC_BYTES, IdFilter
+from gateway.bus.logs.report import LogReject, Selection
+from gateway.bus.signals import IdFilter
 from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 
-CHUNK_FRAMES: Final = 32_768  # chosen: what is handed on at once: large enough that the decoder's own steps cost little
 KEPT_SHAPES: Final = 32  # chosen: shapes of lines that are remembered
 LONGEST_LINE: Final = 4096  # chosen: bytes examined by an exact read
 _LOWER_CASE_BIT: Final = np.uint8(0x20)  # makes an ASCII letter a small one
@@ -28,23 +26,12 @@ _PLACES: Final = np.uint64(0x0001_0203_0405_0607)
 _ERROR_FRAME_TEXT: Final = "20000???"  # SocketCAN's error flag and the classes that exist
 
 
-def read_candump(
-    path: Path | str,
-    filters: Sequence[IdFilter],
-    channel: str | None = None,
-    *,
-    width: int = CLASSIC_BYTES,
-    report: LogReport | None = None,
-    block_bytes: int = BLOCK_BYTES,
-) -> Iterator[Frames]:
-    """Frames that pass one of ``filters``, of ``channel`` or of all, in order of arrival, in chunks.
+def read_candump(selection: Selection, block_bytes: int = BLOCK_BYTES) -> Iterator[Frames]:
+    """The selected frames in order of arrival, in chunks.
 
-    ``width`` is that of the payload rows (8, or 64 for CAN FD). No content of the log ends the run: see LogReport.
-    Raises LogUnreadableError if the file cannot be opened.
+    No content of the log ends the run: see LogReport. Raises LogUnreadableError if the file cannot be opened.
     """
-    report = LogReport(Path(path)) if report is None else report
-    reader = _CandumpReader(filters, channel, width, report)
-    yield from gathered(map(reader.read, line_blocks(Path(path), report, block_bytes)), CHUNK_FRAMES, width)
+    yield from selection.given_out(map(_CandumpReader(selection).read, line_blocks(selection.report, block_bytes)))
 
 
 class IdPattern:
@@ -78,14 +65,12 @@ class IdPattern:
 class _CandumpReader:
     """Reads block after block; keeps the shapes it has learned and the number of lines read."""
 
-    def __init__(self, filters: Sequence[IdFilter], channel: str | None, width: int, report: LogReport) -> None:
-        self._filters = filters
-        self._patterns = [IdPattern.of_filter(id_filter) for id_filter in filters]
+    def __init__(self, selection: Selection) -> None:
+        self._selection = selection
+        self._patterns = [IdPattern.of_filter(id_filter) for id_filter in selection.filters]
         self._error_pattern = IdPattern(_ERROR_FRAME_TEXT)
         self._last_digits = {pattern.last_digit for pattern in self._patterns}
-        self._channel = None if channel is None else channel.encode()
-        self._width = width
-        self._report = report
+        self._report = selection.report
         self._shapes: list[LineShape] = []
         self._finder = _Finder()
 
@@ -101,7 +86,6 @@ class _CandumpReader:
         frames = self._wanted(block, self._hits(block, hashes))
         report.frames += len(hashes)
         report.lines += n_lines
-        report.hand_on(frames.t_ns)
         return frames
 
     def _hits(self, block: LineBlock, hashes: I64) -> I64:
@@ -143,16 +127,16 @@ class _CandumpReader:
             if len(hits) == n_before:
                 self._read_exactly(block, int(hits[0]), line, places, parts)
                 hits = hits[1:]
-        frames = in_order(places, parts, self._width)
-        is_wanted = passing(self._filters, frames.can_id)  # others have the text of a wanted one
+        frames = in_order(places, parts, self._selection.width)
+        is_wanted = self._selection.passes(frames.can_id)  # others have the text of a wanted one
         return frames if is_wanted.all() else take(frames, is_wanted)
 
     def _read_shape(self, block: LineBlock, hits: I64, shape: LineShape, places: list[I64], parts: list[Frames]) -> I64:
         """Take the lines of one shape; those that remain are returned."""
         if not len(hits):
             return hits
-        fits, frames = shape.read(block.text, hits, self._width)
-        if self._is_ours(shape.channel, len(frames)):
+        fits, frames = shape.read(block.text, hits, self._selection.width)
+        if self._selection.has(shape.channel.decode(), len(frames)):
             places.append(hits[fits])
             parts.append(frames)
         return hits[~fits]
@@ -167,18 +151,9 @@ class _CandumpReader:
             self._report.reject(content, line_number)
         elif content is NotData.REMOTE_FRAME:
             self._report.remote_frames += 1
-        elif isinstance(content, LineFrame) and self._is_ours(content.channel, 1):
+        elif isinstance(content, LineFrame) and self._selection.has(content.channel.decode(), 1):
             places.append(np.array([hit]))
-            parts.append(_one_frame(content, self._width))
-
-    def _is_ours(self, channel: bytes, n_frames: int) -> bool:
-        """Whether frames of this channel are handed on; if not, they are counted."""
-        if n_frames and len(self._report.channels) < KEPT_SHAPES:
-            self._report.channels.add(channel.decode("utf-8", "replace"))
-        if self._channel in (None, channel):
-            return True
-        self._report.other_channel += n_frames
-        return False
+            parts.append(_one_frame(content, self._selection.width))
 
     def _report_frameless(self, block: LineBlock, hashes: I64) -> None:
         """Count the non-empty lines without ``#``."""
@@ -238,8 +213,6 @@ def _line_around(block: LineBlock, at: int) -> bytes:
 
 
 def _one_frame(line: LineFrame, width: int) -> Frames:
-    payload = np.zeros((1, width), np.uint8)
-    kept = line.payload[:width]
-    payload[0, : len(kept)] = np.frombuffer(kept, np.uint8)
     length = np.array([len(line.payload)], np.uint8)
+    payload = payload_rows(np.frombuffer(line.payload, np.uint8)[None], length, width)
     return Frames(np.array([line.t_ns]), np.array([line.can_id], np.uint32), length, payload)

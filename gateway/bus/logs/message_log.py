@@ -4,18 +4,17 @@ import io
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
-from pathlib import Path
 from typing import Final, TextIO, cast
 
 import can
 from can.io.generic import MessageReader
 
 from gateway.bus.frames import LAST_SECOND, frames_of, message_id
-from gateway.bus.logs.packed import open_log_file, unpacked_path
-from gateway.bus.logs.report import LogReject, LogReport, Selection, is_same_channel
+from gateway.bus.logs.packed import open_log_file, unpacked_path, unpacked_suffix
+from gateway.bus.logs.report import LogReject, LogReport, Selection
 from gateway.records import Frames
 
-CHUNK_FRAMES: Final = 4096  # chosen: messages of python-can in memory
+CHUNK_MESSAGES: Final = 4096  # chosen: of python-can in memory
 
 # The header for a python-can reader that is restarted in the middle of a file
 _TEXT_READERS: Final[Mapping[str, tuple[Callable[[TextIO], MessageReader], tuple[str, ...]]]] = {
@@ -26,20 +25,17 @@ _TEXT_READERS: Final[Mapping[str, tuple[Callable[[TextIO], MessageReader], tuple
 MESSAGE_SUFFIXES: Final = (*_TEXT_READERS, ".db")
 
 
-def read_message_log(path: Path, suffix: str, selection: Selection, width: int) -> Iterator[Frames]:
+def read_message_log(selection: Selection) -> Iterator[Frames]:
     """The selected frames in order of arrival, in chunks.
 
     Stamps are good to the microsecond, absolute if the format is (.asc in this machine's local time, as its writers
     mean it). A text line that cannot be read is rejected and skipped; a damaged database is read up to the damage, and
     the report says why. Raises LogUnreadableError if not even the beginning can be read.
     """
-    report = selection.report
-    messages = _messages(path, report) if suffix == ".db" else _text_messages(path, suffix, report)
-    ours = _ours(messages, selection)
-    while chunk := list(islice(ours, CHUNK_FRAMES)):
-        frames = frames_of(chunk, width)
-        report.hand_on(frames.t_ns)
-        yield frames
+    report, suffix = selection.report, unpacked_suffix(selection.path)
+    ours = _ours(_messages(report) if suffix == ".db" else _text_messages(suffix, report), selection)
+    chunks = iter(lambda: list(islice(ours, CHUNK_MESSAGES)), [])
+    yield from selection.given_out((frames_of(chunk, selection.width) for chunk in chunks), 1)
 
 
 def _ours(messages: Iterator[can.Message], selection: Selection) -> Iterator[can.Message]:
@@ -56,11 +52,10 @@ def _ours(messages: Iterator[can.Message], selection: Selection) -> Iterator[can
             is_mapped[can_id] = any(ids.is_for(can_id) for ids in selection.filters)
         if not is_mapped[can_id]:
             continue
-        report.channels.add(str(message.channel))
         if message.is_remote_frame:
             report.remote_frames += 1
-        elif not is_same_channel(message.channel, selection.channel):
-            report.other_channel += 1
+        elif not selection.has(message.channel, 1):
+            continue
         elif not abs(message.timestamp) <= LAST_SECOND:
             report.reject(LogReject.BAD_TIME)
         else:
@@ -96,10 +91,10 @@ class _ResumableLines:
         self._file.close()
 
 
-def _text_messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.Message]:
+def _text_messages(suffix: str, report: LogReport) -> Iterator[can.Message]:
     """Messages of a text log; a reader that fails at a line is restarted behind it."""
     make_reader, header = _TEXT_READERS[suffix]
-    with open_log_file(path) as stream:
+    with open_log_file(report.path) as stream:
         text = io.TextIOWrapper(stream, encoding="utf-8", errors="replace")
         lines = _ResumableLines(text)
         reader = make_reader(cast(TextIO, lines))
@@ -116,6 +111,6 @@ def _text_messages(path: Path, suffix: str, report: LogReport) -> Iterator[can.M
                 report.lines = lines.number
 
 
-def _messages(path: Path, report: LogReport) -> Iterator[can.Message]:
-    with report.until_damage(".db"), unpacked_path(path) as unpacked, can.SqliteReader(unpacked) as reader:
+def _messages(report: LogReport) -> Iterator[can.Message]:
+    with report.until_damage(".db"), unpacked_path(report.path) as unpacked, can.SqliteReader(unpacked) as reader:
         yield from reader

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.bus.frames import LAST_SECOND, join, take
+from gateway.bus.frames import LAST_SECOND, join, payload_rows, take
 from gateway.bus.logs.packed import unpacked_path
 from gateway.bus.logs.report import LogReject, Selection
 from gateway.errors import LogUnreadableError, ReaderMissingError
@@ -26,21 +26,19 @@ DATA, REMOTE, ERROR = "CAN_DataFrame", "CAN_RemoteFrame", "CAN_ErrorFrame"  # AS
 _LENGTHS: Final = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64], np.uint8)  # by DLC, ISO 11898-1
 
 
-def read_mf4(path: Path, selection: Selection, width: int) -> Iterator[Frames]:
+def read_mf4(selection: Selection) -> Iterator[Frames]:
     """The selected frames in order of time, in chunks, stamps to the microsecond as every other format's.
 
     A damaged file is read up to the damage, and the report says so. Raises LogUnreadableError if not even the beginning
     can be read, or asammdf is not installed.
     """
-    report = selection.report
+    path, until_damage = selection.path, selection.report.until_damage
     try:
         open_mdf = _asammdf()
     except ImportError:
         raise ReaderMissingError(f'{path}: reading .mf4 needs asammdf: pip install "springscale[mdf]"') from None
-    with report.until_damage(".mf4"), unpacked_path(path) as unpacked, closing(open_mdf(unpacked)) as mdf:
-        for frames in _in_order_of_time(_groups(mdf, selection, width), width):
-            report.hand_on(frames.t_ns)
-            yield frames
+    with until_damage(".mf4"), unpacked_path(path) as unpacked, closing(open_mdf(unpacked)) as mdf:
+        yield from selection.given_out(_in_order_of_time(_groups(mdf, selection), selection.width), 1)
 
 
 @cache
@@ -87,7 +85,7 @@ class _Group:
             yield signal.timestamps, signal.samples
 
 
-def _groups(mdf: "MDF", selection: Selection, width: int) -> list[Iterator[Frames]]:
+def _groups(mdf: "MDF", selection: Selection) -> list[Iterator[Frames]]:
     """The wanted data frames of each group that has any; remote and error frames are counted."""
     start_ns = round(mdf.header.start_time.timestamp() * 1e6) * 1000
     groups = [group for i in range(len(mdf.groups)) if (group := _group(mdf, i)) is not None]
@@ -99,7 +97,7 @@ def _groups(mdf: "MDF", selection: Selection, width: int) -> list[Iterator[Frame
             for _, records in group.records(n_at_once):
                 fields = _Fields(records, group.name)
                 selection.rows(fields.can_id, fields.channel, np.ones(len(records), np.bool_))
-    return [_data_frames(group, n_at_once, start_ns, selection, width) for group in groups if group.name == DATA]
+    return [_data_frames(group, n_at_once, start_ns, selection) for group in groups if group.name == DATA]
 
 
 def _group(mdf: "MDF", number: int) -> _Group | None:
@@ -150,13 +148,10 @@ class _Fields:
         data = data[rows].reshape(len(rows), -1)
         n_bytes = _LENGTHS[np.minimum(codes[rows], 15)] if lengths is None else lengths[rows]
         n_bytes = np.minimum(n_bytes, data.shape[1]).astype(np.uint8)
-        payload = np.zeros((len(rows), width), np.uint8)
-        kept = min(width, data.shape[1])
-        payload[:, :kept] = np.where(np.arange(kept) < n_bytes[:, None], data[:, :kept], 0)
-        return n_bytes, payload
+        return n_bytes, payload_rows(data, n_bytes, width)
 
 
-def _data_frames(group: _Group, n_at_once: int, start_ns: int, selection: Selection, width: int) -> Iterator[Frames]:
+def _data_frames(group: _Group, n_at_once: int, start_ns: int, selection: Selection) -> Iterator[Frames]:
     for seconds, records in group.records(n_at_once):
         fields = _Fields(records, group.name)
         can_id = fields.can_id
@@ -165,13 +160,13 @@ def _data_frames(group: _Group, n_at_once: int, start_ns: int, selection: Select
         selection.report.reject(LogReject.BAD_TIME, n=int(np.count_nonzero(~is_sound)))
         rows = rows[is_sound]
         t_ns = start_ns + np.round(seconds[rows] * 1e6).astype(np.int64) * 1000
-        yield Frames(t_ns, can_id[rows], *fields.payload(rows, width))
+        yield Frames(t_ns, can_id[rows], *fields.payload(rows, selection.width))
 
 
 def _in_order_of_time(sources: Sequence[Iterator[Frames]], width: int) -> Iterator[Frames]:
     """The frames of all sources, each of which is in order of time itself, merged piece by piece."""
     if len(sources) == 1:
-        yield from (frames for frames in sources[0] if len(frames))
+        yield from sources[0]
         return
     waiting = [(source, frames) for source in sources if (frames := _next_frames(source)) is not None]
     while waiting:

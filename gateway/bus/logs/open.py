@@ -14,10 +14,13 @@ from gateway.bus.signals import CAN_FD_BYTES, EVERY_IDENTIFIER, Decoder, IdFilte
 from gateway.errors import LogUnreadableError
 from gateway.records import Frames, Motion
 
-CANDUMP_SUFFIXES: Final = (".log", ".txt", ".candump", "")
-BULK_READERS: Final = {".blf": read_blf, ".mf4": read_mf4}
-UNMISTAKABLE: Final = frozenset({".log", ".candump", *MESSAGE_SUFFIXES, *BULK_READERS} - {".csv", ".db"})
-
+READERS: Final = {
+    **dict.fromkeys((".log", ".txt", ".candump", ""), read_candump),
+    **dict.fromkeys(MESSAGE_SUFFIXES, read_message_log),
+    ".blf": read_blf,
+    ".mf4": read_mf4,
+}
+UNMISTAKABLE: Final = frozenset(READERS.keys() - {".txt", "", ".csv", ".db"})
 
 OTHER_KINDS: Final = {
     b"\x89PNG": "a PNG image",
@@ -57,25 +60,20 @@ def open_whole_log(path: Path | str, channel: str | None = None) -> tuple[Iterat
 def _open(
     path: Path, filters: Sequence[IdFilter], channel: str | None, width: int
 ) -> tuple[Iterator[Frames], LogReport]:
-    report = LogReport(path)
     suffix = unpacked_suffix(path)
     if path.is_dir():
         raise LogUnreadableError(f"{path}: is a folder, not a log file")
     if not path.exists():
         raise LogUnreadableError(f"{path}: no such file")
-    if suffix in CANDUMP_SUFFIXES:
+    if suffix not in READERS:
+        known, packed = " ".join(filter(None, READERS)), ", ".join(PACKED_SUFFIXES)
+        raise LogUnreadableError(
+            f"{path}: cannot tell the kind of log from {suffix!r}; known are {known}, and each with {packed}"
+        )
+    if READERS[suffix] is read_candump:
         _require_no_other_kind(path)
-        return read_candump(path, filters, channel, width=width, report=report), report
-    selection = Selection(filters, channel, report)
-    if suffix in MESSAGE_SUFFIXES:
-        return read_message_log(path, suffix, selection, width), report
-    if suffix in BULK_READERS:
-        return BULK_READERS[suffix](path, selection, width), report
-    known = " ".join((*CANDUMP_SUFFIXES[:-1], *MESSAGE_SUFFIXES, *BULK_READERS))
-    packed = ", ".join(PACKED_SUFFIXES)
-    raise LogUnreadableError(
-        f"{path}: cannot tell the kind of log from {suffix!r}; known are {known}, and each with {packed}"
-    )
+    selection = Selection(LogReport(path), filters, channel, width)
+    return READERS[suffix](selection), selection.report
 
 
 def motion_of_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Motion], LogReport, Decoder]:

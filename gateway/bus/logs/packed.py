@@ -185,8 +185,8 @@ class LineBlock:
     end: int
 
 
-def line_blocks(path: Path, report: LogReport, block_bytes: int = BLOCK_BYTES) -> Iterator[LineBlock]:
-    """The file's lines in blocks of at most ``block_bytes``; memory does not grow with the file.
+def line_blocks(report: LogReport, block_bytes: int = BLOCK_BYTES) -> Iterator[LineBlock]:
+    """The log's lines in blocks of at most ``block_bytes``; memory does not grow with the file.
 
     A line longer than a block (a hole of NULs, usually) is rejected and passed over. A damaged packed stream ends the
     file there: ``report.ended_early`` says so.
@@ -194,7 +194,7 @@ def line_blocks(path: Path, report: LogReport, block_bytes: int = BLOCK_BYTES) -
     buffer = bytearray(b"\n" * (block_bytes + 2 * MARGIN))
     text = np.frombuffer(buffer, np.uint8)
     carried, is_overlong = 0, False  # bytes of an unfinished line at the front of the buffer
-    with open_log_file(path) as stream:
+    with open_log_file(report.path) as stream:
         while True:
             free = memoryview(buffer)[MARGIN + carried : MARGIN + block_bytes]
             n_read = _fill(stream, free, report)

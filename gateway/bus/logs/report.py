@@ -1,7 +1,7 @@
-"""What of a log is wanted, and the result of reading it: counts, and the unreadable lines by reason."""
+"""The wanted frames of a log, and the result of reading it: counts, and the unreadable lines by reason."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -10,12 +10,15 @@ from typing import Any, Final
 
 import numpy as np
 
+from gateway.bus.frames import gathered
 from gateway.bus.signals import IdFilter
 from gateway.errors import LogUnreadableError
-from gateway.records import I64, U32, Bool
+from gateway.records import I64, U32, Bool, Frames
 
 KEPT_LINE_NUMBERS: Final = 5  # chosen: what a person looks at
 NAMED_CHANNELS: Final = 8  # chosen: likewise
+KEPT_CHANNELS: Final = 32  # chosen: in memory; damaged lines name any number
+CHUNK_FRAMES: Final = 32_768  # chosen: given out at once: large enough that the decoder's own steps cost little
 
 
 class LogReject(StrEnum):
@@ -76,10 +79,8 @@ class LogReport:
             self.rejects.setdefault(reason, RejectedLines()).first_lines.append(line)
         self.rejects.setdefault(reason, RejectedLines()).count += n
 
-    def hand_on(self, t_ns: I64) -> None:
-        """Count frames handed on, by their stamps in order of arrival."""
-        if not len(t_ns):
-            return
+    def count_wanted(self, t_ns: I64) -> None:
+        """Count frames that are given out, at least one, by their stamps in order of arrival."""
         before = t_ns[0] if self._last_t_ns is None else self._last_t_ns
         self.out_of_order += int(np.count_nonzero(np.diff(t_ns, prepend=before) < 0))
         self.wanted += len(t_ns)
@@ -156,35 +157,55 @@ def is_same_channel(recorded: object, wanted: str | None) -> bool:
     return isinstance(recorded, int) and digits is not None and int(digits[0]) == recorded
 
 
-def passing(filters: Sequence[IdFilter], can_id: U32) -> Bool:
-    """Which identifiers (n,) pass one of the filters."""
-    passes = np.zeros(len(can_id), np.bool_)
-    for id_filter in filters:
-        passes |= id_filter.matches(can_id)
-    return passes
-
-
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The frames that pass one of ``filters``, of ``channel`` or of all; the others are counted in ``report``."""
+    """The frames that pass one of ``filters``, of ``channel`` or of all, with payload rows of ``width`` bytes.
 
+    ``report`` names the log and counts what is read of it.
+    """
+
+    report: LogReport
     filters: Sequence[IdFilter]
     channel: str | None
-    report: LogReport
+    width: int
+
+    @property
+    def path(self) -> Path:
+        return self.report.path
+
+    def passes(self, can_id: U32) -> Bool:
+        """Which identifiers (n,) pass one of the filters."""
+        passes = np.zeros(len(can_id), np.bool_)
+        for id_filter in self.filters:
+            passes |= id_filter.matches(can_id)
+        return passes
+
+    def has(self, channel: object, n_frames: int) -> bool:
+        """Whether frames of this channel are wanted; if not, they are counted. None: the format keeps no channel."""
+        if channel is not None and n_frames and len(self.report.channels) < KEPT_CHANNELS:
+            self.report.channels.add(str(channel))
+        if is_same_channel(channel, self.channel):
+            return True
+        self.report.other_channel += n_frames
+        return False
+
+    def given_out(self, parts: Iterable[Frames], n: int = CHUNK_FRAMES) -> Iterator[Frames]:
+        """The frames in chunks of at least ``n``, each counted as it is given out."""
+        for frames in gathered(parts, n, self.width):
+            self.report.count_wanted(frames.t_ns)
+            yield frames
 
     def rows(self, can_id: U32, channel: I64 | None, is_remote: Bool | None = None) -> I64:
         """Rows (m,) of the wanted data frames among all (n,), remote ones among them. A format may store no channel."""
         self.report.frames += len(can_id)
-        rows = np.flatnonzero(passing(self.filters, can_id))
+        rows = np.flatnonzero(self.passes(can_id))
         if is_remote is not None and is_remote[rows].any():
             self.report.remote_frames += int(np.count_nonzero(is_remote[rows]))
             rows = rows[~is_remote[rows]]
         if channel is None:
             return rows
         for number in set(channel[rows].tolist()):
-            self.report.channels.add(str(number))
-            if not is_same_channel(number, self.channel):
-                is_other = channel[rows] == number
-                self.report.other_channel += int(np.count_nonzero(is_other))
-                rows = rows[~is_other]
+            is_on_it = channel[rows] == number
+            if not self.has(number, int(np.count_nonzero(is_on_it))):
+                rows = rows[~is_on_it]
         return rows

@@ -75,15 +75,12 @@ def _is_mapped(one: Heard, signal_map: SignalMap) -> bool:
     return any(m.id_filter.is_for(one.can_id) and m.length in one.lengths for m in signal_map.messages)
 
 
-NO_CHANNEL: Final = "None"  # how python-can's readers name the channel of a log that keeps none
-
-
 def heard_in(log: Path) -> tuple[tuple[Heard, ...], LogReport]:
     """Every identifier in order of channel and number. Raises LogUnreadableError if nothing can be read."""
     chunks, report = open_whole_log(log)
     of_all = counted(chunks)
     report.require_frames()
-    channels = sorted(report.channels - {NO_CHANNEL})
+    channels = sorted(report.channels)
     if len(channels) < 2:
         return heard_on(channels[0] if channels else None, of_all), report
     by_channel = [heard_on(channel, counted(open_whole_log(log, channel)[0])) for channel in channels]
