@@ -3,8 +3,8 @@
 A device may be set to another identifier than the database says, or to 29 bits.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -44,41 +44,21 @@ class Heard:
         return id_name(self.can_id)
 
 
-@dataclass(slots=True)
-class _Count:
-    """Counts of one identifier so far."""
-
-    n: int = 0
-    first_ns: int = 0
-    last_ns: int = 0
-    n_kept: int = 0
-    kept: list[Frames] = field(default_factory=list)
-
-    def add(self, frames: Frames) -> None:
-        self.first_ns = int(frames.t_ns.min()) if not self.n else min(self.first_ns, int(frames.t_ns.min()))
-        self.last_ns = max(self.last_ns, int(frames.t_ns.max()))
-        self.n += len(frames)
-        if self.n_kept < KEPT_FRAMES:
-            self.kept.append(frames)
-            self.n_kept += len(frames)
-
-
-Counts = dict[int, _Count]
-
-
-def counted(chunks: Iterable[Frames]) -> Counts:
-    counts: Counts = {}
+def heard_of(chunks: Iterable[Frames], channel: str | None = None) -> tuple[Heard, ...]:
+    """Every identifier of the frames, all of one channel, ordered by identifier."""
+    spans: dict[int, tuple[int, int, int]] = {}  # number of frames, first and last stamp
+    kept: dict[int, list[Frames]] = {}
     for frames in chunks:
-        for can_id in np.unique(frames.can_id):
-            counts.setdefault(int(can_id), _Count()).add(take(frames, frames.can_id == can_id))
-    return counts
-
-
-def heard_on(channel: str | None, counts: Counts) -> tuple[Heard, ...]:
-    """The counts of a channel as ``Heard``, ordered by identifier."""
+        for can_id in np.unique(frames.can_id).tolist():
+            ours = take(frames, frames.can_id == can_id)
+            first_ns, last_ns = int(ours.t_ns.min()), int(ours.t_ns.max())
+            n, before_ns, after_ns = spans.get(can_id, (0, first_ns, last_ns))
+            spans[can_id] = n + len(ours), min(first_ns, before_ns), max(last_ns, after_ns)
+            if n < KEPT_FRAMES:
+                kept.setdefault(can_id, []).append(ours)
     return tuple(
-        Heard(channel, can_id, count.n, (count.last_ns - count.first_ns) / NS_PER_S, join(count.kept, CAN_FD_BYTES))
-        for can_id, count in sorted(counts.items(), key=lambda item: (item[0] & EXTENDED_ID, item[0]))
+        Heard(channel, can_id, n, (last_ns - first_ns) / NS_PER_S, join(kept[can_id], CAN_FD_BYTES))
+        for can_id, (n, first_ns, last_ns) in sorted(spans.items())
     )
 
 
@@ -88,28 +68,19 @@ MOST_SIMILAR: Final = 3  # chosen: what a person looks through
 
 def similar_to(message: MappedMessage, signal_map: SignalMap, heard: Sequence[Heard]) -> tuple[str, ...]:
     """Descriptions of unmapped identifiers that resemble ``message``, the most similar first."""
+    others = [mapped.id_filter for mapped in signal_map.messages if mapped is not message]
+    free = [one for one in heard if not any(ids.is_for(one.can_id) for ids in others)]
+    ranked = sorted(free, key=lambda one: (_distance(message, one), one.can_id))[:MOST_SIMILAR]
     return tuple(
         f"{one.name}{f' on {one.channel}' if one.channel else ''}, {one.rate_hz:.0f} times a second, "
         f"{one.lengths[0]} bytes"
-        for one in _similar(message, signal_map, heard)
+        for one in ranked
+        if _distance(message, one)[0] <= NEAR
     )
 
 
-def _similar(message: MappedMessage, signal_map: SignalMap, heard: Sequence[Heard]) -> Iterator[Heard]:
-    """Identifiers without a mapping, the most similar first: another source, the other width, or a near number."""
-    mapped = [m.id_filter for m in signal_map.messages]
-    free = [
-        one for one in heard
-        if not any(ids.is_for(one.can_id) for ids in mapped) or message.id_filter.is_for(one.can_id)
-    ]  # fmt: skip
-    ranked = sorted((_distance(message, one), one.can_id, i) for i, one in enumerate(free))
-    for distance, _, i in ranked[:MOST_SIMILAR]:
-        if distance[0] <= NEAR:
-            yield free[i]
-
-
 def _distance(message: MappedMessage, one: Heard) -> tuple[int, bool]:
-    """Distance of the numbers, 29 bits or 11, source addresses aside; then whether the length differs."""
+    """Distance of the numbers, source addresses of 29-bit ones aside, and whether the length differs."""
     ours, theirs = message.frame_id & ~EXTENDED_ID, one.can_id & ~EXTENDED_ID
     is_both_long = bool(message.frame_id & one.can_id & EXTENDED_ID)
     apart = abs(ours - theirs)

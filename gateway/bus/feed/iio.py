@@ -92,6 +92,7 @@ class IioDevice:
             )
         self.has_stamps = self._has("scan_elements/in_timestamp_en")
         self._elements: dict[str, _Element] = {}
+        self._turns: dict[str, F64] = {}
         self._scan_bytes = 0
         self._file = -1
         self._rest = b""
@@ -120,6 +121,7 @@ class IioDevice:
             if self._has("buffer/watermark"):
                 self._write("buffer/watermark", "1")
             self._elements, self._scan_bytes = self._laid_out()
+            self._turns = {kind: self._turn @ self._mount(kind) for kind in self.kinds}
             self._write("buffer/enable", "1")
             self._file = os.open(self._node, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as fault:
@@ -160,8 +162,7 @@ class IioDevice:
 
     def _vectors(self, kind: str, scans: np.ndarray) -> F64:
         chip = np.column_stack([self._elements[f"in_{kind}_{axis}"].read(scans) for axis in "xyz"])
-        board = chip @ self._mount(kind).T
-        vehicle: F64 = board @ self._turn.T
+        vehicle: F64 = chip @ self._turns[kind].T
         return vehicle
 
     def _mount(self, kind: str) -> F64:

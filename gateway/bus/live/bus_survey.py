@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import can
 
-from gateway.bus.heard import Heard, counted, heard_on
+from gateway.bus.heard import Heard, heard_of
 from gateway.bus.live.source import OpenReceiver, opener_of
 from gateway.bus.signals import CAN_FD_BYTES, EVERY_IDENTIFIER
 from gateway.errors import BusError
@@ -70,7 +70,7 @@ class BusSurvey(ServicePart):
                     bursts.append(receiver.receive(POLL_S).frames)
         except (OSError, can.CanError, BusError):
             pass  # the live source reports the fault of the channel
-        self._heard = heard_on(None, counted(frames for frames in bursts if len(frames)))
+        self._heard = heard_of(frames for frames in bursts if len(frames))
 
 
 def bus_survey_of(interface: str, channel: str, options: Mapping[str, Any]) -> BusSurvey:

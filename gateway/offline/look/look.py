@@ -2,14 +2,14 @@
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from gateway.bus.frames import merge_frames
-from gateway.bus.heard import Heard, counted, heard_on, similar_to
+from gateway.bus.heard import Heard, heard_of, similar_to
 from gateway.bus.logs import LogReport, motion_of_log, open_whole_log
 from gateway.bus.signals import (
     Decoder,
@@ -78,12 +78,12 @@ def _is_mapped(one: Heard, signal_map: SignalMap) -> bool:
 def heard_in(log: Path) -> tuple[tuple[Heard, ...], LogReport]:
     """Every identifier in order of channel and number. Raises LogUnreadableError if nothing can be read."""
     chunks, report = open_whole_log(log)
-    of_all = counted(chunks)
+    of_all = heard_of(chunks)
     report.require_frames()
     channels = sorted(report.channels)
     if len(channels) < 2:
-        return heard_on(channels[0] if channels else None, of_all), report
-    by_channel = [heard_on(channel, counted(open_whole_log(log, channel)[0])) for channel in channels]
+        return tuple(replace(one, channel=next(iter(channels), None)) for one in of_all), report
+    by_channel = [heard_of(open_whole_log(log, channel)[0], channel) for channel in channels]
     return tuple(one for heard in by_channel for one in heard), report
 
 
