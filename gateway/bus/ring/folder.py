@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from gateway.bus.ring.segment import BlockHead, mended_segment, name_of, names_in, number_of, with_block
+from gateway.bus.ring.segment import block_of, mended_segment, name_of, names_in, number_of, with_block
 from gateway.files.kept import create_plain, open_plain, opened_folder, write_all
 from gateway.log import Event, log_event
 from gateway.status import Segment
@@ -88,23 +88,23 @@ class RingFolder:
             self._day, self.n_bytes_today = today, 0
         return self.n_bytes_today + n_bytes > self._limits.max_daily_bytes
 
-    def append(self, block: bytes, head: BlockHead) -> None:
+    def append(self, content: bytes) -> None:
         """One more block, on disk when this returns. Raises OSError; the next call then begins a new segment."""
         try:
             self.read()
             with opened_folder(self.directory) as folder:
-                self._require_room(folder, len(block))
-                self._let_go(folder, self._limits.max_bytes - len(block))
-                growing = self._to_grow(folder, len(block), head.first_ns)
-                self.n_bytes_today += len(block)
-                write_all(growing.file, block)
+                self._require_room(folder, len(content))
+                self._let_go(folder, self._limits.max_bytes - len(content))
+                growing = self._to_grow(folder, content)
+                self.n_bytes_today += len(content)
+                write_all(growing.file, content)
                 os.fdatasync(growing.file.fileno())
         except OSError:
             self.close()
             self._segments = None
             raise
-        *older, newest = self._segments or ()
-        self._segments = (*older, with_block(newest, head))
+        *older, newest = self.segments()
+        self._segments = (*older, with_block(newest, block_of(content, newest.name)))
 
     def close(self) -> None:
         if self._growing is not None:
@@ -142,16 +142,16 @@ class RingFolder:
                 os.unlink(kept[0].name, dir_fd=folder)
             self._segments = kept[1:]
 
-    def _to_grow(self, folder: int, n_bytes: int, first_ns: int) -> _Growing:
-        """The newest segment while it is young and small, else a new one."""
+    def _to_grow(self, folder: int, content: bytes) -> _Growing:
+        """The segment for one more block: the newest while it is young and small, else a new one."""
         kept = self.segments()
         if self._growing is not None:
             is_young = time.monotonic() - self._growing.since_s < SEGMENT_S
-            if is_young and kept[-1].n_bytes + n_bytes <= SEGMENT_SHARE * self._limits.max_bytes:
+            if is_young and kept[-1].n_bytes + len(content) <= SEGMENT_SHARE * self._limits.max_bytes:
                 return self._growing
             self.close()
         last = number_of(kept[-1].name) if kept else None
-        name = name_of(1 + (last or 0), first_ns)
+        name = name_of(1 + (last or 0), block_of(content, "").first_ns)
         self._growing = _Growing(name, create_plain(folder, name, 0o640), time.monotonic())
         self._segments = (*kept, Segment(name))
         os.fsync(folder)  # the new name, too, outlives a power cut

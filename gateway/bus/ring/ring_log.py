@@ -3,14 +3,14 @@
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO, Final
 
 from gateway.bus.frames import join
 from gateway.bus.live.source import LiveSource
 from gateway.bus.ring.folder import RingFolder, RingLimits
-from gateway.bus.ring.segment import head_of, packed_block
+from gateway.bus.ring.segment import packed_block
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.records import Frames
@@ -102,19 +102,19 @@ class RingLog(ThreadPart):
 
     def _run(self) -> None:
         try:
-            self._look()
+            self._read_folder()
             while self._wait_for_block():
                 self._write_held()
             self._folder.close()
         except Exception as failure:  # noqa: BLE001 - a failure of the recording must not end the weighing
-            self._tell(f"the recorder died: {failure!r}")
+            self._note(f"the recorder died: {failure!r}")
 
-    def _look(self) -> None:
+    def _read_folder(self) -> None:
         """Read the directory, so that segments of earlier runs can be fetched at once."""
         try:
             self._folder.read()
         except OSError as refusal:
-            self._tell(self._told(refusal))
+            self._note(refusal)
 
     def _wait_for_block(self) -> bool:
         """Wait until a block is due or it is time to stop; False if nothing is left to do."""
@@ -134,7 +134,7 @@ class RingLog(ThreadPart):
         try:
             is_written = self._write(frames)
         except OSError as refusal:
-            self._tell(self._told(refusal))
+            self._note(refusal)
             with self._changed:
                 if not self._stopping.is_set():
                     self._changed.wait_for(self._stopping.is_set, self._retry_s)
@@ -151,19 +151,20 @@ class RingLog(ThreadPart):
         """False if the day's bytes are used up. Raises OSError."""
         block = packed_block(frames, self._channel)
         if self._folder.is_over_day(len(block)):
-            self._tell("the day's bytes are used up: [record] max_daily_mb")
+            self._note("the day's bytes are used up: [record] max_daily_mb")
             return False
-        self._folder.append(block, head_of(block))
+        self._folder.append(block)
         self._n_bytes += len(block)
         if self._fault is not None:
             log_event(Event.RECORD_RECOVERED, n_frames_dropped=self._n_dropped)
             self._fault = None
         return True
 
-    def _told(self, refusal: OSError) -> str:
-        return f"{self._folder.directory}: {refusal.strerror or refusal}"
-
-    def _tell(self, fault: str) -> None:
+    def _note(self, refusal: OSError | str) -> None:
+        """Report a fault, and log it if it is new."""
+        fault = str(refusal)
+        if isinstance(refusal, OSError):
+            fault = f"{self._folder.directory}: {refusal.strerror or refusal}"
         if fault != self._fault:
             log_event(Event.RECORD_REFUSED, level=logging.WARNING, fault=fault)
         self._fault = fault
@@ -191,29 +192,30 @@ def record_to_file(
     n_held = n_written = 0
     due_s = time.monotonic() + FILE_BLOCK_S
     with path.open("xb") as file:
-        source.start()
-        try:
-            while not (stop.is_set() or (end_s is not None and time.monotonic() >= end_s) or source.failure):
-                if (frames := source.inbox.drain(DRAIN_S)) is not None:
-                    held.append(frames)
-                    n_held += len(frames)
-                    on_frames(n_written + n_held)
-                if n_held >= FILE_BLOCK_FRAMES or time.monotonic() >= due_s:
-                    n_written += _written(file, held, channel)
-                    held, n_held, due_s = [], 0, time.monotonic() + FILE_BLOCK_S
-        finally:
-            source.stop()
-            while (frames := source.inbox.drain(0.0)) is not None:
+        for frames in _received(source, stop, end_s):
+            if frames is not None:
                 held.append(frames)
                 n_held += len(frames)
                 on_frames(n_written + n_held)
-            n_written += _written(file, held, channel)
-    return n_written
+            if held and (n_held >= FILE_BLOCK_FRAMES or time.monotonic() >= due_s):
+                n_written += _write(file, held, channel)
+                held, n_held, due_s = [], 0, time.monotonic() + FILE_BLOCK_S
+        return n_written + (_write(file, held, channel) if held else 0)
 
 
-def _written(file: BinaryIO, held: list[Frames], channel: str) -> int:
-    if not held:
-        return 0
+def _received(source: LiveSource, stop: threading.Event, end_s: float | None) -> Iterator[Frames | None]:
+    """The frames of a source until ``stop`` or ``end_s``, then those still in its inbox; None after a quiet while."""
+    source.start()
+    try:
+        while not (stop.is_set() or (end_s is not None and time.monotonic() >= end_s) or source.failure):
+            yield source.inbox.drain(DRAIN_S)
+    finally:
+        source.stop()
+    while (frames := source.inbox.drain(0.0)) is not None:
+        yield frames
+
+
+def _write(file: BinaryIO, held: list[Frames], channel: str) -> int:
     frames = join(held, held[0].payload.shape[1])
     file.write(packed_block(frames, channel))
     file.flush()

@@ -10,8 +10,7 @@ import os
 import re
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from functools import reduce
 from typing import BinaryIO, Final
@@ -25,7 +24,7 @@ from gateway.records import Frames
 from gateway.status import Segment
 from gateway.units import NS_PER_S
 
-PIECE_FRAMES: Final = 8192  # chosen: are text at a time
+PIECE_FRAMES: Final = 8192  # chosen: in memory as text at a time
 _LEVEL: Final = 2  # chosen, of isal's 0 to 3
 _RAW_DEFLATE: Final = -15  # wbits of zlib: a window of 2^15 bytes, no header
 
@@ -34,17 +33,8 @@ _FIELD: Final = b"SF"
 _CONTENT: Final = struct.Struct("<IIqq")  # bytes of the whole member, frames, first and last stamp
 _LENGTHS: Final = struct.Struct("<H2sH")
 _TAIL: Final = struct.Struct("<II")  # checksum and length of the text
-HEAD_BYTES: Final = len(_FIXED) + _LENGTHS.size + _CONTENT.size
-
-
-@dataclass(frozen=True, slots=True)
-class BlockHead:
-    """The content of a block's head."""
-
-    n_bytes: int
-    n_frames: int
-    first_ns: int
-    last_ns: int
+_BEGIN: Final = _FIXED + _LENGTHS.pack(4 + _CONTENT.size, _FIELD, _CONTENT.size)
+HEAD_BYTES: Final = len(_BEGIN) + _CONTENT.size
 
 
 def packed_block(frames: Frames, channel: str) -> bytes:
@@ -62,22 +52,13 @@ def packed_block(frames: Frames, channel: str) -> bytes:
     body.append(packer.flush())
     n_bytes = HEAD_BYTES + sum(map(len, body)) + _TAIL.size
     content = _CONTENT.pack(n_bytes, len(frames), int(frames.t_ns.min()), int(frames.t_ns.max()))
-    head = _FIXED + _LENGTHS.pack(4 + len(content), _FIELD, len(content)) + content
-    return b"".join((head, *body, _TAIL.pack(checksum, n_text & 0xFFFF_FFFF)))
+    return b"".join((_BEGIN, content, *body, _TAIL.pack(checksum, n_text & 0xFFFF_FFFF)))
 
 
-def read_head(file: BinaryIO) -> BlockHead | None:
-    """The head at the file's position; None if no block of ours begins there."""
-    head = file.read(HEAD_BYTES)
-    begin = _FIXED + _LENGTHS.pack(4 + _CONTENT.size, _FIELD, _CONTENT.size)
-    if len(head) < HEAD_BYTES or not head.startswith(begin):
-        return None
-    found = BlockHead(*_CONTENT.unpack_from(head, len(begin)))
-    return found if found.n_bytes > HEAD_BYTES + _TAIL.size else None
-
-
-def head_of(block: bytes) -> BlockHead:
-    return BlockHead(*_CONTENT.unpack_from(block, HEAD_BYTES - _CONTENT.size))
+def block_of(head: bytes, name: str) -> Segment:
+    """What the head of a block says, as a segment of this name with this block alone."""
+    n_bytes, n_frames, first_ns, last_ns = _CONTENT.unpack_from(head, len(_BEGIN))
+    return Segment(name, n_bytes, 1, n_frames, first_ns, last_ns)
 
 
 def is_sound(block: bytes) -> bool:
@@ -92,15 +73,17 @@ def is_sound(block: bytes) -> bool:
 _NAME: Final = re.compile(r"([0-9]{8,18})-[0-9]{8}T[0-9]{6}Z\.log\.gz")
 
 
-def with_block(segment: Segment, head: BlockHead) -> Segment:
-    is_first = segment.n_blocks == 0
+def with_block(segment: Segment, block: Segment) -> Segment:
+    """A segment with one more block."""
+    if not segment.n_blocks:
+        return block
     return Segment(
         segment.name,
-        segment.n_bytes + head.n_bytes,
+        segment.n_bytes + block.n_bytes,
         segment.n_blocks + 1,
-        segment.n_frames + head.n_frames,
-        head.first_ns if is_first else min(segment.first_ns, head.first_ns),
-        head.last_ns if is_first else max(segment.last_ns, head.last_ns),
+        segment.n_frames + block.n_frames,
+        min(segment.first_ns, block.first_ns),
+        max(segment.last_ns, block.last_ns),
     )
 
 
@@ -129,10 +112,12 @@ def mended_segment(folder: int, name: str, *, is_newest: bool) -> tuple[Segment,
     In the newest segment, which a power cut may have damaged, the last block is checked completely. Raises OSError.
     """
     with open_plain(folder, name) as file:
-        heads = list(_heads(file))
-        if is_newest and heads and not _is_last_sound(file, heads):
-            del heads[-1]
-        segment = reduce(with_block, heads, Segment(name))
+        blocks = list(_blocks(file, name))
+        if is_newest and blocks:
+            file.seek(sum(block.n_bytes for block in blocks[:-1]))
+            if not is_sound(file.read(blocks[-1].n_bytes)):
+                del blocks[-1]
+        segment = reduce(with_block, blocks, Segment(name))
         n_left = os.fstat(file.fileno()).st_size - segment.n_bytes
     if n_left:
         with open_plain(folder, name, for_writing=True) as file:
@@ -141,19 +126,17 @@ def mended_segment(folder: int, name: str, *, is_newest: bool) -> tuple[Segment,
     return segment, n_left
 
 
-def _is_last_sound(file: BinaryIO, heads: Sequence[BlockHead]) -> bool:
-    file.seek(sum(head.n_bytes for head in heads[:-1]))
-    return is_sound(file.read(heads[-1].n_bytes))
-
-
-def _heads(file: BinaryIO) -> Iterator[BlockHead]:
-    """The heads of the whole blocks, from the first to the first that is not whole."""
+def _blocks(file: BinaryIO, name: str) -> Iterator[Segment]:
+    """The blocks up to the first that is not whole."""
     size = os.fstat(file.fileno()).st_size
     at = 0
     while at < size:
         file.seek(at)
-        head = read_head(file)
-        if head is None or at + head.n_bytes > size:
+        head = file.read(HEAD_BYTES)
+        if len(head) < HEAD_BYTES or not head.startswith(_BEGIN):
             return
-        at += head.n_bytes
-        yield head
+        block = block_of(head, name)
+        if not HEAD_BYTES + _TAIL.size < block.n_bytes <= size - at:
+            return
+        at += block.n_bytes
+        yield block
