@@ -15,21 +15,26 @@ from typing import Any, Final
 import click
 
 from benchmarks.accuracy import advice as on_advice
-from benchmarks.accuracy import alarms as on_alarms
-from benchmarks.accuracy import availability, coverage, delivery, disturbances, false_facts, grades, phones, siblings
+from benchmarks.accuracy import (
+    alarms,
+    availability,
+    coverage,
+    delivery,
+    disturbances,
+    false_facts,
+    grades,
+    phones,
+    siblings,
+)  # fmt: skip
 from benchmarks.accuracy import faults as on_faults
-from benchmarks.accuracy.alarm_days import on_days
 from benchmarks.accuracy.budget import study as budget
-from benchmarks.accuracy.learning_curve import learning_curve_page
 from benchmarks.accuracy.sensitivity import study as sensitivity
 from benchmarks.accuracy.sensor_bounds import limits, limits_table
 from benchmarks.accuracy.study import Study
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection.log import SplitRun
-from gateway.calibration.judgement import learning_curve as on_learning
 from gateway.cli.options import FILE, batch_settings, window
 from gateway.cli.progress import counted
-from gateway.config import ESTIMATOR_NAMES
 from gateway.core.cross_spectrum.predicted import Drive
 from gateway.core.vehicle import Vehicle
 from gateway.errors import SpringscaleError
@@ -37,16 +42,12 @@ from gateway.offline.campaigns import inspect
 
 STUDIES: Final[tuple[Study[Any], ...]] = (
     coverage.STUDY, budget.STUDY, disturbances.STUDY, grades.STUDY, delivery.STUDY, sensitivity.STUDY, siblings.STUDY,
-    phones.STUDY, availability.STUDY,
+    phones.STUDY, availability.STUDY, false_facts.STUDY, alarms.STUDY,
 )  # fmt: skip
 Command = Callable[..., None]
 _workers = click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes")
 _kept = click.option("--kept", type=FILE, default=None, help="directory of cases to resume from: read and stored there")
 _output = click.option("--output", type=FILE, default=None, help="directory to write the numbers and their page to")
-
-
-def _count(name: str, n: int, least: int = 1) -> Callable[[Command], Command]:
-    return click.option(f"--{name}", f"n_{name}", type=click.IntRange(min=least), default=n, show_default=True)
 
 
 def _seed(seed: int) -> Callable[[Command], Command]:
@@ -62,68 +63,19 @@ def _add(study: Study[Any]) -> None:
     """The command of a study that needs nothing but its cases."""
 
     @studies.command(study.name, help=study.does)
-    @_count(study.counts, study.n, study.least)
+    @click.option(f"--{study.counts}", "n", type=click.IntRange(min=study.least), default=study.n, show_default=True)
     @_seed(study.seed)
     @_workers
     @_kept
     @_output
-    def _(seed: int, workers: int, kept: Path | None, output: Path | None, **asked: int) -> None:
-        _run(study, asked[f"n_{study.counts}"], seed, workers, kept, output)
+    def _(n: int, seed: int, workers: int, kept: Path | None, output: Path | None) -> None:
+        with counted(study.doing) as on_done:
+            found = study.run(n, seed, workers=workers, kept=kept, on_done=on_done)
+        _hand_out(study.file or study.name, found, study.page(found), output)
 
 
 for one in STUDIES:
     _add(one)
-
-
-@studies.command("false-facts", help=false_facts.study_of().does)
-@_count("lines", false_facts.N_LINES)
-@_count("right", false_facts.N_RIGHT)
-@_seed(false_facts.SEED)
-@_workers
-@_kept
-@_output
-def run_false_facts(
-    n_lines: int, n_right: int, seed: int, workers: int, kept: Path | None, output: Path | None
-) -> None:
-    """One more amount than the others: vans with true answers."""
-    _run(false_facts.study_of(n_right, n_lines), n_lines, seed, workers, kept, output)
-
-
-@studies.command("learning-curve")
-@click.argument("campaign", type=FILE)
-@click.option("--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, default=ESTIMATOR_NAMES)
-@click.option(
-    "--subsets",
-    "most_subsets",
-    type=click.IntRange(min=1),
-    default=on_learning.MOST_SUBSETS,
-    show_default=True,
-    help="choices of runs to try for each number of runs",
-)
-@_seed(on_learning.SEED)
-@_output
-@window
-def learning_curve(
-    campaign: Path,
-    estimators: tuple[str, ...],
-    most_subsets: int,
-    seed: int,
-    output: Path | None,
-    window_s: float | None,
-) -> None:
-    """How accurate would CAMPAIGN be with 2, 3, 4, 6, 10 of its runs? Leaves runs out."""
-    runs, vehicle = _read(campaign, window_s)
-    with counted("calibrating and judging") as on_trial:
-        found = on_learning.curve_of(
-            runs,
-            vehicle,
-            name=vehicle.name,
-            estimators=estimators,
-            most_subsets=most_subsets,
-            seed=seed,
-            on_trial=on_trial,
-        ).to_json()
-    _hand_out("learning_curve", found, learning_curve_page(found), output)
 
 
 @studies.command("advice")
@@ -162,23 +114,6 @@ def faults(
     _hand_out("sensor-faults", found, on_faults.faults_page(found), output)
 
 
-@studies.command("alarms")
-@_count("loads", on_alarms.N_LOADS)
-@_seed(on_alarms.SEED)
-@_count("days", delivery.N_DAYS)
-@_workers
-@_kept
-@_output
-def alarms(n_loads: int, seed: int, n_days: int, workers: int, kept: Path | None, output: Path | None) -> None:
-    """Are alarms right, and are they steady? Made-up loads, then delivery days; ~25 s a day."""
-    with counted("weighing loads about a limit") as on_line:
-        found = on_alarms.alarms(n_loads, seed, on_line)
-    with counted(delivery.STUDY.doing) as on_done:
-        days = delivery.STUDY.cases(n_days, delivery.SEED, workers=workers, kept=kept, on_done=on_done)
-    found["days"] = on_days(delivery.SEED, days)
-    _hand_out("alarm_rules", found, on_alarms.alarms_page(found), output)
-
-
 @studies.command("bounds")
 @click.option("--duration-s", type=click.FloatRange(min=20.0), default=300.0, show_default=True, help="driving seen")
 @click.option("--speed-kmh", type=click.FloatRange(10.0, 200.0), default=50.0, show_default=True, help="steady speed")
@@ -194,12 +129,6 @@ def _read(path: Path, window_s: float | None) -> tuple[Sequence[SplitRun], Vehic
     campaign = load_campaign(path)
     with counted("reading drives") as on_run:
         return inspect(campaign, batch_settings(window_s), on_run=on_run).usable, campaign.vehicle
-
-
-def _run(study: Study[Any], n: int, seed: int, workers: int, kept: Path | None, output: Path | None) -> None:
-    with counted(study.doing) as on_done:
-        found = study.run(n, seed, workers=workers, kept=kept, on_done=on_done)
-    _hand_out(study.file or study.name, found, study.page(found), output)
 
 
 def _hand_out(name: str, found: Mapping[str, Any], page: str, output: Path | None) -> None:

@@ -7,7 +7,6 @@ it or asks about it. No setting was chosen with these vans: the seed serves this
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -30,7 +29,7 @@ from gateway.stated.facts import DIVISION_KG, VehicleAnswers
 
 SEED: Final = 20304  # arbitrary, of this study alone
 N_LINES: Final = 3  # chosen: one of each type
-N_RIGHT: Final = 20  # chosen: true vehicles
+N_RIGHT: Final = 20  # chosen: true vehicles of all lines
 POUNDS_PER_KG: Final = 1.0 / 0.45359237  # international pound
 ABOARD_AT: Final = 0.7  # chosen: wheelbases behind the front axle
 PASSED: Final = "passed"
@@ -129,8 +128,8 @@ class _Known:
     facts: LineFacts
 
 
-def of_line(n_lines: int, n_right: int, seed: int, number: int) -> Found:
-    """All false facts in one line, and its part of the ``n_right`` vans with true answers."""
+def of_line(seed: int, number: int) -> Found:
+    """All false facts in one line, and its part of the vans with true answers."""
     sister_seeds, false_seeds, right_seeds, other_seeds = np.random.SeedSequence([seed, number]).spawn(4)
     own = _known(_drawn(seed, number), sister_seeds)
     another_seeds, alike_seeds = other_seeds.spawn(2)
@@ -150,7 +149,7 @@ def of_line(n_lines: int, n_right: int, seed: int, number: int) -> Found:
         ways = (lines[fact.line], None) if fact.line == "own" else (lines[fact.line],)
         false += [Tried(fact.words, line is not None, _commissioned(said, run, line)) for line in ways]
     right: list[Tried] = []
-    n_here = len(range(number, n_right, n_lines))
+    n_here = len(range(number % N_LINES, N_RIGHT, N_LINES))
     for i, seeds in enumerate(right_seeds.spawn(n_here)):
         van = drawn_van(_drawn(seed, number), "van", seeds)
         run = _empty_drive(van, 0.0, is_mixed=i % 2 == 1)
@@ -272,18 +271,16 @@ COLUMNS: Final[tuple[Column, ...]] = (
 )
 
 
-def study_of(n_right: int = N_RIGHT, n_lines: int = N_LINES) -> Study[Found]:
-    """The study with this many true vehicles over so many lines."""
-    return Study(
-        name="false-facts",
-        does="Which false facts does commissioning catch, and does it accept true ones? ~3 minutes a line.",
-        doing="commissioning simulated vans",
-        of_case=partial(of_line, n_lines, n_right),
-        numbers=numbers,
-        page=false_facts_page,
-        seed=SEED,
-        n=n_lines,
-        counts="lines",
-        least=1,
-        kept_as=f"false-facts-{n_lines}-{n_right}",
-    )
+STUDY: Final = Study(
+    name="false-facts",
+    does="Which false facts does commissioning catch, and does it accept true ones? ~3 minutes a line.",
+    doing="commissioning simulated vans",
+    of_case=of_line,
+    numbers=numbers,
+    page=false_facts_page,
+    seed=SEED,
+    n=N_LINES,
+    counts="lines",
+    least=1,
+    kept_as=f"false-facts-{N_LINES}-{N_RIGHT}",
+)

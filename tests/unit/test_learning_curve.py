@@ -11,7 +11,6 @@ from support.calibrated import ratio_index_calibration
 from support.half_car_road import VAN
 from support.known_runs import campaign
 
-from benchmarks.accuracy.learning_curve import learning_curve_page
 from gateway.calibration.judgement import learning_curve
 from gateway.calibration.judgement.learning_curve import (
     LearningCurve,
@@ -129,7 +128,7 @@ def test_a_curve_tries_every_size_and_every_triple_once(fits: Fits) -> None:
     assert curve.rungs[2].left_out.n_trials == 0  # nothing is left out of four
     assert curve.rungs[2].validation.n_trials == 1
     assert curve.triple_rungs[0].n_subsets == 3
-    assert "every triple" in learning_curve_page(curve.to_json())
+    assert "every triple" in learning_section(curve).tables[1].caption
     assert len(curve.to_json()["trials"]) == 6
 
 

@@ -1,6 +1,5 @@
 """python -m benchmarks.accuracy: what is printed and written, with stand-ins for the minutes of work."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,18 +16,7 @@ from benchmarks.accuracy.coverage_table import JudgedBatch
 from benchmarks.accuracy.lines import draw_line, drawn_van
 from benchmarks.accuracy.siblings import Way
 from benchmarks.accuracy.study import Study
-from gateway.calibration.judgement.learning_curve import LearningCurve, Score, Trial
 
-SCORE = Score(3, 1, 2.5, 1.0, 1.25, 0.5, 6.0, 14.5, 3.0, None)
-CURVE = LearningCurve(
-    "van",
-    1,
-    trials=(
-        Trial((1, 2), "ratio_index", refused="needs three runs"),
-        Trial((1, 2), "cross_spectrum", left_out=SCORE, validation=SCORE),
-    ),
-    triples=(Trial((1, 2, 3), "cross_spectrum", left_out=SCORE, validation=SCORE),),
-)
 COMPARISON = compared([Choice((1, 2, 3), 4, 5, (7.0, 5.0), (9.0, 8.0), {4: (2.0, 3.0), 5: (8.0, 6.0)})])
 CAMPAIGN = """
 signals = "springscale:reference"
@@ -56,21 +44,6 @@ def run(*arguments: str) -> str:
     found = CliRunner().invoke(command.studies, list(arguments), catch_exceptions=False)
     assert found.exit_code == 0, found.output
     return found.stdout
-
-
-def test_a_learning_curve_is_told_and_written(campaign: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(command.on_learning, "curve_of", lambda *_, **__: CURVE)
-    told = run("learning-curve", campaign, "--output", str(tmp_path / "out"))
-    assert "no calibration" in told
-    assert "2.5 +- 0.0" in told
-    written = json.loads((tmp_path / "out/learning_curve.json").read_text(encoding="utf-8"))
-    assert json.loads(json.dumps(CURVE.to_json())) == written
-    page = (tmp_path / "out/learning_curve.md").read_text(encoding="utf-8")
-    assert "| 2 | ratio index | 1 | 1 | no calibration |" in page
-    assert (
-        "| 2 | cross spectrum | 1 | 0 | left out | 2.5 +- 0.0 | 2.5 | 100 % | 6.0 | 14.5 | 1.2 +- 0.0 | 1.2 | 50 % "
-        "| 3.0 | none | 33 % |" in page
-    )
 
 
 def test_the_advice_is_told_and_written(campaign: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

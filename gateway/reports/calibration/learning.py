@@ -1,14 +1,20 @@
 """The accuracy with fewer runs: errors over their number, found by leaving runs out."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from gateway.calibration.judgement.evaluation import TARGETS
 from gateway.calibration.judgement.learning_curve import LearningCurve, Rung, ScoreSpread
 from gateway.reports.charts import Axis, Chart, Marker, Panel, Points, Rule, Section, Table
 from gateway.words import NONE, decimal, estimator_name, percent
 
 _MARKERS: tuple[Marker, ...] = ("circle", "diamond", "square", "x")
+_ERRORS = "Mean |error| in percent of the ranges (12)"
+_FIGURES = (
+    "± its standard deviation between choices, and that of the worst choice; ± is half the 95 % intervals, the score "
+    "their width and 40 times what the truth lies outside; refused batches are in no mean"
+)
 
 
 def learning_section(curve: LearningCurve) -> Section:
@@ -19,10 +25,10 @@ def learning_section(curve: LearningCurve) -> Section:
     panels = tuple(
         Panel(
             runs,
-            Axis(f"mean |error| of {what} [% of range]"),
-            (Rule(0.0), *_points(curve, names, sizes, quantity)),
+            Axis(f"mean |error| of {target.replace('_', ' ')} [% of range]"),
+            (Rule(0.0), *_points(curve, names, sizes, target)),
         )
-        for what, quantity in (("payload", "payload"), ("front share", "front_share"))
+        for target in TARGETS
     )
     chart = Chart(
         "learning_curve",
@@ -31,14 +37,18 @@ def learning_section(curve: LearningCurve) -> Section:
         "Learning curve: mean error of payload and front share over the number of known-load runs. " + _in_words(curve),
         panels,
     )
-    return Section("learning-curve", "With fewer runs", (), (chart,), (_table(curve),))
+    tables = [_table(f"{_ERRORS} over choices of runs, the empty one among them", curve.rungs)]
+    if curve.triples:
+        what = "over every triple of the empty run and two loads at different positions"
+        tables.append(_table(f"{_ERRORS} {what}", curve.triple_rungs))
+    return Section("learning-curve", "With fewer runs", (), (chart,), tuple(tables))
 
 
-def _points(curve: LearningCurve, names: Sequence[str], sizes: Sequence[int], quantity: str) -> list[Points]:
+def _points(curve: LearningCurve, names: Sequence[str], sizes: Sequence[int], target: str) -> list[Points]:
     points = []
     for colour, name in enumerate(names):
         rows = [
-            (sizes.index(rung.n_runs), *_mean_and_std(rung.left_out, quantity))
+            (sizes.index(rung.n_runs), *_mean_and_std(rung.left_out, target))
             for rung in curve.rungs
             if rung.estimator == name
         ]
@@ -50,10 +60,8 @@ def _points(curve: LearningCurve, names: Sequence[str], sizes: Sequence[int], qu
     return points
 
 
-def _mean_and_std(spread: ScoreSpread, quantity: str) -> tuple[float | None, float | None]:
-    if quantity == "payload":
-        return spread.payload_mean_pct, spread.payload_std_pct
-    return spread.front_share_mean_pct, spread.front_share_std_pct
+def _mean_and_std(spread: ScoreSpread, target: str) -> tuple[float | None, float | None]:
+    return getattr(spread, f"{target}_mean_pct"), getattr(spread, f"{target}_std_pct")
 
 
 def _in_words(curve: LearningCurve) -> str:
@@ -64,41 +72,28 @@ def _in_words(curve: LearningCurve) -> str:
     )
 
 
-def _table(curve: LearningCurve) -> Table:
+def _table(caption: str, rungs: Sequence[Rung]) -> Table:
     rows = tuple(
         (str(rung.n_runs), estimator_name(rung.estimator), _tried(rung), judged, *_cells(spread))
-        for rung in curve.rungs
+        for rung in rungs
         for judged, spread in (("runs left out", rung.left_out), ("later part of all", rung.validation))
         if spread.n_trials
     )
     errors = ("worst", "95 % covers", "±", "score")
-    columns = ("Runs", "estimator", "choices", "judged on", "payload", *errors, "share", *errors)
-    caption = (
-        "Mean |error| in percent of the ranges (12) over choices of runs ± its standard deviation between them, and "
-        "that of the worst choice; ± is half the 95 % intervals, the score their width and 40 times what the truth "
-        "lies outside"
-    )
-    return Table(caption, columns, rows, n_heads=2)
+    columns = ("Runs", "estimator", "choices", "judged on", "payload", *errors, "share", *errors, "refused")
+    return Table(f"{caption}; {_FIGURES}", columns, rows, n_heads=2)
 
 
 def _tried(rung: Rung) -> str:
     return f"{rung.n_subsets - rung.n_refused} of {rung.n_subsets}" if rung.n_refused else str(rung.n_subsets)
 
 
-def _cells(spread: ScoreSpread) -> tuple[str, ...]:
-    payload, share = (
-        NONE if mean is None or std is None else f"{mean:.1f} ± {std:.1f} %"
-        for mean, std in (_mean_and_std(spread, quantity) for quantity in ("payload", "front_share"))
-    )
-    return (
-        payload,
-        decimal(spread.payload_worst_pct, " %", 1),
-        percent(spread.payload_coverage95),
-        decimal(spread.payload_half_width_pct, " %", 1),
-        decimal(spread.payload_interval_score_pct, " %", 1),
-        share,
-        decimal(spread.front_share_worst_pct, " %", 1),
-        percent(spread.front_share_coverage95),
-        decimal(spread.front_share_half_width_pct, " %", 1),
-        decimal(spread.front_share_interval_score_pct, " %", 1),
-    )
+def _cells(spread: ScoreSpread) -> Iterator[str]:
+    for target in TARGETS:
+        mean, std = _mean_and_std(spread, target)
+        yield NONE if mean is None or std is None else f"{mean:.1f} ± {std:.1f} %"
+        yield decimal(getattr(spread, f"{target}_worst_pct"), " %", 1)
+        yield percent(getattr(spread, f"{target}_coverage95"))
+        yield decimal(getattr(spread, f"{target}_half_width_pct"), " %", 1)
+        yield decimal(getattr(spread, f"{target}_interval_score_pct"), " %", 1)
+    yield percent(spread.rejected_share)
