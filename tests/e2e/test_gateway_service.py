@@ -19,6 +19,7 @@ from support.paper_van import PAPER_VAN
 from support.patience import PATIENCE_S, wait_until
 from support.ports import first_answer, free_port
 from support.process import running_service
+from support.running_service import Running, serve, stored
 
 from gateway.bus.logs import write_candump
 from gateway.bus.sink import replay
@@ -30,7 +31,7 @@ from gateway.offline.estimates import estimates_of_logs
 from gateway.records import Motion, json_line
 from gateway.service.gateway import Gateway, GatewayFailedError
 from gateway.setup import setup_of
-from gateway.store import Latest, Store
+from gateway.store import Latest
 
 WINDOW_S = 20.0
 
@@ -43,53 +44,22 @@ def config(tmp_path: Path) -> Path:
     return service_config(tmp_path, paper_van, **keys)
 
 
-def run_with_log(config: Path, log: Path, speed: float | str) -> list[str]:
-    """The records in the database after the service heard ``log`` and stopped."""
-    settings = load_settings(config)
-
-    def on_started(gateway: Gateway) -> None:
-        loop = asyncio.get_running_loop()
-
-        def play() -> None:
-            try:
-                report = replay(log, "virtual", settings.bus.channel, speed=speed)
-                assert wait_until(lambda: gateway.source.counts().frames >= report.frames and gateway.has_caught_up)
-            finally:
-                loop.call_soon_threadsafe(gateway.request_stop)
-
-        threading.Thread(target=play, daemon=True).start()
-
-    Gateway(settings, setup_of(settings), on_started=on_started).run()
-    store = Store.open(settings.store.directory)
-    try:
-        return list(store.reader().estimates().items)
-    finally:
-        store.close()
-
-
 def test_a_sensor_under_another_identifier_is_named_by_the_status(config: Path) -> None:
     """The filters of the bus keep it out: the service looks around, and says what is there instead."""
-    settings = load_settings(config)
     told: list[str] = []
 
-    def on_started(gateway: Gateway) -> None:
-        loop = asyncio.get_running_loop()
+    def others(service: Running) -> None:
+        with can.Bus(interface="virtual", channel=config.parent.name) as bus:
+            strange = can.Message(arbitration_id=0x123, is_extended_id=False, data=bytes(8))
 
-        def others() -> None:
-            with can.Bus(interface="virtual", channel=settings.bus.channel) as bus:
-                strange = can.Message(arbitration_id=0x123, is_extended_id=False, data=bytes(8))
+            def is_told() -> bool:
+                bus.send(strange)
+                told[:] = [service.gateway.status().sentence()]
+                return "similar" in told[0]
 
-                def is_told() -> bool:
-                    bus.send(strange)
-                    told[:] = [gateway.status().sentence()]
-                    return "similar" in told[0]
+            wait_until(is_told)
 
-                wait_until(is_told)
-            loop.call_soon_threadsafe(gateway.request_stop)
-
-        threading.Thread(target=others, daemon=True).start()
-
-    Gateway(settings, setup_of(settings), on_started=on_started).run()
+    serve(config, others)
     assert told[0].startswith("The bus is awake (identifiers heard: 1), but none of them is mapped.")
     assert "vertical acceleration (no frame of its message; similar on the bus: 123, " in told[0]
     assert "8 bytes" in told[0]
@@ -105,7 +75,8 @@ def test_a_replayed_log_gives_byte_identical_batches_to_estimate(config: Path, s
         for found in estimates_of_logs([log], setup_of(settings), settings.batch.for_core())
     ]
     assert len(expected) == 3  # windows of 20 s; the rest is too short to be a batch
-    assert run_with_log(config, log, speed) == expected
+    serve(config, lambda service: service.play(log, speed))
+    assert stored(config) == expected
 
 
 def test_the_last_window_of_a_drive_is_told_once_the_bus_sleeps(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -113,22 +84,12 @@ def test_the_last_window_of_a_drive_is_told_once_the_bus_sleeps(config: Path, mo
     monkeypatch.setenv("SPRINGSCALE_BATCH__SILENCE_S", "1.0")
     log = config.parent / "drive.log"
     write_candump(bus_drive(39.9, seed=5), "can0", log)
-    settings = load_settings(config)
-    told: list[int] = []
 
-    def on_started(gateway: Gateway) -> None:
-        loop = asyncio.get_running_loop()
+    def play(service: Running) -> None:
+        service.play(log)
+        assert wait_until(lambda: len(service.gateway.store.reader().estimates().items) == 2)
 
-        def play() -> None:
-            replay(log, "virtual", settings.bus.channel, speed="max")
-            wait_until(lambda: len(gateway.store.reader().estimates().items) == 2)
-            told.append(len(gateway.store.reader().estimates().items))
-            loop.call_soon_threadsafe(gateway.request_stop)
-
-        threading.Thread(target=play, daemon=True).start()
-
-    Gateway(settings, setup_of(settings), on_started=on_started).run()
-    assert told == [2]
+    serve(config, play)
 
 
 def test_the_process_tells_systemd_and_stops_with_exit_code_zero(config: Path, tmp_path: Path) -> None:
@@ -271,23 +232,14 @@ def test_a_broken_side_file_is_told_and_set_aside_while_the_weighing_begins(
         (state / name).symlink_to("/etc/passwd")
     else:
         (state / name).write_bytes(content)
-    settings = load_settings(config)
     told: list[tuple[list[int], tuple[str, ...]]] = []
 
-    def on_started(gateway: Gateway) -> None:
-        loop = asyncio.get_running_loop()
-
-        def ask() -> None:
-            try:
-                answers = [httpx.get(gateway.url + path, trust_env=False).status_code for path in PATHS]
-                told.append((answers, gateway.status().warnings))
-            finally:
-                loop.call_soon_threadsafe(gateway.request_stop)
-
-        threading.Thread(target=ask, daemon=True).start()
+    def ask(service: Running) -> None:
+        answers = [httpx.get(service.gateway.url + path, trust_env=False).status_code for path in PATHS]
+        told.append((answers, service.gateway.status().warnings))
 
     def start() -> tuple[list[int], tuple[str, ...]]:
-        Gateway(settings, setup_of(settings), on_started=on_started).run()
+        serve(config, ask)
         return told[-1]
 
     seen, (warning,) = start()

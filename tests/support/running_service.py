@@ -33,10 +33,10 @@ class Running:
         self.gateway = gateway
         self._channel = channel
 
-    def play(self, log: Path) -> None:
+    def play(self, log: Path, speed: float | str = "max") -> None:
         """Send a log; return when all of it was worked through."""
         before = self.gateway.source.counts().frames
-        sent = replay(log, "virtual", self._channel, speed="max").frames
+        sent = replay(log, "virtual", self._channel, speed=speed).frames
         gateway = self.gateway
         is_through = wait_until(lambda: gateway.source.counts().frames >= before + sent and gateway.has_caught_up)
         assert is_through, f"{log} was not worked through"
