@@ -1,27 +1,20 @@
 """The real service with a limit of its own settings: what it stores, tells a phone in the cab and writes to its log."""
 
-import asyncio
 import logging
-import threading
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 from support.bus_drive import START_NS, white_noise
 from support.calibrated import calibration_text
 from support.configured import service_config
-from support.patience import wait_until
+from support.ports import first_answer
+from support.running_service import Running, serve
 
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import shipped_map
-from gateway.bus.sink import replay
-from gateway.config import load_settings
 from gateway.log import LOGGER
 from gateway.records import Frames
-from gateway.service.gateway import Gateway
-from gateway.setup import setup_of
 
 SATELLITES = """
 [signals.axle_weight] # stands in for a load sensor
@@ -49,63 +42,31 @@ def config(tmp_path: Path) -> Path:
     )
 
 
-class Cab:
-    """A running service, and a phone that asks it after each log that it heard."""
-
-    def __init__(self, gateway: Gateway, channel: str, folder: Path) -> None:
-        self._gateway, self._channel, self._folder = gateway, channel, folder
-        self._n_frames = 0
-
-    def get(self, path: str = "/api/v1/cab") -> Any:
-        answer = httpx.get(f"{self._gateway.url}{path}")
-        return answer.text if path == "/metrics" else answer.json()
-
-    def after(self, frames: Frames) -> Any:
-        """What the cab is told once the service has worked through these."""
-        log = self._folder / "drive.log"
-        write_candump(frames, "can0", log)
-        self._n_frames += replay(log, "virtual", self._channel, speed="max").frames
-        assert wait_until(
-            lambda: self._gateway.source.counts().frames >= self._n_frames and self._gateway.has_caught_up
-        )
-        return self.get()
+def told(service: Running, path: str = "/api/v1/cab") -> Any:
+    """What a phone in the cab is told."""
+    answer = first_answer(service.gateway.url + path)
+    return answer.text if path == "/metrics" else answer.json()
 
 
-def with_service(config: Path, play: Callable[[Cab], None]) -> None:
-    """Runs the service while ``play`` plays; what that raises fails the test."""
-    settings = load_settings(config)
-    faults: list[BaseException] = []
-
-    def on_started(gateway: Gateway) -> None:
-        loop = asyncio.get_running_loop()
-
-        def run() -> None:
-            try:
-                play(Cab(gateway, settings.bus.channel, config.parent))
-            except BaseException as fault:  # noqa: BLE001 - raised again below, in the test's own thread
-                faults.append(fault)
-            finally:
-                loop.call_soon_threadsafe(gateway.request_stop)
-
-        threading.Thread(target=run, daemon=True).start()
-
-    Gateway(settings, setup_of(settings), on_started=on_started).run()
-    for fault in faults:
-        raise fault
+def after(service: Running, frames: Frames, log: Path) -> Any:
+    """The same once the service has worked through these frames."""
+    write_candump(frames, "can0", log)
+    service.play(log)
+    return told(service)
 
 
 def test_an_overload_by_the_settings_is_told_everywhere(config: Path, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, logger=LOGGER.name)
 
-    def play(cab: Cab) -> None:
-        before = cab.get()
+    def play(service: Running) -> None:
+        before = told(service)
         assert (before["load"], before["light"]) == ("never_weighed", "unknown")
-        told = cab.after(white_noise(45.0, START_NS, seed=3))
-        assert (told["light"], told["light_about"], told["load"]) == ("over", ["gross"], "weighed")
-        assert [(room["place"], room["kg"]) for room in told["room"]] == [("gross", -50.0), ("rear_axle", 171.2)]
-        [reading] = told["own_readings"]
+        cab = after(service, white_noise(45.0, START_NS, seed=3), config.parent / "drive.log")
+        assert (cab["light"], cab["light_about"], cab["load"]) == ("over", ["gross"], "weighed")
+        assert [(room["place"], room["kg"]) for room in cab["room"]] == [("gross", -50.0), ("rear_axle", 171.2)]
+        [reading] = cab["own_readings"]
         assert (reading["signal"], reading["unit"]) == ("axle_weight", "kg")
-        weights = cab.get("/api/v1/estimates")["items"][-1]["weights"]
+        weights = told(service, "/api/v1/estimates")["items"][-1]["weights"]
         low_kg, high_kg = weights["gross"].pop("interval95_kg")
         assert low_kg < 1600.0 < high_kg
         assert {**weights["gross"], "std_kg": None} == {
@@ -117,20 +78,21 @@ def test_an_overload_by_the_settings_is_told_everywhere(config: Path, caplog: py
             "is_unsprung_estimated": False,
         }
         assert weights["rear_axle"]["limit_kg"] == 1000.0
-        assert 'springscale_overload{where="gross"} 1.0' in cab.get("/metrics")
+        assert 'springscale_overload{where="gross"} 1.0' in told(service, "/metrics")
 
-    with_service(config, play)
+    serve(config, play)
     assert "overload begins" in caplog.text
 
 
 def test_a_stop_makes_the_load_unknown_until_it_is_weighed_again(config: Path) -> None:
-    def play(cab: Cab) -> None:
+    def play(service: Running) -> None:
         t_s = 0.0
 
         def goes_on(for_s: float, speed_mps: float = 15.0) -> Any:
             nonlocal t_s
             start_ns, t_s = START_NS + round(t_s * 1e9), t_s + for_s
-            return cab.after(white_noise(for_s, start_ns, seed=3, speed_mps=speed_mps))
+            frames = white_noise(for_s, start_ns, seed=3, speed_mps=speed_mps)
+            return after(service, frames, config.parent / "drive.log")
 
         driven = goes_on(45.0)
         assert (driven["load"], driven["stood_s"]) == ("weighed", None)
@@ -146,4 +108,4 @@ def test_a_stop_makes_the_load_unknown_until_it_is_weighed_again(config: Path) -
         assert again["load"] == "weighed"
         assert again["t_end"] > weighed_at
 
-    with_service(config, play)
+    serve(config, play)
