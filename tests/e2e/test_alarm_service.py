@@ -27,12 +27,8 @@ def url() -> str:
 @pytest.fixture
 def service(tmp_path: Path, receiver: Receiver, url: str) -> Iterator[ReplayedService]:
     (tmp_path / "secret").write_text(SECRET_TEXT)
-    keys = {
-        "web__port": int(url.rpartition(":")[2]),
-        "alarms__axle_share_max_pct": 50.0,
-        "webhook__back_off_max_s": 0.1,
-    }
-    keys |= {"webhook__url": f"http://127.0.0.1:{receiver.port}/hook", "webhook__secret_file": "secret"}
+    keys = {"webhook__url": f"http://127.0.0.1:{receiver.port}/hook", "webhook__secret_file": "secret"}
+    keys |= {"web__port": int(url.rpartition(":")[2]), "webhook__back_off_max_s": 0.1}
     with ReplayedService(tmp_path, alarms__axle_share_max_pct=50.0, **keys) as running:
         yield running
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.browser import expect
 from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, Watched
 from support.web import Gateway, serving
@@ -15,9 +16,6 @@ from gateway.estimate_json import estimate_to_json
 from gateway.records import Why, json_line
 from gateway.status import AlarmsStatus, OwnReading, Standing, State
 from gateway.web.access.tokens import Scope, TokenFile
-
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
-expect = playwright.expect
 
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 HURRIED = "{ const set = setInterval; window.setInterval = (draw, ms) => set(draw, ms / 20); }"  # nobody has to wait

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.browser import expect
 from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Watched
 from support.estimates import make_estimate
 from support.web import Gateway, serving
@@ -14,9 +15,6 @@ from gateway.estimate import Z95
 from gateway.records import Why
 from gateway.status import State
 from gateway.web.access.tokens import Scope, TokenFile
-
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
-expect = playwright.expect
 
 
 @pytest.fixture(scope="module")

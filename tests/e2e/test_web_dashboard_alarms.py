@@ -7,15 +7,13 @@ from typing import Any
 import pytest
 from support.absent import of_no_vehicle
 from support.alarms import LIMIT_KG, AlarmBench, of_load
+from support.browser import expect
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
 from support.web import serving
 
 from gateway.status import DeadLetter, WebhookStatus
 from gateway.web.access.tokens import Scope, TokenFile
 from gateway.web.app import create_app
-
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
-expect = playwright.expect
 
 OVER = LIMIT_KG + 60.0
 WEBHOOK = WebhookStatus(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.browser import expect
 from support.dashboard import STATUS, Watched, demo_calibration, weighed
 from support.estimates import make_estimate
 from support.web import Gateway, serving
@@ -14,9 +15,6 @@ from support.web import Gateway, serving
 from gateway.records import Why
 from gateway.status import State
 from gateway.web.access.tokens import Scope, TokenFile
-
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
-expect = playwright.expect
 
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 MOST_SCREENS_ON_A_PHONE = 3.0

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.browser import expect
 from support.calibrated import calibration_file
 from support.commissioning import ANSWERS, NOW_NS, Bench, fitted, in_steps
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
@@ -21,9 +22,6 @@ from gateway.stated.doubt import Doubt, DoubtKind
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
 from gateway.web.access.tokens import Scope, TokenFile
-
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
-expect = playwright.expect
 
 FAULT = Found(kind="pitch_rate_sign", severity="fault", text="the pitch rate is turned over", advice="set sign = -1")
 PHONE = {"viewport": {"width": 390, "height": 844}}

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.browser import expect
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
 from support.days import RULES, day
 from support.web import Gateway, serving
@@ -13,9 +14,6 @@ from support.web import Gateway, serving
 from gateway.core.events.ledger import Ledger
 from gateway.estimate import Estimate
 from gateway.records import json_line
-
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
-expect = playwright.expect
 
 DAY = day(0.0, 500.0, 500.0, 320.0, 200.0)
 

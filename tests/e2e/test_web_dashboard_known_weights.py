@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from support.browser import expect
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
 from support.estimates import make_estimate
 from support.known_weights import KnownWeightBench, with_all_sources
@@ -14,9 +15,6 @@ from support.web import Gateway, serving
 
 from gateway.budget import BudgetLine, budget_of
 from gateway.web.access.tokens import Scope, TokenFile
-
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
-expect = playwright.expect
 
 NONE = "none: weighed by the calibration alone"
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.browser import expect
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
 from support.epochs import drive_of, stored
 from support.verification import CALIBRATED, verification_desk
@@ -13,9 +14,6 @@ from support.web import Gateway, serving
 
 from gateway.service.verification.verification import VerificationService
 from gateway.store import Store
-
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
-expect = playwright.expect
 
 
 @pytest.fixture

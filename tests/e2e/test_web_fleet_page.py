@@ -6,13 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.browser import expect
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, Watched
 from unit.test_fleet_book import alarm, estimate, message
 
 from gateway.fleet import FleetPage, SqliteBook, fleet_app
-
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (dependency group browser)")
-expect = playwright.expect
 
 NOW_S = 1_800_000_000.0
 HURRIED = "{ const set = setInterval; window.setInterval = (draw, ms) => set(draw, ms / 20); }"  # nobody has to wait
