@@ -37,24 +37,11 @@ class LineError(ConfigurationError):
     """Calibrations do not form a line, or a vehicle does not belong to a line."""
 
 
-class WeightRefusedError(SpringscaleError):
-    """A stated weight cannot be used. ``reason`` is one of calibration.known_weight.WeightRefusal."""
+class RefusedError(SpringscaleError):
+    """The service cannot do now what somebody asks for: a known weight, a step of a commissioning, an acknowledgement.
 
-    def __init__(self, reason: str, message: str) -> None:
-        super().__init__(message)
-        self.reason = reason
-
-
-class CommissioningRefusedError(SpringscaleError):
-    """A step of a commissioning cannot be done now. ``reason`` is for programs; the message says what to do."""
-
-    def __init__(self, reason: str, message: str) -> None:
-        super().__init__(message)
-        self.reason = reason
-
-
-class AlarmRefusedError(SpringscaleError):
-    """An alarm cannot be acknowledged. ``reason`` is for programs; the message says why."""
+    ``reason`` is for programs; the message says why, and what to do.
+    """
 
     def __init__(self, reason: str, message: str) -> None:
         super().__init__(message)

@@ -10,7 +10,7 @@ from typing import Final
 from gateway.core.known_weights import KnownWeightKind
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.core.weights.on_the_road import Unsprung
-from gateway.errors import WeightRefusedError
+from gateway.errors import RefusedError
 from gateway.stated.facts import StatedWeight
 
 LEAST_PAYLOAD_SHARE: Final = -0.1  # chosen: of the empty mass; less means another vehicle or another unit
@@ -77,7 +77,7 @@ def load_of(
 
         L = G - M - u_front - u_rear,    D = (F_front - u_front) / (M + L)
 
-    ``unsprung`` is used where no unsprung mass was stated. Raises WeightRefusedError.
+    ``unsprung`` is used where no unsprung mass was stated. Raises RefusedError.
     """
     below = unsprung.unless_stated(vehicle)
     front_u, rear_u = below.front.number, below.rear.number
@@ -134,7 +134,7 @@ def _gross_kg(stated: StatedWeight) -> float:
 
 def _require_unsprung(front_kg: float, rear_kg: float) -> None:
     if math.isnan(front_kg + rear_kg):
-        raise WeightRefusedError(
+        raise RefusedError(
             WeightRefusal.NO_UNSPRUNG_MASS,
             "no payload follows from a weight on the road: the campaign's [vehicle] states neither unsprung masses nor "
             "kerb axle weights, and calibration found none; state the payload instead",
@@ -144,13 +144,13 @@ def _require_unsprung(front_kg: float, rear_kg: float) -> None:
 def _require_possible(payload_kg: float, share_pct: float | None, vehicle: Vehicle) -> None:
     low_kg, high_kg = (share * vehicle.empty_mass_kg for share in (LEAST_PAYLOAD_SHARE, MOST_PAYLOAD_SHARE))
     if not low_kg <= payload_kg <= high_kg:
-        raise WeightRefusedError(
+        raise RefusedError(
             WeightRefusal.IMPOSSIBLE_WEIGHT,
             f"that would be a payload of {payload_kg:.0f} kg; for this vehicle ({vehicle.empty_mass_kg:.0f} kg sprung, "
             f"empty) {low_kg:.0f} to {high_kg:.0f} kg are possible: is it another vehicle's, or another unit?",
         )
     if share_pct is not None and not SHARES_PCT[0] <= share_pct <= SHARES_PCT[1]:
-        raise WeightRefusedError(
+        raise RefusedError(
             WeightRefusal.IMPOSSIBLE_WEIGHT,
             f"that would be {share_pct:.0f} % of the sprung mass on the front axle: are axles or place mixed up?",
         )

@@ -25,7 +25,7 @@ from gateway.core.alarms.alarm import (
 )
 from gateway.core.alarms.rules import AlarmRules, AlarmVerdict, Says
 from gateway.core.alarms.watch import AlarmWatch
-from gateway.errors import AlarmRefusedError
+from gateway.errors import RefusedError
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_from_json
 from gateway.log import Event, log_event
@@ -153,13 +153,13 @@ class AlarmService:
             return f"[{','.join(map(_text, self._watch.active()))}]"
 
     def acknowledge(self, alarm_id: str, by: str, note: str | None) -> str:
-        """Acknowledge an alarm -> its JSON, on disk. Raises AlarmRefusedError."""
+        """Acknowledge an alarm -> its JSON, on disk. Raises RefusedError."""
         with self._lock:
             alarm = self._watch.acknowledge(alarm_id, by, note, self._clock_ns())
             log_event(Event.ALARM_ACKNOWLEDGED, id=alarm.id, alarm=alarm.cause.name, by=by)
             text = self._kept(alarm)
         if not self._store.flush(ON_DISK_WITHIN_S):
-            raise AlarmRefusedError(
+            raise RefusedError(
                 "not_stored",
                 f"it is noted and shown, but not on disk yet: {self._store.health().reason or 'the disk is slow'}",
             )

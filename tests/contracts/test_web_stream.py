@@ -17,7 +17,7 @@ from support.web import Client, Gateway, Server, serving
 from gateway.records import Why
 from gateway.web.app import WebSettings
 from gateway.web.live import stream
-from gateway.web.live.stream import MOST_UNREAD, Fanout, StreamEvent
+from gateway.web.live.stream import MOST_UNREAD, Fanout, server_sent
 
 
 class Listener:
@@ -174,5 +174,5 @@ def test_publishing_after_the_loop_is_gone_harms_nobody() -> None:
         fanout.join(lambda: "ab-0")
 
     asyncio.run(join_and_leave_the_loop())
-    fanout.publish(StreamEvent.of("estimate", "{}", None))
+    fanout.publish(server_sent("estimate", "{}", None))
     fanout.close()

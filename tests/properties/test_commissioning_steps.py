@@ -12,7 +12,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from support.commissioning import ANSWERS, WINDOW_S, Bench, fitted
 
 from gateway.calibration.commissioning.job import Result
-from gateway.errors import CommissioningRefusedError
+from gateway.errors import RefusedError
 from gateway.records import Why
 from gateway.stated.commissioning import CommissioningState
 from gateway.stated.facts import VehicleAnswers
@@ -48,7 +48,7 @@ class Commissioned(RuleBasedStateMachine):
         before = self.told
         try:
             getattr(self.bench.desk, ask)(*said, **more)
-        except CommissioningRefusedError:
+        except RefusedError:
             assert self.told == before
             return False
         return True

@@ -7,7 +7,7 @@ from typing import Any
 
 from gateway.calibration.verification_file import VerificationRule
 from gateway.core.alarms.rules import AlarmRules
-from gateway.errors import CommissioningRefusedError
+from gateway.errors import RefusedError
 from gateway.service.alarms import AlarmService
 from gateway.service.verification.known_weights import KnownWeightService
 from gateway.service.verification.trend import TrendService
@@ -31,7 +31,7 @@ class NoCommissioning:
 
     def __getattr__(self, step: str) -> Any:
         def refuse(*_: object, **__: object) -> str:
-            raise CommissioningRefusedError("not_allowed", "nobody can calibrate here")
+            raise RefusedError("not_allowed", "nobody can calibrate here")
 
         return refuse
 

@@ -15,7 +15,7 @@ from gateway.config import sections as settings
 from gateway.core.alarms.alarm import CAUSE_NAMES
 from gateway.core.alarms.rules import AlarmRules
 from gateway.core.change import Rules
-from gateway.errors import AlarmRefusedError
+from gateway.errors import RefusedError
 from gateway.records import Why
 from gateway.service.alarms import rules_of
 from gateway.service.batch_log import ledger_of
@@ -134,7 +134,7 @@ def test_an_acknowledgement_that_the_disk_refuses_is_told_as_such(
     bench.weigh(of_load(0, OVER))
     (alarm,) = bench.standing()
     monkeypatch.setattr(bench.store, "flush", lambda timeout_s: False)
-    with pytest.raises(AlarmRefusedError) as refusal:
+    with pytest.raises(RefusedError) as refusal:
         bench.desk.acknowledge(alarm["id"], "yard", None)
     assert refusal.value.reason == "not_stored"
     assert bench.standing()[0]["acknowledged"]["by"] == "yard"  # shown all the same, and stored when it can be

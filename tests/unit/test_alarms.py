@@ -28,7 +28,7 @@ from gateway.core.alarms.alarm import (
 from gateway.core.alarms.rules import AlarmRules, AlarmVerdict, Says, beyond_probability
 from gateway.core.alarms.watch import AlarmWatch
 from gateway.core.fusion import epoch_of
-from gateway.errors import AlarmRefusedError
+from gateway.errors import RefusedError
 from gateway.estimate import Estimate, Quantity
 from gateway.records import Why, json_line
 
@@ -179,9 +179,9 @@ def test_somebody_acknowledges_once_by_name() -> None:
     (alarm,) = watch.weigh(of_load(0, LIMIT_KG + 60.0), VAN)
     seen = watch.acknowledge(alarm.id, "yard", "two pallets off", at(7))
     assert (seen.revision, seen.is_active, seen.acknowledged and seen.acknowledged.by) == (2, True, "yard")
-    with pytest.raises(AlarmRefusedError, match="was acknowledged by yard"):
+    with pytest.raises(RefusedError, match="was acknowledged by yard"):
         watch.acknowledge(alarm.id, "yard", None, at(8))
-    with pytest.raises(AlarmRefusedError) as refusal:
+    with pytest.raises(RefusedError) as refusal:
         watch.acknowledge("alarm-1-2", "yard", None, at(8))
     assert refusal.value.reason == "no_such_alarm"
 

@@ -21,7 +21,7 @@ from gateway.calibration.commissioning.job import Found, Result
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.config import Settings
 from gateway.config.sections import CommissioningSection
-from gateway.errors import CommissioningRefusedError
+from gateway.errors import RefusedError
 from gateway.files.kept import KeptFiles
 from gateway.log import Event
 from gateway.records import Why
@@ -47,7 +47,7 @@ def underway(bench: Bench) -> dict[str, Any]:
 
 
 def reason(ask: Callable[[], Any]) -> str:
-    with pytest.raises(CommissioningRefusedError) as refused:
+    with pytest.raises(RefusedError) as refused:
         ask()
     return refused.value.reason
 
@@ -76,7 +76,7 @@ def test_it_is_offered_where_there_is_no_calibration(tmp_path: Path) -> None:
 
 def test_steps_follow_one_another_and_each_is_on_disk(bench: Bench) -> None:
     for until, step in (("line", "line"), ("vehicle", "vehicle"), ("empty", "empty"), ("drive", "drive")):
-        with suppress(CommissioningRefusedError):
+        with suppress(RefusedError):
             bench.desk.cancel("workshop")
         in_steps(bench, until=until)
         assert underway(bench)["step"] == step
@@ -119,7 +119,7 @@ def test_where_it_is_not_allowed_nothing_begins(tmp_path: Path) -> None:
 )
 def test_a_vehicle_that_cannot_be_is_refused_in_words(bench: Bench, changes: dict[str, Any], what: str) -> None:
     in_steps(bench, until="vehicle")
-    with pytest.raises(CommissioningRefusedError, match=what) as refused:
+    with pytest.raises(RefusedError, match=what) as refused:
         bench.desk.state_vehicle(VehicleAnswers(**{**ANSWERS, **changes}))
     assert refused.value.reason == "vehicle_unusable"
     assert underway(bench)["step"] == "vehicle"
@@ -166,7 +166,7 @@ def test_a_fault_keeps_the_vehicle_from_being_called_empty_until_it_is_mended(be
     in_steps(bench, until="empty")
     bench.drive(0, 60, is_provisional=True)
     bench.worker.finish(Result(findings=(FAULT,)))
-    with pytest.raises(CommissioningRefusedError, match=r"turned over: set sign = -1"):
+    with pytest.raises(RefusedError, match=r"turned over: set sign = -1"):
         bench.desk.is_empty("workshop")
     bench.drive(0, 120, is_provisional=True)
     bench.worker.finish(Result())
@@ -461,7 +461,7 @@ def test_a_book_that_cannot_be_set_aside_is_not_written_over(tmp_path: Path, mon
         patch.setattr(KeptFiles, "set_aside", refuse)
         bench = Bench(tmp_path)
         assert "cannot be set aside" in str(bench.desk.fault)
-        with pytest.raises(CommissioningRefusedError, match="Read-only"):
+        with pytest.raises(RefusedError, match="Read-only"):
             bench.desk.begin("workshop", None)
         assert (tmp_path / FILE_NAME).read_text() == "{what was made here"
     bench.desk.begin("workshop", None)

@@ -13,7 +13,7 @@ from gateway.core.change import Rules
 from gateway.core.fusion import LoadEpoch, epoch_of, fused_epoch
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung, weights_of
-from gateway.errors import WeightRefusedError
+from gateway.errors import RefusedError
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_from_json, estimate_to_json
 from gateway.posterior import PAYLOAD, exactly
@@ -60,7 +60,7 @@ def test_without_unsprung_masses_only_a_payload_is_known() -> None:
     known = load_of(StatedWeight(AT, payload_kg=100.0), BARE, NOT_CALIBRATED)
     assert (known.payload_kg, known.gross_kg, known.rear_axle_kg) == (100.0, None, None)
     for stated in (StatedWeight(AT, gross_kg=1500.0), StatedWeight(AT, front_axle_kg=700.0, rear_axle_kg=800.0)):
-        with pytest.raises(WeightRefusedError, match="state the payload instead") as refused:
+        with pytest.raises(RefusedError, match="state the payload instead") as refused:
             load_of(stated, BARE, NOT_CALIBRATED)
         assert refused.value.reason == WeightRefusal.NO_UNSPRUNG_MASS
 
@@ -80,7 +80,7 @@ def test_those_that_calibration_found_do() -> None:
     ],
 )
 def test_what_cannot_be_is_refused_in_words(stated: StatedWeight, why: str) -> None:
-    with pytest.raises(WeightRefusedError, match=why) as refused:
+    with pytest.raises(RefusedError, match=why) as refused:
         load_of(stated, VAN, NOT_CALIBRATED)
     assert refused.value.reason == WeightRefusal.IMPOSSIBLE_WEIGHT
 
@@ -129,7 +129,7 @@ def at(t_ns: int, drive: Drive | None = None) -> WeighedEpoch:
 
 
 def refused(t_ns: int, drive: Drive | None = None) -> str:
-    with pytest.raises(WeightRefusedError) as caught:
+    with pytest.raises(RefusedError) as caught:
         at(t_ns, drive)
     return caught.value.reason
 

@@ -15,7 +15,7 @@ from support.log import fields_of, names
 from gateway.calibration.known_weight import STD_KG, WeightRefusal
 from gateway.calibration.known_weights_file import FILE_NAME, MOST_KNOWN_WEIGHTS, load_known_weights
 from gateway.core.known_weights import KnownWeightKind
-from gateway.errors import ConfigurationError, WeightRefusedError
+from gateway.errors import ConfigurationError, RefusedError
 from gateway.files.kept import KeptFiles
 from gateway.log import Event
 from gateway.posterior import FRONT_SHARE, PAYLOAD, Posterior, Source
@@ -33,7 +33,7 @@ def bench(tmp_path: Path) -> Iterator[KnownWeightBench]:
 
 
 def refusal(ask: Callable[[], Any]) -> str:
-    with pytest.raises(WeightRefusedError) as refused:
+    with pytest.raises(RefusedError) as refused:
         ask()
     return refused.value.reason
 

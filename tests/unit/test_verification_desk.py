@@ -10,7 +10,7 @@ from support.epochs import START_NS, drive_of, stored
 from support.verification import CALIBRATED, RULE, verification_desk
 
 from gateway.calibration.known_weight import WeightRefusal
-from gateway.errors import WeightRefusedError
+from gateway.errors import RefusedError
 from gateway.records import iso_utc
 from gateway.stated.facts import Drive, StatedWeight
 from gateway.store import Store
@@ -82,7 +82,7 @@ def test_records_stay_and_are_told_newest_first(tmp_path: Path, store: Store) ->
 
 def refusal_of(tmp_path: Path, store: Store, stated: StatedWeight) -> str:
     desk = verification_desk(tmp_path, store)
-    with pytest.raises(WeightRefusedError) as refused:
+    with pytest.raises(RefusedError) as refused:
         desk.verify("workshop", None, [stated])
     assert json.loads(desk.state())["history"] == []
     return refused.value.reason

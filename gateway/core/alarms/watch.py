@@ -7,7 +7,7 @@ from gateway.core.alarms.alarm import CAUSES, Acknowledged, Alarm, AlarmCause, A
 from gateway.core.alarms.rules import NO_DRIVES, AlarmRules, Says, verdicts_of
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung
-from gateway.errors import AlarmRefusedError
+from gateway.errors import RefusedError
 from gateway.estimate import Estimate
 
 SWITCHED_OFF = AlarmFigure(detail="switched off")
@@ -52,15 +52,15 @@ class AlarmWatch:
         return [self._stepped(cause, AlarmStep(AlarmState.CLEARED, t_ns, SWITCHED_OFF)) for cause in off]
 
     def acknowledge(self, alarm_id: str, by: str, note: str | None, t_ns: int) -> Alarm:
-        """Acknowledge an alarm. Raises AlarmRefusedError if it is not the last of its cause, or is already
+        """Acknowledge an alarm. Raises RefusedError if it is not the last of its cause, or is already
         acknowledged.
         """
         alarm = next((one for one in self._last.values() if one.id == alarm_id), None)
         if alarm is None:
-            raise AlarmRefusedError("no_such_alarm", f"{alarm_id} is none of the alarms that can be acknowledged")
+            raise RefusedError("no_such_alarm", f"{alarm_id} is none of the alarms that can be acknowledged")
         if alarm.acknowledged is not None:
             who = alarm.acknowledged.by
-            raise AlarmRefusedError("acknowledged_already", f"{alarm_id} was acknowledged by {who}")
+            raise RefusedError("acknowledged_already", f"{alarm_id} was acknowledged by {who}")
         seen = self._last[alarm.cause] = alarm.seen(Acknowledged(by, t_ns, note))
         return seen
 

@@ -13,7 +13,7 @@ from gateway.calibration.kept.shelf import Shelf
 from gateway.config.sections import CommissioningSection
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle, front_share_pct
-from gateway.errors import CalibrationFileError, CommissioningRefusedError
+from gateway.errors import CalibrationFileError, RefusedError
 from gateway.log import Event
 from gateway.records import Why
 from gateway.service.commissioning.record import MADE, LineChoice, MadeCalibration, RecordStore, Underway
@@ -109,7 +109,7 @@ class EmptyDrive:
             is_of_drive = underway.empty is not None and underway.empty.covers(batch.drive_start_ns, batch.t_start_ns)
             try:
                 has_grown = is_of_drive and self._remember(underway, kept)
-            except (OSError, CommissioningRefusedError) as refusal:
+            except (OSError, RefusedError) as refusal:
                 self._book.cannot_store(refusal)
                 return
             if has_grown:
@@ -135,11 +135,11 @@ class EmptyDrive:
             change["empty"] = underway.empty.model_copy(update={"drive_start_ns": None, "newest_ns": None})
         try:
             self._book.keep_underway(underway.model_copy(update=change))
-        except CommissioningRefusedError as refusal:
+        except RefusedError as refusal:
             self._book.cannot_store(refusal)
 
     def _remember(self, underway: Underway, kept: KeptBatch) -> bool:
-        """Add a batch to the drive; True if one counted. Raises OSError, CommissioningRefusedError."""
+        """Add a batch to the drive; True if one counted. Raises OSError, RefusedError."""
         batch, before = kept.batch, underway.open_batch
         change: dict[str, Any] = {"open_batch": None}
         if batch.is_provisional and not batch.rejected:
@@ -206,7 +206,7 @@ class EmptyDrive:
                 return
             try:
                 self._take(underway, underway.vehicle, result)
-            except (CommissioningRefusedError, CalibrationFileError) as refusal:
+            except (RefusedError, CalibrationFileError) as refusal:
                 self._book.cannot_store(refusal)
 
     def _take(self, underway: Underway, vehicle: VehicleAnswers, result: Result) -> None:

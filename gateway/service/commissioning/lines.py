@@ -14,7 +14,7 @@ from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.file.line_file import LikeFile, load_like
 from gateway.calibration.line_files import line_of_files
 from gateway.core.vehicle import Vehicle
-from gateway.errors import CalibrationFileError, CommissioningRefusedError, ConfigurationError, LineError
+from gateway.errors import CalibrationFileError, ConfigurationError, LineError, RefusedError
 from gateway.files.kept import KeptFiles
 from gateway.files.signed import SUFFIX, Trust
 from gateway.service.commissioning.record import LineChoice
@@ -51,14 +51,14 @@ class Lines:
                     yield LineFoundTold(name=path.name, source=source, id=held.id, vehicle=_figures(held), fault=None)
 
     def choose(self, name: str, source: LineSource) -> tuple[LineChoice, bytes]:
-        """The choice and the file's content. Raises CommissioningRefusedError."""
+        """The choice and the file's content. Raises RefusedError."""
         path = next((folder / name for one, folder in self._folders if one == source and folder is not None), None)
         if path is None or _NAME.fullmatch(name) is None or not path.is_file():
-            raise CommissioningRefusedError("no_such_line", f"there is no line {name!r} of the {source}")
+            raise RefusedError("no_such_line", f"there is no line {name!r} of the {source}")
         try:
             held, content = self._load(source, path)
         except ConfigurationError as fault:
-            raise CommissioningRefusedError("line_unusable", str(fault)) from None
+            raise RefusedError("line_unusable", str(fault)) from None
         copy_name = f"line-{hashlib.sha256(content).hexdigest()[:16]}.json"
         figures = _figures(held)
         shared = {key: figures[key] for key in OF_THE_LINE if figures.get(key) is not None}
@@ -74,14 +74,14 @@ class Lines:
         return choice, content
 
     def upload(self, name: str, content: str, signature: str | None) -> None:
-        """Keep a file under this name; on disk when this returns. Raises CommissioningRefusedError."""
+        """Keep a file under this name; on disk when this returns. Raises RefusedError."""
         if _NAME.fullmatch(name) is None:
-            raise CommissioningRefusedError(
+            raise RefusedError(
                 "bad_name", f"{name!r}: a line's file is called like van-model.json: letters, digits, dots, dashes"
             )
         written = content.encode()
         if len(written) > MOST_BYTES:
-            raise CommissioningRefusedError("too_large", f"{name} is longer than {MOST_BYTES} bytes")
+            raise RefusedError("too_large", f"{name} is longer than {MOST_BYTES} bytes")
         kept, fresh = KeptFiles(self._uploaded), f".{name}.looked-at"
         try:
             self._require_place(name, written)
@@ -93,10 +93,10 @@ class Lines:
                 kept.write(name + SUFFIX, signature.encode())
             kept.write(name, written)
         except OSError as fault:
-            raise CommissioningRefusedError("not_stored", f"{name} cannot be kept: {fault}") from None
+            raise RefusedError("not_stored", f"{name} cannot be kept: {fault}") from None
         except ConfigurationError as fault:
             said = str(fault).replace(str(self._uploaded / fresh), name)
-            raise CommissioningRefusedError("line_unusable", said) from None
+            raise RefusedError("line_unusable", said) from None
         finally:
             for leftover in (fresh, fresh + SUFFIX):
                 with suppress(OSError):
@@ -105,9 +105,9 @@ class Lines:
     def _require_place(self, name: str, written: bytes) -> None:
         there = {path.name for path in self._uploaded.glob("*.json")} if self._uploaded.is_dir() else set()
         if name in there and (self._uploaded / name).read_bytes() != written:
-            raise CommissioningRefusedError("name_taken", f"another line was uploaded as {name}: choose another name")
+            raise RefusedError("name_taken", f"another line was uploaded as {name}: choose another name")
         if name not in there and len(there) >= MOST_UPLOADED:
-            raise CommissioningRefusedError("too_many", f"{MOST_UPLOADED} lines were uploaded already")
+            raise RefusedError("too_many", f"{MOST_UPLOADED} lines were uploaded already")
 
     def _load(self, source: LineSource, path: Path) -> tuple[LikeFile, bytes]:
         """The file and its content. Raises ConfigurationError."""
@@ -127,13 +127,13 @@ class Lines:
 
 
 def require_alike(directory: Path, line: LineChoice, vehicle: Vehicle) -> None:
-    """Raises CommissioningRefusedError if a vehicle is not of the line, whose copy lies in ``directory``."""
+    """Raises RefusedError if a vehicle is not of the line, whose copy lies in ``directory``."""
     if line.copy_name is None:
         return
     try:
         line_of_files([load_like(directory / line.copy_name)]).prior_of(vehicle, with_roll=False)
     except (CalibrationFileError, LineError) as fault:
-        raise CommissioningRefusedError("not_of_the_line", str(fault)) from None
+        raise RefusedError("not_of_the_line", str(fault)) from None
 
 
 def _figures(held: LikeFile) -> dict[str, object]:

@@ -13,7 +13,7 @@ from gateway.calibration.commissioning.job import Learned
 from gateway.calibration.file.calibration_file import load_calibration
 from gateway.calibration.file.parts import Part
 from gateway.core.vehicle import Vehicle
-from gateway.errors import CalibrationFileError, CommissioningRefusedError
+from gateway.errors import CalibrationFileError, RefusedError
 from gateway.files.kept import KeptFiles
 from gateway.log import Event, OnEvent, log_event, tell_event
 from gateway.records import iso_utc
@@ -169,11 +169,11 @@ class RecordStore(RecordFile[CommissioningRecord]):
         self.save(self.record.model_copy(update={"underway": underway}))
 
     def save(self, record: CommissioningRecord) -> None:
-        """Write the record to disk. Raises CommissioningRefusedError if the disk fails; then nothing has changed."""
+        """Write the record to disk. Raises RefusedError if the disk fails; then nothing has changed."""
         try:
             self.keep(record)
         except OSError as fault:
-            raise CommissioningRefusedError(
+            raise RefusedError(
                 "not_stored", f"{self.path} cannot be written, so nothing has changed: {fault}"
             ) from None
 
@@ -181,12 +181,12 @@ class RecordStore(RecordFile[CommissioningRecord]):
         try:
             KeptFiles(self.directory).write(name, content)
         except OSError as fault:
-            raise CommissioningRefusedError("not_stored", f"{name} cannot be written: {fault}") from None
+            raise RefusedError("not_stored", f"{name} cannot be written: {fault}") from None
 
     def write_calibration(self, text: str, calibration_id: str) -> str:
         """Write a calibration that was made here -> the name of its file, after reading it back.
 
-        Raises CommissioningRefusedError, and CalibrationFileError if the file differs from the fit.
+        Raises RefusedError, and CalibrationFileError if the file differs from the fit.
         """
         name = f"{MADE}{calibration_id.removeprefix('sha256:')[:16]}.json"
         self.write(name, text.encode())

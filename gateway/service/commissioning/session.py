@@ -12,7 +12,7 @@ from gateway.config.sections import CommissioningSection
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
-from gateway.errors import CampaignError, CommissioningRefusedError
+from gateway.errors import CampaignError, RefusedError
 from gateway.log import Event, OnEvent
 from gateway.part import STOP_WITHIN_S, ServicePart
 from gateway.service.commissioning.empty_drive import EmptyDrive, MakeWorker, ServiceVehicle
@@ -102,20 +102,18 @@ class Commissioning(ServicePart):
         return LinesFound(items=list(self._lines.found())).model_dump_json()
 
     def upload(self, name: str, content: str, signature: str | None) -> str:
-        """Keep a line's file -> the LinesFound with it. Raises CommissioningRefusedError."""
+        """Keep a line's file -> the LinesFound with it. Raises RefusedError."""
         self._require_allowed()
         with self._book.lock:
             self._lines.upload(name, content, signature)
         return self.lines()
 
     def begin(self, by: str, note: str | None) -> str:
-        """Begin a commissioning. Raises CommissioningRefusedError, as all later steps."""
+        """Begin a commissioning. Raises RefusedError, as all later steps."""
         self._require_allowed()
         with self._book.lock:
             if self._book.record.underway is not None:
-                raise CommissioningRefusedError(
-                    "already_begun", "a commissioning is under way: cancel it to start another"
-                )
+                raise RefusedError("already_begun", "a commissioning is under way: cancel it to start another")
             begun = Underway(begun_at=self._book.now(), by=by, note=note, signals_id=self._vehicle.signals_id)
             self._drive.forget()
             self._book.keep_underway(begun)
@@ -151,7 +149,7 @@ class Commissioning(ServicePart):
             underway = self._underway(CommissioningStep.VEHICLE)
             doubts = underway.open_doubts
             if not doubts:
-                raise CommissioningRefusedError("nothing_doubted", "there is no doubt to confirm")
+                raise RefusedError("nothing_doubted", "there is no doubt to confirm")
             if underway.line is not None and underway.vehicle is not None:
                 require_alike(self._book.directory, underway.line, self._table(underway.vehicle, underway.line))
             kinds = tuple(dict.fromkeys(one.kind for one in doubts))
@@ -168,7 +166,7 @@ class Commissioning(ServicePart):
         with self._book.lock:
             underway = self._underway(CommissioningStep.EMPTY)
             if self._drive.looked is not None and self._drive.looked.has_fault:
-                raise CommissioningRefusedError(
+                raise RefusedError(
                     "inspection_fault",
                     "the first minutes show a fault: " + "; ".join(
                         f"{one.text}: {one.advice}" for one in self._drive.looked.findings if one.severity == "fault"
@@ -189,7 +187,7 @@ class Commissioning(ServicePart):
         with self._book.lock:
             underway = self._underway(CommissioningStep.DRIVE)
             if not underway.batches:
-                raise CommissioningRefusedError(
+                raise RefusedError(
                     "no_batch",
                     "no batch of the empty drive has counted yet: drive on until one has",
                 )
@@ -212,7 +210,7 @@ class Commissioning(ServicePart):
         with self._book.lock:
             standing = tuple(one for one in self._book.record.made if one.ended is None)
             if not standing:
-                raise CommissioningRefusedError("nothing_made", "no calibration made on the vehicle is in use")
+                raise RefusedError("nothing_made", "no calibration made on the vehicle is in use")
             chosen = standing if to_factory else standing[-1:]
             end = Ended(at=self._book.now(), by=by, why="back_to_factory" if to_factory else "undone")
             self._book.save(self._book.record.ended(chosen, end))
@@ -231,20 +229,20 @@ class Commissioning(ServicePart):
         return OpenWindow(0.0, max(0.0, 2.0 * window_s - open_s))
 
     def _underway(self, least: CommissioningStep = CommissioningStep.LINE) -> Underway:
-        """The commissioning under way. Raises CommissioningRefusedError unless it has reached ``least``."""
+        """The commissioning under way. Raises RefusedError unless it has reached ``least``."""
         self._require_allowed()
         underway = self._book.record.underway
         if underway is None:
-            raise CommissioningRefusedError("not_begun", "no commissioning is under way: begin one")
+            raise RefusedError("not_begun", "no commissioning is under way: begin one")
         step, order = step_of(underway), list(CommissioningStep)
         if order.index(step) < order.index(least):
-            raise CommissioningRefusedError("wrong_step", f"{step} is still to be answered before {least}")
+            raise RefusedError("wrong_step", f"{step} is still to be answered before {least}")
         if step is CommissioningStep.FIT:
-            raise CommissioningRefusedError("fitting", "the calibration is being made: wait for it, or cancel")
+            raise RefusedError("fitting", "the calibration is being made: wait for it, or cancel")
         return underway
 
     def _require_usable(self, line: LineChoice, answers: VehicleAnswers | None) -> None:
-        """Raises CommissioningRefusedError if the answers describe no vehicle, or surely not one of the line."""
+        """Raises RefusedError if the answers describe no vehicle, or surely not one of the line."""
         if answers is not None:
             table = self._table(answers, line)
             if not doubts_of(answers, line.facts):
@@ -255,11 +253,11 @@ class Commissioning(ServicePart):
             return vehicle_table(answers, self._vehicle.name)
         except CampaignError as fault:
             meant = meant_by(doubts_of(answers, line.facts))
-            raise CommissioningRefusedError("vehicle_unusable", f"{fault}{meant}") from None
+            raise RefusedError("vehicle_unusable", f"{fault}{meant}") from None
 
     def _require_allowed(self) -> None:
         if self._vehicle.why_not_allowed is not None:
-            raise CommissioningRefusedError("not_allowed", self._vehicle.why_not_allowed)
+            raise RefusedError("not_allowed", self._vehicle.why_not_allowed)
 
 
 def _anew(answers: VehicleAnswers | None, line: LineChoice) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from gateway.calibration.known_weight import WeightRefusal
-from gateway.errors import StoreError, WeightRefusedError
+from gateway.errors import RefusedError, StoreError
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_from_json
 from gateway.history import HistoryPage
@@ -48,9 +48,9 @@ class WeighedEpoch:
         return self.calibration_id, self.estimator
 
     def require(self, calibration_id: str | None, estimator: str) -> None:
-        """Raises WeightRefusedError if it was weighed by another calibration or estimator."""
+        """Raises RefusedError if it was weighed by another calibration or estimator."""
         if self.scale != (calibration_id, estimator):
-            raise WeightRefusedError(
+            raise RefusedError(
                 WeightRefusal.OTHER_CALIBRATION,
                 f"the load of {self.label()} was weighed by another calibration or estimator than the one in use: "
                 "weigh it again",
@@ -82,7 +82,7 @@ def epochs_of(estimates: Iterable[Estimate]) -> list[WeighedEpoch]:
 
 
 def epoch_at(epochs: Sequence[WeighedEpoch], at_ns: int, drive: Drive | None) -> WeighedEpoch:
-    """The epoch whose load was weighed at this time. Raises WeightRefusedError if there is none, or if there are two.
+    """The epoch whose load was weighed at this time. Raises RefusedError if there is none, or if there are two.
 
     Within a drive the epoch is unambiguous. Between two drives it may be the earlier or the later one.
     """
@@ -94,13 +94,13 @@ def epoch_at(epochs: Sequence[WeighedEpoch], at_ns: int, drive: Drive | None) ->
     after = [epoch for epoch in near if epoch.t_start_ns > at_ns][:1]
     candidates = {Drive.BEFORE: before, Drive.AFTER: after, None: before + after}[drive]
     if not candidates:
-        raise WeightRefusedError(
+        raise RefusedError(
             WeightRefusal.NO_EPOCH,
             f"no load was weighed {'around' if drive is None else drive} {iso_utc(at_ns)[:16]}Z (12 hours at most): "
             "drive with it until a batch has counted, and state it then with the time at which it was known",
         )
     if len(candidates) > 1:
-        raise WeightRefusedError(
+        raise RefusedError(
             WeightRefusal.AMBIGUOUS_EPOCH,
             f"{iso_utc(at_ns)[:16]}Z lies between two loads, {before[0].label()} and {after[0].label()}: state whether "
             f"it belongs to the drive before or after",
@@ -109,11 +109,11 @@ def epoch_at(epochs: Sequence[WeighedEpoch], at_ns: int, drive: Drive | None) ->
 
 
 def epochs_around(ask: Ask, at_ns: int) -> list[WeighedEpoch]:
-    """The stored epochs around a time. Raises WeightRefusedError if the store cannot be read."""
+    """The stored epochs around a time. Raises RefusedError if the store cannot be read."""
     try:
         return epochs_of(_estimates(ask, at_ns - NEAR_NS, at_ns + NEAR_NS))
     except (StoreError, TimeoutError) as fault:
-        raise WeightRefusedError(WeightRefusal.NOT_STORED, f"the store cannot be read now: {fault}") from None
+        raise RefusedError(WeightRefusal.NOT_STORED, f"the store cannot be read now: {fault}") from None
 
 
 def _estimates(ask: Ask, since_ns: int, until_ns: int) -> Iterator[Estimate]:

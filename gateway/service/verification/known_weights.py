@@ -17,7 +17,7 @@ from gateway.calibration.known_weights_file import FILE_NAME, KnownWeight, Known
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.fusion import WeighedLoad
 from gateway.core.known_weights import KnownWeightKind
-from gateway.errors import WeightRefusedError
+from gateway.errors import RefusedError
 from gateway.estimate_json import posterior_to_json
 from gateway.log import Event, OnEvent, tell_event
 from gateway.posterior import FRONT_SHARE, PAYLOAD, Posterior, Source
@@ -119,7 +119,7 @@ class KnownWeightService:
 
     def add(self, kind: KnownWeightKind, by: str, note: str | None, stated: StatedWeight | None = None) -> str:
         """One more known weight -> its JSON. Without a stated load the vehicle is empty now. Raises
-        WeightRefusedError.
+        RefusedError.
         """
         with self._lock:
             calibrated = self._calibrated()
@@ -165,11 +165,11 @@ class KnownWeightService:
             return json_line(self._shown(entry))
 
     def confirm(self, by: str, entry_id: str) -> str:
-        """Confirm a held entry, which is used from then on -> the state. Raises WeightRefusedError."""
+        """Confirm a held entry, which is used from then on -> the state. Raises RefusedError."""
         with self._lock:
             entry = self._standing(entry_id)
             if not entry.is_held:
-                raise WeightRefusedError(WeightRefusal.NOT_HELD, "this known weight is in use: nothing to confirm")
+                raise RefusedError(WeightRefusal.NOT_HELD, "this known weight is in use: nothing to confirm")
             confirmed = Confirmation(at=iso_utc(self._clock_ns()), by=by)
             self._keep(self._file.record.changed(entry_id, confirmed=confirmed))
             self._tell(Event.WEIGHT_CONFIRMED, entry, by)
@@ -180,16 +180,16 @@ class KnownWeightService:
         with self._lock:
             entry = self._standing(entry_id)
             if entry.kind not in kinds:
-                raise WeightRefusedError(WeightRefusal.NO_SUCH_WEIGHT, _NO_SUCH)
+                raise RefusedError(WeightRefusal.NO_SUCH_WEIGHT, _NO_SUCH)
             self._end([entry], by, "withdrawn")
             return self.state(kinds)
 
     def take_back_empty(self, by: str, *, to_factory: bool) -> str:
-        """Withdraw the last "it is empty now", or all of them -> their state. Raises WeightRefusedError."""
+        """Withdraw the last "it is empty now", or all of them -> their state. Raises RefusedError."""
         with self._lock:
             standing = [one for one in self._own() if one.kind is KnownWeightKind.EMPTY and one.ended is None]
             if not standing:
-                raise WeightRefusedError(WeightRefusal.NO_SUCH_WEIGHT, "no tare is in use")
+                raise RefusedError(WeightRefusal.NO_SUCH_WEIGHT, "no tare is in use")
             self._end(standing if to_factory else standing[-1:], by, "back_to_factory" if to_factory else "withdrawn")
             return self.state((KnownWeightKind.EMPTY,))
 
@@ -219,7 +219,7 @@ class KnownWeightService:
         try:
             self._calibrated()
             load = self._present()
-        except WeightRefusedError as refusal:
+        except RefusedError as refusal:
             return {"is_possible": False, "reason": refusal.reason, "detail": str(refusal), "load": None}
         estimated = self._estimated(load)
         shown = {
@@ -235,27 +235,25 @@ class KnownWeightService:
 
     def _calibrated(self) -> CalibratedVehicle:
         if self._subject.calibrated is None:
-            raise WeightRefusedError(
-                WeightRefusal.NO_CALIBRATION, "no calibration is loaded, so there is nothing to correct"
-            )
+            raise RefusedError(WeightRefusal.NO_CALIBRATION, "no calibration is loaded, so there is nothing to correct")
         return self._subject.calibrated
 
     def _present(self) -> _Load:
-        """The last weighed load. Raises WeightRefusedError if it may have changed or is stale."""
+        """The last weighed load. Raises RefusedError if it may have changed or is stale."""
         flow, age_s = self._pipeline.flow, self._pipeline.weighed_age_s()
         weighed = flow.weighed
         if weighed is None or age_s is None:
-            raise WeightRefusedError(
+            raise RefusedError(
                 WeightRefusal.NO_COUNTED_BATCH,
                 "no batch has counted since the service started: drive, empty, until one has",
             )
         if flow.load_may_have_changed:
-            raise WeightRefusedError(
+            raise RefusedError(
                 WeightRefusal.LOAD_MAY_HAVE_CHANGED,
                 "the vehicle has stopped and driven on since it was weighed: wait for the next batch that counts",
             )
         if age_s > self._stale_after_s:
-            raise WeightRefusedError(
+            raise RefusedError(
                 WeightRefusal.STALE,
                 f"it was weighed {age_s:.0f} s ago, and this needs less than {self._stale_after_s:.0f} s: "
                 "drive, empty, until the next batch has counted",
@@ -263,7 +261,7 @@ class KnownWeightService:
         return _Load.of_weighed(weighed)
 
     def _at(self, stated: StatedWeight, calibrated: CalibratedVehicle) -> _Load:
-        """The stored load at the stated time. Raises WeightRefusedError."""
+        """The stored load at the stated time. Raises RefusedError."""
         at_ns = ns_of(stated.at)
         epoch = epoch_at(epochs_around(self._ask, at_ns), at_ns, stated.drive)
         epoch.require(calibrated.id, self._subject.estimator)
@@ -278,7 +276,7 @@ class KnownWeightService:
         standing = (one for one in self._own() if one.ended is None)
         other = next((one for one in standing if set(one.batch_ids) & set(load.batch_ids)), None)
         if other is not None:
-            raise WeightRefusedError(
+            raise RefusedError(
                 WeightRefusal.ALREADY_KNOWN,
                 f"that load has a known weight already ({other.payload_kg:.0f} kg, {other.id[:19]}): take that back "
                 f"first",
@@ -287,7 +285,7 @@ class KnownWeightService:
     def _standing(self, entry_id: str) -> KnownWeight:
         found = next((one for one in self._file.record.entries if one.id == entry_id and one.ended is None), None)
         if found is None:
-            raise WeightRefusedError(WeightRefusal.NO_SUCH_WEIGHT, _NO_SUCH)
+            raise RefusedError(WeightRefusal.NO_SUCH_WEIGHT, _NO_SUCH)
         return found
 
     def _end(self, entries: Sequence[KnownWeight], by: str, why: str) -> None:
@@ -300,11 +298,11 @@ class KnownWeightService:
             self._tell(Event.WEIGHT_TAKEN_BACK, entry, by)
 
     def _keep(self, history: KnownWeights) -> None:
-        """On disk, then in use. Raises WeightRefusedError if the disk refuses; then nothing has changed."""
+        """On disk, then in use. Raises RefusedError if the disk refuses; then nothing has changed."""
         try:
             self._file.keep(history)
         except OSError as fault:
-            raise WeightRefusedError(
+            raise RefusedError(
                 WeightRefusal.NOT_STORED, f"the known weights cannot be written, so nothing has changed: {fault}"
             ) from None
         self._use()

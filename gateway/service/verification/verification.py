@@ -19,7 +19,7 @@ from gateway.calibration.verification_file import (
     verdict_of,
 )
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.errors import WeightRefusedError
+from gateway.errors import RefusedError
 from gateway.log import Event, OnEvent, tell_event
 from gateway.quantity import Quantity
 from gateway.records import iso_utc, json_line, ns_of
@@ -102,10 +102,10 @@ class VerificationService:
         return None if found is None else found.model_dump(mode="json")
 
     def verify(self, by: str, note: str | None, stated: Sequence[StatedWeight]) -> str:
-        """Judge these known loads -> the new record as JSON, on disk. Raises WeightRefusedError and stores nothing."""
+        """Judge these known loads -> the new record as JSON, on disk. Raises RefusedError and stores nothing."""
         calibrated = self._subject.calibrated
         if calibrated is None:
-            raise WeightRefusedError(WeightRefusal.NO_CALIBRATION, "there is no calibration, and so nothing to verify")
+            raise RefusedError(WeightRefusal.NO_CALIBRATION, "there is no calibration, and so nothing to verify")
         epochs = [epoch_at(epochs_around(self._ask, ns_of(one.at)), ns_of(one.at), one.drive) for one in stated]
         loads = tuple(self._judged(one, epoch, calibrated) for one, epoch in zip(stated, epochs, strict=True))
         entry = Verification(
@@ -126,7 +126,7 @@ class VerificationService:
             try:
                 self._file.keep(self._file.record.with_entry(entry))
             except OSError as fault:
-                raise WeightRefusedError(WeightRefusal.NOT_STORED, f"the record cannot be kept: {fault}") from None
+                raise RefusedError(WeightRefusal.NOT_STORED, f"the record cannot be kept: {fault}") from None
         told: dict[str, Any] = {"verification_id": entry.id, "by": by, "verdict": entry.verdict, "n_loads": len(loads)}
         tell_event(Event.VERIFIED, told, self._on_event)
         return json_line(entry.model_dump(mode="json"))

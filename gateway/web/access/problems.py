@@ -9,7 +9,7 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
-from gateway.errors import StoreError
+from gateway.errors import RefusedError, StoreError
 from gateway.web.schemas import Fault, Problem
 
 MEDIA_TYPE: Final = "application/problem+json"
@@ -44,6 +44,7 @@ def install(app: FastAPI) -> None:
     """Answer every error in ``app`` with problem details."""
     app.add_exception_handler(HTTPException, _http)
     app.add_exception_handler(RequestValidationError, _invalid)
+    app.add_exception_handler(RefusedError, _refused)
     app.add_exception_handler(StoreError, _unavailable)
     app.add_exception_handler(TimeoutError, _unavailable)
     app.add_exception_handler(Exception, _unforeseen)
@@ -93,6 +94,21 @@ async def _invalid(request: Request, error: Exception) -> Response:
     detail = "; ".join(f"{where}: {what}" for where, what in said.items())
     faults = [Fault(where=where, what=what) for where, what in said.items()]
     return problem_response(422, detail, request.url.path, faults)
+
+
+_CODES: Final = {
+    "not_stored": 503,
+    "not_allowed": 403,
+    "no_such_line": 404,
+    "no_such_alarm": 404,
+    "no_such_weight": 404,
+}  # of reasons; else 409
+
+
+async def _refused(request: Request, refusal: Exception) -> Response:
+    assert isinstance(refusal, RefusedError)
+    code = _CODES.get(refusal.reason, 409)
+    return problem_response(code, str(refusal), request.url.path, reason=refusal.reason)
 
 
 async def _unavailable(request: Request, error: Exception) -> Response:

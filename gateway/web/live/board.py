@@ -15,7 +15,7 @@ from gateway.estimate import Estimate, Weights
 from gateway.estimate_json import estimate_from_json, estimate_to_json
 from gateway.history import ESTIMATE, REJECTION
 from gateway.records import Why, json_line
-from gateway.web.live.stream import Fanout, StreamEvent
+from gateway.web.live.stream import Fanout, server_sent
 
 RECENT: Final = 100  # chosen: good estimates for the warnings, which look back over eight hours of driving
 PROVISIONAL: Final = "provisional"
@@ -105,7 +105,7 @@ class Board:
         with self._lock:
             self._show(estimate_from_json(record), self._clock())
         if estimate.is_provisional:
-            self.fanout.publish(StreamEvent.of(PROVISIONAL, json_line(record), None))
+            self.fanout.publish(server_sent(PROVISIONAL, json_line(record), None))
 
     def restore(self, estimate: str | None, rejection: str | None, age_s: float | None) -> None:
         """Show the estimate that an earlier run of the service stored, with its age; ``age_s`` None: unknown, so it is

@@ -7,7 +7,6 @@ import asyncio
 import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any, Final
 
 from starlette.responses import Response
@@ -20,18 +19,10 @@ from gateway.store import Follower, StoreReader
 MOST_UNREAD: Final = 64  # chosen: events that may come while a client takes none: hours of batches
 
 
-@dataclass(frozen=True, slots=True)
-class StreamEvent:
-    """A server-sent event, ready for the wire (WHATWG HTML, 9.2)."""
-
-    cursor: str | None
-    wire: bytes
-
-    @classmethod
-    def of(cls, kind: str, text: str, cursor: str | None) -> "StreamEvent":
-        """``text`` must be one line, as compact JSON is."""
-        identity = "" if cursor is None else f"id: {cursor}\n"
-        return cls(cursor, f"{identity}event: {kind}\ndata: {text}\n\n".encode())
+def server_sent(kind: str, text: str, cursor: str | None) -> bytes:
+    """An event as sent (WHATWG HTML, 9.2); ``text`` must be one line, as compact JSON is."""
+    identity = "" if cursor is None else f"id: {cursor}\n"
+    return f"{identity}event: {kind}\ndata: {text}\n\n".encode()
 
 
 class Subscription:
@@ -45,13 +36,13 @@ class Subscription:
         self._loop = asyncio.get_running_loop()
         self._head = head
         self._news = asyncio.Event()
-        self._passing: tuple[str, StreamEvent] | None = None
+        self._passing: tuple[str, bytes] | None = None
         self._n_unread = 0
         self.ended = asyncio.Event()
         self.is_lagging = False
         self.n_dropped = 0
 
-    def hear(self, passing: StreamEvent | None = None) -> None:
+    def hear(self, passing: bytes | None = None) -> None:
         """There is a new record, or an event that is not stored; from any thread."""
         self._in_loop(self._count, None if passing is None else (self._head(), passing))
 
@@ -68,7 +59,7 @@ class Subscription:
         self._news.clear()
         return is_news
 
-    def take(self) -> tuple[str, StreamEvent] | None:
+    def take(self) -> tuple[str, bytes] | None:
         """The event that is not stored, if there is one, and the record it follows."""
         passing, self._passing = self._passing, None
         return passing
@@ -77,7 +68,7 @@ class Subscription:
         """The client has received what it was sent."""
         self._n_unread = 0
 
-    def _count(self, passing: tuple[str, StreamEvent] | None) -> None:
+    def _count(self, passing: tuple[str, bytes] | None) -> None:
         self._n_unread += 1
         if passing is not None:
             self._passing = passing
@@ -106,7 +97,7 @@ class Fanout:
     def n_subscribers(self) -> int:
         return len(self._subscriptions)
 
-    def publish(self, event: StreamEvent) -> None:
+    def publish(self, event: bytes) -> None:
         """Give every client an event that is not stored; never waits for one."""
         with self._lock:
             for subscription in self._subscriptions:
@@ -215,11 +206,11 @@ class EventStream(Response):
             while records := await asyncio.to_thread(_read, follower):
                 for record in records:
                     if passing is not None and record.number > _number(passing[0]):
-                        yield passing[1].wire
+                        yield passing[1]
                         passing = None
-                    yield StreamEvent.of(record.kind, record.text, record.cursor).wire
+                    yield server_sent(record.kind, record.text, record.cursor)
             if passing is not None:
-                yield passing[1].wire
+                yield passing[1]
             if is_last:
                 return
             if not await subscription.wait(self._keep_alive_s):

@@ -3,7 +3,7 @@
 import asyncio
 from typing import Annotated, Final, Literal
 
-from fastapi import APIRouter, Path, Query, Request
+from fastapi import APIRouter, Path, Query
 from pydantic import BaseModel, Field
 from starlette.responses import Response
 
@@ -11,7 +11,7 @@ from gateway.history import ALARM
 from gateway.stated.facts import Instant
 from gateway.store import StoreReader
 from gateway.web.routes.history import HistoryQuery, entries_of
-from gateway.web.routes.service_calls import AlarmBackend, call_service, token_name
+from gateway.web.routes.service_calls import AlarmBackend, By, answered
 from gateway.web.schemas import Body, problem_responses
 
 
@@ -83,12 +83,10 @@ def alarms_router(reader: StoreReader, backend: AlarmBackend) -> APIRouter:
         return Response(f'{{"active":{standing},{history}', media_type="application/json")
 
     @router.post("/alarms/{alarm_id}/acknowledgement", response_model=Alarm, responses=_REFUSALS)
-    async def acknowledge(request: Request, alarm_id: AlarmId, said: Acknowledgement) -> Response:
+    async def acknowledge(by: By, alarm_id: AlarmId, said: Acknowledgement) -> Response:
         """Acknowledge an alarm: the service keeps your token's name and the time, and sends them to everybody who gets
         the alarm.
         """
-        return await call_service(
-            request, lambda: backend.acknowledge(alarm_id, token_name(request), said.note or None)
-        )
+        return await answered(backend.acknowledge, alarm_id, by, said.note or None)
 
     return router

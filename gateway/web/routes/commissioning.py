@@ -2,14 +2,14 @@
 
 from typing import Annotated, Final, Literal
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Query
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from starlette.responses import Response
 
 from gateway.stated.commissioning import CommissioningState, LinesFound, LineSource
 from gateway.stated.facts import VehicleAnswers
 from gateway.web.routes.known_weights import UndoQuery
-from gateway.web.routes.service_calls import CommissioningBackend, call_service, token_name
+from gateway.web.routes.service_calls import By, CommissioningBackend, answered, created
 from gateway.web.schemas import Body, problem_responses, utf8_only
 
 
@@ -63,64 +63,62 @@ def commissioning_router(backend: CommissioningBackend) -> APIRouter:
     of_body = {**refusals, **problem_responses(400, 422)}
 
     @router.get("", response_model=CommissioningState)
-    async def commissioning_state(request: Request) -> Response:
+    async def commissioning_state() -> Response:
         """The state: the next step, the findings of inspection, the accuracy reached, the calibrations made."""
-        return await call_service(request, backend.state)
+        return await answered(backend.state)
 
     @router.post("", status_code=201, response_model=CommissioningState, responses=of_body)
-    async def begin_commissioning(request: Request, said: Begin) -> Response:
+    async def begin_commissioning(by: By, said: Begin) -> Response:
         """Begin. On disk before the answer, as every step."""
-        note = said.note if "note" in said.model_fields_set else None
-        return await call_service(request, lambda: backend.begin(token_name(request), note), 201)
+        return await created(backend.begin, by, said.note if "note" in said.model_fields_set else None)
 
     @router.delete("", response_model=CommissioningState, responses=refusals)
-    async def cancel_commissioning(request: Request) -> Response:
+    async def cancel_commissioning(by: By) -> Response:
         """Discard the commissioning under way, at any step. Calibrations made before stay as they are."""
-        return await call_service(request, lambda: backend.cancel(token_name(request)))
+        return await answered(backend.cancel, by)
 
     @router.get("/lines", response_model=LinesFound)
-    async def lines(request: Request) -> Response:
+    async def lines() -> Response:
         """The available lines: of the package, of the administrator, uploaded."""
-        return await call_service(request, backend.lines)
+        return await answered(backend.lines)
 
     @router.post("/lines", status_code=201, response_model=LinesFound, responses={**of_body, **problem_responses(413)})
-    async def upload_line(request: Request, said: UploadLine) -> Response:
+    async def upload_line(said: UploadLine) -> Response:
         """Upload a file to choose from, checked whole, with its signature if the service requires one; up to 1 MiB."""
-        return await call_service(request, lambda: backend.upload(said.name, said.content, said.signature), 201)
+        return await created(backend.upload, said.name, said.content, said.signature)
 
     @router.post("/line", response_model=CommissioningState, responses={**of_body, **problem_responses(404)})
-    async def choose_line(request: Request, said: ChooseLine) -> Response:
+    async def choose_line(said: ChooseLine) -> Response:
         """Which line the vehicle is of. May be changed until the calibration is made."""
-        return await call_service(
-            request, lambda: backend.choose_line(*((said.line.name, said.line.source) if said.line else (None, None)))
-        )
+        name, source = (said.line.name, said.line.source) if said.line else (None, None)
+        return await answered(backend.choose_line, name, source)
 
     @router.post("/vehicle", response_model=CommissioningState, responses=of_body)
-    async def state_vehicle(request: Request, said: Annotated[VehicleAnswers, BeforeValidator(utf8_only)]) -> Response:
+    async def state_vehicle(said: Annotated[VehicleAnswers, BeforeValidator(utf8_only)]) -> Response:
         """The empty vehicle's weights, its wheelbase, and the sensor's position. May be changed until then, too.
 
         Answers that are unlikely are kept and asked about (``doubts``): correct them, or confirm.
         """
-        return await call_service(request, lambda: backend.state_vehicle(said))
+        return await answered(backend.state_vehicle, said)
 
     @router.post("/confirm", response_model=CommissioningState, responses=refusals)
-    async def confirm_doubts(request: Request) -> Response:
+    async def confirm_doubts(by: By) -> Response:
         """Every doubt that is open: it is so all the same. Confirming a doubt from the drive puts the fit to use."""
-        return await call_service(request, lambda: backend.confirm(token_name(request)))
+        return await answered(backend.confirm, by)
 
     @router.post("/empty", response_model=CommissioningState, responses=of_body)
-    async def claim_empty(request: Request, said: ClaimEmpty) -> Response:
+    async def claim_empty(by: By, said: ClaimEmpty) -> Response:
         """The vehicle is empty now: driving counts from now on, until the goal is reached."""
-        return await call_service(request, lambda: backend.is_empty(token_name(request), again=said.again))
+        return await answered(backend.is_empty, by, again=said.again)
 
     @router.post("/fit", response_model=CommissioningState, responses=refusals)
-    async def fit_now(request: Request) -> Response:
+    async def fit_now(by: By) -> Response:
         """Calibrate with the data so far, whether sufficient or not."""
-        return await call_service(request, lambda: backend.fit_now(token_name(request)))
+        return await answered(backend.fit_now, by)
 
     @router.post("/undo", response_model=CommissioningState, responses={**refusals, **problem_responses(422)})
-    async def undo_commissioning(request: Request, query: Annotated[UndoQuery, Query()]) -> Response:
+    async def undo_commissioning(by: By, query: Annotated[UndoQuery, Query()]) -> Response:
         """Take the last calibration made here out of use, or all of them, from the next drive on."""
-        return await call_service(request, lambda: backend.undo(token_name(request), to_factory=query.to == "factory"))
+        return await answered(backend.undo, by, to_factory=query.to == "factory")
 
     return router

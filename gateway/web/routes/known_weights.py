@@ -6,14 +6,14 @@
 import time
 from typing import Annotated, Final, Literal
 
-from fastapi import APIRouter, Path, Query, Request
+from fastapi import APIRouter, Path, Query
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from starlette.responses import Response
 
 from gateway.core.known_weights import KnownWeightKind
 from gateway.records import iso_utc
 from gateway.stated.facts import Drive, KnownWeightFields, StatedWeight
-from gateway.web.routes.service_calls import REFUSALS, KnownWeightBackend, call_service, token_name
+from gateway.web.routes.service_calls import REFUSALS, By, KnownWeightBackend, answered, created
 from gateway.web.schemas import Body, Instant, problem_responses
 
 _LAST_NS: Final = 9_223_372_036_000_000_000  # the last whole second that 64 bits of nanoseconds hold
@@ -179,64 +179,57 @@ def known_weights_router(service: KnownWeightBackend) -> APIRouter:
     router = APIRouter(prefix="/api/v1", tags=["calibration"])
 
     @router.get(KNOWN_WEIGHTS_PATH, response_model=KnownWeightState)
-    async def known_weights(request: Request) -> Response:
+    async def known_weights() -> Response:
         """Every known weight, their combined effect, and the load at which "it is empty now" would be taken."""
-        return await call_service(request, service.state)
+        return await answered(service.state)
 
     @router.post(KNOWN_WEIGHTS_PATH, status_code=201, response_model=KnownWeightEntry, responses=_ADDED)
-    async def add_known_weight(request: Request, claim: KnownWeightRequest) -> Response:
+    async def add_known_weight(by: By, claim: KnownWeightRequest) -> Response:
         """State a known load: it counts from the next batch on. On disk when answered.
 
         A known weight that contradicts its estimate is kept as `held` and counts once somebody confirms it.
         """
         stated = None if claim.weight is None else claim.weight.stated()
-        return await call_service(
-            request, lambda: service.add(claim.kind, token_name(request), claim.note or None, stated), 201
-        )
+        return await created(service.add, claim.kind, by, claim.note or None, stated)
 
     @router.post(KNOWN_WEIGHTS_PATH + "/{entry_id}/confirm", response_model=KnownWeightState, responses=_CHANGED)
-    async def confirm_known_weight(request: Request, entry_id: EntryId) -> Response:
+    async def confirm_known_weight(by: By, entry_id: EntryId) -> Response:
         """Confirm a held known weight: you have seen both numbers, and the known one is right."""
-        return await call_service(request, lambda: service.confirm(token_name(request), entry_id))
+        return await answered(service.confirm, by, entry_id)
 
     @router.delete(KNOWN_WEIGHTS_PATH + "/{entry_id}", response_model=KnownWeightState, responses=_CHANGED)
-    async def take_back_known_weight(request: Request, entry_id: EntryId) -> Response:
+    async def take_back_known_weight(by: By, entry_id: EntryId) -> Response:
         """Take one back: from the next batch on all numbers are as if it had never been stated."""
-        return await call_service(request, lambda: service.take_back(token_name(request), entry_id))
+        return await answered(service.take_back, by, entry_id)
 
     @router.get(TARE_PATH, response_model=KnownWeightState)
-    async def tare_state(request: Request) -> Response:
+    async def tare_state() -> Response:
         """The known weights of kind `empty`."""
-        return await call_service(request, lambda: service.state(EMPTY))
+        return await answered(service.state, EMPTY)
 
     @router.post(TARE_PATH, status_code=201, response_model=KnownWeightEntry, responses=_ADDED)
-    async def set_tare(request: Request, claim: TareRequest) -> Response:
+    async def set_tare(by: By, claim: TareRequest) -> Response:
         """State that the vehicle is empty now: the same as a known weight of kind `empty`."""
-        return await call_service(request, lambda: service.add(EMPTY[0], token_name(request), claim.note or None), 201)
+        return await created(service.add, KnownWeightKind.EMPTY, by, claim.note or None)
 
     @router.delete(TARE_PATH, response_model=KnownWeightState, responses=_CHANGED)
-    async def undo_tare(request: Request, query: Annotated[UndoQuery, Query()]) -> Response:
+    async def undo_tare(by: By, query: Annotated[UndoQuery, Query()]) -> Response:
         """Take the last known weight of kind `empty` back, or all of them."""
-        return await call_service(
-            request, lambda: service.take_back_empty(token_name(request), to_factory=query.to == "factory")
-        )
+        return await answered(service.take_back_empty, by, to_factory=query.to == "factory")
 
     @router.get(TICKETS_PATH, response_model=KnownWeightState)
-    async def ticket_state(request: Request) -> Response:
+    async def ticket_state() -> Response:
         """The known weights of loads: tickets, axle pads and delivery notes."""
-        return await call_service(request, lambda: service.state(WEIGHED))
+        return await answered(service.state, WEIGHED)
 
     @router.post(TICKETS_PATH, status_code=201, response_model=KnownWeightEntry, responses=_ADDED)
-    async def add_ticket(request: Request, claim: TicketRequest) -> Response:
+    async def add_ticket(by: By, claim: TicketRequest) -> Response:
         """State a weighbridge's ticket: the same as a known weight of kind `ticket`."""
-        stated = claim.weight.stated()
-        return await call_service(
-            request, lambda: service.add(KnownWeightKind.TICKET, token_name(request), claim.note or None, stated), 201
-        )
+        return await created(service.add, KnownWeightKind.TICKET, by, claim.note or None, claim.weight.stated())
 
     @router.delete(TICKETS_PATH + "/{entry_id}", response_model=KnownWeightState, responses=_CHANGED)
-    async def withdraw_ticket(request: Request, entry_id: EntryId) -> Response:
+    async def withdraw_ticket(by: By, entry_id: EntryId) -> Response:
         """Take a ticket back."""
-        return await call_service(request, lambda: service.take_back(token_name(request), entry_id, WEIGHED))
+        return await answered(service.take_back, by, entry_id, WEIGHED)
 
     return router

@@ -1,22 +1,20 @@
 """The service behind the routes: what they ask of it, and how they call it.
 
 All calls may block and are made in threads. Those that answer with a text give JSON as the route describes it. Methods
-that change something raise a refusal (gateway.errors), which becomes problem details.
+that change something raise RefusedError, which becomes problem details.
 """
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, BinaryIO, Final, Protocol
+from typing import Annotated, Any, BinaryIO, Final, ParamSpec, Protocol
 
-from fastapi import Request
+from fastapi import Depends, Request
 from starlette.responses import Response
 
 from gateway.core.known_weights import KnownWeightKind
-from gateway.errors import AlarmRefusedError, CommissioningRefusedError, WeightRefusedError
 from gateway.stated.commissioning import LineSource
 from gateway.stated.facts import StatedWeight, VehicleAnswers
 from gateway.status import Segment
-from gateway.web.access.problems import problem_response
 from gateway.web.schemas import problem_responses
 
 
@@ -81,25 +79,23 @@ class FrameLog(Protocol):
 
 LOCAL: Final = "local"  # name of the client if no tokens are in use
 REFUSALS: Final = problem_responses(409, 503)
-_CODES: Final = {
-    "not_stored": 503,
-    "not_allowed": 403,
-    "no_such_line": 404,
-    "no_such_alarm": 404,
-    "no_such_weight": 404,
-}  # of reasons; else 409
+P = ParamSpec("P")
 
 
-async def call_service(request: Request, ask: Callable[[], str], status: int = 200) -> Response:
-    """The JSON returned by ``ask``, or problem details if it refuses."""
-    try:
-        return Response(await asyncio.to_thread(ask), status, media_type="application/json")
-    except (AlarmRefusedError, CommissioningRefusedError, WeightRefusedError) as refusal:
-        code = _CODES.get(refusal.reason, 409)
-        return problem_response(code, str(refusal), request.url.path, reason=refusal.reason)
+async def answered(ask: Callable[P, str], *args: P.args, **named: P.kwargs) -> Response:
+    """The JSON that ``ask`` gives for these arguments."""
+    return Response(await asyncio.to_thread(ask, *args, **named), media_type="application/json")
 
 
-def token_name(request: Request) -> str:
-    """Name of the client's token."""
-    name: Any = getattr(request.state, "token_name", None)
-    return LOCAL if name is None else str(name)
+async def created(ask: Callable[P, str], *args: P.args, **named: P.kwargs) -> Response:
+    """The same with the status of something new."""
+    return Response(await asyncio.to_thread(ask, *args, **named), 201, media_type="application/json")
+
+
+async def _token_name(request: Request) -> str:
+    name: str = getattr(request.state, "token_name", LOCAL)
+    return name
+
+
+By = Annotated[str, Depends(_token_name)]
+"""Name of the client's token."""

@@ -17,7 +17,7 @@ from gateway.status import VerificationStatus
 from gateway.web.access.middleware import content_security_policy
 from gateway.web.access.problems import problem_response
 from gateway.web.routes.known_weights import Stated
-from gateway.web.routes.service_calls import REFUSALS, TrendBackend, VerificationBackend, call_service, token_name
+from gateway.web.routes.service_calls import REFUSALS, By, TrendBackend, VerificationBackend, answered, created
 from gateway.web.schemas import Body, problem_responses
 from gateway.words import one_or_more
 
@@ -47,9 +47,9 @@ def verification_router(backend: VerificationBackend) -> APIRouter:
     router = APIRouter(prefix="/api/v1", tags=["calibration"])
 
     @router.get(VERIFICATIONS_PATH, response_model=VerificationState)
-    async def verification_state(request: Request) -> Response:
+    async def verification_state() -> Response:
         """The requirements, when a verification is due, and the records."""
-        return await call_service(request, backend.state)
+        return await answered(backend.state)
 
     @router.post(
         VERIFICATIONS_PATH,
@@ -57,12 +57,12 @@ def verification_router(backend: VerificationBackend) -> APIRouter:
         response_model=VerificationRecord,
         responses={**REFUSALS, **problem_responses(400, 422)},
     )
-    async def verify(request: Request, claim: VerificationRequest) -> Response:
+    async def verify(by: By, claim: VerificationRequest) -> Response:
         """Compare known loads with their estimates. The calibration does not change; the record is on disk before the
         answer.
         """
         stated = [load.stated() for load in claim.loads]
-        return await call_service(request, lambda: backend.verify(token_name(request), claim.note or None, stated), 201)
+        return await created(backend.verify, by, claim.note or None, stated)
 
     @router.get(
         VERIFICATIONS_PATH + "/{record_id}",
@@ -119,9 +119,9 @@ def trend_router(backend: TrendBackend) -> APIRouter:
     router = APIRouter(prefix="/api/v1", tags=["calibration"])
 
     @router.get(TREND_PATH, response_model=TrendState)
-    async def parameter_trend(request: Request) -> Response:
+    async def parameter_trend() -> Response:
         """Dampers, the delay's scale, the gyro's gain and the zero over the months: whether they drift or are off."""
-        return await call_service(request, backend.state)
+        return await answered(backend.state)
 
     return router
 
