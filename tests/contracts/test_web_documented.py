@@ -2,7 +2,9 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
+import pytest
 from support.web import Client, Gateway
 
 from gateway.estimate_json import COLUMNS
@@ -11,16 +13,29 @@ from gateway.web.schemas import Estimate, WeightFigures
 API = (Path(__file__).parents[2] / "docs" / "api.md").read_text()
 
 
-def test_every_route_is_in_the_table_and_no_other(tmp_path: Path) -> None:
-    with Gateway(tmp_path) as gateway:
-        described = Client(gateway.app).get("/openapi.json").json()["paths"]
-    assert set(re.findall(r"^\| `(/\S+)` \|", API, re.MULTILINE)) == set(described)
+@pytest.fixture(scope="module")
+def description(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    with Gateway(tmp_path_factory.mktemp("store")) as gateway:
+        return Client(gateway.app).get("/openapi.json").json()
 
 
-def test_every_parameter_of_the_history_is_named(tmp_path: Path) -> None:
-    with Gateway(tmp_path) as gateway:
-        history = Client(gateway.app).get("/openapi.json").json()["paths"]["/api/v1/estimates"]["get"]
+@pytest.fixture
+def history(description: dict[str, Any]) -> dict[str, Any]:
+    return description["paths"]["/api/v1/estimates"]["get"]
+
+
+@pytest.fixture
+def row() -> str:
+    """The history's, in the table of routes."""
     (row,) = [line for line in API.splitlines() if line.startswith("| `/api/v1/estimates` ")]
+    return row
+
+
+def test_every_route_is_in_the_table_and_no_other(description: dict[str, Any]) -> None:
+    assert set(re.findall(r"^\| `(/\S+)` \|", API, re.MULTILINE)) == set(description["paths"])
+
+
+def test_every_parameter_of_the_history_is_named(history: dict[str, Any], row: str) -> None:
     assert {f"`{parameter['name']}`" for parameter in history["parameters"]} <= set(re.findall(r"`\w+`", row))
 
 
@@ -34,28 +49,22 @@ def test_the_columns_of_the_export_are_fields_of_an_estimate() -> None:
     assert "weights" in fields
 
 
-def test_every_order_of_the_history_is_named_with_its_meaning(tmp_path: Path) -> None:
-    with Gateway(tmp_path) as gateway:
-        history = Client(gateway.app).get("/openapi.json").json()["paths"]["/api/v1/estimates"]["get"]
+def test_every_order_of_the_history_is_named_with_its_meaning(history: dict[str, Any], row: str) -> None:
     (order,) = [one for one in history["parameters"] if one["name"] == "order"]
-    (row,) = [line for line in API.splitlines() if line.startswith("| `/api/v1/estimates` ")]
     for value in order["schema"]["enum"]:
         assert f"`{value}`" in row
         assert value in order["description"]
 
 
-def test_what_a_load_epoch_tells_is_described(tmp_path: Path) -> None:
+def test_what_a_load_epoch_tells_is_described(description: dict[str, Any]) -> None:
     """The fields epoch_* were once in no schema."""
-    with Gateway(tmp_path) as gateway:
-        shapes = Client(gateway.app).get("/openapi.json").json()["components"]["schemas"]
-    described = {name: one for name, one in shapes["Estimate"]["properties"].items() if name.startswith("epoch_")}
+    fields = description["components"]["schemas"]["Estimate"]["properties"]
+    described = {name: one for name, one in fields.items() if name.startswith("epoch_")}
     figures = {f"epoch_{name}" for name in ("payload_kg", "payload_std_kg", "front_share_pct", "front_share_std_pct")}
     assert figures | {"epoch_n_batches"} <= set(described)
     assert all(one.get("description") for one in described.values())
 
 
-def test_a_summary_is_a_sentence_and_no_function_s_name(tmp_path: Path) -> None:
-    with Gateway(tmp_path) as gateway:
-        paths = Client(gateway.app).get("/openapi.json").json()["paths"]
-    summaries = [operation["summary"] for path in paths.values() for operation in path.values()]
+def test_a_summary_is_a_sentence_and_no_function_s_name(description: dict[str, Any]) -> None:
+    summaries = [operation["summary"] for path in description["paths"].values() for operation in path.values()]
     assert [one for one in summaries if len(one.split()) < 3 or one == one.title()] == []

@@ -14,9 +14,7 @@ from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
 from gateway.estimate_json import COLUMNS, estimate_to_json
 from gateway.records import Why
-from gateway.status import SignalHealth, State, Status
-from gateway.web.app import create_app
-from gateway.web.live.board import Board
+from gateway.status import SignalHealth
 
 N_ROWS = 1203  # several pages of the store, the last one not full
 
@@ -76,12 +74,9 @@ CALIBRATED = CalibratedVehicle(
 
 def test_the_vehicle_is_told_with_its_calibration_and_ranges(tmp_path: Path) -> None:
     health = SignalHealth(signal="speed", rate_hz=5.0)
-    status = Status(
-        version="1", state=State.COLLECTING, uptime_s=0.0, vehicle_id="van-17", vin="VF1" + "0" * 14, signals=(health,)
-    )
-    with Gateway(tmp_path) as gateway:
-        app = create_app(Board(), gateway.store.reader(), lambda: status, calibrated=CALIBRATED)
-        told = Client(app).get("/api/v1/vehicle").json()
+    with Gateway(tmp_path, calibrated=CALIBRATED) as gateway:
+        gateway.status = gateway.status.model_copy(update={"vin": "VF1" + "0" * 14, "signals": (health,)})
+        told = Client(gateway.app).get("/api/v1/vehicle").json()
     assert (told["vehicle_id"], told["vin"]) == ("van-17", "VF1" + "0" * 14)
     assert told["calibration"] == {
         "id": "sha256:ab",
@@ -106,9 +101,8 @@ def test_a_vehicle_without_calibration_says_so(tmp_path: Path) -> None:
 
 
 def test_the_last_spectra_are_those_of_the_last_batch_rejected_or_not(tmp_path: Path) -> None:
-    board = Board()
-    with Gateway(tmp_path) as gateway:
-        client = Client(create_app(board, gateway.store.reader(), lambda: gateway.status, calibrated=CALIBRATED))
+    with Gateway(tmp_path, calibrated=CALIBRATED) as gateway:
+        client, board = Client(gateway.app), gateway.board
         assert client.get("/api/v1/spectra/latest").json()["spectra"] is None
         board.publish(make_estimate(0, with_spectra=True))
         rejected = make_estimate(1, Why.NO_CALIBRATION, with_spectra=True)

@@ -29,7 +29,6 @@ from gateway.status import (
     UplinkStatus,
     WebhookStatus,
 )
-from gateway.web.app import create_app
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 RULES = [
@@ -56,7 +55,8 @@ LABELS_BY_PROMETHEUS = {"instance", "job"}
 @pytest.fixture(scope="module")
 def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set[str]]]:
     """Label values by label, by name of a sample, of a service that has seen everything once."""
-    with Gateway(tmp_path_factory.mktemp("store")) as gateway:
+    calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 420.0), (40.0, 60.0))
+    with Gateway(tmp_path_factory.mktemp("store"), calibrated=calibrated) as gateway:
         gateway.status = Status(
             version="1.2.3",
             state=State.ESTIMATING,
@@ -71,10 +71,7 @@ def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set
             alarms=AlarmsStatus({"overload.gross": "early"}, watched=("overload.gross", "drift.zero")),
         )
         gateway.publish(replace(make_estimate(0), front_share=Quantity(50.5, 0.5)))
-        calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 420.0), (40.0, 60.0))
-        client = Client(
-            create_app(gateway.board, gateway.store.reader(), lambda: gateway.status, calibrated=calibrated)
-        )
+        client = Client(gateway.app)
         client.get("/health/live")
         text = client.get("/metrics").text
     found: dict[str, dict[str, set[str]]] = {}

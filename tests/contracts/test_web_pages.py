@@ -43,7 +43,7 @@ def test_only_the_api_documentation_may_write_styles(client: Client) -> None:
     assert "script-src 'self';" in policies[0]
 
 
-@pytest.mark.parametrize("path", ["/", "/cab"])
+@pytest.mark.parametrize("path", ["/", "/cab", "/docs"])
 def test_the_page_holds_no_script_and_no_style_of_its_own(client: Client, path: str) -> None:
     page = client.get(path).text
     assert re.findall(r"<script(?![^>]*\bsrc=)", page) == []
@@ -86,9 +86,10 @@ def test_an_id_stands_once_in_a_page(client: Client, path: str) -> None:
     assert sorted(ids) == sorted(set(ids))
 
 
-def test_every_file_the_page_names_is_there(client: Client) -> None:
-    named = re.findall(r"(?:src|href|chart-library)=\"(/[^\"]*)\"", client.get("/").text)
-    assert LIBRARY_URL in named
+@pytest.mark.parametrize(("path", "one"), [("/", LIBRARY_URL), ("/docs", "/swagger/swagger-ui.css")])
+def test_every_file_the_page_names_is_there(client: Client, path: str, one: str) -> None:
+    named = re.findall(r"(?:src|href|chart-library)=\"(/[^\"]*)\"", client.get(path).text)
+    assert one in named
     assert [path for path in named if client.get(path).status_code != 200] == []
 
 

@@ -19,7 +19,6 @@ from gateway.core.spectrum import spectra_of
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import spectra_from_json
 from gateway.records import Spectra, Why
-from gateway.web.app import create_app
 from gateway.web.live.board import Board
 
 SPEED_MPS = 14.0
@@ -53,15 +52,19 @@ def weighed(calibrated: CalibratedVehicle, seen: Spectra) -> Estimate:
 
 
 @pytest.fixture
-def board() -> Board:
-    return Board()
+def gateway(tmp_path: Path, calibrated: CalibratedVehicle) -> Iterator[Gateway]:
+    with Gateway(tmp_path, calibrated=calibrated) as opened:
+        yield opened
 
 
 @pytest.fixture
-def client(tmp_path: Path, board: Board, calibrated: CalibratedVehicle) -> Iterator[Client]:
-    with Gateway(tmp_path) as gateway:
-        app = create_app(board, gateway.store.reader(), lambda: gateway.status, calibrated=calibrated)
-        yield Client(app)
+def board(gateway: Gateway) -> Board:
+    return gateway.board
+
+
+@pytest.fixture
+def client(gateway: Gateway) -> Client:
+    return Client(gateway.app)
 
 
 def told(client: Client) -> dict[str, Any]:
