@@ -84,7 +84,7 @@ def _disturbed(rows: Motion, by: Disturbance, seed: int) -> Motion:
 
 def numbers(seed: int, n: int, vans: Sequence[list[JudgedBatch]]) -> dict[str, Any]:
     """A line for every disturbance."""
-    return coverage_table([batch for of_van in vans for batch in of_van], seed).to_json()
+    return coverage_table([batch for of_van in vans for batch in of_van], seed)
 
 
 WELL: Final = 0.9  # chosen: of the batches; covered by their 95 % intervals, or refused for a right reason

@@ -125,8 +125,8 @@ def known_empty(calibrated: CalibratedVehicle, empty: Sequence[KnownRun], vehicl
 
 
 def numbers(seed: int, n: int, lines: Sequence[list[JudgedBatch]]) -> dict[str, Any]:
-    """A row for each way (coverage_table.Line), over all kinds of drives."""
-    table = coverage_table([one for of_line in lines for one in of_line], seed).to_json()
+    """A row for each way (``coverage_table``), over all kinds of drives."""
+    table = coverage_table([one for of_line in lines for one in of_line], seed)
     rows = [line for line in table["lines"] if line["kind"] == ALL_KINDS]
     return {"seed": seed, "n_lines": len(lines), "n_vans": len(table["vans"]), "rows": rows}
 

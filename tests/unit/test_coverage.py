@@ -83,18 +83,18 @@ def test_a_line_for_every_kind_and_one_for_all() -> None:
         seed=3,
         refused=("b: ratio_index: too few",),
     )
-    town, country, everything = table.lines
-    assert [line.kind for line in table.lines] == ["town", "country", ALL_KINDS]
-    assert (town.n_batches, town.n_rejected, town.n_vans, town.n_runs) == (3, 1, 2, 3)
-    assert town.rejected_by_reason == {"gap": 1}
-    assert town.payload_mean_abs_pct == pytest.approx(3.0)  # the rejected batch gave no answer
-    assert town.payload_mean_abs_pct_with_misses == pytest.approx(12.0)
-    assert town.payload_coverage.share == 0.5
-    assert town.payload_coverage_by_van is None  # only one van answered
-    assert country.front_share_coverage is None
-    assert everything.payload_coverage.n == 3
-    assert everything.payload_coverage_by_van.n_clusters == 2
-    assert table.to_json()["refused"] == ("b: ratio_index: too few",)
+    town, country, everything = table["lines"]
+    assert [line["kind"] for line in table["lines"]] == ["town", "country", ALL_KINDS]
+    assert (town["n_batches"], town["n_rejected"], town["n_vans"], town["n_runs"]) == (3, 1, 2, 3)
+    assert town["rejected_by_reason"] == {"gap": 1}
+    assert town["payload_mean_abs_pct"] == pytest.approx(3.0)  # the rejected batch gave no answer
+    assert town["payload_mean_abs_pct_with_misses"] == pytest.approx(12.0)
+    assert town["payload_coverage"]["share"] == 0.5
+    assert town["payload_coverage_by_van"] is None  # only one van answered
+    assert country["front_share_coverage"] is None
+    assert everything["payload_coverage"]["n"] == 3
+    assert everything["payload_coverage_by_van"]["n_clusters"] == 2
+    assert table["refused"] == ["b: ratio_index: too few"]
 
 
 def test_an_interval_score_by_hand() -> None:

@@ -115,15 +115,15 @@ def test_every_van_is_put_to_every_kind_of_drive(monkeypatch: pytest.MonkeyPatch
     table = coverage_table(batches, 11, refused)
     assert len(calibrated_with) == 4  # each van with its roll rate, and without
     assert all(len(set(loads)) > 2 and loads[0] == 0.0 for loads in calibrated_with)
-    assert {line.kind for line in table.lines} == {*TRIPS, "all"}
-    assert {line.estimator for line in table.lines} == {"ratio_index"}
-    *of_kinds, pooled, pooled_without = table.lines
-    assert all(line.n_batches == 6 and line.n_vans == 2 for line in of_kinds)
-    assert [line.has_roll_rate for line in of_kinds] == [True] * len(TRIPS) + [False] * len(TRIPS)
-    assert [line.has_roll_rate for line in (pooled, pooled_without)] == [True, False]
-    assert pooled.n_runs == pooled_without.n_runs == 2 * 3 * len(TRIPS)
+    assert {line["kind"] for line in table["lines"]} == {*TRIPS, "all"}
+    assert {line["estimator"] for line in table["lines"]} == {"ratio_index"}
+    *of_kinds, pooled, pooled_without = table["lines"]
+    assert all(line["n_batches"] == 6 and line["n_vans"] == 2 for line in of_kinds)
+    assert [line["has_roll_rate"] for line in of_kinds] == [True] * len(TRIPS) + [False] * len(TRIPS)
+    assert [line["has_roll_rate"] for line in (pooled, pooled_without)] == [True, False]
+    assert pooled["n_runs"] == pooled_without["n_runs"] == 2 * 3 * len(TRIPS)
     assert len(set(seeds)) == len(seeds) == 2 * (4 + 3 * len(TRIPS))  # no drive is driven twice
-    assert [text.split(": ")[1:] for text in table.refused] == [
+    assert [text.split(": ")[1:] for text in table["refused"]] == [
         ["cross_spectrum, with roll rate", "not today"],
         ["cross_spectrum, without roll rate", "not today"],
     ] * 2

@@ -110,7 +110,7 @@ def found(**changed: Any) -> dict[str, Any]:
         for i in range(10)
     ]
     sensors = [{"name": name, **_facts(grade.sensors_of(REFERENCE))} for name, grade in GRADES.items()]
-    return {"grades": sensors, **coverage_table(batches, 1).to_json()}
+    return {"grades": sensors, **coverage_table(batches, 1)}
 
 
 def _word(name: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.accuracy.coverage_table import JudgedBatch, Line, coverage_table, judged_batches
+from benchmarks.accuracy.coverage_table import JudgedBatch, coverage_table, judged_batches
 from benchmarks.accuracy.drives import TRIPS, USUAL, FreshVan, Scope, driven, fresh_van, unseen_load
 from benchmarks.accuracy.markdown import Column, Row, number, page, table_of, text
 from benchmarks.accuracy.sensitivity.changes import Pair, pairs_of
@@ -54,7 +54,7 @@ class Weighing:
     ``n_unchanged`` pairs showed a change, ``n_seen`` of the ``n_changed`` pairs with a larger true change did.
     """
 
-    line: Line
+    line: dict[str, Any]
     smallest_change_kg: float | None
     n_unchanged: int
     n_false: int
@@ -111,7 +111,7 @@ def _weigh(name: str, calibrated: CalibratedVehicle, tests: Sequence[KnownRun], 
         found.batches.extend(judged_batches(judged, calibrated.vehicle, name, ESTIMATOR, run))
 
 
-def _weighing(line: Line, pairs: Sequence[Pair]) -> Weighing:
+def _weighing(line: dict[str, Any], pairs: Sequence[Pair]) -> Weighing:
     unchanged = [pair for pair in pairs if pair.is_one_load]
     changed = [pair for pair in pairs if abs(pair.change_kg) > pair.smallest_kg]
     return Weighing(
@@ -148,7 +148,7 @@ def _kinds_of_axes(spectra: CrossSpectra, run: KnownRun, fresh: FreshVan) -> set
 def numbers(seed: int, n: int, vans: Sequence[OfVan], constants: Sequence[Constant] = CONSTANTS) -> dict[str, Any]:
     """By setting ("NAME x 0.5", or as it is): the results of weighing and of inspection; and the original values."""
     table = coverage_table([batch for van in vans for batch in van.batches], seed)
-    lines = {line.kind: line for line in table.lines}
+    lines = {line["kind"]: line for line in table["lines"]}
     pairs = {name: [pair for van in vans for pair in van.pairs[name]] for name in vans[0].pairs}
     inspected = {name: sum((van.inspected[name] for van in vans), Inspected()) for name in vans[0].inspected}
     return {
