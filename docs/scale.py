@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from made import DOCS, numbers
+from made import DOCS, numbers, table
 from vehicle_year import GB, Scale, duration, figure, in_bytes, limits_of
 
 SIZES: Final = tuple(10**n for n in range(7))
@@ -42,7 +42,7 @@ def _measured(scale: Scale) -> str:
         ("An additional vehicle in the report", f"{figure(scale.report_cpu_s)} core seconds, "
          f"{in_bytes(scale.report_memory_bytes)} of memory, {in_bytes(scale.report_page_bytes)} of the fleet's page"),
     ]  # fmt: skip
-    return _table(("", ""), rows)
+    return table(" | ", rows)
 
 
 def _vehicle_year(scale: Scale) -> str:
@@ -72,8 +72,8 @@ def _vehicle_year(scale: Scale) -> str:
             figure(scale.bus_core_hours * hour),
         ),
     ]
-    return f"{figure(scale.hours)} h of driving; storage is kept for a year.\n\n" + _table(
-        ("", "amount", "cost by the example prices"), rows
+    return f"{figure(scale.hours)} h of driving; storage is kept for a year.\n\n" + table(
+        " | amount | cost by the example prices", rows
     )
 
 
@@ -100,8 +100,7 @@ def _fleets(scale: Scale) -> str:
         ("A year's cost, mapped frames kept, reprocessed once", lambda n: figure(n * _yearly(scale))),
     ]
     rows = [(name, *(of(float(n)) for n in SIZES)) for name, of in lines]
-    head = ("Vehicles", *(f"{n:,}".replace(",", " ") for n in SIZES))
-    return _table(head, rows)
+    return table(" | ".join(["Vehicles", *(f"{n:,}".replace(",", " ") for n in SIZES)]), rows)
 
 
 def _or_less(cores: float) -> str:
@@ -118,20 +117,13 @@ def _yearly(scale: Scale) -> float:
 
 
 def _limits(scale: Scale) -> str:
-    rows = [
-        (limit.what, figure(limit.n_vehicles), limit.why, limit.then) for limit in limits_of(scale)
-    ]  # fmt: skip
-    return _table(("limit", "vehicles", "because", "remedy"), rows)
+    rows = ((limit.what, figure(limit.n_vehicles), limit.why, limit.then) for limit in limits_of(scale))
+    return table("limit | vehicles | because | remedy", rows)
 
 
 def _assumed(scale: Scale) -> str:
     rows = [(f"`{section}.{key}`", str(each)) for section, keys in scale.assumed.items() for key, each in keys.items()]
-    return _table(("", ""), rows)
-
-
-def _table(head: tuple[str, ...], rows: list[Any]) -> str:
-    lines = [f"| {' | '.join(cells)} |" for cells in (head, *rows)]
-    return "\n".join([lines[0], "|" + "---|" * len(head), *lines[1:]]) + "\n"
+    return table(" | ", rows)
 
 
 def measured_figures() -> dict[str, Any]:

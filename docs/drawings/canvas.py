@@ -47,29 +47,16 @@ class Canvas:
         self._title = title
         self._shapes: list[str] = []
 
-    def line(self, points: Iterable[Point], ink: str = "ink", *, width: float = 1.5, dashes: str = "") -> None:
+    def line(self, points: Iterable[Point], ink: str = "ink", *, width: float = 1.5) -> None:
         """A line through all points."""
         path = "M" + "L".join(f"{_n(x)} {_n(y)}" for x, y in points)
-        dashed = f' stroke-dasharray="{dashes}"' if dashes else ""
-        self._shapes.append(f'<path class="line {ink}" stroke-width="{width:g}"{dashed} d="{path}"/>')
+        self._shapes.append(f'<path class="line {ink}" stroke-width="{width:g}" d="{path}"/>')
 
-    def arrow(
-        self, points: Iterable[Point], ink: str = "ink", *, width: float = 1.5, dashes: str = "", both: bool = False
-    ) -> None:
-        """A line with a head at its end, and at its beginning too where it measures something."""
+    def arrow(self, points: Iterable[Point], ink: str = "ink") -> None:
+        """A line with a head at its end."""
         line = list(points)
-        self.line(line, ink, width=width, dashes=dashes)
+        self.line(line, ink)
         self._head(line[-2], line[-1], ink)
-        if both:
-            self._head(line[1], line[0], ink)
-
-    def arc(self, centre: Point, radius: float, begin: Point, end: Point, ink: str) -> None:
-        """An arrow from ``begin`` anticlockwise around ``centre`` to ``end``, both at ``radius`` from it."""
-        (x0, y0), (x1, y1) = begin, end
-        path = f"M{_n(x0)} {_n(y0)}A{_n(radius)} {_n(radius)} 0 0 0 {_n(x1)} {_n(y1)}"
-        self._shapes.append(f'<path class="line {ink}" stroke-width="1.8" d="{path}"/>')
-        along = (y1 - centre[1], centre[0] - x1)  # the tangent there
-        self._head((x1 - along[0], y1 - along[1]), end, ink)
 
     def _head(self, before: Point, tip: Point, ink: str) -> None:
         (x0, y0), (x1, y1) = before, tip
@@ -79,32 +66,22 @@ class Canvas:
         points = " ".join(f"{_n(x)},{_n(y)}" for x, y in corners)
         self._shapes.append(f'<polygon class="fill {ink}" points="{points}"/>')
 
-    def box(self, x: float, y: float, width: float, height: float, *, radius: float = 5.0) -> None:
+    def box(self, x: float, y: float, width: float, height: float) -> None:
         """A panel with rounded corners."""
         at = f'x="{_n(x)}" y="{_n(y)}" width="{_n(width)}" height="{_n(height)}"'
-        self._shapes.append(f'<rect class="panel" {at} rx="{radius:g}"/>')
-
-    def circle(self, centre: Point, radius: float, *, kind: str = "panel") -> None:
-        """A disc; ``kind`` is panel, or fill with an ink."""
-        at = f'cx="{_n(centre[0])}" cy="{_n(centre[1])}" r="{_n(radius)}"'
-        self._shapes.append(f'<circle class="{kind}" {at}/>')
+        self._shapes.append(f'<rect class="panel" {at} rx="5"/>')
 
     def text(
         self, x: float, y: float, words: str, *, ink: str = "ink", style: str = "", anchor: Anchor = "middle"
     ) -> None:
-        """One line of words; ``_{...}`` sets what stands in the braces lower."""
-        inside = escape(words)
-        while "_{" in inside:
-            before, _, rest = inside.partition("_{")
-            low, _, after = rest.partition("}")
-            inside = f'{before}<tspan dy="4" font-size="10">{low}</tspan><tspan dy="-4">&#8203;</tspan>{after}'
+        """One line of words."""
         at = f'x="{_n(x)}" y="{_n(y)}" text-anchor="{anchor}"'
-        self._shapes.append(f'<text class="{ink} {style}" {at}>{inside}</text>')
+        self._shapes.append(f'<text class="{ink} {style}" {at}>{escape(words)}</text>')
 
-    def lines_of_text(self, x: float, y: float, lines: Iterable[str], *, anchor: Anchor = "middle") -> None:
+    def lines_of_text(self, x: float, y: float, lines: Iterable[str]) -> None:
         """Small soft lines below one another, the first at ``y``."""
         for number, words in enumerate(lines):
-            self.text(x, y + LINE_HEIGHT * number, words, ink="soft", style="small", anchor=anchor)
+            self.text(x, y + LINE_HEIGHT * number, words, ink="soft", style="small")
 
     def svg(self) -> str:
         """The whole file."""

@@ -74,8 +74,8 @@ def _panel(sheet: Canvas, top: float, title: str, freq_hz: F64, lines: Sequence[
         sheet.line(points, ink, width=1.8)
 
 
-def _key(sheet: Canvas, x: float, words: str, ink: str, dashes: str = "") -> None:
-    sheet.line([(x, 24), (x + 30, 24)], ink, width=2.5, dashes=dashes)
+def _key(sheet: Canvas, x: float, words: str, ink: str) -> None:
+    sheet.line([(x, 24), (x + 30, 24)], ink, width=2.5)
     sheet.text(x + 38, 28, words, ink=ink, anchor="start")
 
 
