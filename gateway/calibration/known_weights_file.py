@@ -11,13 +11,12 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from gateway.calibration.file.calibration_file import content_id
-from gateway.calibration.file.parts import Part
 from gateway.core.known_weights import Knowledge, Observation
 from gateway.errors import ConfigurationError
 from gateway.estimate_json import posterior_from_json
 from gateway.files.kept import KeptFiles
 from gateway.records import ns_of
-from gateway.stated.facts import Confirmation, Ending, KnownWeightFields
+from gateway.stated.facts import Confirmation, Ending, KnownWeightFields, Part
 from gateway.toml_file import describe_faults
 
 FILE_NAME: Final = "known_weights.json"

@@ -17,9 +17,9 @@ from typing import Final, Literal
 import numpy as np
 from pydantic import Field
 
-from gateway.calibration.file.parts import Part
 from gateway.estimate import Estimate
 from gateway.records import F64, Why
+from gateway.stated.facts import Part
 from gateway.units import NS_PER_S
 
 FILE_NAME: Final = "trend.json"

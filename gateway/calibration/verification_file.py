@@ -2,45 +2,15 @@
 
 from typing import Final, Literal
 
-from pydantic import Field
-
 from gateway.calibration.file.calibration_file import content_id
-from gateway.calibration.file.parts import Part
 from gateway.calibration.known_weight import StatedLoad
 from gateway.core.vehicle import Vehicle
-from gateway.stated.facts import AxleErrorTold, LoadTold, Rule, VerificationRecord
+from gateway.stated.facts import AxleErrorTold, LoadTold, Part, Rule, VerificationRecord
 
 FILE_NAME: Final = "verifications.json"
 MOST_ENTRIES: Final = 500  # chosen: beyond it the oldest are dropped
-MOST_LOADS: Final = 10  # chosen: of one verification
 
 Verdict = Literal["passed", "failed"]
-
-
-class VerificationRule(Part, Rule):
-    """The requirements of a verification, as its record keeps them."""
-
-
-class AxleError(Part, AxleErrorTold):
-    """The error of an axle load: weighed minus known, in kg and in percent of the known load."""
-
-
-class VerifiedLoad(Part, LoadTold):
-    """One known load, as its record keeps it."""
-
-    front_axle: AxleError | None
-    rear_axle: AxleError | None
-
-
-class Verification(Part, VerificationRecord):
-    """A dated record of some known loads; ``id`` is the hash of everything else."""
-
-    rule: VerificationRule
-    loads: tuple[VerifiedLoad, ...] = Field(min_length=1, max_length=MOST_LOADS)
-
-    def content_id(self) -> str:
-        """The id that the content should have."""
-        return content_id(self.model_dump(mode="json", exclude={"id"}))
 
 
 class VerificationHistory(Part):
@@ -48,16 +18,16 @@ class VerificationHistory(Part):
 
     format: Literal["springscale-verifications"] = "springscale-verifications"
     version: Literal[1] = 1
-    entries: tuple[Verification, ...] = ()
+    entries: tuple[VerificationRecord, ...] = ()
 
-    def with_entry(self, entry: Verification) -> "VerificationHistory":
+    def with_entry(self, entry: VerificationRecord) -> "VerificationHistory":
         """The history with one more record."""
         return self.model_copy(update={"entries": (*self.entries, entry)[-MOST_ENTRIES:]})
 
 
 def axle_errors(
     known: StatedLoad, payload_kg: float, front_share_pct: float, vehicle: Vehicle
-) -> tuple[AxleError | None, AxleError | None]:
+) -> tuple[AxleErrorTold | None, AxleErrorTold | None]:
     """Errors of the front and the rear axle; None if the known load has no place. Unsprung masses cancel in an
     error.
     """
@@ -72,11 +42,11 @@ def axle_errors(
     return _axle_error(on_front, front), _axle_error(on_rear, rear)
 
 
-def _axle_error(known_kg: float, error_kg: float) -> AxleError:
-    return AxleError(known_kg=known_kg, error_kg=error_kg, error_pct=100.0 * error_kg / known_kg)
+def _axle_error(known_kg: float, error_kg: float) -> AxleErrorTold:
+    return AxleErrorTold(known_kg=known_kg, error_kg=error_kg, error_pct=100.0 * error_kg / known_kg)
 
 
-def is_within(rule: VerificationRule, error_pct: float, *axles: AxleError | None) -> bool:
+def is_within(rule: Rule, error_pct: float, *axles: AxleErrorTold | None) -> bool:
     """Whether the gross weight's error, and each axle's if axles are judged, is within the permitted error."""
     most_axle_pct = rule.permitted_axle_error_pct
     return abs(error_pct) <= rule.permitted_error_pct and all(
@@ -84,6 +54,11 @@ def is_within(rule: VerificationRule, error_pct: float, *axles: AxleError | None
     )
 
 
-def verdict_of(rule: VerificationRule, loads: tuple[VerifiedLoad, ...]) -> Verdict:
+def verdict_of(rule: Rule, loads: tuple[LoadTold, ...]) -> Verdict:
     """Passed if every load is within its limits and there are as many as the rule requires."""
     return "passed" if len(loads) >= rule.loads and all(load.is_within for load in loads) else "failed"
+
+
+def with_its_id(record: VerificationRecord) -> VerificationRecord:
+    """The record with the hash of everything else as its id."""
+    return record.model_copy(update={"id": content_id(record.model_dump(mode="json", exclude={"id"}))})

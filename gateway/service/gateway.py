@@ -12,7 +12,6 @@ from functools import partial
 from gateway.bus.live.bus_survey import bus_survey_of
 from gateway.bus.live.source import OpenReceiver, SourceState
 from gateway.bus.signals import Decoder
-from gateway.calibration.verification_file import VerificationRule
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event
@@ -40,6 +39,7 @@ from gateway.service.verification.known_weights import KnownWeightService
 from gateway.service.verification.trend import TrendService
 from gateway.service.verification.verification import VerificationService
 from gateway.setup import Setup
+from gateway.stated.facts import Rule
 from gateway.status import State
 from gateway.web.access.serving import WebServer, refuse_open_address, server_config
 from gateway.web.access.tokens import TokenFile
@@ -122,7 +122,7 @@ class Gateway:
             directory,
             subject,
             ask,
-            VerificationRule(**settings.verification.model_dump(exclude={"every_days"})),
+            Rule(**settings.verification.model_dump(exclude={"every_days"})),
             payload_without=self.known_weights.payload_without,
             every_days=settings.verification.every_days,
             on_event=on_event,

@@ -6,10 +6,10 @@ from typing import Generic, TypeVar
 
 from pydantic import ValidationError
 
-from gateway.calibration.file.parts import Part
 from gateway.errors import ConfigurationError
 from gateway.files.kept import BrokenFile, KeptFiles
 from gateway.log import Event, log_event
+from gateway.stated.facts import Part
 from gateway.toml_file import describe_faults
 
 R = TypeVar("R", bound=Part)

@@ -2,16 +2,16 @@
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from gateway.stated.doubt import DoubtKind
-from gateway.stated.facts import Instant, VehicleAnswers
+from gateway.stated.facts import Instant, Part, VehicleAnswers
 
 LineSource = Literal["package", "administrator", "uploaded"]
 
 
-class _Told(BaseModel):
-    model_config = ConfigDict(from_attributes=True)
+class _Told(Part):
+    model_config = ConfigDict(from_attributes=True, extra="ignore")  # the record holds more than is shown
 
 
 class LineTold(_Told):
@@ -49,7 +49,7 @@ class EmptyTold(_Told):
     by: str
 
 
-class FindingTold(_Told):
+class FindingTold(Part):
     """What inspection found."""
 
     kind: str = Field(examples=["pitch_rate_sign"])
@@ -97,7 +97,7 @@ class UnderwayTold(_Told):
     fault: str | None = Field(description="why the last fit made no calibration")
 
 
-class MadeEnd(_Told):
+class MadeEnd(Part):
     """How a calibration was replaced."""
 
     at: Instant

@@ -15,7 +15,18 @@ from gateway.schema import described
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Instant = Annotated[str, Field(json_schema_extra={"format": "date-time"})]
 
+MOST_LOADS: Final = 10  # chosen: of one verification
 DIVISION_KG: Final = 20.0  # of a weighbridge for trucks; a reading is rounded to it
+
+
+class Part(BaseModel):
+    """A table of a file or of an answer over HTTP: unchangeable, and an unknown key is an error."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        json_schema_serialization_defaults_required=True,  # every key is written
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,11 +88,7 @@ class StatedWeight:
     )
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_serialization_defaults_required=True)
-
-
-class Ending(_Record):
+class Ending(Part):
     """When, by whom and why a known weight was taken back."""
 
     at: Instant
@@ -89,14 +96,14 @@ class Ending(_Record):
     why: Literal["withdrawn", "back_to_factory"] = "withdrawn"
 
 
-class Confirmation(_Record):
+class Confirmation(Part):
     """Who confirmed a known weight that its estimate contradicted, and when."""
 
     at: Instant
     by: str
 
 
-class KnownWeightFields(_Record):
+class KnownWeightFields(Part):
     """One known weight as its file keeps it and the web shows it: what was stated, the load that it belongs to, and the
     estimate of that load without it.
     """
@@ -127,11 +134,7 @@ class KnownWeightFields(_Record):
     ended: Ending | None = None
 
 
-class _Told(BaseModel):
-    model_config = ConfigDict(frozen=True)
-
-
-class Rule(_Told):
+class Rule(Part):
     """The requirements ([verification] in the settings)."""
 
     permitted_error_pct: float = Field(description="of the known gross weight")
@@ -139,7 +142,7 @@ class Rule(_Told):
     loads: int
 
 
-class AxleErrorTold(_Told):
+class AxleErrorTold(Part):
     """Weighed less known."""
 
     known_kg: Finite
@@ -147,7 +150,7 @@ class AxleErrorTold(_Told):
     error_pct: Finite
 
 
-class LoadTold(_Told):
+class LoadTold(Part):
     """One load: stated, weighed, and the errors."""
 
     stated: StatedWeight
@@ -166,7 +169,7 @@ class LoadTold(_Told):
     is_within: bool
 
 
-class VerificationRecord(_Told):
+class VerificationRecord(Part):
     """A dated record; it is never changed."""
 
     id: str = Field(examples=["sha256:9f86d081"])
@@ -178,5 +181,5 @@ class VerificationRecord(_Told):
     estimator: str
     known_weights_id: str | None = Field(description="known weights that the estimate used; null: none")
     rule: Rule
-    loads: tuple[LoadTold, ...]
+    loads: tuple[LoadTold, ...] = Field(min_length=1, max_length=MOST_LOADS)
     verdict: Literal["passed", "failed"]

@@ -15,15 +15,18 @@ from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
 from support.estimates import make_estimate
 from support.web import Gateway, serving
 
-from gateway.calibration.commissioning.job import Found, Result
+from gateway.calibration.commissioning.job import Result
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.records import Why
+from gateway.stated.commissioning import FindingTold
 from gateway.stated.doubt import Doubt, DoubtKind
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
 from gateway.web.access.tokens import Scope, TokenFile
 
-FAULT = Found(kind="pitch_rate_sign", severity="fault", text="the pitch rate is turned over", advice="set sign = -1")
+FAULT = FindingTold(
+    kind="pitch_rate_sign", severity="fault", text="the pitch rate is turned over", advice="set sign = -1"
+)
 PHONE = {"viewport": {"width": 390, "height": 844}}
 
 

@@ -5,7 +5,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from gateway.calibration.verification_file import VerificationRule
 from gateway.core.alarms.rules import AlarmRules
 from gateway.errors import RefusedError
 from gateway.service.alarms import AlarmService
@@ -13,6 +12,7 @@ from gateway.service.verification.known_weights import KnownWeightService
 from gateway.service.verification.trend import TrendService
 from gateway.service.verification.verification import VerificationService
 from gateway.setup import Subject
+from gateway.stated.facts import Rule
 from gateway.store import Store
 
 NOBODY = Subject(None, "ratio_index", "van-17")
@@ -47,7 +47,7 @@ def of_no_vehicle(directory: Path, store: Store) -> dict[str, Any]:
             directory,
             NOBODY,
             ask,
-            VerificationRule(permitted_error_pct=5.0, permitted_axle_error_pct=None, loads=1),
+            Rule(permitted_error_pct=5.0, permitted_axle_error_pct=None, loads=1),
             every_days=0.0,
             on_event=lambda kind, detail: None,
         ),

@@ -3,21 +3,21 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from gateway.calibration.verification_file import VerificationRule
 from gateway.service.verification.verification import VerificationService
 from gateway.setup import Subject
+from gateway.stated.facts import Rule
 from gateway.store import Store
 from support.calibrated import calibration_file
 from support.epochs import START_NS
 
 CALIBRATED = calibration_file().for_core()
-RULE = VerificationRule(permitted_error_pct=5.0, permitted_axle_error_pct=None, loads=1)
+RULE = Rule(permitted_error_pct=5.0, permitted_axle_error_pct=None, loads=1)
 
 
 def verification_desk(
     directory: Path,
     store: Store,
-    rule: VerificationRule = RULE,
+    rule: Rule = RULE,
     *,
     every_days: float = 0.0,
     clock_ns: Callable[[], int] = lambda: START_NS,

@@ -17,7 +17,7 @@ from support.commissioning import ANSWERS, NOW_NS, WINDOW_S, Bench, fitted, in_s
 from support.log import names
 from support.power import KilledError, kill_at
 
-from gateway.calibration.commissioning.job import Found, Result
+from gateway.calibration.commissioning.job import Result
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.config import Settings
 from gateway.config.sections import CommissioningSection
@@ -28,12 +28,12 @@ from gateway.records import Why
 from gateway.service.calibration_in_use import commissioned, with_commissioned
 from gateway.service.commissioning.record import FILE_NAME, MOST_MADE, CommissioningRecord
 from gateway.service.record_file import RecordFile, load_record
-from gateway.stated.commissioning import CommissioningState
+from gateway.stated.commissioning import CommissioningState, FindingTold
 from gateway.stated.doubt import Doubt, DoubtKind
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
 
-FAULT = Found(kind="pitch_rate_sign", severity="fault", text="turned over", advice="set sign = -1")
+FAULT = FindingTold(kind="pitch_rate_sign", severity="fault", text="turned over", advice="set sign = -1")
 
 
 def told(bench: Bench) -> dict[str, Any]:

@@ -8,14 +8,15 @@ from pydantic import BaseModel, ConfigDict, Field
 from gateway.core.vehicle import Vehicle
 from gateway.stated.commissioning import FindingTold
 from gateway.stated.doubt import Doubt
+from gateway.stated.facts import Part
 
 JOB: Final = "job.json"
 RESULT: Final = "result.json"
 ENOUGH_SHARE: Final = 0.98  # chosen: of the goal; a further 2 % are not worth driving
 
 
-class _JobTable(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+class _JobTable(Part):
+    model_config = ConfigDict(allow_inf_nan=False)
 
 
 class Drive(_JobTable):
@@ -43,10 +44,6 @@ class Job(_JobTable):
     command: str
 
 
-class Found(_JobTable, FindingTold):
-    """One finding of the inspection, in words."""
-
-
 class Learned(_JobTable):
     """The accuracy reached so far: standard deviations over the loads the vehicle may carry."""
 
@@ -70,7 +67,7 @@ class Learned(_JobTable):
 class Result(_JobTable):
     """The result of a job. ``fault`` says in words why there is no calibration; its text is that of the file."""
 
-    findings: tuple[Found, ...] = ()
+    findings: tuple[FindingTold, ...] = ()
     refusal: str | None = None
     learned: Learned | None = None
     calibration: str | None = None
@@ -87,9 +84,9 @@ def to_file(table: BaseModel, path: Path) -> None:
     path.write_text(table.model_dump_json(), encoding="utf-8")
 
 
-def findings_of(findings: Any) -> tuple[Found, ...]:
+def findings_of(findings: Any) -> tuple[FindingTold, ...]:
     """The findings without duplicates, the gravest first."""
     told = dict.fromkeys((one.kind, one.severity, one.text, one.advice) for one in findings)
     order = ("fault", "warning", "note")
-    found = [Found(kind=str(k), severity=str(s), text=t, advice=a) for k, s, t, a in told]
+    found = [FindingTold(kind=str(k), severity=str(s), text=t, advice=a) for k, s, t, a in told]
     return tuple(sorted(found, key=lambda one: order.index(one.severity)))

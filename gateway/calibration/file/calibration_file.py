@@ -7,7 +7,7 @@ from typing import Any, Final, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart, Part, ProvenancePart, SeenPart
+from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart, ProvenancePart, SeenPart
 from gateway.calibration.file.sane import absurd
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
@@ -18,6 +18,7 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, UntrustedFileError
 from gateway.files.signed import Read
 from gateway.schema import check_shapes
+from gateway.stated.facts import Part
 from gateway.toml_file import describe_faults
 
 Content = dict[str, Any]

@@ -15,9 +15,10 @@ from gateway.calibration.file.calibration_file import (
     matches_its_id,
     read_content,
 )
-from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart, Part
+from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart
 from gateway.errors import CalibrationFileError
 from gateway.files.signed import Read
+from gateway.stated.facts import Part
 from gateway.toml_file import describe_faults
 
 LINE_FORMAT: Final = "springscale-line"

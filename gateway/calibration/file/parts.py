@@ -3,23 +3,14 @@
 from typing import Annotated, Final, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from gateway.calibration.inheritance import ModelLimits, Seen, Usual
 from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, ROLL_PARAMETERS
 from gateway.errors import CalibrationFileError
 from gateway.records import F64
 from gateway.schema import check_shapes
-
-
-class Part(BaseModel):
-    """A table of the file: unchangeable, and an unknown key is an error."""
-
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        json_schema_serialization_defaults_required=True,  # the tool writes every key
-    )
+from gateway.stated.facts import Part
 
 
 class SeenPart(Part):

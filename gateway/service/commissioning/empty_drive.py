@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.calibration.commissioning.answers import vehicle_table
-from gateway.calibration.commissioning.job import Drive, Found, Job, Result
+from gateway.calibration.commissioning.job import Drive, Job, Result
 from gateway.calibration.kept.batch_file import KeptBatch, packed
 from gateway.calibration.kept.shelf import Shelf
 from gateway.config.sections import CommissioningSection
@@ -18,6 +18,7 @@ from gateway.log import Event
 from gateway.records import Why
 from gateway.service.commissioning.record import MADE, LineChoice, MadeCalibration, RecordStore, Underway
 from gateway.service.commissioning.worker import Worker
+from gateway.stated.commissioning import FindingTold
 from gateway.stated.facts import VehicleAnswers
 
 COMMAND: Final = "commissioned on the vehicle"
@@ -44,7 +45,7 @@ class ServiceVehicle:
 class LastInspection:
     """The last findings of inspection, and the seconds of driving they cover."""
 
-    findings: tuple[Found, ...]
+    findings: tuple[FindingTold, ...]
     seconds: float
 
     @property

@@ -11,7 +11,6 @@ from pydantic import Field
 from gateway.calibration.commissioning.answers import NO_LINE, LineFacts
 from gateway.calibration.commissioning.job import Learned
 from gateway.calibration.file.calibration_file import load_calibration
-from gateway.calibration.file.parts import Part
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, RefusedError
 from gateway.files.kept import KeptFiles
@@ -20,7 +19,7 @@ from gateway.records import iso_utc
 from gateway.service.record_file import RecordFile
 from gateway.stated.commissioning import LineSource, MadeEnd
 from gateway.stated.doubt import Doubt, DoubtKind
-from gateway.stated.facts import VehicleAnswers
+from gateway.stated.facts import Part, VehicleAnswers
 
 FILE_NAME: Final = "commissioning.json"
 MADE: Final = "commissioned-"  # the names of calibrations begin so
@@ -104,10 +103,6 @@ class Underway(Part):
         return (*(one for one in self.doubts if not one.is_of_drive), *found)
 
 
-class Ended(Part, MadeEnd):
-    """When, by whom and why a calibration went out of use."""
-
-
 class MadeCalibration(Part):
     """A calibration that was made here, and what it was made from."""
 
@@ -121,7 +116,7 @@ class MadeCalibration(Part):
     batches: tuple[str, ...]
     learned: Learned | None
     warnings: tuple[str, ...]
-    ended: Ended | None = None
+    ended: MadeEnd | None = None
 
     @property
     def vehicle_name(self) -> str:
@@ -149,7 +144,7 @@ class CommissioningRecord(Part):
         """The record after a commissioning ended with this calibration."""
         return self.model_copy(update={"underway": None, "made": (*self.made, one)[-MOST_MADE:]})
 
-    def ended(self, chosen: tuple[MadeCalibration, ...], end: Ended) -> "CommissioningRecord":
+    def ended(self, chosen: tuple[MadeCalibration, ...], end: MadeEnd) -> "CommissioningRecord":
         made = tuple(one.model_copy(update={"ended": end}) if one in chosen else one for one in self.made)
         return self.model_copy(update={"made": made})
 

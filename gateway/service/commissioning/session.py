@@ -17,10 +17,10 @@ from gateway.log import Event, OnEvent
 from gateway.part import STOP_WITHIN_S, ServicePart
 from gateway.service.commissioning.empty_drive import EmptyDrive, MakeWorker, ServiceVehicle
 from gateway.service.commissioning.lines import Lines, require_alike
-from gateway.service.commissioning.record import Confirmed, EmptyClaim, Ended, LineChoice, RecordStore, Underway
+from gateway.service.commissioning.record import Confirmed, EmptyClaim, LineChoice, RecordStore, Underway
 from gateway.service.commissioning.steps import CommissioningStep, OpenWindow, state_of, step_of
 from gateway.service.commissioning.worker import Worker
-from gateway.stated.commissioning import LinesFound, LineSource
+from gateway.stated.commissioning import LinesFound, LineSource, MadeEnd
 from gateway.stated.doubt import meant_by
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
@@ -212,7 +212,7 @@ class Commissioning(ServicePart):
             if not standing:
                 raise RefusedError("nothing_made", "no calibration made on the vehicle is in use")
             chosen = standing if to_factory else standing[-1:]
-            end = Ended(at=self._book.now(), by=by, why="back_to_factory" if to_factory else "undone")
+            end = MadeEnd(at=self._book.now(), by=by, why="back_to_factory" if to_factory else "undone")
             self._book.save(self._book.record.ended(chosen, end))
             self._book.tell(Event.COMMISSIONING_UNDONE, {"calibration_ids": [one.id for one in chosen], "by": by})
             return self.state()

@@ -10,13 +10,11 @@ from typing import Any
 from gateway.calibration.known_weight import WeightRefusal, load_of
 from gateway.calibration.verification_file import (
     FILE_NAME,
-    Verification,
     VerificationHistory,
-    VerificationRule,
-    VerifiedLoad,
     axle_errors,
     is_within,
     verdict_of,
+    with_its_id,
 )
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.errors import RefusedError
@@ -26,7 +24,7 @@ from gateway.records import iso_utc, json_line, ns_of
 from gateway.service.record_file import RecordFile
 from gateway.service.verification.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
 from gateway.setup import Subject
-from gateway.stated.facts import StatedWeight
+from gateway.stated.facts import LoadTold, Rule, StatedWeight, VerificationRecord
 from gateway.status import VerificationStatus
 from gateway.units import NS_PER_DAY
 
@@ -39,7 +37,7 @@ class VerificationService:
         directory: Path,
         subject: Subject,
         ask: Ask,
-        rule: VerificationRule,
+        rule: Rule,
         *,
         payload_without: Callable[[WeighedEpoch], Quantity] = lambda epoch: epoch.payload,
         every_days: float,
@@ -108,7 +106,7 @@ class VerificationService:
             raise RefusedError(WeightRefusal.NO_CALIBRATION, "there is no calibration, and so nothing to verify")
         epochs = [epoch_at(epochs_around(self._ask, ns_of(one.at)), ns_of(one.at), one.drive) for one in stated]
         loads = tuple(self._judged(one, epoch, calibrated) for one, epoch in zip(stated, epochs, strict=True))
-        entry = Verification(
+        unnamed = VerificationRecord(
             id="",
             at=iso_utc(self._clock_ns()),
             by=by,
@@ -121,7 +119,7 @@ class VerificationService:
             loads=loads,
             verdict=verdict_of(self._rule, loads),
         )
-        entry = entry.model_copy(update={"id": entry.content_id()})
+        entry = with_its_id(unnamed)
         with self._lock:
             try:
                 self._file.keep(self._file.record.with_entry(entry))
@@ -131,7 +129,7 @@ class VerificationService:
         tell_event(Event.VERIFIED, told, self._on_event)
         return json_line(entry.model_dump(mode="json"))
 
-    def _judged(self, stated: StatedWeight, epoch: WeighedEpoch, calibrated: CalibratedVehicle) -> VerifiedLoad:
+    def _judged(self, stated: StatedWeight, epoch: WeighedEpoch, calibrated: CalibratedVehicle) -> LoadTold:
         epoch.require(calibrated.id, self._subject.estimator)
         vehicle = calibrated.vehicle
         known = load_of(stated, vehicle, calibrated.unsprung)
@@ -140,7 +138,7 @@ class VerificationService:
         error_kg = payload.number - known.payload_kg
         error_pct = 100.0 * error_kg / reference_kg
         front, rear = axle_errors(known, payload.number, epoch.front_share.number, vehicle)
-        return VerifiedLoad(
+        return LoadTold(
             stated=stated,
             t_start=iso_utc(epoch.t_start_ns),
             t_end=iso_utc(epoch.t_end_ns),
