@@ -8,7 +8,7 @@ import pytest
 from support.half_car_road import VAN
 from support.odd_content import tried
 
-from gateway.calibration.file.calibration_file import content_id
+from gateway.calibration.file.hashed import content_id
 from gateway.calibration.file.line_file import LineFile, SiblingPart, load_like
 from gateway.calibration.half_car.prior import prior_of
 from gateway.calibration.inheritance import ModelLimits, Seen, Usual

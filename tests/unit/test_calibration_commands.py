@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from support.calibrated import calibration_file
 
 from gateway.calibration.campaign import file_sha256, load_campaign
-from gateway.calibration.file.calibration_file import CalibrationFile, content_id, load_calibration
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.calibration.file.comparison import FittedFigure, check_against_campaign, differences, figures_of
+from gateway.calibration.file.hashed import content_id
 from gateway.cli.calibration import calibration as calibration_commands
 from gateway.core.ratio_index.regression import term_columns
 from gateway.errors import CalibrationFileError

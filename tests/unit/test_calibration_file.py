@@ -10,7 +10,8 @@ import pytest
 from support.calibrated import calibration_file
 
 import gateway
-from gateway.calibration.file.calibration_file import content_id, load_calibration
+from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file.hashed import content_id
 from gateway.errors import CalibrationFileError
 
 Change = Callable[[dict[str, Any]], Any]

@@ -15,11 +15,13 @@ from support.patience import PATIENCE_S
 from support.power import KilledError, kill_at
 
 from gateway.bus.signals import Decoder, load_signal_map
+from gateway.calibration.calibrate import calibrate_inspected
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of, packed, unpacked
-from gateway.calibration.kept.drive import KnownDrive, calibrate_kept
+from gateway.calibration.kept.drive import inspect_kept, split_run_of
 from gateway.calibration.kept.shelf import Shelf, ShelfLimits
+from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
@@ -114,8 +116,9 @@ def test_a_fit_from_kept_batches_is_the_fit_from_the_logs_bit_for_bit(tmp_path: 
         shelf.add(one)
     again = Shelf(tmp_path / "batches", ShelfLimits())  # as after a restart
     kept = tuple(again.read(entry.id) for entry in again.entries())
-    drive = KnownDrive(1, "01.log", 0.0, campaign.front_share_pct(campaign.runs[0]), kept)
-    from_kept = calibrate_kept(campaign, [drive], settings).file
+    drive = split_run_of(KnownRun(1, "01.log", 0.0, campaign.front_share_pct(campaign.runs[0]), ()), kept)
+    inspection = inspect_kept(campaign, (drive,), settings)
+    from_kept = calibrate_inspected(campaign, inspection, estimators=("cross_spectrum",)).file
 
     assert len(kept) == 2
     assert from_kept.cross_spectrum is not None

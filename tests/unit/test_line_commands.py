@@ -8,7 +8,8 @@ from support.calibrated import calibration_file
 from support.commands import called, run
 from support.known_load_logs import write_known_loads
 
-from gateway.calibration.file.calibration_file import content_id, load_calibration
+from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file.hashed import content_id
 from gateway.calibration.file.line_file import load_like
 from gateway.errors import ConfigurationError
 

@@ -23,8 +23,10 @@ from gateway.calibration.commissioning.job import JOB, RESULT, Job, Learned, Res
 from gateway.calibration.file.line_file import load_like
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind
+from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.kept.batch_file import unpacked
-from gateway.calibration.kept.drive import ESTIMATORS, KnownDrive, inspect_kept
+from gateway.calibration.kept.drive import ESTIMATORS, inspect_kept, split_run_of
+from gateway.calibration.known_run import KnownRun
 from gateway.calibration.plan.design import BATCH_S, Design
 from gateway.calibration.plan.loads import empty, weighed_loads
 from gateway.calibration.plan.plan import WORTH_DRIVING
@@ -62,7 +64,7 @@ def main(folder: Path) -> None:
 def done(path: Path, job: Job) -> Result:
     """The result of the job. Raises SpringscaleError if none can be written."""
     campaign = Campaign(path, DraftTable(vehicle=job.vehicle))  # its hash in the calibration is that of the job
-    inspection = inspect_kept(campaign, tuple(_drives(job)), BatchSettings(**job.settings))
+    inspection = inspect_kept(campaign, tuple(_runs(job)), BatchSettings(**job.settings))
     looked = Result(findings=findings_of(_findings(inspection)), refusal=inspection.refusal)
     if not job.is_fit or inspection.refusal is not None:
         return looked
@@ -78,16 +80,10 @@ def done(path: Path, job: Job) -> Result:
     return looked.model_copy(update=made)
 
 
-def _drives(job: Job) -> Iterator[KnownDrive]:
+def _runs(job: Job) -> Iterator[SplitRun]:
     for number, drive in enumerate(job.drives, 1):
-        yield KnownDrive(
-            number=number,
-            name=drive.name,
-            payload_kg=drive.payload_kg,
-            front_share_pct=drive.front_share_pct,
-            batches=tuple(unpacked(path.read_bytes()) for path in drive.batches),
-            payload_left_m=drive.payload_left_m,
-        )
+        run = KnownRun(number, drive.name, drive.payload_kg, drive.front_share_pct, (), drive.payload_left_m)
+        yield split_run_of(run, [unpacked(path.read_bytes()) for path in drive.batches])
 
 
 def _findings(inspection: Inspection) -> Iterator[Finding]:

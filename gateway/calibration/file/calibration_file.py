@@ -1,12 +1,11 @@
-"""The calibration file: versioned JSON whose id is the hash of its content. Written by the tool, never by hand."""
+"""The calibration file. Written by the tool, never by hand."""
 
-import hashlib
-import json
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import ClassVar, Final, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
+from gateway.calibration.file.hashed import FileWords, HashedFile, checked_file, read_content
 from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart, ProvenancePart, SeenPart
 from gateway.calibration.file.sane import absurd
 from gateway.core.calibrated import CalibratedVehicle
@@ -15,20 +14,18 @@ from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAME
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.ratio_index.regression import TERMS
 from gateway.core.vehicle import Vehicle
-from gateway.errors import CalibrationFileError, UntrustedFileError
+from gateway.errors import CalibrationFileError
 from gateway.files.signed import Read
 from gateway.schema import check_shapes
-from gateway.stated.facts import Part
-from gateway.toml_file import describe_faults
 
-Content = dict[str, Any]
 FORMAT: Final = "springscale-calibration"
 VERSION: Final = 10  # of the format
 
 
-class CalibrationFile(Part):
+class CalibrationFile(HashedFile):
     """The whole file except its id."""
 
+    words: ClassVar[FileWords] = FileWords("calibration file", "calibrate again", "springscale calibrate")
     format: Literal["springscale-calibration"] = FORMAT
     version: Literal[10] = VERSION
     vehicle: Vehicle
@@ -55,16 +52,6 @@ class CalibrationFile(Part):
                 directions=(known.directions, (n, known.directions.shape[-1])),
             )
         return self
-
-    @property
-    def id(self) -> str:
-        """sha256 of the canonical JSON of everything in the file but the id itself; estimates name it."""
-        return content_id(self.model_dump(mode="json"))
-
-    def to_json(self) -> str:
-        """The file's text, id first."""
-        content = {"id": self.id, **self.model_dump(mode="json")}
-        return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
     def for_core(self) -> CalibratedVehicle:
         """The calibrations that the estimators need. Raises as :meth:`require_known` does."""
@@ -100,13 +87,6 @@ class CalibrationFile(Part):
         return tuple(name for name, part in held.items() if part is not None)
 
 
-def content_id(content: dict[str, Any]) -> str:
-    """sha256:... over the canonical JSON of ``content`` (keys sorted, no spaces), its own id left out."""
-    rest = {key: part for key, part in content.items() if key != "id"}
-    text = json.dumps(rest, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
-
-
 def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> CalibrationFile:
     """Reads; checks version, hash and shape.
 
@@ -115,51 +95,11 @@ def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> Calibrat
     Raises CalibrationFileError saying what to do.
     """
     path = Path(path)
-    content = read_content(path, read)
-    if content.get("format") != FORMAT:
-        raise CalibrationFileError(f"{path}: not a springscale calibration file (format is {content.get('format')!r})")
-    if content.get("version") != VERSION:
-        raise CalibrationFileError(
-            f"{path}: calibration file version {content.get('version')!r}, this springscale reads version {VERSION}: "
-            "calibrate again with `springscale calibrate`"
-        )
-    if not matches_its_id(content):
-        raise CalibrationFileError(
-            f"{path}: content does not match its id: the file was changed after it was written; "
-            "restore it or calibrate again"
-        )
+    held = checked_file(path, read_content(path, read), CalibrationFile)
     try:
-        held = CalibrationFile.model_validate({key: part for key, part in content.items() if key != "id"})
         held.require_known()
         if (fault := absurd(held)) is not None:
             raise CalibrationFileError(fault)
     except CalibrationFileError as fault:
         raise CalibrationFileError(f"{path}: {fault}") from None
-    except ValidationError as fault:
-        raise CalibrationFileError(describe_faults(path, fault, CalibrationFile)) from None
     return held
-
-
-def matches_its_id(content: Content) -> bool:
-    """False for a file that was changed since it was written."""
-    try:
-        return bool(content.get("id") == content_id(content))
-    except ValueError:  # a number that is not finite, which is never written
-        return False
-
-
-def read_content(path: Path, read: Read) -> Content:
-    """A file's JSON object. Raises CalibrationFileError if it is none."""
-    try:
-        content = json.loads(read(path).decode("utf-8"))
-    except FileNotFoundError:
-        raise CalibrationFileError(f"{path}: no such calibration file") from None
-    except UntrustedFileError as fault:
-        raise CalibrationFileError(str(fault)) from None
-    except (OSError, UnicodeDecodeError) as fault:
-        raise CalibrationFileError(f"{path}: cannot be read: {fault}") from None
-    except (ValueError, RecursionError) as fault:  # a number of 5000 digits and brackets 5000 deep are no JSON for us
-        raise CalibrationFileError(f"{path}: not valid JSON: {fault}") from None
-    if not isinstance(content, dict):
-        raise CalibrationFileError(f"{path}: not a springscale calibration file")
-    return content

@@ -2,24 +2,17 @@
 ``--like``.
 """
 
-import json
 from pathlib import Path
-from typing import Final, Literal
+from typing import ClassVar, Final, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from gateway.calibration.file.calibration_file import (
-    CalibrationFile,
-    content_id,
-    load_calibration,
-    matches_its_id,
-    read_content,
-)
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.file.hashed import FileWords, HashedFile, checked_file, read_content
 from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart
 from gateway.errors import CalibrationFileError
 from gateway.files.signed import Read
 from gateway.stated.facts import Part
-from gateway.toml_file import describe_faults
 
 LINE_FORMAT: Final = "springscale-line"
 LINE_VERSION: Final = 4  # of the format
@@ -34,9 +27,10 @@ class SiblingPart(Part):
     n_runs: int
 
 
-class LineFile(Part):
+class LineFile(HashedFile):
     """The whole file except its id."""
 
+    words: ClassVar[FileWords] = FileWords("line file", "build it again", "springscale line build")
     format: Literal["springscale-line"] = LINE_FORMAT
     version: Literal[4] = LINE_VERSION
     software: str
@@ -49,15 +43,6 @@ class LineFile(Part):
     )
     warnings: tuple[str, ...] = ()
 
-    @property
-    def id(self) -> str:
-        """sha256 of the canonical JSON of everything in the file but the id itself."""
-        return content_id(self.model_dump(mode="json"))
-
-    def to_json(self) -> str:
-        """The file's text, id first."""
-        return json.dumps({"id": self.id, **self.model_dump(mode="json")}, indent=1, allow_nan=False) + "\n"
-
 
 LikeFile = CalibrationFile | LineFile
 
@@ -67,21 +52,9 @@ def load_like(path: Path, read: Read = Path.read_bytes) -> LikeFile:
     content = read_content(path, read)
     if content.get("format") != LINE_FORMAT:
         return load_calibration(path, read)
-    if content.get("version") != LINE_VERSION:
-        raise CalibrationFileError(
-            f"{path}: line file version {content.get('version')!r}, this springscale reads version "
-            f"{LINE_VERSION}: build it again with `springscale line build`"
-        )
-    if not matches_its_id(content):
-        raise CalibrationFileError(
-            f"{path}: content does not match its id: the file was changed after it was written; restore it or build "
-            "it again"
-        )
+    held = checked_file(path, content, LineFile)
     try:
-        held = LineFile.model_validate({key: part for key, part in content.items() if key != "id"})
         held.line.require_known()
-    except ValidationError as fault:
-        raise CalibrationFileError(describe_faults(path, fault, LineFile)) from None
     except CalibrationFileError as fault:
         raise CalibrationFileError(f"{path}: {fault}") from None
     return held

@@ -216,7 +216,6 @@ def curve_of(
     name: str,
     estimators: Sequence[str] = ESTIMATOR_NAMES,
     most_subsets: int = MOST_SUBSETS,
-    seed: int = SEED,
     on_trial: OnTrial = lambda done, of: None,
 ) -> LearningCurve:
     """The learning curve of runs already read, as ``Outcome.split`` of a calibration has them.
@@ -229,7 +228,7 @@ def curve_of(
         raise CalibrationImpossibleError(f"a learning curve needs at least three runs, there are {len(runs)}")
     sizes = sorted({*(size for size in SIZES if size <= len(runs)), len(runs) - 1, len(runs)})
     triples = triples_at_different_positions(runs, vehicle)
-    subsets = [subset for size in sizes for subset in subsets_to_drive(runs, size, most_subsets, seed)]
+    subsets = [subset for size in sizes for subset in subsets_to_drive(runs, size, most_subsets, SEED)]
     asked = [(numbers, estimator) for numbers in dict.fromkeys((*triples, *subsets)) for estimator in estimators]
     trials: dict[tuple[tuple[int, ...], str], Trial] = {}
     for done, (numbers, estimator) in enumerate(asked):
@@ -238,7 +237,7 @@ def curve_of(
     on_trial(len(asked), len(asked))
     return LearningCurve(
         campaign=name,
-        seed=seed,
+        seed=SEED,
         trials=tuple(trials[numbers, estimator] for numbers in subsets for estimator in estimators),
         triples=tuple(trials[numbers, estimator] for numbers in triples for estimator in estimators),
     )

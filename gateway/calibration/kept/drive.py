@@ -2,12 +2,11 @@
 
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign
 from gateway.calibration.inspection.campaign import Inspection, inspect_campaign
 from gateway.calibration.inspection.finding import Finding
@@ -22,44 +21,23 @@ from gateway.records import Signal
 ESTIMATORS: Final = ("cross_spectrum",)  # the ratio index needs many loads
 
 
-@dataclass(frozen=True, slots=True)
-class KnownDrive:
-    """Stored batches (at least one) driven with one known load: a run of a campaign without a log."""
+def split_run_of(run: KnownRun, kept: Sequence[KeptBatch]) -> SplitRun:
+    """A run without a log, of stored batches (at least one): ``run`` has its number, name and load.
 
-    number: int
-    name: str
-    payload_kg: float
-    front_share_pct: float
-    batches: tuple[KeptBatch, ...]
-    payload_left_m: float | None = None
-
-
-def split_run_of(drive: KnownDrive) -> SplitRun:
-    """The run, with all of its batches for identification: a calibration is validated on loads that it has not seen."""
-    batches = tuple(kept.batch for kept in drive.batches)
-    run = KnownRun(
-        drive.number, drive.name, drive.payload_kg, drive.front_share_pct, batches, payload_left_m=drive.payload_left_m
-    )
-    nothing = KnownRun(drive.number, drive.name, drive.payload_kg, drive.front_share_pct, ())
-    facts = joined_facts([kept.facts for kept in drive.batches])
-    ids = hashlib.sha256("\n".join(kept.id for kept in drive.batches).encode()).hexdigest()
+    All batches are for identification: a calibration is validated on loads that it has not seen.
+    """
+    batches = tuple(one.batch for one in kept)
+    facts = joined_facts([one.facts for one in kept])
+    ids = hashlib.sha256("\n".join(one.id for one in kept).encode()).hexdigest()
     span_ns = (min(batch.t_start_ns for batch in batches), max(batch.t_end_ns for batch in batches))
-    return SplitRun(run, nothing, facts, log=LogFacts(sha256=ids, duration_s=facts.duration_s, span_ns=span_ns))
+    log = LogFacts(sha256=ids, duration_s=facts.duration_s, span_ns=span_ns)
+    return SplitRun(replace(run, batches=batches), replace(run, batches=()), facts, log=log)
 
 
-def inspect_kept(campaign: Campaign, drives: Sequence[KnownDrive], settings: BatchSettings) -> Inspection:
-    """Findings about each of the drives; ``campaign`` has their vehicle."""
-    split = tuple(map(split_run_of, drives))
+def inspect_kept(campaign: Campaign, split: tuple[SplitRun, ...], settings: BatchSettings) -> Inspection:
+    """Findings about each of these runs; ``campaign`` has their vehicle."""
     verdicts, findings = inspect_campaign(split, campaign.vehicle, settings)
     return Inspection(split, verdicts, (*findings, *_sideways_findings(campaign, split)))
-
-
-def calibrate_kept(
-    campaign: Campaign, drives: Sequence[KnownDrive], settings: BatchSettings, *, command: str = ""
-) -> Outcome:
-    """Inspects the drives and fits those without a fault. Raises as :func:`calibrate_inspected` does."""
-    inspection = inspect_kept(campaign, drives, settings)
-    return calibrate_inspected(campaign, inspection, estimators=ESTIMATORS, command=command)
 
 
 def joined_facts(parts: Sequence[RowFacts]) -> RowFacts:

@@ -139,7 +139,7 @@ class LoadPlan:
         return asdict(self) | {"is_enough_driven": self.is_enough_driven}
 
 
-def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST, inherited: Inherited | None = None) -> LoadPlan:
+def plan_first(vehicle: Vehicle, inherited: Inherited | None = None) -> LoadPlan:
     """A first campaign: empty, then the most informative loads by the prior of any vehicle, or of its line."""
     prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=False)
     planner = _Planner(
@@ -153,12 +153,12 @@ def plan_first(vehicle: Vehicle, n_runs: int = N_FIRST, inherited: Inherited | N
         n_driven=0,
         drive=FIRST_DRIVE,
         now=None,
-        advice=(first, *planner.advice(known, (unloaded,), n_runs - 1)),
+        advice=(first, *planner.advice(known, (unloaded,), N_FIRST - 1)),
         least=None,
     )
 
 
-def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> LoadPlan:
+def plan_next(outcome: Outcome, vehicle: Vehicle) -> LoadPlan:
     """The next runs after a calibration.
 
     Raises CalibrationImpossibleError without a cross-spectral part, on which the advice rests.
@@ -178,7 +178,7 @@ def plan_next(outcome: Outcome, vehicle: Vehicle, n_runs: int = N_NEXT) -> LoadP
         n_driven=len(runs),
         drive=drive,
         now=planner.expected(of_half_car, driven),
-        advice=planner.advice(of_half_car, driven, n_runs),
+        advice=planner.advice(of_half_car, driven, N_NEXT),
         least=planner.least(of_half_car, driven),
         sideways=sideways_load(runs, vehicle),
     )
