@@ -9,6 +9,7 @@ import cantools
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.encoded import frames_of
 
 from gateway.bus.signals import Decoder, Encoder, SignalMap, load_signal_map
 from gateway.records import Frames, Signal
@@ -52,15 +53,8 @@ def read_map(dbc: str) -> SignalMap:
         return load_signal_map(Path(folder) / "map.toml")
 
 
-def frames_of(payloads: list[bytes], width: int) -> Frames:
-    n = len(payloads)
-    rows = b"".join(payload.ljust(width, b"\0") for payload in payloads)
-    return Frames(
-        np.arange(n, dtype=np.int64),
-        np.full(n, 291, np.uint32),
-        np.array([len(payload) for payload in payloads], np.uint8),
-        np.frombuffer(rows, np.uint8).reshape(n, width),
-    )
+def of_payloads(payloads: list[bytes], width: int) -> Frames:
+    return frames_of([(n, 291, payload) for n, payload in enumerate(payloads)], width)
 
 
 @settings(max_examples=150)
@@ -69,7 +63,7 @@ def test_every_number_is_the_one_cantools_gives(signal, draws):
     dbc, n_bytes = signal
     payloads = draws.draw(st.lists(st.binary(min_size=n_bytes, max_size=n_bytes), min_size=1, max_size=6))
     signal_map = read_map(dbc)
-    motion = Decoder(signal_map).decode(frames_of(payloads, signal_map.payload_width))
+    motion = Decoder(signal_map).decode(of_payloads(payloads, signal_map.payload_width))
     message = cantools.database.load_string(dbc, "dbc").get_message_by_name("M")
     truth = [float(message.decode(payload)["S"]) for payload in payloads]
     finite = [number if math.isfinite(number) else math.nan for number in truth]
@@ -95,7 +89,7 @@ def test_what_the_encoder_writes_cantools_would_write(signal, draws):
 @given(st.lists(st.binary(min_size=8, max_size=8), min_size=1, max_size=20), st.lists(st.integers(0, 20), max_size=5))
 def test_how_frames_are_chunked_leaves_no_trace(payloads, cuts):
     signal_map = load_signal_map("springscale:canmod_gps")
-    frames = frames_of(payloads, 8)
+    frames = of_payloads(payloads, 8)
     frames.can_id[:] = 9
     whole = Decoder(signal_map)
     motion = whole.decode(frames)

@@ -8,6 +8,7 @@ import can
 import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from support.encoded import frames_of
 
 from gateway.bus.frames import join
 from gateway.bus.logs import LogReport, write_candump
@@ -25,16 +26,6 @@ payloads = st.one_of(
 frame_rows = st.tuples(st.integers(0, 9_223_372_035 * 10**9), identifiers, payloads)
 
 
-def table(rows) -> Frames:
-    data = b"".join(payload.ljust(64, b"\0") for _, _, payload in rows)
-    return Frames(
-        np.array([t for t, _, _ in rows], np.int64),
-        np.array([i for _, i, _ in rows], np.uint32),
-        np.array([len(p) for _, _, p in rows], np.uint8),
-        np.frombuffer(data, np.uint8).reshape(len(rows), 64),
-    )
-
-
 def read(path, block_bytes=1 << 16):
     report = LogReport(path)
     chunks = read_candump(Selection(report, EVERY_IDENTIFIER, None, 64), block_bytes)
@@ -48,7 +39,7 @@ def assert_equal(a: Frames, b: Frames) -> None:
 
 @given(st.lists(frame_rows, max_size=40), st.booleans(), st.integers(256, 2000))
 def test_what_is_written_is_read_back_to_the_nanosecond(rows, is_gzip, block_bytes):
-    frames = table(rows)
+    frames = frames_of(rows, 64)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / ("a.log.gz" if is_gzip else "a.log")
         write_candump(frames, "vcan0", path)
@@ -59,7 +50,7 @@ def test_what_is_written_is_read_back_to_the_nanosecond(rows, is_gzip, block_byt
 
 @given(st.lists(frame_rows, min_size=1, max_size=20))
 def test_what_is_written_python_can_reads_as_well(rows):
-    frames = table(rows)
+    frames = frames_of(rows, 64)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.log"
         write_candump(frames, "vcan0", path)
@@ -106,7 +97,8 @@ def test_the_fast_path_reads_what_the_exact_path_reads(lines, block_bytes, has_f
         path = Path(folder) / "a.log"
         path.write_bytes(gzip.compress(text) if block_bytes % 2 else text)
         found = join(list(read_candump(Selection(LogReport(path), filters, "can0", 64), block_bytes)), 64)
-    assert_equal(found, table([row for line in text.split(b"\n") if (row := read_alone(line, filters))]))
+    rows = [row for line in text.split(b"\n") if (row := read_alone(line, filters))]
+    assert_equal(found, frames_of(rows, 64))
 
 
 def read_alone(line: bytes, filters):

@@ -1,6 +1,6 @@
-"""Frames of whatever signal map, from samples in SI."""
+"""Frames as they are given, or of whatever signal map from samples in SI."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -8,6 +8,18 @@ from gateway.bus.frames import merge_frames
 from gateway.bus.signals import Encoder
 from gateway.bus.signals.mapping import SignalMap
 from gateway.records import F64, I64, Frames, Signal
+
+
+def frames_of(rows: Iterable[tuple[int, int, bytes]], width: int = 8) -> Frames:
+    """Of time stamp (ns), identifier and payload; what a payload has beyond ``width`` shows in its length alone."""
+    rows = list(rows)
+    table = b"".join(payload[:width].ljust(width, b"\0") for _, _, payload in rows)
+    return Frames(
+        np.array([t_ns for t_ns, _, _ in rows], np.int64),
+        np.array([can_id for _, can_id, _ in rows], np.uint32),
+        np.array([len(payload) for _, _, payload in rows], np.uint8),
+        np.frombuffer(table, np.uint8).reshape(len(rows), width),
+    )
 
 
 def encode_signals(signal_map: SignalMap, t_ns: Mapping[Signal, I64], samples: Mapping[Signal, F64]) -> Frames:

@@ -5,26 +5,21 @@ import struct
 import cantools
 import numpy as np
 import pytest
-from support.encoded import encode_signals
+from support.encoded import encode_signals, frames_of
 
+from gateway.bus.frames import empty_frames
 from gateway.bus.signals import Decoder, Encoder, load_signal_map
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.signals.decode import Rejected, is_j1939_code
 from gateway.bus.signals.signal_map import shipped_maps
-from gateway.records import EXTENDED_ID, Frames, Signal
+from gateway.records import EXTENDED_ID, Signal
 
 G = 9.80665
 
 
 def frames(*rows, width=8):
     """Rows of (can_id, payload) a millisecond apart."""
-    payload = b"".join(p[:width].ljust(width, b"\0") for _, p in rows)
-    return Frames(
-        np.arange(len(rows), dtype=np.int64) * 1_000_000,
-        np.array([can_id for can_id, _ in rows], np.uint32),
-        np.array([len(p) for _, p in rows], np.uint8),
-        np.frombuffer(payload, np.uint8).reshape(len(rows), width),
-    )
+    return frames_of([(n * 1_000_000, *row) for n, row in enumerate(rows)], width)
 
 
 def gps(speed_raw=5000, satellites=9, fix=3):
@@ -56,7 +51,7 @@ def test_all_signals_of_a_message_share_its_row(reference):
 
 
 def test_nothing_decodes_to_nothing(reference):
-    assert reference.decode(frames()).columns.shape == (0, 12)
+    assert reference.decode(empty_frames(8)).columns.shape == (0, 12)
 
 
 @pytest.mark.parametrize(

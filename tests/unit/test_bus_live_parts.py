@@ -5,8 +5,8 @@ import threading
 from contextlib import contextmanager
 
 import can
-import numpy as np
 import pytest
+from support.encoded import frames_of
 from support.patience import PATIENCE_S, wait_until
 
 from gateway.bus.heard import similar_to
@@ -17,16 +17,10 @@ from gateway.bus.live.python_can import PythonCanReceiver
 from gateway.bus.live.receiver import Inbox
 from gateway.bus.live.source import LiveSource, SourceState
 from gateway.bus.signals import load_signal_map
-from gateway.records import Frames
 
 
 def burst(first, n):
-    return Frames(
-        np.arange(first, first + n, dtype=np.int64),
-        np.zeros(n, np.uint32),
-        np.zeros(n, np.uint8),
-        np.zeros((n, 8), np.uint8),
-    )
+    return frames_of((i, 0, b"") for i in range(first, first + n))
 
 
 def test_what_was_put_comes_out_at_once_in_order():

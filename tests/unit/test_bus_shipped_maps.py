@@ -3,12 +3,12 @@
 import math
 import struct
 
-import numpy as np
 import pytest
+from support.encoded import frames_of
 
 from gateway.bus.signals import CLASSIC_BYTES, Decoder, load_signal_map, shipped_map
 from gateway.bus.signals.signal_map import shipped_maps
-from gateway.records import EXTENDED_ID, Frames, Signal
+from gateway.records import EXTENDED_ID, Signal
 
 RAD = math.pi / 180
 A, P, R, V, W, X, Y, TURN, LAT, LON, ODO, ON, DOOR, AIR = (
@@ -118,13 +118,7 @@ def test_hand_computed_frames(name):
     signal_map = load_signal_map(f"springscale:{name}")
     assert signal_map.payload_width == CLASSIC_BYTES
     for can_id, payload, expected in FRAMES[name]:
-        frame = Frames(
-            np.zeros(1, np.int64),
-            np.array([can_id], np.uint32),
-            np.array([len(payload)], np.uint8),
-            np.frombuffer(payload.ljust(8, b"\0"), np.uint8).reshape(1, 8),
-        )
-        motion = Decoder(signal_map).decode(frame)
+        motion = Decoder(signal_map).decode(frames_of([(0, can_id, payload)]))
         found = {s: x for s, x in zip(motion.signals, motion.columns[0], strict=True) if math.isfinite(x)}
         wanted = {s: x for s, x in expected.items() if s in signal_map.signals}
         assert found == pytest.approx(wanted), f"{name} {can_id:X}"

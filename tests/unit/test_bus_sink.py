@@ -5,14 +5,13 @@ import threading
 import time
 
 import can
-import numpy as np
 import pytest
+from support.encoded import frames_of
 
 from gateway.bus import sink as sink_module
 from gateway.bus.logs import write_candump
 from gateway.bus.sink import BusSink, replay, replay_frames
 from gateway.errors import BusError, LogUnreadableError
-from gateway.records import Frames
 
 
 class RecordingSink:
@@ -56,13 +55,7 @@ def clock(monkeypatch):
 
 
 def frames(*t_s):
-    n = len(t_s)
-    return Frames(
-        np.array([round(t * 1e9) for t in t_s], np.int64),
-        np.arange(n, dtype=np.uint32),
-        np.zeros(n, np.uint8),
-        np.zeros((n, 8), np.uint8),
-    )
+    return frames_of((round(t * 1e9), i, b"") for i, t in enumerate(t_s))
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 4.0])

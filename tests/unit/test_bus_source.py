@@ -5,8 +5,8 @@ import threading
 import time
 
 import can
-import numpy as np
 import pytest
+from support.encoded import frames_of
 from support.log import logged, names
 from support.patience import PATIENCE_S, wait_until
 
@@ -17,18 +17,12 @@ from gateway.bus.live.source import LiveSource, SourceState
 from gateway.bus.signals import load_signal_map
 from gateway.errors import BusError
 from gateway.log import Event
-from gateway.records import Frames
 
 MAP = load_signal_map("springscale:reference")
 
 
 def frames(n, first_ns=0):
-    return Frames(
-        first_ns + np.arange(n, dtype=np.int64),
-        np.full(n, 0x130, np.uint32),
-        np.full(n, 4, np.uint8),
-        np.zeros((n, 8), np.uint8),
-    )
+    return frames_of((first_ns + i, 0x130, bytes(4)) for i in range(n))
 
 
 class ScriptedInterface:

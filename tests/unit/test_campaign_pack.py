@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.commands import printed
+from support.encoded import frames_of
 from support.known_load_logs import write_known_loads
 
 from gateway.bus.frames import merge_frames
@@ -14,7 +15,6 @@ from gateway.bus.logs import open_whole_log, write_candump
 from gateway.bus.signals import Encoder, load_signal_map
 from gateway.errors import CampaignError, ConfigurationError
 from gateway.offline.bundle import CONTRIBUTION, MANIFEST, TEMPLATE, pack, unpacked
-from gateway.records import Frames
 from gateway.workbench.simulate import bench_of, write_campaign
 
 
@@ -23,12 +23,7 @@ def with_strangers(log: Path) -> None:
     chunks, _ = open_whole_log(log)
     frames = merge_frames(list(chunks))
     stamps = frames.t_ns[::50]
-    vin = Frames(
-        stamps,
-        np.full(len(stamps), 0x7E8, np.uint32),
-        np.full(len(stamps), 8, np.uint8),
-        np.tile(np.frombuffer(b"VIN12345", np.uint8), (len(stamps), 1)),
-    )
+    vin = frames_of((t_ns, 0x7E8, b"VIN12345") for t_ns in stamps)
     place = {"Latitude": np.full(len(stamps), 48.0), "Longitude": np.full(len(stamps), 9.0)}
     here = Encoder(load_signal_map("springscale:reference")).encode("GPS_POSITION", stamps, place)
     write_candump(merge_frames([frames, vin, here]), "can0", log)

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.bus_drive import white_noise
+from support.encoded import frames_of
 from support.log import fields_of
 from support.patience import PATIENCE_S, wait_until
 
@@ -217,13 +218,7 @@ def test_a_segment_that_is_let_go_is_read_to_its_end(tmp_path: Path) -> None:
 
 def test_frames_longer_than_the_map_keeps_have_their_length(tmp_path: Path) -> None:
     """A CAN FD frame under a mapped identifier is refused for its length, live and from the log alike."""
-    n = 3
-    frames = Frames(
-        np.arange(n) * 10**9 + 1,
-        np.full(n, 0x101, np.uint32),
-        np.array([8, 12, 2], np.uint8),
-        np.ones((n, 8), np.uint8),
-    )
+    frames = frames_of((n * 10**9 + 1, 0x101, bytes(length)) for n, length in enumerate((8, 12, 2)))
     (path,) = [*files(tmp_path)] or (recorded(tmp_path, frames) and files(tmp_path))
     chunks, _ = open_whole_log(path)
     (found,) = list(chunks)
