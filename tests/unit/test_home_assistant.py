@@ -2,6 +2,8 @@
 
 import json
 import math
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -91,22 +93,27 @@ def test_a_name_that_no_topic_may_hold_stays_different_from_others() -> None:
     assert all(" " not in topic and "." not in topic for topic in topics)
 
 
+@contextmanager
+def delivered(folder: Path, prefix: str, *records: dict[str, Any], **broker: str) -> Iterator[int]:
+    """The port of a broker that an uplink has given all of these, with discovery under ``prefix``."""
+    section = UplinkSection(host="127.0.0.1", tls=False, home_assistant=prefix)
+    with running_broker(folder, **broker) as running, closing(Store.open(folder / "state")) as store:
+        for record in records:
+            store.write_estimate(record)
+        settings = uplink_settings(section.model_copy(update={"port": running.port}), VehicleSection(id="van-17"))
+        uplink = Uplink(settings, Outbox(store, "fleet", with_latest=True), BIRTH)
+        uplink.start()
+        assert wait_until(lambda: uplink.report().n_delivered == len(records)), uplink.report()
+        uplink.stop()
+        yield running.port
+
+
 @needs_mosquitto
 def test_it_is_retained_at_a_real_broker_and_estimates_still_go_out(tmp_path: Path) -> None:
-    section = UplinkSection(host="127.0.0.1", tls=False, home_assistant="ha")
-    store = Store.open(tmp_path / "state")
-    store.write_estimate(make_record(1))
-    with running_broker(tmp_path) as broker:
-        settings = uplink_settings(section.model_copy(update={"port": broker.port}), VehicleSection(id="van-17"))
-        assert settings is not None
-        uplink = Uplink(settings, Outbox(store, "fleet"), BIRTH)
-        uplink.start()
-        assert wait_until(lambda: uplink.report().n_delivered == 1), uplink.report()
-        listener = Listener(broker.port, "ha/#")
+    with delivered(tmp_path, "ha", make_record(1)) as port:
+        listener = Listener(port, "ha/#")
         assert listener.wait_for(1)
         listener.close()
-        uplink.stop()
-    store.close()
     (message,) = listener.heard
     assert (message.topic, message.retain) == ("ha/device/springscale_van-17/config", True)
     assert json.loads(message.payload) == told()
@@ -115,21 +122,10 @@ def test_it_is_retained_at_a_real_broker_and_estimates_still_go_out(tmp_path: Pa
 @needs_mosquitto
 def test_the_last_weights_are_there_for_who_comes_later_though_the_last_batch_was_refused(tmp_path: Path) -> None:
     """After its restart Home Assistant showed nothing until the next estimate."""
-    section = UplinkSection(host="127.0.0.1", tls=False, home_assistant="ha")
-    store = Store.open(tmp_path / "state")
-    for record in (make_record(1), make_record(2), make_record(3, Why.TOO_SLOW)):
-        store.write_estimate(record)
-    with running_broker(tmp_path) as broker:
-        settings = uplink_settings(section.model_copy(update={"port": broker.port}), VehicleSection(id="van-17"))
-        assert settings is not None
-        uplink = Uplink(settings, Outbox(store, "fleet", with_latest=True), BIRTH)
-        uplink.start()
-        assert wait_until(lambda: uplink.report().n_delivered == 3), uplink.report()
-        uplink.stop()
-        listener = Listener(broker.port, "springscale/van-17/#")
+    with delivered(tmp_path, "ha", make_record(1), make_record(2), make_record(3, Why.TOO_SLOW)) as port:
+        listener = Listener(port, "springscale/van-17/#")
         assert wait_until(lambda: {message.topic for message in listener.heard} == RETAINED)
         listener.close()
-    store.close()
     (latest,) = [message for message in listener.heard if message.topic.endswith("latest")]
     assert latest.retain
     assert json.loads(latest.payload)["id"] == make_record(2)["id"]
@@ -138,19 +134,10 @@ def test_the_last_weights_are_there_for_who_comes_later_though_the_last_batch_wa
 @needs_mosquitto
 def test_a_broker_that_does_not_want_it_there_gets_the_estimates_all_the_same(tmp_path: Path) -> None:
     (tmp_path / "acl").write_text("topic read #\ntopic write springscale/#\n")
-    section = UplinkSection(host="127.0.0.1", tls=False, home_assistant="homeassistant")
-    store = Store.open(tmp_path / "state")
-    store.write_estimate(make_record(1))
     # with an unlimited queue, which the other tests have, mosquitto 2.0.11 cuts who writes where it may not
     extra = f"allow_anonymous true\nacl_file {tmp_path}/acl\nmax_queued_messages 1000"
-    with running_broker(tmp_path, extra) as broker:
-        settings = uplink_settings(section.model_copy(update={"port": broker.port}), VehicleSection(id="van-17"))
-        assert settings is not None
-        uplink = Uplink(settings, Outbox(store, "fleet"), BIRTH)
-        uplink.start()
-        assert wait_until(lambda: uplink.report().n_delivered == 1), uplink.report()
-        uplink.stop()
-    store.close()
+    with delivered(tmp_path, "homeassistant", make_record(1), extra=extra):
+        pass
 
 
 def test_a_prefix_that_mqtt_forbids_is_told() -> None:
