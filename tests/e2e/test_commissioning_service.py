@@ -5,21 +5,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.commissioned import Running, serve
 from support.configured import service_config
 from support.half_car_road import VAN
 from support.known_load_logs import write_known_loads
+from support.running_service import COMMISSIONING, Running, serve, stored
 
 from gateway.calibration.calibrate import calibrate_inspected
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
-from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
 from gateway.estimate_json import estimate_to_json
 from gateway.offline.campaigns import calibrate, inspect
 from gateway.offline.estimates import estimates_of_logs
 from gateway.setup import load_setup
-from gateway.store import Store
 
 WINDOW_S = 100.0
 DRIVEN_S = 250.0  # two windows, and a part of one
@@ -64,7 +62,7 @@ def test_commissioned_over_http_it_weighs_as_calibrated_at_a_desk(config: Path, 
     said: dict[str, Any] = {}
 
     def meet(running: Running) -> None:
-        assert running.ask()["is_offered"]
+        assert running.http(COMMISSIONING)["is_offered"]
         assert running.step("vehicle", ANSWERS)["reason"] == "not_begun"
         assert running.step("", {"note": "in the yard"})["underway"]["step"] == "line"
         assert running.step("vehicle", ANSWERS)["reason"] == "wrong_step"
@@ -81,11 +79,11 @@ def test_commissioned_over_http_it_weighs_as_calibrated_at_a_desk(config: Path, 
         running.play(tmp_path / "01.log")
         said["made"] = running.wait_until(lambda told: told["active"] is not None)
         running.wait_until(lambda told: running.n_starts == 2 and not told["is_pending"])
-        said["status"] = running.ask("/api/v1/status")
+        said["status"] = running.http("/api/v1/status")
         running.play(tmp_path / "02.log")
-        said["undone"] = running.ask("/api/v1/calibration/commissioning/undo", {}, "POST")
+        said["undone"] = running.step("undo", {})
         running.wait_until(lambda told: running.n_starts == 3 and not told["is_pending"])
-        said["after"] = running.ask("/api/v1/status")
+        said["after"] = running.http("/api/v1/status")
 
     serve(config, meet)
 
@@ -105,12 +103,9 @@ def test_commissioned_over_http_it_weighs_as_calibrated_at_a_desk(config: Path, 
 
 def assert_weighs_the_same(config: Path, folder: Path, desk: CalibrationFile) -> None:
     """What the service stored of the loaded drive is what its log gives with the desk's calibration."""
-    store = Store.open(load_settings(config).store.directory)
-    try:
-        items = [json.loads(text) for text in store.reader().estimates(limit=100).items]
-    finally:
-        store.close()
-    weighed = [one for one in items if one["calibration_id"] is not None and not one["rejected"]]
+    weighed = [
+        one for one in map(json.loads, stored(config)) if one["calibration_id"] is not None and not one["rejected"]
+    ]
     (folder / "desk.json").write_text(desk.to_json())
     setup = load_setup("springscale:reference", folder / "desk.json")
     offline = list(estimates_of_logs([folder / "02.log"], setup, SETTINGS))

@@ -7,17 +7,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import httpx
 from click.testing import Result
 
 from gateway.bus.sink import replay
-from gateway.config import load_settings
+from gateway.config import Settings, load_settings
 from gateway.history import SERVICE
 from gateway.service.gateway import Gateway
-from gateway.setup import setup_of
+from gateway.service.lifecycle import live
 from gateway.store import Store
 from support.commands import called, printed
 from support.configured import service_config
-from support.patience import wait_until
+from support.patience import PATIENCE_S, wait_until
+
+COMMISSIONING = "/api/v1/calibration/commissioning"
 
 
 def configuration(folder: Path, calibration: str, more: str = "") -> Path:
@@ -27,19 +30,22 @@ def configuration(folder: Path, calibration: str, more: str = "") -> Path:
 
 
 class Running:
-    """A running service as the test's other thread meets it."""
+    """A running service as the test's other thread meets it; ``gateway`` is another after each new start."""
 
-    def __init__(self, gateway: Gateway, channel: str) -> None:
-        self.gateway = gateway
-        self._channel = channel
+    gateway: Gateway
+
+    def __init__(self, settings: Settings) -> None:
+        self._channel = settings.bus.channel
+        self.n_starts = 0
 
     def play(self, log: Path, speed: float | str = "max") -> None:
         """Send a log; return when all of it was worked through."""
-        before = self.gateway.source.counts().frames
-        sent = replay(log, "virtual", self._channel, speed=speed).frames
         gateway = self.gateway
+        before = gateway.source.counts().frames
+        sent = replay(log, "virtual", self._channel, speed=speed).frames
         is_through = wait_until(lambda: gateway.source.counts().frames >= before + sent and gateway.has_caught_up)
         assert is_through, f"{log} was not worked through"
+        gateway.keeper.flush()
 
     def ask(self, *arguments: str) -> Result:
         """springscale ... against this service."""
@@ -51,25 +57,53 @@ class Running:
         assert found.exit_code == 0, (found.output, found.exception)
         return json.loads(found.stdout)
 
+    def http(self, path: str, body: dict[str, Any] | None = None, method: str | None = None) -> dict[str, Any]:
+        """The answer; a refusal's problem."""
+        method = method or ("GET" if body is None else "POST")
+        return httpx.request(method, self.gateway.url + path, json=body, timeout=PATIENCE_S).json()
+
+    def step(self, step: str, body: dict[str, Any]) -> dict[str, Any]:
+        """One step of the commissioning."""
+        return self.http(f"{COMMISSIONING}/{step}" if step else COMMISSIONING, body)
+
+    def wait_until(self, is_so: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        """Until the commissioning is so; between two starts nobody answers."""
+        seen: list[dict[str, Any]] = []
+
+        def came_true() -> bool:
+            try:
+                seen[:] = [self.http(COMMISSIONING)]
+            except (httpx.TransportError, IndexError):
+                return False
+            return is_so(seen[0])
+
+        assert wait_until(came_true), seen
+        return seen[0]
+
 
 def serve(config: Path, meet: Callable[[Running], None]) -> None:
     """Run the service while ``meet`` does its part in another thread; what fails there fails here."""
     settings = load_settings(config)
+    running = Running(settings)
     failures: list[BaseException] = []
+    loops: list[asyncio.AbstractEventLoop] = []
 
     def on_started(gateway: Gateway) -> None:
-        loop = asyncio.get_running_loop()
+        running.gateway = gateway
+        running.n_starts += 1
+        loops.append(asyncio.get_running_loop())
+        if running.n_starts == 1:
+            threading.Thread(target=part, daemon=True).start()
 
-        def part() -> None:
-            try:
-                meet(Running(gateway, settings.bus.channel))
-            except BaseException as failure:  # noqa: BLE001 - raised again in the test's own thread
-                failures.append(failure)
-            loop.call_soon_threadsafe(gateway.request_stop)
+    def part() -> None:
+        try:
+            meet(running)
+        except BaseException as failure:  # noqa: BLE001 - raised again in the test's own thread
+            failures.append(failure)
+        loops[-1].call_soon_threadsafe(running.gateway.request_stop)
 
-        threading.Thread(target=part, daemon=True).start()
-
-    Gateway(settings, setup_of(settings), on_started=on_started).run()
+    while live(settings, lambda: load_settings(config), on_started=on_started):
+        pass
     if failures:
         raise failures[0]
 

@@ -8,13 +8,11 @@ from typing import Any
 from gateway.calibration.axle_weights import UNSPRUNG_SHARE
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.commissioning.answers import vehicle_table
-from gateway.config import load_settings
 from gateway.core.vehicle import Vehicle
 from gateway.stated.facts import VehicleAnswers
-from gateway.store import Store
-from support.commissioned import Running, serve
 from support.configured import service_config
 from support.recordings import recordings
+from support.running_service import Running, serve, stored
 
 WINDOW_S = 300.0
 
@@ -109,9 +107,5 @@ def _campaign(path: Path, vehicle: Vehicle, drives: Path, duration_s: float) -> 
 
 
 def _weighed(config: Path, calibration_id: str) -> list[dict[str, Any]]:
-    store = Store.open(load_settings(config).store.directory)
-    try:
-        records = [json.loads(text) for text in store.reader().estimates(limit=100).items]
-    finally:
-        store.close()
+    records = map(json.loads, stored(config))
     return sorted((one for one in records if one["calibration_id"] == calibration_id), key=lambda one: one["t_end_ns"])
