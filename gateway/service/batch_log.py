@@ -26,7 +26,7 @@ class BatchLog:
     def __init__(self, weigh: Callable[[], LatestWeights]) -> None:
         self._weigh = weigh
         self._rejected: frozenset[Why] = frozenset()  # of the last full batch; before the first, as if it had counted
-        self._overloaded = self._now_overloaded()
+        self._overloaded = overloaded(weigh())
 
     def __call__(self, found: Estimate) -> None:
         """Log a new estimate at level info; rejected and provisional ones at level debug."""
@@ -50,25 +50,20 @@ class BatchLog:
             self._tell_overload()
 
     def _tell_overload(self) -> None:
-        before, self._overloaded = self._overloaded, self._now_overloaded()
-        if before == self._overloaded:
-            return
         weights = self._weigh()
+        before, self._overloaded = self._overloaded, overloaded(weights)
         for where in PLACES:
-            if (where in before) is not (where in self._overloaded):
+            if where in before ^ self._overloaded:
                 figure = getattr(weights, where)
-                is_over = where in self._overloaded
-                log_event(
-                    Event.OVERLOAD_BEGINS if is_over else Event.OVERLOAD_ENDS,
-                    level=logging.WARNING if is_over else logging.INFO,
-                    where=where,
-                    kg=figure.kg,
-                    limit_kg=figure.limit_kg,
-                )
+                event, level = Event.OVERLOAD_ENDS, logging.INFO
+                if where in self._overloaded:
+                    event, level = Event.OVERLOAD_BEGINS, logging.WARNING
+                log_event(event, level=level, where=where, kg=figure.kg, limit_kg=figure.limit_kg)
 
-    def _now_overloaded(self) -> frozenset[str]:
-        weights = self._weigh()
-        return frozenset(where for where in PLACES if getattr(weights, where).is_over_limit)
+
+def overloaded(weights: LatestWeights) -> frozenset[str]:
+    """The places whose weight is over its limit."""
+    return frozenset(where for where in PLACES if getattr(weights, where).is_over_limit)
 
 
 def call_each(*hearers: Callable[[Estimate], None]) -> Callable[[Estimate], None]:

@@ -52,16 +52,15 @@ def commissioned(settings: Settings) -> tuple[Settings, Setup, str | None]:
 
     Raises as ``setup_of``.
     """
-    chosen = with_commissioned(settings)
-    if chosen is settings:
-        return settings, *setup_or_last_good(settings)
-    try:
-        return chosen, _with_made(chosen), None
-    except ConfigurationError as broken:
-        log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=str(broken))
-        setup, fault = setup_or_last_good(settings)
-        what = f"the calibration made on the vehicle cannot be used ({broken}): make another, or undo it"
-        return settings, setup, f"{what}; {fault}" if fault else what
+    chosen, faults = with_commissioned(settings), []
+    if chosen is not settings:
+        try:
+            return chosen, _with_made(chosen), None
+        except ConfigurationError as broken:
+            log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=str(broken))
+            faults.append(f"the calibration made on the vehicle cannot be used ({broken}): make another, or undo it")
+    setup, fault = setup_or_last_good(settings)
+    return settings, setup, "; ".join([*faults, *([fault] if fault else [])]) or None
 
 
 def setup_in_use(settings: Settings) -> Setup:

@@ -21,7 +21,6 @@ from gateway.service.batch_log import BatchLog, LoadEventLog, StateLog, call_eac
 from gateway.service.calibration_in_use import keep_copy
 from gateway.service.part import CLOSE_WITHIN_S, Deadline, Questions, in_own_thread, stop_in_turn
 from gateway.service.parts import (
-    Forwarding,
     board_of,
     broadcaster_of,
     commissioning_of,
@@ -41,6 +40,7 @@ from gateway.service.verification.verification import VerificationService
 from gateway.setup import Setup
 from gateway.stated.facts import Rule
 from gateway.status import State
+from gateway.uplink.settings import uplink_settings, webhook_settings
 from gateway.web.access.serving import WebServer, refuse_open_address, server_config
 from gateway.web.access.tokens import TokenFile
 from gateway.web.app import create_app
@@ -84,8 +84,9 @@ class Gateway:
         self._on_started = on_started
         self._tokens = token_file = TokenFile(settings.store.directory / "tokens.json")
         refuse_open_address(settings.web.host, has_tokens=token_file.are_in_use())
-        forwarding, with_places = Forwarding.of(settings), settings.position.forward
-        self.store = store_of(settings.store, forwarding.queues)
+        broker = uplink_settings(settings.uplink, settings.vehicle)
+        receiver, with_places = webhook_settings(settings.webhook, settings.vehicle), settings.position.forward
+        self.store = store_of(settings.store, broker, receiver)
         if setup.calibration is not None:
             self.store.write_calibration(setup.calibration.id, setup.calibration.to_json())
             if setup_fault is None:
@@ -112,8 +113,8 @@ class Gateway:
             call_each(log_batch, LoadEventLog(setup, self.store), self.alarms),
             self.ring_log.put if self.ring_log else lambda frames: None,
         )
-        self.uplink = uplink_of(forwarding.broker, setup, self.store, with_places=with_places)
-        self.webhook = webhook_of(forwarding.webhook, self.store, with_places=with_places)
+        self.uplink = uplink_of(broker, setup, self.store, with_places=with_places)
+        self.webhook = webhook_of(receiver, self.store, with_places=with_places)
         directory, ask, on_event = settings.store.directory, self.store.reader().estimates, self.store.write_event
         self.known_weights = KnownWeightService(
             directory, subject, self.pipeline, ask, stale_after_s=settings.web.stale_after_s, on_event=on_event

@@ -1,6 +1,6 @@
 """The parts of a service, each built from its section of the settings."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib.metadata import version
 
 from gateway.bus.broadcast import Broadcaster, Sender
@@ -21,7 +21,7 @@ from gateway.setup import Setup
 from gateway.store import Retention, Store, restored
 from gateway.units import BYTES_PER_MB, S_PER_DAY
 from gateway.uplink.outbox import Outbox
-from gateway.uplink.settings import UplinkSettings, WebhookSettings, uplink_settings, webhook_settings
+from gateway.uplink.settings import UplinkSettings, WebhookSettings
 from gateway.uplink.uplink import Uplink
 from gateway.uplink.webhook import Webhook
 from gateway.web.live.board import Board
@@ -49,26 +49,6 @@ def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with
     return Uplink(wanted, outbox, birth)
 
 
-@dataclass(frozen=True, slots=True)
-class Forwarding:
-    """The senders that follow the journal, by the settings; None for those that are not configured."""
-
-    broker: UplinkSettings | None
-    webhook: WebhookSettings | None
-
-    @classmethod
-    def of(cls, settings: Settings) -> "Forwarding":
-        """Raises ConfigurationError for impossible settings."""
-        return cls(
-            uplink_settings(settings.uplink, settings.vehicle), webhook_settings(settings.webhook, settings.vehicle)
-        )
-
-    @property
-    def queues(self) -> tuple[str, ...]:
-        """Names of their queue positions."""
-        return tuple(one.queue for one in (self.broker, self.webhook) if one is not None)
-
-
 def webhook_of(wanted: WebhookSettings | None, store: Store, *, with_places: bool) -> Webhook | None:
     """None if none is configured."""
     if wanted is None:
@@ -77,11 +57,12 @@ def webhook_of(wanted: WebhookSettings | None, store: Store, *, with_places: boo
     return Webhook(wanted, outbox, store.write_event)
 
 
-def store_of(wanted: StoreSection, undelivered_to: tuple[str, ...]) -> Store:
+def store_of(wanted: StoreSection, *receivers: UplinkSettings | WebhookSettings | None) -> Store:
+    """The store, which keeps for each receiver what is still to be delivered."""
     keep = Retention(
         max_age_s=wanted.max_age_days * S_PER_DAY,
         max_bytes=round(wanted.max_size_mb * BYTES_PER_MB),
-        undelivered_to=undelivered_to,
+        undelivered_to=tuple(one.queue for one in receivers if one is not None),
     )
     return Store.open(wanted.directory, keep)
 

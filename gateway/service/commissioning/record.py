@@ -3,6 +3,7 @@
 import logging
 import threading
 from collections.abc import Callable, Mapping
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -24,6 +25,16 @@ from gateway.stated.facts import Part, VehicleAnswers
 FILE_NAME: Final = "commissioning.json"
 MADE: Final = "commissioned-"  # the names of calibrations begin so
 MOST_MADE: Final = 20  # chosen: calibrations; the oldest beyond are forgotten, and their files removed
+
+
+class CommissioningStep(StrEnum):
+    """The next step of a commissioning."""
+
+    LINE = "line"
+    VEHICLE = "vehicle"
+    EMPTY = "empty"
+    DRIVE = "drive"
+    FIT = "fit"
 
 
 class LineChoice(Part):
@@ -87,6 +98,17 @@ class Underway(Part):
     fault: str | None = Field(None, description="why the last fit made no calibration")
     doubts: tuple[Doubt, ...] = Field((), description="about typed answers, and about the result of the last fit")
     confirmed: tuple[Confirmed, ...] = ()
+
+    @property
+    def step(self) -> CommissioningStep:
+        """The first step that is not answered yet."""
+        if self.line is None:
+            return CommissioningStep.LINE
+        if self.vehicle is None or self.is_vehicle_doubted:
+            return CommissioningStep.VEHICLE
+        if self.empty is None:
+            return CommissioningStep.EMPTY
+        return CommissioningStep.FIT if self.is_fit_asked else CommissioningStep.DRIVE
 
     @property
     def open_doubts(self) -> tuple[Doubt, ...]:

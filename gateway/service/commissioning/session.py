@@ -17,10 +17,16 @@ from gateway.log import Event, OnEvent
 from gateway.part import STOP_WITHIN_S, ServicePart
 from gateway.service.commissioning.empty_drive import EmptyDrive, MakeWorker, ServiceVehicle
 from gateway.service.commissioning.lines import Lines, require_alike
-from gateway.service.commissioning.record import Confirmed, EmptyClaim, LineChoice, RecordStore, Underway
-from gateway.service.commissioning.steps import CommissioningStep, OpenWindow, state_of, step_of
+from gateway.service.commissioning.record import (
+    CommissioningStep,
+    Confirmed,
+    EmptyClaim,
+    LineChoice,
+    RecordStore,
+    Underway,
+)
 from gateway.service.commissioning.worker import Worker
-from gateway.stated.commissioning import LinesFound, LineSource, MadeEnd
+from gateway.stated.commissioning import CommissioningState, LinesFound, LineSource, MadeEnd
 from gateway.stated.doubt import meant_by
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
@@ -95,8 +101,18 @@ class Commissioning(ServicePart):
     def state(self) -> str:
         """JSON: a CommissioningState."""
         with self._book.lock:
-            shown = state_of(self._book.record, self._vehicle, self._drive, self._window(), is_pending=self.is_due)
-            return shown.model_dump_json()
+            record, why_not = self._book.record, self._vehicle.why_not_allowed
+            has_any = record.underway is not None or record.active is not None or self._vehicle.is_calibrated
+            shown = {
+                "is_allowed": why_not is None,
+                "why_not": why_not,
+                "is_offered": why_not is None and not has_any,
+                "underway": None if record.underway is None else self._shown(record.underway),
+                "is_pending": self.is_due,
+                "active": record.active,
+                "history": record.made[::-1],
+            }
+            return CommissioningState.model_validate(shown).model_dump_json()
 
     def lines(self) -> str:
         return LinesFound(items=list(self._lines.found())).model_dump_json()
@@ -217,16 +233,34 @@ class Commissioning(ServicePart):
             self._book.tell(Event.COMMISSIONING_UNDONE, {"calibration_ids": [one.id for one in chosen], "by": by})
             return self.state()
 
-    def _window(self) -> OpenWindow | None:
-        """The open window of the empty drive. A window that began before the statement does not count."""
+    def _shown(self, underway: Underway) -> dict[str, Any]:
+        """The commissioning under way for the web."""
+        window = self._window()
+        return {
+            **dict(underway),
+            "step": underway.step,
+            "inspection": self._drive.looked,
+            "n_batches": len(underway.batches),
+            "driven_s": self._drive.driven_s + (window[0] if window else 0.0),
+            "next_window_s": window[1] if window else None,
+            "doubts": underway.open_doubts,
+            "confirmed": [one for one in underway.doubts if one not in underway.open_doubts],
+            "is_fitting": self._drive.is_busy,
+        }
+
+    def _window(self) -> tuple[float, float] | None:
+        """Seconds of the open window of the empty drive that count so far, and until the next window that counts.
+
+        None between drives, and before the vehicle is called empty. A window that began before that does not count.
+        """
         underway, window_ns, window_s = self._book.record.underway, self._drives.open_window_ns, self._window_s
         drive_start_ns = self._drives.drive_start_ns
         if underway is None or underway.empty is None or window_ns is None or drive_start_ns is None:
             return None
         open_s = (window_ns[1] - window_ns[0]) / NS_PER_S
         if underway.empty.covers(drive_start_ns, window_ns[0]):
-            return OpenWindow(open_s, max(0.0, window_s - open_s))
-        return OpenWindow(0.0, max(0.0, 2.0 * window_s - open_s))
+            return open_s, max(0.0, window_s - open_s)
+        return 0.0, max(0.0, 2.0 * window_s - open_s)
 
     def _underway(self, least: CommissioningStep = CommissioningStep.LINE) -> Underway:
         """The commissioning under way. Raises RefusedError unless it has reached ``least``."""
@@ -234,7 +268,7 @@ class Commissioning(ServicePart):
         underway = self._book.record.underway
         if underway is None:
             raise RefusedError("not_begun", "no commissioning is under way: begin one")
-        step, order = step_of(underway), list(CommissioningStep)
+        step, order = underway.step, list(CommissioningStep)
         if order.index(step) < order.index(least):
             raise RefusedError("wrong_step", f"{step} is still to be answered before {least}")
         if step is CommissioningStep.FIT:
