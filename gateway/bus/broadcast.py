@@ -9,15 +9,17 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, Final
 
-import cantools
 import numpy as np
 
+from gateway.bus.signals import load_messages
+from gateway.bus.signals.encode import J1939_UNUSED, put_bits
 from gateway.bus.sink import BusSink
 from gateway.errors import BusError
 from gateway.estimate import Estimate, Weights
-from gateway.j1939 import AXLE_WEIGHT, NOT_AVAILABLE, counts_of
+from gateway.j1939 import AXLE_WEIGHT, counts_of
 from gateway.log import Event, log_event
 from gateway.part import ThreadPart
 from gateway.records import EXTENDED_ID, Frames
@@ -46,35 +48,29 @@ class WeightFrames:
     """Encodes the weights of one moment: VW of the front axle, VW of the rear axle, CVW."""
 
     def __init__(self, sender: Sender) -> None:
-        self._database: Any = cantools.database.load_string(files("gateway.dbc").joinpath(DATABASE).read_text(), "dbc")
+        path = Path(str(files("gateway.dbc") / DATABASE))
+        self._messages = load_messages(path, [path])
         self._sender = sender
 
     def of(self, shown: Estimate | None, t_ns: int) -> Frames:
         """Frames (3,) stamped ``t_ns``. Unknown numbers, or all if ``shown`` is None, are "not available"."""
-        weights = UNWEIGHED if shown is None else shown.weights
-        counts = counts_of(shown, weights, draws_trailers=self._sender.draws_trailers)
-        first = self._sender.first_axle
+        sender, weights = self._sender, UNWEIGHED if shown is None else shown.weights
+        counts = counts_of(shown, weights, draws_trailers=sender.draws_trailers)
         of_axle = {count.axle: count.raw for count in counts if count.axle is not None}
         whole = {count.parameter.signal: count.raw for count in counts if count.axle is None}
-        messages = [
-            ("VW", {"TireLocation": WHOLE_AXLE, "AxleLocation": first, AXLE_WEIGHT.signal: of_axle[1]} | whole),
-            ("VW", {"TireLocation": WHOLE_AXLE, "AxleLocation": first + 1, AXLE_WEIGHT.signal: of_axle[2]} | whole),
-            ("CVW", whole),
+        contents: list[tuple[str, Mapping[str, int]]] = [
+            ("VW", {"TireLocation": WHOLE_AXLE, "AxleLocation": location, AXLE_WEIGHT.signal: of_axle[axle], **whole})
+            for axle, location in ((1, sender.first_axle), (2, sender.first_axle + 1))
         ]
-        payload = np.frombuffer(b"".join(self._encoded(*message) for message in messages), np.uint8).reshape(-1, 8)
-        can_id = [self._identifier(name) for name, _ in messages]
+        messages = [(self._messages[name], raw) for name, raw in (*contents, ("CVW", whole))]
         n = len(messages)
-        return Frames(np.full(n, t_ns, np.int64), np.array(can_id, np.uint32), np.full(n, 8, np.uint8), payload)
-
-    def _identifier(self, name: str) -> int:
-        group: int = self._database.get_message_by_name(name).frame_id & _GROUP
-        return self._sender.priority << _PRIORITY_SHIFT | group | self._sender.source_address | EXTENDED_ID
-
-    def _encoded(self, name: str, known: Mapping[str, int]) -> bytes:
-        """The eight bytes; unused bits are set, as J1939 requires."""
-        message = self._database.get_message_by_name(name)
-        raw = {signal.name: known.get(signal.name, NOT_AVAILABLE) for signal in message.signals}
-        return bytes(message.encode(raw, scaling=False, padding=True, strict=False))
+        payload = np.full((n, 8), J1939_UNUSED, np.uint8)
+        for row, (message, raw) in enumerate(messages):
+            for name in raw.keys() & message.signals.keys():
+                put_bits(payload[row : row + 1], message.signals[name].field, np.array([raw[name]], np.uint64))
+        addressed = sender.priority << _PRIORITY_SHIFT | sender.source_address | EXTENDED_ID
+        can_id = np.array([message.frame_id & _GROUP | addressed for message, _ in messages], np.uint32)
+        return Frames(np.full(n, t_ns, np.int64), can_id, np.full(n, 8, np.uint8), payload)
 
 
 RETRY_S: Final = 5.0  # chosen: pause after a fault of the bus

@@ -8,7 +8,7 @@ from gateway.bus.signals.bit_field import U64, BitField, Coding
 from gateway.bus.signals.mapping import MappedMessage, SignalMap
 from gateway.records import F64, I64, U8, Frames
 
-_J1939_UNUSED = 0xFF  # SAE J1939: bits nobody sends are 1, "not available"
+J1939_UNUSED = 0xFF  # SAE J1939: unused bits are 1, "not available"
 
 
 class Encoder:
@@ -42,7 +42,7 @@ class Encoder:
         """Payload rows (n, width) before any sample is put in."""
         payload = np.zeros((n, self._map.payload_width), np.uint8)
         if self._map.j1939:
-            payload[:, : message.length] = _J1939_UNUSED
+            payload[:, : message.length] = J1939_UNUSED
             return payload
         for field in message.fields.values():
             put_bits(payload, field, physical_bits(field, np.zeros(n)))
