@@ -77,17 +77,10 @@ class PythonCanReceiver:
 
     def _burst(self, messages: Sequence[can.Message]) -> Burst:
         data = [m for m in messages if not (m.is_error_frame or m.is_remote_frame)]
-        errors = [m for m in messages if m.is_error_frame]
-        unstamped = [m for m in data if not 0.0 < m.timestamp <= LAST_SECOND]
-        for message in unstamped:
-            message.timestamp = ExactStamp(time.time_ns())
-        return Burst(
-            frames=frames_of(data, self._width),
-            error_classes={"unspecified": len(errors)} if errors else {},
-            error_frames=len(errors),
-            remote_frames=len(messages) - len(data) - len(errors),
-            stamped_at_receipt=len(unstamped),
-        )
+        for message in data:
+            if not 0.0 < message.timestamp <= LAST_SECOND:
+                message.timestamp = ExactStamp(time.time_ns())
+        return Burst(frames_of(data, self._width), sum(message.is_error_frame for message in messages))
 
     def close(self) -> None:
         self._bus.shutdown()

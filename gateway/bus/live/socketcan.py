@@ -8,7 +8,6 @@ import select
 import socket
 import struct
 import time
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -16,10 +15,10 @@ from typing import Final
 import numpy as np
 
 from gateway.bus.frames import empty_frames, payload_rows, take
-from gateway.bus.live.receiver import Burst, error_class_names
+from gateway.bus.live.receiver import Burst
 from gateway.bus.signals import IdFilter
 from gateway.errors import BusError
-from gateway.records import I64, U32, Frames
+from gateway.records import I64, Frames
 from gateway.units import NS_PER_S
 
 GATHER_S: Final = 0.05  # chosen: frames are left to gather this long: few wake-ups, little work
@@ -28,6 +27,7 @@ RECEIVE_BUFFER_BYTES: Final = 4 << 20  # chosen: for what comes while this proce
 
 _REMOTE_FLAG: Final = 0x4000_0000  # CAN_RTR_FLAG of linux/can.h, as the next two: CAN_ERR_FLAG, CAN_ERR_MASK
 _ERROR_FLAG: Final = 0x2000_0000
+_BUS_OFF: Final = np.uint32(0x40)  # CAN_ERR_BUSOFF of linux/can/error.h
 _NO_DATA_FLAGS: Final = np.uint32(_REMOTE_FLAG | _ERROR_FLAG)
 _ALL_ERROR_CLASSES: Final = 0x1FFF_FFFF
 _CAN_RAW_ERR_FILTER: Final = 2  # linux/can/raw.h; the socket module names neither this nor those below
@@ -104,21 +104,13 @@ class SocketCanReceiver:
         is_classic = all(len(datagram) == _CLASSIC.itemsize for datagram in datagrams)
         layout = _CLASSIC if is_classic else _FD
         rows = np.frombuffer(b"".join(d.ljust(layout.itemsize, b"\0") for d in datagrams), layout)
-        t_ns, n_unstamped = _stamps_ns(stamps)
-        can_id = rows["id"].copy()
-        frames = Frames(t_ns, can_id, rows["length"].copy(), payload_rows(rows["payload"], rows["length"], self._width))
-        if not np.any(can_id & _NO_DATA_FLAGS):
-            return Burst(frames, stamped_at_receipt=n_unstamped)
-        is_error = (can_id & _ERROR_FLAG) != 0
-        is_remote = ~is_error & ((can_id & _REMOTE_FLAG) != 0)
-        error_ids: U32 = can_id[is_error]
-        return Burst(
-            frames=take(frames, ~(is_error | is_remote)),
-            error_classes=Counter(name for error_id in error_ids for name in error_class_names(int(error_id))),
-            error_frames=len(error_ids),
-            remote_frames=int(np.count_nonzero(is_remote)),
-            stamped_at_receipt=n_unstamped,
-        )
+        can_id, payload = rows["id"].copy(), payload_rows(rows["payload"], rows["length"], self._width)
+        frames = Frames(_stamps_ns(stamps), can_id, rows["length"].copy(), payload)
+        is_other = (can_id & _NO_DATA_FLAGS) != 0
+        if not is_other.any():
+            return Burst(frames)
+        error_ids = can_id[(can_id & _ERROR_FLAG) != 0]
+        return Burst(take(frames, ~is_other), len(error_ids), bool(np.any(error_ids & _BUS_OFF)))
 
 
 def open_socketcan(channel: str, filters: Sequence[IdFilter], width: int) -> SocketCanReceiver:
@@ -165,12 +157,8 @@ def packets_received(channel: str) -> int:
         return 0
 
 
-def _stamps_ns(stamps: Sequence[bytes]) -> tuple[I64, int]:
-    """Kernel stamps as ns (n,), and how many frames had none and got the present time instead."""
-    if all(stamps):
-        times = np.frombuffer(b"".join(stamps), _TIMESPEC)
-        return times["seconds"].astype(np.int64) * NS_PER_S + times["nanoseconds"], 0
-    now_ns = time.time_ns()
-    rows = [np.frombuffer(s, _TIMESPEC)[0] if s else None for s in stamps]
-    t_ns = [now_ns if row is None else int(row["seconds"]) * NS_PER_S + int(row["nanoseconds"]) for row in rows]
-    return np.array(t_ns, np.int64), rows.count(None)
+def _stamps_ns(stamps: Sequence[bytes]) -> I64:
+    """Kernel stamps as ns (n,); the present time for frames without one."""
+    times = np.frombuffer(b"".join(stamp or bytes(_TIMESPEC.itemsize) for stamp in stamps), _TIMESPEC)
+    t_ns: I64 = times["seconds"].astype(np.int64) * NS_PER_S + times["nanoseconds"]
+    return t_ns if all(stamps) else np.where([bool(stamp) for stamp in stamps], t_ns, time.time_ns())

@@ -1,7 +1,7 @@
 """The live source: a thread that listens to a CAN channel, survives its faults, and fills an inbox.
 
 Time is each frame's own: the kernel's stamp on SocketCAN, the driver's elsewhere, the recorded one on an
-in-process bus. A frame without any is stamped on receipt and counted.
+in-process bus. A frame without any is stamped on receipt.
 """
 
 import errno
@@ -18,7 +18,7 @@ from typing import Any, Final
 import can
 
 from gateway.bus.live.python_can import open_python_can, require_usable_interface
-from gateway.bus.live.receiver import BUS_OFF, Burst, Inbox, Receiver
+from gateway.bus.live.receiver import Inbox, Receiver
 from gateway.bus.live.socketcan import open_socketcan, packets_received
 from gateway.bus.signals import IdFilter, SignalMap
 from gateway.log import Event, log_event
@@ -52,7 +52,7 @@ class SourceState(StrEnum):
     STOPPED = "stopped"
 
 
-_EVENTS: Final[Mapping[SourceState, Event]] = {  # that it stops is the service's to tell
+_EVENTS: Final[Mapping[SourceState, Event]] = {  # the service logs its stop itself
     SourceState.STARTING: Event.BUS_REOPENED,  # entered from a fault only: the first start is no change
     SourceState.RECEIVING: Event.BUS_RECEIVING,
     SourceState.BUS_SILENT: Event.BUS_SILENT,
@@ -68,10 +68,7 @@ class SourceCounts:
     dropped_inbox: int
     dropped_kernel: int
     error_frames: int
-    error_classes: Mapping[str, int]
-    remote_frames: int
     reconnects: int
-    stamped_at_receipt: int
 
 
 class LiveSource(ThreadPart):
@@ -104,7 +101,6 @@ class LiveSource(ThreadPart):
         self.inbox = Inbox(inbox_frames, width, waits_for_room=interface == "virtual")
         self._packets_received = packets_received if interface == "socketcan" else lambda channel: 0
         self._tally: Counter[str] = Counter()
-        self._error_classes: Counter[str] = Counter()
         self._dropped_before = 0  # by receivers already closed
         self._receiver: Receiver | None = None
         self._state = SourceState.STOPPED
@@ -139,10 +135,7 @@ class LiveSource(ThreadPart):
             dropped_inbox=self.inbox.dropped,
             dropped_kernel=self._dropped_before + (receiver.dropped_kernel if receiver else 0),
             error_frames=self._tally["error_frames"],
-            error_classes=dict(self._error_classes),
-            remote_frames=self._tally["remote_frames"],
             reconnects=self._tally["reconnects"],
-            stamped_at_receipt=self._tally["stamped_at_receipt"],
         )
 
     def _run(self) -> None:
@@ -181,8 +174,9 @@ class LiveSource(ThreadPart):
         try:
             while not self._stopping.is_set():
                 burst = receiver.receive(ASLEEP_POLL_S if self._state is SourceState.BUS_SILENT else POLL_S)
-                self._count(burst)
-                is_bus_off = not len(burst.frames) and (is_bus_off or bool(burst.error_classes.get(BUS_OFF)))
+                self._tally["frames"] += len(burst.frames)
+                self._tally["error_frames"] += burst.error_frames
+                is_bus_off = not len(burst.frames) and (is_bus_off or burst.is_bus_off)
                 if len(burst.frames):
                     heard_s = time.monotonic()
                     self.inbox.put(burst.frames)
@@ -198,13 +192,6 @@ class LiveSource(ThreadPart):
         finally:
             self._dropped_before += receiver.dropped_kernel
             self._receiver = None
-
-    def _count(self, burst: Burst) -> None:
-        self._tally["frames"] += len(burst.frames)
-        self._tally["error_frames"] += burst.error_frames
-        self._tally["remote_frames"] += burst.remote_frames
-        self._tally["stamped_at_receipt"] += burst.stamped_at_receipt
-        self._error_classes.update(burst.error_classes)
 
     def _enter(self, state: SourceState, reason: str | None) -> None:
         is_new_fault = state is SourceState.READER_FAULT and reason != self._reason
