@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from support.dashboard import Watched, furnished
+from support.dashboard import Look, Watched, furnished
 from support.patience import PATIENCE_S
-from support.web import serving
+from support.web import Gateway, serving
 
 
 @pytest.fixture(scope="module")
@@ -37,4 +37,12 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Where a gateway with something to look at is; nobody changes it."""
     with furnished(tmp_path_factory.mktemp("site")) as gateway, serving(gateway.app) as server:
         yield server.url
+        gateway.board.close()
+
+
+@pytest.fixture
+def dashboard(gateway: Gateway, watched: Watched) -> Iterator[Look]:
+    """Opens the dashboard of the module's own gateway."""
+    with serving(gateway.app) as server:
+        yield lambda: watched.opened(server.url)
         gateway.board.close()

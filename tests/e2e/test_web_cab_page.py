@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from support.browser import expect
 from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded
-from support.dashboard import CONTRASTS, LEAST_CONTRAST, Watched
+from support.dashboard import CONTRASTS, LEAST_CONTRAST, Look, Watched
 from support.web import Gateway, serving
 
 from gateway.estimate_json import estimate_to_json
@@ -45,6 +45,14 @@ def phone(browser: Any) -> Iterator[Watched]:
     made.page.add_init_script(HURRIED)
     yield made
     made.page.close()
+
+
+@pytest.fixture
+def cab(gateway: Gateway, phone: Watched) -> Iterator[Look]:
+    """Opens the page of the gateway."""
+    with serving(gateway.app) as server:
+        yield lambda: phone.opened(f"{server.url}/cab")
+        phone.page.close()
 
 
 def test_at_a_glance_it_says_what_can_be_loaded_and_the_rest_on_a_tap(gateway: Gateway, phone: Watched) -> None:
@@ -100,46 +108,40 @@ def test_by_day_and_by_night_every_word_can_be_read(
         watched.page.close()
 
 
-def test_too_heavy_says_what_must_come_out_by_the_same_logic(gateway: Gateway, phone: Watched) -> None:
+def test_too_heavy_says_what_must_come_out_by_the_same_logic(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 620.0, 50.0))
-    with serving(gateway.app) as server:
-        phone.page.goto(f"{server.url}/cab")
-        expect(phone.page.locator("#light")).to_have_text("Too heavy")
-        expect(phone.page.locator("#about")).to_have_text("Whole vehicle, front axle: 99 % probability of overload.")
-        expect(phone.page.locator("#question")).to_have_text("Take out")
-        expect(phone.page.locator("#number")).to_have_text("35 kg")  # by the lower end, as what can be loaded
-        expect(phone.page.locator("#likely")).to_have_text(
-            "Overload: best estimate 20 kg (95 %: 8 to 32 kg). Limit: whole vehicle."
-        )
-        expect(phone.page.locator("#rooms")).to_contain_text("Front axle10 kg too much")
-        standing = {"overload.gross": "final", "drift.zero": "final"}
-        gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(standing=standing)})
-        expect(phone.page.locator("#alarms")).to_have_text("Alarm: drift: zero.")  # the light says the other
-        phone.page.close()
+    page = cab()
+    expect(page.locator("#light")).to_have_text("Too heavy")
+    expect(page.locator("#about")).to_have_text("Whole vehicle, front axle: 99 % probability of overload.")
+    expect(page.locator("#question")).to_have_text("Take out")
+    expect(page.locator("#number")).to_have_text("35 kg")  # by the lower end, as what can be loaded
+    expect(page.locator("#likely")).to_have_text(
+        "Overload: best estimate 20 kg (95 %: 8 to 32 kg). Limit: whole vehicle."
+    )
+    expect(page.locator("#rooms")).to_contain_text("Front axle10 kg too much")
+    standing = {"overload.gross": "final", "drift.zero": "final"}
+    gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(standing=standing)})
+    expect(page.locator("#alarms")).to_have_text("Alarm: drift: zero.")  # the light says the other
 
 
-def test_alarms_that_stand_are_said_in_words(gateway: Gateway, phone: Watched) -> None:
+def test_alarms_that_stand_are_said_in_words(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
-    with serving(gateway.app) as server:
-        phone.page.goto(f"{server.url}/cab")
-        expect(phone.page.locator("#number")).to_have_text("160 kg")
-        expect(phone.page.locator("#alarms")).to_be_hidden()
-        names = {"imbalance.left_right": "final", "overload.rear_left": "final", "drift.zero": "early"}
-        gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(standing=names)})
-        expect(phone.page.locator("#alarms")).to_have_text(
-            "Alarm: load too far to one side, rear left wheel too heavy. First sign: drift: zero."
-        )
-        phone.page.close()
+    page = cab()
+    expect(page.locator("#number")).to_have_text("160 kg")
+    expect(page.locator("#alarms")).to_be_hidden()
+    names = {"imbalance.left_right": "final", "overload.rear_left": "final", "drift.zero": "early"}
+    gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(standing=names)})
+    expect(page.locator("#alarms")).to_have_text(
+        "Alarm: load too far to one side, rear left wheel too heavy. First sign: drift: zero."
+    )
 
 
-def test_near_the_limit_nothing_more_is_promised(gateway: Gateway, phone: Watched) -> None:
+def test_near_the_limit_nothing_more_is_promised(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 592.0, 50.0))
-    with serving(gateway.app) as server:
-        phone.page.goto(f"{server.url}/cab")
-        expect(phone.page.locator("#light")).to_have_text("Near the limit")
-        expect(phone.page.locator("#number")).to_have_text("0 kg")
-        expect(phone.page.locator("#likely")).to_contain_text("best estimate 4 kg (95 %: −5 to 13 kg)")
-        phone.page.close()
+    page = cab()
+    expect(page.locator("#light")).to_have_text("Near the limit")
+    expect(page.locator("#number")).to_have_text("0 kg")
+    expect(page.locator("#likely")).to_contain_text("best estimate 4 kg (95 %: −5 to 13 kg)")
 
 
 def test_a_lorrys_number_fits_too(tmp_path: Path, phone: Watched) -> None:
@@ -153,7 +155,7 @@ def test_a_lorrys_number_fits_too(tmp_path: Path, phone: Watched) -> None:
         phone.page.close()
 
 
-def test_standing_it_says_that_it_cannot_see_what_is_loaded_now(gateway: Gateway, phone: Watched) -> None:
+def test_standing_it_says_that_it_cannot_see_what_is_loaded_now(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     readings = (
         OwnReading(signal="air_spring_pressure", number=412.35, unit="kPa", age_s=0.4),
@@ -162,102 +164,87 @@ def test_standing_it_says_that_it_cannot_see_what_is_loaded_now(gateway: Gateway
     gateway.status = BEFORE.model_copy(
         update={"standing": Standing(stood_s=240.0), "state": State.WAITING_FOR_SPEED, "own_readings": readings}
     )
-    page = phone.page
-    with serving(gateway.app) as server:
-        page.goto(f"{server.url}/cab")
-        expect(page.locator("#not-seen")).to_have_text(
-            "Parked for 4 min. Last weighed at 1 Jan 1970, 00:05. Loading since then is not included."
-        )
-        expect(page.locator("#light")).to_have_text("Go, when last weighed")
-        expect(page.locator("#question")).to_have_text("You can still load, when last weighed")
-        expect(page.locator("#main")).to_have_attribute("data-is", "earlier")
-        expect(page.locator("#own-readings")).to_contain_text("Air spring pressure412.4 kPa")
-        expect(page.locator("#own-readings")).to_contain_text("Ride height−12 mm, silent for 3 min")
-        expect(page.locator("#own")).to_contain_text("Not weighed by Springscale.")
-        gateway.status = BEFORE.model_copy(update={"standing": Standing(is_load_weighed=False)})
-        expect(page.locator("#not-seen")).to_contain_text("The load may have changed at the last stop.")
-        expect(page.locator("#own")).to_be_hidden()
-        gateway.status = BEFORE
-        expect(page.locator("#not-seen")).to_be_hidden()
-        expect(page.locator("#main")).to_have_attribute("data-is", "current")
-        page.close()
+    page = cab()
+    expect(page.locator("#not-seen")).to_have_text(
+        "Parked for 4 min. Last weighed at 1 Jan 1970, 00:05. Loading since then is not included."
+    )
+    expect(page.locator("#light")).to_have_text("Go, when last weighed")
+    expect(page.locator("#question")).to_have_text("You can still load, when last weighed")
+    expect(page.locator("#main")).to_have_attribute("data-is", "earlier")
+    expect(page.locator("#own-readings")).to_contain_text("Air spring pressure412.4 kPa")
+    expect(page.locator("#own-readings")).to_contain_text("Ride height−12 mm, silent for 3 min")
+    expect(page.locator("#own")).to_contain_text("Not weighed by Springscale.")
+    gateway.status = BEFORE.model_copy(update={"standing": Standing(is_load_weighed=False)})
+    expect(page.locator("#not-seen")).to_contain_text("The load may have changed at the last stop.")
+    expect(page.locator("#own")).to_be_hidden()
+    gateway.status = BEFORE
+    expect(page.locator("#not-seen")).to_be_hidden()
+    expect(page.locator("#main")).to_have_attribute("data-is", "current")
 
 
-def test_a_number_of_before_the_machine_was_started_is_old(gateway: Gateway, phone: Watched) -> None:
+def test_a_number_of_before_the_machine_was_started_is_old(gateway: Gateway, phone: Watched, cab: Look) -> None:
     """Nobody knows how old it is."""
     gateway.board.restore(json_line(estimate_to_json(loaded(0, 300.0, 48.0))), None, None)
-    with serving(gateway.app) as server:
-        phone.page.goto(f"{server.url}/cab")
-        expect(phone.page.locator("#bar")).to_contain_text("These numbers are old.")
-        expect(phone.page.locator("#bar")).to_contain_text("Weighed before the gateway started.")
-        expect(phone.page.locator("#aboard")).to_contain_text("weighed before the gateway started.")
-        assert phone.complaints == []
+    page = cab()
+    expect(page.locator("#bar")).to_contain_text("These numbers are old.")
+    expect(page.locator("#bar")).to_contain_text("Weighed before the gateway started.")
+    expect(page.locator("#aboard")).to_contain_text("weighed before the gateway started.")
+    assert phone.complaints == []
 
 
-def test_an_old_number_is_crossed_through_and_said_loudly(gateway: Gateway, phone: Watched) -> None:
+def test_an_old_number_is_crossed_through_and_said_loudly(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     gateway.clock_s += 3.0 * 3600.0
-    with serving(gateway.app) as server:
-        phone.page.goto(f"{server.url}/cab")
-        expect(phone.page.get_by_role("alert")).to_have_text("These numbers are old.")
-        expect(phone.page.locator("#bar")).to_have_text("These numbers are old. Weighed 3.0 h ago.")
-        expect(phone.page.locator("#light")).to_have_text("Go, when last weighed")
-        crossed = phone.page.locator("#number").evaluate("e => getComputedStyle(e).textDecorationLine")
-        assert crossed == "line-through"
-        phone.page.close()
+    page = cab()
+    expect(page.get_by_role("alert")).to_have_text("These numbers are old.")
+    expect(page.locator("#bar")).to_have_text("These numbers are old. Weighed 3.0 h ago.")
+    expect(page.locator("#light")).to_have_text("Go, when last weighed")
+    crossed = page.locator("#number").evaluate("e => getComputedStyle(e).textDecorationLine")
+    assert crossed == "line-through"
 
 
-def test_a_gateway_that_is_gone_is_said_loudly_and_comes_back(gateway: Gateway, phone: Watched) -> None:
+def test_a_gateway_that_is_gone_is_said_loudly_and_comes_back(gateway: Gateway, phone: Watched, cab: Look) -> None:
     """The page's clocks run ahead, so that nobody has to wait."""
     gateway.publish(loaded(0, 300.0, 48.0))
-    page = phone.page
-    page.clock.install()
-    with serving(gateway.app) as server:
-        page.goto(f"{server.url}/cab")
-        expect(page.locator("#number")).to_have_text("160 kg")
-        page.route("**/api/v1/cab", lambda route: route.abort())
-        page.clock.run_for(12_000)
-        expect(page.locator("#bar")).to_be_hidden()
-        page.clock.run_for(48_000)
-        expect(page.get_by_role("alert")).to_have_text("The gateway does not answer. These are its last values.")
-        expect(page.locator("#bar-how-long")).to_have_text(
-            re.compile(r"For (6\d|[7-9]\d|\d{3}) s\.")
-        )  # real time runs on
-        expect(page.locator("#main")).to_have_attribute("data-is", "old")
-        expect(page.locator("#number")).to_have_text("160 kg")
-        expect(page.locator("#aboard")).to_contain_text(re.compile(r"weighed \d+ s ago"))
-        page.unroute("**/api/v1/cab")
-        page.clock.run_for(6_000)
-        expect(page.locator("#bar")).to_be_hidden()
-        expect(page.locator("#main")).to_have_attribute("data-is", "current")
-        page.close()
+    phone.page.clock.install()
+    page = cab()
+    expect(page.locator("#number")).to_have_text("160 kg")
+    page.route("**/api/v1/cab", lambda route: route.abort())
+    page.clock.run_for(12_000)
+    expect(page.locator("#bar")).to_be_hidden()
+    page.clock.run_for(48_000)
+    expect(page.get_by_role("alert")).to_have_text("The gateway does not answer. These are its last values.")
+    expect(page.locator("#bar-how-long")).to_have_text(re.compile(r"For (6\d|[7-9]\d|\d{3}) s\."))  # real time runs on
+    expect(page.locator("#main")).to_have_attribute("data-is", "old")
+    expect(page.locator("#number")).to_have_text("160 kg")
+    expect(page.locator("#aboard")).to_contain_text(re.compile(r"weighed \d+ s ago"))
+    page.unroute("**/api/v1/cab")
+    page.clock.run_for(6_000)
+    expect(page.locator("#bar")).to_be_hidden()
+    expect(page.locator("#main")).to_have_attribute("data-is", "current")
 
 
-def test_a_sensor_that_is_silent_is_said(gateway: Gateway, phone: Watched) -> None:
+def test_a_sensor_that_is_silent_is_said(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 0.0, 50.0).refused(Why.ACCELERATION_MISSING))
     gateway.status = BEFORE.model_copy(update={"state": State.SENSOR_FAULT})
-    with serving(gateway.app) as server:
-        phone.page.goto(f"{server.url}/cab")
-        expect(phone.page.get_by_role("alert")).to_contain_text("weighing has stopped")
-        expect(phone.page.locator("#aboard")).to_contain_text("Not weighed since: acceleration missing.")
-        phone.page.close()
+    page = cab()
+    expect(page.get_by_role("alert")).to_contain_text("weighing has stopped")
+    expect(page.locator("#aboard")).to_contain_text("Not weighed since: acceleration missing.")
 
 
-def test_while_batches_are_refused_the_light_is_not_green(gateway: Gateway, phone: Watched) -> None:
+def test_while_batches_are_refused_the_light_is_not_green(gateway: Gateway, phone: Watched, cab: Look) -> None:
     """An early look between two refused batches brings it back no more than what was weighed before."""
     gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 300.0, 48.0).refused(Why.MODEL_MISFIT))
     gateway.board.publish(replace(loaded(9, 300.0, 48.0), is_provisional=True))
-    page = phone.page
-    with serving(gateway.app) as server:
-        page.goto(f"{server.url}/cab")
-        expect(page.locator("#light")).to_have_text("Not known")
-        expect(page.locator("#number")).to_have_text("?")
-        expect(page.locator("#why")).to_have_text("The last minutes could not be weighed: model misfit.")
-        expect(page.locator("#main")).to_have_attribute("data-is", "earlier")
-        gateway.publish(loaded(9, 300.0, 48.0))
-        expect(page.locator("#light")).to_have_text("Go")
-        expect(page.locator("#main")).to_have_attribute("data-is", "current")
-        assert phone.complaints == []
+    page = cab()
+    expect(page.locator("#light")).to_have_text("Not known")
+    expect(page.locator("#number")).to_have_text("?")
+    expect(page.locator("#why")).to_have_text("The last minutes could not be weighed: model misfit.")
+    expect(page.locator("#main")).to_have_attribute("data-is", "earlier")
+    gateway.publish(loaded(9, 300.0, 48.0))
+    expect(page.locator("#light")).to_have_text("Go")
+    expect(page.locator("#main")).to_have_attribute("data-is", "current")
+    assert phone.complaints == []
 
 
 def test_before_the_first_estimate_and_without_limits_it_claims_nothing(tmp_path: Path, phone: Watched) -> None:
@@ -286,21 +273,16 @@ def test_before_the_first_estimate_and_without_limits_it_claims_nothing(tmp_path
         (REFUSED, "it refused to keep it on"),
     ],
 )
-def test_it_keeps_the_screen_on_or_says_that_it_cannot(
-    gateway: Gateway, phone: Watched, script: str, said: str
-) -> None:
-    page = phone.page
-    page.add_init_script(script)
-    with serving(gateway.app) as server:
-        page.goto(f"{server.url}/cab")
-        expect(page.locator("#awake")).to_contain_text(said)
-        if script == WAKE_LOCK:
-            assert page.evaluate("window.asked") == "screen"
-            page.evaluate("window.letGo()")
-            expect(page.locator("#awake")).to_contain_text("Touch the page to try again")
-            page.locator("#awake").tap()
-            expect(page.locator("#awake")).to_have_text("The screen stays on.")
-        page.close()
+def test_it_keeps_the_screen_on_or_says_that_it_cannot(phone: Watched, cab: Look, script: str, said: str) -> None:
+    phone.page.add_init_script(script)
+    page = cab()
+    expect(page.locator("#awake")).to_contain_text(said)
+    if script == WAKE_LOCK:
+        assert page.evaluate("window.asked") == "screen"
+        page.evaluate("window.letGo()")
+        expect(page.locator("#awake")).to_contain_text("Touch the page to try again")
+        page.locator("#awake").tap()
+        expect(page.locator("#awake")).to_have_text("The screen stays on.")
 
 
 def test_where_tokens_are_asked_for_it_asks_and_shows_nothing_before(tmp_path: Path, phone: Watched) -> None:

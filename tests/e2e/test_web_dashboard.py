@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from support.browser import expect
-from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Watched
+from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Look, Watched
 from support.estimates import make_estimate
 from support.web import Gateway, serving
 
@@ -187,37 +187,32 @@ def test_it_looks_further_back_when_asked(site: str, watched: Watched) -> None:
         page.get_by_label("7 days").check()
 
 
-def test_it_follows_what_happens(gateway: Gateway, watched: Watched) -> None:
-    with serving(gateway.app) as server:
-        page = watched.page
-        page.goto(server.url)
-        expect(page.locator("#payload")).to_have_text("unknown")
-        expect(page.locator("#note")).to_have_text("No estimate yet.")
-        expect(page.locator("#history")).to_contain_text("No batch yet.")
-        expect(page.locator("#payload-chart")).to_be_hidden()
-        expect(page.locator("#link")).to_have_text("live")
-        gateway.publish(make_estimate(7))
-        expect(page.locator("#payload")).to_have_text("107 kg")
-        expect(page.locator("#announcement")).to_have_text("Payload 107 kg, 50.5 % on the front axle.")
-        expect(page.locator("#note")).to_be_hidden()
-        expect(page.locator("#recent tr")).to_have_count(1)
-        gateway.board.publish(make_estimate(20, is_provisional=True))
-        expect(page.locator("#note")).to_contain_text("Early value")
-        gateway.publish(make_estimate(20, Why.SPEED_FROZEN))
-        expect(page.locator("#rejected")).to_contain_text("Speed frozen: the speed repeated the same number")
-        expect(page.locator("#recent tr")).to_have_count(2)
-        gateway.board.close()
+def test_it_follows_what_happens(gateway: Gateway, dashboard: Look) -> None:
+    page = dashboard()
+    expect(page.locator("#payload")).to_have_text("unknown")
+    expect(page.locator("#note")).to_have_text("No estimate yet.")
+    expect(page.locator("#history")).to_contain_text("No batch yet.")
+    expect(page.locator("#payload-chart")).to_be_hidden()
+    expect(page.locator("#link")).to_have_text("live")
+    gateway.publish(make_estimate(7))
+    expect(page.locator("#payload")).to_have_text("107 kg")
+    expect(page.locator("#announcement")).to_have_text("Payload 107 kg, 50.5 % on the front axle.")
+    expect(page.locator("#note")).to_be_hidden()
+    expect(page.locator("#recent tr")).to_have_count(1)
+    gateway.board.publish(make_estimate(20, is_provisional=True))
+    expect(page.locator("#note")).to_contain_text("Early value")
+    gateway.publish(make_estimate(20, Why.SPEED_FROZEN))
+    expect(page.locator("#rejected")).to_contain_text("Speed frozen: the speed repeated the same number")
+    expect(page.locator("#recent tr")).to_have_count(2)
 
 
-def test_an_old_estimate_is_said_to_be_old(gateway: Gateway, watched: Watched) -> None:
+def test_an_old_estimate_is_said_to_be_old(gateway: Gateway, dashboard: Look) -> None:
     gateway.publish(make_estimate(0))
     gateway.clock_s += 7200.0
-    with serving(gateway.app) as server:
-        watched.page.goto(server.url)
-        expect(watched.page.locator("#note")).to_contain_text("This estimate is old")
-        expect(watched.page.locator("#age")).to_have_text("2.0 h ago")
-        expect(watched.page.locator("#latest")).to_have_class(re.compile("stale"))
-        gateway.board.close()
+    page = dashboard()
+    expect(page.locator("#note")).to_contain_text("This estimate is old")
+    expect(page.locator("#age")).to_have_text("2.0 h ago")
+    expect(page.locator("#latest")).to_have_class(re.compile("stale"))
 
 
 ENGLISH = re.compile(r"\b(the|and|not|of|load|weighed|batch|unknown|heard|never)\b")
@@ -250,17 +245,14 @@ def test_every_state_has_a_name_and_a_sentence(gateway: Gateway, watched: Watche
         gateway.board.close()
 
 
-def test_between_drives_a_silent_bus_alarms_nobody(gateway: Gateway, watched: Watched) -> None:
+def test_between_drives_a_silent_bus_alarms_nobody(gateway: Gateway, dashboard: Look) -> None:
     gateway.publish(make_estimate(0))
     gateway.status = STATUS.model_copy(update={"state": State.WAITING_FOR_BUS})
-    page = watched.page
-    with serving(gateway.app) as server:
-        page.goto(server.url)
-        expect(page.locator("#state")).to_have_text(re.compile("Bus silent\\s+The vehicle is asleep."))
-        expect(page.locator("#state")).to_have_attribute("data-tone", "calm")
-        expect(page.locator("#signals tr").nth(1)).to_contain_text("paused for 75 s")
-        expect(page.locator("#signals .silent")).to_have_count(0)
-        gateway.board.close()
+    page = dashboard()
+    expect(page.locator("#state")).to_have_text(re.compile("Bus silent\\s+The vehicle is asleep."))
+    expect(page.locator("#state")).to_have_attribute("data-tone", "calm")
+    expect(page.locator("#signals tr").nth(1)).to_contain_text("paused for 75 s")
+    expect(page.locator("#signals .silent")).to_have_count(0)
 
 
 def test_it_stays_readable_without_the_service_and_comes_back_with_it(gateway: Gateway, watched: Watched) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from support.browser import expect
-from support.dashboard import STATUS, Watched, demo_calibration, weighed
+from support.dashboard import STATUS, Look, Watched, demo_calibration, weighed
 from support.estimates import make_estimate
 from support.web import Gateway, serving
 
@@ -75,50 +75,44 @@ def test_without_scripts_it_shows_where_the_numbers_are_and_claims_nothing(site:
     page.close()
 
 
-def test_where_all_was_refused_the_reason_stands_beside_the_missing_number(gateway: Gateway, watched: Watched) -> None:
+def test_where_all_was_refused_the_reason_stands_beside_the_missing_number(gateway: Gateway, dashboard: Look) -> None:
     gateway.status = STATUS.model_copy(update={"state": State.COLLECTING})
     gateway.publish(make_estimate(0, Why.TOO_SLOW))
-    with serving(gateway.app) as server:
-        watched.page.goto(server.url)
-        note = watched.page.locator("#note")
-        expect(note).to_contain_text("No estimate yet. The last batch could not be weighed: too slow.")
-        expect(note).to_contain_text("What to do: nothing; an open road is enough.")
-        gateway.board.close()
+    page = dashboard()
+    note = page.locator("#note")
+    expect(note).to_contain_text("No estimate yet. The last batch could not be weighed: too slow.")
+    expect(note).to_contain_text("What to do: nothing; an open road is enough.")
 
 
 def test_a_refused_batch_casts_doubt_on_the_number_before_it_and_on_early_ones(
-    gateway: Gateway, watched: Watched
+    gateway: Gateway, dashboard: Look
 ) -> None:
     calibrated = demo_calibration()
     gateway.publish(weighed(0, 270.0, 48.0, calibrated), make_estimate(1, Why.TOO_SLOW))
-    with serving(gateway.app) as server:
-        watched.page.goto(server.url)
-        expect(watched.page.locator("#payload")).to_have_text("270 kg")
-        expect(watched.page.locator("#note")).to_be_hidden()  # of the road: nothing against it
-        gateway.publish(make_estimate(2, Why.MODEL_MISFIT))
-        expect(watched.page.locator("#note")).to_contain_text(
-            "could not be weighed: model misfit. This number may be wrong"
-        )
-        gateway.board.publish(replace(weighed(4, 270.0, 48.0, calibrated), is_provisional=True))
-        expect(watched.page.locator("#note")).to_contain_text("Early value")
-        expect(watched.page.locator("#note")).to_contain_text("model misfit")
-        gateway.publish(weighed(4, 270.0, 48.0, calibrated))
-        expect(watched.page.locator("#note")).to_be_hidden()
-        gateway.board.close()
+    page = dashboard()
+    expect(page.locator("#payload")).to_have_text("270 kg")
+    expect(page.locator("#note")).to_be_hidden()  # of the road: nothing against it
+    gateway.publish(make_estimate(2, Why.MODEL_MISFIT))
+    expect(page.locator("#note")).to_contain_text("could not be weighed: model misfit. This number may be wrong")
+    gateway.board.publish(replace(weighed(4, 270.0, 48.0, calibrated), is_provisional=True))
+    expect(page.locator("#note")).to_contain_text("Early value")
+    expect(page.locator("#note")).to_contain_text("model misfit")
+    gateway.publish(weighed(4, 270.0, 48.0, calibrated))
+    expect(page.locator("#note")).to_be_hidden()
 
 
-def test_a_load_is_not_drawn_with_the_payload_of_another_estimate(gateway: Gateway, watched: Watched) -> None:
+def test_a_load_is_not_drawn_with_the_payload_of_another_estimate(
+    gateway: Gateway, watched: Watched, dashboard: Look
+) -> None:
     """A negative payload came before its weights did: the radius was the square root of a negative number."""
     calibrated = demo_calibration()
     gateway.publish(weighed(0, 270.0, 48.0, calibrated))
-    with serving(gateway.app) as server:
-        watched.page.goto(server.url)
-        expect(watched.page.locator("#van circle.load")).to_have_count(1)
-        gateway.publish(weighed(1, -14.0, 50.0, calibrated))
-        expect(watched.page.locator("#payload")).to_have_text("−14 kg")
-        expect(watched.page.locator("#van circle.load")).to_have_count(0)
-        assert [said for said in watched.complaints if "attribute" in said] == []
-        gateway.board.close()
+    page = dashboard()
+    expect(page.locator("#van circle.load")).to_have_count(1)
+    gateway.publish(weighed(1, -14.0, 50.0, calibrated))
+    expect(page.locator("#payload")).to_have_text("−14 kg")
+    expect(page.locator("#van circle.load")).to_have_count(0)
+    assert [said for said in watched.complaints if "attribute" in said] == []
 
 
 def test_a_phone_shows_the_load_and_folds_the_rest(site: str, browser: Any) -> None:

@@ -11,7 +11,7 @@ import pytest
 from support.browser import expect
 from support.calibrated import calibration_file
 from support.commissioning import ANSWERS, NOW_NS, Bench, fitted, in_steps
-from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched
+from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Look, Watched
 from support.estimates import make_estimate
 from support.web import Gateway, serving
 
@@ -114,21 +114,19 @@ def test_a_fitter_walks_through_it(gateway: Gateway, bench: Bench, browser: Any,
     page.close()
 
 
-def test_what_was_made_is_undone_after_a_question(gateway: Gateway, bench: Bench, watched: Watched) -> None:
+def test_what_was_made_is_undone_after_a_question(bench: Bench, watched: Watched, dashboard: Look) -> None:
     in_steps(bench)
     for n in range(2):
         bench.drive(n)
     bench.worker.finish(fitted())
-    with serving(gateway.app) as server:
-        watched.page.goto(server.url)
-        expect(watched.page.locator("#commissioning-in-use")).to_contain_text("van-17, without a line, from 2 windows")
-        watched.page.locator("#commissioning-undo").click()
-        watched.page.get_by_role("button", name="Yes").click()
-        expect(watched.page.locator("#commissioning-in-use")).to_contain_text("the one named in the settings")
-        watched.page.get_by_text("What was made here").click()
-        expect(watched.page.locator("#commissioning-entries li")).to_contain_text("undone")
-        assert watched.complaints == []
-        gateway.board.close()
+    page = dashboard()
+    expect(page.locator("#commissioning-in-use")).to_contain_text("van-17, without a line, from 2 windows")
+    page.locator("#commissioning-undo").click()
+    page.get_by_role("button", name="Yes").click()
+    expect(page.locator("#commissioning-in-use")).to_contain_text("the one named in the settings")
+    page.get_by_text("What was made here").click()
+    expect(page.locator("#commissioning-entries li")).to_contain_text("undone")
+    assert watched.complaints == []
 
 
 def test_cancel_wants_a_yes_and_a_token_that_may_operate(tmp_path: Path, bench: Bench, watched: Watched) -> None:
@@ -321,12 +319,10 @@ def test_by_keyboard_alone(with_line: tuple[Gateway, Bench], watched: Watched) -
         gateway.board.close()
 
 
-def test_meanwhile_the_load_says_that_it_is_being_calibrated(gateway: Gateway, bench: Bench, watched: Watched) -> None:
+def test_meanwhile_the_load_says_that_it_is_being_calibrated(gateway: Gateway, bench: Bench, dashboard: Look) -> None:
     gateway.publish(make_estimate(0, Why.NO_CALIBRATION))
     in_steps(bench)
-    with serving(gateway.app) as server:
-        watched.page.goto(server.url)
-        expect(watched.page.locator("#note")).to_contain_text("the vehicle is being calibrated")
-        expect(watched.page.locator("#note")).not_to_contain_text("springscale")
-        expect(watched.page.locator("#rejected")).not_to_contain_text("springscale", use_inner_text=False)
-        gateway.board.close()
+    page = dashboard()
+    expect(page.locator("#note")).to_contain_text("the vehicle is being calibrated")
+    expect(page.locator("#note")).not_to_contain_text("springscale")
+    expect(page.locator("#rejected")).not_to_contain_text("springscale", use_inner_text=False)

@@ -1,6 +1,7 @@
 """A gateway with something to look at, and a browser page that keeps count of what it did."""
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -73,6 +74,9 @@ def furnished(directory: Path) -> Gateway:
     return gateway
 
 
+Look = Callable[[], Any]  # opens a page -> the page
+
+
 class Watched:
     """A page, what it loaded from where, and what its console said."""
 
@@ -84,6 +88,11 @@ class Watched:
         self.page.on("request", lambda request: self.addresses.append(request.url))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("console", lambda said: self.complaints.append(said.text) if said.type == "error" else None)
+
+    def opened(self, url: str) -> Any:
+        """The page, showing what is there."""
+        self.page.goto(url)
+        return self.page
 
     def wait_for_charts(self) -> None:
         """Until the last of them is drawn."""
