@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import GenerateJsonSchema
 
-from gateway.archive.dataset import OVER_LIMIT, OWN_STD, PROVENANCE, columns
+from gateway.archive.dataset import DIAGNOSTICS, OVER_LIMIT, OWN_STD, PROVENANCE, columns
 from gateway.archive.manifest import ManifestFile, VehicleEntry
 from gateway.bus.signals import SignalMapFile, shipped_map
 from gateway.bus.signals.signal_map import QUANTITIES, SignalEntry, shipped_maps
@@ -180,39 +180,6 @@ NULL: Final = {
     "measured": "absent if no known weight is in use",
 }
 """When a field is unknown, by the part of Estimate that it shows. Empty: never."""
-
-DIAGNOSTICS: Final = {
-    "reach": "distance of the load beyond the known ones, in parts of the empty sprung mass; 0 among them",
-    "misfit": "likelihood ratio per degree of freedom against free matrices: about 1 if the model fits",
-    "n_segments": "segments that were averaged",
-    "amplitude_ratio": "movement of the vehicle, relative to the usual one in calibration",
-    "damper_front_ratio": "front dampers' rate over the calibrated",
-    "damper_rear_ratio": "rear dampers' rate over the calibrated",
-    "damper_front_freed_ratio": "front dampers' rate over the calibrated, if the search is free to find worn ones",
-    "damper_rear_freed_ratio": "the same for the rear dampers",
-    "delay_scale": "relative delay of the rear axle beyond wheelbase and speed",
-    "tension": "deviation of the vehicle from its calibration: chi-squared of five; refused above 25.7",
-    "sensor_position_score": "pull to another place or gain of the sensor, in standard deviations; refused beyond 6",
-    "sensor_noise_score": "slope towards more noise in the acceleration, as roll makes it, in the same unit; refused "
-    "above 6",
-    "soft_mass_score": "slope towards a mass on a soft support behind the rear axle, in the same unit; refused above 5 "
-    "if it weighs more than 10 kg",
-    "soft_mass_kg": "that mass, as one step of the search finds it",
-    "soft_mass_hz": "the frequency at which it swings",
-    "noise_acceleration_ratio": "noise of the accelerometer from 16.5 to 20 Hz relative to the greatest expected: "
-    "from 2 on the model includes it",
-    "noise_pitch_rate_ratio": "the same for the pitch rate",
-    "noise_roll_rate_ratio": "the same for the roll rate",
-    "gyro_gain_ratio": "gain of the gyro over that in calibration, measured in bends; refused beyond 3.5 standard "
-    "deviations from 1",
-    "gyro_gain_ratio_std": "its standard deviation",
-    "payload_gyration_m2": "squared radius of gyration in pitch of the load, as the fit began with it",
-    "payload_mode_hz": "frequency at which the payload rings on its floor",
-    "payload_damping_ratio": "damping of its floor or mount, relative to critical",
-    "delay_s": "mean time from axle to axle",
-    "delay_std_s": "its standard deviation over the segments",
-}
-"""What cross_spectrum says of its own; the ratio index says nothing."""
 
 LACKS: Final = {
     Lack.CALIBRATION: "the empty vehicle's weight is unknown: no calibration is in use",

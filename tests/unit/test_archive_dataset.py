@@ -11,11 +11,10 @@ import duckdb
 import polars as pl
 import pyarrow.parquet as pq
 import pytest
-import reference as page
 from support.estimates import make_record, with_everything
 
 from gateway.archive import Slot, failures, place_of, receipts, rows_of, slots_done, trusted_tables
-from gateway.archive.dataset import DIAGNOSTICS, PROVENANCE, columns, parquet_of, row_of, schema
+from gateway.archive.dataset import PROVENANCE, columns, parquet_of, row_of, schema
 from gateway.archive.receipts import slots_failed, text_of
 from gateway.errors import ConfigurationError
 from gateway.estimate_json import COLUMNS, FIELDS, estimate_to_json
@@ -45,7 +44,6 @@ def test_every_field_of_an_estimate_is_a_column_but_its_spectra() -> None:
         "epoch_posterior",
         "measured_posterior",
     }
-    assert list(page.DIAGNOSTICS) == list(DIAGNOSTICS)
     assert names[-len(PROVENANCE) :] == list(PROVENANCE)
 
 
