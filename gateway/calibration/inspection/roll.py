@@ -87,17 +87,17 @@ class RollMatrix:
         return slice(*np.searchsorted(self.freq_hz, [low_hz, high_hz], side="left"))
 
 
-def roll_spectra_of(batches: Sequence[Batch], n_segment: int = N_SEGMENT) -> RollMatrix | None:
+def roll_spectra_of(batches: Sequence[Batch]) -> RollMatrix | None:
     """Over all segments in which the three sensors are known; None if there are fewer than six, or no roll rate."""
-    matrix, n_segments, freq_hz = np.zeros((3, 3, n_segment // 2 + 1), np.complex128), 0, np.empty(0)
+    matrix, n_segments, freq_hz = np.zeros((3, 3, N_SEGMENT // 2 + 1), np.complex128), 0, np.empty(0)
     for batch in batches:
         if batch.roll_rate_radps is None:
             continue
         sensors = (batch.vertical_acceleration_mps2, batch.pitch_rate_radps, batch.roll_rate_radps)
-        starts = segment_starts(batch.usable & np.isfinite(np.sum(sensors, axis=0)), n_segment, n_segment // 2)
+        starts = segment_starts(batch.usable & np.isfinite(np.sum(sensors, axis=0)), N_SEGMENT, N_SEGMENT // 2)
         if starts.size:
-            freq_hz = frequencies_hz(n_segment, batch.rate_hz)
-            x = np.stack([segment_transforms(one, starts, n_segment, batch.rate_hz) for one in sensors])
+            freq_hz = frequencies_hz(N_SEGMENT, batch.rate_hz)
+            x = np.stack([segment_transforms(one, starts, N_SEGMENT, batch.rate_hz) for one in sensors])
             matrix += np.einsum("akf,bkf->abf", x, np.conj(x))
             n_segments += len(starts)
     return RollMatrix(freq_hz, matrix / n_segments, n_segments) if n_segments >= LEAST_SEGMENTS else None
