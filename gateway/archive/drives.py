@@ -96,7 +96,7 @@ class JobDrives:
         for one, next_ns in followed(before, first_ns):
             try:
                 self.take(one, next_ns)
-            except LogUnreadableError:  # it is told where it is a job's own, and so is what it breaks off
+            except LogUnreadableError:  # the job that the log belongs to reports it, and what it breaks off
                 self.break_off()
 
     def _leads_on(self, one: JobLog, first_ns: int | None) -> bool:
@@ -105,7 +105,7 @@ class JobDrives:
             try:
                 motions, _, _ = motion_of_log(fetched.path, self._job.setup.signal_map)
                 newest_ns = max((int(motion.t_ns.max()) for motion in motions if len(motion)), default=None)
-            except Exception:  # noqa: BLE001 - a log that cannot be read leads nowhere; it is told where it is a job's own
+            except Exception:  # noqa: BLE001 - a log that cannot be read leads nowhere; its own job reports it
                 return False
         return goes_on(newest_ns, first_ns, self._job.settings)
 

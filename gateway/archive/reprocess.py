@@ -207,7 +207,7 @@ def _outcome(job: ArchiveJob, answer: "Future[JobOutcome]") -> JobOutcome:
         return fail(job, str(fault))
     except ConfigurationError:  # a missing library or another version: no worker would do better
         raise
-    except Exception as fault:  # noqa: BLE001 - a store, a cluster or a bug: the other jobs go on, this one is told
+    except Exception as fault:  # noqa: BLE001 - a store, a cluster or a bug: the other jobs go on, this one is reported
         return JobOutcome(job.slot, JobStatus.LOST, job.size, failures=(str(fault) or repr(fault),))
 
 

@@ -121,7 +121,7 @@ def _answer(pipe: "Connection[Any, Any]") -> None:
     while True:
         try:
             fn, args, kwargs = pipe.recv()
-        except EOFError:  # nobody asks any more
+        except EOFError:  # the driver has ended
             return
         try:
             answer = (True, fn(*args, **kwargs))
@@ -193,7 +193,7 @@ def cluster(address: str) -> Cluster:
 def _pass_on(done: Future[Answer], told: Future[Answer]) -> None:
     """Pass on the answer, or the fault in our own words."""
     if done.cancelled():
-        told.set_exception(PlaceError("the cluster has let go of it: its scheduler went away, or was told to stop"))
+        told.set_exception(PlaceError("the cluster dropped the job: its scheduler went away, or was stopped"))
         return
     fault = done.exception()
     if fault is None:

@@ -59,7 +59,7 @@ def _event(told: Mapping[str, Any]) -> str:
     after = told["after"]
     place = told["place"]
     where = "" if place is None else f"; at {place['latitude_deg']}, {place['longitude_deg']}"
-    return f"{_span(told)}  {what}{sure}; {after['payload_kg']:.0f} kg aboard then{where}"
+    return f"{_span(told)}  {what}{sure}; {after['payload_kg']:.0f} kg on board then{where}"
 
 
 def _trip(told: Mapping[str, Any]) -> str:

@@ -80,7 +80,7 @@ def _steps(loads: Sequence[LoadStep] | tuple[Load, ...], drive: Drive) -> list[L
     steps = [step for step in loads if isinstance(step, LoadStep)]
     constant = tuple(load for load in loads if isinstance(load, Load))
     if steps and constant:
-        raise ValueError("loads are either constant or steps, not both: what is always aboard belongs in every step")
+        raise ValueError("loads are either constant or steps, not both: what is always on board belongs in every step")
     if not steps:
         return [LoadStep(0.0, constant)]
     if steps[0].t_s != 0.0:

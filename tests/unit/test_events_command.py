@@ -97,7 +97,7 @@ def test_a_withdrawn_event_does_not_say_how_sure_it_was() -> None:
         "change_interval95_kg": [1.0, 61.0], "probability": 0.43, "is_withdrawn": True, "before": load, "after": load,
     }  # fmt: skip
     assert entry_sentence(Entry(EntryKind.EVENT, "event-1-a", T0_NS, record)) == (
-        "2026-09-21 14:13 to 14:20  withdrawn, nothing was loaded or unloaded after all; 300 kg aboard then"
+        "2026-09-21 14:13 to 14:20  withdrawn, nothing was loaded or unloaded after all; 300 kg on board then"
     )
 
 
@@ -127,7 +127,7 @@ def sentence(**changed: Any) -> str:
 
 
 def test_what_was_unloaded_when_and_how_surely() -> None:
-    assert sentence() == "2026-01-01 00:14 to 00:31  180 kg unloaded (± 20 kg), 87% probable; 220 kg aboard then"
+    assert sentence() == "2026-01-01 00:14 to 00:31  180 kg unloaded (± 20 kg), 87% probable; 220 kg on board then"
 
 
 @pytest.mark.parametrize(

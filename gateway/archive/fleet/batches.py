@@ -122,7 +122,7 @@ def _read(dataset: Location, slot: Slot) -> Batches:
     except FileNotFoundError:
         raise PlaceError(
             f"{where}: is missing, though a receipt vouches for it: remove {slot.receipt} and run "
-            "`springscale reprocess` again, which makes it anew"
+            "`springscale reprocess` again, which writes it again"
         ) from None
     except pa.ArrowInvalid as fault:
         raise PlaceError(

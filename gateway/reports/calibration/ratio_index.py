@@ -141,7 +141,7 @@ def _trials_table(fit: RatioIndexFit) -> Table:
     )
     return Table(
         "Regressions tried: (9) and (10) single, both logarithms, and (11) joint. Errors are root "
-        "mean squares over runs for which bands and terms were chosen anew without them",
+        "mean squares over runs for which bands and terms were chosen again without them",
         ("Family", "bands", "terms of payload", "terms of share", "payload", "share"),
         rows,
     )

@@ -78,7 +78,7 @@ def _drifting(vehicle: FleetVehicle, name: str, drift: Drift) -> Look:
     advice = (
         "look for wear; calibrate again where it is repaired"
         if name in OF_VEHICLE
-        else "look for a changed tyre, spring or sensor mount; calibrate anew"
+        else "look for a changed tyre, spring or sensor mount; calibrate again"
     )
     return Look(vehicle.name, f"drift: {NAMES[name]}", drift_told(drift), advice)
 
@@ -103,7 +103,7 @@ def _little_answered(fleet: FleetSummary) -> Iterator[Look]:
 def _failing(fleet: FleetSummary) -> Iterator[Look]:
     with_page = {vehicle.name for vehicle in fleet.vehicles}
     for name, n in sorted(Counter(failure.vehicle for failure in fleet.failures).items()):
-        yield Look(name, "logs failed", f"{whole(n)}, told below", "mend or remove them", name in with_page)
+        yield Look(name, "logs failed", f"{whole(n)}, listed below", "mend or remove them", name in with_page)
 
 
 def _look_section(looks: Sequence[Look]) -> Section:

@@ -131,8 +131,8 @@ def _parameters(vehicle: FleetVehicle) -> Section:
     )
     text = (
         "What the estimator found of the vehicle and its sensors, batch by batch; points are a week's median over "
-        "every batch that has the number. A slope is since the last calibration, for parameters are told "
-        "relative to one. It is believed where it is significant among all vehicles and parameters of the report.",
+        "every batch that has the number. A slope is since the last calibration, because parameters are "
+        "relative to it. It is believed if it is significant among all vehicles and parameters of the report.",
         *(f"{NAMES[name]}: {drift_told(drift)}." for name, drift in vehicle.believed_drifts.items()),
     )
     chart = Chart(
