@@ -12,7 +12,7 @@ from gateway.core.cross_spectrum.located import Answer, answer_at, precision_of
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
 from gateway.core.cross_spectrum.model.strokes import with_strokes
 from gateway.core.cross_spectrum.packing import Packing
-from gateway.core.cross_spectrum.shape import EVIDENCE
+from gateway.core.cross_spectrum.shape import EVIDENCE, EVIDENCE_WITHOUT_ROLL
 from gateway.posterior import Source
 from gateway.records import F64
 
@@ -54,10 +54,11 @@ def _prior(found: Weighed, calibration: CrossSpectrumCalibration) -> Packing:
 def _at(found: Weighed, calibration: CrossSpectrumCalibration, prior: Packing) -> Answer:
     point, ground = found.located.point, calibration.ground
     spectra = with_strokes(found.spectra.without_roll, calibration.parameters, point.load, ground)
-    return answer_at(Whittle(spectra, ground), point, calibration, prior, EVIDENCE, is_shape_known=False)
+    evidence = EVIDENCE_WITHOUT_ROLL if found.located.sideways is None else EVIDENCE
+    return answer_at(Whittle(spectra, ground), point, calibration, prior, evidence, is_shape_known=False)
 
 
 def _held_back(at: Answer, prior: Packing) -> F64:
     """(2, k) derivative of the load by the drifting parameters."""
-    held: F64 = at.covariance[-2:, : len(DRIFTING)] @ prior.precision
+    held: F64 = at.marginal[-2:, : len(DRIFTING)] @ prior.precision
     return held

@@ -171,10 +171,11 @@ _PACKING_OF_DRIFTING: Final = _factor(np.where(np.outer(_IS_PACKING, _IS_PACKING
 def day_columns(found: F64, moves: F64, precision: F64) -> F64:
     """(8, k) change of drifting parameters and load by the day's springs, tyres, dampers and their friction.
 
-    ``found`` (k, k) is their covariance in the search, ``precision`` that of its prior, ``moves`` (k, s) their change
-    with each of the STEADY parameters. A parameter that drifts further than the prior allows shifts the answer by the
-    part that the prior determines: found times precision (S. F. Schmidt's consider covariance, Adv. Control Syst. 3,
-    1966).
+    ``found`` (k, k) is their covariance, ``precision`` that of the search's prior, ``moves`` (k, s) their change with
+    each of the STEADY parameters. A parameter that drifts further than the prior allows shifts the answer by the part
+    that the prior determines: found times precision (S. F. Schmidt's consider covariance, Adv. Control Syst. 3, 1966).
+    STEADY parameters that follow the batch also follow such a drift, which moves the answer further; so ``found`` has
+    them free.
     """
     return np.concatenate([(moves @ DAY_OF_STEADY).T, (_pulls(found, precision) @ _DAY_OF_DRIFTING).T])
 

@@ -163,7 +163,8 @@ class Answer:
     parameters and load). cost is minus the log evidence by Laplace's approximation, with t integrated out over its
     covariance by calibration and nature. One Gauss-Newton step moves t as far as the batch and the day's drift allow:
     shift (k,) is the resulting change of the fitted parameters, steady (k, s) their derivative by an error of each t
-    after that step, own (k, k) the covariance that the batch's noise adds by it.
+    after that step, marginal (k, k) their covariance with t free to take it, own (k, k) what the step adds to the
+    covariance of the answer: by the batch's noise, and by the drift that the search's prior allows.
     """
 
     whole: Curvature
@@ -171,6 +172,7 @@ class Answer:
     cost: float
     shift: F64
     steady: F64
+    marginal: F64
     own: F64
 
     @property
@@ -219,6 +221,8 @@ def answer_at(
     by_noise = along @ posterior * evidence
     steady = np.zeros((len(along), len(STEADY)))
     steady[:, free] = along - by_noise @ information  # along S_posterior S^-1
+    marginal = covariance + by_noise @ along.T
+    held = _flat_in_load(prior.precision)
     to_peak = -covariance @ pull
     at_peak = whittle.cost(point) + 0.5 * float(off @ prior.precision @ off + pull @ to_peak)
     return Answer(
@@ -227,7 +231,8 @@ def answer_at(
         cost=at_peak + gained + narrowed,
         shift=to_peak + along @ step,
         steady=steady,
-        own=by_noise @ information @ by_noise.T,
+        marginal=marginal,
+        own=by_noise @ information @ by_noise.T + marginal @ held @ marginal - covariance @ held @ covariance,
     )
 
 
@@ -312,11 +317,11 @@ def _located(
         x = x + np.r_[np.zeros(len(DRIFTING)), at.shift[-2:]]
         point = _point(x, calibration, cg_left_m)
     found = at.covariance
-    day = day_columns(found, at.steady, prior.precision)
+    day = day_columns(at.marginal, at.steady, prior.precision)
     moved_by_gain = gain_moves(at.whole, whittle, point, found)
     columns = {
         Source.DAY: day[:, -2:],
-        Source.LOAD_LENGTH: packing_columns(found, prior.precision)[:, -2:],
+        Source.LOAD_LENGTH: packing_columns(at.marginal, prior.precision)[:, -2:],
     }
     if shape is not None:
         columns |= _of_shape(shape, columns[Source.LOAD_LENGTH])
