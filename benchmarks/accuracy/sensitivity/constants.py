@@ -79,6 +79,10 @@ CONSTANTS: Final = (
         "how fast they widen on smoother and rougher roads",
     ),
     Constant(
+        "UNSEEN_PLACE_PART", "gateway.core.cross_spectrum.estimator", Acts.IN_WEIGHING,
+        "how much of that growth the lateral place takes",
+    ),
+    Constant(
         "EVIDENCE", "gateway.core.cross_spectrum.shape", Acts.IN_WEIGHING,
         "how much a batch's evidence counts against calibration and nature",
     ),
