@@ -16,11 +16,13 @@ from support.half_car_road import (
     run_over_road,
     weighed,
 )
+from support.rolling_road import batch_over_two_tracks, calibrated_with_roll
 
 from gateway.calibration.half_car.fit import SPRINGS_FROM_PRIORS, UNTESTED, calibrate_cross_spectrum, fit_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.estimator import (
+    UNSEEN_PLACE_PART,
     UNSEEN_ROUGHNESS_SCALE,
     UNSEEN_SPEED_SCALE,
 )
@@ -134,6 +136,18 @@ def test_another_roughness_widens_the_interval(calibration: CrossSpectrumCalibra
     factor = (1.0 + roughness_ratio(on_other_roads)) / (1.0 + roughness_ratio(calibration))
     assert factor > 1.5
     assert model_variances(unseen) == pytest.approx(factor * model_variances(seen), rel=1e-6)
+
+
+def test_the_lateral_place_hardly_loses_on_other_roads() -> None:
+    """Of the growth of the model error's standard deviation, squared, it takes UNSEEN_PLACE_PART squared."""
+    rolled, batch = calibrated_with_roll(), batch_over_two_tracks(200.0, 50.0, 0.03, seed=7)
+    on_other_roads = replace(
+        rolled, acceleration_rms_mps2=3.0 * rolled.acceleration_rms_mps2, model_per_reach=(0.0, 0.0)
+    )
+    found = weighed(batch, on_other_roads)
+    payload, _, place = np.diag(found.posterior.sources[Source.MODEL][:3]) / rolled.model_std
+    assert payload > 1.5
+    assert place == pytest.approx(np.sqrt(1.0 + UNSEEN_PLACE_PART**2 * (payload**2 - 1.0)), rel=1e-6)
 
 
 def roughness_ratio(calibration: CrossSpectrumCalibration) -> float:
