@@ -1,6 +1,6 @@
 """A campaign's drives: read, split into identification and validation, inspected, calibrated and judged."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
@@ -11,10 +11,8 @@ from gateway.bus.logs import LogReport, motion_of_log
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, OnRun, RunTable, chosen_runs, file_sha256
-from gateway.calibration.inspection.campaign import Inspection, inspect_campaign
-from gateway.calibration.inspection.finding import Finding
+from gateway.calibration.inspection.campaign import Inspection, inspect_drives
 from gateway.calibration.inspection.log import LogFacts, SplitRun
-from gateway.calibration.inspection.roll import offset_findings, unmapped_roll_findings
 from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.judgement.evaluation import Judged, judge
 from gateway.calibration.known_run import KnownRun
@@ -164,16 +162,10 @@ def inspect(
 ) -> Inspection:
     """Read the logs of the chosen runs and find their faults."""
     split = split_runs(campaign, settings, numbers=numbers, on_run=on_run, keeps_unreadable=True)
-    verdicts, findings = inspect_campaign(split, campaign.vehicle, settings)
-    return Inspection(tuple(split), verdicts, (*findings, *_sideways_findings(campaign)))
-
-
-def _sideways_findings(campaign: Campaign) -> Iterator[Finding]:
-    """Findings about missing data for lateral places."""
     signal_map = load_signal_map(campaign.signals)
-    if Signal.ROLL_RATE not in signal_map.signals:
-        yield from unmapped_roll_findings(unmapped_roll_rate(signal_map))
-    yield from offset_findings(campaign.vehicle)
+    has_roll_rate = Signal.ROLL_RATE in signal_map.signals
+    unmapped = None if has_roll_rate else unmapped_roll_rate(signal_map)
+    return inspect_drives(split, campaign.vehicle, settings, has_roll_rate=has_roll_rate, unmapped_roll_rate=unmapped)
 
 
 def calibrate(

@@ -9,7 +9,7 @@ import numpy as np
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.loads import compare_loads
 from gateway.calibration.inspection.log import SplitRun, same_drive_findings
-from gateway.calibration.inspection.roll import roll_sign_of
+from gateway.calibration.inspection.roll import offset_findings, roll_sign_of, unmapped_roll_findings
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import is_other_rate
@@ -93,6 +93,23 @@ def inspect_campaign(
     if roll_sign is not None and roll_sign.sign == 0:
         findings.append(Finding.of(Kind.ROLL_RATE_SIGN_UNTOLD, roll_sign.why))
     return tuple(verdicts.values()), tuple(findings)
+
+
+def inspect_drives(
+    drives: Sequence[SplitRun],
+    vehicle: Vehicle,
+    settings: BatchSettings,
+    *,
+    has_roll_rate: bool,
+    unmapped_roll_rate: str | None = None,
+) -> Inspection:
+    """The same, with findings about missing data for lateral places.
+
+    ``unmapped_roll_rate`` names a signal that the map could use as roll rate, if it has none.
+    """
+    verdicts, findings = inspect_campaign(drives, vehicle, settings)
+    unmapped = () if has_roll_rate else tuple(unmapped_roll_findings(unmapped_roll_rate))
+    return Inspection(tuple(drives), verdicts, (*findings, *unmapped, *offset_findings(vehicle)))
 
 
 def _with(verdict: RunVerdict, finding: Finding) -> RunVerdict:

@@ -231,18 +231,11 @@ def _target_errors(
     error = estimated - true
     missed = 0.5 * (low + high) - compared[~answered, 0]
     percent = 100.0 / (high - low)
-    in_pct, in_unit = _Spread.of(error * percent), _Spread.of(error)
     return TargetErrors(
         unit,
-        mean_abs_pct=in_pct.mean_abs,
+        **_spread(error * percent, "_pct"),
+        **_spread(error),
         mean_abs_pct_with_misses=_mean(np.abs(np.r_[error, missed]) * percent),
-        bias_pct=in_pct.bias,
-        std_pct=in_pct.std,
-        max_abs_pct=in_pct.max_abs,
-        mean_abs=in_unit.mean_abs,
-        bias=in_unit.bias,
-        std=in_unit.std,
-        max_abs=in_unit.max_abs,
         coverage95=_mean(((lower <= true) & (true <= upper)).astype(float)),
         mean_abs_pct_of_gross=None if unloaded_kg is None else _mean(100.0 * np.abs(error) / (unloaded_kg + true)),
         half_width_pct=_mean(0.5 * (upper - lower) * percent),
@@ -256,12 +249,8 @@ def _cg_left_errors(compared: F64) -> CgLeftErrors | None:
     if not len(known):
         return None
     true, estimated, low, high = known[np.isfinite(known[:, 1])].T
-    error = _Spread.of(estimated - true)
     return CgLeftErrors(
-        mean_abs_m=error.mean_abs,
-        bias_m=error.bias,
-        std_m=error.std,
-        max_abs_m=error.max_abs,
+        **_spread(estimated - true, "_m"),
         coverage95=_mean(((low <= true) & (true <= high)).astype(float)),
         half_width_m=_mean(0.5 * (high - low)),
         interval_score_m=_mean(interval_scores(true, low, high)),
@@ -275,20 +264,16 @@ def _wheel_errors(judged: Sequence[Judged], vehicle: Vehicle) -> WheelErrors | N
     return WheelErrors(float(np.mean(known)), float(np.max(known))) if known.size else None
 
 
-class _Spread(NamedTuple):
-    """Statistics of errors; None without any."""
-
-    mean_abs: float | None
-    bias: float | None
-    std: float | None
-    max_abs: float | None
-
-    @classmethod
-    def of(cls, error: F64) -> "_Spread":
-        if not error.size:
-            return cls(None, None, None, None)
-        size = np.abs(error)
-        return cls(float(np.mean(size)), float(np.mean(error)), float(np.std(error)), float(np.max(size)))
+def _spread(error: F64, unit: str = "") -> dict[str, float | None]:
+    """Statistics of errors (n,), their names ending in ``unit``; None without any."""
+    size = np.abs(error)
+    found = {
+        "mean_abs": _mean(size),
+        "bias": _mean(error),
+        "std": float(np.std(error)) if error.size else None,
+        "max_abs": float(np.max(size)) if error.size else None,
+    }
+    return {f"{name}{unit}": figure for name, figure in found.items()}
 
 
 def _mean(x: F64) -> float | None:

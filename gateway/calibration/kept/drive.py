@@ -1,17 +1,15 @@
 """Stored batches of a known load as a run for calibration, with the same inspection and fit as for logs."""
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from gateway.calibration.campaign import Campaign
-from gateway.calibration.inspection.campaign import Inspection, inspect_campaign
-from gateway.calibration.inspection.finding import Finding
+from gateway.calibration.inspection.campaign import Inspection, inspect_drives
 from gateway.calibration.inspection.log import LogFacts, SplitRun
-from gateway.calibration.inspection.roll import offset_findings, unmapped_roll_findings
 from gateway.calibration.inspection.rows import RowFacts, Stream
 from gateway.calibration.kept.batch_file import KeptBatch
 from gateway.calibration.known_run import KnownRun
@@ -34,10 +32,10 @@ def split_run_of(run: KnownRun, kept: Sequence[KeptBatch]) -> SplitRun:
     return SplitRun(replace(run, batches=batches), replace(run, batches=()), facts, log=log)
 
 
-def inspect_kept(campaign: Campaign, split: tuple[SplitRun, ...], settings: BatchSettings) -> Inspection:
+def inspect_kept(campaign: Campaign, split: Sequence[SplitRun], settings: BatchSettings) -> Inspection:
     """Findings about each of these runs; ``campaign`` has their vehicle."""
-    verdicts, findings = inspect_campaign(split, campaign.vehicle, settings)
-    return Inspection(split, verdicts, (*findings, *_sideways_findings(campaign, split)))
+    has_roll_rate = any(Signal.ROLL_RATE in run.facts.streams for run in split)
+    return inspect_drives(split, campaign.vehicle, settings, has_roll_rate=has_roll_rate)
 
 
 def joined_facts(parts: Sequence[RowFacts]) -> RowFacts:
@@ -71,10 +69,3 @@ def _joined_stream(streams: Sequence[Stream]) -> Stream:
         high=max(stream.high for stream in spoke),
         resolution=spoke[0].resolution,
     )
-
-
-def _sideways_findings(campaign: Campaign, split: Sequence[SplitRun]) -> Iterator[Finding]:
-    """Findings about missing data for lateral places."""
-    if not any(Signal.ROLL_RATE in run.facts.streams for run in split):
-        yield from unmapped_roll_findings(None)
-    yield from offset_findings(campaign.vehicle)
