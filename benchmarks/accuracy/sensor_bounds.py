@@ -20,6 +20,7 @@ from typing import Final
 
 import numpy as np
 
+from benchmarks.accuracy.markdown import table
 from gateway.calibration.half_car.known_spectra import BAND_HZ, N_SEGMENT
 from gateway.calibration.half_car.prior import prior_of
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
@@ -258,11 +259,15 @@ def limits(drive: Drive | None = None) -> list[Limit]:
 
 def limits_table(found: list[Limit]) -> str:
     """The table in Markdown."""
-    lines = ["| seen | vehicle | beside the road | payload | front share |", "|---|---|---|---|---|"]
-    for one in found:
-        known = "known" if one.is_vehicle_known else "mild priors"
-        lines.append(
-            f"| {one.seen} | {known} | {one.disturbance} | {one.bound.payload_std_kg:.2f} kg, {one.payload_pct:.2f} % "
-            f"| {one.bound.front_share_std_pct:.3f} pp, {one.front_share_pct:.2f} % |"
+    columns = ("seen", "vehicle", "beside the road", "payload", "front share")
+    rows = (
+        (
+            one.seen,
+            "known" if one.is_vehicle_known else "mild priors",
+            one.disturbance,
+            f"{one.bound.payload_std_kg:.2f} kg, {one.payload_pct:.2f} %",
+            f"{one.bound.front_share_std_pct:.3f} pp, {one.front_share_pct:.2f} %",
         )
-    return "\n".join(lines) + "\n"
+        for one in found
+    )
+    return "\n".join(table(columns, rows)) + "\n"

@@ -21,7 +21,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from gateway.bus.frames import join, take
 from gateway.bus.logs import write_candump
@@ -31,6 +31,7 @@ from gateway.calibration.campaign import Campaign, RunTable, file_sha256, load_c
 from gateway.errors import CampaignError, ConfigurationError
 from gateway.files.whole import refusal_told, written_whole
 from gateway.records import Frames, Signal
+from gateway.stated.facts import Part
 from gateway.toml_file import load_toml, read_toml
 from gateway.units import NS_PER_S
 
@@ -66,11 +67,7 @@ mounting = "where, and how it was fixed"
 """
 
 
-class _BundleTable(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Permission(_BundleTable):
+class Permission(Part):
     """[permission]: who permits which use."""
 
     given_by: str = Field(min_length=1)
@@ -78,7 +75,7 @@ class Permission(_BundleTable):
     may_be_published: Literal[True]
 
 
-class Truth(_BundleTable):
+class Truth(Part):
     """[truth]: the source of the payloads in campaign.toml."""
 
     weighed_by: Literal["weighbridge", "axle_pads", "wheel_pads", "platform_scale", "bathroom_scale", "stated_by_maker"]
@@ -86,7 +83,7 @@ class Truth(_BundleTable):
     note: str = ""
 
 
-class VehicleNote(_BundleTable):
+class VehicleNote(Part):
     """[vehicle]: facts that campaign.toml has no key for."""
 
     make_and_model: str = Field(min_length=1)
@@ -94,14 +91,14 @@ class VehicleNote(_BundleTable):
     tyres: str = ""
 
 
-class SensorNote(_BundleTable):
+class SensorNote(Part):
     """[sensor]: the sensor and its mounting."""
 
     device: str = Field(min_length=1)
     mounting: str = Field(min_length=1)
 
 
-class Contribution(_BundleTable):
+class Contribution(Part):
     """The content of contribution.toml."""
 
     permission: Permission

@@ -17,6 +17,8 @@ from matplotlib.figure import Figure
 from gateway.calibration.judgement.coverage import IDEAL_SCORE
 from gateway.core.ratio_index.index import PAPER_BANDS, Band
 from gateway.errors import ConfigurationError
+from gateway.reports.charts import Section, Table
+from gateway.reports.charts.html import Page, document, prose, section_html
 from gateway.reports.charts.still import save
 from gateway.reports.paper import figures as draw
 from gateway.reports.paper.experiments import N_STEPS, Experiments, Extent, Method, OnStep, gather
@@ -46,14 +48,6 @@ COLUMNS: Final = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class PaperRow:
-    """One line of the table; ``is_paper`` marks the paper's own."""
-
-    cells: tuple[str, ...]
-    is_paper: bool = False
-
-
 def tables_of(experiments: Experiments) -> list[dict[str, Any]]:
     """The errors (12) of every method over every drive."""
     tables = []
@@ -65,9 +59,9 @@ def tables_of(experiments: Experiments) -> list[dict[str, Any]]:
     return tables
 
 
-def rows_of(tables: Sequence[Mapping[str, Any]]) -> list[PaperRow]:
+def rows_of(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
     """For every drive: the paper's row, if it has one, then a row for each method."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for key, title in TITLES.items():
         if key in PAPER_PCT:
             rows.append(_paper_row(title, PAPER_PCT[key], PAPER_STD_PCT.get(key)))
@@ -81,7 +75,7 @@ QUICK: Final = "A quick try with a part of the driving and shorter batches: its 
 def accuracy_page(results: Mapping[str, Any]) -> str:
     """accuracy.md, from results.json alone."""
     head = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
-    lines = ["| " + " | ".join(row.cells) + " |" for row in rows_of(results["tables"])]
+    lines = ["| " + " | ".join(row) + " |" for row in rows_of(results["tables"])]
     is_whole = results.get("is_whole", True)  # not said by results that were always of the whole
     command = f"springscale reproduce --output DIR --seed {results['seed']}{'' if is_whole else ' --quick'}"
     return (
@@ -98,27 +92,25 @@ def accuracy_page(results: Mapping[str, Any]) -> str:
     )
 
 
-def _paper_row(title: str, mean_pct: tuple[float, float], std_pct: tuple[float, float] | None) -> PaperRow:
+def _paper_row(title: str, mean_pct: tuple[float, float], std_pct: tuple[float, float] | None) -> tuple[str, ...]:
     payload, share = mean_pct
     payload_std, share_std = (f"{std:.2f}" for std in std_pct) if std_pct else ("", "")
-    cells = (
+    return (
         title, "the paper", "", "",
         f"{payload:.2f}", payload_std, f"{4.5 * payload:.1f}", "", "", "",
         f"{share:.2f}", share_std, f"{0.2 * share:.2f}", "", "", "",
     )  # fmt: skip
-    return PaperRow(cells, is_paper=True)
 
 
-def _row(title: str, table: Mapping[str, Any]) -> PaperRow:
+def _row(title: str, table: Mapping[str, Any]) -> tuple[str, ...]:
     payload, share = table["payload"], table["front_share"]
-    cells = (
+    return (
         title, table["method"], str(table["n_batches"]), str(table["n_rejected"]),
         _decimal(payload["mean_abs_pct"], 2), _decimal(payload["std_pct"], 2), _decimal(payload["mean_abs_kg"], 1),
         _percent(payload["coverage95"]), *_widths(payload),
         _decimal(share["mean_abs_pct"], 2), _decimal(share["std_pct"], 2), _decimal(share["mean_abs_pp"], 2),
         _percent(share["coverage95"]), *_widths(share),
     )  # fmt: skip
-    return PaperRow(cells)
 
 
 def _widths(errors: Mapping[str, Any]) -> tuple[str, str]:
@@ -197,14 +189,6 @@ PLATES: Final = (
     Plate("fig14_experiment", "Fig. 14: the experimental protocol, simulated", "", draw.figure_14),
 )  # fmt: skip
 
-_STYLE: Final = """
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 68rem; margin: 2rem auto; padding: 0 1rem; color: #1c2733 }
-table { border-collapse: collapse; font-size: 0.85rem }
-td, th { border-bottom: 1px solid #ccd; padding: 0.25rem 0.6rem }
-td:nth-child(n+3), th:nth-child(n+3) { text-align: right } svg { max-width: 100%; height: auto }
-.paper { background: #f3f1e7 }
-"""
-
 OTHER_CONDITIONS: Final = {
     "speeds of 30 to 130 km/h": "kmh/",
     "IRI 2 and 8": "_iri",
@@ -212,47 +196,46 @@ OTHER_CONDITIONS: Final = {
 }
 
 
-def page(experiments: Experiments, rows: Sequence[PaperRow], drawings: Sequence[tuple[Plate, str]]) -> str:
+def page(experiments: Experiments, rows: Sequence[tuple[str, ...]], drawings: Sequence[tuple[Plate, str]]) -> str:
     """The complete page; each drawing is an SVG element."""
-    head = "".join(f"<th>{escape(column)}</th>" for column in COLUMNS)
-    body = "".join(
-        f'<tr class="{"paper" if row.is_paper else ""}">'
-        + "".join(f"<td>{escape(c)}</td>" for c in row.cells)
-        + "</tr>"
-        for row in rows
+    caption = "Errors (12): percent of 450 kg and of 20 percentage points"
+    numbers = Table(caption, COLUMNS, tuple(rows), n_heads=2)
+    sections = (
+        Section("numbers", "The paper's numbers beside ours", tables=(numbers,)),
+        _findings(experiments),
+        _bands_section(experiments),
     )
     plates = "".join(
-        f'<section id="{plate.name}"><h2>{escape(plate.heading)}</h2>{drawn}<p>{escape(plate.text)}</p></section>'
+        f'<section id="{plate.name}"><h2>{escape(plate.heading)}</h2><div class="wide">{drawn}</div>'
+        f"<p>{prose(plate.text)}</p></section>"
         for plate, drawn in drawings
     )
-    is_whole = experiments.extent.is_whole
-    title = f"Section 4, reproduced{'' if is_whole else ': a quick try'}"
-    quick = "" if is_whole else f"<p><strong>{QUICK}</strong></p>"
-    return (
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        f"<style>{_STYLE}</style></head><body><h1>{title}</h1>{quick}"
-        f"<p>The simulations and the experiment of Bottelli, Tanelli, Boniolo and Savaresi, driven again with our own "
-        f"simulator (seed {experiments.extent.seed}, batches of {experiments.extent.window_s:g} s). Nothing here is "
-        f"measured on a real vehicle. Errors are (12): percent of 450 kg and of 20 percentage points.</p>"
-        f"<h2>The paper's numbers beside ours</h2><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-        f"{_findings(experiments)}{_bands_table(experiments)}{plates}</body></html>\n"
+    extent = experiments.extent
+    text = (
+        "The simulations and the experiment of Bottelli, Tanelli, Boniolo and Savaresi, driven again with our own "
+        f"simulator (seed {extent.seed}, batches of {extent.window_s:g} s). Nothing here is measured on a real vehicle."
     )
+    quick = "" if extent.is_whole else f"<p><strong>{QUICK}</strong></p>"
+    title = f"Section 4, reproduced{'' if extent.is_whole else ': a quick try'}"
+    main = "".join(section_html(one, {}) for one in sections) + plates
+    return document(Page(title, f"{quick}<p>{prose(text)}</p>", main, ("numbers", "Skip to the numbers"), plotly=None))
 
 
-def _findings(experiments: Experiments) -> str:
+def _findings(experiments: Experiments) -> Section:
     """Where our results contradict the paper's section 3.3: each method's errors away from 50 km/h and IRI 4."""
-    lines = "".join(
-        f"<tr><td>{escape(method.label)}</td><td>{what}</td><td>{payload_kg:.0f} kg</td><td>{share_pp:.1f}</td></tr>"
+    rows = tuple(
+        (method.label, what, f"{payload_kg:.0f} kg", f"{share_pp:.1f}")
         for method in experiments.simulated
         for what, part in OTHER_CONDITIONS.items()
         for payload_kg, share_pp in [worst_errors(experiments, method, part)]
     )
-    return (
-        "<h2>Speed and roughness do not drop out</h2><p>The paper's section 3.3 expects the ratio to cancel them. "
-        "Calibrated at 50 km/h on IRI 4, with the ratio index's speed gate lifted, the worst mean errors for half the "
-        "rated payload at other speeds and on other roads are:</p><table><tr><th>Method</th><th>Over</th>"
-        f"<th>Payload</th><th>Share, points</th></tr>{lines}</table>"
+    text = (
+        "The paper's section 3.3 expects the ratio to cancel them. Here all methods are calibrated at 50 km/h on IRI "
+        "4, and the ratio index's speed gate is lifted."
     )
+    caption = "Worst mean errors for half the rated payload at other speeds and on other roads"
+    table = Table(caption, ("Method", "Over", "Payload", "Share, points"), rows)
+    return Section("conditions", "Speed and roughness do not drop out", (text,), tables=(table,))
 
 
 def worst_errors(experiments: Experiments, method: Method, part: str) -> tuple[float, float]:
@@ -263,17 +246,14 @@ def worst_errors(experiments: Experiments, method: Method, part: str) -> tuple[f
     return (float(np.max(answered[:, 0])), float(np.max(answered[:, 1]))) if len(answered) else (np.nan, np.nan)
 
 
-def _bands_table(experiments: Experiments) -> str:
+def _bands_section(experiments: Experiments) -> Section:
     """Table 2: the paper's bands, and our bands for our van."""
     own = experiments.ratio_index
-    lines = "".join(
-        f"<tr><td>{name}</td><td>{_bands(PAPER_BANDS[key])}</td><td>{_bands(ours)}</td></tr>"
-        for name, key, ours in (
-            ("vertical acceleration", "acceleration", own.acceleration_bands),
-            ("pitch rate", "pitch_rate", own.pitch_rate_bands),
-        )
+    rows = (
+        ("vertical acceleration", _bands(PAPER_BANDS["acceleration"]), _bands(own.acceleration_bands)),
+        ("pitch rate", _bands(PAPER_BANDS["pitch_rate"]), _bands(own.pitch_rate_bands)),
     )
-    return f"<h2>Table 2: bands</h2><table><tr><th>Sensor</th><th>The paper</th><th>Ours</th></tr>{lines}</table>"
+    return Section("bands", "Table 2: bands", tables=(Table("Bands", ("Sensor", "The paper", "Ours"), rows),))
 
 
 def _bands(bands: tuple[Band, Band] | None) -> str:
