@@ -95,3 +95,19 @@ def test_a_decimal_comma_is_a_comma_in_german_and_refused_in_english(gateway: Ga
                 assert sent.value.post_data_json["loads"][0]["gross_kg"] == 1240.5
             page.close()
         gateway.board.close()
+
+
+def test_what_was_mistyped_for_another_kind_of_weight_does_not_block_the_form(
+    gateway: Gateway, watched: Watched
+) -> None:
+    page = watched.page
+    with serving(gateway.app) as server:
+        page.goto(server.url)
+        page.locator("#known-add").click()
+        page.locator("[name=gross_kg]").fill("12 tons")
+        page.locator("#known-by").select_option("payload")
+        page.locator("[name=payload_kg]").fill("100")
+        with page.expect_request(lambda asked: asked.method == "POST") as sent:
+            page.locator("#known-confirm").click()
+        assert sent.value.post_data_json["loads"] == [{"by": "payload", "payload_kg": 100.0}]
+        gateway.board.close()

@@ -62,13 +62,14 @@ const PURPOSES = {
 
 let listed = [], purpose = "verify";
 
-/** The fields of the kind of weight that was chosen, and no others. */
+/** The fields of the kind of weight that was chosen, and no others: an invalid hidden field would block the form. */
 function fit() {
   const by = element("known-by").value;
   for (const label of document.querySelectorAll("#known-form [data-by]")) {
     label.hidden = label.dataset.by !== by;
     const input = label.querySelector("input");
-    input.required = label.dataset.by === by && !OPTIONAL.has(input.name);
+    input.disabled = label.hidden;
+    input.required = !OPTIONAL.has(input.name);
   }
 }
 
