@@ -50,9 +50,11 @@ def read_toml(
         raise error(f"{path}: is a folder, a file is wanted") from None
     except PermissionError:
         raise error(f"{path}: no permission to read it") from None
+    except OSError as fault:
+        raise error(f"{path}: cannot be read: {fault.strerror or fault}") from None
     except UnicodeDecodeError as fault:
         raise error(f"{path}: not UTF-8 text (byte {fault.start})") from None
-    except tomllib.TOMLDecodeError as fault:
+    except (ValueError, RecursionError) as fault:  # a number of 5,000 digits, a thousand brackets
         raise error(f"{path}: not valid TOML: {fault}") from None
 
 

@@ -225,8 +225,10 @@ def _found(named: str, pinned: Trust) -> tuple[Location, str, bytes]:
     for name in NAMES:
         try:
             return base, name, _Loader(base, pinned).read(base.path(name))
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             continue
+        except OSError as fault:
+            raise ConfigurationError(f"{base.path(name)}: cannot be read: {fault.strerror or fault}") from None
     raise ConfigurationError(
         f"{base}: has neither {' nor '.join(NAMES)}, which tells whose logs lie where; write one, or name yours"
     )

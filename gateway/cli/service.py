@@ -69,9 +69,10 @@ class Service:
         headers = {"Accept": "application/json, */*;q=0.5", "Content-Type": "application/json", **more}
         if self.token:
             headers["Authorization"] = f"Bearer {self.token}"
-        request = urllib.request.Request(address, content, headers, method=method)
+        opener = self._opener()
         try:
-            with self._opener().open(request, timeout=TIMEOUT_S) as answer:
+            request = urllib.request.Request(address, content, headers, method=method)
+            with opener.open(request, timeout=TIMEOUT_S) as answer:
                 yield answer
         except urllib.error.HTTPError as refusal:
             raise SpringscaleError(f"{address}: {_said(refusal)}") from None

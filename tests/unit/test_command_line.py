@@ -1,8 +1,10 @@
 """The command line beside any one command: version, mistyped names and numbers, what a start does not import."""
 
 import json
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import click
 import pytest
@@ -12,7 +14,7 @@ from support.patience import PATIENCE_S
 import gateway.cli
 from gateway.cli import INTERRUPTED, springscale
 from gateway.cli.options import LoadArgument
-from gateway.errors import BusError
+from gateway.errors import BusError, SpringscaleError
 
 
 @pytest.mark.parametrize(("typed", "meant"), [("estmate", "estimate"), ("check_config", "check-config")])
@@ -64,6 +66,27 @@ def test_what_is_no_number_is_a_usage_error(command: tuple[str, ...], text: str)
     said = CliRunner().invoke(springscale, [*command, text])
     assert said.exit_code == 2
     assert f"Invalid value for '{command[-1]}'" in said.output
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (("campaign", "pack", "a.log", "--output", "a.zip"), "campaign.toml: cannot be read: Not a directory"),
+        (("reprocess", "a.log", "--output", "out", "--dry-run"), "a.log: has neither archive.toml"),
+        (("verification", "show", "--url", "http://[::1"), "cannot reach the service: Invalid IPv6 URL"),
+        (("check-config", "deep.toml"), "deep.toml: not valid TOML"),
+        (("check-config", "long.toml"), "long.toml: not valid TOML"),
+    ],
+)
+def test_what_cannot_be_read_or_reached_is_said_in_one_line(
+    command: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.log").write_text("(1.0) can0 120#00\n")
+    Path("deep.toml").write_text("a = " + "[" * 5000)
+    Path("long.toml").write_text("a = " + "1" * 5000)
+    with pytest.raises(SpringscaleError, match=re.escape(said)):
+        CliRunner().invoke(springscale, command, catch_exceptions=False)
 
 
 @pytest.mark.parametrize("command", [("verification", "record", "--load"), ("calibration", "ticket", "add")])
