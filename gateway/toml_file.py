@@ -41,7 +41,7 @@ def read_toml(
 ) -> dict[str, Any]:
     """The tables of ``path``. Raises ``error`` naming the file, and the line where its syntax breaks."""
     try:
-        return tomllib.loads(read(path).decode("utf-8"))
+        tables = tomllib.loads(read(path).decode("utf-8"))
     except UntrustedFileError as fault:
         raise error(str(fault)) from None
     except FileNotFoundError:
@@ -56,6 +56,18 @@ def read_toml(
         raise error(f"{path}: not UTF-8 text (byte {fault.start})") from None
     except (ValueError, RecursionError) as fault:  # a number of 5,000 digits, a thousand brackets
         raise error(f"{path}: not valid TOML: {fault}") from None
+    if (where := _with_nul(tables)) is not None:
+        raise error(f"{path}: {where}: contains a NUL character, which no name or path may")
+    return tables
+
+
+def _with_nul(part: Any) -> str | None:
+    """The keys of the first text with a NUL character; None if there is none."""
+    if isinstance(part, str):
+        return "" if "\0" in part else None
+    pairs = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ()
+    found = ((key, _with_nul(one)) for key, one in pairs)
+    return next((f"{key}.{below}".rstrip(".") for key, below in found if below is not None), None)
 
 
 def load_toml(

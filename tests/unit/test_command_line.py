@@ -76,6 +76,7 @@ def test_what_is_no_number_is_a_usage_error(command: tuple[str, ...], text: str)
         (("verification", "show", "--url", "http://[::1"), "cannot reach the service: Invalid IPv6 URL"),
         (("check-config", "deep.toml"), "deep.toml: not valid TOML"),
         (("check-config", "long.toml"), "long.toml: not valid TOML"),
+        (("check-config", "nul.toml"), "nul.toml: store.directory: contains a NUL character"),
     ],
 )
 def test_what_cannot_be_read_or_reached_is_said_in_one_line(
@@ -84,6 +85,7 @@ def test_what_cannot_be_read_or_reached_is_said_in_one_line(
     monkeypatch.chdir(tmp_path)
     Path("a.log").write_text("(1.0) can0 120#00\n")
     Path("deep.toml").write_text("a = " + "[" * 5000)
+    Path("nul.toml").write_text('signals = "springscale:reference"\n[store]\ndirectory = "a\\u0000"')
     Path("long.toml").write_text("a = " + "1" * 5000)
     with pytest.raises(SpringscaleError, match=re.escape(said)):
         CliRunner().invoke(springscale, command, catch_exceptions=False)
