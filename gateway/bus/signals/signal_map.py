@@ -174,6 +174,8 @@ def _condition(where: str, name: str, allowed: Accepted | list[Accepted], messag
     judged = _find(key, name, message)
     _require_decodable(key, judged, message)
     choices = allowed if isinstance(allowed, list) else [allowed]
+    if not choices:
+        raise SignalMapError(f"{key}.{name}: an empty list allows no frame; name the values under which this counts")
     return Condition(judged.field, tuple(_allowed_bits(f"{key}.{name}", choice, judged) for choice in choices))
 
 
@@ -186,8 +188,8 @@ def _allowed_bits(where: str, allowed: Accepted, signal: DatabaseSignal) -> int:
         return _bits_of(signal.choices[allowed], field)
     if field.coding is Coding.FLOAT:
         raise SignalMapError(f"{where}: {signal.name!r} is a float, which cannot be compared for equality")
-    raw = round((allowed - field.offset) / field.scale)
-    low, high = field.raw_range
+    steps, (low, high) = (allowed - field.offset) / field.scale, field.raw_range
+    raw = round(steps) if low - 1 < steps < high + 1 else low - 1  # beyond, and NaN: no step of the signal
     if not low <= raw <= high or not math.isclose(raw * field.scale + field.offset, allowed, abs_tol=1e-9):
         raise SignalMapError(f"{where}: {signal.name!r} can never be {allowed!r}")
     return _bits_of(raw, field)
