@@ -175,7 +175,7 @@ def test_a_number_out_of_all_bounds_is_refused_in_words_or_can_be_used(tmp_path:
         list(scheduler.feed(drive(1.0)))
         list(scheduler.flush())
         kept = settings.store.model_copy(update={"directory": tmp_path / str(n)})
-        with closing(store_of(kept, ())) as store:
+        with closing(store_of(kept)) as store:
             store.write_event("started", {})
             assert store.flush(PATIENCE_S)
     assert refusals
