@@ -377,9 +377,9 @@ def _runs(verdicts: Sequence[RunVerdict]) -> Iterator[Reason]:
     in_all = counted(len(verdicts), "run")
     if unusable:
         grade = Grade.UNFIT if 2 * len(unusable) > len(verdicts) else Grade.RESERVED
-        yield Reason("runs", grade, f"Of {in_all} cannot be used: {_listed(unusable)}.")
+        yield Reason("runs", grade, f"{len(unusable)} of {in_all} cannot be used: {_listed(unusable)}.")
     elif doubtful:
-        yield Reason("runs", Grade.RESERVED, f"Of {in_all} need attention: {_listed(doubtful)}.")
+        yield Reason("runs", Grade.RESERVED, f"{len(doubtful)} of {in_all} need attention: {_listed(doubtful)}.")
     elif verdicts:
         yield Reason("runs", Grade.FIT, f"Without a fault: {in_all}, all there are.")
 
@@ -395,7 +395,7 @@ def _labels(verdicts: Sequence[RunVerdict]) -> Iterator[Reason]:
         text = (
             f"The other runs find another weight for {_listed(doubted)} than the campaign file says: correct the load,"
         )
-        yield Reason("labels", Grade.UNFIT, f"{text} or calibrate without (--runs).")
+        yield Reason("labels", Grade.UNFIT, f"{text} or calibrate without these runs (--runs).")
 
 
 def _sentence(text: str) -> str:

@@ -9,7 +9,7 @@ from gateway.words import percent
 def plan_sentences(plan: LoadPlan) -> str:
     """The present expectation, the runs to drive in order, and the gain of each."""
     is_enough = plan.is_enough_driven
-    what = "most would bring" if is_enough else "drive next"
+    what = "most useful would be" if is_enough else "drive next"
     minutes, kmh = plan.drive.duration_s / 60.0, 3.6 * plan.drive.speed_mps
     lines = [
         f"{plan.vehicle}: nothing driven yet; expected from typical road vehicles"
@@ -25,8 +25,8 @@ def plan_sentences(plan: LoadPlan) -> str:
         load, left_m = plan.sideways.load, plan.sideways.payload_left_m
         lines.append(
             f"one run with a load to one side: {load_words(load)}, {left_m:g} m left or right of the centre line "
-            f"(payload_left_m = {left_m:g} or -{left_m:g}): what such a load does then shows, and no longer follows "
-            "from springs and road alone; so do the signs of the roll rate and of sensor_offset_left_m"
+            f"(payload_left_m = {left_m:g} or -{left_m:g}): its effect is then measured instead of derived "
+            "from springs and road; so are the signs of the roll rate and of sensor_offset_left_m"
         )
     return "\n".join(lines)
 
@@ -53,7 +53,8 @@ def best_next(plan: LoadPlan) -> str | None:
     load, now = load_words(first.load), f" (now {_expected(plan.now)})" if plan.now else ""
     after = f"expected {_expected(first.expected)} afterwards{now}."
     if plan.is_enough_driven:
-        return f"Enough is driven: no further run would narrow answers by a tenth. Most would bring {load}: {after}"
+        enough = "Enough is driven: no further run would narrow answers by a tenth."
+        return f"{enough} The most useful would be {load}: {after}"
     return f"{load.capitalize()}: {after}"
 
 

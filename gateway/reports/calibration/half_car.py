@@ -93,7 +93,7 @@ def half_car_section(
         (
             "Measured spectra of every run beside those of the one half-car fitted to all of them, each at its true "
             "load. The road's level is a straight line drawn through the spectra; everything else is the model's. "
-            "Misfit is the likelihood ratio per degree of freedom: about 1 where the model is all there is to it.",
+            "Misfit is the likelihood ratio per degree of freedom: about 1 if the model explains everything.",
             told(known, "its line told" if inherited else "vehicles usually have"),
         ),
         (*charts[:1], knowledge_chart(known)),

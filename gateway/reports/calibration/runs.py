@@ -69,8 +69,8 @@ def plan_section(plan: LoadPlan) -> Section:
     columns = ("After driving", "payload", "front share", "loads within reach")
     caption = f"Expected of a five-minute batch, ± spans 95 %; each run {minutes:.0f} minutes near {kmh:.0f} km/h"
     text = (
-        "The runs after which loads would be weighed best, each with those above it. The half-car says so of itself, "
-        "to first order: it tells which run to drive rather than how good the result will be."
+        "The runs after which loads would be weighed best, each with those above it. These are the half-car's own "
+        "predictions, to first order: they show which run to drive rather than how good the result will be."
     )
     paragraphs = (text, *([_sideways(plan.sideways)] if plan.sideways else []))
     return Section("next", "What to drive next", paragraphs, (), (Table(caption, columns, tuple(rows)),))
