@@ -31,7 +31,7 @@ PART_NAMES: Mapping[BatchSet, str] = {
 PART_TEXT: Mapping[BatchSet, str] = {
     BatchSet.LEFT_OUT: "Runs left out: every run's identification part, weighed by a calibration from the other runs.",
     BatchSet.IDENTIFICATION: "Identification part: the batches of the fit, where errors look small.",
-    BatchSet.VALIDATION: "Validation part: later batches of the same runs: new batches with loads that the fit has seen.",
+    BatchSet.VALIDATION: "Validation part: later batches of the same runs, new to the fit; their loads are not new.",
     BatchSet.ALL: "All batches of the campaign, whether the calibration was fitted to them or not.",
 }
 
