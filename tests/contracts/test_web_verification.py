@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
+from support.commands import called
 from support.epochs import START_NS, drive_of, stored
 from support.verification import CALIBRATED, verification_desk
 from support.web import Client, Gateway, serving
 
-from gateway.cli import springscale
 from gateway.errors import SpringscaleError
 from gateway.records import iso_utc
 from gateway.web.access.tokens import Scope, TokenFile
@@ -113,7 +113,7 @@ def test_where_nothing_is_weighed_there_is_nothing_to_verify(tmp_path: Path) -> 
 
 
 def run(url: str, *arguments: str) -> Result:
-    return CliRunner().invoke(springscale, ["verification", *arguments, "--url", url])
+    return called("verification", *arguments, "--url", url)
 
 
 def test_the_command_records_shows_and_exports(gateway: Gateway, tmp_path: Path) -> None:

@@ -7,16 +7,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from distributed import LocalCluster
 from support.archive import Here, object_store, tables_of, uploaded, write_fleet
+from support.commands import called
 
 from gateway.archive import failures, place_of, receipts, rows_of, slots_done
 from gateway.archive.manifest import load_manifest
 from gateway.archive.places import PlaceError
 from gateway.archive.reprocess import Progress, reprocess
 from gateway.archive.workers import Cluster, cluster
-from gateway.cli import springscale
 from gateway.errors import ConfigurationError
 
 N_VEHICLES = 15
@@ -79,7 +78,7 @@ def test_the_command_works_on_a_cluster(tmp_path: Path, bucket: str, scheduler: 
     archive = write_fleet(tmp_path / "archive", 2).parent
     uploaded(archive, place_of(f"{bucket}/few"))
     command = ["reprocess", f"{bucket}/few/archive.toml", "--output", f"{bucket}/few_out", "--scheduler", scheduler]
-    result = CliRunner().invoke(springscale, [*command, "--json"])
+    result = called(*command, "--json")
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout)
     assert (told["n_vehicles"], told["n_logs"], told["n_batches"], told["n_weighed"]) == (2, 3, 2, 2)

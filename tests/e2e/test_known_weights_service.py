@@ -5,16 +5,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
 from support.bus_drive import START_NS, white_noise
 from support.calibrated import calibration_file
+from support.commands import called, run
 from support.log import fields_of, names
 from support.ports import first_answer
 from support.running_service import Running, configuration, counted, estimated, events, serve, stored
 
 from gateway.bus.logs import write_candump
 from gateway.calibration.known_weights_file import load_known_weights
-from gateway.cli import springscale
 from gateway.errors import SpringscaleError
 from gateway.log import Event
 
@@ -116,7 +115,7 @@ def test_a_copied_file_gives_the_same_numbers_elsewhere(config: Path, logs: list
     assert estimated(config, logs[1], options=("--known-weights", str(copy))) == here
     (tmp_path / "vehicle.json").write_text(calibration_file(payload_kg=13.0, front_share_pct=51.0).to_json())
     arguments = ["estimate", str(logs[1]), "--config", str(config), "--known-weights", str(copy)]
-    other = CliRunner().invoke(springscale, arguments)
+    other = called(*arguments)
     assert isinstance(other.exception, SpringscaleError)
     assert "no known weight in use" in str(other.exception)
     assert other.exception.exit_code == 2
@@ -128,12 +127,12 @@ def test_check_config_looks_at_known_weights_too(config: Path, logs: list[Path],
         told(service, "set", "--empty")
 
     serve(config, meet)
-    good = CliRunner().invoke(springscale, ["check-config", str(config), "--json"], catch_exceptions=False)
+    good = run("check-config", config, "--json")
     held = load_known_weights(tmp_path / "state" / "known_weights.json")
     knowledge = held.knowledge(held.entries[0].calibration_id, "ratio_index")
     assert json.loads(good.output)["known_weights_id"] == knowledge.id
     (tmp_path / "state" / "known_weights.json").write_text("{")
-    fault = CliRunner().invoke(springscale, ["check-config", str(config)]).exception
+    fault = called("check-config", config).exception
     assert isinstance(fault, SpringscaleError)
     assert "known_weights.json" in str(fault)
     assert fault.exit_code == 2

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
 from support.archive import MIDNIGHT_NS, WINDOW_S, Here, S, write_cut_drive, write_drive, write_manifest
 from support.bus_drive import bus_drive
+from support.commands import called
 from support.paper_van import PAPER_VAN
 
 from gateway.archive import place_of, rows_of, slots_done
@@ -16,7 +16,6 @@ from gateway.archive.dataset import PROVENANCE, row_of
 from gateway.archive.manifest import load_manifest
 from gateway.archive.reprocess import reprocess
 from gateway.bus.logs import write_candump
-from gateway.cli import springscale
 
 IDENTITY = ("id", "vehicle_id", *PROVENANCE)  # `estimate` on bare files knows neither vehicle nor archive
 
@@ -33,7 +32,7 @@ def reprocessed(folder: Path) -> list[dict[str, Any]]:
 def printed(calibration: Path, window_s: float, *logs: Path, options: Sequence[str] = ()) -> list[dict[str, Any]]:
     """What `springscale estimate --json` prints, as rows."""
     command = ["estimate", *map(str, logs), "--signals", "springscale:reference", "--calibration", str(calibration)]
-    result = CliRunner().invoke(springscale, [*command, "--window-s", str(window_s), "--json", *options])
+    result = called(*command, "--window-s", window_s, "--json", *options)
     records = [json.loads(line) for line in result.stdout.splitlines()]
     assert result.exit_code == all(record["rejected"] for record in records), result.stderr
     return [row_of(record) for record in records]

@@ -8,13 +8,13 @@ from typing import Any
 
 import can
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
+from support.commands import called
 
 from gateway.bus.frames import message_of
 from gateway.bus.logs import open_whole_log
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file.calibration_file import load_calibration
-from gateway.cli import springscale
 from gateway.errors import CalibrationImpossibleError
 from gateway.workbench.simulate import bench_of, write_campaign
 
@@ -36,7 +36,7 @@ UNTOLD = "note:roll_rate_sign_untold"  # one run with a sensor 0.15 m off the ce
 
 def calibrate(campaign: Path, *options: str | Path) -> Result:
     """What the command did; the message of a refusal is in ``exception``."""
-    done = CliRunner().invoke(springscale, ["calibrate", str(campaign), *WINDOW, *map(str, options)])
+    done = called("calibrate", campaign, *WINDOW, *options)
     if done.exception is not None and not isinstance(done.exception, CalibrationImpossibleError):
         raise done.exception
     return done

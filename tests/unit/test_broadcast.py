@@ -12,7 +12,7 @@ from typing import Any
 import can
 import cantools
 import pytest
-from click.testing import CliRunner
+from support.commands import called
 from support.estimates import make_estimate
 from support.log import names
 from support.patience import wait_until
@@ -22,7 +22,6 @@ from gateway.bus import broadcast as broadcaster_module
 from gateway.bus.broadcast import Broadcaster, Sender, WeightFrames
 from gateway.bus.frames import message_of
 from gateway.bus.sink import BusSink
-from gateway.cli import springscale
 from gateway.errors import ConfigurationError
 from gateway.estimate import Estimate, Quantity, Weight, Weights
 from gateway.log import Event
@@ -162,7 +161,7 @@ def test_check_config_refuses_what_could_disturb(broadcast: str, words: str, tmp
         'signals = "springscale:reference"\n[bus]\ninterface = "virtual"\nchannel = "x"\n[web]\nport = 0\n'
         f'[store]\ndirectory = "state"\n[broadcast]\n{broadcast}\n'
     )
-    found = CliRunner().invoke(springscale, ["check-config", str(path)])
+    found = called("check-config", path)
     assert isinstance(found.exception, ConfigurationError)
     assert words in str(found.exception)
 
@@ -174,8 +173,8 @@ def test_check_config_says_where_weights_are_sent(tmp_path: Path) -> None:
         '[store]\ndirectory = "state"\n'
         '[broadcast]\ninterface = "virtual"\nchannel = "y"\nsource_address = 66\n'
     )
-    assert "Sends weights on y" in CliRunner().invoke(springscale, ["check-config", str(path)]).output
-    told = CliRunner().invoke(springscale, ["check-config", str(path), "--json"]).output
+    assert "Sends weights on y" in called("check-config", path).output
+    told = called("check-config", path, "--json").output
     assert json.loads(told)["broadcast"] == "y"
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import NoReturn
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
+from support.commands import called
 from support.commissioning import Bench, fitted, in_steps
 
 from gateway.bus.live.python_can import usable_interfaces, what_lacks
 from gateway.bus.signals.signal_map import shipped_map
-from gateway.cli import springscale
 from gateway.errors import ConfigurationError
 from gateway.web.access.tokens import Scope, TokenFile
 
@@ -24,7 +24,7 @@ def checked(folder: Path, **sections: str) -> Result:
     tables = "\n".join(f"[{name}]\n{text}" for name, text in (SOUND | sections).items())
     path = folder / "springscale.toml"
     path.write_text(f'signals = "springscale:reference"\n[store]\ndirectory = "{folder / "state"}"\n{tables}\n')
-    return CliRunner().invoke(springscale, ["check-config", str(path)])
+    return called("check-config", path)
 
 
 def test_a_sound_configuration_is_good(tmp_path: Path) -> None:
@@ -79,7 +79,7 @@ def test_a_map_that_cannot_weigh_is_not_called_good(tmp_path: Path) -> None:
         (tmp_path / dbc.name).write_bytes(dbc.read_bytes())
     config = tmp_path / "springscale.toml"
     config.write_text(config.read_text().replace("springscale:reference", str(tmp_path / "map.toml")))
-    again = CliRunner().invoke(springscale, ["check-config", str(config)])
+    again = called("check-config", config)
     assert isinstance(again.exception, ConfigurationError)
     assert "maps no pitch_rate, which every estimate needs" in str(again.exception)
 
@@ -91,7 +91,7 @@ def test_a_store_that_cannot_be_written_is_not_called_good(tmp_path: Path) -> No
     assert f"{tmp_path / 'state'} is a file; name a folder" in str(found.exception)
     config = tmp_path / "springscale.toml"
     config.write_text(config.read_text().replace(str(tmp_path / "state"), "/proc/sys/springscale"))
-    again = CliRunner().invoke(springscale, ["check-config", str(config)])
+    again = called("check-config", config)
     assert "directory = /proc/sys/springscale: " in str(again.exception)
 
 
@@ -101,7 +101,7 @@ def test_a_store_in_a_file_system_without_files_is_not_called_good(virtual: str,
     checked(tmp_path)
     config = tmp_path / "springscale.toml"
     config.write_text(config.read_text().replace(str(tmp_path / "state"), virtual))
-    found = CliRunner().invoke(springscale, ["check-config", str(config)])
+    found = called("check-config", config)
     assert isinstance(found.exception, ConfigurationError)
     assert f"directory = {virtual}: " in str(found.exception)
 
@@ -135,7 +135,7 @@ def test_an_open_address_with_a_token_is_good(tmp_path: Path) -> None:
 
 
 def test_the_help_offers_only_interfaces_that_work() -> None:
-    told = " ".join(CliRunner().invoke(springscale, ["replay", "--help"]).output.split())
+    told = " ".join(called("replay", "--help").output.split())
     usable = usable_interfaces()
     assert f"on this computer {', '.join(usable)}" in told
     assert ("udp_multicast" in usable) is (importlib.util.find_spec("msgpack") is not None)

@@ -1,6 +1,5 @@
 """The command line beside any one command: version, mistyped names and numbers, what a start does not import."""
 
-import json
 import re
 import subprocess
 import sys
@@ -8,24 +7,24 @@ from pathlib import Path
 
 import click
 import pytest
-from click.testing import CliRunner
+from support.commands import called, run
 from support.patience import PATIENCE_S
 
 import gateway.cli
-from gateway.cli import INTERRUPTED, springscale
+from gateway.cli import INTERRUPTED
 from gateway.cli.options import LoadArgument
 from gateway.errors import BusError, SpringscaleError
 
 
 @pytest.mark.parametrize(("typed", "meant"), [("estmate", "estimate"), ("check_config", "check-config")])
 def test_a_mistyped_command_is_told_which_was_meant(typed: str, meant: str) -> None:
-    said = CliRunner().invoke(springscale, [typed])
+    said = called(typed)
     assert said.exit_code == 2
     assert f"No such command {typed!r}: did you mean {meant}?" in said.output
 
 
 def test_a_name_that_resembles_none_is_only_refused() -> None:
-    said = CliRunner().invoke(springscale, ["frobnicate"])
+    said = called("frobnicate")
     assert said.exit_code == 2
     assert "did you mean" not in said.output
 
@@ -36,13 +35,13 @@ def test_ctrl_c_ends_quietly_with_the_code_of_an_interrupted_process(monkeypatch
         raise KeyboardInterrupt
 
     monkeypatch.setattr(gateway.cli._Lazy, "get_command", lambda self, ctx, name: stopped)
-    said = CliRunner().invoke(springscale, ["run"])
+    said = called("run")
     assert said.exit_code == INTERRUPTED
     assert said.output == ""
 
 
 def test_its_version_is_told_by_either_name() -> None:
-    short, long = (CliRunner().invoke(springscale, [name]).output for name in ("-V", "--version"))
+    short, long = (called(name).output for name in ("-V", "--version"))
     assert short == long
     assert short.startswith("springscale, version ")
 
@@ -63,7 +62,7 @@ NOWHERE = ("--url", "http://127.0.0.1:9")
     ],
 )
 def test_what_is_no_number_is_a_usage_error(command: tuple[str, ...], text: str) -> None:
-    said = CliRunner().invoke(springscale, [*command, text])
+    said = called(*command, text)
     assert said.exit_code == 2
     assert f"Invalid value for '{command[-1]}'" in said.output
 
@@ -88,13 +87,13 @@ def test_what_cannot_be_read_or_reached_is_said_in_one_line(
     Path("nul.toml").write_text('signals = "springscale:reference"\n[store]\ndirectory = "a\\u0000"')
     Path("long.toml").write_text("a = " + "1" * 5000)
     with pytest.raises(SpringscaleError, match=re.escape(said)):
-        CliRunner().invoke(springscale, command, catch_exceptions=False)
+        run(*command)
 
 
 @pytest.mark.parametrize("command", [("verification", "record", "--load"), ("calibration", "ticket", "add")])
 @pytest.mark.parametrize("text", ["nan", "inf", "much"])
 def test_a_known_weight_that_is_no_number_is_a_usage_error(command: tuple[str, ...], text: str) -> None:
-    said = CliRunner().invoke(springscale, [*command, f"gross_kg={text}", *NOWHERE])
+    said = called(*command, f"gross_kg={text}", *NOWHERE)
     assert said.exit_code == 2
     assert f"gross_kg = {text!r} is no number" in said.output
 
@@ -119,26 +118,34 @@ def test_a_drive_that_fails_ends_the_command_with_what_it_was(monkeypatch: pytes
         raise BusError("springscale-demo: the bus has gone")
 
     monkeypatch.setattr("gateway.cli.demo.demo_drive", drive)
-    said = CliRunner().invoke(springscale, ["demo", "--once", "--json"])
+    said = called("demo", "--once", "--json")
     assert isinstance(said.exception, BusError)  # as with every command, main makes one line of it
 
 
-HEAVY = (
-    "scipy.stats",
-    "scipy.signal",
-    "scipy",
-    "asammdf",
-    "pandas",
-    "matplotlib",
-    "numba",
-    "pyarrow",
+HEAVY = ("scipy", "asammdf", "pandas", "matplotlib", "numba", "pyarrow")
+
+
+FITTING = ("gateway.calibration.half_car", "gateway.calibration.ratio_index", "gateway.calibration.line")
+
+
+def python(code: str) -> str:
+    """What the code prints in a process of its own."""
+    command = [sys.executable, "-c", code]
+    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=True).stdout
+
+
+@pytest.mark.parametrize(
+    ("modules", "unneeded"),
+    [
+        ("gateway", ("gateway.", "numpy")),  # the Python API
+        ("gateway.service.gateway", HEAVY),
+        ("gateway.cli, gateway.bus.logs", ("asammdf",)),  # python-can takes it, and pandas: two seconds of every start
+        ("gateway.calibration.file.comparison, gateway.calibration.file.line_file", FITTING),  # these take the others
+    ],
 )
-
-
-def test_the_service_starts_without_what_it_does_not_need():
-    code = "import json, sys, gateway.service.gateway; print(json.dumps(sorted(sys.modules)))"
-    loaded = json.loads(subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout)
-    assert not set(HEAVY) & set(loaded)
+def test_nothing_is_imported_that_is_not_needed(modules: str, unneeded: tuple[str, ...]) -> None:
+    found = python(f"import sys, {modules}; print([name for name in sys.modules if name.startswith({unneeded})])")
+    assert found.strip() == "[]"
 
 
 WEIGHED = """
@@ -160,22 +167,7 @@ print(sum(one.counted for one in found))
 
 def test_weighing_needs_no_scipy() -> None:
     """It held a fifth of a service's memory."""
-    command = [sys.executable, "-c", WEIGHED]
-    said = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=True).stdout
-    assert int(said) > 3
-
-
-FITTING = ("gateway.calibration.half_car", "gateway.calibration.ratio_index", "gateway.calibration.line")
-
-
-def test_the_file_knows_nothing_of_the_fit() -> None:
-    command = (
-        f"import sys, gateway.calibration.file; print([name for name in sys.modules if name.startswith({FITTING})])"
-    )
-    said = subprocess.run(
-        [sys.executable, "-c", command], capture_output=True, text=True, timeout=PATIENCE_S, check=True
-    ).stdout
-    assert said.strip() == "[]"
+    assert int(python(WEIGHED)) > 3
 
 
 CODE = """
@@ -190,6 +182,4 @@ print(*resource.getrlimit(resource.RLIMIT_AS))
 
 @pytest.mark.parametrize(("outside", "most"), [(0, 8_000_000_000), (6_000_000_000, 6_000_000_000)])
 def test_the_narrower_of_two_bounds_holds(outside: int, most: int) -> None:
-    code = CODE.format(outside=outside)
-    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
-    assert told.split() == [str(most)] * 2
+    assert python(CODE.format(outside=outside)).split() == [str(most)] * 2

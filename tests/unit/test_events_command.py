@@ -6,14 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
 from support.bus_drive import white_noise
 from support.calibrated import calibration_file
+from support.commands import called
 from support.configured import service_config
 from support.known_weights import SUBJECT, KnownWeightBench
 
 from gateway.bus.logs import write_candump
-from gateway.cli import springscale
 from gateway.cli.events import entry_sentence
 from gateway.core.events.entry import Entry, EntryKind
 from gateway.errors import LogUnreadableError
@@ -35,7 +34,7 @@ def drives(tmp_path: Path) -> tuple[str, str]:
 
 
 def said(folder: Path, *arguments: str) -> str:
-    found = CliRunner().invoke(springscale, ["events", *arguments, "--config", str(folder / "springscale.toml")])
+    found = called("events", *arguments, "--config", folder / "springscale.toml")
     assert found.exit_code == 0, found.output
     return found.stdout
 
@@ -82,8 +81,8 @@ def test_a_log_that_cannot_be_read_takes_nothing_from_those_before_it(
     if content is not None:
         bad.write_bytes(content)
     options = ("--config", str(tmp_path / "springscale.toml"))
-    alone = CliRunner().invoke(springscale, [command, *drives, *options])
-    found = CliRunner().invoke(springscale, [command, *drives, str(bad), *options])
+    alone = called(command, *drives, *options)
+    found = called(command, *drives, bad, *options)
     assert alone.stdout.count("\n") == 2  # a batch a log
     assert found.stdout == alone.stdout
     assert isinstance(found.exception, LogUnreadableError)
@@ -104,7 +103,7 @@ def test_a_withdrawn_event_does_not_say_how_sure_it_was() -> None:
 def test_logs_out_of_order_are_refused(tmp_path: Path, drives: tuple[str, str]) -> None:
     first, second = drives
     config = str(tmp_path / "springscale.toml")
-    found = CliRunner().invoke(springscale, ["events", second, first, "--config", config])
+    found = called("events", second, first, "--config", config)
     assert isinstance(found.exception, LogUnreadableError)
     assert f"{first}: begins before {second}: name the logs in order of time" in str(found.exception)
 

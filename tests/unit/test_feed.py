@@ -13,7 +13,7 @@ from pathlib import Path
 import can
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from support.commands import called, run
 from support.iio import ACCEL_SCALE, GYRO_SCALE, FakeIio, Scan
 from support.patience import PATIENCE_S, wait_until
 
@@ -21,7 +21,6 @@ from gateway.bus.feed import AXES, Feeder, Gpsd, IioDevice, find_devices, turned
 from gateway.bus.feed.feeder import Numbering
 from gateway.bus.frames import frames_of
 from gateway.bus.signals import Decoder, load_signal_map
-from gateway.cli import springscale
 from gateway.core.sample_clock import sample_times
 from gateway.errors import BusError, ConfigurationError
 from gateway.records import Motion, Signal
@@ -289,10 +288,10 @@ def test_the_command_tells_what_it_did_and_that_the_wrong_axis_is_up(tmp_path: P
     options = ["--interface", "virtual", "--channel", "feed-cli", "--gpsd", "", "--up", "y", "--forward", "x"]
     options += ["--sysfs", str(fake.sysfs), "--nodes", str(fake.nodes), "--for-s", "4", "--json"]
     with fake.sampling(500.0, at_rest):
-        result = CliRunner().invoke(springscale, ["feed", *options], catch_exceptions=False)
+        result = run("feed", *options)
     told = json.loads(result.stdout)
     assert told["sent"] >= 2 * 1000
     assert told["gravity_mps2"] == pytest.approx(0.0, abs=0.1)
     assert "name it by --up" in result.stderr
-    empty = CliRunner().invoke(springscale, ["feed", *options[:6], "--sysfs", str(tmp_path / "none")])
+    empty = called("feed", *options[:6], "--sysfs", tmp_path / "none")
     assert "nothing to send" in str(empty.exception)

@@ -9,14 +9,15 @@ from typing import Any
 import duckdb
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
+from support.commands import called
 from support.fleet import DAY_S, MONDAY_S, row, week, write_table
 from support.html_page import Page
 
 from gateway.archive import place_of
 from gateway.archive.fleet.fleet import FleetSummary, fleet_of
 from gateway.archive.fleet.weeks import monday_of
-from gateway.cli import main, springscale
+from gateway.cli import main
 from gateway.reports.fleet.text import page_of, time_axis
 from gateway.reports.fleet.vehicle import runs_of
 
@@ -25,7 +26,7 @@ N_WEEKS = 26
 
 
 def run(dataset: Path, output: Path) -> Result:
-    return CliRunner().invoke(springscale, ["fleet-report", str(dataset), "--output", str(output), "--json"])
+    return called("fleet-report", dataset, "--output", output, "--json")
 
 
 def drifting() -> list[dict[str, Any]]:

@@ -1,6 +1,7 @@
 """Batches kept for calibrations to come: bit for bit what they were, bounded, whole whenever the power fails."""
 
 import threading
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import fields, replace
 from pathlib import Path
@@ -39,6 +40,13 @@ EMPTY = ((0.0, None),)
 
 def driven(duration_s: float) -> Motion:
     return Decoder(MAP).decode(bus_drive(duration_s, seed=1))
+
+
+def weighed(keeper: BatchKeeper, motion: Motion) -> Iterator[Estimate]:
+    """As a service does whose batches the keeper keeps."""
+    flow = Flow(SETTINGS, MAP.traits, None, "cross_spectrum", Identity("van-17"))
+    flow.on_batch = keeper.keep
+    return flow.feed(motion)
 
 
 def kept_of(motion: Motion, settings: BatchSettings = SETTINGS) -> list[KeptBatch]:
@@ -229,9 +237,7 @@ def test_a_full_disk_loses_batches_is_told_once_and_forgotten_when_there_is_room
     keeper = BatchKeeper(shelf, MAP)
     keeper.start()
     motion = driven(105.0)
-    flow = Flow(SETTINGS, MAP.traits, None, "cross_spectrum", Identity("van-17"))
-    flow.on_batch = keeper.keep
-    estimates = flow.feed(motion)
+    estimates = weighed(keeper, motion)
     for _ in range(2):
         next(estimates)
         keeper.flush()
@@ -247,9 +253,7 @@ def test_a_full_disk_loses_batches_is_told_once_and_forgotten_when_there_is_room
 
 def test_the_pipeline_never_waits_for_the_keeper(tmp_path: Path) -> None:
     keeper = BatchKeeper(Shelf(tmp_path, ShelfLimits()), MAP)  # not started: a disk that hangs
-    flow = Flow(SETTINGS, MAP.traits, None, "cross_spectrum", Identity("van-17"))
-    flow.on_batch = keeper.keep
-    assert len(list(flow.feed(driven(20.0 * (MOST_WAITING + 2) + 5.0)))) == MOST_WAITING + 2
+    assert len(list(weighed(keeper, driven(20.0 * (MOST_WAITING + 2) + 5.0)))) == MOST_WAITING + 2
     assert keeper.n_lost == 2
     assert keeper.fault is not None
 
@@ -266,9 +270,7 @@ def test_a_batch_that_nobody_can_read_ends_no_keeping(tmp_path: Path) -> None:
     keeper = BatchKeeper(Shelf(tmp_path, ShelfLimits()), MAP)
     keeper.listener = Deaf()
     keeper.start()
-    flow = Flow(SETTINGS, MAP.traits, None, "cross_spectrum", Identity("van-17"))
-    flow.on_batch = keeper.keep
-    for _ in flow.feed(driven(65.0)):
+    for _ in weighed(keeper, driven(65.0)):
         keeper.flush()
     assert len(keeper.shelf.entries()) == 3
     assert "cannot read this one" in str(keeper.fault)
@@ -290,9 +292,7 @@ def test_a_disk_that_hangs_holds_the_stop_no_longer_than_it_may_and_what_is_lost
 
     keeper.listener = Hanging()
     keeper.start()
-    flow = Flow(SETTINGS, MAP.traits, None, "cross_spectrum", Identity("van-17"))
-    flow.on_batch = keeper.keep
-    estimates = flow.feed(driven(20.0 * 4 + 5.0))
+    estimates = weighed(keeper, driven(20.0 * 4 + 5.0))
     next(estimates)
     assert hangs.wait(PATIENCE_S)
     assert len(list(estimates)) == 3

@@ -11,12 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from support.commands import called, printed
 from support.kept import kept_file
 
 from gateway.bus.logs import motion_of_log
 from gateway.bus.signals import load_signal_map
-from gateway.cli import springscale
 from gateway.errors import ConfigurationError, LogUnreadableError, SpringscaleError
 from gateway.offline.phone import import_recording, imported, read_recording
 from gateway.offline.phone.imported import Imported
@@ -312,13 +311,12 @@ def test_the_command_writes_a_log_with_its_map_and_look_takes_it(tmp_path: Path)
     path = exported()
     log = tmp_path / "out" / "drive.log"
     log.parent.mkdir()
-    result = CliRunner().invoke(springscale, ["import", str(path), str(log), "--json"], catch_exceptions=False)
-    told = json.loads(result.stdout)
+    told = json.loads(printed("import", path, log, "--json"))
     assert [Path(each).name for each in told["written"]] == ["drive.log", "phone.toml", "phone.dbc"]
     assert told["accelerometer_hz"] == pytest.approx(100.1, abs=0.1)
-    seen = json.loads(CliRunner().invoke(springscale, ["look", str(log), "--json"]).stdout)
+    seen = json.loads(printed("look", log, "--json"))
     assert "springscale:phone" in [fit["name"] for fit in seen["maps"] if fit["fits"]]
-    text = CliRunner().invoke(springscale, ["import", str(path), str(tmp_path / "out" / "second.log.gz")])
+    text = called("import", path, tmp_path / "out" / "second.log.gz")
     assert text.exit_code == 0
     assert "points ahead" in text.stdout
 

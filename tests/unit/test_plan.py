@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from scipy.linalg import block_diag
 from support.calibrated import calibration_file
+from support.commands import called, printed
 from support.half_car_road import VAN, batch_over_road
 from support.known_runs import split_run
 
@@ -34,7 +34,6 @@ from gateway.calibration.plan.plan import (
     usual_drive,
 )
 from gateway.calibration.plan.words import best_next, plan_sentences, widths_sentence
-from gateway.cli import springscale
 from gateway.core.cross_spectrum.predicted import Drive
 from gateway.core.vehicle import Carries
 from gateway.core.weights.on_the_road import weights_of
@@ -170,11 +169,8 @@ def test_runs_without_a_usable_batch_leave_the_usual_drive() -> None:
 def test_the_command_plans_from_a_vehicle_alone(tmp_path: Path) -> None:
     draft = tmp_path / "campaign.toml"
     draft.write_text(DRAFT, encoding="utf-8")
-    told = CliRunner().invoke(springscale, ["calibrate", str(draft), "--plan"], catch_exceptions=False)
-    assert told.exit_code == 0
-    assert "1. the empty vehicle" in told.stdout
-    numbers = CliRunner().invoke(springscale, ["calibrate", str(draft), "--plan", "--json"], catch_exceptions=False)
-    assert json.loads(numbers.stdout)["plan"]["n_driven"] == 0
+    assert "1. the empty vehicle" in printed("calibrate", draft, "--plan")
+    assert json.loads(printed("calibrate", draft, "--plan", "--json"))["plan"]["n_driven"] == 0
 
 
 @pytest.mark.parametrize(
@@ -190,7 +186,7 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_is_read(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("campaign.toml").write_text(DRAFT, encoding="utf-8")
-    done = CliRunner().invoke(springscale, ["calibrate", "campaign.toml", *options])
+    done = called("calibrate", "campaign.toml", *options)
     assert done.exit_code == 2
     assert said in done.output
 
@@ -200,13 +196,13 @@ def test_a_plan_asks_what_the_vehicle_may_carry(tmp_path: Path) -> None:
     draft = tmp_path / "campaign.toml"
     draft.write_text(re.sub("payload_range_kg.*\n", "", DRAFT), encoding="utf-8")
     with pytest.raises(CampaignError, match=r"payload_range_kg: not stated.* write what the vehicle may carry"):
-        CliRunner().invoke(springscale, ["calibrate", str(draft), "--plan"], catch_exceptions=False)
+        printed("calibrate", draft, "--plan")
 
 
 def test_neither_a_file_nor_a_plan_asked_for_is_a_usage_error(tmp_path: Path) -> None:
     draft = tmp_path / "campaign.toml"
     draft.write_text(DRAFT, encoding="utf-8")
-    told = CliRunner().invoke(springscale, ["calibrate", str(draft)])
+    told = called("calibrate", draft)
     assert told.exit_code == 2
     assert "--output" in told.stderr
 

@@ -5,12 +5,12 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from support.calibrated import calibration_file
+from support.commands import called
 from support.configured import service_config
 from support.signing import Signer
 
-from gateway.cli import springscale
 from gateway.config import load_settings
 from gateway.errors import CalibrationFileError, ConfigurationError, SignalMapError, UntrustedFileError
 from gateway.files.signed import PublicKey, Trust, load_public_keys, signature_path
@@ -157,7 +157,7 @@ def deciding(folder: Path) -> tuple[Path, ...]:
 
 
 def checked(config: Path, *options: str) -> Result:
-    return CliRunner().invoke(springscale, ["check-config", str(config), *options])
+    return called("check-config", config, *options)
 
 
 def test_check_config_says_who_signed(config: Path) -> None:

@@ -137,26 +137,19 @@ def test_numbers_go_on_after_a_restart(tmp_path: Path) -> None:
     second.close()
 
 
-def test_what_is_old_goes_and_is_counted(tmp_path: Path) -> None:
-    clock = [1_790_000_000 * NS_PER_S]
-    store = Store.open(tmp_path, Retention(max_age_s=60.0), clock_ns=lambda: clock[0])
-    write(store, make_record(0), make_record(1))
-    clock[0] += 61 * NS_PER_S
-    write(store, make_record(2))
-    assert store.close() == 0
-    assert store.health().n_pruned == 2
-    assert store.reader().estimates().items == texts(make_record(2))
-
-
-def test_what_came_before_the_clock_was_set_is_not_taken_for_old(tmp_path: Path) -> None:
-    clock = [7 * NS_PER_S]  # a box without a clock battery wakes up in 1970
+@pytest.mark.parametrize(
+    ("first_s", "n_pruned"),
+    [(1_790_000_000 - 61, 2), (7, 0)],  # a box without a clock battery wakes up in 1970: that is not old
+)
+def test_what_is_old_goes_and_is_counted(tmp_path: Path, first_s: int, n_pruned: int) -> None:
+    clock = [first_s * NS_PER_S]
     store = Store.open(tmp_path, Retention(max_age_s=60.0), clock_ns=lambda: clock[0])
     write(store, make_record(0), make_record(1))
     clock[0] = 1_790_000_000 * NS_PER_S
     write(store, make_record(2))
     assert store.close() == 0
-    assert store.health().n_pruned == 0
-    assert store.reader().estimates().items == texts(make_record(0), make_record(1), make_record(2))
+    assert store.health().n_pruned == n_pruned
+    assert store.reader().estimates().items == texts(*map(make_record, range(n_pruned, 3)))
 
 
 def test_the_oldest_go_when_the_size_is_reached(tmp_path: Path) -> None:

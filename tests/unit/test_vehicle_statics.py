@@ -6,13 +6,13 @@ import tomllib
 from dataclasses import replace
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
+from support.commands import called
 
 from gateway.calibration.axle_weights import UNSPRUNG_SHARE, AxleWeights, Sprung, sprung_of
-from gateway.cli import springscale
 from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct, left_share_pct, payload_position_m
 from gateway.core.weights.on_the_road import unsprung_kg
 from gateway.errors import CampaignError
@@ -84,7 +84,7 @@ unsprung_shares = st.floats(0.03, 0.1)
 
 
 def run(*arguments: str) -> Result:
-    return CliRunner().invoke(springscale, ["calibration", "sprung", *arguments])
+    return called("calibration", "sprung", *arguments)
 
 
 @given(mass_kg=masses_kg, share=shares, front=unsprung_shares, rear=unsprung_shares)

@@ -9,18 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from support.archive import write_manifest
 from support.calibrated import calibration_text
+from support.commands import called
 from support.configured import service_config
 from support.estimates import make_estimate, posterior_of
 from support.web import Client, Gateway
 
 from gateway.archive.manifest import load_manifest
-from gateway.cli import springscale
 from gateway.config import load_settings
 from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct
 from gateway.core.weights.limits import Light, Limits, nearness, over_limit_probability, rooms_of
@@ -160,16 +159,16 @@ def test_a_vehicle_that_nobody_can_ask_tells_its_overload(tmp_path: Path) -> Non
 
 def test_check_config_says_which_limits_stand(tmp_path: Path) -> None:
     path = configured(tmp_path, "gross_limit_kg = 1850.0")
-    said = CliRunner().invoke(springscale, ["check-config", str(path), "--json"])
+    said = called("check-config", path, "--json")
     assert json.loads(said.output)["limits"] == {"gross_limit_kg": 1850.0, "rear_axle_limit_kg": 1100.0}
-    words = CliRunner().invoke(springscale, ["check-config", str(path)]).output
+    words = called("check-config", path).output
     assert "It may weigh: gross_limit_kg 1850 kg, rear_axle_limit_kg 1100 kg." in words
 
 
 def test_no_limit_is_told_too(tmp_path: Path) -> None:
     path = configured(tmp_path)
     (tmp_path / "vehicle.json").write_text(calibration_text(gross_limit_kg=None))
-    assert "No limit is known" in CliRunner().invoke(springscale, ["check-config", str(path)]).output
+    assert "No limit is known" in called("check-config", path).output
 
 
 def test_an_archive_is_judged_by_its_manifests_limits(tmp_path: Path) -> None:
