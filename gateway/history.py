@@ -65,15 +65,13 @@ class JournalRecord:
 
 @dataclass(frozen=True, slots=True)
 class HistoryPage:
-    """A page of the history: JSON texts in order, with the cursor of each and the number of the one before it.
+    """A page of the history: JSON texts in order.
 
     ``next_cursor`` requests the next page; None if there are no more records now. ``last_cursor`` is the cursor of the
     newest record of this page, from which to follow new records; None if there is no record at all.
     """
 
     items: tuple[str, ...]
-    cursors: tuple[str, ...]
-    previous: tuple[int, ...]
     next_cursor: str | None
     last_cursor: str | None
 

@@ -98,13 +98,10 @@ class StoreReader:
                 newest[row.id] = row
         rows = sorted(newest.values(), key=lambda row: row.seq, reverse=newest_first)
         has_more, shown = len(rows) > limit, rows[:limit]
-        cursors = tuple(f"{epoch}-{row.seq}" for row in shown)
         return HistoryPage(
             items=tuple(row.text if with_spectra or not row.boot_ns else without_spectra(row.text) for row in shown),
-            cursors=cursors,
-            previous=tuple(row.previous for row in shown),
-            next_cursor=cursors[-1] if has_more else None,
-            last_cursor=cursors[0 if newest_first else -1] if shown else cursor,
+            next_cursor=f"{epoch}-{shown[-1].seq}" if has_more else None,
+            last_cursor=f"{epoch}-{max(row.seq for row in shown)}" if shown else cursor,
         )
 
     def estimates(self, **question: Unpack[PageQuery]) -> HistoryPage:

@@ -103,7 +103,7 @@ def test_a_bad_record_is_set_aside_counted_told_and_no_loss_of_retention(
     with closing(Store.open(tmp_path)) as store:
         reader = store.reader()
         assert set(reader.estimates().items) == set(TEXTS) - {TEXTS[4]}
-        assert store.write_delivery("fleet", reader.estimates().cursors[0])
+        assert store.write_delivery("fleet", reader.estimates(limit=1).last_cursor)
         assert wait_until(lambda: store.health().n_bad_records == 1)
         assert store.flush(PATIENCE_S)
         assert reader.delivery("fleet").n_pruned == 0

@@ -65,7 +65,7 @@ def test_what_nobody_wants_is_passed_over_on_disk_so_that_age_may_remove_it(stor
     assert store.flush(PATIENCE_S)
     kept = store.reader().delivery(NAME)
     assert kept.n_waiting == 0
-    assert kept.cursor == store.reader().entries(limit=1).cursors[0]
+    assert kept.cursor == store.reader().entries(limit=1).last_cursor
     tell(store, "estimate", "alarm-1", "estimate")
     assert box.look().n_waiting == 1
     assert drained(box) == ["alarm-1-1"]

@@ -10,6 +10,7 @@ import pytest
 from support.estimates import make_record
 from support.patience import PATIENCE_S
 
+from gateway.history import BATCHES
 from gateway.store import Retention, Store
 from gateway.uplink.outbox import Outbox
 
@@ -99,9 +100,11 @@ def test_estimates_are_linked_past_the_entries_between(tmp_path):
         write(store, entry(1))
         second = store.write_estimate(make_record(1))
         assert store.flush(PATIENCE_S)
-        page = store.reader().estimates()
-        assert page.cursors == (first, second)
-        assert page.previous[1] == int(first.partition("-")[2])
+        follower = store.follow(BATCHES, None, lambda: None)
+        one, other = follower.read(9)
+        follower.close()
+        assert (one.cursor, other.cursor) == (first, second)
+        assert other.previous == one.number
 
 
 def test_entries_outlive_a_restart_and_numbers_go_on(tmp_path):

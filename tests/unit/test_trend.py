@@ -220,7 +220,7 @@ def test_what_no_version_wrote_ends_no_following(
 
     def ask(**question: object) -> HistoryPage:
         asked.append(question)
-        return HistoryPage(("[]",), ("a-1",), (None,), None, "a-1")
+        return HistoryPage(("[]",), None, "a-1")
 
     keeper = TrendService(tmp_path, Subject(CALIBRATED, "cross_spectrum", "van-17"), ask, lambda: [])
     keeper.start()

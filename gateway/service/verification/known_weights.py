@@ -8,14 +8,13 @@ import math
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from gateway.calibration.known_weight import WeightRefusal, load_of
 from gateway.calibration.known_weights_file import FILE_NAME, KnownWeight, KnownWeights
 from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.fusion import WeighedLoad
 from gateway.core.known_weights import KnownWeightKind
 from gateway.errors import RefusedError
 from gateway.estimate_json import posterior_to_json
@@ -32,8 +31,7 @@ from gateway.stated.facts import Confirmation, Ending, StatedWeight
 ALL_KINDS: Final = tuple(KnownWeightKind)
 
 
-@dataclass(frozen=True, slots=True)
-class _Load:
+class _Load(NamedTuple):
     """One load: its measured posterior and its batches."""
 
     posterior: Posterior
@@ -41,15 +39,6 @@ class _Load:
     t_end_ns: int
     n_batches: int
     batch_ids: tuple[str, ...]
-
-    @classmethod
-    def of_weighed(cls, weighed: WeighedLoad) -> "_Load":
-        epoch = weighed.epoch
-        return cls(epoch.posterior, epoch.t_start_ns, weighed.t_end_ns, epoch.n_batches, weighed.batch_ids)
-
-    @classmethod
-    def of_epoch(cls, epoch: WeighedEpoch) -> "_Load":
-        return cls(epoch.posterior, epoch.t_start_ns, epoch.t_end_ns, epoch.n_batches, epoch.batch_ids)
 
 
 class KnownWeightService:
@@ -258,14 +247,15 @@ class KnownWeightService:
                 f"it was weighed {age_s:.0f} s ago, and this needs less than {self._stale_after_s:.0f} s: "
                 "drive, empty, until the next batch has counted",
             )
-        return _Load.of_weighed(weighed)
+        epoch = weighed.epoch
+        return _Load(epoch.posterior, epoch.t_start_ns, weighed.t_end_ns, epoch.n_batches, weighed.batch_ids)
 
     def _at(self, stated: StatedWeight, calibrated: CalibratedVehicle) -> _Load:
         """The stored load at the stated time. Raises RefusedError."""
         at_ns = ns_of(stated.at)
         epoch = epoch_at(epochs_around(self._ask, at_ns), at_ns, stated.drive)
         epoch.require(calibrated.id, self._subject.estimator)
-        return _Load.of_epoch(epoch)
+        return _Load(epoch.posterior, epoch.t_start_ns, epoch.t_end_ns, epoch.n_batches, epoch.batch_ids)
 
     def _estimated(self, load: _Load) -> Posterior:
         """The estimate of the load by the calibration and the known weights in use."""
