@@ -149,7 +149,7 @@ class UplinkStatus:
     broker: Annotated[str, Field(examples=["fleet.example:8883"])]
     is_connected: bool = False
     n_delivered: Annotated[int, Field(description="acknowledged by the broker")] = 0
-    n_refused: Annotated[int, Field(description="given up: the broker will never take them")] = 0
+    n_refused: Annotated[int, Field(description="given up: the broker will never accept them")] = 0
     n_waiting: Annotated[int, Field(description="stored but not yet delivered; as of a few seconds ago")] = 0
     waiting_age_s: Annotated[
         float | None, Field(description="of the oldest of them, since its receipt; null: none waits")
@@ -178,7 +178,7 @@ class WebhookStatus:
     receiver: Annotated[str, Field(examples=["https://fleet.example:443"])]
     n_delivered: Annotated[int, Field(description="answered with 2xx")] = 0
     n_failed: Annotated[int, Field(description="attempts that were not")] = 0
-    n_dead: Annotated[int, Field(description="letters given up: found wrong, or refused for too long")] = 0
+    n_dead: Annotated[int, Field(description="messages given up: refused for good, or for too long")] = 0
     dead: Annotated[tuple[DeadLetter, ...], Field(description="the last of them, the newest at the end")] = ()
     n_waiting: Annotated[int, Field(description="still to be delivered; as of a few seconds ago")] = 0
     waiting_age_s: Annotated[
@@ -221,7 +221,7 @@ class VerificationStatus:
     n_records: Annotated[int, Field(description="kept in all, those of earlier calibrations among them")] = 0
     last_at: Annotated[str | None, Field(description="of the present calibration; null: never")] = None
     last_verdict: Annotated[str | None, Field(examples=["passed", "failed"])] = None
-    due_at: Annotated[str | None, Field(description="null: never asked for, [verification] every_days = 0")] = None
+    due_at: Annotated[str | None, Field(description="null: not required, [verification] every_days = 0")] = None
     is_due: bool = False
 
 
@@ -231,7 +231,7 @@ class AlarmsStatus:
 
     standing: Annotated[dict[str, str], Field(description="by name: early or final")] = field(default_factory=dict)
     n_unacknowledged: Annotated[int, Field(description="active ones, and ended ones that nobody acknowledged")] = 0
-    n_told: Annotated[int, Field(description="early and final words since the start")] = 0
+    n_told: Annotated[int, Field(description="alarms sent since the start, provisional and final")] = 0
     watched: Annotated[tuple[str, ...], Field(description="names of all that are not switched off")] = ()
 
 

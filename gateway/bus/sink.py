@@ -20,7 +20,7 @@ from gateway.records import Frames
 from gateway.units import NS_PER_S
 
 SEND_TIMEOUT_S: Final = 5.0  # chosen: for a full transmit queue, or an in-process receiver that is busy
-LONGEST_SLEEP_S: Final = 0.1  # chosen: how soon a stop is heeded
+LONGEST_SLEEP_S: Final = 0.1  # chosen: how soon a stop takes effect
 PIECE_FRAMES: Final = 512  # chosen: between two reports of progress at full speed
 
 Speed = float | Literal["max"]

@@ -132,7 +132,7 @@ def summary_in_words(summary: Summary, output: str) -> str:
     lines = [
         f"{counted(summary.n_vehicles, 'vehicle')}, {counted(summary.n_logs, 'log')}, {size(summary.size)}: "
         f"{counted(summary.n_jobs, 'job')}",
-        f"done now: {counts['done']}, {batches} batches, of which {weighed} weighed; done before: {counts['already']}",
+        f"done now: {counts['done']}, {batches} batches, {weighed} of them weighed; done before: {counts['already']}",
         f"took {duration(summary.took_s)}; the data set is in {output}",
     ]
     if counts["failed_before"]:

@@ -70,7 +70,7 @@ def what_is_silent(status: Status) -> str:
     if status.state is State.READER_FAULT:
         return status.bus.last_fault or "the bus cannot be read"
     silent = [signal.signal for signal in status.signals if signal.is_silent and signal.signal in NEEDED_SENSORS]
-    return " and ".join(silent) or "nobody knows which"
+    return " and ".join(silent) or "an unknown sensor"
 
 
 def drift_says(trends: Sequence[Trend]) -> Iterator[Says]:

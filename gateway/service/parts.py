@@ -58,7 +58,7 @@ def webhook_of(wanted: WebhookSettings | None, store: Store, *, with_places: boo
 
 
 def store_of(wanted: StoreSection, *receivers: UplinkSettings | WebhookSettings | None) -> Store:
-    """The store, which keeps for each receiver what is still to be delivered."""
+    """The store; it keeps the records that a receiver has not received yet."""
     keep = Retention(
         max_age_s=wanted.max_age_days * S_PER_DAY,
         max_bytes=round(wanted.max_size_mb * BYTES_PER_MB),

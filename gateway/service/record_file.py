@@ -52,6 +52,6 @@ class RecordFile(Generic[R]):
         self.fault = None
 
     def set_aside(self, fault: str, aside: str) -> None:
-        """Report an invalid file; ``aside`` says what became of it."""
+        """Report an invalid file; ``aside`` says where it is now."""
         self.fault = f"{self.path} is invalid, its history starts empty (it {aside})"
         log_event(Event.HISTORY_SET_ASIDE, level=logging.ERROR, file=str(self.path), fault=fault, set_aside=aside)

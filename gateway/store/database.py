@@ -25,7 +25,7 @@ FILE_NAME: Final = "springscale.db"
 LOCK_NAME: Final = "springscale.lock"
 _DAMAGED: Final = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
 MOST_SET_ASIDE: Final = 3  # chosen: damaged databases that are kept, the newest
-MOST_BAD_RECORDS: Final = 1000  # chosen: likewise records
+MOST_BAD_RECORDS: Final = 1000  # chosen: bad records that are kept, the newest
 
 
 @dataclass(frozen=True, slots=True)

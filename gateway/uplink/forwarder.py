@@ -93,7 +93,7 @@ class Forwarder(ThreadPart, Generic[Report]):
         """Wait before the next attempt, or until stopped, and keep counting the waiting records."""
         end_s = time.monotonic() + pause_s
         while not self._stopping.is_set():
-            with suppress(StoreError, TimeoutError, OSError):  # told where messages are asked for
+            with suppress(StoreError, TimeoutError, OSError):  # next_messages reports them
                 self._look()
             left_s = end_s - time.monotonic()
             if left_s <= 0.0:

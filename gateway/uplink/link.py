@@ -40,7 +40,7 @@ class BrokerAnswer:
 
 _TOO_LARGE: Final = 0x95  # MQTT 5, table 2-6
 _HOPELESS: Final = frozenset({_TOO_LARGE, 0x99})  # and payload format invalid
-_NOBODY: Final = 0x10  # likewise; no matching subscribers: taken, and forgotten at once
+_NOBODY: Final = 0x10  # likewise; no matching subscribers: accepted and discarded
 _NOTHING: Final = 0  # no packet has this number
 
 # mosquitto answers a message over its limit with 0x95, which MQTT 5 has not among those of PUBACK, and so neither paho

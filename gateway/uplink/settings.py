@@ -17,7 +17,7 @@ MOST_NAME_BYTES: Final = 65_535  # MQTT 5, 1.5.4: the length has two bytes
 
 
 class UplinkSettings(UplinkSection):
-    """A broker and how to reach it: the section for this vehicle, with what it left to be chosen.
+    """A broker and how to reach it: the section with its open choices made for this vehicle.
 
     ``topic`` is the branch of this vehicle: estimates go to ``topic/estimates``, presence is retained at
     ``topic/status``.
@@ -92,7 +92,7 @@ def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSe
     names = {"topic": f"{topic}/estimates", "client_id": settings.client_id, "username": settings.username}
     for name, text in names.items():
         _check_name(name, text)
-    settings.tls_context()  # a wrong file is told at the start
+    settings.tls_context()  # a wrong file is reported at the start
     settings.password()
     require_own_id("[uplink] host", vehicle, "two of them would cut each other's link")
     return settings
@@ -186,7 +186,7 @@ def webhook_settings(section: WebhookSection, vehicle: VehicleSection) -> Webhoo
         back_off_max_s=section.back_off_max_s,
         give_up_s=3600.0 * section.give_up_h,
     )
-    settings.tls_context()  # a wrong file is told at the start
+    settings.tls_context()  # a wrong file is reported at the start
     settings.secrets()
     require_own_id("[webhook] url", vehicle, "a receiver could not tell them apart")
     return settings

@@ -16,7 +16,7 @@ from gateway.uplink.settings import UplinkSettings
 
 IDLE_S: Final = 5.0  # chosen: a turn with nothing to do; a new record ends it
 TURN_S: Final = 0.5  # chosen: likewise while an answer is awaited
-ANSWER_TIMEOUT_S: Final = 30.0  # chosen: a broker that takes longer is as good as gone
+ANSWER_TIMEOUT_S: Final = 30.0  # chosen: a broker that takes longer counts as lost
 
 
 class Uplink(Forwarder[UplinkStatus]):

@@ -55,11 +55,13 @@ class WeightFigure(BaseModel):
 
     kg: float | None = Field(examples=[1894.2])
     std_kg: float | None = Field(examples=[6.1])
-    limit_kg: float | None = Field(description="null: nobody said", examples=[2100.0])
+    limit_kg: float | None = Field(description="null: no limit is known", examples=[2100.0])
     is_over_limit: bool = Field(examples=[False])
     lacks: Lack | None = Field(description="facts that are missing for it; null: it is known", examples=[None])
     is_unsprung_estimated: bool = Field(
-        False, description="whether calibration found the unsprung mass in it: nobody stated one", examples=[False]
+        False,
+        description="whether its unsprung mass was found by calibration: none was stated",
+        examples=[False],
     )
 
 

@@ -22,7 +22,7 @@ from gateway.records import F64, I64, Frames
 MAP: Final = f"{SHIPPED_PREFIX}reference"
 MODULUS: Final = 256  # of the counters, which have eight bits in the database
 QUEUE: Final = 500  # chosen: bursts: ten seconds of two sensors
-READ_S: Final = 0.5  # chosen: longest wait for a sensor: how soon a stop is heeded
+READ_S: Final = 0.5  # chosen: longest wait for a sensor: how soon a stop takes effect
 HEAP_S: Final = 0.04  # chosen: length of a burst: a fifth of the work; the counter restores the samples' times
 RETRY_S: Final = 2.0  # chosen: pause after a fault of the bus or of gpsd
 HOLE: Final = 2.5  # chosen: periods without a sample after which samples count as lost, not late

@@ -20,7 +20,7 @@ from gateway.part import STOP_WITHIN_S, ServicePart
 
 LOOK_S: Final = 2.0  # chosen: every periodic message of a vehicle comes within that
 EVERY_S: Final = 60.0  # chosen: from one survey to the next
-POLL_S: Final = 0.1  # chosen: how soon a stop is heeded
+POLL_S: Final = 0.1  # chosen: how soon a stop takes effect
 
 
 class BusSurvey(ServicePart):

@@ -86,7 +86,7 @@ class SocketCanReceiver:
             except OSError as fault:
                 if not datagrams:
                     raise
-                self._fault = fault  # the kernel tells it once
+                self._fault = fault  # the kernel reports it once
                 break
             datagrams.append(datagram)
             stamp = b""

@@ -24,7 +24,7 @@ from gateway.bus.signals import IdFilter, SignalMap
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ThreadPart
 
-POLL_S: Final = 0.3  # chosen: longest wait inside a receiver: how soon a stop is heeded
+POLL_S: Final = 0.3  # chosen: longest wait inside a receiver: how soon a stop takes effect
 ASLEEP_POLL_S: Final = 1.0  # chosen: likewise while the bus is silent; a frame ends the wait at once
 FIRST_PAUSE_S: Final = 0.25  # chosen: before a channel that failed is opened again; doubles up to the longest
 LONGEST_PAUSE_S: Final = 5.0  # chosen: how late a channel that came back is noticed

@@ -170,7 +170,7 @@ def _in_order_of_time(sources: Sequence[Iterator[Frames]], width: int) -> Iterat
         return
     waiting = [(source, frames) for source in sources if (frames := _next_frames(source)) is not None]
     while waiting:
-        known_ns = min(int(frames.t_ns.max()) for _, frames in waiting)  # nobody has anything to add up to here
+        known_ns = min(int(frames.t_ns.max()) for _, frames in waiting)  # no source has an earlier frame left
         parts, still_waiting = [], []
         for source, frames in waiting:
             is_known = frames.t_ns <= known_ns

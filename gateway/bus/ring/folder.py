@@ -1,4 +1,4 @@
-"""The directory of the ring log: segments, of which the oldest are removed when a new block needs room."""
+"""The directory of the ring log: segments; the oldest are removed when a new block needs room."""
 
 import errno
 import os

@@ -172,7 +172,7 @@ class RingLog(ThreadPart):
 
 FILE_BLOCK_S: Final = 10.0  # chosen: a killed recording loses as much
 FILE_BLOCK_FRAMES: Final = 65_536  # chosen: likewise of a busy bus
-DRAIN_S: Final = 0.2  # chosen: how soon a stop is heeded
+DRAIN_S: Final = 0.2  # chosen: how soon a stop takes effect
 
 OnFrames = Callable[[int], None]
 

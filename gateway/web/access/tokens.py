@@ -156,7 +156,7 @@ class TokenFile:
     def are_required(self) -> bool:
         """Whether requests need a token; fast enough for every request, since it reads the file only after a change.
 
-        A file without tokens requires none. If the file disappears while tokens are in use, one is still required.
+        A file without tokens requires none. If the file disappears while tokens are in use, a token is still required.
         """
         stamp = self._files.stamp(self._path.name)
         if self._asked_at is not None and stamp == self._asked_at[0]:
@@ -203,7 +203,7 @@ class TokenFile:
         return token if is_valid else None
 
     def _known(self) -> dict[str, Token]:
-        """The tokens by id, read again whenever the file has changed. With an unreadable file nobody is let in."""
+        """The tokens by id, read again whenever the file has changed. An unreadable file accepts no token."""
         stamp = self._files.stamp(self._path.name)
         if stamp != self._read[0]:
             try:

@@ -131,7 +131,7 @@ class Fanout:
                 subscription.end()
 
 
-GRACE_S: Final = 0.2  # chosen: for the last words of a stream that ends
+GRACE_S: Final = 0.2  # chosen: for the last events of a stream that ends
 RETRY_MS: Final = 3000  # chosen: pause of a browser before it connects again
 _PAGE: Final = 5  # chosen: records in memory for each client
 
