@@ -111,9 +111,9 @@ def test_slopes_and_squares_by_hand() -> None:
         Shift("day", np.array([-11.0, 0.1]), np.array([-10.0, -0.2]), np.array([100.0, 0.0])),
     ]
     row = row_of("day", shifts)
-    assert (row.payload_slope, row.payload_z2) == pytest.approx((1.0, (0.81 + 1.21) / 2.0))
-    assert (row.payload_stated_kg, row.payload_found_kg) == pytest.approx((10.0, np.sqrt(101.0)))
-    assert (row.front_share_slope, row.front_share_z2) == (None, None)
+    assert (row["payload_slope"], row["payload_z2"]) == pytest.approx((1.0, (0.81 + 1.21) / 2.0))
+    assert (row["payload_stated_kg"], row["payload_found_kg"]) == pytest.approx((10.0, np.sqrt(101.0)))
+    assert (row["front_share_slope"], row["front_share_z2"]) == (None, None)
 
 
 def weighing(i: int, error: float, *, half_width: float = 2.0) -> Weighing:
@@ -155,7 +155,7 @@ def test_the_page_says_what_is_right_and_what_is_not() -> None:
     found = {
         "seed": 1,
         "n_vans": 3,
-        "alone": [{name: getattr(one, name) for name in type(one).__slots__} for one in (good, steep)],
+        "alone": [good, steep],
         "together": rows_of_weighings([weighing(i, 1.0) for i in range(5)]),
     }
     page = budget_page(json.loads(json.dumps(found, allow_nan=False)))

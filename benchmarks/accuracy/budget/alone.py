@@ -6,7 +6,7 @@ observed shifts over the stated variance.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final, TypeGuard
 
 import numpy as np
@@ -66,42 +66,29 @@ class Shift:
     variance: Pair
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One source over all batches; None for a quantity that it does not affect."""
-
-    source: str
-    n: int
-    payload_slope: float | None
-    payload_z2: float | None
-    payload_stated_kg: float
-    payload_found_kg: float
-    front_share_slope: float | None
-    front_share_z2: float | None
-    front_share_stated_pct: float
-    front_share_found_pct: float
-
-
 def rows_of_shifts(shifts: Sequence[Shift]) -> list[dict[str, Any]]:
     """A row for each source."""
     sources = dict.fromkeys(shift.source for shift in shifts)
-    return [asdict(row_of(source, [one for one in shifts if one.source == source])) for source in sources]
+    return [row_of(source, [one for one in shifts if one.source == source]) for source in sources]
 
 
-def row_of(source: str, shifts: Sequence[Shift]) -> Row:
-    """Slopes through the origin, mean squares, and root mean squares of both."""
+def row_of(source: str, shifts: Sequence[Shift]) -> dict[str, Any]:
+    """Slopes through the origin, mean squares, and root mean squares of both, over all batches.
+
+    Slope and mean square are None for a quantity that the source does not affect.
+    """
     found, predicted, variance = (np.array([getattr(one, name) for one in shifts]) for name in _OF_SHIFT)
-    slopes, z2 = [], []
-    for i in (PAYLOAD, FRONT_SHARE):
+    row: dict[str, Any] = {"source": source, "n": len(shifts)}
+    for i, name, unit in ((PAYLOAD, "payload", "kg"), (FRONT_SHARE, "front_share", "pct")):
         is_moved = bool(np.any(variance[:, i] > 0.0))
         across = float(predicted[:, i] @ predicted[:, i])
-        slopes.append(float(found[:, i] @ predicted[:, i]) / across if is_moved and across > 0.0 else None)
-        z2.append(float(np.mean(found[:, i] ** 2 / variance[:, i])) if is_moved else None)
-    stated, seen = np.sqrt(np.mean(variance, axis=0)), np.sqrt(np.mean(found**2, axis=0))
-    return Row(
-        source, len(shifts), slopes[0], z2[0], float(stated[0]), float(seen[0]), slopes[1], z2[1], float(stated[1]),
-        float(seen[1]),
-    )  # fmt: skip
+        row |= {
+            f"{name}_slope": float(found[:, i] @ predicted[:, i]) / across if is_moved and across > 0.0 else None,
+            f"{name}_z2": float(np.mean(found[:, i] ** 2 / variance[:, i])) if is_moved else None,
+            f"{name}_stated_{unit}": float(np.sqrt(np.mean(variance[:, i]))),
+            f"{name}_found_{unit}": float(np.sqrt(np.mean(found[:, i] ** 2))),
+        }
+    return row
 
 
 _OF_SHIFT: Final = ("found", "predicted", "variance")

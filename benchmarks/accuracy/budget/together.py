@@ -67,19 +67,6 @@ class Weighing:
     watched: dict[str, float]  # figures with a limit for refusal, over that limit
 
 
-@dataclass(frozen=True, slots=True)
-class Figures:
-    """One quantity over many batches; None if too few were answered."""
-
-    n: int
-    mean_abs: float | None
-    z2: float | None
-    half_width: float | None
-    interval_score: float | None
-    coverage: dict[str, Any] | None
-    coverage_by_van: dict[str, Any] | None
-
-
 def rows_of_weighings(weighings: Sequence[Weighing]) -> list[dict[str, Any]]:
     """A row for each of the four cases."""
     rows = []
@@ -93,29 +80,26 @@ def rows_of_weighings(weighings: Sequence[Weighing]) -> list[dict[str, Any]]:
                 "n_batches": len(some),
                 "n_rejected": sum(bool(one.rejected) for one in some),
                 "rejected_by_reason": {why: reasons.count(why) for why in sorted({*reasons})},
-                **{name: asdict(figures_of(name, some)) for name in QUANTITIES},
+                **{name: figures_of(name, some) for name in QUANTITIES},
                 "refusals": refusals_of(some),
             }
         )
     return rows
 
 
-def figures_of(quantity: str, weighings: Iterable[Weighing]) -> Figures:
-    """The figures over answered batches."""
+def figures_of(quantity: str, weighings: Iterable[Weighing]) -> dict[str, Any]:
+    """The figures of one quantity over answered batches; None if too few were answered."""
     answered = [one for one in weighings if quantity in one.judged]
-    if not answered:
-        return Figures(0, None, None, None, None, None, None)
-    error, half_width, score, z2 = np.array([one.judged[quantity] for one in answered]).T
-    held = [one.judged[quantity][2] <= 2.0 * one.judged[quantity][1] * (1.0 + 1e-9) for one in answered]
-    by_run, by_van = ([one.run for one in answered], [one.van for one in answered])
-    return Figures(
-        len(answered),
-        float(np.mean(np.abs(error))),
-        float(np.mean(z2)),
-        float(np.mean(half_width)),
-        float(np.mean(score)),
-        *(asdict(coverage_of(held, each)) if len({*each}) > 1 else None for each in (by_run, by_van)),
-    )
+    judged = np.array([one.judged[quantity] for one in answered]).reshape(-1, 4).T
+    error, half_width, score, z2 = judged
+    means = {"mean_abs": np.abs(error), "z2": z2, "half_width": half_width, "interval_score": score}
+    held = (score <= 2.0 * half_width * (1.0 + 1e-9)).tolist()
+    clusters = {"coverage": [one.run for one in answered], "coverage_by_van": [one.van for one in answered]}
+    return {
+        "n": len(answered),
+        **{name: float(np.mean(each)) if answered else None for name, each in means.items()},
+        **{name: asdict(coverage_of(held, of)) if len({*of}) > 1 else None for name, of in clusters.items()},
+    }
 
 
 def refusals_of(weighings: Sequence[Weighing]) -> dict[str, Any]:
