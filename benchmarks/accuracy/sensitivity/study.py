@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Final
 
@@ -31,35 +31,7 @@ MISLABELLED_SHARE: Final = 1.0 / 3.0  # chosen: of the rated payload, the error 
 AS_IT_IS: Final = "as it is"
 
 
-@dataclass(frozen=True, slots=True)
-class Inspected:
-    """One van: right drives and labels and how many were doubted, wrong ones and how many were found."""
-
-    n_right: int = 0
-    n_doubted: int = 0
-    n_wrong: int = 0
-    n_named: int = 0
-
-    def __add__(self, other: "Inspected") -> "Inspected":
-        return Inspected(*(a + b for a, b in zip(_counts(self), _counts(other), strict=True)))
-
-
-def _counts(one: Inspected) -> tuple[int, int, int, int]:
-    return one.n_right, one.n_doubted, one.n_wrong, one.n_named
-
-
-@dataclass(frozen=True, slots=True)
-class Weighing:
-    """One setting over all vans. ``smallest_change_kg`` is the median over pairs of batches, ``n_false`` of the
-    ``n_unchanged`` pairs showed a change, ``n_seen`` of the ``n_changed`` pairs with a larger true change did.
-    """
-
-    line: dict[str, Any]
-    smallest_change_kg: float | None
-    n_unchanged: int
-    n_false: int
-    n_changed: int
-    n_seen: int
+Inspected = dict[str, int]  # right drives and labels and how many were doubted, wrong ones and how many were named
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,33 +83,38 @@ def _weigh(name: str, calibrated: CalibratedVehicle, tests: Sequence[KnownRun], 
         found.batches.extend(judged_batches(judged, calibrated.vehicle, name, ESTIMATOR, run))
 
 
-def _weighing(line: dict[str, Any], pairs: Sequence[Pair]) -> Weighing:
+def _weighing(line: dict[str, Any], pairs: Sequence[Pair]) -> dict[str, Any]:
+    """One setting over all vans. ``smallest_change_kg`` is the median over pairs of batches, ``n_false`` of the
+    ``n_unchanged`` pairs showed a change, ``n_seen`` of the ``n_changed`` pairs with a larger true change did.
+    """
     unchanged = [pair for pair in pairs if pair.is_one_load]
     changed = [pair for pair in pairs if abs(pair.change_kg) > pair.smallest_kg]
-    return Weighing(
-        line=line,
-        smallest_change_kg=float(np.median([pair.smallest_kg for pair in pairs])) if pairs else None,
-        n_unchanged=len(unchanged),
-        n_false=sum(pair.is_noticed for pair in unchanged),
-        n_changed=len(changed),
-        n_seen=sum(pair.is_noticed for pair in changed),
-    )
+    return {
+        "line": line,
+        "smallest_change_kg": float(np.median([pair.smallest_kg for pair in pairs])) if pairs else None,
+        "n_unchanged": len(unchanged),
+        "n_false": sum(pair.is_noticed for pair in unchanged),
+        "n_changed": len(changed),
+        "n_seen": sum(pair.is_noticed for pair in changed),
+    }
 
 
 def _inspected(fresh: FreshVan) -> Inspected:
     """Right labels and a wrong one; right axes and a pitch rate with the wrong sign."""
     doubted = {number for number, _ in compare_loads(fresh.runs, fresh.vehicle)}
-    found = Inspected(n_right=len(fresh.runs), n_doubted=len(doubted))
     laden = max(fresh.runs, key=lambda run: run.payload_kg)
     wrong_kg = laden.payload_kg - MISLABELLED_SHARE * fresh.vehicle.payload_range_kg[1]
     mislabelled = [replace(run, payload_kg=wrong_kg) if run is laden else run for run in fresh.runs]
     named = {number for number, _ in compare_loads(mislabelled, fresh.vehicle)}
-    found += Inspected(n_wrong=1, n_named=int(laden.number in named))
-    for known in known_spectra(fresh.runs, fresh.vehicle):
-        both_ways = known.spectra, known.spectra.with_pitch_reversed()
-        upright, turned = (_kinds_of_axes(spectra, known.run, fresh) for spectra in both_ways)
-        found += Inspected(1, int(bool(upright)), 1, int(Kind.PITCH_RATE_SIGN in turned))
-    return found
+    known_runs = known_spectra(fresh.runs, fresh.vehicle)
+    upright = [_kinds_of_axes(known.spectra, known.run, fresh) for known in known_runs]
+    turned = [_kinds_of_axes(known.spectra.with_pitch_reversed(), known.run, fresh) for known in known_runs]
+    return {
+        "n_right": len(fresh.runs) + len(known_runs),
+        "n_doubted": len(doubted) + sum(map(bool, upright)),
+        "n_wrong": 1 + len(known_runs),
+        "n_named": (laden.number in named) + sum(Kind.PITCH_RATE_SIGN in kinds for kinds in turned),
+    }
 
 
 def _kinds_of_axes(spectra: CrossSpectra, run: KnownRun, fresh: FreshVan) -> set[StrEnum]:
@@ -150,13 +127,16 @@ def numbers(seed: int, n: int, vans: Sequence[OfVan], constants: Sequence[Consta
     table = coverage_table([batch for van in vans for batch in van.batches], seed)
     lines = {line["kind"]: line for line in table["lines"]}
     pairs = {name: [pair for van in vans for pair in van.pairs[name]] for name in vans[0].pairs}
-    inspected = {name: sum((van.inspected[name] for van in vans), Inspected()) for name in vans[0].inspected}
+    inspected = {
+        name: {key: sum(van.inspected[name][key] for van in vans) for key in of_van}
+        for name, of_van in vans[0].inspected.items()
+    }
     return {
         "seed": seed,
         "n_vans": n,
         "constants": {one.name: [float(x) for x in np.ravel(one.current)] for one in constants},
-        "weighing": {name: asdict(_weighing(lines[name], of_setting)) for name, of_setting in pairs.items()},
-        "inspection": {name: asdict(counted) for name, counted in inspected.items()},
+        "weighing": {name: _weighing(lines[name], of_setting) for name, of_setting in pairs.items()},
+        "inspection": inspected,
     }
 
 
