@@ -86,7 +86,7 @@ def advice(campaign: Path, output: Path | None, window_s: float | None) -> None:
     """Does driving the loads that --plan advises help? Uses CAMPAIGN's own runs as the next ones."""
     runs, vehicle = _read(campaign, window_s)
     with counted("calibrating and judging") as on_fit:
-        found = on_advice.advice_of(runs, vehicle, name=vehicle.name, on_fit=on_fit).to_json()
+        found = on_advice.advice_of(runs, vehicle, name=vehicle.name, on_fit=on_fit)
     _hand_out("advice", found, on_advice.advice_page(found), output)
 
 

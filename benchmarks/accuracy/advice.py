@@ -7,7 +7,7 @@ part of all runs.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -59,45 +59,13 @@ class Choice:
     after: Mapping[int, Errors]
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """Means over all choices, payload and front share.
-
-    ``others`` is the mean of the runs not advised, the expectation without advice; ``best`` and ``worst`` are known in
-    hindsight, by the sum of both errors. better_share (0..1): how often the advised run was better than the mean of the
-    others.
-    """
-
-    n_choices: int
-    expected: Errors
-    before: Errors
-    advised: Errors
-    others: Errors
-    least: Errors
-    best: Errors
-    worst: Errors
-    better_share: tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class AdviceStudy:
-    """``with_misses`` counts a rejected batch as a mid-range answer; ``answered`` leaves it out, which favours a
-    calibration that refuses many.
-    """
-
-    campaign: str
-    with_misses: Comparison
-    answered: Comparison
-
-    def to_json(self) -> dict[str, Any]:
-        """The figures for a file or a report; null without an answer."""
-        return {"campaign": self.campaign, "with_misses": _plain(self.with_misses), "answered": _plain(self.answered)}
-
-
 def advice_of(
     split: Sequence[SplitRun], vehicle: Vehicle, *, name: str, on_fit: OnFit = lambda done, of: None
-) -> AdviceStudy:
-    """Errors with and without the advice, over runs without a fault.
+) -> dict[str, Any]:
+    """Errors with and without the advice, over runs without a fault: ``compared`` twice.
+
+    ``with_misses`` counts a rejected batch as a mid-range answer; ``answered`` leaves it out, which favours a
+    calibration that refuses many.
 
     Raises CalibrationImpossibleError if there is no such triple with runs to choose from.
     """
@@ -110,7 +78,7 @@ def advice_of(
     tried = _Tried(split, vehicle, on_fit, _n_calibrations(triples, [run.number for run in runs]))
     choices = [tried.choice(triple) for triple in triples]
     with_misses, answered = (compared([choice[which] for choice in choices]) for which in (0, 1))
-    return AdviceStudy(name, with_misses, answered)
+    return {"campaign": name, "with_misses": with_misses, "answered": answered}
 
 
 def _n_calibrations(triples: Sequence[tuple[int, ...]], numbers: Sequence[int]) -> int:
@@ -199,35 +167,29 @@ def _or_nan(x: float | None) -> float:
     return float("nan") if x is None else x
 
 
-def compared(choices: Sequence[Choice]) -> Comparison:
-    """The means over all choices. Raises ValueError without any choice."""
+def compared(choices: Sequence[Choice]) -> dict[str, Any]:
+    """Means over all choices, of payload and front share; None without an answer. Raises ValueError without any choice.
+
+    ``others`` is the mean of the runs not advised, the expectation without advice; ``best`` and ``worst`` are known in
+    hindsight, by the sum of both errors. better_share (0..1): how often the advised run was better than the mean of the
+    others.
+    """
     if not choices:
         raise ValueError("nothing to compare: no runs could follow")
     advised = _rows([choice.after[choice.advised] for choice in choices])
-    others = _rows([_mean_of_others(choice) for choice in choices])
+    others = _rows([_mean([errors for n, errors in choice.after.items() if n != choice.advised]) for choice in choices])
     by_hindsight = [sorted(choice.after.values(), key=_both) for choice in choices]
-    return Comparison(
-        n_choices=len(choices),
-        expected=_mean([choice.expected for choice in choices]),
-        before=_mean([choice.before for choice in choices]),
-        advised=_mean(advised),
-        others=_mean(others),
-        least=_mean([choice.after[choice.least] for choice in choices]),
-        best=_mean([ordered[0] for ordered in by_hindsight]),
-        worst=_mean([ordered[-1] for ordered in by_hindsight]),
-        better_share=_mean(_rows(advised) < _rows(others)),
-    )
-
-
-def _plain(comparison: Comparison) -> dict[str, Any]:
-    return {
-        name: found if isinstance(found, int) else [x if np.isfinite(x) else None for x in found]
-        for name, found in asdict(comparison).items()
+    errors_of: dict[str, Any] = {
+        "expected": [choice.expected for choice in choices],
+        "before": [choice.before for choice in choices],
+        "advised": advised,
+        "others": others,
+        "least": [choice.after[choice.least] for choice in choices],
+        "best": [ordered[0] for ordered in by_hindsight],
+        "worst": [ordered[-1] for ordered in by_hindsight],
+        "better_share": advised < others,
     }
-
-
-def _mean_of_others(choice: Choice) -> Errors:
-    return _mean([errors for number, errors in choice.after.items() if number != choice.advised])
+    return {"n_choices": len(choices), **{name: _mean(errors) for name, errors in errors_of.items()}}
 
 
 def _both(errors: Errors) -> float:
@@ -239,18 +201,16 @@ def _rows(errors: Any) -> np.ndarray:
     return np.asarray(errors, dtype=float).reshape(-1, 2)
 
 
-def _mean(errors: Any) -> Errors:
-    """Mean of each column over answered batches; NaN without any."""
-    payload, share = (_mean_known(column[np.isfinite(column)]) for column in _rows(errors).T)
+def _mean(errors: Any) -> tuple[float | None, float | None]:
+    """Mean of each column over answered batches; None without any."""
+    payload, share = (
+        float(np.mean(known)) if (known := column[np.isfinite(column)]).size else None for column in _rows(errors).T
+    )
     return payload, share
 
 
-def _mean_known(column: np.ndarray) -> float:
-    return float(np.mean(column)) if column.size else float("nan")
-
-
 def advice_page(found: Mapping[str, Any]) -> str:
-    """The page in Markdown, from AdviceStudy.to_json."""
+    """The page in Markdown, from the numbers of ``advice_of``."""
     missed, answered = found["with_misses"], found["answered"]
     return page(
         "Does the plan's advice help?",

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from benchmarks.accuracy import __main__ as command
 from benchmarks.accuracy import siblings
 from benchmarks.accuracy import study as study_module
-from benchmarks.accuracy.advice import AdviceStudy, Choice, compared
+from benchmarks.accuracy.advice import Choice, compared
 from benchmarks.accuracy.coverage_table import JudgedBatch
 from benchmarks.accuracy.lines import draw_line, drawn_van
 from benchmarks.accuracy.siblings import Way
@@ -47,7 +47,11 @@ def run(*arguments: str) -> str:
 
 
 def test_the_advice_is_told_and_written(campaign: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(command.on_advice, "advice_of", lambda *_, **__: AdviceStudy("van", COMPARISON, COMPARISON))
+    monkeypatch.setattr(
+        command.on_advice,
+        "advice_of",
+        lambda *_, **__: {"campaign": "van", "with_misses": COMPARISON, "answered": COMPARISON},
+    )
     assert "| 8.00 | 6.00 |" in run("advice", campaign, "--output", str(tmp_path / "out"))
     page = (tmp_path / "out/advice.md").read_text(encoding="utf-8")
     assert "| and the fourth that the plan advises | 2.00 | 3.00 | 2.00 | 3.00 |" in page
