@@ -5,7 +5,7 @@ to 0.4 m off the centre line. Every van is calibrated and judged twice on the sa
 and without.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
 from typing import Any, Final
@@ -61,11 +61,6 @@ def of_one_van(seed: int, number: int, scope: Scope = USUAL) -> Found:
             judged = judge([run], calibrated, estimator)
             batches += judged_batches(judged, vehicle, trip.kind, estimator, run, has_roll_rate=has_roll_rate)
     return batches, refused
-
-
-def numbers(seed: int, n: int, vans: Sequence[Found]) -> dict[str, Any]:
-    """All batches in one table. ``refused`` lists impossible calibrations."""
-    return pooled(vans, seed)
 
 
 def _name(line: Mapping[str, Any]) -> str:
@@ -155,7 +150,7 @@ STUDY: Final = Study(
     does="Do 95 % intervals contain the truth? Simulated vans, each calibrated and then driven elsewhere; ~40 s a van.",
     doing="calibrating and driving vans",
     of_case=of_one_van,
-    numbers=numbers,
+    numbers=pooled,
     page=coverage_page,
     seed=SEED,
     n=12,

@@ -82,7 +82,7 @@ def coverage_table(batches: Sequence[JudgedBatch], seed: int, refused: Sequence[
     }
 
 
-def pooled(vans: Sequence[tuple[Sequence[JudgedBatch], Sequence[str]]], seed: int) -> dict[str, Any]:
+def pooled(seed: int, n: int, vans: Sequence[tuple[list[JudgedBatch], list[str]]]) -> dict[str, Any]:
     """The table of all vans' batches, with the reasons of impossible calibrations."""
     batches = [batch for of_van, _ in vans for batch in of_van]
     return coverage_table(batches, seed, [reason for _, of_van in vans for reason in of_van])

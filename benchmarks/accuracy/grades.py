@@ -7,7 +7,7 @@ calibrated and a mixed one carry loads within the calibrated range, near the cen
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -44,35 +44,25 @@ def _sampled(rate_hz: float) -> Callable[[Sensors], Sensors]:
     return lambda sensors: replace(sensors, imu=replace(sensors.imu, rate_hz=rate_hz, corner_hz=corner_hz))
 
 
-@dataclass(frozen=True, slots=True)
-class Grade:
-    """One sensor: its name, and its difference from the reference unit."""
-
-    name: str
-    sensors_of: Callable[[Sensors], Sensors] = lambda mounted: mounted
-
-
-AS_SIMULATED: Final = Grade("reference unit")
-GRADES: Final[Mapping[str, Grade]] = MappingProxyType(
+AS_SIMULATED: Final = "reference unit"
+GRADES: Final[Mapping[str, Callable[[Sensors], Sensors]]] = MappingProxyType(
     {
-        one.name: one
-        for one in (
-            AS_SIMULATED,
-            *(Grade(f"accelerometer's noise x {by:g}", noisier(accel=by)) for by in TIMES),
-            *(Grade(f"gyro's noise x {by:g}", noisier(gyro=by)) for by in TIMES),
-            *(Grade(f"both x {by:g}", noisier(by, by)) for by in TIMES),
-            Grade("resolutions of CANmod.gps", _as_coarse_as_canmod),
-            Grade("50 samples a second", _sampled(50.0)),
-            Grade("one fix a second", lambda sensors: replace(sensors, gps=replace(sensors.gps, rate_hz=1.0))),
-        )
+        AS_SIMULATED: lambda mounted: mounted,
+        **{f"accelerometer's noise x {by:g}": noisier(accel=by) for by in TIMES},
+        **{f"gyro's noise x {by:g}": noisier(gyro=by) for by in TIMES},
+        **{f"both x {by:g}": noisier(by, by) for by in TIMES},
+        "resolutions of CANmod.gps": _as_coarse_as_canmod,
+        "50 samples a second": _sampled(50.0),
+        "one fix a second": lambda sensors: replace(sensors, gps=replace(sensors.gps, rate_hz=1.0)),
     }
 )
+"""Sensors by name, each by its difference from the reference unit."""
 
 
 def numbers(seed: int, n: int, vans: Sequence[Found]) -> dict[str, Any]:
     """The table, and each sensor's noise and resolution. ``refused`` lists impossible calibrations."""
-    sensors = [{"name": name, **_facts(grade.sensors_of(REFERENCE))} for name, grade in GRADES.items()]
-    return {"grades": sensors, **pooled(vans, seed)}
+    sensors = [{"name": name, **_facts(sensors_of(REFERENCE))} for name, sensors_of in GRADES.items()]
+    return {"grades": sensors, **pooled(seed, n, vans)}
 
 
 def _facts(sensors: Sensors) -> dict[str, float]:
@@ -91,8 +81,8 @@ def of_one_van(seed: int, number: int, scope: Scope = USUAL) -> Found:
     """One van calibrated, driven and judged with every sensor."""
     batches: list[JudgedBatch] = []
     refused: list[str] = []
-    for name, grade in GRADES.items():
-        fresh = fresh_van(scope, seed, number, grade.sensors_of)
+    for name, sensors_of in GRADES.items():
+        fresh = fresh_van(scope, seed, number, sensors_of)
         van = fresh.van
         try:
             calibrated = calibrated_on(fresh.runs, fresh.vehicle, ESTIMATOR)
@@ -170,7 +160,7 @@ def limits(found: Mapping[str, Any]) -> str:
 
 def verdict_of(found: Mapping[str, Any], name: str) -> str:
     """Whether this sensor is as good as the reference unit, works, or does not, by the page's criteria."""
-    line, reference = _line(found, name), _line(found, AS_SIMULATED.name)
+    line, reference = _line(found, name), _line(found, AS_SIMULATED)
     if line is None or reference is None or line["n_vans"] < reference["n_vans"]:
         return FAILS
     errors, widths = (
@@ -212,7 +202,7 @@ def _noisiest(found: Mapping[str, Any], verdicts: tuple[str, ...], sensor: str) 
 
 def _of(found: Mapping[str, Any]) -> Mapping[str, Any]:
     """The facts of the reference unit."""
-    reference: Mapping[str, Any] = next(one for one in found["grades"] if one["name"] == AS_SIMULATED.name)
+    reference: Mapping[str, Any] = next(one for one in found["grades"] if one["name"] == AS_SIMULATED)
     return reference
 
 

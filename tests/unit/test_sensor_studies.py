@@ -109,7 +109,7 @@ def found(**changed: Any) -> dict[str, Any]:
         for name in GRADES
         for i in range(10)
     ]
-    sensors = [{"name": name, **_facts(grade.sensors_of(REFERENCE))} for name, grade in GRADES.items()]
+    sensors = [{"name": name, **_facts(sensors_of(REFERENCE))} for name, sensors_of in GRADES.items()]
     return {"grades": sensors, **coverage_table(batches, 1)}
 
 
@@ -119,15 +119,15 @@ def _word(name: str) -> str:
 
 
 def test_a_noisier_sensor_differs_in_its_noise_alone() -> None:
-    both = GRADES["both x 5"].sensors_of(REFERENCE)
+    both = GRADES["both x 5"](REFERENCE)
     assert both.imu.accel.noise_density == pytest.approx(5.0 * REFERENCE.imu.accel.noise_density)
     assert both.imu.gyro.noise_density == pytest.approx(5.0 * REFERENCE.imu.gyro.noise_density)
-    alone = GRADES["gyro's noise x 20"].sensors_of(REFERENCE)
+    alone = GRADES["gyro's noise x 20"](REFERENCE)
     assert alone.imu.accel == REFERENCE.imu.accel
     assert replace(alone, imu=REFERENCE.imu) == REFERENCE
-    coarse = GRADES["resolutions of CANmod.gps"].sensors_of(REFERENCE)
+    coarse = GRADES["resolutions of CANmod.gps"](REFERENCE)
     assert coarse.imu.accel.resolution == CANMOD.imu.accel.resolution
-    assert GRADES["50 samples a second"].sensors_of(REFERENCE).imu.corner_hz < 25.0
+    assert GRADES["50 samples a second"](REFERENCE).imu.corner_hz < 25.0
 
 
 def test_the_noisiest_lies_before_the_first_that_is_worse() -> None:
