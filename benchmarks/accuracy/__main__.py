@@ -29,7 +29,7 @@ from benchmarks.accuracy import (
 from benchmarks.accuracy import faults as on_faults
 from benchmarks.accuracy.budget import study as budget
 from benchmarks.accuracy.sensitivity import study as sensitivity
-from benchmarks.accuracy.sensor_bounds import limits, limits_table
+from benchmarks.accuracy.sensor_bounds import limits_table
 from benchmarks.accuracy.study import Study
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection.log import SplitRun
@@ -121,7 +121,7 @@ def bounds(duration_s: float, speed_kmh: float) -> None:
     """Cramer-Rao bounds of payload and front share for the paper's van on its road, by observation and prior
     knowledge.
     """
-    click.echo(limits_table(limits(Drive(duration_s, speed_kmh / 3.6))), nl=False)
+    click.echo(limits_table(Drive(duration_s, speed_kmh / 3.6)), nl=False)
 
 
 def _read(path: Path, window_s: float | None) -> tuple[Sequence[SplitRun], Vehicle]:

@@ -1,6 +1,6 @@
 """Cramer-Rao bounds of payload and front share for each kind of observation.
 
-    bound_of(Seen.BOTH, unknown, scene) -> Bound; ``limits`` are those of the paper's van on the paper's road
+    bound_of(Seen.BOTH, unknown, scene) -> Bound; ``limits_table`` has those of the paper's van on the paper's road
 
 On a road of displacement density s(f) the transforms X of the two sensors are complex Gaussian with
 
@@ -33,7 +33,7 @@ from gateway.core.spectrum import frequencies_hz
 from gateway.core.vehicle import Vehicle
 from gateway.records import C128, F64
 from gateway.units import STANDARD_GRAVITY_MPS2
-from gateway.workbench.campaigns import PAPER_PAYLOAD_KG, PAPER_ROUGHNESS_M3, PAPER_SPEED_MPS, PAPER_WHEELBASE_M
+from gateway.workbench.campaigns import PAPER_PAYLOAD_KG, PAPER_ROUGHNESS_M3, PAPER_WHEELBASE_M
 
 STEP: Final = 1e-5  # chosen: of a difference quotient
 PAYLOAD_STEP_KG: Final = 0.1  # chosen, likewise
@@ -219,55 +219,24 @@ MILD: Final[Mapping[str, float]] = MappingProxyType(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Limit:
-    """One row: the observation, whether the vehicle is known, the disturbance, and the bound."""
-
-    seen: Seen
-    is_vehicle_known: bool
-    disturbance: str
-    bound: Bound
-
-    @property
-    def payload_pct(self) -> float:
-        """In percent of the paper's range, 450 kg."""
-        return 100.0 * self.bound.payload_std_kg / PAPER_PAYLOAD_KG
-
-    @property
-    def front_share_pct(self) -> float:
-        """In percent of the paper's range, 20 points."""
-        return 100.0 * self.bound.front_share_std_pct / SHARE_RANGE_PCT
-
-
-def limits(drive: Drive | None = None) -> list[Limit]:
-    """Bounds at half the rated payload, 50 % in front; by default 300 s at 50 km/h."""
-    driven = drive or Drive(300.0, PAPER_SPEED_MPS)
+def limits_table(drive: Drive) -> str:
+    """Bounds at half the rated payload, 50 % in front, as a table in Markdown; percent are of the paper's ranges."""
     ground = Ground.of(PAPER_VAN)
     point = Point(prior_of(PAPER_VAN).mean, PAPER_PAYLOAD_KG / 2.0, 0.5)
     reading = Reading(PAPER_VAN.wheelbase_m, BAND_HZ, N_SEGMENT)
     scenes = {
-        f"{100.0 * MODEL_SLACK:g} % slack": Scene(point, ground, reading, driven, PAPER_ROUGHNESS_M3, MODEL_SLACK),
-        "sensor noise": Scene(point, ground, reading, driven, PAPER_ROUGHNESS_M3, 0.0, *SENSOR_NOISE),
+        f"{100.0 * MODEL_SLACK:g} % slack": Scene(point, ground, reading, drive, PAPER_ROUGHNESS_M3, MODEL_SLACK),
+        "sensor noise": Scene(point, ground, reading, drive, PAPER_ROUGHNESS_M3, 0.0, *SENSOR_NOISE),
     }
-    return [
-        Limit(seen, not unknown, name, bound_of(seen, unknown, scene))
+    rows = [
+        (seen, "mild priors" if unknown else "known", name, *_cells(bound_of(seen, unknown, scene)))
         for unknown in ({}, MILD)
         for seen in Seen
         for name, scene in scenes.items()
     ]
+    return "\n".join(table(("seen", "vehicle", "beside the road", "payload", "front share"), rows)) + "\n"
 
 
-def limits_table(found: list[Limit]) -> str:
-    """The table in Markdown."""
-    columns = ("seen", "vehicle", "beside the road", "payload", "front share")
-    rows = (
-        (
-            one.seen,
-            "known" if one.is_vehicle_known else "mild priors",
-            one.disturbance,
-            f"{one.bound.payload_std_kg:.2f} kg, {one.payload_pct:.2f} %",
-            f"{one.bound.front_share_std_pct:.3f} pp, {one.front_share_pct:.2f} %",
-        )
-        for one in found
-    )
-    return "\n".join(table(columns, rows)) + "\n"
+def _cells(bound: Bound) -> tuple[str, str]:
+    kg, pp = bound.payload_std_kg, bound.front_share_std_pct
+    return f"{kg:.2f} kg, {100.0 * kg / PAPER_PAYLOAD_KG:.2f} %", f"{pp:.3f} pp, {100.0 * pp / SHARE_RANGE_PCT:.2f} %"
