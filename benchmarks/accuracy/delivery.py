@@ -69,14 +69,10 @@ class Carried:
     told_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class Weighed:
-    """A counted batch, in percent of the rated payload: its error, half its 95 % interval, and its score."""
-
-    error_pct: float
-    half_width_pct: float
-    score_pct: float
-    is_held: bool
+Weighed = tuple[float, float, float, bool]
+"""A counted batch in percent of the rated payload: its error, half its 95 % interval, its score; and whether the
+interval contains the truth.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,23 +135,19 @@ def _weighed(estimate: Estimate, driven: DrivenDay) -> Weighed:
     low, high = estimate.payload.interval95
     percent = 100.0 / driven.rated_kg
     (score_kg,) = interval_scores(np.array([payload_kg]), np.array([low]), np.array([high])).tolist()
-    return Weighed(
-        percent * (estimate.payload.number - payload_kg),
-        percent * 0.5 * (high - low),
-        percent * score_kg,
-        low <= payload_kg <= high,
-    )
+    error_kg, is_held = estimate.payload.number - payload_kg, low <= payload_kg <= high
+    return percent * error_kg, percent * 0.5 * (high - low), percent * score_kg, is_held
 
 
 def _batches(weighed: Sequence[Weighed]) -> dict[str, Any]:
-    errors = np.array([one.error_pct for one in weighed])
+    error, half_width, score, is_held = np.array(weighed).T
     return {
         "n": len(weighed),
-        "mean_abs_pct": _rounded(float(np.mean(np.abs(errors)))),
-        "bias_pct": _rounded(float(np.mean(errors))),
-        "half_width_pct": _rounded(float(np.mean([one.half_width_pct for one in weighed]))),
-        "interval_score_pct": _rounded(float(np.mean([one.score_pct for one in weighed]))),
-        "n_held": sum(one.is_held for one in weighed),
+        "mean_abs_pct": _rounded(float(np.mean(np.abs(error)))),
+        "bias_pct": _rounded(float(np.mean(error))),
+        "half_width_pct": _rounded(float(np.mean(half_width))),
+        "interval_score_pct": _rounded(float(np.mean(score))),
+        "n_held": int(np.sum(is_held)),
     }
 
 

@@ -4,7 +4,7 @@ Vans, roads and seeds serve this study alone: no setting of the line's calibrati
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from typing import Any, Final
 
@@ -57,8 +57,8 @@ def of_one_line(seed: int, number: int) -> list[JudgedBatch]:
     found: list[JudgedBatch] = []
     for i, one in enumerate(sibling_seeds.spawn(VANS_PER_LINE)):
         van = sibling(drawn, f"{drawn.van.name}_{number}_{i}", one)
-        for way, judged in _ways(van, first, of_one, of_three):
-            found += judged(way)
+        for way, by, knowledge in _ways(van, first, of_one, of_three):
+            found += _judged(van, way, by, knowledge)
     return found
 
 
@@ -67,38 +67,30 @@ def _sibling(driven: Driven) -> Sibling:
     return Sibling(Sister(driven.vehicle.name, driven.vehicle, fit.calibration), driven.runs)
 
 
-def _ways(van: Driven, first: Sister, of_one: Line, of_three: Line) -> Iterator[tuple[Way, "_Judging"]]:
+def _ways(
+    van: Driven, first: Sister, of_one: Line, of_three: Line
+) -> Iterator[tuple[Way, CalibratedVehicle, Knowledge | None]]:
+    """The calibrations of a sibling, with the knowledge of a known weight if there is one."""
     steady = van.runs[:1]
     as_is = _calibrated(first.vehicle, CrossSpectrumFit(first.calibration, {}))
-    yield Way.AS_IS, _Judging(van, as_is)
-    yield Way.WEIGHED_EMPTY, _Judging(van, as_is, known_empty(as_is, steady, van.vehicle))
+    yield Way.AS_IS, as_is, None
+    yield Way.WEIGHED_EMPTY, as_is, known_empty(as_is, steady, van.vehicle)
     for way, runs, line in (
         (Way.ALONE, steady, None),
         (Way.LIKE_ONE, steady, of_one),
         (Way.LIKE_ONE_TWO_DRIVES, van.runs, of_one),
         (Way.LIKE_THREE, steady, of_three),
     ):
-        fit = fit_cross_spectrum(runs, van.vehicle, inherited=line)
-        yield way, _Judging(van, _calibrated(van.vehicle, fit))
+        yield way, _calibrated(van.vehicle, fit_cross_spectrum(runs, van.vehicle, inherited=line)), None
 
 
-@dataclass(frozen=True, slots=True)
-class _Judging:
-    """A sibling by one calibration, with the knowledge of a known weight if there is one."""
-
-    van: Driven
-    calibrated: CalibratedVehicle
-    knowledge: Knowledge | None = None
-
-    def __call__(self, way: Way) -> list[JudgedBatch]:
-        found = []
-        for trip, run in self.van.tests:
-            judged = [
-                replace(one, estimate=_known(one.estimate, self.knowledge))
-                for one in judge([run], self.calibrated, ESTIMATOR)
-            ]
-            found += judged_batches(judged, self.van.vehicle, trip.kind, way, run)
-        return found
+def _judged(van: Driven, way: Way, calibrated: CalibratedVehicle, knowledge: Knowledge | None) -> list[JudgedBatch]:
+    found = []
+    for trip, run in van.tests:
+        judged = judge([run], calibrated, ESTIMATOR)
+        known = [replace(one, estimate=_known(one.estimate, knowledge)) for one in judged]
+        found += judged_batches(known, van.vehicle, trip.kind, way, run)
+    return found
 
 
 def _calibrated(vehicle: Vehicle, fit: CrossSpectrumFit) -> CalibratedVehicle:
