@@ -4,8 +4,7 @@ import logging
 import queue
 import time
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from gateway.bus.signals import SignalMap
 from gateway.calibration.kept.batch_file import kept_batch_of
@@ -19,8 +18,7 @@ from gateway.service.commissioning.session import Commissioning
 MOST_WAITING: Final = 4  # chosen: batches in the queue; each has some megabytes of rows, one comes every few minutes
 
 
-@dataclass(frozen=True, slots=True)
-class _Handed:
+class _Handed(NamedTuple):
     batch_id: str
     batch: Batch
     rows: Motion

@@ -59,7 +59,7 @@ class Pipeline(ThreadPart):
         self.flow = flow
         self.watch = SignalWatch(decoder.signals)
         self.standing = StandingWatch(flow.settings.standstill_speed_mps)
-        self.n_estimates = self.n_rejected = self.n_provisional = self.n_remainders = 0
+        self.counts = dict.fromkeys(("n_estimates", "n_rejected", "n_provisional", "n_remainders"), 0)
         self.rejected_by_reason: Counter[str] = Counter()
         self.roll_rate_fault: str | None = None  # of the last batch, as people read it
         self.noise_fault: str | None = None  # likewise
@@ -143,7 +143,7 @@ class Pipeline(ThreadPart):
     @property
     def fault(self) -> str | None:
         """Faults of sensors that do not stop the weighing, for people."""
-        return "; ".join(fault for fault in (self.roll_rate_fault, self.noise_fault) if fault) or None
+        return "; ".join(filter(None, (self.roll_rate_fault, self.noise_fault))) or None
 
     def _count(self, found: Estimate) -> None:
         if math.isfinite(found.roll_usable_share) and not found.is_remainder:
@@ -151,14 +151,10 @@ class Pipeline(ThreadPart):
             self.roll_rate_fault = ROLL_RATE_LOST.format(found.roll_usable_share) if is_lost else None
         if not SENSOR_OF.keys().isdisjoint(found.diagnostics):
             self.noise_fault = noise_fault(found)
-        if found.is_provisional:
-            self.n_provisional += 1
-        elif found.is_remainder:
-            self.n_remainders += 1
-        elif found.counted:
-            self.n_estimates += 1
+        if found.is_provisional or found.is_remainder:
+            self.counts["n_provisional" if found.is_provisional else "n_remainders"] += 1
         else:
-            self.n_rejected += 1
+            self.counts["n_estimates" if found.counted else "n_rejected"] += 1
             self.rejected_by_reason.update(map(str, found.rejected))
 
 

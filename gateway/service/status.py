@@ -81,10 +81,7 @@ class StatusReport:
             own_readings=self._own_readings(),
             standing=self._standing(),
             batches=BatchCounts(
-                n_estimates=self.pipeline.n_estimates,
-                n_rejected=self.pipeline.n_rejected,
-                n_provisional=self.pipeline.n_provisional,
-                n_remainders=self.pipeline.n_remainders,
+                **self.pipeline.counts,
                 missing_s=round(self.pipeline.flow.missing_s, 1),
                 rejected_by_reason=dict(self.pipeline.rejected_by_reason),
             ),
