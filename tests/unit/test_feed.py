@@ -231,6 +231,24 @@ def test_mount_matrices_of_the_driver_are_applied_before_the_named_axes(tmp_path
     assert samples.accel_mps2[0] == pytest.approx(np.array([-200, -100, 300]) * ACCEL_SCALE)
 
 
+@pytest.mark.parametrize("text", ["1, 0; 0, 1", "a, b, c", "1, 0, 0; 0, 1, 0; 0, 0"])
+def test_a_mount_matrix_that_is_none_is_said_when_the_device_is_opened(text: str, tmp_path: Path) -> None:
+    fake = FakeIio(tmp_path)
+    (fake.device / "in_mount_matrix").write_text(text)
+    with pytest.raises(ConfigurationError, match=r"mount matrix is .* no 3 by 3 numbers"):
+        IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes).open()
+
+
+@pytest.mark.parametrize("host", ["x..y", "a" * 300])
+def test_a_host_that_no_name_service_can_know_is_a_fault_of_gpsd(host: str) -> None:
+    with pytest.raises(BusError, match="gpsd"):
+        Gpsd(host, 2947).read(0.1)
+
+
+def test_a_line_that_no_parser_takes_is_no_fix() -> None:
+    assert Gpsd("127.0.0.1", 2947)._fix(b"[" * 60_000) is None
+
+
 @pytest.mark.parametrize(
     ("kind", "word", "expected"),
     [

@@ -50,9 +50,9 @@ class Gpsd:
             if self._socket is None:
                 raise BusError(f"{self.name}: does not answer") from None
             return []
-        except OSError as fault:
+        except (OSError, UnicodeError) as fault:  # UnicodeError: a name that the domain name system cannot have
             self.close()
-            raise BusError(f"{self.name}: {fault.strerror or fault}") from None
+            raise BusError(f"{self.name}: {getattr(fault, 'strerror', None) or fault}") from None
         if not got or len(self._rest) > LONGEST_LINE:
             self.close()
             raise BusError(f"{self.name}: hung up" if not got else f"{self.name}: sends something that is not JSON")
@@ -69,7 +69,7 @@ class Gpsd:
         """None unless it is a fix: other reports, and lines that are not JSON."""
         try:
             report: Any = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             return None
         if not isinstance(report, dict):
             return None
@@ -88,5 +88,5 @@ class Gpsd:
         )
 
 
-def _number(told: Any, least: float, most: float) -> float | None:
-    return float(told) if isinstance(told, int | float) and least <= told <= most else None
+def _number(reported: Any, least: float, most: float) -> float | None:
+    return float(reported) if isinstance(reported, int | float) and least <= reported <= most else None

@@ -106,7 +106,10 @@ class IioDevice:
         return self._wanted_hz
 
     def open(self) -> None:
-        """Choose the channels, set the rate and start the buffer. Raises BusError if the kernel refuses."""
+        """Choose the channels, set the rate and start the buffer.
+
+        Raises BusError if the kernel refuses, ConfigurationError for a channel or a mount matrix that cannot be read.
+        """
         try:
             self._write("buffer/enable", "0")
             for each in sorted((self.folder / "scan_elements").glob("*_en")):
@@ -166,9 +169,14 @@ class IioDevice:
         return vehicle
 
     def _mount(self, kind: str) -> F64:
-        """The mount matrix (3, 3); the identity if the driver has none."""
+        """The mount matrix (3, 3); the identity if the driver has none. Raises ConfigurationError."""
         text = self._text(f"in_{kind}_mount_matrix") or self._text("in_mount_matrix") or "1,0,0;0,1,0;0,0,1"
-        return np.array([[float(x) for x in row.split(",")] for row in text.split(";")])
+        try:
+            return np.array([float(x) for row in text.split(";") for x in row.split(",")]).reshape(3, 3)
+        except ValueError:
+            raise ConfigurationError(
+                f"{self.folder}: its mount matrix is {text!r}, which is no 3 by 3 numbers"
+            ) from None
 
     def _laid_out(self) -> tuple[dict[str, _Element], int]:
         """Every enabled channel in the order of its index, and the bytes of a scan."""
