@@ -85,6 +85,7 @@ FAULTS = [
     (LEAST + "[batch]\nsilence_s = 300.0", "batch: silence_s must be below window_s"),
     (LEAST + "[batch]\nprovisional_every_s = 0.5", "batch: provisional_every_s must be 0 or at least 1"),
     (LEAST + "[web]\nport = 70000", "web.port: "),
+    (LEAST + '[web]\nhost = "x..y"', "web.host: 'x..y' is neither an address nor a name"),
     (LEAST + '[vehicle]\nvin = "TOO-SHORT"', "vehicle.vin: "),
     (LEAST + '[log]\nlevel = "loud"', "log.level: "),
     ('estimator = "guess"\n' + LEAST, "estimator: "),
