@@ -284,22 +284,18 @@ TABLE: Final = (
 )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class StatusCollector:
-    """Turns the present status into metrics at each request."""
+    """Turns the present status into metrics at each request. The registry tells collectors apart by identity."""
 
-    def __init__(self, board: Board, scales: Scales, status: Callable[[], Status], responses: Counter[int]) -> None:
-        self._board = board
-        self._scales = scales
-        self._status = status
-        self._responses = responses
-
-    def describe(self) -> Iterable[Metric]:
-        """Nothing in advance: the registry need not collect to register."""
-        return ()
+    board: Board
+    scales: Scales
+    status: Callable[[], Status]
+    responses: Mapping[int, int]
 
     def collect(self) -> Iterator[Metric]:
-        weights = weigh_latest(self._board, self._scales)
-        moment = Moment(self._status(), self._board.shown(), weights, self._board, self._responses)
+        weights = weigh_latest(self.board, self.scales)
+        moment = Moment(self.status(), self.board.shown(), weights, self.board, self.responses)
         for row in TABLE:
             samples = row.samples(moment)
             if samples is None:
