@@ -274,9 +274,9 @@ def test_squares_of_the_lines_add_up_to_the_variance(one: Posterior, said: bool,
     assert [line.payload_kg for line in lines] == sorted((line.payload_kg for line in lines), reverse=True)
 
 
-@given(budgets, st.booleans())
-def test_a_remedy_is_narrower_than_today(one: Posterior, said: bool) -> None:
-    for line in budget_of(one, is_shape_said=said):
+@given(budgets, st.booleans(), st.booleans())
+def test_a_remedy_is_narrower_than_today(one: Posterior, said: bool, weighed: bool) -> None:
+    for line in budget_of(one, is_shape_said=said, is_empty_weighed=weighed):
         if line.remedy is None:
             assert math.isnan(line.payload_with_remedy_kg)
         else:
