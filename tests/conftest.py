@@ -1,5 +1,6 @@
 """No test depends on the machine's speed; what continuous integration promised and left out fails the run."""
 
+import logging
 import os
 from collections.abc import Iterator
 
@@ -7,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from gateway.allocator import keep_freed_memory
+from gateway.log import LOGGER
 
 # The last lie beside the checkout
 PROMISED = ("chromium", "playwright", "mosquitto", "postgresql", "ssh-keygen", "a test machine", "recorded drives")
@@ -75,6 +77,17 @@ def _unhurried() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         unhurry(patch)
         yield
+
+
+@pytest.fixture(autouse=True)
+def _log_as_before() -> Iterator[None]:
+    """A command that sets up the log leaves no handler that writes to a stream closed since."""
+    root = logging.getLogger()
+    before = root.handlers[:], root.level, LOGGER.level
+    yield
+    root.handlers[:], level, ours = before
+    root.setLevel(level)
+    LOGGER.setLevel(ours)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -21,13 +21,6 @@ from gateway.web.access.serving import server_config
 BROKEN = ["", "{", "gone", "changed"]
 
 
-@pytest.fixture(autouse=True)
-def _log_level() -> Iterator[None]:
-    level = LOGGER.level
-    yield
-    LOGGER.setLevel(level)
-
-
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
     (tmp_path / "map.toml").write_text(_map(tmp_path))

@@ -2,7 +2,6 @@
 
 import json
 import logging
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,24 +12,12 @@ from gateway.log import LOGGER, Event, FloodGate, JsonFormatter, PlainFormatter,
 DEPLOYMENT = Path(__file__).parents[2] / "docs" / "deployment.md"
 
 
-@pytest.fixture
-def restored() -> Iterator[None]:
-    """The logging of the test run as it was."""
-    root = logging.getLogger()
-    before = root.handlers[:], root.level, LOGGER.level
-    yield
-    root.handlers[:], level, ours = before
-    root.setLevel(level)
-    LOGGER.setLevel(ours)
-
-
 def record_of(event: str, name: str = LOGGER.name, **fields: object) -> logging.LogRecord:
     return logging.makeLogRecord(
         {"name": name, "msg": event, "levelno": logging.INFO, "levelname": "INFO", "created": 0.5, "fields": fields}
     )
 
 
-@pytest.mark.usefixtures("restored")
 @pytest.mark.parametrize(
     ("level", "written"),
     [("debug", ["debug", "info", "warning"]), ("info", ["info", "warning"]), ("warning", ["warning"]), ("error", [])],
@@ -47,7 +34,6 @@ def test_the_level_holds_for_every_event_of_ours(
     assert all(line["event"] == "ready" and set(line) == {"t", "level", "event", "url"} for line in lines)
 
 
-@pytest.mark.usefixtures("restored")
 def test_others_come_through_from_warning_on_whatever_our_level(capsys: pytest.CaptureFixture[str]) -> None:
     set_up_log("error", under_journald=False)
     logging.getLogger("some.package").info("chatter")
@@ -90,7 +76,6 @@ def test_the_gate_is_for_our_events_alone() -> None:
     assert all(gate.filter(record_of("careful", "some.package")) for _ in range(5))
 
 
-@pytest.mark.usefixtures("restored")
 def test_a_reload_can_change_the_level(caplog: pytest.LogCaptureFixture) -> None:
     set_log_level("warning")
     log_event(Event.READY)

@@ -40,13 +40,6 @@ PLAIN = 'signals = "springscale:reference"\n'
 TLS = PLAIN + '[web]\ntls_certificate = "web.pem"\ntls_key = "web.key"\n'
 
 
-@pytest.fixture(autouse=True)
-def _log_level() -> Iterator[None]:
-    level = LOGGER.level
-    yield
-    LOGGER.setLevel(level)
-
-
 def settings_of(folder: Path, text: str) -> Settings:
     (folder / "springscale.toml").write_text(text)
     return load_settings(folder / "springscale.toml")
