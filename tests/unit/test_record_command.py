@@ -87,9 +87,12 @@ def test_what_cannot_be_recorded_is_told(tmp_path: Path, name: str, why: str) ->
     assert (tmp_path / "taken.log.gz").read_text() == "mine"
 
 
-def test_the_reason_of_the_source_is_given_where_nothing_came(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("failure", [RuntimeError, OSError])  # the thread dies; the source tries again
+def test_the_reason_of_the_source_is_given_where_nothing_came(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: type[Exception]
+) -> None:
     def no_bus() -> None:
-        raise RuntimeError("the adapter was unplugged")
+        raise failure("the adapter was unplugged")
 
     monkeypatch.setattr("gateway.bus.live.source.opener_of", lambda *_: no_bus)
     found = recorded(tmp_path / "drive.log.gz")

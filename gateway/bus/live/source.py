@@ -114,7 +114,7 @@ class LiveSource(ThreadPart):
 
     @property
     def reason(self) -> str | None:
-        """Why the bus is silent or the reader at fault, for people."""
+        """Why the bus is silent or the reader at fault, for people; after a stop, why it was until then."""
         return self._reason
 
     def start(self) -> None:
@@ -145,7 +145,7 @@ class LiveSource(ThreadPart):
             self.failure = failure
             self._enter(SourceState.READER_FAULT, f"the receive thread died: {failure!r}")
         else:
-            self._enter(SourceState.STOPPED, None)
+            self._enter(SourceState.STOPPED, self._reason)
         finally:
             self._has_tried.set()
             self.inbox.close()
