@@ -77,7 +77,7 @@ class VehicleFields:
     sensor_position_std_m: float = field(
         default=0.1,
         metadata=described(
-            "standard deviation of the sensor's position; the fit may move it accordingly", gt=0.0, le=10.0
+            "standard deviation of the sensor's position; the fit may move it accordingly", ge=1e-3, le=10.0
         ),
     )
     sensor_offset_left_m: MetresLeft | None = field(
@@ -89,7 +89,7 @@ class VehicleFields:
         metadata=described(
             f"standard deviation of that; absent: {MEASURED_OFFSET_STD_M:g} with an offset, by tape, "
             f"{UNKNOWN_OFFSET_STD_M:g} without one",
-            gt=0.0,
+            ge=1e-3,
             le=2.0,
         ),
     )

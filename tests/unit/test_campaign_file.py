@@ -94,6 +94,14 @@ def test_a_sensor_whose_place_to_the_side_is_not_stated_is_unsure(tmp_path: Path
     assert placed(sensor_offset_left_std_m="0.5") == (0.0, 0.5)
 
 
+@pytest.mark.parametrize("name", ["sensor_position_std_m", "sensor_offset_left_std_m"])
+def test_no_place_of_a_sensor_is_known_to_less_than_a_millimetre(tmp_path: Path, name: str) -> None:
+    """The square of 1e-320 is 0, and a fit cannot divide by it."""
+    fault = fault_of(tmp_path, campaign_text(vehicle={name: "1e-320"}))
+    assert f"vehicle.{name}" in fault
+    assert "0.001" in fault
+
+
 def test_what_is_carried_reaches_the_vehicle(tmp_path: Path) -> None:
     said = {"carries": '"long_goods"', "payload_height_m": "0.6", "tow_bar": "true"}
     vehicle = loaded(tmp_path, campaign_text(vehicle=said)).vehicle
