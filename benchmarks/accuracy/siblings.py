@@ -142,7 +142,7 @@ def siblings_page(found: Mapping[str, Any]) -> str:
         "friction 30 %, unsprung masses 3 %, mass, centre of gravity and inertia 1.5 % (standard deviations, each "
         "axle its own). Each has another sensor unit, mounted 2 cm and one degree beside where it should be. "
         "Sisters are calibrated with six known loads of ten minutes near 50 km/h. A sibling is driven empty near "
-        "50 km/h, and mixed: town, country, motorway. It is judged on loads that nobody told: mixed, mixed on "
+        "50 km/h, and mixed: town, country, motorway. It is judged on loads that nobody stated: mixed, mixed on "
         "another day (springs changed by 1.5 %, dampers and tyres by 5 %), and at another steady speed from 30 to "
         "110 km/h. All with a roll "
         "rate. What is inherited, and how: [a whole line of vehicles](line.md).",
@@ -157,7 +157,7 @@ def siblings_page(found: Mapping[str, Any]) -> str:
         "The line's own file knows nothing of the sibling, and its intervals nothing of that; knowing once that "
         "the vehicle is empty mends the "
         "zero alone. Alone, an empty drive leaves the springs' answer to load to a guess, so that the vehicle is "
-        "believed near its own speeds only. The sister tells the rest.",
+        "believed near its own speeds only. A sister shows the rest.",
         "",
     )
 
