@@ -221,8 +221,8 @@ def posterior_of(
     left_over += outward @ located.rival_covariance @ outward.T
     grown = np.array([*(1.0 + per_reach * reach for per_reach in calibration.model_per_reach), 1.0])
     unlike = math.hypot(unseen, wear_of(located.freed))
-    added = math.sqrt(unlike**2 - 1.0)
-    unlikes = np.array([unlike, unlike, math.hypot(1.0, UNSEEN_PLACE_PART * added)])
+    of_place = math.hypot(math.sqrt(1.0 - UNSEEN_PLACE_PART**2), UNSEEN_PLACE_PART * unlike)
+    unlikes = np.array([unlike, unlike, of_place])
     of_model = np.diag((np.array(calibration.model_std) * unlikes * grown)[: len(mean)])
     return Posterior(
         mean=mean,
