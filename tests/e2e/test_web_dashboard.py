@@ -347,6 +347,8 @@ def test_the_keyboard_reaches_everything_in_order(site: str, watched: Watched) -
     expect(page.locator("#recent tr")).to_have_count(4)
     for late in ("History as a table", "Spectra as a table", "Verify with a known load …"):
         expect(page.get_by_text(late)).to_be_visible()  # each is drawn when its numbers come
+    expect(page.locator("#link")).to_have_text("live")
+    watched.wait_until(f"{REACHABLE} === 12")  # the span's three buttons are one stop
     order = []
     for _ in range(10):
         page.keyboard.press("Tab")
@@ -357,6 +359,8 @@ def test_the_keyboard_reaches_everything_in_order(site: str, watched: Watched) -
     assert order[7:] == ["In the cab", "API", "Metrics"]
 
 
+REACHABLE = """[...document.querySelectorAll("a[href], button, select, input, summary, [tabindex='0']")]
+  .filter(e => e.checkVisibility() && !e.disabled).length"""
 FOCUSED = """(() => { const e = document.activeElement;
   const label = document.getElementById(e.getAttribute("aria-labelledby"))?.textContent;
   return e === document.body ? "BODY" : e.getAttribute("aria-label") ?? label ?? (e.value || e.textContent.trim());
