@@ -43,7 +43,7 @@ def config(tmp_path: Path) -> Path:
 
 
 def told(service: Running, path: str = "/api/v1/cab") -> Any:
-    """What a phone in the cab is told."""
+    """What the cab page shows on a phone."""
     answer = first_answer(service.gateway.url + path)
     return answer.text if path == "/metrics" else answer.json()
 

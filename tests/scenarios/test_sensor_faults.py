@@ -1,4 +1,4 @@
-"""Every way a sensor can fail, over the bus and through the gates: (fault, the reason a person is told)."""
+"""Every way a sensor can fail, over the bus and through the gates: (fault, the reason that a person reads)."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -48,7 +48,7 @@ def edgewise(samples: F64, is_faulty: Bool) -> F64:
     return np.where(is_faulty[:, None], samples[:, ::-1], samples)
 
 
-# what becomes of a recording, given which samples of IMU and GPS are faulty, and what a person is told
+# the fault of a recording, given which samples of IMU and GPS are faulty, and the reason that a person reads
 FAULTS: dict[str, tuple[Spoil, tuple[Why, ...]]] = {
     "accelerometer stuck": (lambda r, imu, _: {"accel_mps2": held(r.accel_mps2, imu)}, (Why.ACCELERATION_STUCK,)),
     "gyro stuck": (lambda r, imu, _: {"gyro_radps": held(r.gyro_radps, imu)}, (Why.PITCH_RATE_STUCK,)),
