@@ -84,7 +84,7 @@ class DoubtKind(StrEnum):
     DRIVEN_WEIGHT = ("driven_weight",
         "by the way it moves the vehicle weighs {front_kg:.0f} ± {front_95_kg:.0f} kg in front and {rear_kg:.0f} ± "
         "{rear_95_kg:.0f} kg at the rear (95 %), not {said_front_kg:.0f} and {said_rear_kg:.0f}",
-        "check whether something is aboard and read the axle weights again; then drive empty again. If both are "
+        "check that nothing is loaded and read the axle weights again; then drive empty again. If both are "
         "right, it is not of this line")
     DRIVEN_LINE = ("driven_line",
         "springs, dampers and tyres differ from those of its line by more than vehicles of one line do",

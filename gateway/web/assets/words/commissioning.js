@@ -157,7 +157,7 @@ export const COMMISSIONING_WORDS = {
   "do.line": ["Read the ticket of the scales again, or choose another line.", "Den Wiegeschein noch einmal lesen oder eine andere Baureihe wählen."],
   "do.papers": ["Read the vehicle's papers again, in kilograms.", "Die Fahrzeugpapiere noch einmal lesen, in Kilogramm."],
   "do.place": ["Measure again; the signs are beside the fields.", "Noch einmal messen; die Vorzeichen stehen an den Feldern."],
-  "do.aboard": ["Check whether something is aboard and read the axle weights again; then drive empty again. If both are right, the vehicle is not of this line.", "Nachsehen, ob etwas geladen ist, und die Achslasten noch einmal lesen; dann neu leer fahren. Stimmt beides, gehört es nicht zu dieser Baureihe."],
+  "do.aboard": ["Check that nothing is loaded and read the axle weights again; then drive empty again. If both are right, the vehicle is not of this line.", "Nachsehen, ob etwas geladen ist, und die Achslasten noch einmal lesen; dann neu leer fahren. Stimmt beides, gehört es nicht zu dieser Baureihe."],
   "do.other_line": ["Choose another line, or none; worn dampers and a wrong tyre pressure look like this too.", "Eine andere Baureihe wählen, oder keine; verschlissene Dämpfer und falscher Reifendruck sehen auch so aus."],
   "do.speed": ["Measure the wheelbase; if it is right, the signal map's speed is wrong by the same factor.", "Den Radstand messen; stimmt er, ist die Geschwindigkeit der Signaltabelle um so viel falsch."],
   "do.leave": ["Leave it empty if nobody weighed it.", "Leer lassen, wo niemand gewogen hat."],
