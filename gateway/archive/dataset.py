@@ -110,16 +110,6 @@ def rows_of(dataset: Location, slot: Slot, wanted: Sequence[str] | None = None) 
     return rows
 
 
-def table_rows(file: io.BytesIO, where: str) -> list[dict[str, Any]]:
-    """The rows of any Parquet file. Raises ConfigurationError naming ``where`` for another file."""
-    pa, pq = pyarrow_and_parquet()
-    try:
-        rows: list[dict[str, Any]] = pq.read_table(file).to_pylist()
-    except (pa.ArrowException, OSError) as fault:
-        raise ConfigurationError(f"{where}: not a Parquet file: {str(fault).partition(chr(10))[0]}") from None
-    return rows
-
-
 def schema() -> "pa.Schema":
     """The table's schema in Arrow's terms; its version is in the metadata."""
     pa, _ = pyarrow_and_parquet()

@@ -1,12 +1,10 @@
 """The manifest of an archive: the vehicles' log folders, with the signal map, calibration and known weights for each
 span of time.
 
-TOML, or Parquet with one row for each entry of ``[[vehicles]]``. Paths in it are relative to the manifest, which may be
-in an object store.
+TOML. Paths in it are relative to the manifest, which may be in an object store.
 """
 
 import fnmatch
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, time
@@ -17,7 +15,6 @@ from typing import Annotated, Any, Final
 
 from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from gateway.archive.dataset import table_rows
 from gateway.archive.places import Location, place_of
 from gateway.bus.logs import is_named_as_log
 from gateway.calibration.known_weights_file import KnownWeights, known_weights_of
@@ -31,7 +28,7 @@ from gateway.setup import Setup, load_setup
 from gateway.toml_file import checked, read_toml
 from gateway.units import NS_PER_S
 
-NAMES: Final = ("archive.toml", "archive.parquet")  # names of a folder's own manifest
+NAME: Final = "archive.toml"  # of a folder's own manifest
 EVERYBODY: Final = Trust()
 FOREVER_NS: Final = (1 << 63) - 1  # the largest 64-bit integer
 
@@ -114,7 +111,6 @@ class ManifestFile(Means):
     batch: BatchSection = BatchSection()
     trust: TrustSection = TrustSection()
     vehicles: tuple[VehicleEntry, ...] = Field((), description="one table a vehicle and span of time")
-    vehicles_in: str | None = Field(None, description="a Parquet file of such tables, one row each, instead of them")
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,17 +151,8 @@ def load_manifest(named: str, pinned: Trust = EVERYBODY) -> Manifest:
     """
     base, name, content = _found(named, pinned)
     where = base.path(name)
-    if name.endswith(".parquet"):
-        told = checked({"vehicles": _entries(content, where)}, where, ManifestFile)
-    else:
-        told = checked(read_toml(where, read=lambda _: content), where, ManifestFile)
+    told = checked(read_toml(where, read=lambda _: content), where, ManifestFile)
     entries = told.vehicles
-    if told.vehicles_in is not None:
-        if entries:
-            raise ConfigurationError(f"{where}: vehicles and vehicles_in: give one of them")
-        where = base.path(told.vehicles_in)
-        rows = {"vehicles": _entries(_read(base, told.vehicles_in, pinned), where)}
-        entries = checked(rows, where, ManifestFile).vehicles
     if not entries:
         raise ConfigurationError(f"{where}: names no vehicle; write [[vehicles]] with id or vin for each")
     _require_distinct(entries, where)
@@ -217,21 +204,19 @@ def _assignment(base: Location, told: ManifestFile, entry: VehicleEntry, load: A
 
 def _found(named: str, pinned: Trust) -> tuple[Location, str, bytes]:
     """Folder, name and content of the manifest."""
-    if named.endswith((".toml", ".parquet")):
+    if named.endswith(".toml"):
         folder, _, name = named.rpartition("/")
         base = place_of(folder or (Path("/") if named.startswith("/") else Path()))
         return base, name, _read(base, name, pinned)
     base = place_of(named)
-    for name in NAMES:
-        try:
-            return base, name, _Loader(base, pinned).read(base.path(name))
-        except (FileNotFoundError, NotADirectoryError):
-            continue
-        except OSError as fault:
-            raise ConfigurationError(f"{base.path(name)}: cannot be read: {fault.strerror or fault}") from None
-    raise ConfigurationError(
-        f"{base}: has neither {' nor '.join(NAMES)}, which tells whose logs lie where; write one, or name yours"
-    )
+    try:
+        return base, NAME, _Loader(base, pinned).read(base.path(NAME))
+    except (FileNotFoundError, NotADirectoryError):
+        raise ConfigurationError(
+            f"{base}: has no {NAME}, which tells whose logs lie where; write one, or name yours"
+        ) from None
+    except OSError as fault:
+        raise ConfigurationError(f"{base.path(NAME)}: cannot be read: {fault.strerror or fault}") from None
 
 
 def _read(base: Location, name: str, trust: Trust = EVERYBODY) -> bytes:
@@ -248,12 +233,6 @@ def _below(base: Location, named: str) -> Location:
     if "://" in named or named.startswith("/"):
         return place_of(named)
     return base.at("" if named == "." else named.removeprefix("./"))
-
-
-def _entries(content: bytes, where: Path) -> list[dict[str, Any]]:
-    """Rows of a Parquet file; null means not given."""
-    rows = table_rows(io.BytesIO(content), str(where))
-    return [{key: cell for key, cell in row.items() if cell is not None} for row in rows]
 
 
 def _require_distinct(entries: Sequence[VehicleEntry], where: Path) -> None:

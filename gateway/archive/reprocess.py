@@ -1,6 +1,6 @@
 """Reprocesses a whole archive: survey, plan, run the jobs without a receipt, and summarise.
 
-with Processes() as workers:
+with local_workers() as workers:
     summary = reprocess(load_manifest("fleet/archive.toml"), place_of("DATASET"), workers)
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any, Final, TypeVar
+from typing import Any, TypeVar
 
 from gateway.archive.inventory import Inventory, look
 from gateway.archive.jobs import ArchiveJob
@@ -24,8 +24,6 @@ from gateway.errors import ConfigurationError
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
-
-AHEAD: Final = 2  # chosen: tasks queued per worker, so that none waits for the driver
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,11 +54,14 @@ OnProgress = Callable[[Progress], None]
 def done_by(
     workers: Workers, fn: Callable[[Task], Answer], tasks: Iterable[Task]
 ) -> "Iterator[tuple[Task, Future[Answer]]]":
-    """Each task with its future, in the order of completion; ``tasks`` may be endless."""
+    """Each task with its future, in the order of completion; ``tasks`` may be endless.
+
+    No more tasks than workers are under way: one that waits behind a task that kills its worker would be blamed too.
+    """
     waiting = iter(tasks)
     under_way: dict[Future[Answer], Task] = {}
     while True:
-        n_free = max(0, AHEAD * workers.n_workers - len(under_way))
+        n_free = max(0, workers.n_workers - len(under_way))
         under_way.update((workers.submit(fn, task), task) for task in islice(waiting, n_free))
         if not under_way:
             return

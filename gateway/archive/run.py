@@ -14,6 +14,7 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from typing import Any, Final
 
+from gateway.allocator import keep_freed_memory
 from gateway.archive.dataset import SCHEMA_VERSION, parquet_of, row_of
 from gateway.archive.drives import JobDrives, followed, readable
 from gateway.archive.jobs import ArchiveJob, JobLog, software
@@ -53,6 +54,7 @@ class JobOutcome:
 
 def run(job: ArchiveJob) -> JobOutcome:
     """Run a job unless it is done. Raises PlaceError if logs or data set cannot be reached now."""
+    keep_freed_memory()
     _require_same_software(job)
     if _is_done(job):
         return JobOutcome(job.slot, JobStatus.ALREADY, job.size)

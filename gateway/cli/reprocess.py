@@ -2,8 +2,6 @@
 
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final
@@ -16,7 +14,7 @@ from gateway.archive.places import place_of
 from gateway.archive.reprocess import Progress, Summary
 from gateway.archive.reprocess import reprocess as reprocess_archive
 from gateway.archive.run import JobStatus
-from gateway.archive.workers import Processes, Workers, cluster
+from gateway.archive.workers import local_workers, workers_of
 from gateway.cli.options import as_json, trusted_keys
 from gateway.cli.progress import StatusLine
 from gateway.files.signed import pinned_by
@@ -49,7 +47,7 @@ def reprocess(
     trusted_keys: Path | None,
     as_json: bool,
 ) -> None:
-    """Reprocesses every log of ARCHIVE: a manifest (.toml or .parquet), or a folder with an archive.toml in it.
+    """Reprocesses every log of ARCHIVE: a manifest (.toml), or a folder with an archive.toml in it.
 
     Jobs with a receipt are not done again, so that a stopped run resumes. With --json, progress
     comes as JSON lines on standard error. See docs/archive.md.
@@ -57,7 +55,7 @@ def reprocess(
     if scheduler is not None and workers is not None:
         raise click.UsageError("give --scheduler ADDRESS or --workers N, not both")
     dataset, manifest = place_of(output), load_manifest(archive, pinned_by(trusted_keys))
-    with _workers(scheduler, workers) as at_work:
+    with local_workers(workers) if scheduler is None else workers_of(scheduler) as at_work:
         if dry_run:
             ahead = forecast(look(manifest, dataset), at_work.n_workers)
             click.echo(json_line(ahead.to_json()) if as_json else forecast_in_words(ahead))
@@ -81,18 +79,6 @@ class _Progress:
         if time.monotonic() >= self._next_s or progress.n_done == progress.n_total:
             self._next_s = time.monotonic() + TOLD_EVERY_S
             click.echo(json_line(asdict(progress) | {"remaining_s": progress.remaining_s}), err=True)
-
-
-@contextmanager
-def _workers(scheduler: str | None, n_workers: int | None) -> Iterator[Workers]:
-    """The executor of the jobs; stopped at once when the command stops."""
-    workers: Workers = Processes(n_workers) if scheduler is None else cluster(scheduler)
-    try:
-        yield workers
-    except BaseException:
-        workers.shutdown(wait=False, cancel_futures=True)
-        raise
-    workers.shutdown()
 
 
 MOST_TOLD: Final = 10  # chosen: failures, one line each; the data set has them all

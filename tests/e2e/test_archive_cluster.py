@@ -15,7 +15,7 @@ from gateway.archive import failures, place_of, receipts, rows_of, slots_done
 from gateway.archive.manifest import load_manifest
 from gateway.archive.places import PlaceError
 from gateway.archive.reprocess import Progress, reprocess
-from gateway.archive.workers import Cluster, cluster
+from gateway.archive.workers import Workers, workers_of
 from gateway.errors import ConfigurationError
 
 N_VEHICLES = 15
@@ -38,7 +38,7 @@ def scheduler(bucket: str) -> Iterator[str]:
 class Killer:
     """Kills a worker's process, once, when some jobs are done."""
 
-    def __init__(self, workers: Cluster) -> None:
+    def __init__(self, workers: Workers) -> None:
         self._pids = workers._client.run(os.getpid)
         self.killed: int | None = None
 
@@ -55,7 +55,7 @@ def test_a_fleet_on_a_cluster_that_loses_a_worker(tmp_path: Path, bucket: str, s
     uploaded(archive, place_of(f"{bucket}/archive"))
     manifest = load_manifest(f"{bucket}/archive")
 
-    with cluster(scheduler) as workers:
+    with workers_of(scheduler) as workers:
         killer = Killer(workers)
         first = reprocess(manifest, together, workers, killer)
     assert killer.killed is not None
@@ -68,7 +68,7 @@ def test_a_fleet_on_a_cluster_that_loses_a_worker(tmp_path: Path, bucket: str, s
     assert [one["log"] for one in told["logs"]] == ["van-010/1.log", "van-010/2.log"]
 
     before = {item.path: item.stamp for item in together.items()}
-    with cluster(scheduler) as workers:
+    with workers_of(scheduler) as workers:
         second = reprocess(manifest, together, workers)
     assert second.counts == {"done": 0, "already": N_VEHICLES, "failed": 0, "failed_before": 0, "lost": 0}
     assert {item.path: item.stamp for item in together.items()} == before
@@ -88,6 +88,6 @@ def test_the_command_works_on_a_cluster(tmp_path: Path, bucket: str, scheduler: 
 def test_a_scheduler_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gateway.archive.workers.CONNECT_WITHIN_S", 1)
     with pytest.raises(PlaceError, match=r"tcp://127\.0\.0\.1:9: no Dask scheduler answers within 1 s: start one with"):
-        cluster("tcp://127.0.0.1:9")
+        workers_of("tcp://127.0.0.1:9")
     with pytest.raises(ConfigurationError, match="no address of a Dask scheduler"):
-        cluster("nonsense://x")
+        workers_of("nonsense://x")

@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,6 +14,7 @@ import httpx
 import pytest
 
 from gateway.archive import Location, place_of, slots_done
+from gateway.archive.workers import Workers
 from gateway.bus.frames import take
 from gateway.bus.logs import write_candump
 from gateway.records import Frames
@@ -35,10 +36,13 @@ batch.window_s = {WINDOW_S}
 """
 
 
-class Here(Executor):
+class Here(Workers):
     """Does at once, in this process, what is submitted."""
 
     n_workers = 1
+
+    def __init__(self) -> None:
+        """Nothing is started."""
 
     def submit(self, fn: Callable[..., Answer], /, *args: Any, **kwargs: Any) -> Future[Answer]:
         future: Future[Answer] = Future()

@@ -1,19 +1,23 @@
 """Which logs make which jobs, and that a job's name is the hash of all that its rows follow from."""
 
+import pickle
+import shutil
+import subprocess
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from support.archive import MIDNIGHT_NS, S, write_manifest
+from support.archive import MIDNIGHT_NS, S, write_drive, write_manifest
 from support.calibrated import calibration_file
 from support.known_weights import with_all_sources
 
 from gateway.archive import Location, place_of
-from gateway.archive.jobs import ArchiveJob, code_id, hash_of, plan, software
+from gateway.archive.jobs import PACKAGE, ArchiveJob, _imported, code_id, hash_of, plan, software
 from gateway.archive.manifest import Assignment, Manifest, load_manifest
-from gateway.archive.survey import LogFile, SurveyedLog, in_goes
+from gateway.archive.survey import LogFile, SurveyedLog, in_goes, logs_of, survey
 from gateway.calibration.known_weights_file import KnownWeight, KnownWeights
 from gateway.core.known_weights import Knowledge
 from gateway.core.settings import BatchSettings
@@ -164,9 +168,38 @@ def test_a_known_weight_stated_later_leaves_earlier_months_as_they_are(van: Assi
     assert before[1].slot != after[1].slot
 
 
-def test_the_software_is_the_code_that_weighs() -> None:
+def test_the_hash_of_the_code_holds_every_module_that_a_job_loads(tmp_path: Path) -> None:
+    """Whatever a process that ran a job has loaded of the package; the web server is not of it."""
+    write_drive(tmp_path / "van" / "1.log", MIDNIGHT_NS, 21.0)
+    manifest = load_manifest(str(write_manifest(tmp_path, "van")))
+    [log] = logs_of(manifest, manifest.assignments[0])
+    [job] = plan(place_of(tmp_path / "dataset"), manifest.assignments[0], [log], survey([log]).facts, manifest.settings)
+    (tmp_path / "job").write_bytes(pickle.dumps(job))
+    ran = subprocess.run([sys.executable, "-c", RUN_ONE_JOB, tmp_path], capture_output=True, text=True, check=True)
+    loaded = {Path(line) for line in ran.stdout.splitlines()}
+    hashed = _imported(PACKAGE, "archive.run")
+    assert len(loaded) > 50
+    assert loaded <= hashed
+    assert not any(path.is_relative_to(PACKAGE / room) for path in hashed for room in ("web", "service", "reports"))
+
+
+RUN_ONE_JOB = """
+import pickle, sys
+from gateway.archive.run import run
+run(pickle.load(open(f"{sys.argv[1]}/job", "rb")))
+print(*(m.__file__ for name, m in sys.modules.items() if name.partition(".")[0] == "gateway"), sep="\\n")
+"""
+
+
+@pytest.mark.parametrize("module", ["posterior", "budget", "quantity", "setup", "calibration/file/calibration_file"])
+def test_a_changed_module_makes_another_software(tmp_path: Path, module: str) -> None:
     assert software().endswith(f" code {code_id()}")
-    assert len(code_id()) == 12
+    copy = tmp_path / "gateway"
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__", "assets"))
+    assert code_id(copy) == code_id()
+    with (copy / f"{module}.py").open("a") as file:
+        file.write("# changed\n")
+    assert code_id(copy) != code_id()
 
 
 def test_logs_are_surveyed_in_groups_worth_a_turn() -> None:

@@ -1,21 +1,16 @@
 """The manifest of an archive: what it may say, and that every fault in it is told with where and how to mend it."""
 
 import re
-from datetime import UTC, datetime
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
-from support.archive import MANIFEST, MIDNIGHT_NS, object_store, uploaded, write_manifest
+from support.archive import MIDNIGHT_NS, object_store, uploaded, write_manifest
 from support.signing import Signer
 
 from gateway.archive import place_of
 from gateway.archive.manifest import FOREVER_NS, load_manifest
 from gateway.errors import ConfigurationError
 from gateway.files.signed import Trust
-
-NOVEMBER = datetime(2026, 11, 1, tzinfo=UTC)
 
 
 def test_a_manifest_maps_folders_to_vehicles_and_shares_what_they_share(tmp_path: Path) -> None:
@@ -43,30 +38,6 @@ def test_validity_in_time_is_a_day_or_an_instant(tmp_path: Path) -> None:
     ]
 
 
-def test_a_parquet_manifest_says_the_same(tmp_path: Path) -> None:
-    write_manifest(tmp_path)
-    rows = [
-        {"id": "van-1", "since": None, "signals": "springscale:reference", "calibration": "vehicle.json"},
-        {"id": "van-2", "since": NOVEMBER, "signals": "springscale:reference", "calibration": None},
-    ]
-    pq.write_table(pa.Table.from_pylist(rows), tmp_path / "archive.parquet")
-    (tmp_path / "archive.toml").unlink()
-    one, other = load_manifest(str(tmp_path)).assignments
-    assert (one.vehicle, one.span_ns[0], other.span_ns[0]) == ("van-1", -FOREVER_NS, MIDNIGHT_NS)
-    assert one.setup.calibration is not None
-    assert other.setup.calibration is None
-
-
-def test_a_toml_manifest_may_name_a_parquet_file_of_vehicles(tmp_path: Path) -> None:
-    write_manifest(tmp_path)
-    (tmp_path / "archive.toml").write_text('vehicles_in = "fleet.parquet"\n' + MANIFEST)
-    pq.write_table(pa.Table.from_pylist([{"id": "van-1"}, {"id": "van-2"}]), tmp_path / "fleet.parquet")
-    assert [one.vehicle for one in load_manifest(str(tmp_path)).assignments] == ["van-1", "van-2"]
-    pq.write_table(pa.Table.from_pylist([{"id": "van-1", "sinse": "x"}]), tmp_path / "fleet.parquet")
-    with pytest.raises(ConfigurationError, match=r"fleet\.parquet: vehicles\[1\]\.sinse: unknown key"):
-        load_manifest(str(tmp_path))
-
-
 def test_a_manifest_lies_in_an_object_store_with_all_it_names(tmp_path: Path) -> None:
     write_manifest(tmp_path, "van-1")
     with object_store() as bucket:
@@ -74,7 +45,7 @@ def test_a_manifest_lies_in_an_object_store_with_all_it_names(tmp_path: Path) ->
         [one] = load_manifest(f"{bucket}/archive").assignments
         assert one.logs.url == f"{bucket}/archive/van-1"
         assert one.setup.calibration is not None
-        with pytest.raises(ConfigurationError, match=r"s3:.*/nothing: has neither archive\.toml nor archive\.parquet"):
+        with pytest.raises(ConfigurationError, match=r"s3:.*/nothing: has no archive\.toml"):
             load_manifest(f"{bucket}/nothing")
 
 
@@ -117,7 +88,6 @@ def test_a_pinned_key_must_have_signed_the_manifest_itself(tmp_path: Path) -> No
             'signals = "springscale:reference"',
             r"archive\.toml: names no vehicle; write \[\[vehicles\]\] with id or vin",
         ),
-        ('vehicles_in = "x"\nvehicles = [{id = "a"}]', r"vehicles and vehicles_in: give one of them"),
         ("signals = 1\nvehicles = []", r"archive\.toml: signals: Input should be a valid string \(it says 1\)"),
         ("vehicles = [{}]", r"vehicles\[1\]: give id or vin: nothing tells whose logs these are"),
         ('vehicles = [{id = "a", vins = "x"}]', r"vehicles\[1\]\.vins: unknown key"),
@@ -158,8 +128,6 @@ def test_a_pinned_key_must_have_signed_the_manifest_itself(tmp_path: Path) -> No
             r"none\.json: no such file",
         ),
         ("batch.window_s = 5\nvehicles = []", r"batch\.window_s: 5 is below 20"),
-        ('vehicles_in = "none.parquet"', r"none\.parquet: no such file"),
-        ('vehicles_in = "archive.toml"', r"archive\.toml: not a Parquet file"),
         ("vehicles = [", r"archive\.toml: not valid TOML"),
     ],
 )

@@ -11,7 +11,7 @@ from benchmarks.speed.meter import CALIBRATION
 from gateway.archive import place_of, slots_done
 from gateway.archive.manifest import load_manifest
 from gateway.archive.reprocess import reprocess
-from gateway.archive.workers import Processes
+from gateway.archive.workers import local_workers
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.records import json_line
@@ -81,9 +81,9 @@ def _reprocessed(folder: Path, logs: Sequence[Path]) -> _Month:
         (folder / "archive" / VEHICLE / log.name).symlink_to(log)
     manifest = folder / "archive/archive.toml"
     manifest.write_text(MANIFEST.format(signals=SIGNALS, calibration=CALIBRATION, vehicle=VEHICLE))
-    dataset, workers = place_of(folder / "dataset"), Processes(1)
-    reprocess(load_manifest(str(manifest)), dataset, workers)
-    workers.shutdown()
+    dataset = place_of(folder / "dataset")
+    with local_workers(1) as workers:
+        reprocess(load_manifest(str(manifest)), dataset, workers)
     [slot] = slots_done(dataset)
     receipt = dataset.read(slot.receipt)
     return _Month(len(dataset.read(slot.table)), len(receipt), json.loads(receipt)["n_batches"])
