@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from isal import igzip
 
-from gateway.bus.frames import join, merge_frames, message_of
+from gateway.bus.frames import join, merge_frames
 from gateway.bus.logs import open_whole_log
 from gateway.bus.logs.candump_write import append_candump
 from gateway.bus.logs.packed import zstd
@@ -19,7 +19,7 @@ FRAMES_PER_S: Final = 2500  # chosen: a bus of 500 kbit/s, well used
 N_IDS: Final = 60  # chosen
 START_NS: Final = 1_760_146_908_000_000_000  # arbitrary, in 2025
 DATABASE: Final = shipped_map("reference").with_name("springscale_reference.dbc")
-FORMATS: Final = (".log", ".log.gz", ".log.zst", ".log.xz", ".blf", ".mf4", ".asc", ".trc", ".csv", ".db")
+FORMATS: Final = (".log", ".log.gz", ".log.zst", ".log.xz", ".mf4")  # the others are read by python-can itself
 
 
 def make_log(path: Path, minutes: float) -> int:
@@ -55,7 +55,7 @@ def _ours(rng: np.random.Generator, begin_ns: int, can_id: int, length: int, n: 
 
 
 def write_as(log: Path, suffix: str) -> Path:
-    """Convert a candump log to another format, in its folder. Raises ModuleNotFoundError if a library is missing."""
+    """Convert a candump log to another of FORMATS beside it. Raises ModuleNotFoundError if a library is missing."""
     path = log.with_suffix(suffix)
     packers: dict[str, Any] = {".gz": igzip.compress, ".zst": zstd.compress, ".xz": lzma.compress}
     if suffix == ".log":
@@ -64,16 +64,7 @@ def write_as(log: Path, suffix: str) -> Path:
         path.write_bytes(packers[path.suffix](log.read_bytes()))
         return path
     frames = join(list(open_whole_log(log)[0]), 64)
-    if suffix == ".mf4":
-        _write_mf4(frames, path)
-        return path
-    import can  # noqa: PLC0415 # after ours, which keeps asammdf out of it (gateway/bus)
-
-    with can.Logger(path) as writer:
-        for row in range(len(frames)):
-            message = message_of(frames, row)
-            message.channel, message.timestamp = 0, float(message.timestamp)
-            writer(message)
+    _write_mf4(frames, path)
     return path
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-LEAST_TIMES: Final = {".blf": 15, ".mf4": 10}  # as fast as python-can's reader
+LEAST_TIMES: Final = {".mf4": 10}  # as fast as python-can's reader
 WHOLE_DAY_H: Final = 8.0  # a working day
 MOST_DAY_S: Final = {"cross_spectrum": 10.0}
 HELD_BY: Final = {
@@ -22,7 +22,6 @@ HELD_BY: Final = {
         "finding line ends and marks (30 %), our twelfth of the lines (23 %) and their signals (14 %), reading the "
         "file (13 %), comparing identifiers (12 %)"
     ),
-    ".blf": "inflating (half)",
     "memory": "what is imported (83 MB before the service starts); weighing takes 12 MB",
     "idle": "three wake-ups a second of 0.2 ms: bus reader 1, event loop 0.9, pipeline 0.5, both senders 0.4",
 }
@@ -98,7 +97,7 @@ def _formats(found: Mapping[str, Any]) -> Iterator[Line]:
         least = LEAST_TIMES.get(suffix)
         goal = f"at least {least} x" if least else ""
         told = f"{told}, {_times(times)} python-can's reader"
-        yield Line("every format", suffix, told, goal, times >= (least or 0), HELD_BY.get(suffix, ""))
+        yield Line("every format", suffix, told, goal, times >= (least or 0))
 
 
 def _day(found: Mapping[str, Any]) -> Iterator[Line]:

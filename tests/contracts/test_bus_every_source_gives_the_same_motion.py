@@ -22,6 +22,7 @@ from gateway.bus.live.source import LiveSource
 from gateway.bus.logs import mf4, write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.logs.packed import zstd
+from gateway.bus.logs.report import LogReject
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.bus.sink import BusSink, replay
 from gateway.errors import LogUnreadableError
@@ -271,6 +272,33 @@ def test_a_cut_blf_gives_what_was_readable_and_says_so(tmp_path, drive, signal_m
     motion, report = read(path, signal_map)
     assert 50 < len(motion) < 400
     assert report.ended_early == "the file is cut off: shorter than its header says"
+
+
+@pytest.mark.parametrize("how", ["cut", "damaged"])
+def test_a_packed_or_damaged_blf_gives_what_lies_before(how, tmp_path, drive, signal_map, monkeypatch):
+    monkeypatch.setattr(can.BLFWriter, "max_container_size", 4096)
+    path = tmp_path / "drive.blf"
+    write_log(drive, path)
+    content = bytearray(path.read_bytes())
+    middle = content.index(b"LOBJ", len(content) // 2)
+    if how == "cut":
+        content = bytearray(gzip.compress(content, 0)[:middle])
+    else:
+        content[middle : middle + 4] = b"JUNK"
+    path.write_bytes(content)
+    motion, report = read(path, signal_map)
+    assert 50 < len(motion) < 400
+    assert report.ended_early.startswith("the gzip stream is cut off" if how == "cut" else "the file is damaged: ")
+
+
+@pytest.mark.parametrize("year", [1, 9999])
+def test_a_blf_that_starts_beyond_all_time_has_no_sound_stamp(year, tmp_path, drive, truth, signal_map):
+    path = tmp_path / "drive.blf"
+    write_log(drive, path)
+    content = path.read_bytes()
+    path.write_bytes(content[:40] + year.to_bytes(2, "little") + content[42:])
+    _, report = read(path, signal_map)
+    assert (report.wanted, report.rejects[LogReject.BAD_TIME].count) == (0, len(truth))
 
 
 def test_a_blf_that_is_none_is_refused(tmp_path, signal_map):

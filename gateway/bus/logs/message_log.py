@@ -1,4 +1,4 @@
-"""Logs that python-can reads message by message (.asc .trc .csv .db), as columns of the wanted frames."""
+"""Logs that python-can reads message by message (.blf .asc .trc .csv .db), as columns of the wanted frames."""
 
 import io
 from collections import deque
@@ -10,7 +10,7 @@ import can
 from can.io.generic import MessageReader
 
 from gateway.bus.frames import LAST_SECOND, frames_of, message_id
-from gateway.bus.logs.packed import open_log_file, unpacked_path, unpacked_suffix
+from gateway.bus.logs.packed import is_packed, open_log_file, unpacked_path, unpacked_suffix
 from gateway.bus.logs.report import LogReject, LogReport, Selection
 from gateway.records import Frames
 
@@ -22,18 +22,19 @@ _TEXT_READERS: Final[Mapping[str, tuple[Callable[[TextIO], MessageReader], tuple
     ".csv": (can.CSVReader, ("timestamp,arbitration_id,extended,remote,error,dlc,data\n",)),
     ".trc": (can.TRCReader, ()),
 }
-MESSAGE_SUFFIXES: Final = (*_TEXT_READERS, ".db")
+MESSAGE_SUFFIXES: Final = (*_TEXT_READERS, ".blf", ".db")
 
 
 def read_message_log(selection: Selection) -> Iterator[Frames]:
     """The selected frames in order of arrival, in chunks.
 
     Stamps are good to the microsecond, absolute if the format is (.asc in this machine's local time, as its writers
-    mean it). A text line that cannot be read is rejected and skipped; a damaged database is read up to the damage, and
+    mean it). A text line that cannot be read is rejected and skipped; a damaged .blf or .db is read up to there, and
     the report says why. Raises LogUnreadableError if not even the beginning can be read.
     """
     report, suffix = selection.report, unpacked_suffix(selection.path)
-    ours = _ours(_messages(report) if suffix == ".db" else _text_messages(suffix, report), selection)
+    binary = {".blf": _blf_messages, ".db": _database_messages}
+    ours = _ours(binary[suffix](report) if suffix in binary else _text_messages(suffix, report), selection)
     chunks = iter(lambda: list(islice(ours, CHUNK_MESSAGES)), [])
     yield from selection.given_out((frames_of(chunk, selection.width) for chunk in chunks), 1)
 
@@ -111,6 +112,15 @@ def _text_messages(suffix: str, report: LogReport) -> Iterator[can.Message]:
                 report.lines = lines.number
 
 
-def _messages(report: LogReport) -> Iterator[can.Message]:
+def _blf_messages(report: LogReport) -> Iterator[can.Message]:
+    with report.until_damage(".blf"), open_log_file(report.path) as stream:
+        n_bytes = None if is_packed(stream) else report.path.stat().st_size  # a packed one says itself where it is cut
+        reader = can.BLFReader(stream)
+        yield from reader
+        if n_bytes is not None and n_bytes < reader.file_size:
+            raise EOFError("the file is cut off: shorter than its header says")
+
+
+def _database_messages(report: LogReport) -> Iterator[can.Message]:
     with report.until_damage(".db"), unpacked_path(report.path) as unpacked, can.SqliteReader(unpacked) as reader:
         yield from reader

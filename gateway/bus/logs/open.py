@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
-from gateway.bus.logs.blf import read_blf
 from gateway.bus.logs.candump import read_candump
 from gateway.bus.logs.message_log import MESSAGE_SUFFIXES, read_message_log
 from gateway.bus.logs.mf4 import read_mf4
@@ -17,7 +16,6 @@ from gateway.records import Frames, Motion
 READERS: Final = {
     **dict.fromkeys((".log", ".txt", ".candump", ""), read_candump),
     **dict.fromkeys(MESSAGE_SUFFIXES, read_message_log),
-    ".blf": read_blf,
     ".mf4": read_mf4,
 }
 UNMISTAKABLE: Final = frozenset(READERS.keys() - {".txt", "", ".csv", ".db"})
@@ -45,9 +43,9 @@ def is_named_as_log(path: Path | str) -> bool:
 def open_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Frames], LogReport]:
     """The map's frames of a log in order of arrival, and a report that fills while they are read.
 
-    candump text (.log, .txt, .candump), .blf and .mf4 go through readers that take thousands of frames at once,
-    .asc .trc .csv .db through python-can's; each may be packed. Raises LogUnreadableError if the file is missing or of
-    an unknown kind.
+    candump text (.log, .txt, .candump) goes through a reader that takes thousands of frames at once, .mf4 through
+    asammdf, .blf .asc .trc .csv .db through python-can; each may be packed. Raises LogUnreadableError if the file is
+    missing or of an unknown kind.
     """
     return _open(Path(path), signal_map.filters, signal_map.channel, signal_map.payload_width)
 

@@ -28,7 +28,7 @@ else:
     from backports import zstd
 
 
-__all__ = ["BUFFER_BYTES", "PACKED_SUFFIXES", "open_log_file", "packing_of", "unpacked_path", "unpacked_suffix", "zstd"]
+__all__ = ["BUFFER_BYTES", "PACKED_SUFFIXES", "is_packed", "open_log_file", "unpacked_path", "unpacked_suffix", "zstd"]
 
 PACKED_BYTES: Final = 1 << 18  # chosen: read of the file at a time
 INFLATED_BYTES: Final = 1 << 17  # chosen: at most this much before a damage is lost
@@ -138,7 +138,8 @@ def open_log_file(path: Path) -> AbstractContextManager[BinaryIO]:
         file = path.open("rb")
     except OSError as fault:
         raise LogUnreadableError(f"{path}: cannot be read: {fault.strerror or fault}") from None
-    packing = packing_of(file.peek(_LONGEST_MAGIC))
+    first = file.peek(_LONGEST_MAGIC)
+    packing = next((packing for packing in PACKINGS if packing.begins(first)), None)
     return file if packing is None else io.BufferedReader(InflatedStream(file, packing), BUFFER_BYTES)
 
 
@@ -149,7 +150,7 @@ def unpacked_path(path: Path) -> Iterator[Path]:
     Raises EOFError and OSError as InflatedStream does, LogUnreadableError if it cannot be opened.
     """
     with open_log_file(path) as stream:
-        if not isinstance(getattr(stream, "raw", None), InflatedStream):
+        if not is_packed(stream):
             yield path
             return
         with tempfile.NamedTemporaryFile(suffix=unpacked_suffix(path)) as copy:
@@ -158,9 +159,9 @@ def unpacked_path(path: Path) -> Iterator[Path]:
             yield Path(copy.name)
 
 
-def packing_of(content: bytes) -> Packing | None:
-    """The packing of a file that begins with these bytes, None if it is not packed."""
-    return next((packing for packing in PACKINGS if packing.begins(content)), None)
+def is_packed(stream: BinaryIO) -> bool:
+    """Whether a stream of ``open_log_file`` inflates a packed file."""
+    return isinstance(getattr(stream, "raw", None), InflatedStream)
 
 
 def unpacked_suffix(path: Path) -> str:

@@ -33,7 +33,6 @@ class LogReject(StrEnum):
     TOO_LONG = "too_long"  # more bytes than a frame can hold
     GARBLED = "garbled"
     OVERLONG_LINE = "overlong_line"
-    DAMAGED_BLOCK = "damaged_block"  # of a binary log, with all the frames in it
 
 
 @dataclass(slots=True)
@@ -125,7 +124,7 @@ class LogReport:
             why = str(fault) or type(fault).__name__
             if self.frames == 0:
                 raise LogUnreadableError(f"{self.path}: cannot be read as {kind}: {why}") from None
-            self.ended_early = f"the file is damaged: {why}"
+            self.ended_early = why if isinstance(fault, EOFError | OSError) else f"the file is damaged: {why}"
 
     def require_frames(self) -> None:
         """After reading: raise LogUnreadableError, saying why, if not one wanted frame was found."""
