@@ -80,7 +80,6 @@ class Event(StrEnum):
     BATCH_NOT_KEPT = "batch not kept"
     RECORD_REFUSED = "frames not recorded"
     RECORD_RECOVERED = "frames recorded again"
-    RECORD_MENDED = "unfinished block cut off"
     VERIFIED = "verified"
     WEIGHT_KNOWN = "known weight stated"
     WEIGHT_CONFIRMED = "known weight confirmed"

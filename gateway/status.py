@@ -189,28 +189,13 @@ class WebhookStatus:
 
 
 @dataclass(frozen=True, slots=True)
-class Segment:
-    """One file of the ring log as far as its whole blocks reach; stamps of its first and its last frame."""
-
-    name: str
-    n_bytes: int = 0
-    n_blocks: int = 0
-    n_frames: int = 0
-    first_ns: int = 0
-    last_ns: int = 0
-
-
-@dataclass(frozen=True, slots=True)
 class RecordStatus:
     """State of the ring log; counts begin at the start of the service."""
 
     n_frames_written: int = 0
-    n_frames_held: Annotated[int, Field(description="frames that wait in memory for the next block")] = 0
-    n_frames_dropped: Annotated[int, Field(description="frames lost to a disk that refused or a day's limit")] = 0
-    n_bytes_written: int = 0
-    n_bytes_today: Annotated[int, Field(description="bytes written since midnight UTC")] = 0
-    size_bytes: Annotated[int, Field(description="of all segments")] = 0
-    n_segments: int = 0
+    n_frames_held: Annotated[int, Field(description="frames that wait in memory to be written")] = 0
+    n_frames_dropped: Annotated[int, Field(description="frames lost to a disk that refused")] = 0
+    size_bytes: Annotated[int, Field(description="of all files, after the last writing")] = 0
     last_fault: Annotated[str | None, Field(description="why nothing is recorded; null while it is")] = None
 
 

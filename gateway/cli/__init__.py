@@ -33,7 +33,7 @@ _COMMANDS = {
     "import": "Make a log from the recording of a phone: Sensor Logger or phyphox.",
     "line": "Build the line of several vehicles, so that the next one is calibrated by an empty drive.",
     "look": "The content of an unknown log, and a first signal map from it.",
-    "record": "Frames on disk: list and fetch those of a service, or record from a bus.",
+    "record": "Record the mapped frames of a bus into a log.",
     "replay": "Send a log to a bus, paced by its time stamps.",
     "reprocess": "Reprocess a fleet's archive of logs, on all cores or a cluster.",
     "reproduce": "Repeat the paper's section 4 in the simulator, as a report.",

@@ -29,13 +29,9 @@ class RecordSection(SettingsSection):
     """The ring log: the mapped frames themselves, kept on disk as long as there is room."""
 
     enabled: bool = Field(False, description="whether frames are recorded")
-    directory: Path | None = Field(None, description="folder of the segments [default: `record` in that of the store]")
-    max_size_mb: float = Field(1024.0, ge=16.0, le=1e9, description="the oldest segments are removed beyond this size")
-    max_daily_mb: float = Field(512.0, gt=0.0, le=1e9, description="no more than this is written in a day (UTC)")
+    directory: Path | None = Field(None, description="folder of the files [default: `record` in that of the store]")
+    max_size_mb: float = Field(1024.0, ge=16.0, le=1e9, description="the oldest files are removed beyond this size")
     free_mb: float = Field(256.0, ge=0.0, le=1e9, description="with less free space on the disk nothing is recorded")
-    block_s: float = Field(
-        120.0, ge=1.0, le=3600.0, description="frames are written together so often; a power cut costs as much"
-    )
 
 
 class VerificationSection(SettingsSection):

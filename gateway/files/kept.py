@@ -103,14 +103,13 @@ def opened_folder(directory: Path) -> Iterator[int]:
         os.close(folder)
 
 
-def open_plain(folder: int, name: str, *, for_writing: bool = False) -> BinaryIO:
+def open_plain(folder: int, name: str) -> BinaryIO:
     """A plain file in an open directory; no link is followed. Raises OSError, FileNotFoundError if there is none."""
-    flags = os.O_RDWR if for_writing else os.O_RDONLY
-    file = os.open(name, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
+    file = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
     if not stat.S_ISREG(os.fstat(file).st_mode):
         os.close(file)
         raise OSError(errno.EINVAL, "is no plain file", name)
-    return os.fdopen(file, "r+b" if for_writing else "rb")
+    return os.fdopen(file, "rb")
 
 
 def create_plain(folder: int, name: str, mode: int) -> BinaryIO:

@@ -154,7 +154,6 @@ class Gateway:
             known_weights=self.known_weights,
             commissioning=self.commissioning,
             known_loads=known_loads,
-            record=self.ring_log,
             verification=self.verification,
             trend=self.trend,
             alarms=self.alarms,

@@ -5,7 +5,7 @@ from importlib.metadata import version
 
 from gateway.bus.broadcast import Broadcaster, Sender
 from gateway.bus.live.source import LiveSource, OpenReceiver
-from gateway.bus.ring import RingLimits, RingLog
+from gateway.bus.ring_log import RingLog
 from gateway.calibration.kept.shelf import FOLDER, Shelf, ShelfLimits
 from gateway.config import BusSection, Settings, StoreSection
 from gateway.config.sections import BroadcastSection, KeepSection
@@ -136,11 +136,6 @@ def ring_log_of(settings: Settings, setup: Setup) -> RingLog | None:
     wanted = settings.record
     if not wanted.enabled:
         return None
-    limits = RingLimits(
-        max_bytes=round(wanted.max_size_mb * BYTES_PER_MB),
-        max_daily_bytes=round(wanted.max_daily_mb * BYTES_PER_MB),
-        free_bytes=round(wanted.free_mb * BYTES_PER_MB),
-        block_s=wanted.block_s,
-    )
+    max_bytes, free_bytes = round(wanted.max_size_mb * BYTES_PER_MB), round(wanted.free_mb * BYTES_PER_MB)
     directory = wanted.directory or settings.store.directory / "record"
-    return RingLog(directory, setup.signal_map.channel or settings.bus.channel, limits)
+    return RingLog(directory, setup.signal_map.channel or settings.bus.channel, max_bytes, free_bytes)

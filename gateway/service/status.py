@@ -10,7 +10,7 @@ from typing import Final
 from gateway.bus.heard import similar_to
 from gateway.bus.live.bus_survey import BusSurvey
 from gateway.bus.live.source import LiveSource, SourceState
-from gateway.bus.ring import RingLog
+from gateway.bus.ring_log import RingLog
 from gateway.config import Settings
 from gateway.records import Signal
 from gateway.service.pipeline import Pipeline

@@ -26,7 +26,6 @@ from gateway.web.routes.history import api_router, events_router, export_router
 from gateway.web.routes.known_weights import known_weights_router
 from gateway.web.routes.monitoring import health_router, metrics_registry
 from gateway.web.routes.reasons import reasons_router
-from gateway.web.routes.record import record_router
 from gateway.web.routes.spectra import spectra_router
 from gateway.web.routes.vehicle import vehicle_router
 from gateway.web.routes.verification import trend_router, verification_router
@@ -68,7 +67,6 @@ def create_app(
     known_weights: service.KnownWeightBackend | None = None,
     commissioning: service.CommissioningBackend | None = None,
     known_loads: KnownLoads | None = None,
-    record: service.FrameLog | None = None,
     verification: service.VerificationBackend | None = None,
     trend: service.TrendBackend | None = None,
     alarms: service.AlarmBackend | None = None,
@@ -118,7 +116,6 @@ def create_app(
         export_router(reader),
         events_router(reader),
         *([alarms_router(reader, alarms)] if alarms else ()),
-        record_router(record),
         weights_router(board, scales),
         cab_router(board, reader, status, scales),
         standards_router(board, scales, draws_trailers=draws_trailers),

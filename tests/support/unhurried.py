@@ -8,7 +8,7 @@ import pytest
 
 from gateway.bus import sink
 from gateway.bus.live import source
-from gateway.bus.ring import RingLog
+from gateway.bus.ring_log import RingLog
 from gateway.cli import main
 from gateway.cli import service as asked_service
 from gateway.service.pipeline import Pipeline

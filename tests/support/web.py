@@ -22,7 +22,7 @@ from gateway.web.access.serving import server_config
 from gateway.web.access.tokens import TokenFile
 from gateway.web.app import WebSettings, create_app
 from gateway.web.live.board import Board
-from gateway.web.routes.service_calls import CommissioningBackend, FrameLog, KnownWeightBackend, VerificationBackend
+from gateway.web.routes.service_calls import CommissioningBackend, KnownWeightBackend, VerificationBackend
 from gateway.web.routes.weights import KnownLoads
 from support.absent import of_no_vehicle
 from support.patience import PATIENCE_S
@@ -40,7 +40,6 @@ class Gateway:
         commissioning: CommissioningBackend | None = None,
         calibrated: CalibratedVehicle | None = None,
         known_loads: KnownLoads | None = None,
-        record: FrameLog | None = None,
         verification: VerificationBackend | None = None,
     ) -> None:
         self.clock_s = 1000.0
@@ -52,7 +51,6 @@ class Gateway:
             "tokens": tokens,
             "calibrated": calibrated,
             "known_loads": known_loads,
-            "record": record,
             **of_no_vehicle(directory, self.store),
         }
         known = {"known_weights": known_weights, "commissioning": commissioning, "verification": verification}

@@ -12,7 +12,7 @@ from vm.harness.vehicle import CONFIG, SETTINGS, Vehicle
 
 LINE = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
 PATH = "calibration/commissioning"
-UNCALIBRATED = SETTINGS.replace('calibration = "vehicle.json"\n', "") + "[record]\nenabled = true\nblock_s = 5.0\n"
+UNCALIBRATED = SETTINGS.replace('calibration = "vehicle.json"\n', "") + "[record]\nenabled = true\n"
 ANSWERS = {
     "kerb_front_axle_kg": 700.0,
     "kerb_rear_axle_kg": 700.0,

@@ -17,8 +17,6 @@ from gateway.web.access.tokens import Scope, TokenFile
 # These contain nothing about the vehicle: the pages' own files, the API's description, and whether the process lives.
 PUBLIC: Final = ("/assets/", "/swagger/")
 PUBLIC_PATHS: Final = frozenset({"/", "/cab", "/docs", "/openapi.json", "/health/live"})
-# Raw frames may contain the vehicle's position: reading them needs more than reading a weight.
-RECORD_PATH: Final = "/api/v1/record"
 _SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _FORWARDED: Final = ("forwarded", "via", "x-forwarded-for", "x-forwarded-host", "x-forwarded-proto", "x-real-ip")
 _LOCAL_NAMES: Final = frozenset({"localhost", "127.0.0.1", "[::1]"})
@@ -73,8 +71,7 @@ class Guard:
         shown = Headers(scope=scope).get("authorization")
         kind, _, text = (shown or "").partition(" ")
         token = tokens.verify(text.strip()) if kind.lower() == "bearer" else None
-        is_reading = scope["method"] in _SAFE_METHODS and not f"{scope['path']}/".startswith(f"{RECORD_PATH}/")
-        wanted = Scope.READ if is_reading else Scope.OPERATE
+        wanted = Scope.READ if scope["method"] in _SAFE_METHODS else Scope.OPERATE
         if token is not None:
             scope.setdefault("state", {})["token_name"] = token.name
             return None if token.scope.allows(wanted) else _forbidden(scope, wanted)

@@ -100,7 +100,6 @@ _HISTORY: Final = (
     "/api/v1/trips",
     "/api/v1/alarms",
     "/api/v1/export",
-    "/api/v1/record",
 )
 _STREAM: Final = "/api/v1/stream"
 _LOOK_S: Final = 0.05  # chosen: between two looks whether it is the client's turn

@@ -230,7 +230,6 @@ TABLE: Final = (
         lambda m: None if m.now.record is None else [((), float(bool(m.now.record.last_fault)))],
     ),
     one("springscale_record_size_bytes", "Size of the ring log.", "now.record.size_bytes"),
-    one("springscale_record_written_bytes_total", "Bytes written to it.", "now.record.n_bytes_written"),
     counts(
         "springscale_record_frames_total",
         "Frames by outcome.",

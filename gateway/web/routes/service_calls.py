@@ -6,7 +6,7 @@ that change something raise RefusedError, which becomes problem details.
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any, BinaryIO, Final, ParamSpec, Protocol
+from typing import Annotated, Any, Final, ParamSpec, Protocol
 
 from fastapi import Depends, Request
 from starlette.responses import Response
@@ -14,7 +14,6 @@ from starlette.responses import Response
 from gateway.core.known_weights import KnownWeightKind
 from gateway.stated.commissioning import LineSource
 from gateway.stated.facts import StatedWeight, VehicleAnswers
-from gateway.status import Segment
 from gateway.web.schemas import problem_responses
 
 
@@ -66,15 +65,6 @@ class CommissioningBackend(Protocol):
     def fit_now(self, by: str) -> str: ...
     def cancel(self, by: str) -> str: ...
     def undo(self, by: str, *, to_factory: bool) -> str: ...
-
-
-class FrameLog(Protocol):
-    """The ring log, oldest segment first. ``open`` gives a segment and the number of its bytes, None for an unknown
-    name, and raises OSError if the disk fails.
-    """
-
-    def segments(self) -> Sequence[Segment]: ...
-    def open(self, name: str) -> tuple[BinaryIO, int] | None: ...
 
 
 LOCAL: Final = "local"  # name of the client if no tokens are in use
