@@ -68,8 +68,6 @@ class Event(StrEnum):
     CLOCK_DOUBTED = "clock far ahead, age removes nothing"
     CLOCK_BELIEVED = "clock believed again"
     STORE_LOST_ROWS = "store closed with rows unwritten"
-    BROADCASTING = "weights are sent"
-    NOT_BROADCASTING = "weights are not sent"
     UPLINK_CONNECTED = "uplink connected"
     UPLINK_LOST = "uplink lost"
     UPLINK_NOT_REACHED = "uplink not reached"

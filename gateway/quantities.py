@@ -1,7 +1,7 @@
 """Every quantity in the outputs, with its name in each of them: one row per quantity.
 
 JSON, CSV and Parquet take a name from ``json_name``, VSS from ``vss``, Prometheus from ``metric``, Home Assistant from
-``label``, SAE J1939 from ``spns``. A new quantity is a row here, a new outlet a column.
+``label``. A new quantity is a row here, a new outlet a column.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,6 @@ class Outward:
 
     ``vss`` is its path in the Vehicle Signal Specification; ``has_vss_std`` is false for a core path, which has no
     standard deviation beside it. ``label`` and ``digits`` are for Home Assistant, which shows what has a label.
-    ``spns`` are parameters of SAE J1939-71; ``axle`` counts from 1 at the front.
     """
 
     name: str
@@ -34,8 +33,6 @@ class Outward:
     has_vss_std: bool = True
     label: str | None = None
     digits: int = 0
-    spns: tuple[int, ...] = ()
-    axle: int | None = None
 
     @property
     def suffix(self) -> str:
@@ -73,7 +70,6 @@ QUANTITIES: Final = (
         "load in addition to the empty vehicle",
         "Vehicle.Load.Payload",
         label="Payload",
-        spns=(181,),
     ),
     Outward(
         "front_share",
@@ -98,7 +94,6 @@ QUANTITIES: Final = (
         is_weight=True,
         has_vss_std=False,
         label="Gross weight",
-        spns=(1585, 1760),
     ),
     *(
         Outward(
@@ -108,8 +103,6 @@ QUANTITIES: Final = (
             f"{_ROW}{axle}.Load",
             is_weight=True,
             label=f"{end.capitalize()} axle",
-            spns=(582,),
-            axle=axle,
         )
         for axle, end in enumerate(("front", "rear"), 1)
     ),

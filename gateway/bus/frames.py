@@ -1,7 +1,7 @@
 """Columns of frames: splitting, joining, and conversion from and to python-can messages."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Final
+from typing import Final, Literal
 
 import can
 import numpy as np
@@ -10,6 +10,8 @@ from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 from gateway.units import NS_PER_S
 
 LAST_SECOND: Final = 9_223_372_035  # int64 nanoseconds reach no further
+
+Speed = float | Literal["max"]  # of a replay: 2.0 is twice as fast as recorded
 
 
 def empty_frames(width: int) -> Frames:

@@ -1,4 +1,4 @@
-"""The sending side: frames onto a bus, paced by their stamps for replay and simulation, or as `broadcast` requests."""
+"""The sending side: frames onto a bus, paced by their stamps for replay and simulation. The service never loads it."""
 
 import threading
 import time
@@ -7,11 +7,11 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import can
 
-from gateway.bus.frames import message_of, take
+from gateway.bus.frames import Speed, message_of, take
 from gateway.bus.live.python_can import require_usable_interface
 from gateway.bus.live.source import system_reason
 from gateway.bus.logs import LogReport, open_whole_log
@@ -22,8 +22,6 @@ from gateway.units import NS_PER_S
 SEND_TIMEOUT_S: Final = 5.0  # chosen: for a full transmit queue, or an in-process receiver that is busy
 LONGEST_SLEEP_S: Final = 0.1  # chosen: how soon a stop takes effect
 PIECE_FRAMES: Final = 512  # chosen: between two reports of progress at full speed
-
-Speed = float | Literal["max"]
 
 
 class BusSink(AbstractContextManager["BusSink"]):

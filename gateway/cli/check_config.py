@@ -57,17 +57,13 @@ def check_config(config: Path, trusted_keys: Path | None) -> Told:
         "trusted_keys": keys,
         "limits": limits_in_force(setup),
         "uplink": forwarding.broker if forwarding else None,
-        "broadcast": settings.broadcast.channel,  # None with its interface
         "webhook": pushing.receiver if pushing else None,
     }
     return summary, "\n".join(_sentences(config, settings, setup, keys))
 
 
 def _sentences(config: Path, settings: Settings, setup: Setup, keys: list[str]) -> Iterator[str]:
-    channel, sends_on = settings.bus.channel, settings.broadcast.channel
-    yield f"{config}: good. Reads {', '.join(setup.signal_map.signals)} from {channel}."
-    if sends_on is not None:
-        yield f"Sends weights on {sends_on}, which must not be the bus of {channel} by another name."
+    yield f"{config}: good. Reads {', '.join(setup.signal_map.signals)} from {settings.bus.channel}."
     if keys:
         yield f"Its files are signed as required, by {' or '.join(keys)}."
     if (commissioned := with_commissioned(settings)) is not settings:

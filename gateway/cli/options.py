@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import click
 
+from gateway.bus.frames import Speed
 from gateway.bus.live.python_can import usable_interfaces
-from gateway.bus.sink import Speed
 from gateway.config import ESTIMATOR_NAMES, BatchSection
 from gateway.core.settings import BatchSettings
 from gateway.records import json_line

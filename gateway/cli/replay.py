@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
+from gateway.bus.frames import Speed
 from gateway.bus.logs import LogReport
-from gateway.bus.sink import Speed
 from gateway.bus.sink import replay as send_log
 from gateway.cli import options
 from gateway.cli.options import FILE, Told, prints

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from gateway.bus.sink import Speed
+from gateway.bus.frames import Speed
 from gateway.cli import options
 from gateway.cli.options import FILE, NumberRange, Told, prints
 from gateway.cli.progress import StatusLine, counted

@@ -12,7 +12,6 @@ from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, Settings
 from gateway.config.sections import (
     OF_CALIBRATION,
     AlarmsSection,
-    BroadcastSection,
     CommissioningSection,
     KeepSection,
     LimitKg,
@@ -206,22 +205,8 @@ class Settings(BaseSettings):
     alarms: AlarmsSection = AlarmsSection()
     uplink: UplinkSection = UplinkSection()
     webhook: WebhookSection = WebhookSection()
-    broadcast: BroadcastSection = BroadcastSection()
     trust: TrustSection = TrustSection()
     log: LogSection = LogSection()
-
-    @model_validator(mode="after")
-    def _listens_only(self) -> "Settings":
-        sends, hears = (
-            f"{self.broadcast.interface} {self.broadcast.channel}",
-            f"{self.bus.interface} {self.bus.channel}",
-        )
-        if sends.casefold() == hears.casefold():
-            raise ValueError(
-                f"[broadcast] {sends} is the bus that the service listens to, and it never sends there: give "
-                f"[broadcast] an interface of its own"
-            )
-        return self
 
     @classmethod
     def settings_customise_sources(

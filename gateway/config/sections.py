@@ -128,33 +128,6 @@ class UplinkSection(SettingsSection):
         return self
 
 
-class BroadcastSection(SettingsSection):
-    """Weights sent as J1939 frames onto another CAN bus than the one that the service listens to."""
-
-    interface: str | None = Field(
-        None, min_length=1, description="any python-can interface; without it nothing is ever sent on any bus"
-    )
-    channel: str | None = Field(None, min_length=1, description="its channel; never that of [bus]")
-    options: dict[str, str | int | float | bool] = Field(
-        default_factory=dict, description="further arguments of that python-can interface, e.g. bitrate"
-    )
-    source_address: int | None = Field(None, ge=0, le=253, description="J1939 source address, unique on that bus")
-    priority: int = Field(6, ge=0, le=7, description="J1939 priority; 0 is the most urgent")
-    every_s: float = Field(1.0, ge=0.1, le=3600.0, description="frames are sent so often")
-    first_axle: int = Field(1, ge=0, le=1, description="number that the receivers expect of the front axle")
-    draws_trailers: bool = Field(
-        False, description="then the gross weight of the combination is unknown and is not sent"
-    )
-
-    @model_validator(mode="after")
-    def _whole(self) -> "BroadcastSection":
-        if self.interface is not None and (self.channel is None or self.source_address is None):
-            raise ValueError("interface needs channel and source_address beside it")
-        if self.interface is None and (self.channel is not None or self.source_address is not None):
-            raise ValueError("nothing is sent without interface: give it, or leave out channel and source_address")
-        return self
-
-
 CAUSE_NAMES: Final = (  # those of core.alarms, which loads too much for this
     *("overload", "imbalance", "sensor_fault", "drift", "no_estimate"),
     *("overload.gross", "overload.front_axle", "overload.rear_axle"),

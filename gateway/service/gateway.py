@@ -22,7 +22,6 @@ from gateway.service.calibration_in_use import keep_copy
 from gateway.service.part import CLOSE_WITHIN_S, Deadline, Questions, in_own_thread, stop_in_turn
 from gateway.service.parts import (
     board_of,
-    broadcaster_of,
     commissioning_of,
     keeper_of,
     ring_log_of,
@@ -129,7 +128,6 @@ class Gateway:
             on_event=on_event,
         )
         self.trend = TrendService(directory, subject, ask, self.known_weights.zeros)
-        self.broadcaster = broadcaster_of(settings.broadcast, self.board)
         self.status = StatusReport(
             settings,
             setup,
@@ -157,7 +155,6 @@ class Gateway:
             verification=self.verification,
             trend=self.trend,
             alarms=self.alarms,
-            draws_trailers=settings.broadcast.draws_trailers,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = WebServer(web)
@@ -168,7 +165,7 @@ class Gateway:
         self._web_fault: str | None = None
         self._reloading: asyncio.Task[None] | None = None
         self._vital = (self.store, self.pipeline, self.source)  # each tuple in the order of the start
-        optional = (self.ring_log, self.broadcaster, self.uplink, self.webhook)
+        optional = (self.ring_log, self.uplink, self.webhook)
         present = (part for part in optional if part is not None)
         self._beside = (self.commissioning, self.keeper, self.trend, *present, self.bus_survey)
         self.needs_restart = False  # with the calibration that was made meanwhile; see life.py

@@ -27,8 +27,6 @@ def startable_faults(settings: Settings, signal_map: SignalMap) -> Iterator[str]
     lacking = what_lacks(settings.bus.interface)
     if lacking is not None:
         yield lacking
-    if settings.broadcast.interface is not None and (lacking := what_lacks(settings.broadcast.interface)) is not None:
-        yield lacking.replace("[bus]", "[broadcast]")
     try:
         refuse_open_address(settings.web.host, has_tokens=_has_tokens(settings))
     except ConfigurationError as fault:

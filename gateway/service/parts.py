@@ -3,14 +3,12 @@
 from dataclasses import asdict
 from importlib.metadata import version
 
-from gateway.bus.broadcast import Broadcaster, Sender
 from gateway.bus.live.source import LiveSource, OpenReceiver
 from gateway.bus.ring_log import RingLog
 from gateway.calibration.kept.shelf import FOLDER, Shelf, ShelfLimits
 from gateway.config import BusSection, Settings, StoreSection
-from gateway.config.sections import BroadcastSection, KeepSection
+from gateway.config.sections import KeepSection
 from gateway.core.flow import Flow
-from gateway.estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.service.calibration_in_use import why_not_allowed
 from gateway.service.commissioning.empty_drive import ServiceVehicle
@@ -116,19 +114,6 @@ def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | No
         silence_s=wanted.silence_s,
         open_receiver=open_receiver,
     )
-
-
-def broadcaster_of(wanted: BroadcastSection, board: Board) -> Broadcaster | None:
-    """None if nothing is to be sent. A stale estimate is not sent, because a frame cannot mark it as stale."""
-    if wanted.interface is None or wanted.channel is None or wanted.source_address is None:
-        return None
-
-    def fresh() -> Estimate | None:
-        shown = board.shown()
-        return None if shown.is_stale else shown.estimate
-
-    sender = Sender(wanted.source_address, wanted.priority, wanted.first_axle, wanted.draws_trailers)
-    return Broadcaster(wanted.interface, wanted.channel, wanted.options, sender, wanted.every_s, fresh)
 
 
 def ring_log_of(settings: Settings, setup: Setup) -> RingLog | None:

@@ -70,8 +70,6 @@ def create_app(
     verification: service.VerificationBackend | None = None,
     trend: service.TrendBackend | None = None,
     alarms: service.AlarmBackend | None = None,
-    *,
-    draws_trailers: bool = False,
 ) -> FastAPI:
     """The application over the pipeline's publications (``board``), the store (``reader``) and the service's state
     (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the estimates if
@@ -118,7 +116,7 @@ def create_app(
         *([alarms_router(reader, alarms)] if alarms else ()),
         weights_router(board, scales),
         cab_router(board, reader, status, scales),
-        standards_router(board, scales, draws_trailers=draws_trailers),
+        standards_router(board, scales),
         health_router(status, metrics),
         *([known_loads_router(known_loads)] if known_loads else ()),
     ]

@@ -15,10 +15,10 @@ from typing import Final
 
 import numpy as np
 
-from gateway.bus.frames import merge_frames
+from gateway.bus.frames import Speed, merge_frames
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import SignalMapFile, shipped_map
-from gateway.bus.sink import BusSink, OnProgress, Speed, replay_frames
+from gateway.bus.sink import BusSink, OnProgress, replay_frames
 from gateway.errors import ConfigurationError, SignalMapError
 from gateway.records import F64, Frames
 from gateway.sim.drive import Drive, Leg, constant, drive_of, standstill

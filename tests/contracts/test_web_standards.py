@@ -1,4 +1,4 @@
-"""Our weights in the words of others: VSS, J1939, and our own figures behind both."""
+"""Our weights in the words of others: VSS, and our own figures behind it."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -153,45 +153,3 @@ def test_vss_speaks_core_paths_and_exactly_those_of_the_overlay(gateway: Gateway
         "Vehicle.GrossWeight": 1545,
     }
     assert points["Vehicle.Chassis.Axle.Row1.Load"]["value"] == 760.0
-
-
-def test_j1939_counts_are_the_weights_in_its_resolutions(gateway: Gateway) -> None:
-    gateway.publish(loaded(0, payload_kg=101.3))
-    told = client(gateway).get("/api/v1/weights/j1939").json()
-    counted = {(each["spn"], each["axle"]): (each["pgn"], each["raw"], each["kg"]) for each in told["parameters"]}
-    assert counted == {
-        (582, 1): (65258, 1521, 760.5),  # 90 + (1240 + 101.3) / 2 = 760.65 kg at 0.5 kg a bit
-        (582, 2): (65258, 1561, 780.5),
-        (181, None): (65258, 51, 102.0),
-        (1760, None): (65136, 154, 1540.0),
-    }
-    assert told["id"] == loaded(0).id
-
-
-@pytest.mark.parametrize(("payload_kg", "raw", "kg"), [(-3.2, 0, 0.0), (200_000.0, 65024, None)])
-def test_j1939_counts_stay_in_their_range(gateway: Gateway, payload_kg: float, raw: int, kg: float | None) -> None:
-    gateway.publish(loaded(0, payload_kg=payload_kg))
-    cargo = client(gateway).get("/api/v1/weights/j1939").json()["parameters"][2]
-    assert (cargo["spn"], cargo["raw"], cargo["kg"]) == (181, raw, kg)
-
-
-def test_j1939_tells_no_early_look_and_nothing_of_what_is_drawn(gateway: Gateway) -> None:
-    """The bus and the page disagreed."""
-    gateway.publish(loaded(0))
-    calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 420.0), (40.0, 60.0))
-    drawing = create_app(
-        gateway.board, gateway.store.reader(), lambda: gateway.status, calibrated=calibrated, draws_trailers=True
-    )
-    *known, combination = Client(drawing).get("/api/v1/weights/j1939").json()["parameters"]
-    assert (combination["raw"], combination["kg"]) == (0xFFFF, None)
-    assert all(each["kg"] for each in known)
-    gateway.board.publish(replace(loaded(1), t_start_ns=10**15, t_end_ns=2 * 10**15, is_provisional=True))
-    assert gateway.board.shown().estimate.is_provisional
-    early = client(gateway).get("/api/v1/weights/j1939").json()["parameters"]
-    assert {each["raw"] for each in early} == {0xFFFF}
-
-
-def test_j1939_says_not_available_for_what_is_not_known(gateway: Gateway) -> None:
-    told = client(gateway, vehicle=None).get("/api/v1/weights/j1939").json()
-    assert {each["raw"] for each in told["parameters"]} == {0xFFFF}
-    assert {each["kg"] for each in told["parameters"]} == {None}

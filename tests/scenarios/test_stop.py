@@ -125,7 +125,7 @@ def test_a_question_of_a_client_that_hangs_does_not_keep_the_process_from_ending
     told_until_stopped("held_service", config, ask)
 
 
-@pytest.mark.parametrize("name", ["webhook", "uplink", "broadcaster"])
+@pytest.mark.parametrize("name", ["webhook", "uplink"])
 def test_the_death_of_a_sender_is_shown_and_the_weighing_goes_on(
     config: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,6 +1,5 @@
-"""/api/v1/weights/latest, /weights/j1939 and /vss: gross weight, axle and wheel loads of the latest estimate, whether
-they are too much, the same in the terms of SAE J1939 and of the COVESA Vehicle Signal Specification, and the actual
-load where it is known.
+"""/api/v1/weights/latest and /vss: gross weight, axle and wheel loads of the latest estimate, whether they are too
+much, the same in the terms of the COVESA Vehicle Signal Specification, and the actual load where it is known.
 """
 
 import math
@@ -16,7 +15,6 @@ from gateway.core.vehicle import Vehicle
 from gateway.core.weights.limits import is_over_limit
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, PayloadPlace, place_of, unsprung_kg, weighed
 from gateway.estimate import Estimate, Weight, Weights
-from gateway.j1939 import NOT_AVAILABLE, POWERED_WEIGHT, counts_of
 from gateway.quantities import QUANTITIES
 from gateway.records import iso_utc, rounded
 from gateway.stated.facts import Instant
@@ -133,24 +131,6 @@ def _place(place: PayloadPlace | None) -> LoadPlace | None:
     return None if place is None else LoadPlace(**{name: rounded(x, 3) for name, x in asdict(place).items()})
 
 
-class J1939Weight(BaseModel):
-    """One parameter. ``raw`` is the count on the wire; 65535 means not available, 65024 error; then ``kg`` is null."""
-
-    pgn: int = Field(examples=[65258])
-    spn: int = Field(examples=[582])
-    name: str = Field(examples=["Axle Weight"])
-    axle: int | None = Field(None, description="counted from 1 at the front", examples=[1])
-    kg: float | None = Field(description="raw times the resolution", examples=[845.0])
-    kg_per_bit: float = Field(examples=[0.5])
-    raw: int = Field(ge=0, le=NOT_AVAILABLE, examples=[1690])
-
-
-class J1939Weights(WeighedWhen):
-    """Vehicle Weight (VW) and Combination Vehicle Weight (CVW) of the estimate that ``/estimates/latest`` shows."""
-
-    parameters: list[J1939Weight]
-
-
 _UINT16_LAST: Final = 65_535  # the greatest number of 16 bits
 
 
@@ -163,23 +143,9 @@ class VssPoint(BaseModel):
     timestamp: str | None = Field(description="end of the batch", examples=["2026-11-21T03:55:00.000000Z"])
 
 
-def standards_router(board: Board, scales: Scales, *, draws_trailers: bool) -> APIRouter:
-    """The weights in the terms of J1939 and VSS; ``draws_trailers`` as for the frames that are sent."""
+def standards_router(board: Board, scales: Scales) -> APIRouter:
+    """The weights in the terms of VSS."""
     router = APIRouter(prefix="/api/v1", tags=["standards"])
-
-    @router.get("/weights/j1939")
-    async def j1939_weights() -> J1939Weights:
-        """Axle, cargo and gross weights with the SPNs, resolutions and counts of SAE J1939-71."""
-        shown = board.shown()
-        counts = counts_of(shown.estimate, scales.weigh(shown.estimate), draws_trailers=draws_trailers)
-        return J1939Weights(
-            **_when(shown),
-            parameters=[
-                J1939Weight(**asdict(count.parameter), axle=count.axle, kg=count.kg, raw=count.raw)
-                for count in counts
-                if count.parameter is not POWERED_WEIGHT
-            ],
-        )
 
     @router.get("/vss")
     async def vss() -> list[VssPoint]:
