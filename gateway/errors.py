@@ -17,10 +17,6 @@ class NothingWeighedError(SpringscaleError):
     """Logs were read, and no batch in them gave an estimate."""
 
 
-class UntrustedFileError(ConfigurationError):
-    """A required signature is missing, made by an untrusted key, or does not match the file."""
-
-
 class SignalMapError(ConfigurationError):
     """A signal map and its DBC files do not fit together."""
 

@@ -33,11 +33,8 @@ class Event(StrEnum):
     READY = "ready"
     STATE = "state"
     STOPPED = "stopped"
-    RELOADED = "reloaded"
-    RELOAD_REFUSED = "reload refused"
     NOT_RESTORED = "stored estimates cannot be shown yet"
     CALIBRATION_CHANGED = "calibration changed"
-    CALIBRATION_NOT_KEPT = "copy of the calibration cannot be kept"
     SETUP_REFUSED = "signal map or calibration cannot be used"
     PIPELINE_DIED = "pipeline died"
     WEB_DIED = "web server died"
@@ -168,16 +165,13 @@ class PlainFormatter(logging.Formatter):
 
 
 def set_up_log(level: str, *, under_journald: bool) -> None:
-    """Everything goes to standard error; other libraries' warnings and worse come through as well."""
+    """Everything goes to standard error: our own events from ``level`` on (debug, info, warning or error), and other
+    libraries' warnings and worse.
+    """
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(PlainFormatter() if sys.stderr.isatty() else JsonFormatter(with_priority=under_journald))
     handler.addFilter(FloodGate())
     logging.basicConfig(level=logging.WARNING, handlers=[handler], force=True)
-    set_log_level(level)
-
-
-def set_log_level(level: str) -> None:
-    """The least level of our own events that is written: debug, info, warning or error."""
     LOGGER.setLevel(level.upper())
 
 

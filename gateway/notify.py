@@ -2,7 +2,6 @@
 
 import os
 import socket
-import time
 
 
 class Notifier:
@@ -30,10 +29,6 @@ class Notifier:
             self._socket.sendto(text.encode(), self._address)
         except OSError:
             self.n_unsent += 1
-
-    def send_reloading(self) -> None:
-        """A reload begins; READY="1" ends it."""
-        self.send(RELOADING="1", MONOTONIC_USEC=str(time.monotonic_ns() // 1000))
 
     def close(self) -> None:
         """Close the socket."""

@@ -13,7 +13,7 @@ from gateway.core.known_weights import Knowledge
 from gateway.core.settings import BatchSettings
 from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError
-from gateway.files.signed import Read
+from gateway.toml_file import Read
 
 NO_OTHER = Limits()  # than the calibration's
 NOBODY = Identity()  # a log without a configuration belongs to no named vehicle
@@ -86,7 +86,7 @@ def load_setup(
 ) -> Setup:
     """Load the signal map and the calibration file. Without ``estimator``, the best one of the file is used.
 
-    ``limits`` override those of the calibration. ``read`` checks signatures if they are required (files.signed).
+    ``limits`` override those of the calibration. ``read`` reads the files, which may lie in an object store.
 
     Raises SignalMapError, CalibrationFileError, or ConfigurationError if the file lacks the estimator.
     """
@@ -100,20 +100,15 @@ def load_setup(
     return Setup(load_signal_map(signals, read), held, chosen, identity, limits=limits)
 
 
-def setup_of(settings: Settings, estimator: str | None = None, read: Read | None = None) -> Setup:
-    """The setup that a springscale.toml describes. Raises as :func:`load_setup`, and for another vehicle's file.
-
-    ``read`` replaces reading with the trust of the settings.
-    """
+def setup_of(settings: Settings, estimator: str | None = None) -> Setup:
+    """The setup that a springscale.toml describes. Raises as :func:`load_setup`, and for another vehicle's file."""
     identity = Identity(settings.vehicle.id, settings.vehicle.vin)
-    read = read or settings.trust.for_reading().read
     setup = load_setup(
         settings.signals,
         settings.calibration,
         estimator or settings.estimator,
         identity,
-        read,
-        Limits.of(settings.vehicle),
+        limits=Limits.of(settings.vehicle),
     )
     wanted = settings.vehicle.calibrated_as
     if wanted and setup.calibration and setup.calibration.vehicle.name != wanted:

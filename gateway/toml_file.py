@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from math import isnan
@@ -11,10 +11,10 @@ from typing import Any, Final, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from gateway.errors import ConfigurationError, UntrustedFileError
-from gateway.files.signed import Read
+from gateway.errors import ConfigurationError
 
 Model = TypeVar("Model", bound=BaseModel)
+Read = Callable[[Path], bytes]  # reads a file, on a disk or from an object store; raises OSError
 
 SIMILAR: Final = 0.7  # of difflib's ratio: a letter too many, too few or another one, or a unit left out
 _OF_KEY: Final = "[key]"  # how pydantic ends the place of a fault in a key itself
@@ -42,8 +42,6 @@ def read_toml(
     """The tables of ``path``. Raises ``error`` naming the file, and the line where its syntax breaks."""
     try:
         tables = tomllib.loads(read(path).decode("utf-8"))
-    except UntrustedFileError as fault:
-        raise error(str(fault)) from None
     except FileNotFoundError:
         raise error(f"{path}: no such file") from None
     except IsADirectoryError:

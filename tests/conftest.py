@@ -11,7 +11,7 @@ from gateway.allocator import keep_freed_memory
 from gateway.log import LOGGER
 
 # The last lie beside the checkout
-PROMISED = ("chromium", "playwright", "mosquitto", "postgresql", "ssh-keygen", "a test machine", "recorded drives")
+PROMISED = ("chromium", "playwright", "mosquitto", "postgresql", "a test machine", "recorded drives")
 
 # Files of more than about ten seconds, the longest first: two workers that take whole files then end together.
 LONGEST_FIRST = (

@@ -161,7 +161,7 @@ def soak(hours_a_day: float, n_days: int) -> list[dict[str, float]]:
                 faults.append(fault)
             service.stop()
 
-        while live(settings, lambda: load_settings(config), on_started=on_started, open_receiver=lambda: receiver):
+        while live(settings, on_started=on_started, open_receiver=lambda: receiver):
             pass
     if faults:
         raise faults[0]

@@ -18,18 +18,16 @@ from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Fiel
 from gateway.archive.places import Location, place_of
 from gateway.bus.logs import is_named_as_log
 from gateway.calibration.known_weights_file import KnownWeights, known_weights_of
-from gateway.config import BatchSection, EstimatorName, TrustSection
+from gateway.config import BatchSection, EstimatorName
 from gateway.config.sections import OF_CALIBRATION, LimitKg
 from gateway.core.settings import BatchSettings
 from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError
-from gateway.files.signed import Trust
 from gateway.setup import Setup, load_setup
 from gateway.toml_file import checked, read_toml
 from gateway.units import NS_PER_S
 
 NAME: Final = "archive.toml"  # of a folder's own manifest
-EVERYBODY: Final = Trust()
 FOREVER_NS: Final = (1 << 63) - 1  # the largest 64-bit integer
 
 
@@ -109,7 +107,6 @@ class ManifestFile(Means):
         None, description="which files are logs, e.g. *.txt.gz [default: those with the suffix of a log, packed or not]"
     )
     batch: BatchSection = BatchSection()
-    trust: TrustSection = TrustSection()
     vehicles: tuple[VehicleEntry, ...] = Field((), description="one table a vehicle and span of time")
 
 
@@ -143,21 +140,16 @@ class Manifest:
         return not name.startswith(".") and is_named_as_log(name)
 
 
-def load_manifest(named: str, pinned: Trust = EVERYBODY) -> Manifest:
-    """The manifest ``named``, or the one in the folder ``named``. Raises ConfigurationError naming every fault.
-
-    If there are ``pinned`` keys, one of them must have signed it; one of these or of its own ``[trust]`` must have
-    signed signal maps, databases and calibrations.
-    """
-    base, name, content = _found(named, pinned)
+def load_manifest(named: str) -> Manifest:
+    """The manifest ``named``, or the one in the folder ``named``. Raises ConfigurationError naming every fault."""
+    base, name, content = _found(named)
     where = base.path(name)
     told = checked(read_toml(where, read=lambda _: content), where, ManifestFile)
     entries = told.vehicles
     if not entries:
         raise ConfigurationError(f"{where}: names no vehicle; write [[vehicles]] with id or vin for each")
     _require_distinct(entries, where)
-    trusted = Trust((*pinned.keys, *told.trust.for_reading().keys))
-    load = lru_cache(maxsize=None)(_Loader(base, trusted).setup)
+    load = lru_cache(maxsize=None)(_Loader(base).setup)
     found = tuple(_assignment(base, told, entry, load, f"{where}: vehicles[{i}]") for i, entry in enumerate(entries, 1))
     return Manifest(str(where), found, told.batch.for_core(), told.pattern)
 
@@ -167,13 +159,9 @@ class _Loader:
     """Loads the manifest's files, relative to the manifest."""
 
     base: Location
-    trust: Trust
 
     def read(self, path: Path) -> bytes:
-        """The content of a file beside the manifest. Raises FileNotFoundError, UntrustedFileError."""
-        return self.trust.read(path, self._raw)
-
-    def _raw(self, path: Path) -> bytes:
+        """The content of a file beside the manifest. Raises FileNotFoundError."""
         if self.base.local("") is not None:
             return path.read_bytes()
         return self.base.read(path.relative_to(self.base.path("")).as_posix())
@@ -202,15 +190,15 @@ def _assignment(base: Location, told: ManifestFile, entry: VehicleEntry, load: A
     return Assignment(entry.name, entry.vin, place, folder.rstrip("/"), entry.span_ns, setup, known)
 
 
-def _found(named: str, pinned: Trust) -> tuple[Location, str, bytes]:
+def _found(named: str) -> tuple[Location, str, bytes]:
     """Folder, name and content of the manifest."""
     if named.endswith(".toml"):
         folder, _, name = named.rpartition("/")
         base = place_of(folder or (Path("/") if named.startswith("/") else Path()))
-        return base, name, _read(base, name, pinned)
+        return base, name, _read(base, name)
     base = place_of(named)
     try:
-        return base, NAME, _Loader(base, pinned).read(base.path(NAME))
+        return base, NAME, _Loader(base).read(base.path(NAME))
     except (FileNotFoundError, NotADirectoryError):
         raise ConfigurationError(
             f"{base}: has no {NAME}, which tells whose logs lie where; write one, or name yours"
@@ -219,9 +207,9 @@ def _found(named: str, pinned: Trust) -> tuple[Location, str, bytes]:
         raise ConfigurationError(f"{base.path(NAME)}: cannot be read: {fault.strerror or fault}") from None
 
 
-def _read(base: Location, name: str, trust: Trust = EVERYBODY) -> bytes:
+def _read(base: Location, name: str) -> bytes:
     try:
-        return _Loader(base, trust).read(base.path(name))
+        return _Loader(base).read(base.path(name))
     except FileNotFoundError:
         raise ConfigurationError(f"{base.path(name)}: no such file") from None
     except OSError as fault:

@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 
 from gateway.calibration.known_weights_file import FILE_NAME
-from gateway.cli.options import FILE, Told, prints, trusted_keys
+from gateway.cli.options import FILE, Told, prints
 from gateway.config import Settings, load_settings
 from gateway.core.weights.limits import Limits
-from gateway.errors import ConfigurationError, UntrustedFileError
+from gateway.errors import ConfigurationError
 from gateway.service.calibration_in_use import with_commissioned
 from gateway.service.lifecycle import startable_faults
 from gateway.setup import Setup, setup_of
@@ -19,24 +19,11 @@ from gateway.uplink.settings import uplink_settings, webhook_settings
 
 @click.command("check-config")
 @click.argument("config", type=FILE)
-@trusted_keys
 @prints
-def check_config(config: Path, trusted_keys: Path | None) -> Told:
+def check_config(config: Path) -> Told:
     """Check CONFIG, its signal map, its DBC files, its calibration and its known weights; name every fault."""
-    settings = load_settings(config, trusted_keys)
-    trust, untrusted = settings.trust.for_reading(), dict[Path, str]()
-
-    def read(path: Path) -> bytes:
-        """Every file without a required signature is reported, not only the first."""
-        try:
-            return trust.read(path)
-        except UntrustedFileError as fault:
-            untrusted[path] = str(fault)
-            return path.read_bytes()
-
-    setup = setup_of(settings, read=read)
-    if untrusted:
-        raise ConfigurationError("\n".join(untrusted.values()))
+    settings = load_settings(config)
+    setup = setup_of(settings)
     known_weights = settings.store.directory / FILE_NAME
     if os.access(known_weights, os.R_OK):  # the service's own; others may not be allowed to see it
         setup = setup.with_known_weights_of(known_weights)
@@ -45,7 +32,6 @@ def check_config(config: Path, trusted_keys: Path | None) -> Told:
         raise ConfigurationError("\n".join(f"{config}: {fault}" for fault in faults))
     forwarding = uplink_settings(settings.uplink, settings.vehicle)
     pushing = webhook_settings(settings.webhook, settings.vehicle)
-    keys = [key.fingerprint for key in trust.keys]
     summary = {
         "config": str(config),
         "signals": [str(signal) for signal in setup.signal_map.signals],
@@ -54,18 +40,15 @@ def check_config(config: Path, trusted_keys: Path | None) -> Told:
         "estimator": setup.estimator,
         "interface": settings.bus.interface,
         "channel": settings.bus.channel,
-        "trusted_keys": keys,
         "limits": limits_in_force(setup),
         "uplink": forwarding.broker if forwarding else None,
         "webhook": pushing.receiver if pushing else None,
     }
-    return summary, "\n".join(_sentences(config, settings, setup, keys))
+    return summary, "\n".join(_sentences(config, settings, setup))
 
 
-def _sentences(config: Path, settings: Settings, setup: Setup, keys: list[str]) -> Iterator[str]:
+def _sentences(config: Path, settings: Settings, setup: Setup) -> Iterator[str]:
     yield f"{config}: good. Reads {', '.join(setup.signal_map.signals)} from {settings.bus.channel}."
-    if keys:
-        yield f"Its files are signed as required, by {' or '.join(keys)}."
     if (commissioned := with_commissioned(settings)) is not settings:
         yield f"The service weighs with the calibration that was made on the vehicle: {commissioned.calibration}."
     elif setup.calibration is None:

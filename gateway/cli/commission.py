@@ -12,7 +12,6 @@ from gateway.cli.progress import StatusLine
 from gateway.cli.service import Answer, Service, asks_service, prints_answer
 from gateway.core.vehicle import Carries
 from gateway.errors import ConfigurationError, SpringscaleError
-from gateway.files.signed import signature_path
 from gateway.records import json_line
 from gateway.words import one_or_more
 
@@ -210,9 +209,7 @@ def lines(service: Service) -> Answer:
 @click.argument("file", type=FILE)
 @prints_answer(lambda told: lines_text(told["items"]))
 def upload(service: Service, file: Path) -> Answer:
-    """Upload the calibration of a vehicle of the same model or a line file to the service, and FILE.sig if there is
-    one.
-    """
+    """Upload the calibration of a vehicle of the same model or a line file to the service."""
     return _upload(service, file)
 
 
@@ -285,9 +282,6 @@ def _named(item: Answer) -> dict[str, str]:
 def _upload(service: Service, file: Path) -> Answer:
     try:
         body = {"name": file.name, "content": file.read_text(encoding="utf-8")}
-        signature = signature_path(file)
-        if signature.is_file():
-            body["signature"] = signature.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as fault:
         raise ConfigurationError(f"{file}: cannot be read: {fault}") from None
     return service.ask(f"{PATH}/lines", "POST", body)

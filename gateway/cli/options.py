@@ -70,12 +70,6 @@ def prints(command: Callable[..., Told]) -> Callable[..., None]:
     return as_json(printing)
 
 
-trusted_keys = click.option(
-    "--trusted-keys",
-    type=FILE,
-    default=None,
-    help="file of public keys, one of which must have signed the configuration [default: signatures are not required]",
-)
 window = click.option(
     "--window-s", type=NumberRange(20.0, 3600.0), default=None, help="length of a batch [default: 300]"
 )

@@ -3,7 +3,6 @@
 import sys
 import time
 from dataclasses import asdict
-from pathlib import Path
 from typing import Final
 
 import click
@@ -15,9 +14,8 @@ from gateway.archive.reprocess import Progress, Summary
 from gateway.archive.reprocess import reprocess as reprocess_archive
 from gateway.archive.run import JobStatus
 from gateway.archive.workers import local_workers, workers_of
-from gateway.cli.options import as_json, trusted_keys
+from gateway.cli.options import as_json
 from gateway.cli.progress import StatusLine
-from gateway.files.signed import pinned_by
 from gateway.records import json_line
 from gateway.words import counted
 
@@ -34,7 +32,6 @@ TOLD_EVERY_S: Final = 5.0  # chosen: between two lines of progress
 @click.option("--dry-run", is_flag=True, help="print how much there is and how long it will take; write nothing")
 @click.option("--keep-going", is_flag=True, help="end with 0 although logs could not be read or jobs failed")
 @click.option("--retry-failed", is_flag=True, help="also try those jobs again that gave no result")
-@trusted_keys
 @as_json
 def reprocess(
     archive: str,
@@ -44,7 +41,6 @@ def reprocess(
     dry_run: bool,
     keep_going: bool,
     retry_failed: bool,
-    trusted_keys: Path | None,
     as_json: bool,
 ) -> None:
     """Reprocesses every log of ARCHIVE: a manifest (.toml), or a folder with an archive.toml in it.
@@ -54,7 +50,7 @@ def reprocess(
     """
     if scheduler is not None and workers is not None:
         raise click.UsageError("give --scheduler ADDRESS or --workers N, not both")
-    dataset, manifest = place_of(output), load_manifest(archive, pinned_by(trusted_keys))
+    dataset, manifest = place_of(output), load_manifest(archive)
     with local_workers(workers) if scheduler is None else workers_of(scheduler) as at_work:
         if dry_run:
             ahead = forecast(look(manifest, dataset), at_work.n_workers)

@@ -25,7 +25,6 @@ from gateway.config.sections import (
 )
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
-from gateway.files.signed import PublicKey, Trust, load_public_keys
 from gateway.toml_file import describe_faults, read_toml
 
 Section = TypeVar("Section", bound=BaseModel)
@@ -150,28 +149,6 @@ class StoreSection(SettingsSection):
     max_size_mb: float = Field(512.0, ge=4.0, le=1e9, description="the oldest records are removed beyond this size")
 
 
-def _of_a_key(line: str) -> str:
-    PublicKey.of(line)
-    return line
-
-
-KeyLine = Annotated[str, AfterValidator(_of_a_key)]
-
-
-class TrustSection(SettingsSection):
-    """Whose signature is required on files that decide a weight: calibration file, signal map, databases."""
-
-    public_keys: tuple[KeyLine, ...] = Field(
-        (),
-        description="ed25519 keys, each the line of a KEY.pub; if there are any, files without a signature by one of "
-        "them are refused",
-    )
-
-    def for_reading(self) -> Trust:
-        """The same trust for the reader of such a file."""
-        return Trust(tuple(dict.fromkeys(map(PublicKey.of, self.public_keys))))
-
-
 class LogSection(SettingsSection):
     """What the service writes to its log."""
 
@@ -205,7 +182,6 @@ class Settings(BaseSettings):
     alarms: AlarmsSection = AlarmsSection()
     uplink: UplinkSection = UplinkSection()
     webhook: WebhookSection = WebhookSection()
-    trust: TrustSection = TrustSection()
     log: LogSection = LogSection()
 
     @classmethod
@@ -221,19 +197,14 @@ class Settings(BaseSettings):
         return env_settings, init_settings
 
 
-def load_settings(path: Path, trusted_keys: Path | None = None) -> Settings:
-    """Settings of ``path`` and the environment, paths made absolute. Raises ConfigurationError naming every fault.
-
-    ``trusted_keys`` is a file of public keys: one of them must have signed ``path``, and may have signed the rest.
-    """
-    pinned = TrustSection(public_keys=load_public_keys(trusted_keys) if trusted_keys else ())
-    tables = read_toml(path, read=pinned.for_reading().read)
+def load_settings(path: Path) -> Settings:
+    """Settings of ``path`` and the environment, paths made absolute. Raises ConfigurationError naming every fault."""
+    tables = read_toml(path)
     try:
         settings = Settings(**tables)
     except ValidationError as fault:
         raise ConfigurationError(describe_faults(path, fault, Settings)) from None
-    trust = TrustSection(public_keys=(*pinned.public_keys, *settings.trust.public_keys))
-    return _with_absolute_paths(settings.model_copy(update={"trust": trust}), path.resolve().parent)
+    return _with_absolute_paths(settings, path.resolve().parent)
 
 
 def _with_absolute_paths(settings: Settings, folder: Path) -> Settings:

@@ -64,10 +64,6 @@ class CommissioningSection(SettingsSection):
     memory_mb: float = Field(
         768.0, ge=256.0, le=16_384.0, description="address space of the process that fits, which takes far less memory"
     )
-    is_unsigned_believed: bool = Field(
-        False,
-        description="if [trust] requires signatures: accept calibrations made here, which nobody signs",
-    )
 
 
 class PositionSection(SettingsSection):

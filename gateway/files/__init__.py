@@ -1,1 +1,1 @@
-"""Files: the service's own beside its database, signed files, and output files that are replaced in one step."""
+"""Files: the service's own beside its database, and output files that are replaced in one step."""

@@ -18,7 +18,6 @@ from gateway.log import Event, log_event
 from gateway.notify import Notifier
 from gateway.service.alarms import AlarmService, rules_of
 from gateway.service.batch_log import BatchLog, LoadEventLog, StateLog, call_each
-from gateway.service.calibration_in_use import keep_copy
 from gateway.service.part import CLOSE_WITHIN_S, Deadline, Questions, in_own_thread, stop_in_turn
 from gateway.service.parts import (
     board_of,
@@ -27,11 +26,11 @@ from gateway.service.parts import (
     ring_log_of,
     source_of,
     store_of,
+    tls_of,
     uplink_of,
     webhook_of,
 )
 from gateway.service.pipeline import Pipeline
-from gateway.service.reload import LoadSettings, Reloader, tls_of
 from gateway.service.status import StatusReport
 from gateway.service.verification.known_weights import KnownWeightService
 from gateway.service.verification.trend import TrendService
@@ -68,18 +67,17 @@ class Gateway:
         settings: Settings,
         setup: Setup,
         *,
-        load: LoadSettings | None = None,
         on_started: OnStarted = lambda gateway: None,
         known_loads: KnownLoads | None = None,
         open_receiver: OpenReceiver | None = None,
         setup_fault: str | None = None,
     ) -> None:
-        """``load`` reads the settings again for a reload; without it they never change.
+        """``setup_fault`` says why the calibration that was made on the vehicle is not in use.
 
-        ``setup_fault`` says why the setup is not the one that the settings name (last_good). ``open_receiver`` replaces
-        the bus interface (soak run).
+        ``open_receiver`` replaces the bus interface (soak run).
         """
         self._settings = settings
+        self._setup_fault = setup_fault
         self._on_started = on_started
         self._tokens = token_file = TokenFile(settings.store.directory / "tokens.json")
         refuse_open_address(settings.web.host, has_tokens=token_file.are_in_use())
@@ -88,8 +86,6 @@ class Gateway:
         self.store = store_of(settings.store, broker, receiver)
         if setup.calibration is not None:
             self.store.write_calibration(setup.calibration.id, setup.calibration.to_json())
-            if setup_fault is None:
-                keep_copy(settings, setup.calibration)
         if setup_fault is not None:
             log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=setup_fault)
             self.store.write_event("setup_fault", {"fault": setup_fault})
@@ -158,12 +154,10 @@ class Gateway:
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = WebServer(web)
-        self._reload = Reloader(settings, load or (lambda: settings), web, setup, setup_fault)
         self._notifier = Notifier()
         self._stopping = asyncio.Event()
         self._failure: str | None = None
         self._web_fault: str | None = None
-        self._reloading: asyncio.Task[None] | None = None
         self._vital = (self.store, self.pipeline, self.source)  # each tuple in the order of the start
         optional = (self.ring_log, self.uplink, self.webhook)
         present = (part for part in optional if part is not None)
@@ -172,7 +166,7 @@ class Gateway:
 
     def _warnings(self) -> tuple[str, ...]:
         """Faults that do not stop the weighing, as sentences for people."""
-        faults = [self._tokens.fault, self._reload.fault, self._web_fault, self.known_weights.fault]
+        faults = [self._tokens.fault, self._setup_fault, self._web_fault, self.known_weights.fault]
         faults.append(self.verification.fault)
         faults += [*(part.fault for part in self._vital), *(part.shown_fault() for part in self._beside)]
         return tuple(fault for fault in faults if fault)
@@ -204,7 +198,6 @@ class Gateway:
         loop.set_default_executor(Questions(thread_name_prefix="question"))
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self.request_stop)
-        loop.add_signal_handler(signal.SIGHUP, self._reload_told)
         bus = self._settings.bus
         log_event(Event.STARTED, version=self.status().version, interface=bus.interface, channel=bus.channel)
         for part in (*self._beside, *self._vital):
@@ -219,19 +212,6 @@ class Gateway:
         self._server.end()
         await serving
         self._notifier.close()
-
-    def _reload_told(self) -> None:
-        """Start a reload in a thread, because reading databases and calibrations takes seconds. One at a time."""
-        if self._server.started and (self._reloading is None or self._reloading.done()):
-            self._reloading = asyncio.create_task(self._reload_beside())
-
-    async def _reload_beside(self) -> None:
-        """Reload, and notify systemd before and after."""
-        self._notifier.send_reloading()
-        try:
-            await in_own_thread(self._reload)
-        finally:
-            self._notifier.send(READY="1")
 
     async def _serve_web(self) -> None:
         """Run uvicorn. A failed start raises SystemExit, which must not leave the task."""

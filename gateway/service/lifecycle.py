@@ -12,9 +12,8 @@ from gateway.bus.signals.mapping import SignalMap
 from gateway.config import Settings
 from gateway.errors import ConfigurationError
 from gateway.records import Signal
-from gateway.service.calibration_in_use import commissioned, with_commissioned
+from gateway.service.calibration_in_use import commissioned
 from gateway.service.gateway import Gateway, OnStarted
-from gateway.service.reload import LoadSettings
 from gateway.store import why_no_database
 from gateway.web.access.serving import refuse_open_address
 from gateway.web.access.tokens import TokenFile
@@ -77,7 +76,6 @@ RESTART_CODE: Final = 75  # exit code after which systemd restarts the service (
 
 def live(
     settings: Settings,
-    load: LoadSettings,
     *,
     on_started: OnStarted = lambda gateway: None,
     open_receiver: OpenReceiver | None = None,
@@ -85,13 +83,12 @@ def live(
     """Serve until stopped -> whether to restart. Raises as ``setup_of`` and as :meth:`Gateway.run`.
 
     A calibration made on the vehicle takes effect between two drives, when no window is open: the service ends and
-    restarts. ``load`` reads the settings again for a reload; ``open_receiver`` is as of :class:`Gateway`.
+    restarts. ``open_receiver`` is as of :class:`Gateway`.
     """
     chosen, setup, fault = commissioned(settings)
     gateway = Gateway(
         chosen,
         setup,
-        load=lambda: with_commissioned(load()),
         setup_fault=fault,
         on_started=on_started,
         open_receiver=open_receiver,

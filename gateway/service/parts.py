@@ -22,6 +22,7 @@ from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings, WebhookSettings
 from gateway.uplink.uplink import Uplink
 from gateway.uplink.webhook import Webhook
+from gateway.web.access.serving import Tls
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import Scales
 
@@ -88,7 +89,7 @@ def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow
         directory,
         settings.commissioning,
         settings.batch.for_core(),
-        Lines(directory, settings.commissioning.lines, settings.trust.for_reading()),
+        Lines(directory, settings.commissioning.lines),
         keeper.shelf,
         flow.scheduler,
         ServiceVehicle(
@@ -124,3 +125,11 @@ def ring_log_of(settings: Settings, setup: Setup) -> RingLog | None:
     max_bytes, free_bytes = round(wanted.max_size_mb * BYTES_PER_MB), round(wanted.free_mb * BYTES_PER_MB)
     directory = wanted.directory or settings.store.directory / "record"
     return RingLog(directory, setup.signal_map.channel or settings.bus.channel, max_bytes, free_bytes)
+
+
+def tls_of(settings: Settings) -> Tls | None:
+    """The certificate files these settings name; None for plain HTTP."""
+    web = settings.web
+    if web.tls_certificate is None or web.tls_key is None:
+        return None
+    return Tls(web.tls_certificate, web.tls_key, web.tls_client_ca)

@@ -13,7 +13,6 @@ from gateway.calibration.kept.batch_file import KeptBatch
 from gateway.calibration.kept.shelf import Shelf, ShelfLimits
 from gateway.config.sections import CommissioningSection
 from gateway.core.settings import BatchSettings
-from gateway.files.signed import Trust
 from gateway.records import Batch, Why
 from gateway.service.commissioning.empty_drive import ServiceVehicle
 from gateway.service.commissioning.lines import Lines
@@ -79,7 +78,6 @@ class Bench:
         self,
         directory: Path,
         vehicle: ServiceVehicle = VEHICLE,
-        trust: Trust | None = None,
         lines: Path | None = None,
         **settings: Any,
     ) -> None:
@@ -92,7 +90,7 @@ class Bench:
             directory,
             self.settings,
             BatchSettings(window_s=WINDOW_S),
-            Lines(directory, lines, trust or Trust(())),
+            Lines(directory, lines),
             self.shelf,
             self.drives,
             vehicle,

@@ -102,7 +102,7 @@ def serve(config: Path, meet: Callable[[Running], None]) -> None:
             failures.append(failure)
         loops[-1].call_soon_threadsafe(running.gateway.request_stop)
 
-    while live(settings, lambda: load_settings(config), on_started=on_started):
+    while live(settings, on_started=on_started):
         pass
     if failures:
         raise failures[0]

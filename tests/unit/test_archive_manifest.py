@@ -1,16 +1,13 @@
 """The manifest of an archive: what it may say, and that every fault in it is told with where and how to mend it."""
 
-import re
 from pathlib import Path
 
 import pytest
 from support.archive import MIDNIGHT_NS, object_store, uploaded, write_manifest
-from support.signing import Signer
 
 from gateway.archive import place_of
 from gateway.archive.manifest import FOREVER_NS, load_manifest
 from gateway.errors import ConfigurationError
-from gateway.files.signed import Trust
 
 
 def test_a_manifest_maps_folders_to_vehicles_and_shares_what_they_share(tmp_path: Path) -> None:
@@ -47,38 +44,6 @@ def test_a_manifest_lies_in_an_object_store_with_all_it_names(tmp_path: Path) ->
         assert one.setup.calibration is not None
         with pytest.raises(ConfigurationError, match=r"s3:.*/nothing: has no archive\.toml"):
             load_manifest(f"{bucket}/nothing")
-
-
-OWNER, STRANGER = Signer("owner"), Signer("stranger")
-
-
-def test_what_a_manifest_trusts_is_signed_or_refused(tmp_path: Path) -> None:
-    write_manifest(tmp_path, "van-1", more=f"[trust]\npublic_keys = ['{OWNER.public_line}']\n")
-    with pytest.raises(ConfigurationError, match=r"vehicle\.json: not signed, there is no vehicle\.json\.sig"):
-        load_manifest(str(tmp_path))
-    STRANGER.sign(tmp_path / "vehicle.json")
-    with pytest.raises(ConfigurationError, match=f"signed by {re.escape(STRANGER.public.fingerprint)}"):
-        load_manifest(str(tmp_path))
-    OWNER.sign(tmp_path / "vehicle.json")
-    assert load_manifest(str(tmp_path)).assignments[0].setup.calibration is not None
-
-
-def test_a_pinned_key_must_have_signed_the_manifest_itself(tmp_path: Path) -> None:
-    """And what it names, wherever they lie."""
-    path, pinned = write_manifest(tmp_path, "van-1"), Trust((OWNER.public,))
-    OWNER.sign(tmp_path / "vehicle.json")
-    with pytest.raises(ConfigurationError, match=r"archive\.toml: not signed"):
-        load_manifest(str(tmp_path), pinned)
-    OWNER.sign(path)
-    for named in (path, tmp_path):
-        assert load_manifest(str(named), pinned).assignments[0].vehicle == "van-1"
-    with object_store() as bucket:
-        uploaded(tmp_path, place_of(f"{bucket}/archive"))
-        assert load_manifest(f"{bucket}/archive", pinned).assignments[0].vehicle == "van-1"
-        (tmp_path / "vehicle.json").write_text((tmp_path / "vehicle.json").read_text() + " ")
-        uploaded(tmp_path, place_of(f"{bucket}/changed"))
-        with pytest.raises(ConfigurationError, match=r"vehicle\.json: changed after it was signed"):
-            load_manifest(f"{bucket}/changed", pinned)
 
 
 @pytest.mark.parametrize(

@@ -105,7 +105,7 @@ def test_what_is_out_of_turn_is_refused(bench: Bench) -> None:
 def test_where_it_is_not_allowed_nothing_begins(tmp_path: Path) -> None:
     bench = Bench(tmp_path, replaced(why_not_allowed="no"))
     assert reason(lambda: bench.desk.begin("x", None)) == "not_allowed"
-    assert reason(lambda: bench.desk.upload("a.json", "{}", None)) == "not_allowed"
+    assert reason(lambda: bench.desk.upload("a.json", "{}")) == "not_allowed"
 
 
 @pytest.mark.parametrize(

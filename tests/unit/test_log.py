@@ -5,9 +5,8 @@ import logging
 from pathlib import Path
 
 import pytest
-from support.log import names
 
-from gateway.log import LOGGER, Event, FloodGate, JsonFormatter, PlainFormatter, log_event, set_log_level, set_up_log
+from gateway.log import LOGGER, Event, FloodGate, JsonFormatter, PlainFormatter, log_event, set_up_log
 
 DEPLOYMENT = Path(__file__).parents[2] / "docs" / "deployment.md"
 
@@ -74,14 +73,6 @@ def test_an_event_that_comes_too_often_is_left_out_and_counted() -> None:
 def test_the_gate_is_for_our_events_alone() -> None:
     gate = FloodGate(most=1)
     assert all(gate.filter(record_of("careful", "some.package")) for _ in range(5))
-
-
-def test_a_reload_can_change_the_level(caplog: pytest.LogCaptureFixture) -> None:
-    set_log_level("warning")
-    log_event(Event.READY)
-    set_log_level("info")
-    log_event(Event.STOPPED)
-    assert names(caplog) == [Event.STOPPED]
 
 
 def test_the_documents_tell_of_every_event_and_of_no_other() -> None:

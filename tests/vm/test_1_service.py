@@ -1,4 +1,4 @@
-"""The installed service under real systemd: ready, confined, reloadable, passive."""
+"""The installed service under real systemd: ready, confined, passive."""
 
 import re
 import time
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import httpx
 import pytest
-from vm.harness.vehicle import CONFIG, HEARD, SETTINGS, Vehicle
+from vm.harness.vehicle import CONFIG, HEARD, Vehicle
 
 
 def test_it_is_ready_and_answers_who_shows_a_token(vehicle: Vehicle) -> None:
@@ -62,19 +62,6 @@ def test_systemd_networkd_understands_the_network_files(vehicle: Vehicle) -> Non
     finally:
         vehicle.run(f"rm {copies}*; systemctl restart systemd-networkd")
     assert not re.search("Unknown|Failed to parse|Invalid|ignoring", said), said
-
-
-def test_a_reload_changes_the_log_level_and_says_what_waits(vehicle: Vehicle) -> None:
-    pid = vehicle.pid()
-    vehicle.configure(SETTINGS.replace("window_s = 20.0", "window_s = 25.0") + '[log]\nlevel = "warning"\n')
-    vehicle.run("systemctl reload springscale")
-    vehicle.wait_for(lambda: '"waits_for_restart": ["batch.window_s"]' in vehicle.journal())
-    assert vehicle.run("systemctl is-active springscale").strip() == "active"
-    vehicle.configure("signals = 7")
-    vehicle.run("systemctl reload springscale")
-    vehicle.wait_for(lambda: "reload refused" in vehicle.journal())
-    assert vehicle.pid() == pid
-    vehicle.status()
 
 
 def test_a_token_revoked_by_root_is_refused_at_once(vehicle: Vehicle) -> None:

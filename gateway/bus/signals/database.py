@@ -14,9 +14,9 @@ from cantools.database.can import Signal as CantoolsSignal
 from cantools.database.errors import UnsupportedDatabaseFormatError
 
 from gateway.bus.signals.bit_field import BitField, Coding
-from gateway.errors import SignalMapError, UntrustedFileError
-from gateway.files.signed import Read
+from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID
+from gateway.toml_file import Read
 
 _LONG_SIGNAL = re.compile(rb"^\s*SG_\s+(\w+)[^:\n]*:\s*\d+\s*\|\s*0*[1-9]\d{3,}\s*@", re.MULTILINE)
 _FRAME_ID = re.compile(rb"^\s*BO_\s+0*(\d+)\s", re.MULTILINE)
@@ -80,7 +80,7 @@ def _load(map_path: Path, path: Path, read: Read) -> list[CantoolsMessage]:
         raise SignalMapError(f"{map_path}: dbc: {path}: its name must end in .{', .'.join(ENCODINGS)}")
     try:
         content = read(path)
-    except (OSError, UntrustedFileError) as fault:
+    except OSError as fault:
         raise SignalMapError(f"{map_path}: dbc: {fault}") from None
     _refuse_absurd(map_path, path, content)
     try:

@@ -12,9 +12,8 @@ from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.signals.database import DatabaseMessage, DatabaseSignal, closest, load_messages
 from gateway.bus.signals.mapping import Condition, MappedMessage, MappedSignal, SignalMap, exact_filter, j1939_filter
 from gateway.errors import SignalMapError
-from gateway.files.signed import Read
 from gateway.records import EXTENDED_ID, Signal
-from gateway.toml_file import load_toml
+from gateway.toml_file import Read, load_toml
 from gateway.units import si_factor
 
 QUANTITIES: Final[Mapping[Signal, str]] = {
@@ -214,7 +213,7 @@ class SignalMapFile(BaseModel):
 def load_signal_map(path: Path | str, read: Read = Path.read_bytes) -> SignalMap:
     """Read and resolve a signal map; ``springscale:NAME`` is one of those that come with the package.
 
-    ``read`` checks required signatures (files.signed); files of the package need none.
+    ``read`` reads the map and its databases, unless they are the package's.
 
     Raises SignalMapError naming the file, the key, what is wrong with it and how to mend it.
     """

@@ -15,8 +15,8 @@ from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.ratio_index.regression import TERMS
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError
-from gateway.files.signed import Read
 from gateway.schema import check_shapes
+from gateway.toml_file import Read
 
 FORMAT: Final = "springscale-calibration"
 VERSION: Final = 10  # of the format
@@ -89,8 +89,6 @@ class CalibrationFile(HashedFile):
 
 def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> CalibrationFile:
     """Reads; checks version, hash and shape.
-
-    ``read`` checks the signature if one is required (files.signed).
 
     Raises CalibrationFileError saying what to do.
     """

@@ -7,10 +7,9 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
-from gateway.errors import CalibrationFileError, UntrustedFileError
-from gateway.files.signed import Read
+from gateway.errors import CalibrationFileError
 from gateway.stated.facts import Part
-from gateway.toml_file import describe_faults
+from gateway.toml_file import Read, describe_faults
 
 Content = dict[str, Any]
 
@@ -85,8 +84,6 @@ def read_content(path: Path, read: Read) -> Content:
         content = json.loads(read(path).decode("utf-8"))
     except FileNotFoundError:
         raise CalibrationFileError(f"{path}: no such calibration file") from None
-    except UntrustedFileError as fault:
-        raise CalibrationFileError(str(fault)) from None
     except (OSError, UnicodeDecodeError) as fault:
         raise CalibrationFileError(f"{path}: cannot be read: {fault}") from None
     except (ValueError, RecursionError) as fault:  # a number of 5000 digits and brackets 5000 deep are no JSON for us

@@ -11,8 +11,8 @@ from gateway.calibration.file.calibration_file import CalibrationFile, load_cali
 from gateway.calibration.file.hashed import FileWords, HashedFile, checked_file, read_content
 from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart
 from gateway.errors import CalibrationFileError
-from gateway.files.signed import Read
 from gateway.stated.facts import Part
+from gateway.toml_file import Read
 
 LINE_FORMAT: Final = "springscale-line"
 LINE_VERSION: Final = 4  # of the format

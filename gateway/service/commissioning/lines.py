@@ -16,7 +16,6 @@ from gateway.calibration.line_files import line_of_files
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, ConfigurationError, LineError, RefusedError
 from gateway.files.kept import KeptFiles
-from gateway.files.signed import SUFFIX, Trust
 from gateway.service.commissioning.record import LineChoice
 from gateway.stated.commissioning import LineFoundTold, LineSource
 
@@ -27,9 +26,9 @@ _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,58}\.json")
 
 
 class Lines:
-    """All available lines. Files of the package need no signature; all others do if signatures are required."""
+    """All available lines."""
 
-    def __init__(self, directory: Path, administrator: Path | None, trust: Trust) -> None:
+    def __init__(self, directory: Path, administrator: Path | None) -> None:
         """``directory`` is the service's folder; uploaded files lie in a folder below it."""
         self._uploaded = directory / FOLDER
         self._folders: tuple[tuple[LineSource, Path | None], ...] = (
@@ -37,14 +36,13 @@ class Lines:
             ("administrator", administrator),
             ("uploaded", self._uploaded),
         )
-        self._trust = trust
 
     def found(self) -> Iterator[LineFoundTold]:
         """Every file that could be one, by source and name."""
         for source, folder in self._folders:
             for path in sorted(folder.glob("*.json")) if folder is not None and folder.is_dir() else ():
                 try:
-                    held, _ = self._load(source, path)
+                    held, _ = self._load(path)
                 except ConfigurationError as fault:
                     yield LineFoundTold(name=path.name, source=source, id=None, vehicle=None, fault=str(fault))
                 else:
@@ -56,7 +54,7 @@ class Lines:
         if path is None or _NAME.fullmatch(name) is None or not path.is_file():
             raise RefusedError("no_such_line", f"there is no line {name!r} of the {source}")
         try:
-            held, content = self._load(source, path)
+            held, content = self._load(path)
         except ConfigurationError as fault:
             raise RefusedError("line_unusable", str(fault)) from None
         copy_name = f"line-{hashlib.sha256(content).hexdigest()[:16]}.json"
@@ -73,7 +71,7 @@ class Lines:
         )
         return choice, content
 
-    def upload(self, name: str, content: str, signature: str | None) -> None:
+    def upload(self, name: str, content: str) -> None:
         """Keep a file under this name; on disk when this returns. Raises RefusedError."""
         if _NAME.fullmatch(name) is None:
             raise RefusedError(
@@ -86,11 +84,7 @@ class Lines:
         try:
             self._require_place(name, written)
             kept.write(fresh, written)
-            if signature is not None:
-                kept.write(fresh + SUFFIX, signature.encode())
-            self._load("uploaded", self._uploaded / fresh)
-            if signature is not None:
-                kept.write(name + SUFFIX, signature.encode())
+            self._load(self._uploaded / fresh)
             kept.write(name, written)
         except OSError as fault:
             raise RefusedError("not_stored", f"{name} cannot be kept: {fault}") from None
@@ -98,9 +92,8 @@ class Lines:
             said = str(fault).replace(str(self._uploaded / fresh), name)
             raise RefusedError("line_unusable", said) from None
         finally:
-            for leftover in (fresh, fresh + SUFFIX):
-                with suppress(OSError):
-                    (self._uploaded / leftover).unlink()
+            with suppress(OSError):
+                (self._uploaded / fresh).unlink()
 
     def _require_place(self, name: str, written: bytes) -> None:
         there = {path.name for path in self._uploaded.glob("*.json")} if self._uploaded.is_dir() else set()
@@ -109,13 +102,12 @@ class Lines:
         if name not in there and len(there) >= MOST_UPLOADED:
             raise RefusedError("too_many", f"{MOST_UPLOADED} lines were uploaded already")
 
-    def _load(self, source: LineSource, path: Path) -> tuple[LikeFile, bytes]:
+    def _load(self, path: Path) -> tuple[LikeFile, bytes]:
         """The file and its content. Raises ConfigurationError."""
-        read = Path.read_bytes if source == "package" else self._trust.read
         try:
             if path.stat().st_size > MOST_BYTES:
                 raise CalibrationFileError(f"{path}: is longer than {MOST_BYTES} bytes")
-            content = read(path)
+            content = path.read_bytes()
         except OSError as fault:
             raise CalibrationFileError(f"{path}: cannot be read: {fault}") from None
         held = load_like(path, lambda _: content)

@@ -117,11 +117,11 @@ class Commissioning(ServicePart):
     def lines(self) -> str:
         return LinesFound(items=list(self._lines.found())).model_dump_json()
 
-    def upload(self, name: str, content: str, signature: str | None) -> str:
+    def upload(self, name: str, content: str) -> str:
         """Keep a line's file -> the LinesFound with it. Raises RefusedError."""
         self._require_allowed()
         with self._book.lock:
-            self._lines.upload(name, content, signature)
+            self._lines.upload(name, content)
         return self.lines()
 
     def begin(self, by: str, note: str | None) -> str:

@@ -310,17 +310,6 @@ def server_config(app: FastAPI, host: str, port: int, tls: Tls | None = None) ->
     )
 
 
-def renew_certificate(config: uvicorn.Config, tls: Tls) -> None:
-    """Use the files' present certificate and key for new connections; open ones keep theirs.
-
-    Raises ConfigurationError, and changes nothing, for unusable files. Trusted client authorities stay as they are: a
-    context can add authorities, never remove one.
-    """
-    _tls_settings(tls)  # tried elsewhere first: a key that does not fit would leave the context half changed
-    if isinstance(config, TlsConfig):
-        config.context.load_cert_chain(tls.certificate, tls.key)
-
-
 def _tls_settings(tls: Tls) -> dict[str, Any]:
     """Checked here, so that a wrong file gives a clear line at the start and not a traceback."""
     try:

@@ -49,9 +49,6 @@ class UploadLine(Body):
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,58}\.json$", examples=["van-model.json"])
     content: str = Field(max_length=1_000_000, description="the file's text")
-    signature: str | None = Field(
-        None, max_length=4096, description="the text of its .sig, if the service requires signatures"
-    )
 
 
 COMMISSIONING_PATH: Final = "/calibration/commissioning"
@@ -84,8 +81,8 @@ def commissioning_router(backend: CommissioningBackend) -> APIRouter:
 
     @router.post("/lines", status_code=201, response_model=LinesFound, responses={**of_body, **problem_responses(413)})
     async def upload_line(said: UploadLine) -> Response:
-        """Upload a file to choose from, checked whole, with its signature if the service requires one; up to 1 MiB."""
-        return await created(backend.upload, said.name, said.content, said.signature)
+        """Upload a file to choose from, checked whole; up to 1 MiB."""
+        return await created(backend.upload, said.name, said.content)
 
     @router.post("/line", response_model=CommissioningState, responses={**of_body, **problem_responses(404)})
     async def choose_line(said: ChooseLine) -> Response:

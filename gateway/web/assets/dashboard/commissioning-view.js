@@ -237,13 +237,10 @@ async function step(place, path, claim, method = "POST") {
 }
 
 async function chooseLine(place) {
-  const files = [...element("commissioning-file").files];
-  const file = files.find((one) => !one.name.endsWith(".sig"));
+  const [file] = element("commissioning-file").files;
   let line = null;
   if (file) {
-    const signature = files.find((one) => one.name === `${file.name}.sig`);
-    const said = { name: file.name, content: await file.text(), ...(signature ? { signature: await signature.text() } : {}) };
-    if (!(await step(place, "/lines", said))) return;
+    if (!(await step(place, "/lines", { name: file.name, content: await file.text() }))) return;
     await askLines();
     line = { name: file.name, source: "uploaded" };
   } else if (element("commissioning-choice").value !== NO_LINE) {

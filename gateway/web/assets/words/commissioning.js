@@ -24,7 +24,7 @@ export const COMMISSIONING_WORDS = {
   com_no: ["No", "Nein"],
 
   com_which: ["Which vehicles is it like?", "Welchen Fahrzeugen gleicht es?"],
-  com_file: ["Or a file from this device, with its .sig if it has one", "Oder eine Datei von diesem Gerät, mit ihrer .sig, wo es eine gibt"],
+  com_file: ["Or a file from this device", "Oder eine Datei von diesem Gerät"],
   com_take_line: ["Take this line", "Diese Baureihe nehmen"],
   com_no_line: ["none of them: like any vehicle, less accurate", "keine davon: wie irgendein Fahrzeug, ungenauer"],
   com_line_option: ["{name} ({source}): {vehicle}, wheelbase {wheelbase}", "{name} ({source}): {vehicle}, Radstand {wheelbase}"],

@@ -1,0 +1,48 @@
+"""The start of the service: what its TLS settings say, and how it begins anew with another calibration."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from gateway.config import Settings, load_settings
+from gateway.errors import ConfigurationError
+from gateway.service import lifecycle as life
+from gateway.service.parts import tls_of
+
+PLAIN = 'signals = "springscale:reference"\n'
+TLS = PLAIN + '[web]\ntls_certificate = "web.pem"\ntls_key = "web.key"\n'
+
+
+def settings_of(folder: Path, text: str) -> Settings:
+    (folder / "springscale.toml").write_text(text)
+    return load_settings(folder / "springscale.toml")
+
+
+@pytest.mark.parametrize("half", ['tls_certificate = "a"', 'tls_key = "a"', 'tls_client_ca = "a"'])
+def test_half_of_a_tls_configuration_is_refused(half: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match="web: tls_"):
+        settings_of(tmp_path, PLAIN + f"[web]\n{half}\n")
+
+
+def test_tls_files_are_found_beside_the_configuration(tmp_path: Path) -> None:
+    tls = tls_of(settings_of(tmp_path, TLS))
+    assert (tls.certificate, tls.key, tls.client_ca) == (tmp_path / "web.pem", tmp_path / "web.key", None)
+
+
+def test_who_is_to_start_anew_under_systemd_leaves_with_the_code_that_the_unit_knows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A service that began anew inside its process had to clear private caches of FastAPI."""
+    unit = (Path(__file__).parents[2] / "deploy/springscale.service").read_text()
+    assert f"RestartForceExitStatus={life.RESTART_CODE}\n" in unit
+    assert f"SuccessExitStatus={life.RESTART_CODE}\n" in unit
+    monkeypatch.setenv("NOTIFY_SOCKET", "/run/nobody")
+    with pytest.raises(SystemExit) as leaving:
+        life.restart()
+    assert leaving.value.code == life.RESTART_CODE
+    monkeypatch.delenv("NOTIFY_SOCKET")
+    called: list[list[str]] = []
+    monkeypatch.setattr(life.os, "execv", lambda path, arguments: called.append(arguments))
+    life.restart()
+    assert called == [[sys.executable, *sys.orig_argv[1:]]]
