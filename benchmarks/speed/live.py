@@ -1,4 +1,4 @@
-"""The live path: CPU of receiving and decoding, compared with python-can's own receive loop in the same run.
+"""The live path: CPU of receiving and decoding, by python-can's SocketCAN bus and our decoder.
 
 Frames come from another process as CAN datagrams over a loopback socket with kernel stamps, so that no CAN
 hardware is needed: everything but the socket's address family is the live path. A kernel-filtered bus is one
@@ -11,21 +11,19 @@ import struct
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
+from can.interfaces.socketcan import socketcan
+
 from benchmarks.speed.meter import command_of, in_own_process, peak_mb
-from gateway.bus.live.socketcan import SocketCanReceiver, ask_for_stamps
-from gateway.bus.live.source import LiveSource
-from gateway.bus.signals import Decoder, load_signal_map, shipped_map
-from gateway.bus.signals.mapping import SignalMap
+from gateway.bus.live.source import LiveSource, opener_of
+from gateway.bus.signals import Decoder, load_signal_map
 
 OURS_SHARE = 0.084  # of the frames on the bus: two IMU messages at 100 Hz, GNSS at 10 Hz
 DRAIN_S = 0.1  # how often the pipeline looks into the inbox
 N_RUNS = 3  # chosen: a single run met 2.5 % of other work once
 RATES = {"2500 frames/s": 2500, "8000 frames/s": 8000, "2500, filtered": 210, "8000, filtered": 672}
-
-Receive = Callable[[threading.Event], dict[str, Any]]  # until the event is set; what it received
 
 
 def send(port: int, frames_per_s: int, seconds: float) -> int:
@@ -54,70 +52,35 @@ def _mix(is_filtered: bool) -> list[tuple[int, int, bytes]]:
 
 
 def listening_socket() -> socket.socket:
-    """A loopback socket that stands in for a CAN one."""
+    """A loopback socket that stands in for a CAN one, in python-can's SocketCAN bus too."""
     wire = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     wire.bind(("127.0.0.1", 0))
-    ask_for_stamps(wire)
+    bus: Any = socketcan  # its way to a real CAN socket is put out of the way
+    bus.create_socket = lambda: wire
+    bus.bind_socket = lambda sock, channel: None
+    bus.SocketcanBus._apply_filters = lambda self, filters: setattr(self, "_is_filtered", True)
     return wire
 
 
-def ours(wire: socket.socket, signal_map: SignalMap) -> Receive:
-    """LiveSource and the decoder, as the service runs them."""
-    source = LiveSource("socketcan", "bench", signal_map, open_receiver=lambda: SocketCanReceiver(wire, 8))
+def receive(is_over: threading.Event) -> dict[str, Any]:
+    """LiveSource and the decoder, as the service runs them, until the event is set."""
+    signal_map = load_signal_map("springscale:reference")
+    source = LiveSource("socketcan", "bench", signal_map, open_receiver=opener_of("socketcan", "bench", (), 8, {}))
     decoder = Decoder(signal_map)
-
-    def receive(is_over: threading.Event) -> dict[str, Any]:
-        source.start()
-        n_rows = 0
-        while not is_over.is_set():
-            is_over.wait(DRAIN_S)
-            frames = source.inbox.drain(0.0)
-            n_rows += len(decoder.decode(frames)) if frames is not None else 0
-        counts = source.counts()
-        source.stop()
-        return {"frames": counts.frames, "samples": n_rows, "dropped": counts.dropped_inbox + counts.dropped_kernel}
-
-    return receive
+    source.start()
+    n_rows = 0
+    while not is_over.is_set():
+        is_over.wait(DRAIN_S)
+        frames = source.inbox.drain(0.0)
+        n_rows += len(decoder.decode(frames)) if frames is not None else 0
+    counts = source.counts()
+    source.stop()
+    return {"frames": counts.frames, "samples": n_rows, "dropped": counts.dropped_inbox + counts.dropped_kernel}
 
 
-def python_can(wire: socket.socket, signal_map: SignalMap) -> Receive:
-    """python-can's SocketcanBus over the same kind of socket, cantools for the mapped frames."""
-    import cantools  # noqa: PLC0415 # what ours shall not hold in memory
-    from can.interfaces.socketcan import socketcan as python_can_socketcan  # noqa: PLC0415
-
-    database: Any = cantools.database.load_file(shipped_map("reference").with_name("springscale_reference.dbc"))
-    messages = {message.frame_id: message for message in database.messages}
-    peer: Any = python_can_socketcan  # its way to a real CAN socket is put out of the way
-    peer.create_socket = lambda: wire
-    peer.bind_socket = lambda sock, channel: None
-    peer.SocketcanBus._apply_filters = lambda self, filters: None
-
-    def receive(is_over: threading.Event) -> dict[str, Any]:
-        n_frames = n_rows = 0
-        with peer.SocketcanBus("bench", local_loopback=True) as bus:
-            while not is_over.is_set():
-                frame = bus.recv(0.1)
-                if frame is None:
-                    continue
-                n_frames += 1
-                if (message := messages.get(frame.arbitration_id)) is not None:
-                    message.decode(frame.data, decode_choices=False)
-                    n_rows += 1
-        return {"frames": n_frames, "samples": n_rows, "dropped": None}
-
-    return receive
-
-
-PATHS: dict[str, Callable[[socket.socket, SignalMap], Receive]] = {
-    "springscale": ours,
-    "python-can + cantools": python_can,
-}
-
-
-def run(path: str, frames_per_s: int, seconds: float) -> dict[str, Any]:
-    """One path at one rate; CPU is this process's from the first frame sent to the last."""
+def run(frames_per_s: int, seconds: float) -> dict[str, Any]:
+    """One rate; CPU is this process's from the first frame sent to the last."""
     wire = listening_socket()
-    receive = PATHS[path](wire, load_signal_map("springscale:reference"))
     command = command_of(send, wire.getsockname()[1], frames_per_s, seconds)
     sender = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     is_over = threading.Event()
@@ -139,16 +102,12 @@ def run(path: str, frames_per_s: int, seconds: float) -> dict[str, Any]:
 
 
 def measure(seconds: float) -> dict[str, Any]:
-    """Every path at every rate, some times: of the runs that lost most frames, the cheapest.
-
-    The paths take turns, so that a disturbance meets both.
-    """
-    runs: dict[str, dict[str, list[dict[str, Any]]]] = {bus: {path: [] for path in PATHS} for bus in RATES}
+    """Every rate, some times: of the runs that lost most frames, the cheapest."""
+    runs: dict[str, list[dict[str, Any]]] = {bus: [] for bus in RATES}
     for _ in range(N_RUNS):
         for bus, rate in RATES.items():
-            for path in PATHS:
-                runs[bus][path].append(in_own_process(run, path, rate, seconds))
-    return {bus: {path: max(each, key=_judged) for path, each in paths.items()} for bus, paths in runs.items()}
+            runs[bus].append(in_own_process(run, rate, seconds))
+    return {bus: max(each, key=_judged) for bus, each in runs.items()}
 
 
 def _judged(found: Mapping[str, Any]) -> tuple[int, float]:

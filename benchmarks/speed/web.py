@@ -24,8 +24,7 @@ import uvloop
 
 from benchmarks.speed import live
 from benchmarks.speed.meter import command_of, free_port
-from gateway.bus.live.socketcan import SocketCanReceiver
-from gateway.bus.live.source import LiveSource
+from gateway.bus.live.source import LiveSource, opener_of
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
@@ -68,7 +67,7 @@ def serve(directory: str, port: int) -> None:
     store, board = Store.open(Path(directory)), Board()
     signal_map = load_signal_map("springscale:reference")
     wire = live.listening_socket()
-    source = LiveSource("socketcan", "bench", signal_map, open_receiver=lambda: SocketCanReceiver(wire, 8))
+    source = LiveSource("socketcan", "bench", signal_map, open_receiver=opener_of("socketcan", "bench", (), 8, {}))
     flow = Flow(BatchSettings(), signal_map.traits, None, "cross_spectrum", Identity())
     pipeline = Pipeline(source.inbox, Decoder(signal_map), flow, store, board)
     source.start()

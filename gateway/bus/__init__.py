@@ -4,6 +4,7 @@
 ``frames`` are columns, ``sink`` sends them to a bus again. Only this room imports python-can and cantools.
 """
 
+import logging
 import sys
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, cast
@@ -26,3 +27,5 @@ def _without(module: str) -> "Iterator[None]":
 # that is not used here (logs.mf4 is).
 with _without("asammdf"):
     import can  # noqa: F401 # before any other module imports it
+
+logging.getLogger("can").setLevel(logging.CRITICAL)  # its faults come as exceptions too, which we tell once

@@ -200,6 +200,16 @@ def test_bus_off_is_a_fault_until_frames_come_again(listen):
     wait_for(lambda: source.state is SourceState.RECEIVING)
 
 
+def test_bus_off_behind_frames_of_the_same_burst_is_no_silence(listen):
+    """The frames hid it, and soon the bus was called silent."""
+    source, interface = listen(Burst(frames(3), error_frames=1, is_bus_off=True), silence_s=0.02)
+    assert interface.is_played.wait(PATIENCE_S)
+    wait_for(lambda: source.state is SourceState.READER_FAULT)
+    time.sleep(0.1)
+    assert source.reason == "bus-off: ip link set can9 type can restart-ms 100"
+    assert source.counts().frames == 3
+
+
 def test_what_kills_the_thread_surfaces(listen):
     source, interface = listen(Burst(frames(1)), ZeroDivisionError("a bug"))
     wait_for(lambda: source.reason and "the receive thread died" in source.reason)

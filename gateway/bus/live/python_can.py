@@ -1,10 +1,17 @@
-"""Any python-can interface but SocketCAN (slcan, pcan, virtual, ...), only listened to."""
+"""Any interface of python-can (SocketCAN, slcan, pcan, virtual, ...), only listened to.
+
+Whether a SocketCAN controller itself stays silent on the wire (not even acknowledging) is the interface's setting:
+``ip link set can0 type can bitrate 500000 listen-only on``.
+"""
 
 import importlib.util
 import socket
+import struct
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
 from typing import Any, Final
 
 import can
@@ -15,8 +22,15 @@ from gateway.bus.signals import IdFilter
 from gateway.errors import BusError
 from gateway.records import EXTENDED_ID
 
-BURST_FRAMES: Final = 1024  # chosen: taken before they are handed on
+BURST_FRAMES: Final = 4096  # chosen: taken before they are handed on
+GATHER_S: Final = 0.05  # chosen: frames are left to gather in the kernel this long: few wake-ups
+RECEIVE_BUFFER_BYTES: Final = 4 << 20  # chosen: for what comes while this process does not get the processor
 VIRTUAL_QUEUE_FRAMES: Final = 4096  # chosen: an in-process sender waits when it is full
+
+_BUS_OFF: Final = 0x40  # CAN_ERR_BUSOFF of linux/can/error.h, in the identifier of an error frame
+_SO_RCVBUFFORCE: Final = 33  # linux/asm-generic/socket.h, as the next; the socket module names neither
+_SO_MEMINFO: Final = 55
+_MEMINFO: Final = struct.Struct("=9I")  # linux/sock_diag.h; the last is SK_MEMINFO_DROPS
 
 # The options that make an interface acknowledge nothing and send nothing, if python-can has a name for it
 _LISTEN_ONLY: Final[Mapping[str, Mapping[str, Any]]] = {
@@ -24,6 +38,7 @@ _LISTEN_ONLY: Final[Mapping[str, Mapping[str, Any]]] = {
     "vector": {"listen_only": True},
     "nixnet": {"listen_only": True},
     "virtual": {"rx_queue_size": VIRTUAL_QUEUE_FRAMES},
+    "socketcan": {"fd": True},
 }
 
 
@@ -45,12 +60,22 @@ _WINDOWS_ONLY: Final = frozenset({"etas", "ixxat", "nican", "nixnet", "systec", 
 class PythonCanReceiver:
     """Messages of an open python-can bus as bursts of frames."""
 
-    dropped_kernel = 0  # python-can does not report it
-
-    def __init__(self, bus: can.BusABC, width: int) -> None:
+    def __init__(self, bus: can.BusABC, width: int, kernel_socket: socket.socket | None = None) -> None:
+        """``kernel_socket`` is the bus's own, if the kernel receives into it (SocketCAN)."""
         self._bus = bus
         self._width = width
+        self._socket = kernel_socket
+        self._n_dropped = 0
         self._fault: Exception | None = None
+
+    @property
+    def dropped_kernel(self) -> int:
+        """Frames that found the socket's buffer full; 0 for other interfaces, which do not tell."""
+        if self._socket is not None:
+            with suppress(OSError, struct.error):  # closed meanwhile, or a kernel before 4.12
+                told = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMINFO.size)
+                self._n_dropped = _MEMINFO.unpack(told)[-1]
+        return self._n_dropped
 
     def receive(self, timeout_s: float) -> Burst:
         """The received messages, waiting up to ``timeout_s`` for a first one. Raises can.CanError or OSError.
@@ -63,6 +88,8 @@ class PythonCanReceiver:
                 message = self._bus.recv(0.0 if messages else timeout_s)
                 if message is None:
                     break
+                if not messages and self._socket is not None:
+                    time.sleep(GATHER_S)
                 messages.append(message)
         except (OSError, can.CanError) as fault:
             self._fault = fault
@@ -76,11 +103,18 @@ class PythonCanReceiver:
         return self._burst(messages)
 
     def _burst(self, messages: Sequence[can.Message]) -> Burst:
-        data = [m for m in messages if not (m.is_error_frame or m.is_remote_frame)]
-        for message in data:
-            if not 0.0 < message.timestamp <= LAST_SECOND:
-                message.timestamp = ExactStamp(time.time_ns())
-        return Burst(frames_of(data, self._width), sum(message.is_error_frame for message in messages))
+        data: list[can.Message] = []
+        n_errors, is_bus_off = 0, False
+        for message in messages:
+            if message.is_error_frame:
+                n_errors += 1
+                is_bus_off |= self._socket is not None and bool(message.arbitration_id & _BUS_OFF)
+            elif not message.is_remote_frame:
+                is_bus_off = False
+                if not 0.0 < message.timestamp <= LAST_SECOND:
+                    message.timestamp = ExactStamp(time.time_ns())
+                data.append(message)
+        return Burst(frames_of(data, self._width), n_errors, is_bus_off)
 
     def close(self) -> None:
         self._bus.shutdown()
@@ -89,7 +123,7 @@ class PythonCanReceiver:
 def open_python_can(
     interface: str, channel: str, filters: Sequence[IdFilter], width: int, options: Mapping[str, Any]
 ) -> PythonCanReceiver:
-    """Open a python-can bus for listening, filtered as far as the interface can.
+    """Open a bus for listening, filtered as far as the interface can; SocketCAN filters in the kernel.
 
     Raises BusError if its driver is missing or an option is wrong, can.CanError or OSError if the device is absent or
     busy.
@@ -103,7 +137,27 @@ def open_python_can(
         raise BusError(f"interface {interface!r} cannot be used here: {fault}; is its driver installed?") from fault
     except (TypeError, ValueError) as fault:
         raise BusError(f"interface {interface!r} does not take these [bus] options: {fault}") from fault
-    return PythonCanReceiver(bus, width)
+    if interface != "socketcan":
+        return PythonCanReceiver(bus, width)
+    kernel_socket: socket.socket = bus.socket  # type: ignore[attr-defined] # of SocketcanBus
+    with_enough_room(kernel_socket)
+    return PythonCanReceiver(bus, width, kernel_socket)
+
+
+def with_enough_room(kernel_socket: socket.socket) -> None:
+    """Ask the kernel for a large buffer; without CAP_NET_ADMIN the system's limit holds."""
+    try:
+        kernel_socket.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, RECEIVE_BUFFER_BYTES)
+    except PermissionError:
+        kernel_socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+
+
+def packets_received(channel: str) -> int:
+    """Number of frames a SocketCAN interface has received, before our filters; 0 if it does not say."""
+    try:
+        return int((Path("/sys/class/net") / channel / "statistics" / "rx_packets").read_text())
+    except (OSError, ValueError):
+        return 0
 
 
 def require_usable_interface(interface: str) -> None:

@@ -11,7 +11,7 @@ from gateway.records import Frames
 
 @dataclass(frozen=True, slots=True)
 class Burst:
-    """Frames that came together, in order of arrival, the number of error frames, and whether one said bus-off."""
+    """Frames that came together in order, the number of error frames, and whether bus-off came behind all frames."""
 
     frames: Frames
     error_frames: int = 0

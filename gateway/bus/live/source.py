@@ -17,9 +17,8 @@ from typing import Any, Final
 
 import can
 
-from gateway.bus.live.python_can import open_python_can, require_usable_interface
+from gateway.bus.live.python_can import open_python_can, packets_received, require_usable_interface
 from gateway.bus.live.receiver import Inbox, Receiver
-from gateway.bus.live.socketcan import open_socketcan, packets_received
 from gateway.bus.signals import IdFilter, SignalMap
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ThreadPart
@@ -176,15 +175,17 @@ class LiveSource(ThreadPart):
                 burst = receiver.receive(ASLEEP_POLL_S if self._state is SourceState.BUS_SILENT else POLL_S)
                 self._tally["frames"] += len(burst.frames)
                 self._tally["error_frames"] += burst.error_frames
-                is_bus_off = not len(burst.frames) and (is_bus_off or burst.is_bus_off)
+                is_bus_off = burst.is_bus_off or (is_bus_off and not len(burst.frames))
                 if len(burst.frames):
                     heard_s = time.monotonic()
                     self.inbox.put(burst.frames)
                     self._enter(SourceState.RECEIVING, None)
-                elif is_bus_off:
+                if is_bus_off:
                     self._enter(
                         SourceState.READER_FAULT, f"bus-off: ip link set {self._channel} type can restart-ms 100"
                     )
+                elif len(burst.frames):
+                    continue
                 elif time.monotonic() - heard_s > self._silence_s:
                     self._enter(SourceState.BUS_SILENT, self._silence())
                 elif self._state is SourceState.READER_FAULT:
@@ -215,9 +216,7 @@ class LiveSource(ThreadPart):
 def opener_of(
     interface: str, channel: str, filters: Sequence[IdFilter], width: int, options: Mapping[str, Any]
 ) -> OpenReceiver:
-    """Opens the channel with these filters, on SocketCAN or through python-can."""
-    if interface == "socketcan":
-        return lambda: open_socketcan(channel, filters, width)
+    """Opens the channel with these filters."""
     return lambda: open_python_can(interface, channel, filters, width, options)
 
 
