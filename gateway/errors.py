@@ -29,8 +29,8 @@ class CalibrationFileError(ConfigurationError):
     """A calibration file is missing, damaged, of another version or of another vehicle."""
 
 
-class LineError(ConfigurationError):
-    """Calibrations do not form a line, or a vehicle does not belong to a line."""
+class NoSisterError(ConfigurationError):
+    """A calibration cannot serve as a sister's, or the vehicle is of another model."""
 
 
 class RefusedError(SpringscaleError):

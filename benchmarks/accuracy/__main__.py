@@ -21,10 +21,8 @@ from benchmarks.accuracy import (
     coverage,
     delivery,
     disturbances,
-    false_facts,
     grades,
     phones,
-    siblings,
 )  # fmt: skip
 from benchmarks.accuracy import faults as on_faults
 from benchmarks.accuracy.budget import study as budget
@@ -41,8 +39,8 @@ from gateway.errors import SpringscaleError
 from gateway.offline.campaigns import inspect
 
 STUDIES: Final[tuple[Study[Any], ...]] = (
-    coverage.STUDY, budget.STUDY, disturbances.STUDY, grades.STUDY, delivery.STUDY, sensitivity.STUDY, siblings.STUDY,
-    phones.STUDY, availability.STUDY, false_facts.STUDY, alarms.STUDY,
+    coverage.STUDY, budget.STUDY, disturbances.STUDY, grades.STUDY, delivery.STUDY, sensitivity.STUDY,
+    phones.STUDY, availability.STUDY, alarms.STUDY,
 )  # fmt: skip
 Command = Callable[..., None]
 _workers = click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes")

@@ -11,7 +11,6 @@ import numpy as np
 from gateway.calibration.campaign import Campaign, file_sha256
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.file.calibration_file import CalibrationFile
-from gateway.calibration.file.line_file import LikeFile
 from gateway.calibration.file.parts import ExpectedErrorsPart, ProvenancePart, RunPart, SeenPart
 from gateway.calibration.half_car.fit import CrossSpectrumFit, fit_cross_spectrum
 from gateway.calibration.inheritance import Seen
@@ -19,11 +18,10 @@ from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Kind, Severity
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
-from gateway.calibration.line.line import Line
-from gateway.calibration.line_files import line_of_files, line_part
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.choice import StructureChoice
 from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
+from gateway.calibration.sister import Sister, sister_of
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, Batch
@@ -58,13 +56,13 @@ def calibrate_inspected(
     estimators: Sequence[str],
     bands: BandChoice = "campaign",
     structure: StructureChoice = "auto",
-    like: Sequence[LikeFile] = (),
+    like: CalibrationFile | None = None,
     command: str = "",
     on_fit: OnFit = lambda name, done, of: None,
 ) -> Outcome:
     """Fits every named estimator on the identification parts of the runs without a fault.
 
-    ``like`` are calibrations of vehicles of the same model, or a line file: they replace the prior of any vehicle.
+    ``like`` is the calibration of a vehicle of the same model: it replaces the prior of any vehicle.
     ``bands`` and ``structure`` are the ratio index's: found on the campaign, or named.
 
     An estimator that these runs do not determine is left out with a warning; raises CalibrationImpossibleError if none
@@ -72,23 +70,23 @@ def calibrate_inspected(
     """
     if inspection.refusal is not None:
         raise CalibrationImpossibleError(_refused(campaign, inspection, inspection.refusal))
-    line = line_of_files(like) if like else None
-    if line is not None:
+    sister = sister_of(like) if like else None
+    if sister is not None:
         inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)
     split = inspection.usable
     runs = [one.identification for one in split]
     counted = [batch for run in runs for batch in run.batches if not batch.rejected]
-    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, line, bands, structure, on_fit)
+    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, sister, bands, structure, on_fit)
     doubts = (
-        contradictions(runs, campaign.vehicle, cross_spectrum.calibration, inherited=line) if cross_spectrum else ()
+        contradictions(runs, campaign.vehicle, cross_spectrum.calibration, inherited=sister) if cross_spectrum else ()
     )
     warnings += [f"{one.kind}: {one.sentence}" for one in doubts]
     file = CalibrationFile(
         vehicle=campaign.vehicle,
-        seen=_seen(runs, counted, line.seen if line and cross_spectrum else None),
+        seen=_seen(runs, counted, sister.seen if sister and cross_spectrum else None),
         cross_spectrum=cross_spectrum.calibration if cross_spectrum else None,
         ratio_index=ratio_index.calibration if ratio_index else None,
-        line=line_part(line) if line and cross_spectrum else None,
+        sister_id=sister.id if sister and cross_spectrum else None,
         expected_errors=_expected_errors(ratio_index=ratio_index, cross_spectrum=cross_spectrum),
         warnings=(*inspection.warnings, *warnings),
         provenance=_provenance(campaign, split, command),
@@ -100,7 +98,7 @@ def _fit(
     estimators: Sequence[str],
     runs: Sequence[KnownRun],
     campaign: Campaign,
-    line: Line | None,
+    sister: Sister | None,
     bands: BandChoice,
     structure: StructureChoice,
     on_fit: OnFit,
@@ -117,7 +115,7 @@ def _fit(
                     runs, campaign.vehicle, bands=bands, structure=structure, progress=progress
                 )
             else:
-                cross_spectrum = fit_cross_spectrum(runs, campaign.vehicle, progress, line)
+                cross_spectrum = fit_cross_spectrum(runs, campaign.vehicle, progress, sister)
                 warnings.extend(cross_spectrum.calibration.warnings)
         except CalibrationImpossibleError as fault:
             warnings.append(f"{name}: {fault}")
@@ -137,15 +135,15 @@ def _refused(campaign: Campaign, inspection: Inspection, why: str) -> str:
     return "\n".join([f"{campaign.path}: {why}", *dict.fromkeys(faults)])
 
 
-def _seen(runs: Sequence[KnownRun], counted: Sequence[Batch], by_line: Seen | None) -> SeenPart:
-    """The ranges covered by the runs with a batch, and by the line before them."""
+def _seen(runs: Sequence[KnownRun], counted: Sequence[Batch], of_sister: Seen | None) -> SeenPart:
+    """The ranges covered by the runs with a batch, and by those of its sister."""
     driven = [run for run in runs if any(not batch.rejected for batch in run.batches)]
     return SeenPart(
-        payload_kg=_span([*(run.payload_kg for run in driven), *(by_line.payload_seen_kg if by_line else ())]),
+        payload_kg=_span([*(run.payload_kg for run in driven), *(of_sister.payload_seen_kg if of_sister else ())]),
         front_share_pct=_span(
-            [*(run.front_share_pct for run in driven), *(by_line.front_share_seen_pct if by_line else ())]
+            [*(run.front_share_pct for run in driven), *(of_sister.front_share_seen_pct if of_sister else ())]
         ),
-        speed_mps=_span([*(b.mean_speed_mps for b in counted), *(by_line.speed_seen_mps if by_line else ())]),
+        speed_mps=_span([*(b.mean_speed_mps for b in counted), *(of_sister.speed_seen_mps if of_sister else ())]),
         roughness_mps2=_roughness_span(counted),
         sensor_rate_hz=sensor_rate_seen_hz(runs),
     )

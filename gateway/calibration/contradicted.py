@@ -1,9 +1,9 @@
-"""Contradictions between a drive and the stated facts of the vehicle: its weight, its wheelbase, its line, its sensor.
+"""Contradictions between a drive and the stated facts of the vehicle: its weight, its wheelbase, its model, its sensor.
 
     contradictions(runs, vehicle, calibration, inherited) -> the doubts, none if all agrees
 
 A fit takes the stated facts for true, and bends springs and dampers until the drive fits. Their shift, compared with
-its expected size (the prior: of the line, or of any vehicle), reveals a false fact. With prior N(m, P), posterior N(x,
+its expected size (the prior: of a sister, or of any vehicle), reveals a false fact. With prior N(m, P), posterior N(x,
 C) and directions D in which a false fact moves the parameters, the marginal likelihood of the drive is Gaussian in the
 amount b of that fact:
 
@@ -35,8 +35,8 @@ from gateway.records import F64
 from gateway.stated.doubt import Doubt, DoubtKind
 
 SELDOM: Final = 1e-3  # chosen: probability of doubting true weights; a question costs less than a false calibration
-SELDOM_LINE: Final = 1e-4  # chosen: probability of doubting a vehicle that is of the line
-LINES_DIFFER: Final = 2.0  # chosen: variance within a line over its default
+SELDOM_SISTER: Final = 1e-4  # chosen: probability of doubting a vehicle that is of its sister's model
+SISTERS_DIFFER: Final = 2.0  # chosen: variance within a model over its default
 STATED_STD: Final = 0.02  # chosen: of each axle's weight, for fuel, driver, loose items and the scales' step
 DOUBTED_STDS: Final = 4.0  # chosen: of a length estimated from the drive
 LOOKED_STDS: Final = 3.0  # chosen: of the time between the axles; beyond it the fit is repeated with this time free
@@ -94,7 +94,7 @@ def contradictions(
         found += _wheelbase(fitted, vehicle)
     found += _weight(fitted, vehicle)
     if inherited is not None and not any(one.kind is not DoubtKind.DRIVEN_SENSOR for one in found):
-        found += _line(fitted)
+        found += _model(fitted)
     return tuple(found)
 
 
@@ -156,8 +156,8 @@ def _axle_directions(vehicle: Vehicle) -> F64:
     return directions
 
 
-def _line(fitted: _Fitted) -> Iterator[Doubt]:
-    """Whether it is of this line at all: all figures that vehicles of a line share, each by itself."""
+def _model(fitted: _Fitted) -> Iterator[Doubt]:
+    """Whether it is of its sister's model at all: all figures that such vehicles share, each by itself."""
     off, covariance = fitted.amount(np.eye(_N)[:, _BUILT])
-    if off @ np.linalg.solve(LINES_DIFFER * covariance, off) > special.chdtri(len(_BUILT), SELDOM_LINE):
-        yield Doubt.of(DoubtKind.DRIVEN_LINE)
+    if off @ np.linalg.solve(SISTERS_DIFFER * covariance, off) > special.chdtri(len(_BUILT), SELDOM_SISTER):
+        yield Doubt.of(DoubtKind.DRIVEN_SISTER)

@@ -31,7 +31,6 @@ _COMMANDS = {
     "feed": "Send an IMU of Linux IIO and a receiver behind gpsd onto a CAN interface.",
     "fleet-report": "A fleet's data set as pages: each vehicle and what needs attention.",
     "import": "Make a log from the recording of a phone: Sensor Logger or phyphox.",
-    "line": "Build the line of several vehicles, so that the next one is calibrated by an empty drive.",
     "look": "The content of an unknown log, and a first signal map from it.",
     "record": "Record the mapped frames of a bus into a log.",
     "replay": "Send a log to a bus, paced by its time stamps.",

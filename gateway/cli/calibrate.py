@@ -9,19 +9,18 @@ import click
 
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.file.calibration_file import CalibrationFile
-from gateway.calibration.file.line_file import LikeFile, load_like
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.judgement.assessment import assess_calibration
 from gateway.calibration.judgement.learning_curve import LearningCurve, curve_of
 from gateway.calibration.judgement.verdict import summary_of, verdicts_of
-from gateway.calibration.line_files import line_of_files
 from gateway.calibration.plan.plan import LoadPlan, StatedWidths, plan_first, plan_next, stated_widths, usual_drive
 from gateway.calibration.plan.words import plan_sentences, widths_sentence
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.choice import StructureChoice
+from gateway.calibration.sister import sister_of
 from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, require_output_place, window
 from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
@@ -103,8 +102,8 @@ def inspection_json(inspection: Inspection) -> dict[str, object]:
     "--like",
     "like",
     type=FILE,
-    multiple=True,
-    help="calibration of a sister vehicle, or a line file; repeatable. One empty drive is then enough",
+    default=None,
+    help="calibration of a vehicle of the same model, as the prior: one empty drive is then enough",
 )
 @click.option(
     "--bands",
@@ -138,7 +137,7 @@ def calibrate(
     output: Path | None,
     estimators: tuple[str, ...],
     numbers: tuple[int, ...] | None,
-    like: tuple[Path, ...],
+    like: Path | None,
     bands: BandChoice,
     structure: StructureChoice,
     wants_plan: bool,
@@ -158,15 +157,15 @@ def calibrate(
     _require_places(output, report)
     loaded = load_campaign(campaign, may_lack_runs=wants_plan)
     _ask_for_payload_range(loaded, is_needed=wants_plan)
-    sisters = [load_like(path) for path in like]
+    sister = load_calibration(like) if like else None
     if not loaded.runs:
-        first = plan_first(loaded.vehicle, inherited=line_of_files(sisters) if sisters else None)
+        first = plan_first(loaded.vehicle, inherited=sister_of(sister) if sister else None)
         click.echo(json_line({"plan": first.to_json()}) if as_json else plan_sentences(first))
         return
     with counted("reading drives") as on_run:
         inspection = inspect(loaded, batch_settings(window_s), numbers=numbers, on_run=on_run)
-    if sisters:
-        inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)  # other loads were driven with the sisters
+    if sister:
+        inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)  # other loads were driven with the sister
     _tell_inspection(inspection, as_json=as_json, is_all=only_checks)
     if inspection.refusal is not None:
         raise CalibrationImpossibleError(f"{campaign}: {inspection.refusal}; the findings say how to mend it")
@@ -179,8 +178,8 @@ def calibrate(
             estimators=estimators or ESTIMATOR_NAMES,
             bands=bands,
             structure=structure,
-            like=sisters,
-            command=_command(campaign, estimators, numbers, sisters, bands, structure, window_s),
+            like=sister,
+            command=_command(campaign, estimators, numbers, sister, bands, structure, window_s),
             on_fit=on_share(on_step, estimators or ESTIMATOR_NAMES),
         )
     if output is not None:
@@ -205,19 +204,19 @@ def _command(
     campaign: Path,
     estimators: Sequence[str],
     numbers: Sequence[int] | None,
-    like: Sequence[LikeFile],
+    like: CalibrationFile | None,
     bands: BandChoice,
     structure: StructureChoice,
     window_s: float | None,
 ) -> str:
     """The options that decide the result: the calibration's id depends on them too.
 
-    Sisters by their ids. Without the places of its files: the same drives give the same calibration under any name.
+    The sister by her id. Without the places of its files: the same drives give the same calibration under any name.
     """
     words = ["springscale", "calibrate", campaign.name]
     words += [word for name in estimators for word in ("--estimator", name)]
     words += [] if numbers is None else ["--runs", ",".join(map(str, numbers))]
-    words += [word for one in like for word in ("--like", one.id)]
+    words += [] if like is None else ["--like", like.id]
     words += ["--bands", bands, "--structure", structure]
     words += [] if window_s is None else ["--window-s", f"{window_s:g}"]
     return shlex.join(words)
@@ -307,7 +306,7 @@ def _sentences(
         f"{output or 'no file written'}: {', '.join(file.estimators)}; payloads {low:g} to {high:g} kg, "
         f"{len(file.provenance.runs)} runs, {sum(run.n_batches for run in file.provenance.runs)} batches",
         f"id {file.id}",
-        *([f"inherited from {len(file.line.members)} of its line"] if file.line else []),
+        *([f"prior from its sister {file.sister_id}"] if file.sister_id else []),
         *(f"warning: {warning}" for warning in file.warnings if warning not in said),
         *([widths_sentence(widths)] if widths else []),
         *([plan_sentences(plan)] if plan else []),

@@ -21,7 +21,7 @@ from gateway.calibration.file.comparison import (
     differences,
     figures_of,
 )
-from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart
+from gateway.calibration.file.parts import ExpectedErrorsPart
 from gateway.cli.known_weights import tare_commands, ticket_commands
 from gateway.cli.options import FILE, NumberRange, Told, as_json, prints
 from gateway.records import json_line
@@ -111,12 +111,10 @@ def sprung(
 
 def _own_checks(held: CalibrationFile) -> tuple[Check, ...]:
     """Checks that reading the file has already made."""
-    members = held.line.members if held.line else ()
     return (
         Check("content", CheckResult.GOOD, f"matches its id {held.id}"),
         Check("shape", CheckResult.GOOD, f"version {held.version}"),
         Check("model", CheckResult.GOOD, f"known to this springscale: {', '.join(held.estimators) or 'no estimator'}"),
-        *(Check("line", CheckResult.GOOD, f"inherited from {member}, kept in this file") for member in members),
     )
 
 
@@ -154,9 +152,9 @@ def calibration_text(held: CalibrationFile) -> str:
         "vehicle (as the campaign stated it)": _vehicle(held),
         "calibrated for": _ranges(held),
         "expected errors (runs left out of the fit)": _expected(held),
-        **({"inherited from its line": _line(held.line)} if held.line else {}),
+        **({"prior from its sister": (held.sister_id,)} if held.sister_id else {}),
         **{
-            f"{part}: {len(figures)} parameters ± their standard deviations": _figures(figures, held.line)
+            f"{part}: {len(figures)} parameters ± their standard deviations": _figures(figures)
             for part, figures in figures_of(held).items()
         },
         "warnings": held.warnings or ("none",),
@@ -197,17 +195,9 @@ def _errors(errors: ExpectedErrorsPart) -> str:
     return ", ".join(parts)
 
 
-def _figures(figures: Sequence[FittedFigure], line: LinePart | None) -> Iterator[str]:
-    """With a line, inherited parameters are distinguished from the vehicle's own."""
+def _figures(figures: Sequence[FittedFigure]) -> Iterator[str]:
     for figure in figures:
-        row = f"{figure.name:28}{figure.centre:>12.5g} ± {figure.std:.2g}"
-        yield row if line is None else f"{row:52}{'inherited' if figure.name in line.scatter_std else 'its own'}"
-
-
-def _line(line: LinePart) -> Iterator[str]:
-    scatter = f"estimated from {line.n_siblings} of them" if line.n_siblings else "the defaults"
-    yield f"{'scatter between vehicles':28}{scatter}"
-    yield from (f"{'ancestor':28}{member}" for member in line.members)
+        yield f"{figure.name:28}{figure.centre:>12.5g} ± {figure.std:.2g}"
 
 
 def _provenance(held: CalibrationFile) -> Iterator[str]:

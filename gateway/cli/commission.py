@@ -2,21 +2,19 @@
 
 import sys
 import time
-from pathlib import Path
 from typing import Any, Final
 
 import click
 
-from gateway.cli.options import FILE, NUMBER, as_json
+from gateway.cli.options import NUMBER, as_json
 from gateway.cli.progress import StatusLine
 from gateway.cli.service import Answer, Service, asks_service, prints_answer
 from gateway.core.vehicle import Carries
-from gateway.errors import ConfigurationError, SpringscaleError
+from gateway.errors import SpringscaleError
 from gateway.records import json_line
 from gateway.words import one_or_more
 
 STEPS: Final = {
-    "line": "choose the line that this vehicle is of",
     "vehicle": "state its axle weights, wheelbase, and the sensor's position",
     "empty": "state that it is empty, and drive",
     "drive": "drive, empty, on any ordinary road above 20 km/h",
@@ -77,25 +75,13 @@ def progress_text(underway: Answer) -> str:
     )
 
 
-def lines_text(items: list[Answer]) -> str:
-    """The lines with numbers to choose from."""
-    if not items:
-        return "there is no line: `springscale commission upload FILE` adds one, or continue without"
-    return "\n".join(
-        f"{n}: {item['name']} ({item['source']}): {item['fault'] or _line_text(item['vehicle'])}"
-        for n, item in enumerate(items, 1)
-    )
-
-
-def _line_text(vehicle: Answer) -> str:
-    return f"{vehicle['name']}, wheelbase {vehicle['wheelbase_m']:g} m"
-
-
 def _made_text(made: Answer) -> str:
-    line = f"of the line {made['line']['name']}" if made["line"]["name"] else "without a line"
+    sister = f"like {made['sister']}" if made["sister"] else "like any vehicle"
     note = f" ({made['note']})" if made["note"] else ""
     windows = one_or_more(made["n_batches"], "window", "windows")
-    return f"{made['id'][:19]} {made['vehicle_name']} {line}, {windows}, made {made['at'][:19]}Z by {made['by']}{note}"
+    return (
+        f"{made['id'][:19]} {made['vehicle_name']} {sister}, {windows}, made {made['at'][:19]}Z by {made['by']}{note}"
+    )
 
 
 def end_text(ended: Answer | None) -> str:
@@ -106,7 +92,6 @@ def end_text(ended: Answer | None) -> str:
 PATH: Final = "/api/v1/calibration/commissioning"
 LOOK_EVERY_S: Final = 5.0  # chosen: seconds between two looks at the progress
 MOST_UNANSWERED: Final = 6  # chosen: looks, half a minute: a restart with another calibration takes seconds
-NO_LINE: Final = "none"
 MOST_PAYLOAD: Final = "payload_range_kg"
 SAID: Final = {  # option: key of the vehicle, question, whether it must be answered
     "front_axle_kg": ("kerb_front_axle_kg", "Under the front axle, empty [kg]", True),
@@ -127,11 +112,10 @@ SAID: Final = {  # option: key of the vehicle, question, whether it must be answ
 
 @click.group("commission")
 def commission() -> None:
-    """Calibrate the vehicle of a running service from its axle weights and an empty drive, of a line or without."""
+    """Calibrate the vehicle of a running service from its axle weights and an empty drive."""
 
 
 @commission.command("start")
-@click.option("--line", default=None, help="name of a line (`commission lines`), a file to upload, or `none`")
 @click.option("--name", default=None, help="name of the vehicle [default: its id]")
 @click.option("--front-axle-kg", type=NUMBER, default=None, help="under the front axle of the empty vehicle")
 @click.option("--rear-axle-kg", type=NUMBER, default=None, help="the same at the rear")
@@ -141,7 +125,7 @@ def commission() -> None:
     "--sensor-left-m", type=NUMBER, default=None, help="sensor left of the centre line; negative: right of it"
 )
 @click.option("--track-m", type=NUMBER, default=None, help="between the middles of left and right tyres")
-@click.option("--payload-kg", type=NUMBER, default=None, help="maximum payload [default: as its line, else 450]")
+@click.option("--payload-kg", type=NUMBER, default=None, help="maximum payload [default: as its sister, else 450]")
 @click.option(
     "--carries", type=click.Choice([str(one) for one in Carries]), default=None, help="what it usually carries"
 )
@@ -159,7 +143,6 @@ def commission() -> None:
 @as_json
 def start(
     service: Service,
-    line: str | None,
     empty: bool,
     sure: bool,
     note: str | None,
@@ -171,8 +154,6 @@ def start(
     state = service.ask(PATH)
     if state["underway"] is None:
         state = service.ask(PATH, "POST", {} if note is None else {"note": note})
-    if line is not None or state["underway"]["step"] == "line":
-        state = service.ask(f"{PATH}/line", "POST", {"line": _line(service, line)})
     if any(answer is not None for answer in said.values()) or state["underway"]["vehicle"] is None:
         state = service.ask(f"{PATH}/vehicle", "POST", _vehicle(said))
     if doubts := state["underway"]["doubts"]:
@@ -196,21 +177,6 @@ def start(
 def show(service: Service) -> Answer:
     """The commissioning under way, the findings of inspection, the progress, and earlier calibrations."""
     return service.ask(PATH)
-
-
-@commission.command("lines")
-@prints_answer(lambda told: lines_text(told["items"]))
-def lines(service: Service) -> Answer:
-    """The available lines."""
-    return service.ask(f"{PATH}/lines")
-
-
-@commission.command("upload")
-@click.argument("file", type=FILE)
-@prints_answer(lambda told: lines_text(told["items"]))
-def upload(service: Service, file: Path) -> Answer:
-    """Upload the calibration of a vehicle of the same model or a line file to the service."""
-    return _upload(service, file)
 
 
 def _add_step(name: str, words: str, method: str, step: str = "", body: Answer | None = None) -> None:
@@ -250,41 +216,6 @@ def undo(service: Service, factory: bool) -> Answer:
 
 def _is_at_terminal() -> bool:
     return sys.stdin.isatty()
-
-
-def _line(service: Service, said: str | None) -> dict[str, str] | None:
-    """The line that was named, uploaded, or chosen at the terminal."""
-    if said == NO_LINE:
-        return None
-    items = service.ask(f"{PATH}/lines")["items"]
-    if said is None:
-        items = [item for item in items if item["fault"] is None]
-        if not items:
-            click.echo(lines_text(items), err=True)
-            return None
-        if not _is_at_terminal():
-            raise click.UsageError(f"say --line NAME, or --line {NO_LINE}; there are:\n{lines_text(items)}")
-        click.echo(f"0: none, as any vehicle\n{lines_text(items)}")
-        number = click.prompt("Which line is it of", type=click.IntRange(0, len(items)))
-        return None if number == 0 else _named(items[number - 1])
-    known = [item for item in items if item["name"] == said]
-    if not known and Path(said).is_file():
-        known = [one for one in _upload(service, Path(said))["items"] if one["name"] == Path(said).name]
-    if not known:
-        raise ConfigurationError(f"--line {said}: no such line, and no such file; there are:\n{lines_text(items)}")
-    return _named(known[-1])
-
-
-def _named(item: Answer) -> dict[str, str]:
-    return {"name": item["name"], "source": item["source"]}
-
-
-def _upload(service: Service, file: Path) -> Answer:
-    try:
-        body = {"name": file.name, "content": file.read_text(encoding="utf-8")}
-    except (OSError, UnicodeDecodeError) as fault:
-        raise ConfigurationError(f"{file}: cannot be read: {fault}") from None
-    return service.ask(f"{PATH}/lines", "POST", body)
 
 
 def _vehicle(said: Answer) -> Answer:

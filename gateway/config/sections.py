@@ -53,7 +53,7 @@ class CommissioningSection(SettingsSection):
     """Calibrating on the vehicle itself, from an empty drive."""
 
     is_allowed: bool = Field(True, description="whether users with scope operate may make a calibration here")
-    lines: Path | None = Field(None, description="folder with calibrations of sister vehicles and line files to choose")
+    like: Path | None = Field(None, description="calibration file of a vehicle of the same model: the prior of the fit")
     goal_pct: float = Field(
         4.5,
         ge=0.5,

@@ -5,14 +5,15 @@ from importlib.metadata import version
 
 from gateway.bus.live.source import LiveSource, OpenReceiver
 from gateway.bus.ring_log import RingLog
+from gateway.calibration.file.calibration_file import load_calibration
 from gateway.calibration.kept.shelf import FOLDER, Shelf, ShelfLimits
+from gateway.calibration.sister import sister_of
 from gateway.config import BusSection, Settings, StoreSection
 from gateway.config.sections import KeepSection
 from gateway.core.flow import Flow
 from gateway.log import Event, log_event
 from gateway.service.calibration_in_use import why_not_allowed
 from gateway.service.commissioning.empty_drive import ServiceVehicle
-from gateway.service.commissioning.lines import Lines
 from gateway.service.commissioning.session import Commissioning
 from gateway.service.keeper import BatchKeeper
 from gateway.setup import Setup
@@ -84,12 +85,12 @@ def keeper_of(wanted: KeepSection, store: StoreSection, setup: Setup) -> BatchKe
 def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow: Flow, store: Store) -> Commissioning:
     """The commissioning, subscribed to every batch that the flow passes to the keeper."""
     own_name = settings.vehicle.calibrated_as
-    directory = settings.store.directory
+    directory, path = settings.store.directory, settings.commissioning.like
+    like = load_calibration(path) if path else None
     desk = Commissioning(
         directory,
         settings.commissioning,
         settings.batch.for_core(),
-        Lines(directory, settings.commissioning.lines),
         keeper.shelf,
         flow.scheduler,
         ServiceVehicle(
@@ -98,6 +99,8 @@ def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow
             is_calibrated=setup.calibration is not None,
             why_not_allowed=why_not_allowed(settings),
             is_name_fixed=own_name is not None,
+            like=settings.commissioning.like,
+            sister=sister_of(like).vehicle if like else None,
         ),
         on_event=store.write_event,
     )

@@ -7,25 +7,9 @@ from pydantic import ConfigDict, Field
 from gateway.stated.doubt import DoubtKind
 from gateway.stated.facts import Instant, Part, VehicleAnswers
 
-LineSource = Literal["package", "administrator", "uploaded"]
-
 
 class _Told(Part):
     model_config = ConfigDict(from_attributes=True, extra="ignore")  # the record holds more than is shown
-
-
-class LineTold(_Told):
-    """The chosen line; no name: none."""
-
-    name: str
-    id: str | None
-    source: LineSource | None
-
-
-class ChosenLine(LineTold):
-    """The same with those of its figures that prefill the form."""
-
-    vehicle: dict[str, object]
 
 
 class DoubtTold(_Told):
@@ -79,11 +63,10 @@ class LearnedTold(_Told):
 class UnderwayTold(_Told):
     """The commissioning under way, and its next step."""
 
-    step: Literal["line", "vehicle", "empty", "drive", "fit"]
+    step: Literal["vehicle", "empty", "drive", "fit"]
     begun_at: Instant
     by: str
     note: str | None
-    line: ChosenLine | None
     vehicle: VehicleAnswers | None
     empty: EmptyTold | None = Field(description="null: nobody has said that it is empty")
     doubts: list[DoubtTold] = Field(description="what is asked still")
@@ -112,7 +95,7 @@ class MadeTold(_Told):
     at: Instant
     by: str
     note: str | None
-    line: LineTold
+    sister: str | None = Field(description="name of the vehicle whose calibration gave the prior; null: none")
     vehicle_name: str
     n_batches: int
     learned: LearnedTold | None
@@ -130,19 +113,3 @@ class CommissioningState(_Told):
     is_pending: bool = Field(description="another calibration than the one at work counts from the next drive on")
     active: MadeTold | None = Field(description="null: the calibration that the settings name, if any")
     history: list[MadeTold]
-
-
-class LineFoundTold(_Told):
-    """A file to choose; a fault says why it cannot be used. ``vehicle`` are its figures, to fill a form with."""
-
-    name: str
-    source: LineSource
-    id: str | None
-    vehicle: dict[str, object] | None
-    fault: str | None
-
-
-class LinesFound(_Told):
-    """Every line there is."""
-
-    items: list[LineFoundTold]

@@ -37,15 +37,15 @@ class DoubtKind(StrEnum):
     FRONT_SHARE = ("front_share",
         "{front_pct:.0f} % of the empty weight on the front axle: vehicles have {low_pct:.0f} to {high_pct:.0f} %",
         "were front and rear exchanged, or was one axle weighed with a load? " + _SCALES)
-    LINE_MASS = ("line_mass",
-        "{gross_kg:.0f} kg empty: the vehicles of its line weigh about {line_kg:.0f} kg",
-        _SCALES + "; or choose another line")
-    LINE_AXLES = ("line_axles",
-        "{front_kg:.0f} kg in front and {rear_kg:.0f} kg at the rear: its sister weighs {line_front_kg:.0f} and "
-        "{line_rear_kg:.0f} kg there",
-        _SCALES + "; or choose another line")
-    LINE_TRACK = ("line_track",
-        "a track of {track_m:g} m: its line has {line_m:g} m",
+    SISTER_MASS = ("sister_mass",
+        "{gross_kg:.0f} kg empty: its sister weighs about {sister_kg:.0f} kg",
+        _SCALES + "; or name another sister in the settings")
+    SISTER_AXLES = ("sister_axles",
+        "{front_kg:.0f} kg in front and {rear_kg:.0f} kg at the rear: its sister weighs {sister_front_kg:.0f} and "
+        "{sister_rear_kg:.0f} kg there",
+        _SCALES + "; or name another sister in the settings")
+    SISTER_TRACK = ("sister_track",
+        "a track of {track_m:g} m: its sister has {sister_m:g} m",
         "measure between the middles of the left and the right tyre")
     SENSOR_PLACE = ("sensor_place",
         "a sensor {sensor_m:g} m behind the front axle, with axles {wheelbase_m:g} m apart, is outside the vehicle",
@@ -85,10 +85,10 @@ class DoubtKind(StrEnum):
         "by the way it moves the vehicle weighs {front_kg:.0f} ± {front_95_kg:.0f} kg in front and {rear_kg:.0f} ± "
         "{rear_95_kg:.0f} kg at the rear (95 %), not {said_front_kg:.0f} and {said_rear_kg:.0f}",
         "check that nothing is loaded and read the axle weights again; then drive empty again. If both are "
-        "right, it is not of this line")
-    DRIVEN_LINE = ("driven_line",
-        "springs, dampers and tyres differ from those of its line by more than vehicles of one line do",
-        "choose another line, or none; worn dampers and a wrong tyre pressure look like this too")
+        "right, it is of another model than its sister")
+    DRIVEN_SISTER = ("driven_sister",
+        "springs, dampers and tyres differ from its sister's by more than those of one model do",
+        "calibrate like another sister, or like none; worn dampers and a wrong tyre pressure look like this too")
     DRIVEN_WHEELBASE = ("driven_wheelbase",
         "bumps reach the rear axle as if it were {found_m:.2f} ± {within_m:.2f} m behind the front axle, not "
         "{said_m:g} m",

@@ -36,10 +36,16 @@ ANSWERS = {
 
 
 @pytest.fixture
-def config(tmp_path: Path) -> Path:
-    """A service without a calibration on a bus of the test's own."""
+def sister(tmp_path: Path) -> CalibrationFile:
+    return a_sister(tmp_path / "sister")
+
+
+@pytest.fixture
+def config(tmp_path: Path, sister: CalibrationFile) -> Path:
+    """A service without a calibration of its own on a bus of the test's own; it knows a sister."""
+    (tmp_path / "sister.json").write_text(sister.to_json())
     batch = {"batch__window_s": WINDOW_S, "batch__provisional_every_s": 0.0, "batch__silence_s": 2.0}
-    return service_config(tmp_path, vehicle__id="van-17", **batch)
+    return service_config(tmp_path, vehicle__id="van-17", commissioning__like="sister.json", **batch)
 
 
 def a_sister(folder: Path) -> CalibrationFile:
@@ -53,26 +59,22 @@ def calibrated_at_a_desk(campaign_path: Path, sister: CalibrationFile) -> Calibr
     """As `springscale calibrate --runs 1 --like` does."""
     campaign = load_campaign(campaign_path)
     inspection = inspect(campaign, SETTINGS, numbers=[1])
-    return calibrate_inspected(campaign, inspection, estimators=("cross_spectrum",), like=[sister]).file
+    return calibrate_inspected(campaign, inspection, estimators=("cross_spectrum",), like=sister).file
 
 
-def test_commissioned_over_http_it_weighs_as_calibrated_at_a_desk(config: Path, tmp_path: Path) -> None:
+def test_commissioned_over_http_it_weighs_as_calibrated_at_a_desk(
+    config: Path, sister: CalibrationFile, tmp_path: Path
+) -> None:
     campaign = write_known_loads(tmp_path, LOADS, DRIVEN_S, identification_fraction=1.0)
-    sister = a_sister(tmp_path / "sister")
     said: dict[str, Any] = {}
 
     def meet(running: Running) -> None:
         assert running.http(COMMISSIONING)["is_offered"]
         assert running.step("vehicle", ANSWERS)["reason"] == "not_begun"
-        assert running.step("", {"note": "in the yard"})["underway"]["step"] == "line"
-        assert running.step("vehicle", ANSWERS)["reason"] == "wrong_step"
-        assert running.step("line", {"line": {"name": "sister.json", "source": "uploaded"}})["reason"] == "no_such_line"
-        found = running.step("lines", {"name": "sister.json", "content": sister.to_json()})["items"]
-        assert [(one["name"], one["id"], one["fault"]) for one in found] == [("sister.json", sister.id, None)]
-        chosen = running.step("line", {"line": {"name": "sister.json", "source": "uploaded"}})
-        assert (chosen["underway"]["step"], chosen["underway"]["line"]["id"]) == ("vehicle", sister.id)
+        assert running.step("", {"note": "in the yard"})["underway"]["step"] == "vehicle"
+        assert running.step("empty", {"is_empty": True})["reason"] == "wrong_step"
         other = running.step("vehicle", {**ANSWERS, "wheelbase_m": 3.5})
-        assert (other["reason"], "another model" in other["detail"]) == ("not_of_the_line", True)
+        assert (other["reason"], "another model" in other["detail"]) == ("not_its_sister", True)
         assert running.step("vehicle", ANSWERS)["underway"]["step"] == "empty"
         assert running.step("empty", {"is_empty": True})["underway"]["step"] == "drive"
         assert running.step("fit", {})["reason"] == "no_batch"

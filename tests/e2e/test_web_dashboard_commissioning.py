@@ -3,14 +3,14 @@
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
 from support.browser import expect
-from support.calibrated import calibration_file
-from support.commissioning import ANSWERS, NOW_NS, Bench, fitted, in_steps
+from support.commissioning import ANSWERS, NOW_NS, Bench, fitted, in_steps, replaced
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Look, Watched
 from support.estimates import make_estimate
 from support.web import Gateway, serving
@@ -61,22 +61,13 @@ def fill(page: Any, *answers: str) -> None:
         page.get_by_label(label).fill(said)
 
 
-def test_a_fitter_walks_through_it(gateway: Gateway, bench: Bench, browser: Any, tmp_path: Path) -> None:
-    sister = tmp_path / "sister.json"
-    sister.write_text(calibration_file().to_json())
+def test_a_fitter_walks_through_it(gateway: Gateway, bench: Bench, browser: Any) -> None:
     watched = Watched(browser, **PHONE)
     page = watched.page
     with serving(gateway.app) as server:
         page.goto(server.url)
         expect(page.locator("#commissioning-said")).to_contain_text("This vehicle is not calibrated.")
         page.get_by_role("button", name="Commission …").click()
-        expect(page.get_by_text("Which vehicles is it like?")).to_be_visible()
-        page.locator("#commissioning-file").set_input_files(str(sister))
-        page.get_by_role("button", name="Take this line").click()
-        expect(page.locator("#commissioning-refusal")).to_contain_text("has no cross_spectrum calibration")
-        page.locator("#commissioning-file").set_input_files([])
-        page.locator("#commissioning-choice").select_option("")
-        page.get_by_role("button", name="Take this line").click()
         expect(page.get_by_label("Under the front axle [kg]")).to_be_visible()
         assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
         fill(page, "690", "20", "2.75", "1.2")
@@ -108,7 +99,7 @@ def test_a_fitter_walks_through_it(gateway: Gateway, bench: Bench, browser: Any,
         bench.worker.finish(fitted(payload_std_kg=15.0))
         news(gateway, watched)
         expect(page.locator("#commissioning-said")).to_contain_text("It counts from the next drive on")
-        expect(page.locator("#commissioning-in-use")).to_contain_text("without a line, from 2 windows")
+        expect(page.locator("#commissioning-in-use")).to_contain_text("like any vehicle, from 2 windows")
         assert watched.complaints == [] or all("409" in said for said in watched.complaints)
         gateway.board.close()
     page.close()
@@ -120,7 +111,7 @@ def test_what_was_made_is_undone_after_a_question(bench: Bench, watched: Watched
         bench.drive(n)
     bench.worker.finish(fitted())
     page = dashboard()
-    expect(page.locator("#commissioning-in-use")).to_contain_text("van-17, without a line, from 2 windows")
+    expect(page.locator("#commissioning-in-use")).to_contain_text("van-17, like any vehicle, from 2 windows")
     page.locator("#commissioning-undo").click()
     page.get_by_role("button", name="Yes").click()
     expect(page.locator("#commissioning-in-use")).to_contain_text("the one named in the settings")
@@ -165,16 +156,14 @@ ENGLISH = re.compile(
 
 
 @pytest.fixture
-def with_line(tmp_path: Path) -> Iterator[tuple[Gateway, Bench]]:
-    """A sister in the administrator's folder: 700 kg on each axle, 2.8 m from axle to axle, 900 kg of payload."""
+def with_sister(tmp_path: Path) -> Iterator[tuple[Gateway, Bench]]:
+    """A sister: 700 kg on each axle, 2.8 m from axle to axle, 900 kg of payload."""
     sister = json.loads((Path(str(files("gateway"))) / "demo" / "paper_van.json").read_text())
     sister["vehicle"] |= {
         "payload_range_kg": [0.0, 900.0], "track_width_m": 1.6, "kerb_front_axle_kg": 700.0, "kerb_rear_axle_kg": 700.0,
     }  # fmt: skip
     held = CalibrationFile.model_validate({key: part for key, part in sister.items() if key != "id"})
-    (tmp_path / "lines").mkdir()
-    (tmp_path / "lines" / "sister.json").write_text(held.to_json())
-    bench = Bench(tmp_path / "service", lines=tmp_path / "lines")
+    bench = Bench(tmp_path / "service", replaced(sister=replace(held.vehicle, name="van-16")))
     with Gateway(tmp_path / "store", commissioning=bench.desk) as opened:
         opened.status = STATUS.model_copy(update={"calibration_id": None})
         yield opened, bench
@@ -189,7 +178,7 @@ def in_order(page: Any, locale: str) -> None:
     """No English where German is spoken, contrast, and no sideways scrolling."""
     card = page.locator("#commissioning")
     if locale.startswith("de"):
-        said = card.inner_text().replace("van-17", "").replace("sister.json", "").splitlines()
+        said = card.inner_text().replace("van-17", "").replace("van-16", "").splitlines()
         assert [line for line in said if ENGLISH.search(line)] == []
     assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
@@ -207,19 +196,16 @@ def seen(request: pytest.FixtureRequest, browser: Any) -> Iterator[tuple[Watched
 
 
 def test_unlikely_answers_are_asked_about_and_nothing_typed_is_lost(
-    with_line: tuple[Gateway, Bench], seen: tuple[Watched, str]
+    with_sister: tuple[Gateway, Bench], seen: tuple[Watched, str]
 ) -> None:
-    gateway, _ = with_line
+    gateway, _ = with_sister
     page, locale = seen[0].page, seen[1]
     with serving(gateway.app) as server:
         page.goto(server.url)
         page.locator("#commissioning-begin").click()
-        page.locator("#commissioning-choice").select_option("0")
-        page.locator("#commissioning-line .go").click()
         sign = "," if locale.startswith("de") else "."
-        expect(page.locator("[name=track_width_m]")).to_have_value(f"1{sign}6")
-        expect(page.locator("[name=payload_range_kg]")).to_have_value("900")
         typed_into(page, kerb_front_axle_kg=f"71{sign}3", kerb_rear_axle_kg="704", sensor_position_m="3.2")
+        typed_into(page, wheelbase_m=f"2{sign}8", track_width_m=f"1{sign}6")
         page.reload()  # what was typed and not sent is there again
         expect(page.locator("[name=kerb_front_axle_kg]")).to_have_value(f"71{sign}3")
         expect(page.locator("[name=track_width_m]")).to_have_value(f"1{sign}6")
@@ -232,22 +218,18 @@ def test_unlikely_answers_are_asked_about_and_nothing_typed_is_lost(
         expect(page.locator("#commissioning-entered")).to_contain_text("713")
         page.locator("#commissioning-empty .back").click()
         expect(page.locator("[name=kerb_front_axle_kg]")).to_have_value("713")
-        page.locator("#commissioning-vehicle .back").click()
-        expect(page.locator("#commissioning-choice")).to_have_value("0")
-        page.locator("#commissioning-steps button").first.click()
         page.locator("#commissioning-vehicle .go").click()
         expect(page.locator("#commissioning-claim")).to_be_visible()
         gateway.board.close()
 
 
 def test_a_drive_that_contradicts_is_asked_about_and_the_end_says_how_good_it_is(
-    with_line: tuple[Gateway, Bench], seen: tuple[Watched, str]
+    with_sister: tuple[Gateway, Bench], seen: tuple[Watched, str]
 ) -> None:
-    gateway, bench = with_line
+    gateway, bench = with_sister
     watched, locale = seen
     page = watched.page
     bench.desk.begin("workshop", None)
-    bench.desk.choose_line("sister.json", "administrator")
     bench.desk.state_vehicle(VehicleAnswers(**{**ANSWERS, "wheelbase_m": 2.8}))
     with serving(gateway.app) as server:
         page.goto(server.url)
@@ -279,14 +261,14 @@ def test_a_drive_that_contradicts_is_asked_about_and_the_end_says_how_good_it_is
         expect(page.locator("#commissioning-effect")).to_contain_text("van-17")
         page.locator("#commissioning-yes").click()
         expect(page.locator("#commissioning-said")).to_contain_text("van-17")
-        expect(page.locator("#commissioning-said")).to_contain_text("sister.json")
+        expect(page.locator("#commissioning-said")).to_contain_text("van-16")
         in_order(page, locale)
         gateway.board.close()
 
 
-def test_by_keyboard_alone(with_line: tuple[Gateway, Bench], watched: Watched) -> None:
+def test_by_keyboard_alone(with_sister: tuple[Gateway, Bench], watched: Watched) -> None:
     """Every step is taken, and taken back, without a pointer."""
-    gateway, _ = with_line
+    gateway, _ = with_sister
     page = watched.page
 
     def press(selector: str) -> None:
@@ -299,14 +281,11 @@ def test_by_keyboard_alone(with_line: tuple[Gateway, Bench], watched: Watched) -
         expect(page.locator("#commissioning-begin")).to_be_visible()
         page.keyboard.press("Tab")  # from here on the browser takes us for a keyboard
         press("#commissioning-begin")
-        expect(page.locator("#commissioning-choice option")).to_have_count(2)
-        press("#commissioning-line .go")
         expect(page.locator("[name=kerb_front_axle_kg]")).to_be_visible()
         page.locator("[name=kerb_front_axle_kg]").focus()
-        for answer in ("404", "1013"):
+        for answer in ("404", "1013", "2.8"):
             page.keyboard.type(answer)
             page.keyboard.press("Tab")
-        page.keyboard.press("Tab")  # past the wheelbase, which its line says
         page.keyboard.type("3.2")
         page.keyboard.press("Enter")
         expect(page.locator("#commissioning-asked")).to_contain_text("29 % of the empty weight on the front axle")

@@ -22,11 +22,9 @@ from benchmarks.accuracy.coverage_table import ALL_KINDS
 from benchmarks.accuracy.delivery import delivery_page
 from benchmarks.accuracy.disturbances import disturbances_page
 from benchmarks.accuracy.drives import TRIPS
-from benchmarks.accuracy.false_facts import false_facts_page
 from benchmarks.accuracy.faults import faults_page
 from benchmarks.accuracy.grades import GRADES, grades_page
 from benchmarks.accuracy.phones import CAN, phones_page
-from benchmarks.accuracy.siblings import siblings_page
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
@@ -34,11 +32,9 @@ PAGES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "coverage": coverage_page,
     "delivery": delivery_page,
     "disturbances": disturbances_page,
-    "false-facts": false_facts_page,
     "phone_accuracy": phones_page,
     "sensor-faults": faults_page,
     "sensor-grades": grades_page,
-    "siblings": siblings_page,
 }
 
 

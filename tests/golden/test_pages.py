@@ -12,7 +12,6 @@ import pytest
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.known_weight import STD_KG, WeightRefusal
 from gateway.calibration.known_weights_file import MOST_KNOWN_WEIGHTS
-from gateway.calibration.line.scatter import SCATTER_STD
 from gateway.config import BatchSection, Settings
 from gateway.core.known_weights import CONTRADICTED
 from gateway.records import Why
@@ -148,37 +147,3 @@ def test_a_count_takes_the_place_of_the_last_with_as_many_vehicles(
         measured.take({**FLEETS[0], "vehicles": n, "seconds": seconds})
     told = [(run["vehicles"], run["seconds"]) for run in json.loads(measured.COUNTS.read_text())]
     assert told == [(FLEETS[0]["vehicles"], 7.0), (500, 8.0)]
-
-
-LINE = {
-    "springs": ("spring_front_npm", "spring_rear_npm"),
-    "slope, each bend of the springs": ("spring_slope_rear_per_kn", "spring_bend_front_0_per_kn"),
-    "dampers": ("damper_front_nspm", "damper_rear_nspm"),
-    "mounts of the dampers": ("damper_mount_front_npm",),
-    "tyres": ("tyre_front_npm", "tyre_rear_npm"),
-    "friction shares": ("damper_friction_front", "spring_friction_rear"),
-    "unsprung masses": ("unsprung_front_kg", "unsprung_rear_kg"),
-    "pitch and roll inertia": ("pitch_inertia_kgm2", "roll_inertia_kgm2"),
-    "additional delay of the rear axle": ("rear_lag_s",),
-    "anti-roll bars, dampers against roll": ("anti_roll_front_npm", "anti_roll_rear_npm", "damper_against_front"),
-    "the payload's gyration, the floor's damping": (
-        "payload_gyration_m2", "payload_roll_gyration_m2", "payload_damping_ratio",
-    ),
-    "frequency of the floor": ("payload_mode_hz",),
-    "the roads' tracks and twist": ("tracks_apart_m", "twist_level"),
-}  # fmt: skip
-
-
-def test_the_table_of_a_line_says_by_how_much_vehicles_differ() -> None:
-    def stem(name: str) -> str:
-        """Whichever end and bend it is of."""
-        return re.sub("_front|_rear|_[0-9]", "", name)
-
-    rows = {line.split("|")[1].strip(): line.split("|") for line in text_of("line.md").splitlines() if "|" in line}
-    for row, names in LINE.items():
-        for name in names:
-            std = SCATTER_STD[name]
-            assert any(said in rows[row][2] for said in (f"{100.0 * std:g} %", f"{std:g} ", f"{1000.0 * std:g} ms")), (
-                name
-            )
-    assert {stem(name) for names in LINE.values() for name in names} == {stem(name) for name in SCATTER_STD}

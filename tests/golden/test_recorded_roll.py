@@ -117,7 +117,7 @@ def test_commissioned_at_a_service_a_sister_weighs_as_calibrated_at_a_desk(
     printed("calibrate", van.desk_campaign, "--like", calibration, "--output", tmp_path / "desk.json", "--json", *CROSS)
     desk, box = (json.loads(path.read_text()) for path in (tmp_path / "desk.json", van.calibration))
     assert box["cross_spectrum"] == desk["cross_spectrum"]
-    assert box["line"] == desk["line"]
+    assert box["sister_id"] == desk["sister_id"]
     maps = ("--signals", van.signals, "--calibration", tmp_path / "desk.json", "--json", *CROSS)
     told = [json.loads(line) for line in printed("estimate", *van.logs, *maps).splitlines()]
     counted = [[one[key] for key in NUMBERS] for one in told if not one["rejected"]]

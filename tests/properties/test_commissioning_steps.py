@@ -17,7 +17,7 @@ from gateway.records import Why
 from gateway.stated.commissioning import CommissioningState
 from gateway.stated.facts import VehicleAnswers
 
-ORDER = [None, "line", "vehicle", "empty", "drive", "fit"]
+ORDER = [None, "vehicle", "empty", "drive", "fit"]
 
 
 class Commissioned(RuleBasedStateMachine):
@@ -59,10 +59,6 @@ class Commissioned(RuleBasedStateMachine):
         if self.asks("begin", "workshop", None):
             assert was is None
             self.n_driven = 0
-
-    @rule()
-    def choose_line(self) -> None:
-        self.asks("choose_line", None, None)
 
     @rule(wheelbase_m=st.sampled_from([2.5, 2.75, 3.0]))
     def state_vehicle(self, wheelbase_m: float) -> None:

@@ -15,7 +15,6 @@ from gateway.config.sections import CommissioningSection
 from gateway.core.settings import BatchSettings
 from gateway.records import Batch, Why
 from gateway.service.commissioning.empty_drive import ServiceVehicle
-from gateway.service.commissioning.lines import Lines
 from gateway.service.commissioning.session import Commissioning
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
@@ -78,7 +77,6 @@ class Bench:
         self,
         directory: Path,
         vehicle: ServiceVehicle = VEHICLE,
-        lines: Path | None = None,
         **settings: Any,
     ) -> None:
         self.directory = directory
@@ -90,7 +88,6 @@ class Bench:
             directory,
             self.settings,
             BatchSettings(window_s=WINDOW_S),
-            Lines(directory, lines),
             self.shelf,
             self.drives,
             vehicle,
@@ -148,9 +145,6 @@ def fitted(payload_std_kg: float = 15.0, **vehicle: Any) -> Result:
 def in_steps(bench: Bench, *, until: str = "drive") -> None:
     """As far as a step."""
     bench.desk.begin("workshop", None)
-    if until == "line":
-        return
-    bench.desk.choose_line(None, None)
     if until == "vehicle":
         return
     bench.desk.state_vehicle(VehicleAnswers(**ANSWERS))

@@ -1,4 +1,4 @@
-"""A recorded sister of the line's van at the running service: her empty drive, her commissioning, her loads."""
+"""A recorded sister of the calibrated van at the running service: her empty drive, her commissioning, her loads."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -31,21 +31,19 @@ class Commissioned:
     desk_campaign: Path
 
 
-def commissioned(name: str, line: Path, folder: Path, n_logs: int) -> Commissioned:
+def commissioned(name: str, sister: Path, folder: Path, n_logs: int) -> Commissioned:
     """An empty drive of a quarter of an hour is replayed into the service, then drives with loads."""
     drives = recordings() / "siblings" / name
     signals, logs = (
         drives / "empty" / "signals_roll.toml",
         tuple(sorted((drives / "test").glob("*/can.log.gz")))[:n_logs],
     )
-    config = _settings(folder, signals)
+    config = _settings(folder, signals, sister)
     answers = _typed(load_campaign(drives / "empty" / "campaign_roll.toml").vehicle)
     made: dict[str, Any] = {}
 
     def meet(running: Running) -> None:
         running.step("", {})
-        running.step("lines", {"name": "line.json", "content": line.read_text()})
-        running.step("line", {"line": {"name": "line.json", "source": "uploaded"}})
         running.step("vehicle", answers)
         assert running.step("empty", {"is_empty": True})["underway"]["step"] == "drive"
         running.play(drives / "empty" / "01_empty_steady" / "can.log.gz")
@@ -70,9 +68,11 @@ def commissioned(name: str, line: Path, folder: Path, n_logs: int) -> Commission
     )
 
 
-def _settings(folder: Path, signals: Path) -> Path:
+def _settings(folder: Path, signals: Path, sister: Path) -> Path:
     """A service without a calibration on a bus of the test's own; all else as it comes, but for the patience."""
-    return service_config(folder, signals=str(signals), vehicle__id=folder.name, batch__silence_s=2.0)
+    return service_config(
+        folder, signals=str(signals), vehicle__id=folder.name, batch__silence_s=2.0, commissioning__like=str(sister)
+    )
 
 
 def _typed(vehicle: Vehicle) -> dict[str, Any]:

@@ -75,11 +75,11 @@ def test_a_lost_id_is_refused(tmp_path: Path) -> None:
 
 
 FAULTS: list[tuple[Change, str]] = [
-    (lambda c: c.update(version=11), "version 11, this springscale reads version 10: calibrate again"),
-    (lambda c: c.update(version=9), "version 9, this springscale reads version 10: calibrate again"),
-    (lambda c: c.update(version="10"), "version '10', this springscale reads version 10"),
-    (lambda c: c.update(version=True), "version True, this springscale reads version 10"),
-    (lambda c: c.pop("version"), "version None, this springscale reads version 10"),
+    (lambda c: c.update(version=12), "version 12, this springscale reads version 11: calibrate again"),
+    (lambda c: c.update(version=10), "version 10, this springscale reads version 11: calibrate again"),
+    (lambda c: c.update(version="11"), "version '11', this springscale reads version 11"),
+    (lambda c: c.update(version=True), "version True, this springscale reads version 11"),
+    (lambda c: c.pop("version"), "version None, this springscale reads version 11"),
     (lambda c: c.update(seen=[]), "seen: "),
     (lambda c: c.update(format="else"), "not a springscale calibration file"),
     (lambda c: c.update(colour="red"), "colour: unknown key"),

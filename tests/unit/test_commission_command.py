@@ -1,9 +1,7 @@
 """springscale commission: every step as an option, for scripts; refusals in the service's own words."""
 
 import json
-import shutil
 from collections.abc import Iterator
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -13,7 +11,7 @@ from support.web import Gateway, serving
 
 from gateway.cli import commission as command
 from gateway.core.cargo import is_said
-from gateway.errors import ConfigurationError, SpringscaleError
+from gateway.errors import SpringscaleError
 
 VEHICLE = ("--front-axle-kg", "690", "--rear-axle-kg", "710", "--wheelbase-m", "2.75", "--sensor-m", "1.2")
 
@@ -34,7 +32,7 @@ def run(url: str, *arguments: str, answers: str | None = None) -> Result:
 
 
 def test_one_call_answers_everything(url: str, bench: Bench) -> None:
-    begun = run(url, "start", "--line", "none", *VEHICLE, "--empty", "--note", "yard", "--json")
+    begun = run(url, "start", *VEHICLE, "--empty", "--note", "yard", "--json")
     assert begun.exit_code == 0, begun.exception
     underway = json.loads(begun.stdout)["underway"]
     assert (underway["step"], underway["note"], underway["vehicle"]["wheelbase_m"]) == ("drive", "yard", 2.75)
@@ -47,14 +45,14 @@ def test_one_call_answers_everything(url: str, bench: Bench) -> None:
     bench.worker.finish(fitted(payload_std_kg=36.0))
     made = run(url, "show").stdout
     assert "in use: sha256:" in made
-    assert "van-17 without a line, one window, made 2026-09-21T14:13:20Z by local (yard)" in made
+    assert "van-17 like any vehicle, one window, made 2026-09-21T14:13:20Z by local (yard)" in made
     assert "another calibration counts from the next drive on" in made
     assert "undone" in run(url, "undo").stdout
 
 
 def test_what_it_carries_can_be_said_and_reaches_the_vehicle_that_is_fitted(url: str, bench: Bench) -> None:
     loads = ("--carries", "parcels", "--payload-length-m", "2.4", "--payload-height-m", "1.2", "--roof-rack")
-    begun = json.loads(run(url, "start", "--line", "none", *VEHICLE, *loads, "--empty", "--json").stdout)
+    begun = json.loads(run(url, "start", *VEHICLE, *loads, "--empty", "--json").stdout)
     said = begun["underway"]["vehicle"]
     assert [said[key] for key in ("carries", "payload_length_m", "payload_height_m")] == ["parcels", 2.4, 1.2]
     assert (said["roof_rack"], said["tow_bar"]) == (True, False)
@@ -66,14 +64,12 @@ def test_what_it_carries_can_be_said_and_reaches_the_vehicle_that_is_fitted(url:
 
 
 def test_what_it_may_carry_can_be_said(url: str) -> None:
-    begun = json.loads(
-        run(url, "start", "--line", "none", *VEHICLE, "--payload-kg", "1200", "--empty", "--json").stdout
-    )
+    begun = json.loads(run(url, "start", *VEHICLE, "--payload-kg", "1200", "--empty", "--json").stdout)
     assert begun["underway"]["vehicle"]["payload_range_kg"] == [0.0, 1200.0]
 
 
 def test_steps_may_come_one_by_one(url: str) -> None:
-    assert isinstance(run(url, "start", "--line", "none").exception, SystemExit)
+    assert isinstance(run(url, "start").exception, SystemExit)
     assert json.loads(run(url, "show", "--json").stdout)["underway"]["step"] == "vehicle"
     kept = run(url, "start", *VEHICLE)
     assert isinstance(kept.exception, SpringscaleError)
@@ -82,26 +78,17 @@ def test_steps_may_come_one_by_one(url: str) -> None:
     assert json.loads(run(url, "cancel", "--json").stdout)["underway"] is None
 
 
-def test_a_person_is_asked(url: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_person_is_asked(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command, "_is_at_terminal", lambda: True)
-    file = tmp_path / "sister.json"
-    shutil.copy(Path(str(files("gateway"))) / "demo" / "paper_van.json", file)
-    assert "1: sister.json (uploaded)" in run(url, "upload", str(file)).stdout
-    begun = run(url, "start", "--no-follow", answers="0\n690\n710\n2.75\n1.2\ny\n")
+    begun = run(url, "start", "--no-follow", answers="690\n710\n2.75\n1.2\ny\n")
     assert begun.exit_code == 0, (begun.output, begun.exception)
     assert "Wheelbase [m]" in begun.stdout
     assert "next: drive, empty" in begun.stdout
 
 
-def test_what_is_wrong_is_told_in_words(url: str, tmp_path: Path) -> None:
+def test_what_is_wrong_is_told_in_words(url: str) -> None:
     refused = run(url, "fit")
     assert isinstance(refused.exception, SpringscaleError)
     assert "no commissioning is under way" in str(refused.exception)
-    unknown = run(url, "start", "--line", "nothing.json")
-    assert isinstance(unknown.exception, ConfigurationError)
-    assert "no such line, and no such file" in str(unknown.exception)
-    (tmp_path / "broken.json").write_text("{}")
-    broken = run(url, "upload", str(tmp_path / "broken.json"))
-    assert "broken.json: not a springscale calibration file" in str(broken.exception)
-    missing = run(url, "start", "--line", "none", "--front-axle-kg", "690")
+    missing = run(url, "start", "--front-axle-kg", "690")
     assert "--rear-axle-kg" in missing.output

@@ -75,7 +75,7 @@ def test_it_is_offered_where_there_is_no_calibration(tmp_path: Path) -> None:
 
 
 def test_steps_follow_one_another_and_each_is_on_disk(bench: Bench) -> None:
-    for until, step in (("line", "line"), ("vehicle", "vehicle"), ("empty", "empty"), ("drive", "drive")):
+    for until, step in (("vehicle", "vehicle"), ("empty", "empty"), ("drive", "drive")):
         with suppress(RefusedError):
             bench.desk.cancel("workshop")
         in_steps(bench, until=until)
@@ -87,7 +87,6 @@ def test_steps_follow_one_another_and_each_is_on_disk(bench: Bench) -> None:
 def test_what_is_out_of_turn_is_refused(bench: Bench) -> None:
     desk = bench.desk
     for ask in (
-        lambda: desk.choose_line(None, None),
         lambda: desk.state_vehicle(VehicleAnswers(**ANSWERS)),
         lambda: desk.is_empty("x"),
         lambda: desk.fit_now("x"),
@@ -95,17 +94,14 @@ def test_what_is_out_of_turn_is_refused(bench: Bench) -> None:
     ):
         assert reason(ask) == "not_begun"
     assert reason(lambda: desk.undo("x", to_factory=False)) == "nothing_made"
-    in_steps(bench, until="line")
+    in_steps(bench, until="vehicle")
     assert reason(lambda: desk.begin("x", None)) == "already_begun"
     assert reason(lambda: desk.is_empty("x")) == "wrong_step"
-    assert reason(lambda: desk.choose_line("no.json", "package")) == "no_such_line"
-    assert reason(lambda: desk.choose_line("../commissioning.json", "uploaded")) == "no_such_line"
 
 
 def test_where_it_is_not_allowed_nothing_begins(tmp_path: Path) -> None:
     bench = Bench(tmp_path, replaced(why_not_allowed="no"))
     assert reason(lambda: bench.desk.begin("x", None)) == "not_allowed"
-    assert reason(lambda: bench.desk.upload("a.json", "{}")) == "not_allowed"
 
 
 @pytest.mark.parametrize(
@@ -198,7 +194,7 @@ def test_whoever_asks_may_have_it_of_one_window(driving: Bench) -> None:
     driving.worker.finish(fitted(payload_std_kg=90.0))
     driving.desk.fit_now("workshop")
     assert (underway(driving)["step"], underway(driving)["is_fitting"]) == ("fit", True)
-    assert reason(lambda: driving.desk.choose_line(None, None)) == "fitting"
+    assert reason(lambda: driving.desk.state_vehicle(VehicleAnswers(**ANSWERS))) == "fitting"
     driving.worker.finish(fitted(payload_std_kg=90.0))
     assert told(driving)["active"]["learned"]["payload_std_kg"] == 90.0
 
@@ -227,7 +223,7 @@ def test_a_calibration_that_does_not_hold_its_own_hash_is_not_used(driving: Benc
     assert driving.desk.fault is not None
 
 
-def test_line_and_vehicle_may_be_answered_anew_and_what_was_driven_stays(driving: Bench) -> None:
+def test_the_vehicle_may_be_answered_anew_and_what_was_driven_stays(driving: Bench) -> None:
     driving.drive(0)
     driving.worker.finish(fitted(payload_std_kg=50.0))
     driving.desk.state_vehicle(VehicleAnswers(**{**ANSWERS, "wheelbase_m": 2.9}))
@@ -237,16 +233,14 @@ def test_line_and_vehicle_may_be_answered_anew_and_what_was_driven_stays(driving
 
 
 @pytest.mark.parametrize(
-    ("typed", "payload_kg"), [({}, 900.0), ({"payload_range_kg": (0.0, 700.0)}, 700.0)], ids=["as its line", "said"]
+    ("typed", "payload_kg"), [({}, 900.0), ({"payload_range_kg": (0.0, 700.0)}, 700.0)], ids=["as its sister", "said"]
 )
-def test_what_a_line_shares_need_not_be_typed(tmp_path: Path, typed: dict[str, Any], payload_kg: float) -> None:
+def test_what_a_sister_shares_need_not_be_typed(tmp_path: Path, typed: dict[str, Any], payload_kg: float) -> None:
     sister = json.loads((Path(str(files("gateway"))) / "demo" / "paper_van.json").read_text())
     sister["vehicle"] |= {"payload_range_kg": [0.0, 900.0], "gross_limit_kg": 2300.0, "track_width_m": 1.6}
     held = CalibrationFile.model_validate({key: part for key, part in sister.items() if key != "id"})
-    (tmp_path / "sister.json").write_text(held.to_json())
-    bench = Bench(tmp_path / "state", lines=tmp_path)
+    bench = Bench(tmp_path / "state", replaced(sister=held.vehicle))
     bench.desk.begin("workshop", None)
-    bench.desk.choose_line("sister.json", "administrator")
     bench.desk.state_vehicle(VehicleAnswers(**{**ANSWERS, "wheelbase_m": held.vehicle.wheelbase_m, **typed}))
     bench.desk.is_empty("workshop")
     bench.drive(0)
@@ -256,7 +250,7 @@ def test_what_a_line_shares_need_not_be_typed(tmp_path: Path, typed: dict[str, A
     assert vehicle.kerb_front_axle_kg == ANSWERS["kerb_front_axle_kg"]
 
 
-CONTRADICTED = Doubt.of(DoubtKind.DRIVEN_LINE)
+CONTRADICTED = Doubt.of(DoubtKind.DRIVEN_SISTER)
 SLIPPED = {**ANSWERS, "kerb_front_axle_kg": 69.0}
 
 
@@ -293,7 +287,7 @@ def test_a_fit_that_contradicts_the_facts_is_held_until_somebody_confirms(drivin
         driving.drive(n)
         driving.worker.finish(doubtful)
     assert told(driving)["active"] is None
-    assert [one["kind"] for one in underway(driving)["doubts"]] == ["driven_line"]
+    assert [one["kind"] for one in underway(driving)["doubts"]] == ["driven_sister"]
     driving.desk.confirm("workshop")
     assert underway(driving)["step"] == "fit"
     driving.worker.finish(doubtful)
@@ -480,7 +474,6 @@ def test_only_so_many_are_remembered(driving: Bench) -> None:
 
 STEPS: list[Callable[[Bench], Any]] = [
     lambda b: b.desk.begin("workshop", "note"),
-    lambda b: b.desk.choose_line(None, None),
     lambda b: b.desk.state_vehicle(VehicleAnswers(**ANSWERS)),
     lambda b: b.desk.is_empty("workshop"),
     lambda b: b.drive(0, 60, is_provisional=True),

@@ -1,21 +1,17 @@
 """Answers that are unlikely, or that a drive contradicts: asked about, with what was probably meant."""
 
-import json
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
-from pydantic import TypeAdapter, ValidationError
 from support.half_car_road import CAR, VAN
 from support.known_runs import SIBLING, calibrated_on_loads, known_run
 
-from benchmarks.accuracy.false_facts import FALSE, Fact
-from gateway.calibration.commissioning.answers import LineFacts, doubts_of
+from gateway.calibration.commissioning.answers import doubts_of
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.half_car.fit import fit_cross_spectrum
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.line.line import Line, Sister, line_of
+from gateway.calibration.sister import Sister
 from gateway.core.vehicle import Vehicle
 from gateway.stated.doubt import Doubt, DoubtKind, meant_by
 from gateway.stated.facts import VehicleAnswers
@@ -30,12 +26,18 @@ ANSWERED: dict[str, Any] = {
     "payload_range_kg": (0.0, 450.0),
     "gross_limit_kg": 1900.0,
 }
-SISTER = LineFacts(sprung_kg=1254.0, wheelbase_m=2.8, axles_kg=(700.0, 710.0), track_width_m=1.5)
-NO_LINE = LineFacts()
+SISTER = replace(
+    VAN,
+    empty_mass_kg=1254.0,
+    wheelbase_m=2.8,
+    kerb_front_axle_kg=700.0,
+    kerb_rear_axle_kg=710.0,
+    track_width_m=1.5,
+)
 
 
-def asked(line: LineFacts, **changes: Any) -> tuple[Doubt, ...]:
-    return doubts_of(VehicleAnswers(**ANSWERED | changes), line)
+def asked(sister: Vehicle | None, **changes: Any) -> tuple[Doubt, ...]:
+    return doubts_of(VehicleAnswers(**ANSWERED | changes), sister)
 
 
 @pytest.mark.parametrize(
@@ -76,7 +78,7 @@ def asked(line: LineFacts, **changes: Any) -> tuple[Doubt, ...]:
 def test_what_vehicles_are_not_like_is_asked_about(
     changes: dict[str, Any], kind: DoubtKind, meant: dict[str, Any]
 ) -> None:
-    found = asked(NO_LINE, **changes)
+    found = asked(None, **changes)
     assert kind in {one.kind for one in found}
     assert all(one.meant == meant for one in found)
 
@@ -84,24 +86,24 @@ def test_what_vehicles_are_not_like_is_asked_about(
 @pytest.mark.parametrize(
     ("changes", "kind"),
     [
-        ({"kerb_front_axle_kg": 850.0, "kerb_rear_axle_kg": 840.0}, DoubtKind.LINE_MASS),
-        ({"kerb_front_axle_kg": 570.0, "kerb_rear_axle_kg": 850.0}, DoubtKind.LINE_AXLES),
-        ({"track_width_m": 1.7}, DoubtKind.LINE_TRACK),
+        ({"kerb_front_axle_kg": 850.0, "kerb_rear_axle_kg": 840.0}, DoubtKind.SISTER_MASS),
+        ({"kerb_front_axle_kg": 570.0, "kerb_rear_axle_kg": 850.0}, DoubtKind.SISTER_AXLES),
+        ({"track_width_m": 1.7}, DoubtKind.SISTER_TRACK),
     ],
 )
-def test_what_the_line_is_not_like_is_asked_about(changes: dict[str, Any], kind: DoubtKind) -> None:
+def test_what_its_sister_is_not_like_is_asked_about(changes: dict[str, Any], kind: DoubtKind) -> None:
     of_gross = {"gross_limit_kg": None}
     assert [one.kind for one in asked(SISTER, **changes | of_gross)] == [kind]
-    assert asked(NO_LINE, **changes | of_gross) == ()
+    assert asked(None, **changes | of_gross) == ()
 
 
-@pytest.mark.parametrize("line", [NO_LINE, SISTER], ids=["no line", "a sister"])
+@pytest.mark.parametrize("sister", [None, SISTER], ids=["no sister", "a sister"])
 @pytest.mark.parametrize(
     "changes",
     [{}, {"kerb_front_axle_kg": 740.0}, {"sensor_position_m": -0.6}, {"sensor_offset_left_m": -0.7}],
 )
-def test_a_van_as_it_is_passes(line: LineFacts, changes: dict[str, Any]) -> None:
-    assert asked(line, **changes) == ()
+def test_a_van_as_it_is_passes(sister: Vehicle | None, changes: dict[str, Any]) -> None:
+    assert asked(sister, **changes) == ()
 
 
 @pytest.mark.parametrize(
@@ -124,7 +126,7 @@ def test_cars_vans_and_trucks_pass(front_kg: float, rear_kg: float, wheelbase_m:
 
 
 def test_a_doubt_is_a_sentence_with_the_question_at_its_end() -> None:
-    (first, *_) = asked(NO_LINE, kerb_front_axle_kg=71.3)
+    (first, *_) = asked(None, kerb_front_axle_kg=71.3)
     assert first.text == "775 kg empty on a wheelbase of 2.8 m: such vehicles weigh 862 to 2979 kg"
     assert first.sentence.endswith("in kilograms; did you mean kerb_front_axle_kg = 713?")
     assert meant_by(()) == ""
@@ -142,8 +144,8 @@ OTHER_MODEL = replace(
 
 
 @pytest.fixture(scope="module")
-def line() -> Line:
-    return line_of([Sister("a", VAN, calibrated_on_loads(seed=1))])
+def sister() -> Sister:
+    return Sister("a", VAN, calibrated_on_loads(seed=1))
 
 
 @pytest.fixture(scope="module")
@@ -155,10 +157,10 @@ def said_empty(run: KnownRun, vehicle: Vehicle) -> KnownRun:
     return replace(run, payload_kg=0.0, front_share_pct=vehicle.empty_front_share_pct)
 
 
-def doubted(run: KnownRun, line: Line | None, **false: Any) -> tuple[Doubt, ...]:
+def doubted(run: KnownRun, sister: Sister | None, **false: Any) -> tuple[Doubt, ...]:
     vehicle = replace(VAN, **false)
     claimed = said_empty(run, vehicle)
-    known = None if line is None else replace(line, wheelbase_m=vehicle.wheelbase_m)
+    known = None if sister is None else replace(sister, vehicle=vehicle)
     return contradictions(
         [claimed], vehicle, fit_cross_spectrum([claimed], vehicle, inherited=known).calibration, known
     )
@@ -168,73 +170,37 @@ def kinds(doubts: tuple[Doubt, ...]) -> list[DoubtKind]:
     return [one.kind for one in doubts]
 
 
-def test_true_facts_are_not_doubted(line: Line, empty: KnownRun) -> None:
-    assert doubted(empty, line) == ()
+def test_true_facts_are_not_doubted(sister: Sister, empty: KnownRun) -> None:
+    assert doubted(empty, sister) == ()
     assert doubted(empty, None) == ()
 
 
-def test_a_load_aboard_is_weighed_by_the_line(line: Line) -> None:
-    (doubt,) = doubted(known_run(1, 300.0, 2.0, seed=8, car=SIBLING), line)
+def test_a_load_aboard_is_weighed_by_the_sister(sister: Sister) -> None:
+    (doubt,) = doubted(known_run(1, 300.0, 2.0, seed=8, car=SIBLING), sister)
     assert doubt.kind is DoubtKind.DRIVEN_WEIGHT
     gross_kg = doubt.numbers["front_kg"] + doubt.numbers["rear_kg"]
     assert gross_kg == pytest.approx(VAN.empty_mass_kg + 300.0, abs=90.0)
 
 
-def test_weights_of_another_vehicle_are_doubted(line: Line, empty: KnownRun) -> None:
-    assert kinds(doubted(empty, line, empty_front_share_pct=40.0)) == [DoubtKind.DRIVEN_WEIGHT]
-    assert kinds(doubted(empty, line, empty_mass_kg=1000.0)) == [DoubtKind.DRIVEN_WEIGHT]
+def test_weights_of_another_vehicle_are_doubted(sister: Sister, empty: KnownRun) -> None:
+    assert kinds(doubted(empty, sister, empty_front_share_pct=40.0)) == [DoubtKind.DRIVEN_WEIGHT]
+    assert kinds(doubted(empty, sister, empty_mass_kg=1000.0)) == [DoubtKind.DRIVEN_WEIGHT]
 
 
 @pytest.mark.parametrize("factor", [0.93, 1.07])
-def test_a_wrong_wheelbase_is_measured(line: Line, empty: KnownRun, factor: float) -> None:
-    found = {one.kind: one for one in doubted(empty, line, wheelbase_m=factor * VAN.wheelbase_m)}
+def test_a_wrong_wheelbase_is_measured(sister: Sister, empty: KnownRun, factor: float) -> None:
+    found = {one.kind: one for one in doubted(empty, sister, wheelbase_m=factor * VAN.wheelbase_m)}
     measured = found[DoubtKind.DRIVEN_WHEELBASE].numbers
     assert measured["found_m"] == pytest.approx(VAN.wheelbase_m, abs=0.06)
 
 
-def test_a_sensor_elsewhere_is_found(line: Line, empty: KnownRun) -> None:
-    for known in (line, None):
+def test_a_sensor_elsewhere_is_found(sister: Sister, empty: KnownRun) -> None:
+    for known in (sister, None):
         (doubt,) = doubted(empty, known, sensor_position_m=2.4)
         assert doubt.kind is DoubtKind.DRIVEN_SENSOR
         assert doubt.numbers["found_m"] == pytest.approx(VAN.sensor_position_m, abs=0.1)
 
 
-def test_another_model_is_not_of_the_line(line: Line) -> None:
-    found = kinds(doubted(known_run(1, 0.0, None, seed=9, car=OTHER_MODEL), line))
-    assert set(found) & {DoubtKind.DRIVEN_LINE, DoubtKind.DRIVEN_WEIGHT}
-
-
-DOCS = Path(__file__).parents[2] / "docs"
-TRUTH = {
-    "kerb_front_axle_kg": 860.0,
-    "kerb_rear_axle_kg": 540.0,
-    "wheelbase_m": 2.75,
-    "sensor_position_m": 3.2,
-    "sensor_offset_left_m": 0.2,
-    "track_width_m": 1.5,
-}
-BY_DRIVING = ("aboard", "of another model", "exchanged", "laden", "15 %", "10 %", "half a metre")
-
-
-def is_asked_about(fact: Fact) -> bool:
-    try:
-        return bool(doubts_of(TypeAdapter(VehicleAnswers).validate_python(fact.falsify(dict(TRUTH)))))
-    except ValidationError:
-        return True
-
-
-def test_there_are_twenty_and_the_truth_is_none_of_them() -> None:
-    assert len({fact.words for fact in FALSE}) == 20
-    assert not is_asked_about(Fact("true"))
-
-
-@pytest.mark.parametrize(
-    "fact", [fact for fact in FALSE if not any(word in fact.words for word in BY_DRIVING)], ids=lambda fact: fact.words
-)
-def test_what_no_vehicle_is_like_is_caught_before_any_drive(fact: Fact) -> None:
-    assert is_asked_about(fact)
-
-
-def test_the_study_tried_each_of_them() -> None:
-    found = json.loads((DOCS / "false-facts.json").read_text())
-    assert [row["words"] for row in found["rows"]] == [fact.words for fact in FALSE]
+def test_another_model_is_told_from_its_sister(sister: Sister) -> None:
+    found = kinds(doubted(known_run(1, 0.0, None, seed=9, car=OTHER_MODEL), sister))
+    assert set(found) & {DoubtKind.DRIVEN_SISTER, DoubtKind.DRIVEN_WEIGHT}

@@ -4,17 +4,14 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from benchmarks.accuracy import __main__ as command
-from benchmarks.accuracy import siblings
+from benchmarks.accuracy import coverage
 from benchmarks.accuracy import study as study_module
 from benchmarks.accuracy.advice import Choice, compared
 from benchmarks.accuracy.coverage_table import JudgedBatch
-from benchmarks.accuracy.lines import draw_line, drawn_van
-from benchmarks.accuracy.siblings import Way
 from benchmarks.accuracy.study import Study
 
 COMPARISON = compared([Choice((1, 2, 3), 4, 5, (7.0, 5.0), (9.0, 8.0), {4: (2.0, 3.0), 5: (8.0, 6.0)})])
@@ -92,32 +89,6 @@ def test_coverage_says_whether_it_falls_short(
     assert (tmp_path / "out/coverage.md").read_text(encoding="utf-8") == page
 
 
-def test_siblings_are_told_way_by_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    batches = [
-        JudgedBatch(f"van {i % 3}", f"van {i % 3} {i}", "mixed", way, (), 2.0, 1.0, i > 0, True)
-        for way in Way
-        for i in range(20)
-    ]
-    refused = JudgedBatch("van 0", "van 0 20", "mixed", Way.ALONE, ("gap",), 9.0, 9.0, False, False)
-    monkeypatch.setattr(Study, "cases", lambda *_, **__: [batches, [refused]])
-    page = run("siblings", "--vans", "4", "--output", str(tmp_path / "out"))
-    assert "3 simulated vans of 2 lines" in page
-    assert f"| {Way.ALONE} | 21 | 1: 1 gap | 2.00 | 2.33 | 95 % (" in page
-    assert (tmp_path / "out/siblings.md").read_text(encoding="utf-8") == page
-
-
-def test_a_line_and_its_siblings_are_drawn_alike_again() -> None:
-    """Other numbers of siblings, or another order of work, change none of them; each differs from the others."""
-    drawn = [draw_line(0, np.random.default_rng(1)) for _ in range(2)]
-    assert drawn[0] == drawn[1]
-    vans = [drawn_van(drawn[0], f"van {i}", seeds).van for i, seeds in enumerate(np.random.SeedSequence(2).spawn(3))]
-    again = drawn_van(drawn[1], "van 1", np.random.SeedSequence(2).spawn(3)[1]).van
-    assert again == vans[1]
-    rates = [van.front.spring.rate_npm / drawn[0].van.front.spring.rate_npm for van in vans]
-    assert len({*rates}) == 3
-    assert all(0.85 < rate < 1.15 for rate in rates)
-
-
 N_COMPUTED: list[int] = []
 
 
@@ -128,14 +99,14 @@ def counted_case(seed: int, number: int) -> list[JudgedBatch]:
 
 def test_a_study_that_was_broken_off_resumes_with_the_finished_cases(tmp_path: Path) -> None:
     """The cases that were read are those that were computed, NaN included."""
-    study = replace(siblings.STUDY, of_case=counted_case, n_cases=int)
+    study = replace(coverage.STUDY, of_case=counted_case, n_cases=int)
     N_COMPUTED.clear()
     first = study.cases(2, 5, kept=tmp_path)
     again = study.cases(3, 5, kept=tmp_path)
     assert N_COMPUTED == [0, 1, 2]
     assert repr(again[:2]) == repr(first)
     assert repr(study.cases(3, 5)) == repr(again)
-    assert {path.name for path in tmp_path.iterdir()} == {f"siblings-5-{number}.json" for number in range(3)}
+    assert {path.name for path in tmp_path.iterdir()} == {f"coverage-5-{number}.json" for number in range(3)}
     assert study.cases(1, 6, kept=tmp_path)[0][0].payload_error_pct == 7.0  # another seed is another case
 
 

@@ -10,9 +10,10 @@ import pytest
 from vm.harness.drives import empty_drive, loaded_drive, log_of
 from vm.harness.vehicle import CONFIG, SETTINGS, Vehicle
 
-LINE = Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json"
 PATH = "calibration/commissioning"
-UNCALIBRATED = SETTINGS.replace('calibration = "vehicle.json"\n', "") + "[record]\nenabled = true\n"
+UNCALIBRATED = SETTINGS.replace('calibration = "vehicle.json"\n', "") + (
+    '[record]\nenabled = true\n[commissioning]\nlike = "vehicle.json"\n'
+)
 ANSWERS = {
     "kerb_front_axle_kg": 700.0,
     "kerb_rear_axle_kg": 700.0,
@@ -72,8 +73,6 @@ def test_commissioned_through_a_power_cut_it_weighs_by_what_it_made(
     vehicle: Vehicle, fitter: Fitter, tmp_path: Path, measured: Callable[..., None]
 ) -> None:
     fitter.say("", {"note": "in the yard"})
-    fitter.say("/lines", {"name": "line.json", "content": LINE.read_text()})
-    fitter.say("/line", {"line": {"name": "line.json", "source": "uploaded"}})
     fitter.say("/vehicle", ANSWERS)
     fitter.say("/empty", {"is_empty": True})
     empty = vehicle.put_log(log_of(empty_drive(WINDOW_S + 4.0, 11), tmp_path / "empty.log"))

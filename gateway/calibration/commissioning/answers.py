@@ -1,14 +1,14 @@
 """A fitter's answers: questions about those that are unlikely, and the vehicle of a campaign that follows from them.
 
-    doubts_of(answers, line) -> questions, each with the answer that was probably meant
+    doubts_of(answers, sister) -> questions, each with the answer that was probably meant
     vehicle_table(answers, name) -> the vehicle
 
-The questions compare the answers with ordinary road vehicles, and with the line's other vehicles. They use no drive;
+The questions compare the answers with ordinary road vehicles, and with a sister of its model. They use no drive;
 ``gateway.calibration.contradicted`` compares the same answers with a drive.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from math import inf
 from types import MappingProxyType
 from typing import Any, Final
@@ -38,11 +38,11 @@ MOST_HEIGHT_M: Final = 3.0  # above the floor: 4 m is the legal height
 UNSPRUNG_SHARE: Final = (0.025, 0.15)  # of the empty vehicle, one axle's wheels, brakes and half its links
 LEAST_SPRUNG: Final = 0.75  # of the empty vehicle
 
-# Figures that vehicles of a line share; shelves and a tail lift account for a tenth. Chosen.
+# Figures that vehicles of one model share; shelves and a tail lift account for a tenth. Chosen.
 MOST_MASS_OFF: Final = 0.12
 MOST_AXLE_OFF: Final = 0.18  # chosen: shelves and a tail lift act mostly on one axle
 MOST_TRACK_OFF: Final = 0.05  # chosen: other wheels
-MOST_WHEELBASE_OFF: Final = 0.01  # as a line asks for
+MOST_WHEELBASE_OFF: Final = 0.01  # as calibration.sister asks for
 GROSS_ROUNDED: Final = 1.005  # papers round; of the sum of the axles' limits, which is the most
 MOST_LIMIT: Final = 5.0  # times what is there empty: the rear axle of a truck
 
@@ -72,40 +72,29 @@ _SLIPPED: Final[Mapping[tuple[str, ...], tuple[float, ...]]] = MappingProxyType(
 """Answers that are typed together, and the factors from the typed to the probably meant number."""
 
 
-@dataclass(frozen=True, slots=True)
-class LineFacts:
-    """A figure of a line's vehicles from its file; None if it has none."""
-
-    sprung_kg: float | None = None
-    wheelbase_m: float | None = None
-    axles_kg: tuple[float, float] | None = None
-    track_width_m: float | None = None
-
-
-NO_LINE: Final = LineFacts()
 _ANSWERS: Final = TypeAdapter(VehicleAnswers)
 
 
-def doubts_of(said: VehicleAnswers, line: LineFacts = NO_LINE) -> tuple[Doubt, ...]:
+def doubts_of(said: VehicleAnswers, sister: Vehicle | None = None) -> tuple[Doubt, ...]:
     """Unlikely answers; with the answers that leave no doubt if one slip explains all."""
-    found = tuple(_checked(said, line))
-    meant = _meant(said, line) if found else {}
+    found = tuple(_checked(said, sister))
+    meant = _meant(said, sister) if found else {}
     return tuple(one.model_copy(update={"meant": meant}) for one in found) if meant else found
 
 
-def _checked(said: VehicleAnswers, line: LineFacts) -> Iterator[Doubt]:
+def _checked(said: VehicleAnswers, sister: Vehicle | None) -> Iterator[Doubt]:
     for rule in _RULES:
-        yield from rule(said, line)
+        yield from rule(said, sister)
 
 
-def _meant(said: VehicleAnswers, line: LineFacts) -> dict[str, Any]:
+def _meant(said: VehicleAnswers, sister: Vehicle | None) -> dict[str, Any]:
     """The answers after which no doubt is left; empty if no single slip explains it."""
     for changed in _candidates(said):
         try:
             fresh = _ANSWERS.validate_python(asdict(replace(said, **changed)))
         except ValidationError:
             continue
-        if next(_checked(fresh, line), None) is None and _has_wheelbase_of(line, fresh):
+        if next(_checked(fresh, sister), None) is None and _has_wheelbase_of(sister, fresh):
             return changed
     return {}
 
@@ -127,8 +116,8 @@ def _rounded(number: float) -> float:
     return float(f"{number:.4g}")
 
 
-def _has_wheelbase_of(line: LineFacts, said: VehicleAnswers) -> bool:
-    return line.wheelbase_m is None or abs(said.wheelbase_m - line.wheelbase_m) <= MOST_WHEELBASE_OFF * line.wheelbase_m
+def _has_wheelbase_of(sister: Vehicle | None, said: VehicleAnswers) -> bool:
+    return sister is None or abs(said.wheelbase_m - sister.wheelbase_m) <= MOST_WHEELBASE_OFF * sister.wheelbase_m
 
 
 def _gross_kg(said: VehicleAnswers) -> float:
@@ -139,7 +128,7 @@ def _is_within(number: float, span: tuple[float, float]) -> bool:
     return span[0] <= number <= span[1]
 
 
-def _body(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
+def _body(said: VehicleAnswers, _sister: Vehicle | None) -> Iterator[Doubt]:
     wheelbase_m, gross_kg = said.wheelbase_m, _gross_kg(said)
     if not _is_within(wheelbase_m, WHEELBASE_M):
         low_m, high_m = WHEELBASE_M
@@ -153,26 +142,33 @@ def _body(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
         yield Doubt.of(DoubtKind.FRONT_SHARE, front_pct=front_pct, low_pct=low_pct, high_pct=high_pct)
 
 
-def _beside_its_line(said: VehicleAnswers, line: LineFacts) -> Iterator[Doubt]:
+def _beside_its_sister(said: VehicleAnswers, sister: Vehicle | None) -> Iterator[Doubt]:
+    if sister is None:
+        return
     front_kg, rear_kg = said.kerb_front_axle_kg, said.kerb_rear_axle_kg
-    sprung_kg = _sprung_kg(said)
-    if line.sprung_kg and sprung_kg and abs(sprung_kg - line.sprung_kg) > MOST_MASS_OFF * line.sprung_kg:
+    her_front_kg, her_rear_kg = sister.kerb_front_axle_kg, sister.kerb_rear_axle_kg
+    sprung_kg, her_kg = _sprung_kg(said), sister.empty_mass_kg
+    if sprung_kg and abs(sprung_kg - her_kg) > MOST_MASS_OFF * her_kg:
         gross_kg = _gross_kg(said)
-        yield Doubt.of(DoubtKind.LINE_MASS, gross_kg=gross_kg, line_kg=gross_kg * line.sprung_kg / sprung_kg)
-    elif line.axles_kg and any(
-        abs(own - other) > MOST_AXLE_OFF * other for own, other in zip((front_kg, rear_kg), line.axles_kg, strict=True)
+        yield Doubt.of(DoubtKind.SISTER_MASS, gross_kg=gross_kg, sister_kg=gross_kg * her_kg / sprung_kg)
+    elif (
+        her_front_kg
+        and her_rear_kg
+        and any(
+            abs(own - other) > MOST_AXLE_OFF * other
+            for own, other in ((front_kg, her_front_kg), (rear_kg, her_rear_kg))
+        )
     ):
-        line_front_kg, line_rear_kg = line.axles_kg
         yield Doubt.of(
-            DoubtKind.LINE_AXLES,
+            DoubtKind.SISTER_AXLES,
             front_kg=front_kg,
             rear_kg=rear_kg,
-            line_front_kg=line_front_kg,
-            line_rear_kg=line_rear_kg,
+            sister_front_kg=her_front_kg,
+            sister_rear_kg=her_rear_kg,
         )
-    track_m = said.track_width_m
-    if track_m and line.track_width_m and abs(track_m - line.track_width_m) > MOST_TRACK_OFF * line.track_width_m:
-        yield Doubt.of(DoubtKind.LINE_TRACK, track_m=track_m, line_m=line.track_width_m)
+    track_m, her_track_m = said.track_width_m, sister.track_width_m
+    if track_m and her_track_m and abs(track_m - her_track_m) > MOST_TRACK_OFF * her_track_m:
+        yield Doubt.of(DoubtKind.SISTER_TRACK, track_m=track_m, sister_m=her_track_m)
 
 
 def _sprung_kg(said: VehicleAnswers) -> float | None:
@@ -185,7 +181,7 @@ def _sprung_kg(said: VehicleAnswers) -> float | None:
         return None
 
 
-def _places(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
+def _places(said: VehicleAnswers, _sister: Vehicle | None) -> Iterator[Doubt]:
     sensor_m, track_m, left_m = said.sensor_position_m, said.track_width_m, said.sensor_offset_left_m
     if not -MOST_AHEAD_M <= sensor_m <= MOST_BEHIND * said.wheelbase_m:
         yield Doubt.of(DoubtKind.SENSOR_PLACE, sensor_m=sensor_m, wheelbase_m=said.wheelbase_m)
@@ -195,7 +191,7 @@ def _places(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
         yield Doubt.of(DoubtKind.SENSOR_SIDE, sensor_m=left_m)
 
 
-def _unsprung(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
+def _unsprung(said: VehicleAnswers, _sister: Vehicle | None) -> Iterator[Doubt]:
     gross_kg = _gross_kg(said)
     low_kg, high_kg = (share * gross_kg for share in UNSPRUNG_SHARE)
     for unsprung_kg in (said.unsprung_front_kg, said.unsprung_rear_kg):
@@ -206,7 +202,7 @@ def _unsprung(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
         yield Doubt.of(DoubtKind.SPRUNG, sprung_kg=sprung_kg, gross_kg=gross_kg)
 
 
-def _loads(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
+def _loads(said: VehicleAnswers, _sister: Vehicle | None) -> Iterator[Doubt]:
     gross_kg = _gross_kg(said)
     payload_kg = said.payload_range_kg[1] if said.payload_range_kg else None
     if payload_kg is not None:
@@ -226,7 +222,7 @@ def _loads(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
         yield Doubt.of(DoubtKind.LOAD_HEIGHT, height_m=said.payload_height_m)
 
 
-def _limits(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
+def _limits(said: VehicleAnswers, _sister: Vehicle | None) -> Iterator[Doubt]:
     gross_kg, limit_kg = _gross_kg(said), said.gross_limit_kg
     axles = (
         (said.kerb_front_axle_kg, said.front_axle_limit_kg),
@@ -241,9 +237,9 @@ def _limits(said: VehicleAnswers, _line: LineFacts) -> Iterator[Doubt]:
         yield Doubt.of(DoubtKind.GROSS_LIMIT, limit_kg=limit_kg, gross_kg=gross_kg)
 
 
-_RULES: Final[tuple[Callable[[VehicleAnswers, LineFacts], Iterator[Doubt]], ...]] = (
+_RULES: Final[tuple[Callable[[VehicleAnswers, Vehicle | None], Iterator[Doubt]], ...]] = (
     _body,
-    _beside_its_line,
+    _beside_its_sister,
     _places,
     _unsprung,
     _loads,
@@ -251,7 +247,7 @@ _RULES: Final[tuple[Callable[[VehicleAnswers, LineFacts], Iterator[Doubt]], ...]
 )
 
 
-OF_THE_LINE: Final = (
+_SHARED: Final = (
     "track_width_m",
     "payload_range_kg",
     "front_share_range_pct",
@@ -261,20 +257,21 @@ OF_THE_LINE: Final = (
     "front_wheel_limit_kg",
     "rear_wheel_limit_kg",
 )
-"""Figures common to a line besides what a fit inherits: used unless others are stated."""
+"""Figures that vehicles of one model share: a sister's are used unless others are stated."""
 
 _VEHICLE: Final = TypeAdapter(Vehicle)
 
 
-def vehicle_table(said: VehicleAnswers, name: str, of_the_line: Mapping[str, Any] = MappingProxyType({})) -> Vehicle:
+def vehicle_table(said: VehicleAnswers, name: str, sister: Vehicle | None = None) -> Vehicle:
     """[vehicle] of a campaign; ``name`` if none was typed. Raises CampaignError in words for people."""
     if (said.empty_mass_kg is None) != (said.empty_front_share_pct is None):
         raise CampaignError("empty_mass_kg and empty_front_share_pct belong together: give both or neither")
     typed = {name: answer for name, answer in asdict(said).items() if answer is not None and name != "division_kg"}
     try:
         sprung = sprung_of(_axle_weights(said), said.division_kg)
+        shared = {key: known for key in _SHARED if sister and (known := getattr(sister, key)) is not None}
         named = {"name": said.name.strip() or name}
-        return _VEHICLE.validate_python(sprung.vehicle_keys() | dict(of_the_line) | typed | named)
+        return _VEHICLE.validate_python(sprung.vehicle_keys() | shared | typed | named)
     except ValidationError as fault:
         raise CampaignError(describe_faults("the vehicle that follows", fault, Vehicle)) from None
 

@@ -30,14 +30,12 @@ class Drive(_JobTable):
 
 
 class Job(_JobTable):
-    """Inspect the drives, and also fit them if ``is_fit``; ``like`` are files of vehicles of the same model or of their
-    line.
-    """
+    """Inspect the drives, and also fit them if ``is_fit``; ``like`` is the calibration file of a sister."""
 
     vehicle: Vehicle
     drives: tuple[Drive, ...] = Field(min_length=1)
     settings: dict[str, Any]
-    like: tuple[Path, ...] = ()
+    like: Path | None = None
     is_fit: bool = True
     goal_std_share: float = Field(gt=0.0, description="of the largest payload: the standard deviation that is the goal")
     most_memory_mb: float = Field(gt=0.0)

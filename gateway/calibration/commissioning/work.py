@@ -20,7 +20,7 @@ import numpy as np
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, DraftTable
 from gateway.calibration.commissioning.job import JOB, RESULT, Job, Learned, Result, findings_of, to_file
-from gateway.calibration.file.line_file import load_like
+from gateway.calibration.file.calibration_file import load_calibration
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind
 from gateway.calibration.inspection.log import SplitRun
@@ -68,7 +68,7 @@ def done(path: Path, job: Job) -> Result:
     looked = Result(findings=findings_of(_findings(inspection)), refusal=inspection.refusal)
     if not job.is_fit or inspection.refusal is not None:
         return looked
-    like = [load_like(path) for path in job.like]
+    like = None if job.like is None else load_calibration(job.like)
     outcome = calibrate_inspected(campaign, inspection, estimators=ESTIMATORS, like=like, command=job.command)
     made = {
         "learned": learned_by(outcome, campaign.vehicle, job.goal_std_share),

@@ -6,7 +6,7 @@ from typing import ClassVar, Final, Literal, Self
 from pydantic import Field, model_validator
 
 from gateway.calibration.file.hashed import FileWords, HashedFile, checked_file, read_content
-from gateway.calibration.file.parts import ExpectedErrorsPart, LinePart, ProvenancePart, SeenPart
+from gateway.calibration.file.parts import ExpectedErrorsPart, ProvenancePart, SeenPart
 from gateway.calibration.file.sane import absurd
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
@@ -19,7 +19,7 @@ from gateway.schema import check_shapes
 from gateway.toml_file import Read
 
 FORMAT: Final = "springscale-calibration"
-VERSION: Final = 10  # of the format
+VERSION: Final = 11  # of the format
 
 
 class CalibrationFile(HashedFile):
@@ -27,13 +27,13 @@ class CalibrationFile(HashedFile):
 
     words: ClassVar[FileWords] = FileWords("calibration file", "calibrate again", "springscale calibrate")
     format: Literal["springscale-calibration"] = FORMAT
-    version: Literal[10] = VERSION
+    version: Literal[11] = VERSION
     vehicle: Vehicle
     seen: SeenPart
     cross_spectrum: CrossSpectrumCalibration | None = None
     ratio_index: RatioIndexCalibration | None = None
-    line: LinePart | None = Field(
-        None, description="prior from vehicles of the same line; null: its own drives are the only data"
+    sister_id: str | None = Field(
+        None, description="of the calibration that gave the prior; null: its own drives are the only data"
     )
     expected_errors: dict[str, ExpectedErrorsPart] = Field(
         default_factory=dict, description="by estimator: errors on runs left out of the fit"
@@ -77,8 +77,6 @@ class CalibrationFile(HashedFile):
         unknown = sorted({term for one in regressions if one for term in one.terms} - set(TERMS))
         if unknown:
             raise CalibrationFileError(f"regression terms {unknown} are not known to this version of springscale")
-        if self.line is not None:
-            self.line.require_known()
 
     @property
     def estimators(self) -> tuple[str, ...]:

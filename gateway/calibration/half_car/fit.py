@@ -97,7 +97,7 @@ def fit_cross_spectrum(
 ) -> CrossSpectrumFit:
     """Fit the half-car to ``runs``; one empty run is enough, then with the warning ``springs_from_priors``.
 
-    ``inherited`` is the prior from vehicles of the same line; it replaces the prior of any vehicle.
+    ``inherited`` is the prior from a vehicle of the same model; it replaces the prior of any vehicle.
     ``progress`` is called with (steps done, steps in all). Raises CalibrationImpossibleError if no run has enough
     steady driving.
     """
@@ -105,7 +105,7 @@ def fit_cross_spectrum(
     known = known_spectra(runs, vehicle, with_roll=can_roll(vehicle), usual=usual)
     with_roll = known[0].spectra.roll is not None
     prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=with_roll)
-    shifts = _STARTS[:1] if inherited else _STARTS  # the line's prior selects the peak
+    shifts = _STARTS[:1] if inherited else _STARTS  # the sister's prior selects the peak
     can_leave_out = len(known) >= LEAST_RUNS_TO_LEAVE_ONE_OUT
     step = _counted(progress, len(shifts) + (2 * len(shifts) + len(known)) * can_leave_out)
 

@@ -175,17 +175,17 @@ def _roll(vehicle: Vehicle) -> Rows:
 
 
 class Inherited(Protocol):
-    """The prior from vehicles of the same line before a fit starts (calibration.line)."""
+    """The prior from a vehicle of the same model before a fit starts (calibration.sister)."""
 
     @property
     def usual(self) -> Usual:
-        """The usual movement of its vehicles."""
+        """Its usual movement."""
 
     def prior_of(self, vehicle: Vehicle, *, with_roll: bool) -> Prior:
-        """Of one of its vehicles that has not been driven yet."""
+        """Of a vehicle of its model that has not been driven yet."""
 
     def on(self, calibration: CrossSpectrumCalibration, *, is_tested: bool) -> CrossSpectrumCalibration:
-        """``calibration`` of one of its vehicles, valid in the line's ranges, with the line's limits.
+        """``calibration`` of a vehicle of its model, valid in its ranges too, with its limits.
 
         If left-out runs of its own have tested it (``is_tested``), its limits are the wider of both.
         """

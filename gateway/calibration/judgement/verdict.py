@@ -228,15 +228,15 @@ def _errors_and_intervals(judgement: Judgement) -> Iterator[Reason]:
 
 
 def _inherited(assessment: Assessment) -> Iterator[Reason]:
-    """The loads' effect is inherited from other vehicles of its line and accepted, but no load of its own has confirmed
+    """The loads' effect is inherited from a sister and accepted, but no load of its own has confirmed
     it yet.
     """
     file = assessment.file
-    if file.line is None or len({run.payload_kg for run in file.provenance.runs}) > 1:
+    if file.sister_id is None or len({run.payload_kg for run in file.provenance.runs}) > 1:
         return
     text = (
-        "Only one load was driven: the effect of others was inherited from "
-        f"{counted(len(file.line.members), 'vehicle')} of its line. One known load, weighed, confirms it for this one."
+        "Only one load was driven: the effect of others was inherited from a sister. One known load, weighed, confirms "
+        "it for this vehicle."
     )
     yield Reason("inherited", Grade.RESERVED, text)
 

@@ -140,7 +140,7 @@ class LoadPlan:
 
 
 def plan_first(vehicle: Vehicle, inherited: Inherited | None = None) -> LoadPlan:
-    """A first campaign: empty, then the most informative loads by the prior of any vehicle, or of its line."""
+    """A first campaign: empty, then the most informative loads by the prior of any vehicle, or of its sister."""
     prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=False)
     planner = _Planner(
         vehicle, prior.mean, FIRST_DRIVE, _beside_calibration(_of_prior(prior, vehicle), vehicle, FIRST_DRIVE)

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car.prior import Inherited, prior_of
+from gateway.calibration.half_car.prior import prior_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
 from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
@@ -81,11 +81,10 @@ def half_car_section(
     runs: Sequence[KnownRun],
     calibration: CrossSpectrumCalibration,
     vehicle: Vehicle,
-    inherited: Inherited | None = None,
 ) -> Section:
     """Identifiability, and every run's spectra beside the model's; the worst run first."""
     fits = sorted(fits_of(runs, calibration), key=lambda fit: -fit.misfit)
-    known = knowledge_of(calibration, vehicle, inherited)
+    known = knowledge_of(calibration, vehicle)
     charts = [_fit_chart(fit) for fit in fits]
     return Section(
         "half-car",
@@ -94,7 +93,7 @@ def half_car_section(
             "Measured spectra of every run beside those of the one half-car fitted to all of them, each at its true "
             "load. The road's level is a straight line drawn through the spectra; everything else is the model's. "
             "Misfit is the likelihood ratio per degree of freedom: about 1 if the model explains everything.",
-            told(known, "its line told" if inherited else "vehicles usually have"),
+            told(known),
         ),
         (*charts[:1], knowledge_chart(known)),
         (_misfit_table(fits, calibration), knowledge_table(known)),
@@ -160,14 +159,10 @@ class Known:
     is_slack: bool
 
 
-def knowledge_of(
-    calibration: CrossSpectrumCalibration, vehicle: Vehicle, inherited: Inherited | None = None
-) -> list[Known]:
-    """The posterior of each parameter against its prior, or against the ``inherited`` one, in the order of the
-    parameters.
-    """
+def knowledge_of(calibration: CrossSpectrumCalibration, vehicle: Vehicle) -> list[Known]:
+    """The posterior of each parameter against the prior of any vehicle, in the order of the parameters."""
     theta = calibration.parameters
-    prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=has_roll(theta))
+    prior = prior_of(vehicle, with_roll=has_roll(theta))
     stds, before_stds = np.sqrt(np.diag(calibration.covariance)), prior.std
     known = []
     for i, name in enumerate(names_of(theta)):
@@ -180,15 +175,15 @@ def knowledge_of(
     return known
 
 
-def told(known: Sequence[Known], beforehand: str = "vehicles usually have") -> str:
-    """The parameters with little information in the data, which stay as known ``beforehand``, in words."""
+def told(known: Sequence[Known]) -> str:
+    """The parameters with little information in the data, which stay as vehicles usually are, in words."""
     untold = [one.name for one in known if one.left_over > UNTOLD_SHARE and not one.is_slack]
     if not untold:
         return "The data told something of every parameter of the vehicle."
     return (
         f"What the data could not tell ({len(untold)} of {sum(not one.is_slack for one in known)} parameters keep more "
         f"than {100.0 * UNTOLD_SHARE:.0f} % of their prior's spread): {', '.join(untold)}. These stay at what "
-        f"{beforehand}; loads that depend on them are weighed with that uncertainty."
+        "vehicles usually have; loads that depend on them are weighed with that uncertainty."
     )
 
 

@@ -17,7 +17,6 @@ from gateway.calibration.campaign import Campaign
 from gateway.calibration.judgement.assessment import Assessment, assess_calibration, stated_budget
 from gateway.calibration.judgement.learning_curve import LearningCurve
 from gateway.calibration.judgement.verdict import GRADE_TEXT, Grade, Summary, Verdict, summary_of, verdicts_of
-from gateway.calibration.line_files import line_in
 from gateway.calibration.plan.plan import LoadPlan, plan_next
 from gateway.estimate_json.kinds import budget_to_json
 from gateway.reports.calibration.accuracy import accuracy_section
@@ -73,8 +72,7 @@ def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: LoadPlan |
     if outcome.ratio_index is not None:
         yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in outcome.split])
     if outcome.cross_spectrum is not None:
-        line = line_in(outcome.file.line) if outcome.file.line else None
-        yield half_car_section(identification, outcome.cross_spectrum.calibration, campaign.vehicle, line)
+        yield half_car_section(identification, outcome.cross_spectrum.calibration, campaign.vehicle)
 
 
 def _evaluation_sections(assessment: Assessment) -> list[Section]:
@@ -107,8 +105,7 @@ def _write(
 def _subtitle(assessment: Assessment) -> str:
     seen = assessment.file.seen
     speeds = span(3.6 * seen.speed_mps[0], 3.6 * seen.speed_mps[1], "km/h")
-    line = assessment.file.line
-    inherited = f" and what {counted(len(line.members), 'vehicle')} of its line told" if line else ""
+    inherited = " and a sister's calibration" if assessment.file.sister_id else ""
     return (
         f"Calibrated on {counted(len(assessment.file.provenance.runs), 'run')}{inherited}: payloads of "
         f"{span(*seen.payload_kg, 'kg')}, front shares of {span(*seen.front_share_pct, '%', 1)}, {speeds}. "

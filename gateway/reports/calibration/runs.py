@@ -104,7 +104,7 @@ def provenance_section(assessment: Assessment) -> Section:
         ("front shares seen", span(*seen.front_share_pct, "%", 1)),
         ("speeds seen", span(3.6 * seen.speed_mps[0], 3.6 * seen.speed_mps[1], "km/h")),
         ("roughness seen", roughness),
-        *(("inherited from", member) for member in (file.line.members if file.line else ())),
+        *((("prior from", file.sister_id),) if file.sister_id else ()),
         ("software", provenance.software),
         ("command", provenance.command),
         ("campaign file", f"sha256:{provenance.campaign_sha256}"),

@@ -6,17 +6,18 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.calibration.commissioning.answers import vehicle_table
+from gateway.calibration.commissioning.answers import doubts_of, vehicle_table
 from gateway.calibration.commissioning.job import Drive, Job, Result
 from gateway.calibration.kept.batch_file import KeptBatch, packed
 from gateway.calibration.kept.shelf import Shelf
+from gateway.calibration.sister import require_alike
 from gateway.config.sections import CommissioningSection
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.errors import CalibrationFileError, RefusedError
 from gateway.log import Event
 from gateway.records import Why
-from gateway.service.commissioning.record import MADE, LineChoice, MadeCalibration, RecordStore, Underway
+from gateway.service.commissioning.record import MADE, MadeCalibration, RecordStore, Underway
 from gateway.service.commissioning.worker import Worker
 from gateway.stated.commissioning import FindingTold
 from gateway.stated.facts import VehicleAnswers
@@ -32,13 +33,25 @@ MakeWorker = Callable[[Callable[[Job, Result], None]], Worker]
 
 @dataclass(frozen=True, slots=True)
 class ServiceVehicle:
-    """The vehicle as the service knows it, and whether the service may make a calibration."""
+    """The vehicle as the service knows it, and whether the service may make a calibration.
+
+    ``like`` is the calibration file of its sister, ``sister`` the vehicle in it; None without one.
+    """
 
     name: str
     signals_id: str
     is_calibrated: bool
     why_not_allowed: str | None = None
     is_name_fixed: bool = False
+    like: Path | None = None
+    sister: Vehicle | None = None
+
+    def stated(self, answers: VehicleAnswers) -> Vehicle:
+        """The vehicle that follows from a fitter's answers. Raises CampaignError, NoSisterError."""
+        table = vehicle_table(answers, self.name, self.sister)
+        if self.sister is not None and not doubts_of(answers, self.sister):
+            require_alike(self.sister, table)
+        return replace(table, name=self.name) if self.is_name_fixed else table
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,17 +185,16 @@ class EmptyDrive:
         self, underway: Underway, durations_s: Mapping[Path, float], files: Mapping[str, bytes], *, is_fit: bool
     ) -> None:
         """Start a job on batches, by path. Its window is at most as long as the longest of them."""
-        line = underway.line
-        if self.is_over or underway.vehicle is None or line is None:
+        if self.is_over or underway.vehicle is None:
             return
-        vehicle = self._table(underway.vehicle, line)
+        vehicle = self._vehicle.stated(underway.vehicle)
         window_s = min(self._batch.window_s, max(durations_s.values()))
         share_pct = front_share_pct(vehicle, 0.0, None)
         self._job = Job(
             vehicle=vehicle,
             drives=(Drive(name=EMPTY, front_share_pct=share_pct, batches=tuple(durations_s)),),
             settings=asdict(self._batch) | {"window_s": window_s},
-            like=() if line.copy_name is None else (self._book.directory / line.copy_name,),
+            like=self._vehicle.like,
             is_fit=is_fit,
             goal_std_share=self._settings.goal_pct / 100.0,
             most_memory_mb=self._settings.memory_mb,
@@ -222,15 +234,14 @@ class EmptyDrive:
             self._book.keep_underway(doubted.model_copy(update=change))
             return
         name = self._book.write_calibration(result.calibration, result.calibration_id)
-        line = underway.line or LineChoice(name="")
         made = MadeCalibration(
             id=result.calibration_id,
             file_name=name,
             at=self._book.now(),
             by=underway.by,
             note=underway.note,
-            line=line,
-            vehicle=self._table(vehicle, line),
+            sister=self._vehicle.sister.name if self._vehicle.sister else None,
+            vehicle=self._vehicle.stated(vehicle),
             batches=underway.batches,
             learned=result.learned,
             warnings=(*result.warnings, *(one.sentence for one in doubts if one not in result.doubts)),
@@ -244,7 +255,3 @@ class EmptyDrive:
                     self._shelf.let_go(owner)
             self._book.forget_others()
         self._book.tell(Event.COMMISSIONED, {"calibration_id": made.id, "by": made.by, "n_batches": len(made.batches)})
-
-    def _table(self, answers: VehicleAnswers, line: LineChoice) -> Vehicle:
-        table = vehicle_table(answers, self._vehicle.name, line.shared)
-        return replace(table, name=self._vehicle.name) if self._vehicle.is_name_fixed else table

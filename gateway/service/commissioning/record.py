@@ -9,7 +9,6 @@ from typing import Any, Final, Literal
 
 from pydantic import Field
 
-from gateway.calibration.commissioning.answers import NO_LINE, LineFacts
 from gateway.calibration.commissioning.job import Learned
 from gateway.calibration.file.calibration_file import load_calibration
 from gateway.core.vehicle import Vehicle
@@ -18,7 +17,7 @@ from gateway.files.kept import KeptFiles
 from gateway.log import Event, OnEvent, log_event, tell_event
 from gateway.records import iso_utc
 from gateway.service.record_file import RecordFile
-from gateway.stated.commissioning import LineSource, MadeEnd
+from gateway.stated.commissioning import MadeEnd
 from gateway.stated.doubt import Doubt, DoubtKind
 from gateway.stated.facts import Part, VehicleAnswers
 
@@ -30,32 +29,10 @@ MOST_MADE: Final = 20  # chosen: calibrations; the oldest beyond are forgotten, 
 class CommissioningStep(StrEnum):
     """The next step of a commissioning."""
 
-    LINE = "line"
     VEHICLE = "vehicle"
     EMPTY = "empty"
     DRIVE = "drive"
     FIT = "fit"
-
-
-class LineChoice(Part):
-    """The chosen line. ``copy_name`` is its copy in the service's folder, None without a line.
-
-    ``shared`` gives figures that were not typed, ``facts`` figures to compare typed answers with, ``figures`` those
-    that prefill a form.
-    """
-
-    name: str
-    id: str | None = None
-    source: LineSource | None = None
-    copy_name: str | None = None
-    shared: dict[str, Any] = Field(default_factory=dict)
-    facts: LineFacts = NO_LINE
-    figures: dict[str, Any] = Field(default_factory=dict)
-
-    @property
-    def vehicle(self) -> dict[str, Any]:
-        """The figures, as the web names them."""
-        return self.figures
 
 
 class EmptyClaim(Part):
@@ -87,7 +64,6 @@ class Underway(Part):
     begun_at: str
     by: str
     note: str | None = None
-    line: LineChoice | None = None
     vehicle: VehicleAnswers | None = None
     empty: EmptyClaim | None = None
     batches: tuple[str, ...] = Field((), description="kept batches of the empty drive, oldest first")
@@ -102,8 +78,6 @@ class Underway(Part):
     @property
     def step(self) -> CommissioningStep:
         """The first step that is not answered yet."""
-        if self.line is None:
-            return CommissioningStep.LINE
         if self.vehicle is None or self.is_vehicle_doubted:
             return CommissioningStep.VEHICLE
         if self.empty is None:
@@ -133,7 +107,7 @@ class MadeCalibration(Part):
     at: str
     by: str
     note: str | None
-    line: LineChoice
+    sister: str | None = Field(description="name of the vehicle whose calibration gave the prior; null: none")
     vehicle: Vehicle
     batches: tuple[str, ...]
     learned: Learned | None
@@ -212,11 +186,9 @@ class RecordStore(RecordFile[CommissioningRecord]):
         return name
 
     def forget_others(self) -> None:
-        """Remove calibrations and copies of lines that the record no longer names. Raises OSError."""
-        named = {one.file_name for one in self.record.made} | {one.line.copy_name for one in self.record.made}
-        if self.record.underway is not None and self.record.underway.line is not None:
-            named.add(self.record.underway.line.copy_name)
-        for path in (*self.directory.glob(f"{MADE}*.json"), *self.directory.glob("line-*.json")):
+        """Remove calibrations that the record no longer names. Raises OSError."""
+        named = {one.file_name for one in self.record.made}
+        for path in self.directory.glob(f"{MADE}*.json"):
             if path.name not in named:
                 path.unlink()
 

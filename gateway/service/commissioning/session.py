@@ -3,35 +3,24 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-from gateway.calibration.commissioning.answers import doubts_of, vehicle_table
+from gateway.calibration.commissioning.answers import doubts_of
 from gateway.calibration.kept.batch_file import KeptBatch
 from gateway.calibration.kept.shelf import Shelf
 from gateway.config.sections import CommissioningSection
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
-from gateway.core.vehicle import Vehicle
-from gateway.errors import CampaignError, RefusedError
+from gateway.errors import CampaignError, NoSisterError, RefusedError
 from gateway.log import Event, OnEvent
 from gateway.part import STOP_WITHIN_S, ServicePart
 from gateway.service.commissioning.empty_drive import EmptyDrive, MakeWorker, ServiceVehicle
-from gateway.service.commissioning.lines import Lines, require_alike
-from gateway.service.commissioning.record import (
-    CommissioningStep,
-    Confirmed,
-    EmptyClaim,
-    LineChoice,
-    RecordStore,
-    Underway,
-)
+from gateway.service.commissioning.record import CommissioningStep, Confirmed, EmptyClaim, RecordStore, Underway
 from gateway.service.commissioning.worker import Worker
-from gateway.stated.commissioning import CommissioningState, LinesFound, LineSource, MadeEnd
+from gateway.stated.commissioning import CommissioningState, MadeEnd
 from gateway.stated.doubt import meant_by
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
-
-UPLOADED: Final = "uploaded"
 
 
 class Commissioning(ServicePart):
@@ -44,7 +33,6 @@ class Commissioning(ServicePart):
         directory: Path,
         settings: CommissioningSection,
         batch: BatchSettings,
-        lines: Lines,
         shelf: Shelf,
         drives: Scheduler,
         vehicle: ServiceVehicle,
@@ -54,7 +42,7 @@ class Commissioning(ServicePart):
         make_worker: MakeWorker | None = None,
     ) -> None:
         """Resumes a commissioning under way. ``make_worker`` replaces the process that fits (tests)."""
-        self._lines, self._drives, self._vehicle = lines, drives, vehicle
+        self._drives, self._vehicle = drives, vehicle
         self._window_s = batch.window_s
         self._book = RecordStore(directory, on_event, clock_ns)
         active = self._book.record.active
@@ -114,16 +102,6 @@ class Commissioning(ServicePart):
             }
             return CommissioningState.model_validate(shown).model_dump_json()
 
-    def lines(self) -> str:
-        return LinesFound(items=list(self._lines.found())).model_dump_json()
-
-    def upload(self, name: str, content: str) -> str:
-        """Keep a line's file -> the LinesFound with it. Raises RefusedError."""
-        self._require_allowed()
-        with self._book.lock:
-            self._lines.upload(name, content)
-        return self.lines()
-
     def begin(self, by: str, note: str | None) -> str:
         """Begin a commissioning. Raises RefusedError, as all later steps."""
         self._require_allowed()
@@ -133,29 +111,17 @@ class Commissioning(ServicePart):
             begun = Underway(begun_at=self._book.now(), by=by, note=note, signals_id=self._vehicle.signals_id)
             self._drive.forget()
             self._book.keep_underway(begun)
-            self._book.tell(Event.COMMISSIONING, {"step": CommissioningStep.LINE, "by": by})
-            return self.state()
-
-    def choose_line(self, name: str | None, source: LineSource | None) -> str:
-        """Choose one of ``lines``; None for no line, with the prior of any vehicle."""
-        with self._book.lock:
-            underway = self._underway()
-            choice = LineChoice(name="")
-            if name is not None:
-                choice, content = self._lines.choose(name, source or UPLOADED)
-                self._book.write(str(choice.copy_name), content)
-            self._require_usable(choice, underway.vehicle)
-            self._book.keep_underway(underway.model_copy(update={"line": choice} | _anew(underway.vehicle, choice)))
-            self._drive.fit()
+            self._book.tell(Event.COMMISSIONING, {"step": CommissioningStep.VEHICLE, "by": by})
             return self.state()
 
     def state_vehicle(self, answers: VehicleAnswers) -> str:
         """State the vehicle's figures. Unlikely answers raise doubts, which must be confirmed before the next step."""
         with self._book.lock:
             underway = self._underway(CommissioningStep.VEHICLE)
-            line = underway.line or LineChoice(name="")
-            self._require_usable(line, answers)
-            self._book.keep_underway(underway.model_copy(update={"vehicle": answers} | _anew(answers, line)))
+            self._require_usable(answers)
+            doubts = doubts_of(answers, self._vehicle.sister)
+            anew = {"vehicle": answers, "doubts": doubts, "confirmed": (), "learned": None, "fault": None}
+            self._book.keep_underway(underway.model_copy(update=anew))
             self._drive.fit()
             return self.state()
 
@@ -166,8 +132,8 @@ class Commissioning(ServicePart):
             doubts = underway.open_doubts
             if not doubts:
                 raise RefusedError("nothing_doubted", "there is no doubt to confirm")
-            if underway.line is not None and underway.vehicle is not None:
-                require_alike(self._book.directory, underway.line, self._table(underway.vehicle, underway.line))
+            if underway.vehicle is not None:
+                self._require_usable(underway.vehicle)
             kinds = tuple(dict.fromkeys(one.kind for one in doubts))
             confirmed = Confirmed(at=self._book.now(), by=by, kinds=kinds)
             is_of_drive = any(one.is_of_drive for one in doubts)
@@ -262,7 +228,7 @@ class Commissioning(ServicePart):
             return open_s, max(0.0, window_s - open_s)
         return 0.0, max(0.0, 2.0 * window_s - open_s)
 
-    def _underway(self, least: CommissioningStep = CommissioningStep.LINE) -> Underway:
+    def _underway(self, least: CommissioningStep = CommissioningStep.VEHICLE) -> Underway:
         """The commissioning under way. Raises RefusedError unless it has reached ``least``."""
         self._require_allowed()
         underway = self._book.record.underway
@@ -275,29 +241,19 @@ class Commissioning(ServicePart):
             raise RefusedError("fitting", "the calibration is being made: wait for it, or cancel")
         return underway
 
-    def _require_usable(self, line: LineChoice, answers: VehicleAnswers | None) -> None:
-        """Raises RefusedError if the answers describe no vehicle, or surely not one of the line."""
-        if answers is not None:
-            table = self._table(answers, line)
-            if not doubts_of(answers, line.facts):
-                require_alike(self._book.directory, line, table)
-
-    def _table(self, answers: VehicleAnswers, line: LineChoice) -> Vehicle:
+    def _require_usable(self, answers: VehicleAnswers) -> None:
+        """Raises RefusedError if the answers describe no vehicle, or surely not one of its sister's model."""
         try:
-            return vehicle_table(answers, self._vehicle.name)
+            self._vehicle.stated(answers)
+        except NoSisterError as fault:
+            raise RefusedError("not_its_sister", str(fault)) from None
         except CampaignError as fault:
-            meant = meant_by(doubts_of(answers, line.facts))
+            meant = meant_by(doubts_of(answers, self._vehicle.sister))
             raise RefusedError("vehicle_unusable", f"{fault}{meant}") from None
 
     def _require_allowed(self) -> None:
         if self._vehicle.why_not_allowed is not None:
             raise RefusedError("not_allowed", self._vehicle.why_not_allowed)
-
-
-def _anew(answers: VehicleAnswers | None, line: LineChoice) -> dict[str, Any]:
-    """Fields that a changed answer resets: its doubts, and the result of the drive so far."""
-    doubts = () if answers is None else doubts_of(answers, line.facts)
-    return {"doubts": doubts, "confirmed": (), "learned": None, "fault": None}
 
 
 def _not_driven(underway: Underway) -> dict[str, Any]:

@@ -3,10 +3,10 @@
 from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Query
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 from starlette.responses import Response
 
-from gateway.stated.commissioning import CommissioningState, LinesFound, LineSource
+from gateway.stated.commissioning import CommissioningState
 from gateway.stated.facts import VehicleAnswers
 from gateway.web.routes.known_weights import UndoQuery
 from gateway.web.routes.service_calls import By, CommissioningBackend, answered, created
@@ -19,21 +19,6 @@ class Begin(Body):
     note: str = Field("", max_length=200, description="kept in the history")
 
 
-class LineNamed(BaseModel):
-    """A file among the available lines."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    name: str = Field(max_length=64, examples=["van-model.json"])
-    source: LineSource
-
-
-class ChooseLine(Body):
-    """One of the available lines; null: none, with the prior of any vehicle."""
-
-    line: LineNamed | None
-
-
 class ClaimEmpty(Body):
     """The claim that the drive rests on."""
 
@@ -42,13 +27,6 @@ class ClaimEmpty(Body):
     is_empty: Literal[True] = Field(
         description="you know that the vehicle is empty, and will be until the calibration is made"
     )
-
-
-class UploadLine(Body):
-    """The calibration of a vehicle of the same model, or a line file, from your disk."""
-
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,58}\.json$", examples=["van-model.json"])
-    content: str = Field(max_length=1_000_000, description="the file's text")
 
 
 COMMISSIONING_PATH: Final = "/calibration/commissioning"
@@ -73,22 +51,6 @@ def commissioning_router(backend: CommissioningBackend) -> APIRouter:
     async def cancel_commissioning(by: By) -> Response:
         """Discard the commissioning under way, at any step. Calibrations made before stay as they are."""
         return await answered(backend.cancel, by)
-
-    @router.get("/lines", response_model=LinesFound)
-    async def lines() -> Response:
-        """The available lines: of the package, of the administrator, uploaded."""
-        return await answered(backend.lines)
-
-    @router.post("/lines", status_code=201, response_model=LinesFound, responses={**of_body, **problem_responses(413)})
-    async def upload_line(said: UploadLine) -> Response:
-        """Upload a file to choose from, checked whole; up to 1 MiB."""
-        return await created(backend.upload, said.name, said.content)
-
-    @router.post("/line", response_model=CommissioningState, responses={**of_body, **problem_responses(404)})
-    async def choose_line(said: ChooseLine) -> Response:
-        """Which line the vehicle is of. May be changed until the calibration is made."""
-        name, source = (said.line.name, said.line.source) if said.line else (None, None)
-        return await answered(backend.choose_line, name, source)
 
     @router.post("/vehicle", response_model=CommissioningState, responses=of_body)
     async def state_vehicle(said: Annotated[VehicleAnswers, BeforeValidator(utf8_only)]) -> Response:

@@ -4,10 +4,10 @@ import { phrase } from "/assets/dashboard/phrases.js";
 import { capital, figure, number } from "/assets/dashboard/words.js";
 
 const ADVICE = {
-  wheelbase: "measure", mass: "scales", front_share: "scales", line_mass: "line", line_axles: "line", line_track: "place",
+  wheelbase: "measure", mass: "scales", front_share: "scales", sister_mass: "sister", sister_axles: "sister", sister_track: "place",
   sensor_place: "place", sensor_side: "place", track: "place", unsprung: "leave", sprung: "leave", payload: "papers",
   payload_limit: "papers", gross_limit: "papers", axle_limit: "papers", load_length: "place", load_height: "place",
-  driven_weight: "aboard", driven_line: "other_line", driven_wheelbase: "speed", driven_sensor: "place",
+  driven_weight: "aboard", driven_sister: "other_sister", driven_wheelbase: "speed", driven_sensor: "place",
 };
 const FIELDS = {
   kerb_front_axle_kg: "com_front", kerb_rear_axle_kg: "com_rear", wheelbase_m: "com_wheelbase", sensor_position_m: "com_sensor",

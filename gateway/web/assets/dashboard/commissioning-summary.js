@@ -15,23 +15,18 @@ function axles({ kerb_front_axle_kg: front, kerb_rear_axle_kg: rear }) {
   return phrase("com_axles", { front: kg(front), rear: kg(rear), share: figure((100 * front) / (front + rear), 0, "%") });
 }
 
-/** The typed answer, else the line's, else that it is unknown. */
-function typedOrLine(typed, ofLine, digits, unit) {
-  if (typed !== null && typed !== undefined) return figure(typed, digits, unit);
-  return ofLine === undefined ? UNKNOWN : phrase("com_as_line", { value: figure(ofLine, digits, unit) });
-}
+const ifTyped = (typed, digits, unit) => (typed === null || typed === undefined ? UNKNOWN : figure(typed, digits, unit));
 
-function entered({ line, vehicle, empty }) {
-  const rows = line === null ? [] : [["com_sum_line", line.name || phrase("com_none"), "line"]];
+function entered({ vehicle, empty }) {
+  const rows = [];
   if (vehicle !== null) {
-    const ofLine = line?.vehicle ?? {};
     rows.push(
       ["com_sum_axles", axles(vehicle), "vehicle"],
       ["com_sum_gross", figure(vehicle.kerb_front_axle_kg + vehicle.kerb_rear_axle_kg, 0, "kg"), "vehicle"],
       ["com_sum_wheelbase", figure(vehicle.wheelbase_m, 2, "m"), "vehicle"],
-      ["com_sum_track", typedOrLine(vehicle.track_width_m, ofLine.track_width_m, 2, "m"), "vehicle"],
+      ["com_sum_track", ifTyped(vehicle.track_width_m, 2, "m"), "vehicle"],
       ["com_sum_sensor", place(vehicle), "vehicle"],
-      ["com_sum_payload", typedOrLine(vehicle.payload_range_kg?.[1], ofLine.payload_range_kg?.[1], 0, "kg"), "vehicle"],
+      ["com_sum_payload", ifTyped(vehicle.payload_range_kg?.[1], 0, "kg"), "vehicle"],
     );
     if (vehicle.carries) rows.push(["com_sum_carries", phrase(`com_carries.${vehicle.carries}`), "vehicle"]);
   }

@@ -4,30 +4,28 @@
 import { asked, changed, meantText } from "/assets/dashboard/commissioning-doubts.js";
 import { summary } from "/assets/dashboard/commissioning-summary.js";
 import { unfold } from "/assets/dashboard/fold.js";
-import { COMMISSIONING, change, hasToken, load } from "/assets/dashboard/gateway.js";
+import { COMMISSIONING, change, hasToken } from "/assets/dashboard/gateway.js";
 import { known, learn, show } from "/assets/dashboard/known.js";
 import { button, element, made, numberText, say, typedNumber, write } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
 import { Z95, clock, duration, figure } from "/assets/dashboard/words.js";
 
-const STEPS = ["line", "vehicle", "empty", "drive", "fit"];
+const STEPS = ["vehicle", "empty", "drive", "fit"];
 const TONES = { fault: "alarm", warning: "warning", note: "soft" };
-const NO_LINE = "";
 const DRAFT = "springscale-commissioning-draft";
 const OPTIONAL = new Set(["sensor_offset_left_m", "track_width_m", "payload_range_kg", "name", "carries", "payload_length_m", "payload_height_m"]);
 
 const card = element("commissioning");
 const form = element("commissioning-vehicle");
-let lines = [];
 let at = null; // an earlier step that somebody went back to; null: the one that is wanted next
 let shown = null; // the step whose form is on the page: what is typed in it stays while news come
 let told = ""; // what was done last, where the gateway's state does not say it
 let windowAt = null; // [seconds until the next window, when that was learned]
 
-const lineText = (line) => (line.name ? phrase("com_of_line", { name: line.name }) : phrase("com_without_line"));
+const sisterText = (name) => (name === null ? phrase("com_without_sister") : phrase("com_of_sister", { name }));
 
 const madeText = (one) =>
-  phrase("com_made", { n: one.n_batches, vehicle: one.vehicle_name, line: lineText(one.line), time: clock(one.at), by: one.by, note: one.note ? ` (${one.note})` : "" });
+  phrase("com_made", { n: one.n_batches, vehicle: one.vehicle_name, sister: sisterText(one.sister), time: clock(one.at), by: one.by, note: one.note ? ` (${one.note})` : "" });
 
 const activeText = (one) => (one === null ? phrase("com_of_settings") : madeText(one));
 
@@ -90,9 +88,8 @@ export function goTo(step) {
 function openForm(step) {
   if (step === shown) return;
   shown = step;
-  for (const name of ["line", "vehicle", "empty"]) element(`commissioning-${name}`).hidden = name !== step;
+  for (const name of ["vehicle", "empty"]) element(`commissioning-${name}`).hidden = name !== step;
   element("commissioning-drive").hidden = step !== "drive" && step !== "fit";
-  if (step === "line") askLines();
   if (step === "vehicle") fillVehicle();
   if (step === "empty") element("commissioning-claim").checked = false;
 }
@@ -112,7 +109,7 @@ function drawDone({ underway, active, is_pending }) {
   element("commissioning-done").hidden = underway !== null || active === null || !learned;
   if (underway !== null || !learned) return;
   write("commissioning-reached", phrase("com_reached", { payload: figure(Z95 * learned.payload_std_kg, 0, "kg"), share: figure(Z95 * learned.front_share_std_pct, 1, "%") }));
-  const better = active.line.name === "" ? "com_better_line" : learned.is_enough ? "com_better_load" : "com_better_drive";
+  const better = active.sister === null ? "com_better_sister" : learned.is_enough ? "com_better_load" : "com_better_drive";
   write("commissioning-better", phrase(better));
   card.classList.toggle("wanted", is_pending);
 }
@@ -138,7 +135,7 @@ function draw({ commissioning: state }) {
   element("commissioning-cancel").hidden = underway === null;
   element("commissioning-undo").hidden = active === null || underway !== null;
   element("commissioning-token").hidden = !hasToken() || !state.is_allowed;
-  element("commissioning-summary").hidden = underway === null || underway.line === null || current === "line";
+  element("commissioning-summary").hidden = underway === null || underway.vehicle === null || current === "vehicle";
   if (underway !== null) {
     drawDoubts(underway);
     drawWindow(underway);
@@ -167,25 +164,6 @@ function historyEntry(one) {
 show(draw, "commissioning");
 setInterval(showWindow, 1000);
 
-async function askLines() {
-  ({ items: lines } = await load(`${COMMISSIONING}/lines`));
-  const choices = lines.map((line, i) => {
-    const source = phrase(`com_source.${line.source}`);
-    const text = line.fault
-      ? `${line.name} (${source}): ${line.fault}`
-      : phrase("com_line_option", { name: line.name, source, vehicle: line.vehicle.name, wheelbase: figure(line.vehicle.wheelbase_m, 2, "m") });
-    const option = made("option", text);
-    option.value = i;
-    option.disabled = line.fault !== null;
-    return option;
-  });
-  const none = made("option", phrase("com_no_line"));
-  none.value = NO_LINE;
-  element("commissioning-choice").replaceChildren(...choices, none);
-  const chosen = known.commissioning?.underway?.line;
-  if (chosen) element("commissioning-choice").value = chosen.name ? String(lines.findIndex((one) => one.id === chosen.id)) : NO_LINE;
-}
-
 const fields = () => [...form.querySelectorAll("input, select")];
 
 function put(field, answer) {
@@ -199,15 +177,11 @@ function draft(begunAt) {
   return kept?.begun_at === begunAt ? kept.answers : null;
 }
 
-/** Filled with the typed answers, else with those sent before, else with the line's common figures. */
+/** Filled with the typed answers, else with those sent before. */
 function fillVehicle() {
-  const { line, vehicle, begun_at } = known.commissioning.underway;
-  const typed = draft(begun_at);
-  const ofLine = Object.fromEntries(Object.entries(line?.vehicle ?? {}).filter(([name]) => !name.startsWith("kerb_")));
-  const answers = typed ?? vehicle ?? ofLine;
+  const { vehicle, begun_at } = known.commissioning.underway;
+  const answers = draft(begun_at) ?? vehicle ?? {};
   for (const field of fields()) put(field, answers[field.name]);
-  const isFilled = !typed && !vehicle && Object.keys(ofLine).length > 0;
-  say("commissioning-prefilled", isFilled ? phrase("com_prefilled", { line: line.name }) : "");
 }
 
 const typedNow = () => Object.fromEntries(fields().map((field) => [field.name, field.type === "checkbox" ? field.checked : field.value]));
@@ -236,20 +210,6 @@ async function step(place, path, claim, method = "POST") {
   }
 }
 
-async function chooseLine(place) {
-  const [file] = element("commissioning-file").files;
-  let line = null;
-  if (file) {
-    if (!(await step(place, "/lines", { name: file.name, content: await file.text() }))) return;
-    await askLines();
-    line = { name: file.name, source: "uploaded" };
-  } else if (element("commissioning-choice").value !== NO_LINE) {
-    const { name, source } = lines[Number(element("commissioning-choice").value)];
-    line = { name, source };
-  }
-  await step(place, "/line", { line });
-}
-
 async function sendVehicle(said) {
   const isTaken = await step(form, "/vehicle", said);
   if (!isTaken) return;
@@ -268,7 +228,7 @@ function stateVehicle() {
   return sendVehicle(said);
 }
 
-const SUBMITTED = { line: chooseLine, vehicle: stateVehicle, empty: (place) => step(place, "/empty", { is_empty: true }) };
+const SUBMITTED = { vehicle: stateVehicle, empty: (place) => step(place, "/empty", { is_empty: true }) };
 
 for (const [name, submit] of Object.entries(SUBMITTED)) {
   element(`commissioning-${name}`).addEventListener("submit", (event) => {
