@@ -1,6 +1,6 @@
 """The service's status as types and as a sentence: the service fills it in, the web sends it unchanged."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Final
 
@@ -212,11 +212,10 @@ class VerificationStatus:
 
 @dataclass(frozen=True, slots=True)
 class AlarmsStatus:
-    """Active alarms and their delivery; counts begin at the start of the service."""
+    """Active alarms; counts begin at the start of the service."""
 
-    standing: Annotated[dict[str, str], Field(description="by name: early or final")] = field(default_factory=dict)
-    n_unacknowledged: Annotated[int, Field(description="active ones, and ended ones that nobody acknowledged")] = 0
-    n_told: Annotated[int, Field(description="alarms sent since the start, provisional and final")] = 0
+    active: Annotated[tuple[str, ...], Field(description="names, the oldest first")] = ()
+    n_raised: Annotated[int, Field(description="alarms raised since the start")] = 0
     watched: Annotated[tuple[str, ...], Field(description="names of all that are not switched off")] = ()
 
 

@@ -16,7 +16,6 @@ import click
 
 from benchmarks.accuracy import advice as on_advice
 from benchmarks.accuracy import (
-    alarms,
     availability,
     coverage,
     delivery,
@@ -40,7 +39,7 @@ from gateway.offline.campaigns import inspect
 
 STUDIES: Final[tuple[Study[Any], ...]] = (
     coverage.STUDY, budget.STUDY, disturbances.STUDY, grades.STUDY, delivery.STUDY, sensitivity.STUDY,
-    phones.STUDY, availability.STUDY, alarms.STUDY,
+    phones.STUDY, availability.STUDY,
 )  # fmt: skip
 Command = Callable[..., None]
 _workers = click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes")

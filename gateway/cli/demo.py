@@ -21,7 +21,6 @@ from gateway.cli.estimate import sentence
 from gateway.cli.options import NumberRange
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
 from gateway.core.alarms.alarm import alarm_to_json
-from gateway.core.alarms.alarm import sentence as alarm_sentence
 from gateway.core.alarms.rules import AlarmRules
 from gateway.core.alarms.watch import AlarmWatch
 from gateway.core.flow import Identity
@@ -107,7 +106,7 @@ class _Van:
             yield estimate.t_end_ns, self._message("estimates", estimate_to_json(estimate))
             if calibrated is not None:
                 for alarm in self._watch.weigh(estimate, calibrated.vehicle, calibrated.unsprung):
-                    yield estimate.t_end_ns, self._message("alarms", alarm_to_json(alarm, alarm_sentence(alarm)))
+                    yield estimate.t_end_ns, self._message("alarms", alarm_to_json(alarm))
 
     def _message(self, kind: str, record: dict[str, Any]) -> Message:
         return Message(BRANCH.replace("+", self._id) + f"/{kind}", json_line(record).encode())

@@ -125,11 +125,10 @@ class UplinkSection(SettingsSection):
 
 
 CAUSE_NAMES: Final = (  # those of core.alarms, which loads too much for this
-    *("overload", "imbalance", "sensor_fault", "drift", "no_estimate"),
+    *("overload", "sensor_fault"),
     *("overload.gross", "overload.front_axle", "overload.rear_axle"),
     *("overload.front_left", "overload.front_right", "overload.rear_left", "overload.rear_right"),
-    *("imbalance.left_right", "imbalance.front_rear", "sensor_fault.silent", "sensor_fault.refused"),
-    *("drift.damper_front", "drift.damper_rear", "drift.delay", "drift.gyro_gain", "drift.zero"),
+    *("sensor_fault.silent", "sensor_fault.refused"),
 )
 
 
@@ -143,44 +142,24 @@ CauseName = Annotated[str, AfterValidator(_of_a_cause)]
 
 
 class AlarmsSection(SettingsSection):
-    """When an alarm is raised, confirmed and ended. Permitted weights are those of the vehicle."""
+    """When an alarm is raised and when it ends. Permitted weights are those of the vehicle."""
 
     off: tuple[CauseName, ...] = Field(
-        (), description='unwanted alarms, by name or by kind: `["drift", "overload.front_left"]`'
+        (), description='unwanted alarms, by name or by kind: `["sensor_fault", "overload.front_left"]`'
     )
-    early_probability: float = Field(
-        0.9, gt=0.5, lt=1.0, description="raised early if it is so probable that a limit is exceeded, even by one batch"
+    raise_probability: float = Field(
+        0.95, gt=0.5, lt=1.0, description="raised if the batches of one load together make it so probable"
     )
-    final_probability: float = Field(
-        0.95, gt=0.5, lt=1.0, description="confirmed if the batches of one load together make it so probable"
-    )
-    final_batches: int = Field(2, ge=2, le=20, description="least number of batches of one load")
+    raise_batches: int = Field(2, ge=1, le=20, description="least number of batches of one load")
     clear_probability: float = Field(
         0.25, gt=0.0, le=0.5, description="the alarm ends when the load makes it no more probable than this"
     )
-    side_share_max_pct: float = Field(
-        55.0, ge=50.0, le=100.0, description="of the sprung mass, on the wheels of one side (needs a roll rate)"
-    )
-    axle_share_max_pct: float = Field(75.0, ge=50.0, le=100.0, description="of the sprung mass, on one axle")
     sensor_silent_s: float = Field(
-        60.0,
+        600.0,
         ge=10.0,
         le=86_400.0,
         description="a needed sensor that is silent for so long on a live bus raises an alarm",
     )
-    sensor_silent_final_s: float = Field(600.0, ge=10.0, le=86_400.0, description="likewise, for sure")
-    no_estimate_min: float = Field(
-        120.0,
-        ge=5.0,
-        le=10_000.0,
-        description="minutes driven without an estimate before an early alarm; twice as long confirms it",
-    )
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.sensor_silent_final_s < self.sensor_silent_s:
-            raise ValueError("sensor_silent_final_s must not be below sensor_silent_s")
-        return self
 
 
 class WebhookSection(SettingsSection):

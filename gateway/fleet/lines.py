@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from datetime import datetime
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -11,8 +11,7 @@ class LineAlarm(BaseModel):
     """An alarm that stands."""
 
     kind: str = Field(examples=["overload"])
-    where: str | None = Field(examples=["rear_axle"])
-    state: Literal["early", "final"]
+    where: str = Field(examples=["rear_axle"])
     t_start: str
 
 

@@ -150,7 +150,7 @@ class Gateway:
             known_loads=known_loads,
             verification=self.verification,
             trend=self.trend,
-            alarms=self.alarms,
+            alarms=self.alarms.standing,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
         self._server = WebServer(web)
@@ -244,7 +244,7 @@ class Gateway:
         """One check of the service's state, in a thread because it may wait for a lock or a disk."""
         now = self.status()
         log_state(now)
-        self.alarms.watch(now, self.trend.trends)
+        self.alarms.watch(now)
         if now.state in (State.WAITING_FOR_BUS, State.SENSOR_FAULT):
             self.bus_survey.look()  # a silent sensor may send under an identifier that the filters exclude
         else:

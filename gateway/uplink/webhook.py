@@ -125,13 +125,8 @@ def body_of(message: OutboxMessage) -> bytes:
 
 
 def _happened(record: dict[str, Any]) -> str | None:
-    """Time of the last change: the last step or acknowledgement of an alarm, else the end of the record."""
-    if "steps" not in record:
-        return record.get("t_end")
-    moments: list[str] = [step["t"] for step in record["steps"]]
-    if record["acknowledged"]:
-        moments.append(record["acknowledged"]["at"])
-    return max(moments)
+    """Time of the last change: the beginning of an alarm that stands, else the end of the record."""
+    return record.get("t_end") or record.get("t_start")
 
 
 def _seconds(retry_after: str | None, now_s: float) -> float:

@@ -69,7 +69,7 @@ def create_app(
     known_loads: KnownLoads | None = None,
     verification: service.VerificationBackend | None = None,
     trend: service.TrendBackend | None = None,
-    alarms: service.AlarmBackend | None = None,
+    alarms: Callable[[], str] | None = None,
 ) -> FastAPI:
     """The application over the pipeline's publications (``board``), the store (``reader``) and the service's state
     (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the estimates if

@@ -142,10 +142,10 @@ def test_the_last_load_event_by_the_clock_is_told_and_none_that_was_withdrawn(ga
 
 def test_alarms_that_stand_are_told_by_name(gateway: Gateway) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
-    assert told(gateway)["alarms"] == {}
-    standing = {"overload.gross": "final", "drift.zero": "early"}
-    gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(standing=standing)})
-    assert told(gateway)["alarms"] == standing
+    assert told(gateway)["alarms"] == []
+    active = ("overload.gross", "sensor_fault.silent")
+    gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(active=active)})
+    assert told(gateway)["alarms"] == list(active)
 
 
 def test_what_the_vehicles_own_sensors_say_is_passed_on_under_its_name(gateway: Gateway) -> None:

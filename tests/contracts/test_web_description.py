@@ -56,7 +56,7 @@ def schema(token_file: TokenFile) -> Iterator[BaseSchema]:
         ) as gateway,
     ):
         gateway.publish(*(make_estimate(n, *([Why.GAP] if n % 3 == 0 else []), with_spectra=True) for n in range(20)))
-        AlarmService(AlarmRules(), SUBJECT, gateway.store)(of_load(0, LIMIT_KG + 60.0))
+        AlarmService(AlarmRules(), SUBJECT, gateway.store)(of_load(0, LIMIT_KG + 60.0, n_batches=2))
         assert gateway.store.flush(PATIENCE_S)
         gateway.board.close()  # so that the stream has an end
         yield schemathesis.openapi.from_asgi("/openapi.json", gateway.app)

@@ -68,7 +68,7 @@ def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set
             uplink=UplinkStatus(broker="fleet.example:8883", waiting_age_s=7.0),
             webhook=WebhookStatus(receiver="https://fleet.example:443", waiting_age_s=7.0),
             record=RecordStatus(n_frames_written=7),
-            alarms=AlarmsStatus({"overload.gross": "early"}, watched=("overload.gross", "drift.zero")),
+            alarms=AlarmsStatus(("overload.gross",), watched=("overload.gross", "sensor_fault.silent")),
         )
         gateway.publish(replace(make_estimate(0), front_share=Quantity(50.5, 0.5)))
         client = Client(gateway.app)

@@ -119,9 +119,9 @@ def test_too_heavy_says_what_must_come_out_by_the_same_logic(gateway: Gateway, c
         "Overload: best estimate 20 kg (95 %: 8 to 32 kg). Limit: whole vehicle."
     )
     expect(page.locator("#rooms")).to_contain_text("Front axle10 kg too much")
-    standing = {"overload.gross": "final", "drift.zero": "final"}
-    gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(standing=standing)})
-    expect(page.locator("#alarms")).to_have_text("Alarm: drift: zero.")  # the light says the other
+    active = ("overload.gross", "sensor_fault.silent")
+    gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(active=active)})
+    expect(page.locator("#alarms")).to_have_text("Alarm: a sensor is silent.")  # the light says the other
 
 
 def test_alarms_that_stand_are_said_in_words(gateway: Gateway, cab: Look) -> None:
@@ -129,11 +129,9 @@ def test_alarms_that_stand_are_said_in_words(gateway: Gateway, cab: Look) -> Non
     page = cab()
     expect(page.locator("#number")).to_have_text("160 kg")
     expect(page.locator("#alarms")).to_be_hidden()
-    names = {"imbalance.left_right": "final", "overload.rear_left": "final", "drift.zero": "early"}
-    gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(standing=names)})
-    expect(page.locator("#alarms")).to_have_text(
-        "Alarm: load too far to one side, rear left wheel too heavy. First sign: drift: zero."
-    )
+    names = ("sensor_fault.refused", "overload.rear_left")
+    gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(active=names)})
+    expect(page.locator("#alarms")).to_have_text("Alarm: a sensor gives implausible values, rear left wheel too heavy.")
 
 
 def test_near_the_limit_nothing_more_is_promised(gateway: Gateway, cab: Look) -> None:

@@ -52,6 +52,6 @@ def of_no_vehicle(directory: Path, store: Store) -> dict[str, Any]:
             on_event=lambda kind, detail: None,
         ),
         "trend": TrendService(directory, NOBODY, ask, lambda: []),
-        "alarms": AlarmService(AlarmRules(), NOBODY, store),
+        "alarms": AlarmService(AlarmRules(), NOBODY, store).standing,
         "commissioning": NoCommissioning(),
     }

@@ -12,7 +12,7 @@ from typing import Any
 
 from gateway.bus.logs import write_candump
 from support.bus_drive import START_NS, white_noise
-from support.calibrated import calibration_file
+from support.calibrated import calibration_file, calibration_text
 from support.configured import service_config
 
 TESTS = Path(__file__).parents[1]
@@ -43,7 +43,8 @@ class ReplayedService:
     """
 
     def __init__(self, folder: Path, **keys: str | float) -> None:
-        calibration = calibration_file(payload_kg=12.0, front_share_pct=51.0).to_json()
+        weighs = calibration_file(payload_kg=12.0, front_share_pct=51.0)
+        calibration = calibration_text(weighs, unsprung_front_kg=80.0, unsprung_rear_kg=80.0)
         weighing = {"estimator": "ratio_index", "vehicle__id": "van-17", "batch__window_s": 20.0}
         config, log = service_config(folder, calibration, **weighing, **keys), folder / "drive.log"
         write_candump(white_noise(70.0, START_NS, seed=5), "can0", log)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gateway.config import load_settings
-from gateway.core.alarms.alarm import Alarm, AlarmCause, AlarmFigure, AlarmKind, AlarmState, AlarmStep, alarm_to_json
+from gateway.core.alarms.alarm import Alarm, AlarmCause, AlarmFigure, AlarmKind, alarm_to_json
 from gateway.core.events.entry import EntryKind, entry_id
 from gateway.estimate import Estimate, Weight, Weights
 from gateway.estimate_json import estimate_to_json
@@ -106,8 +106,8 @@ def _entries(found: Estimate) -> Iterator[dict[str, Any]]:
         }
     way = {"distance_m": 12_000.0, "carried_tkm": 2.4, "empty_share": 0.5, "overloaded_share": 0.0}
     yield {"id": entry_id(EntryKind.TRIP, found.vehicle_id, found.t_end_ns), "revision": 1, **shared, **way}
-    step = AlarmStep(AlarmState.FINAL, found.t_end_ns, AlarmFigure(2050.0, 8.0, 2000.0, "kg", 0.99))
-    yield alarm_to_json(Alarm.begun(AlarmCause(AlarmKind.OVERLOAD, "gross"), found.vehicle_id, step), "50 kg too much")
+    figure = AlarmFigure(2050.0, 8.0, 2000.0, 0.99)
+    yield alarm_to_json(Alarm(AlarmCause(AlarmKind.OVERLOAD, "gross"), found.vehicle_id, found.t_end_ns, figure))
 
 
 class SimulatedVehicles(list[SimulatedVehicle]):

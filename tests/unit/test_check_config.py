@@ -48,7 +48,7 @@ def test_it_says_by_what_is_weighed_where_no_calibration_is_configured(tmp_path:
         ({"bus": 'interface = "udp_multicast"\nchannel = "239.0.0.1"'}, "needs the Python package msgpack"),
         ({"web": 'host = "0.0.0.0"'}, "springscale token create NAME --config"),
         ({"web": "stale_after_s = 200.0"}, "stale_after_s = 200 is below [batch] window_s = 300"),
-        ({"alarms": 'off = ["overlaod"]'}, "is no alarm; known are overload, imbalance, "),
+        ({"alarms": 'off = ["overlaod"]'}, "is no alarm; known are overload, sensor_fault, "),
         ({"webhook": 'url = "https://fleet.example/hook"'}, "url needs secret_file"),
         (
             {"webhook": 'url = "http://fleet.example/hook"\nsecret_file = "none"'},

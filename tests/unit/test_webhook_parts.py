@@ -93,9 +93,9 @@ def test_the_body_says_what_it_is_and_when_it_happened() -> None:
     record = {"id": "event-5-a", "revision": 2, "t_end": "2026-11-22T08:00:00.000000Z"}
     message = OutboxMessage("e-1", "event-5-a-2", json_line(record), "events", kind="event")
     assert json.loads(body_of(message)) == {"type": "event", "timestamp": record["t_end"], "data": record}
-    seen = {"steps": [{"t": "2026-11-22T08:00:00.000000Z"}], "acknowledged": {"at": "2026-11-22T09:00:00.000000Z"}}
-    message = OutboxMessage("e-1", "alarm-5-a-2", json_line(seen), "alarms/drift/zero", kind="alarm")
-    assert json.loads(body_of(message))["timestamp"] == "2026-11-22T09:00:00.000000Z"
+    active = {"t_start": "2026-11-22T08:00:00.000000Z", "t_end": None}
+    message = OutboxMessage("e-1", "alarm-5-a-1", json_line(active), "alarms/overload/gross", kind="alarm")
+    assert json.loads(body_of(message))["timestamp"] == "2026-11-22T08:00:00.000000Z"
 
 
 @pytest.fixture

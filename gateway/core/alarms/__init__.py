@@ -1,4 +1,4 @@
-"""Alarms: each from its first sign to its end, with its acknowledgement.
+"""Alarms: a weight over its limit, and a faulty sensor; each from its beginning to its end.
 
     watch = AlarmWatch(rules, vehicle_id, known, recent)      # the state when the service stopped
     for alarm in watch.weigh(estimate, vehicle, unsprung): ...      # alarms that one more batch changed

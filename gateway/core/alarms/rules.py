@@ -1,55 +1,31 @@
-"""When an alarm is reported, confirmed and ended: probabilities with a hysteresis between them, and times.
+"""When an alarm is raised and when it ends: probabilities with a hysteresis between them, and times.
 
-Verdicts on overload and imbalance follow from all batches of a load (``verdicts_of``), verdicts on refused batches and
-missing estimates from the batches since the last counted one (``DriveTally``).
+Verdicts on overload follow from all batches of a load (``overload_says``), verdicts on refused batches from the batches
+since the last counted one (``Refusals``).
 """
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from gateway.core.alarms.alarm import (
-    AXLES,
-    NO_ESTIMATE,
-    NOTHING_FOUND,
-    OVERLOADS,
-    REFUSED,
-    SIDES,
-    AlarmCause,
-    AlarmFigure,
-    AlarmState,
-)
-from gateway.core.vehicle import Vehicle, left_share_pct
+from gateway.core.alarms.alarm import OVERLOADS, REFUSED, AlarmCause, AlarmFigure
+from gateway.core.vehicle import Vehicle
 from gateway.core.weights.limits import over_limit_probability
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung, weighed
-from gateway.estimate import UNKNOWN, Estimate, Quantity
+from gateway.estimate import Estimate
 from gateway.reasons import EXPLANATIONS, Cause
 from gateway.records import Why
-from gateway.units import NS_PER_S
+
+NOTHING_FOUND: Final = AlarmFigure()
 
 
 class AlarmVerdict(StrEnum):
-    """What the newest evidence says about an alarm, whatever its state."""
+    """What the newest evidence says about an alarm, whether it is active or not."""
 
-    EARLY = "early"
-    FINAL = "final"
+    RAISE = "raise"
     CLEAR = "clear"
     HOLD = "hold"  # no change: no evidence, or not enough
-
-    def state_after(self, before: AlarmState | None) -> AlarmState | None:
-        """The state after this verdict. States only move forward; None means no alarm yet, and a cleared alarm may be
-        followed by a new one.
-        """
-        stands = before in {AlarmState.EARLY, AlarmState.FINAL}
-        if self is AlarmVerdict.FINAL:
-            return AlarmState.FINAL
-        if self is AlarmVerdict.EARLY:
-            return before if stands else AlarmState.EARLY
-        if self is AlarmVerdict.CLEAR and stands:
-            return AlarmState.CLEARED
-        return before
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,15 +44,10 @@ class AlarmRules:
     ``off`` holds names of causes, or of kinds, which switch off every cause of the kind.
     """
 
-    early_probability: float = 0.9
-    final_probability: float = 0.95
-    final_batches: int = 2
+    raise_probability: float = 0.95
+    raise_batches: int = 2
     clear_probability: float = 0.25
-    side_share_max_pct: float = 55.0
-    axle_share_max_pct: float = 75.0
-    sensor_silent_s: float = 60.0
-    sensor_silent_final_s: float = 600.0
-    no_estimate_s: float = 7200.0
+    sensor_silent_s: float = 600.0
     off: tuple[str, ...] = ()
 
     def is_on(self, cause: AlarmCause) -> bool:
@@ -85,69 +56,42 @@ class AlarmRules:
     def of_probability(self, probability: float, n_batches: int) -> AlarmVerdict:
         """The verdict for ``probability``, computed from all ``n_batches`` of a load together; NaN: unknown.
 
-        Final: enough batches, and their joint probability is high. Early: the probability is nearly as high, or it
-        rests on a single batch. Clear: the probability is low. The gap between the early and the clear probability
-        keeps an alarm from switching on and off at a weight near its limit.
+        The gap between both probabilities keeps an alarm from switching on and off at a weight near its limit.
         """
-        if math.isnan(probability):
-            return AlarmVerdict.HOLD
-        if n_batches >= self.final_batches and probability >= self.final_probability:
-            return AlarmVerdict.FINAL
-        if probability <= self.clear_probability:
-            return AlarmVerdict.CLEAR
-        return AlarmVerdict.EARLY if probability >= self.early_probability else AlarmVerdict.HOLD
+        if n_batches >= self.raise_batches and probability >= self.raise_probability:
+            return AlarmVerdict.RAISE
+        return AlarmVerdict.CLEAR if probability <= self.clear_probability else AlarmVerdict.HOLD
 
 
 SENSORS: Final = frozenset(why for why, told in EXPLANATIONS.items() if told.cause is Cause.SENSORS)
-TO_BE_SURE: Final = 2  # batches, or times the time
+REFUSED_BATCHES: Final = 2  # in a row, for the sensor's sake, raise an alarm
 
 
 @dataclass(frozen=True, slots=True)
-class DriveTally:
-    """``driven_s`` is the time driven without an estimate, ``n_refused`` the number of consecutive batches that a
-    sensor caused to be refused.
-    """
+class Refusals:
+    """The number of consecutive batches that a sensor caused to be refused; None after a batch that counted."""
 
-    driven_s: float = 0.0
-    n_refused: int = 0
+    n: int | None = None
     last: tuple[Why, ...] = ()
 
-    def after(self, estimate: Estimate) -> "DriveTally":
+    def after(self, estimate: Estimate) -> "Refusals":
         """The state after one more whole batch. A batch without a calibration changes nothing, as it cannot count."""
         if estimate.counted:
-            return NO_DRIVES
+            return Refusals()
         if Why.NO_CALIBRATION in estimate.rejected:
             return self
-        driven_s = self.driven_s + (estimate.t_end_ns - estimate.t_start_ns) / NS_PER_S
         of_sensors = tuple(why for why in estimate.rejected if why in SENSORS)
-        n_refused = self.n_refused + 1 if of_sensors else 0
-        return DriveTally(driven_s, n_refused, of_sensors or estimate.rejected)
+        return Refusals((self.n or 0) + 1 if of_sensors else 0, of_sensors)
 
-    def verdicts(self, rules: AlarmRules) -> tuple[Says, Says]:
-        """Verdicts on refused batches and on the time without an estimate.
-
-        Refusals because of a sensor: early at the first, final at the second in a row. A long time: final at twice the
-        limit. The first batch that counts clears both. A refusal for another reason leaves the sensor's alarm as it is.
-        """
-        why = ", ".join(self.last)
-        refused, long = AlarmVerdict.CLEAR, AlarmVerdict.CLEAR
-        if self.driven_s > 0.0:
-            refused = _grown(self.n_refused, 1, TO_BE_SURE)
-            long = _grown(self.driven_s, rules.no_estimate_s, TO_BE_SURE * rules.no_estimate_s)
-        minutes = AlarmFigure(self.driven_s / 60.0, limit=rules.no_estimate_s / 60.0, unit="min", detail=why or None)
-        return Says(REFUSED, refused, AlarmFigure(detail=why or None)), Says(NO_ESTIMATE, long, minutes)
+    def says(self) -> Says:
+        """The first batch that counts ends the alarm. A refusal for another reason leaves it as it is."""
+        if self.n is None:
+            return Says(REFUSED, AlarmVerdict.CLEAR)
+        verdict = AlarmVerdict.RAISE if self.n >= REFUSED_BATCHES else AlarmVerdict.HOLD
+        return Says(REFUSED, verdict, AlarmFigure(detail=", ".join(self.last) or None))
 
 
-NO_DRIVES: Final = DriveTally()
-
-
-def _grown(now: float, early: float, final: float) -> AlarmVerdict:
-    if now >= final:
-        return AlarmVerdict.FINAL
-    return AlarmVerdict.EARLY if now >= early else AlarmVerdict.HOLD
-
-
-def verdicts_of(
+def overload_says(
     rules: AlarmRules, estimate: Estimate, vehicle: Vehicle | None, unsprung: Unsprung = NOT_CALIBRATED
 ) -> Iterator[Says]:
     """Verdicts of a whole batch that counted, and of its load epoch (core.fusion).
@@ -158,18 +102,10 @@ def verdicts_of(
     weights = weighed(load, vehicle, unsprung).weights if vehicle else estimate.weights
     for cause, (_, weight) in zip(OVERLOADS, weights.items(), strict=True):
         if weight.limit_kg is None:
-            yield Says(cause, AlarmVerdict.CLEAR, AlarmFigure(detail="no limit is given"))
+            yield Says(cause, AlarmVerdict.CLEAR)
             continue
         probability = over_limit_probability(weight.kg, weight.std_kg, weight.limit_kg)
-        figure = AlarmFigure(weight.kg, weight.std_kg, weight.limit_kg, "kg", probability)
-        yield Says(cause, rules.of_probability(probability, n_batches), figure)
-    shares = (
-        (SIDES, _left_share(load, vehicle), rules.side_share_max_pct),
-        (AXLES, load.front_share, rules.axle_share_max_pct),
-    )
-    for cause, share, most_pct in shares:
-        probability = beyond_probability(share, most_pct)
-        figure = AlarmFigure(_larger(share.number), share.std, most_pct, "%", probability)
+        figure = AlarmFigure(weight.kg, weight.std_kg, weight.limit_kg, probability)
         yield Says(cause, rules.of_probability(probability, n_batches), figure)
 
 
@@ -179,24 +115,3 @@ def as_of_load(estimate: Estimate) -> Estimate:
     if epoch is None or epoch.posterior is None:
         return estimate
     return estimate.answered(epoch.posterior)
-
-
-def beyond_probability(share: Quantity, most_pct: float) -> float:
-    """P(one of two sides carries more than ``most_pct``), 0 to 1, for a share with a normal error; NaN where unknown.
-
-    With X the share of one side it is P(X > m) + P(100 - X > m); both events exclude each other for m >= 50.
-    """
-    one = over_limit_probability(share.number, share.std, most_pct)
-    return one + over_limit_probability(100.0 - share.number, share.std, most_pct)
-
-
-def _left_share(estimate: Estimate, vehicle: Vehicle | None) -> Quantity:
-    cg_left = estimate.cg_left
-    if vehicle is None or vehicle.track_width_m is None or math.isnan(cg_left.number):
-        return UNKNOWN
-    track_m = vehicle.track_width_m
-    return Quantity(left_share_pct(cg_left.number, track_m), 100.0 * cg_left.std / track_m)
-
-
-def _larger(share_pct: float) -> float:
-    return max(share_pct, 100.0 - share_pct)

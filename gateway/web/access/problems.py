@@ -100,7 +100,6 @@ _CODES: Final = {
     "not_stored": 503,
     "not_allowed": 403,
     "no_such_line": 404,
-    "no_such_alarm": 404,
     "no_such_weight": 404,
 }  # of reasons; else 409
 

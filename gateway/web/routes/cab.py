@@ -87,7 +87,7 @@ class Cab(BaseModel):
     lacks: Lack | None = Field(description="facts that are missing for the gross weight")
     payload_kg: float | None
     payload_interval95_kg: list[float] | None
-    alarms: dict[str, str] = Field(description="active alarms, by name: early or final; see /api/v1/alarms")
+    alarms: tuple[str, ...] = Field(description="active alarms by name, the oldest first; see /api/v1/alarms")
     rejected: list[str] = Field(
         description="why the last whole batch was refused; empty: it was not, or there was none"
     )
@@ -129,7 +129,7 @@ def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
             lacks=weights.gross.lacks,
             payload_kg=None if load is None else rounded(load.payload.number, 1),
             payload_interval95_kg=None if load is None else _interval(load.payload),
-            alarms=now.alarms.standing,
+            alarms=now.alarms.active,
             rejected=[str(why) for why in rejected],
             last_event=await asyncio.to_thread(_last_event, reader),
             own_readings=now.own_readings,

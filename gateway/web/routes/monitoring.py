@@ -117,9 +117,9 @@ def _of_places(field: str) -> Callable[[Moment], Mapping[str, float | None]]:
     return lambda m: {where: getattr(getattr(m.weights, where), field) for where in PLACES}
 
 
-def _levels(moment: Moment) -> dict[str, float | None]:
+def _active(moment: Moment) -> dict[str, float | None]:
     alarms = moment.now.alarms
-    return {name: {"early": 1.0, "final": 2.0}.get(alarms.standing.get(name, ""), 0.0) for name in alarms.watched}
+    return {name: float(name in alarms.active) for name in alarms.watched}
 
 
 def _info(moment: Moment) -> Labelled:
@@ -221,9 +221,8 @@ TABLE: Final = (
     ),
     one("springscale_verification_due", "1 while one with known loads is due.", "now.verification.is_due"),
     MetricRow("springscale_verification_passed", "1 if the last of this calibration passed.", _passed),
-    by("springscale_alarm", "0 without an alarm, 1 provisional, 2 confirmed.", "alarm", _levels),
-    one("springscale_alarms_unacknowledged", "Alarms that nobody has acknowledged.", "now.alarms.n_unacknowledged"),
-    one("springscale_alarms_told_total", "Alarms sent since the start, provisional and final.", "now.alarms.n_told"),
+    by("springscale_alarm", "1 while the alarm is active, else 0.", "alarm", _active),
+    one("springscale_alarms_raised_total", "Alarms raised since the start.", "now.alarms.n_raised"),
     MetricRow(
         "springscale_record_refused",
         "1 while frames cannot be recorded.",

@@ -16,13 +16,6 @@ from gateway.stated.facts import StatedWeight, VehicleAnswers
 from gateway.web.schemas import problem_responses
 
 
-class AlarmBackend(Protocol):
-    """The alarms: ``standing`` is an array of Alarm, the worst first; ``acknowledge`` gives the Alarm after it."""
-
-    def standing(self) -> str: ...
-    def acknowledge(self, alarm_id: str, by: str, note: str | None) -> str: ...
-
-
 class KnownWeightBackend(Protocol):
     """The known weights. ``add`` gives the new KnownWeightEntry, the others the KnownWeightState after it.
 

@@ -75,12 +75,11 @@ export function notSeen(cab) {
   return cab.load === "not_weighed_yet" ? phrase("changed") : "";
 }
 
-/** Active alarms, the confirmed ones first, without those that the red light shows already. */
+/** Active alarms, without those that the red light shows already. */
 export function alarmText(cab) {
   const isSaid = (name) => cab.light === "over" && cab.light_about.some((place) => name === `overload.${place}`);
-  const told = (level) => Object.keys(cab.alarms).filter((name) => cab.alarms[name] === level && !isSaid(name)).map((name) => alarmName(...name.split(".")));
-  const [sure, early] = [told("final"), told("early")];
-  return [sure.length ? phrase("alarms", { names: sure.join(", ") }) : "", early.length ? phrase("first_signs", { names: early.join(", ") }) : ""].filter(Boolean).join(" ");
+  const names = cab.alarms.filter((name) => !isSaid(name)).map((name) => alarmName(...name.split(".")));
+  return names.length ? phrase("alarms", { names: names.join(", ") }) : "";
 }
 
 export const stood = (cab, silentS) => (cab.load === "standing" ? phrase("standing", { duration: duration(cab.stood_s + silentS) }) : "");

@@ -61,9 +61,7 @@ export const reasons = (names) => names.map((name) => common.named("reason", nam
 export const placeName = (place) => common.named("place", place);
 
 export function alarmName(kind, where) {
-  if (kind === "overload") return common("alarm.overload", { place: placeName(where) });
-  if (kind === "drift") return common("alarm.drift", { where: words(where) });
-  return common.named("alarm", where ? `${kind}.${where}` : kind);
+  return kind === "overload" ? common("alarm.overload", { place: placeName(where) }) : common.named("alarm", `${kind}.${where}`);
 }
 
 export function capital(text) {

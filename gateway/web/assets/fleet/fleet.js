@@ -12,10 +12,7 @@ const phrase = speaker(COMMON, FLEET);
 
 let vehicles = null;
 
-function alarmText({ kind, where, state }) {
-  const name = alarmName(kind, where);
-  return capital(state === "early" ? phrase("early", { name }) : name);
-}
+const alarmText = ({ kind, where }) => capital(alarmName(kind, where));
 
 function loadCell(one) {
   const bar = made("div", [made("span")], "bar");

@@ -47,7 +47,6 @@ export const CAB = {
   no_sensor: ["A sensor or the bus is silent: weighing has stopped.", "Ein Sensor oder der Bus schweigt: Es wird nicht gewogen."],
 
   alarms: ["Alarm: {names}.", "Alarm: {names}."],
-  first_signs: ["First sign: {names}.", "Erstes Anzeichen: {names}."],
   aboard: ["On board: {kg}{interval}, weighed {ago}.", "Geladen: {kg}{interval}, gewogen {ago}."],
   before_start: ["before the gateway started", "bevor das Gateway startete"],
   early: [" First value; a full batch is more accurate.", " Erster Wert; ein voller Abschnitt ist genauer."],

@@ -25,13 +25,9 @@ export const COMMON = {
   "place.rear_left": ["rear left wheel", "Rad hinten links"],
   "place.rear_right": ["rear right wheel", "Rad hinten rechts"],
 
-  "alarm.imbalance.left_right": ["load too far to one side", "Ladung zu weit auf einer Seite"],
-  "alarm.imbalance.front_rear": ["load too far to one end", "Ladung zu weit an einem Ende"],
   "alarm.sensor_fault.silent": ["a sensor is silent", "ein Sensor schweigt"],
   "alarm.sensor_fault.refused": ["a sensor gives implausible values", "ein Sensor liefert unglaubwürdige Werte"],
-  "alarm.no_estimate": ["no weight for a long time", "lange kein Gewicht"],
   "alarm.overload": ["{place} too heavy", "{place} zu schwer"],
-  "alarm.drift": ["drift: {where}", "Drift: {where}"],
 
   "reason.no_estimate_yet": ["no estimate yet", "noch keine Schätzung"],
   "reason.no_calibration": ["no calibration", "keine Kalibrierung"],

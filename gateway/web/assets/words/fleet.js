@@ -16,7 +16,6 @@ export const FLEET = {
   found: ["{shown} of {n} shown", "{shown} von {n} gezeigt"],
   of_limit: ["{kg} of {limit}", "{kg} von {limit}"],
   over: ["over the limit: {places}", "über der Grenze: {places}"],
-  early: ["{name} (first sign)", "{name} (erstes Anzeichen)"],
   since: ["since {time}", "seit {time}"],
   gone: ["The fleet's service does not answer. These are its last values.", "Der Dienst der Flotte antwortet nicht. Gezeigt wird, was er zuletzt gesendet hat."],
 };
