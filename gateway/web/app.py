@@ -48,12 +48,9 @@ Names end in the unit. Unknown is null. Errors are problem details (RFC 9457).""
 class WebSettings:
     """Limits of the application.
 
-    ``keep_alive_s`` is the time between comments on a quiet stream. Beyond ``n_streams_max`` open streams the answer is
-    503. After ``n_wrong_tokens_per_min`` wrong tokens from one address, further ones are answered with 429.
+    After ``n_wrong_tokens_per_min`` wrong tokens from one address, further ones are answered with 429.
     """
 
-    keep_alive_s: float = 15.0
-    n_streams_max: int = 100
     n_wrong_tokens_per_min: int = 10
 
 
@@ -103,7 +100,7 @@ def create_app(
     scales = Scales(calibrated)
     metrics = metrics_registry(board, scales, status, responses)
     routers = [
-        api_router(board, reader, status, chosen.keep_alive_s, chosen.n_streams_max),
+        api_router(board, reader, status),
         reasons_router(),
         vehicle_router(status, calibrated),
         spectra_router(board, calibrated),

@@ -8,14 +8,13 @@ from pathlib import Path
 
 import jsonschema_rs
 import pytest
-from starlette.types import Message
+from fastapi.sse import ServerSentEvent
 from support.alarms import LIMIT_KG, AlarmBench, of_load
 from support.web import Client
 
 from gateway.records import Why
 from gateway.status import State, Status
 from gateway.web.app import create_app
-from gateway.web.live.stream import EventStream
 from gateway.web.routes.alarms import Alarm
 
 URL = "/api/v1/alarms"
@@ -86,27 +85,18 @@ def test_metrics_name_every_alarm_that_is_watched(alarmed: Alarmed) -> None:
 
 
 def test_a_stream_that_is_resumed_tells_what_was_missed(alarmed: Alarmed) -> None:
-    async def first() -> bytes:
+    async def first() -> list[ServerSentEvent]:
         board = alarmed.bench.board
-        response = EventStream(board.fanout, alarmed.bench.store.reader(), "0000-0", 30.0)
-        sent: list[bytes] = []
+        told = []
+        with board.fanout.joined(alarmed.bench.store.reader(), "0000-0") as subscription:
+            async for event in subscription.events():
+                told.append(event)
+                if event.event == "alarm":
+                    board.close()
+        return told
 
-        async def send(message: Message) -> None:
-            sent.append(message.get("body", b""))
-            if b"event: alarm" in sent[-1]:
-                board.close()
-
-        async def receive() -> Message:
-            await asyncio.Event().wait()
-            return {"type": "http.disconnect"}
-
-        await response({"type": "http"}, receive, send)
-        return b"".join(sent)
-
-    told = asyncio.run(first()).decode()
-    assert "event: alarm" in told
-    (line,) = [line for line in told.splitlines() if line.startswith("data:") and '"alarm-' in line]
-    assert json.loads(line.removeprefix("data:"))["kind"] == "overload"
+    (text,) = [event.raw_data for event in asyncio.run(first()) if event.event == "alarm"]
+    assert json.loads(text or "")["kind"] == "overload"
 
 
 def test_what_is_told_is_as_the_schema_says(alarmed: Alarmed) -> None:

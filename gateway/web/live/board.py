@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
+from fastapi.sse import ServerSentEvent
 from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -15,7 +16,7 @@ from gateway.estimate import Estimate, Weights
 from gateway.estimate_json import estimate_from_json, estimate_to_json
 from gateway.history import ESTIMATE, REJECTION
 from gateway.records import Why, json_line
-from gateway.web.live.stream import Fanout, server_sent
+from gateway.web.live.stream import Fanout
 
 RECENT: Final = 100  # chosen: good estimates for the warnings, which look back over eight hours of driving
 PROVISIONAL: Final = "provisional"
@@ -105,7 +106,7 @@ class Board:
         with self._lock:
             self._show(estimate_from_json(record), self._clock())
         if estimate.is_provisional:
-            self.fanout.publish(server_sent(PROVISIONAL, json_line(record), None))
+            self.fanout.publish(ServerSentEvent(event=PROVISIONAL, raw_data=json_line(record)))
 
     def restore(self, estimate: str | None, rejection: str | None, age_s: float | None) -> None:
         """Show the estimate that an earlier run of the service stored, with its age; ``age_s`` None: unknown, so it is

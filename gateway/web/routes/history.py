@@ -6,11 +6,11 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from functools import partial
 from typing import Annotated, Any, Final, Literal
 
-from fastapi import APIRouter, Header, Query, Request
+from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.exceptions import RequestValidationError
+from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic.json_schema import SkipJsonSchema
-from starlette.exceptions import HTTPException
 from starlette.responses import Response, StreamingResponse
 
 from gateway.core.events import entry as table
@@ -20,9 +20,10 @@ from gateway.history import BATCHES, HistoryPage
 from gateway.records import json_line
 from gateway.status import Status
 from gateway.store import StoreReader
+from gateway.web.access.problems import MEDIA_TYPE
 from gateway.web.file_response import FORMATS, JsonLines, file_responses, sent_as_file
 from gateway.web.live.board import Board, LatestResponse
-from gateway.web.live.stream import EVENT_SCHEMA, EventStream
+from gateway.web.live.stream import EVENT_SCHEMA
 from gateway.web.schemas import EstimatesPage, Instant, Latest, problem_responses
 
 JSON: Final = "application/json"
@@ -196,9 +197,7 @@ _ENTRIES: Final = {
 }
 
 
-def api_router(
-    board: Board, reader: StoreReader, status: Callable[[], Status], keep_alive_s: float, n_streams_max: int
-) -> APIRouter:
+def api_router(board: Board, reader: StoreReader, status: Callable[[], Status]) -> APIRouter:
     """The latest estimate, the history of estimates, the status and the stream."""
     router = APIRouter(prefix="/api/v1", tags=["api"])
 
@@ -222,22 +221,28 @@ def api_router(
         """The state of the service, as a sentence and as numbers."""
         return status()
 
+    async def joined(last_event_id: Annotated[Cursor | SkipJsonSchema[None], Header()] = None) -> AsyncIterator[Any]:
+        with board.fanout.joined(reader, last_event_id) as subscription:
+            yield subscription
+
     @router.get(
         "/stream",
-        response_class=Response,
+        response_class=EventSourceResponse,
         responses={
-            200: {"content": {EventStream.media_type: {"schema": EVENT_SCHEMA}}},
-            **problem_responses(422, 503),
+            200: {"content": {EventSourceResponse.media_type: {"itemSchema": EVENT_SCHEMA}}},
+            422: {
+                "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
+                "description": "no cursor",
+            },
         },
     )
-    async def stream(last_event_id: Annotated[Cursor | SkipJsonSchema[None], Header()] = None) -> Response:
+    async def stream(subscription: Annotated[Any, Depends(joined)]) -> AsyncIterator[ServerSentEvent]:
         """Server-sent events: estimate, rejection, provisional; data is the estimate object.
 
         With Last-Event-ID, missed events come first.
         """
-        if board.fanout.n_subscribers >= n_streams_max:
-            raise HTTPException(503, f"{n_streams_max} streams are open already: close one")
-        return EventStream(board.fanout, reader, last_event_id, keep_alive_s)
+        async for event in subscription.events():
+            yield event
 
     return router
 

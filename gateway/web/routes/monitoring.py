@@ -270,8 +270,6 @@ TABLE: Final = (
         lambda m: {str(code): n for code, n in m.responses.items()},
     ),
     one("springscale_stream_clients", "Open streams.", "board.fanout.n_subscribers"),
-    one("springscale_stream_slow_clients_total", "Streams whose client did not read.", "board.fanout.n_slow_clients"),
-    one("springscale_stream_dropped_events_total", "Events those clients lost.", "board.fanout.n_events_dropped"),
     *(row for quantity in FOUND for row in _found(quantity)),
     one("springscale_estimate_age_seconds", "Since the latest estimate was received.", "shown.age_s"),
     one("springscale_estimate_stale", "1 while the latest estimate is old.", "shown.is_stale"),
