@@ -8,13 +8,12 @@ was broken off resumes with the cases that were finished.
 
 import json
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 import click
 
-from benchmarks.accuracy import advice as on_advice
 from benchmarks.accuracy import (
     availability,
     coverage,
@@ -28,14 +27,10 @@ from benchmarks.accuracy.budget import study as budget
 from benchmarks.accuracy.sensitivity import study as sensitivity
 from benchmarks.accuracy.sensor_bounds import limits_table
 from benchmarks.accuracy.study import Study
-from gateway.calibration.campaign import load_campaign
-from gateway.calibration.inspection.log import SplitRun
-from gateway.cli.options import FILE, batch_settings, window
+from gateway.cli.options import FILE
 from gateway.cli.progress import counted
 from gateway.core.cross_spectrum.predicted import Drive
-from gateway.core.vehicle import Vehicle
 from gateway.errors import SpringscaleError
-from gateway.offline.campaigns import inspect
 
 STUDIES: Final[tuple[Study[Any], ...]] = (
     coverage.STUDY, budget.STUDY, disturbances.STUDY, grades.STUDY, delivery.STUDY, sensitivity.STUDY,
@@ -75,18 +70,6 @@ for one in STUDIES:
     _add(one)
 
 
-@studies.command("advice")
-@click.argument("campaign", type=FILE)
-@_output
-@window
-def advice(campaign: Path, output: Path | None, window_s: float | None) -> None:
-    """Does driving the loads that --plan advises help? Uses CAMPAIGN's own runs as the next ones."""
-    runs, vehicle = _read(campaign, window_s)
-    with counted("calibrating and judging") as on_fit:
-        found = on_advice.advice_of(runs, vehicle, name=vehicle.name, on_fit=on_fit)
-    _hand_out("advice", found, on_advice.advice_page(found), output)
-
-
 @studies.command("faults")
 @click.argument("campaign", type=FILE)
 @click.option("--calibration", type=FILE, required=True, help="calibration file of that vehicle")
@@ -119,13 +102,6 @@ def bounds(duration_s: float, speed_kmh: float) -> None:
     knowledge.
     """
     click.echo(limits_table(Drive(duration_s, speed_kmh / 3.6)), nl=False)
-
-
-def _read(path: Path, window_s: float | None) -> tuple[Sequence[SplitRun], Vehicle]:
-    """The runs of a campaign, without those with a fault."""
-    campaign = load_campaign(path)
-    with counted("reading drives") as on_run:
-        return inspect(campaign, batch_settings(window_s), on_run=on_run).usable, campaign.vehicle
 
 
 def _hand_out(name: str, found: Mapping[str, Any], page: str, output: Path | None) -> None:

@@ -10,12 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.accuracy.calibrated import calibrated_on
 from benchmarks.accuracy.delivery_days import ROAD
 from benchmarks.accuracy.drives import MAP_NAME, FreshVan, Scope, fresh_van, unseen_load
 from benchmarks.accuracy.markdown import Column, number, page, table_of, text
 from benchmarks.accuracy.study import Study
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
-from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings

@@ -10,6 +10,7 @@ from dataclasses import replace
 from itertools import product
 from typing import Any, Final
 
+from benchmarks.accuracy.calibrated import calibrated_on
 from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, judged_batches, pooled, roll_in_words
 from benchmarks.accuracy.drives import TRIPS, USUAL, Scope, driven, fresh_van, unseen_load, without_roll_rate
 from benchmarks.accuracy.markdown import (
@@ -27,7 +28,6 @@ from benchmarks.accuracy.markdown import (
 from benchmarks.accuracy.study import Study
 from gateway.calibration.judgement.coverage import PROMISED
 from gateway.calibration.judgement.evaluation import judge
-from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import CalibrationImpossibleError
 

@@ -11,11 +11,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.accuracy.calibrated import calibrated_on
 from benchmarks.accuracy.drives import MAP_NAME, Scope, fresh_van
 from benchmarks.accuracy.loads import box
 from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, scattered
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map
-from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings

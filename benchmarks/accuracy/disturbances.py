@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.accuracy.calibrated import calibrated_on
 from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, coverage_table, judged_batches
 from benchmarks.accuracy.disturbed import DISTURBANCES, UNDISTURBED, Disturbance
 from benchmarks.accuracy.drives import (
@@ -37,7 +38,6 @@ from benchmarks.accuracy.markdown import (
 )
 from benchmarks.accuracy.study import Study
 from gateway.calibration.judgement.evaluation import judge
-from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.records import Motion, Why
 from gateway.sim.sensors import Sensors
 from gateway.sim.vehicle import Load, Vehicle

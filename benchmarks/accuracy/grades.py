@@ -11,6 +11,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final
 
+from benchmarks.accuracy.calibrated import calibrated_on
 from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, judged_batches, pooled
 from benchmarks.accuracy.disturbances import ESTIMATOR, WITHIN_PARTS, WITHIN_PLACES
 from benchmarks.accuracy.disturbed import noisier
@@ -18,7 +19,6 @@ from benchmarks.accuracy.drives import AS_CALIBRATED, TRIPS, USUAL, Scope, drive
 from benchmarks.accuracy.markdown import number, page, rejected_cell, table
 from benchmarks.accuracy.study import Study
 from gateway.calibration.judgement.evaluation import judge
-from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.errors import CalibrationImpossibleError
 from gateway.sim.sensors import CANMOD, REFERENCE, Sensors
 from gateway.sim.vehicle import Load

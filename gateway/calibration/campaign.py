@@ -115,14 +115,10 @@ class Campaign:
         return front_share_pct(self.vehicle, run.payload_kg, run.payload_position_m)
 
 
-def load_campaign(path: Path, *, may_lack_runs: bool = False) -> Campaign:
-    """Raises CampaignError naming every fault of the file, logs that are not there and loads that cannot be.
-
-    ``may_lack_runs`` accepts a file whose runs, and signals, are still to be written.
-    """
+def load_campaign(path: Path) -> Campaign:
+    """Raises CampaignError naming every fault of the file, logs that are not there and loads that cannot be."""
     tables = read_toml(path, CampaignError)
-    model = DraftTable if may_lack_runs and not tables.get("runs") else CampaignTable
-    table = checked(_with_sprung(tables, path), path, model, CampaignError)
+    table = checked(_with_sprung(tables, path), path, CampaignTable, CampaignError)
     campaign = Campaign(path, table, states_payload_range="payload_range_kg" in tables["vehicle"])
     faults = [f"{path}: vehicle.{fault}" for fault in _range_faults(campaign.vehicle)]
     faults += [

@@ -20,7 +20,7 @@ from gateway.errors import SpringscaleError
 
 _COMMANDS = {
     "calibrate": "Make a calibration file from drives with known loads.",
-    "calibration": "Show, compare and check calibration files; state known weights to a running service.",
+    "calibration": "Show a calibration file, find the sprung mass, state known weights to a running service.",
     "campaign": "Pack known-load drives into one archive, to pass on or to contribute.",
     "check-config": "Check a configuration, without opening the bus.",
     "commission": "Calibrate a running service's vehicle from its axle weights and an empty drive.",

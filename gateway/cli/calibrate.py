@@ -13,18 +13,14 @@ from gateway.calibration.file.calibration_file import CalibrationFile, load_cali
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
 from gateway.calibration.inspection.log import SplitRun
+from gateway.calibration.judgement.advice import verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
-from gateway.calibration.judgement.learning_curve import LearningCurve, curve_of
-from gateway.calibration.judgement.verdict import summary_of, verdicts_of
-from gateway.calibration.plan.plan import LoadPlan, StatedWidths, plan_first, plan_next, stated_widths, usual_drive
-from gateway.calibration.plan.words import plan_sentences, widths_sentence
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.choice import StructureChoice
-from gateway.calibration.sister import sister_of
 from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, require_output_place, window
 from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
-from gateway.errors import CalibrationImpossibleError, CampaignError, ConfigurationError
+from gateway.errors import CalibrationImpossibleError, ConfigurationError
 from gateway.files.whole import refusal_told, write_whole
 from gateway.offline.campaigns import inspect
 from gateway.records import json_line
@@ -95,7 +91,7 @@ def inspection_json(inspection: Inspection) -> dict[str, object]:
 
 @click.command("calibrate")
 @click.argument("campaign", type=CAMPAIGN)
-@click.option("--output", type=FILE, default=None, help="calibration file to write; not needed with --plan or --check")
+@click.option("--output", type=FILE, default=None, help="calibration file to write; not needed with --check")
 @click.option("--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, help="[default: all]")
 @click.option("--runs", "numbers", type=RunNumbers(), default=None, help="these runs only, counted from 1: 1,5,10")
 @click.option(
@@ -119,17 +115,8 @@ def inspection_json(inspection: Inspection) -> dict[str, object]:
     show_default=True,
     help="of the ratio index: single is (9) and (10), joint is (11)",
 )
-@click.option(
-    "--plan",
-    "wants_plan",
-    is_flag=True,
-    help="advise which load to drive next; [vehicle] with its payload_range_kg is enough",
-)
 @click.option("--check", "only_checks", is_flag=True, help="inspect the drives and write nothing; exits 1 on a refusal")
 @click.option("--report", type=FILE, default=None, help="directory to write a report into: report.html, figures")
-@click.option(
-    "--learning-curve", "wants_curve", is_flag=True, help="how accurate with fewer runs, in the report; takes minutes"
-)
 @window
 @as_json
 def calibrate(
@@ -140,28 +127,20 @@ def calibrate(
     like: Path | None,
     bands: BandChoice,
     structure: StructureChoice,
-    wants_plan: bool,
     only_checks: bool,
     report: Path | None,
-    wants_curve: bool,
     window_s: float | None,
     as_json: bool,
 ) -> None:
     """Fit every estimator on the identification parts of CAMPAIGN's runs."""
-    if output is None and not wants_plan and not only_checks:
-        raise click.UsageError("name the calibration file to write with --output, or ask with --check or --plan")
+    if output is None and not only_checks:
+        raise click.UsageError("name the calibration file to write with --output, or ask with --check")
     if like and estimators and "cross_spectrum" not in estimators:
         raise click.UsageError("--like is for cross_spectrum: the ratio index has nothing to inherit")
-    if wants_curve and report is None:
-        raise click.UsageError("--learning-curve is part of a report: name its directory with --report")
     _require_places(output, report)
-    loaded = load_campaign(campaign, may_lack_runs=wants_plan)
-    _ask_for_payload_range(loaded, is_needed=wants_plan)
+    loaded = load_campaign(campaign)
+    _say_payload_range(loaded)
     sister = load_calibration(like) if like else None
-    if not loaded.runs:
-        first = plan_first(loaded.vehicle, inherited=sister_of(sister) if sister else None)
-        click.echo(json_line({"plan": first.to_json()}) if as_json else plan_sentences(first))
-        return
     with counted("reading drives") as on_run:
         inspection = inspect(loaded, batch_settings(window_s), numbers=numbers, on_run=on_run)
     if sister:
@@ -186,18 +165,13 @@ def calibrate(
         with refusal_told(output, ConfigurationError):
             write_whole(output, outcome.file.to_json())
     if report is not None:
-        _report(report, loaded, outcome, _curve(loaded, outcome) if wants_curve else None)
-    plan = plan_next(outcome, loaded.vehicle) if wants_plan else None
-    fitted = outcome.cross_spectrum
-    speed_mps = usual_drive([one.identification for one in outcome.split]).speed_mps
-    widths = stated_widths(fitted.calibration, loaded.vehicle, speed_mps) if fitted else None
+        _report(report, loaded, outcome)
     if as_json:
-        record = _record(outcome.file, output, plan, widths) | {"inspection": inspection_json(inspection)}
-        click.echo(json_line(record))
+        click.echo(json_line(_record(outcome.file, output) | {"inspection": inspection_json(inspection)}))
     else:
-        click.echo(_sentences(outcome.file, output, plan, widths, said=inspection.warnings))
+        click.echo(_sentences(outcome.file, output, said=inspection.warnings))
         if report is None:  # its page says the same
-            click.echo(_verdict(loaded, outcome, plan))
+            click.echo(_verdict(loaded, outcome))
 
 
 def _command(
@@ -222,16 +196,15 @@ def _command(
     return shlex.join(words)
 
 
-def _ask_for_payload_range(campaign: Campaign, *, is_needed: bool) -> None:
-    """Errors are in percent of it, and a plan stays within it: a van of 3.5 t carries far more than the default."""
-    if campaign.states_payload_range:
-        return
-    low_kg, high_kg = campaign.vehicle.payload_range_kg
-    missing = f"{campaign.path}: vehicle.payload_range_kg: not stated"
-    ask = "write what the vehicle may carry, such as payload_range_kg = [0.0, 1200.0]"
-    if is_needed:
-        raise CampaignError(f"{missing}; a plan stays within it: {ask}")
-    click.echo(f"{missing}: using {low_kg:g} to {high_kg:g} kg, errors are in percent of it; {ask}", err=True)
+def _say_payload_range(campaign: Campaign) -> None:
+    """Errors are in percent of it: a van of 3.5 t carries far more than the default."""
+    if not campaign.states_payload_range:
+        low_kg, high_kg = campaign.vehicle.payload_range_kg
+        click.echo(
+            f"{campaign.path}: vehicle.payload_range_kg: not stated: using {low_kg:g} to {high_kg:g} kg, errors are in "
+            "percent of it; write what the vehicle may carry, such as payload_range_kg = [0.0, 1200.0]",
+            err=True,
+        )
 
 
 def _tell_inspection(inspection: Inspection, *, as_json: bool, is_all: bool) -> None:
@@ -250,37 +223,21 @@ def _require_places(output: Path | None, report: Path | None) -> None:
         raise click.UsageError(f"--report {report}: is a file, not a directory")
 
 
-def _curve(campaign: Campaign, outcome: Outcome) -> LearningCurve:
-    with counted("calibrating on fewer runs") as on_trial:
-        return curve_of(
-            outcome.split,
-            campaign.vehicle,
-            name=campaign.vehicle.name,
-            estimators=outcome.file.estimators,
-            on_trial=on_trial,
-        )
-
-
-def _report(directory: Path, campaign: Campaign, outcome: Outcome, curve: LearningCurve | None) -> None:
+def _report(directory: Path, campaign: Campaign, outcome: Outcome) -> None:
     from gateway.reports.calibration.report import write_calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
 
     with counted("judging and drawing") as on_chart:
-        written = write_calibration_report(directory, campaign, outcome, on_chart, curve=curve)
+        written = write_calibration_report(directory, campaign, outcome, on_chart)
     click.echo(str(written), err=True)
 
 
-def _verdict(campaign: Campaign, outcome: Outcome, printed: LoadPlan | None) -> str:
-    """How good the calibration is, and what would narrow its answers; without the advice of a plan that is printed."""
+def _verdict(campaign: Campaign, outcome: Outcome) -> str:
+    """How good the calibration is by the estimator that the service runs."""
     with counted("judging"):
-        plan = printed or (plan_next(outcome, campaign.vehicle) if outcome.cross_spectrum else None)
-        assessment = assess_calibration(campaign, outcome)
-        verdicts = verdicts_of(assessment, plan.now if plan else None)
-    return summary_of(assessment, verdicts, None if printed else plan).text
+        return verdicts_of(assess_calibration(campaign, outcome))[0].text
 
 
-def _record(
-    file: CalibrationFile, output: Path | None, plan: LoadPlan | None, widths: StatedWidths | None
-) -> dict[str, object]:
+def _record(file: CalibrationFile, output: Path | None) -> dict[str, object]:
     return {
         "calibration_id": file.id,
         "output": str(output) if output else None,
@@ -288,18 +245,10 @@ def _record(
         "seen": file.seen.model_dump(mode="json"),
         "expected_errors": {name: errors.model_dump(mode="json") for name, errors in file.expected_errors.items()},
         "warnings": list(file.warnings),
-        **({"stated_widths": widths.to_json()} if widths else {}),
-        **({"plan": plan.to_json()} if plan else {}),
     }
 
 
-def _sentences(
-    file: CalibrationFile,
-    output: Path | None,
-    plan: LoadPlan | None,
-    widths: StatedWidths | None,
-    said: Sequence[str],
-) -> str:
+def _sentences(file: CalibrationFile, output: Path | None, said: Sequence[str]) -> str:
     """The finished calibration in sentences, without the warnings that were printed already (``said``)."""
     low, high = file.seen.payload_kg
     lines = [
@@ -308,7 +257,5 @@ def _sentences(
         f"id {file.id}",
         *([f"prior from its sister {file.sister_id}"] if file.sister_id else []),
         *(f"warning: {warning}" for warning in file.warnings if warning not in said),
-        *([widths_sentence(widths)] if widths else []),
-        *([plan_sentences(plan)] if plan else []),
     ]
     return "\n".join(lines)

@@ -1,37 +1,28 @@
-"""springscale calibration: look at calibration files, compare and check them; state known weights to a service."""
+"""springscale calibration: show a calibration file, find the sprung mass, state known weights to a service."""
 
 import math
-import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import click
+import numpy as np
 
 from gateway.calibration.axle_weights import UNSPRUNG_SHARE, AxleWeights, Sprung, sprung_of
-from gateway.calibration.campaign import load_campaign
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
-from gateway.calibration.file.comparison import (
-    Check,
-    CheckResult,
-    Difference,
-    FittedFigure,
-    check_against_campaign,
-    differences,
-    figures_of,
-)
 from gateway.calibration.file.parts import ExpectedErrorsPart
 from gateway.cli.known_weights import tare_commands, ticket_commands
-from gateway.cli.options import FILE, NumberRange, Told, as_json, prints
-from gateway.records import json_line
+from gateway.cli.options import FILE, NumberRange, Told, prints
+from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
+from gateway.core.cross_spectrum.model.parameters import is_positive
+from gateway.core.ratio_index.regression import RegressionModel
 from gateway.stated.facts import DIVISION_KG
 from gateway.words import in_sections
 
 
 @click.group("calibration")
 def calibration() -> None:
-    """Look at calibration files, compare and check them; state known weights to a running service (tare, ticket)."""
+    """Show a calibration file, find the sprung mass, and state known weights to a running service (tare, ticket)."""
 
 
 calibration.add_command(tare_commands)
@@ -45,40 +36,6 @@ def show(file: Path) -> Told:
     """The content of FILE: vehicle, ranges, parameters with their standard deviations, expected errors, provenance."""
     held = load_calibration(file)
     return {"id": held.id, **held.model_dump(mode="json")}, calibration_text(held)
-
-
-@calibration.command("diff")
-@click.argument("one", type=FILE)
-@click.argument("other", type=FILE)
-@prints
-def diff(one: Path, other: Path) -> Told:
-    """The differences between two files; fitted figures in combined standard deviations, the most different first."""
-    ours, theirs = load_calibration(one), load_calibration(other)
-    changes = differences(ours, theirs)
-    listed = [asdict(each) | {"n_std": None if each.n_std == math.inf else each.n_std} for each in changes]
-    identical = f"identical: {ours.id}" if ours.id == theirs.id else "identical but for the ids"
-    record = {"ids": [ours.id, theirs.id], "is_identical": not changes, "differences": listed}
-    return record, "\n".join(map(_difference, changes)) or identical
-
-
-@calibration.command("verify")
-@click.argument("file", type=FILE)
-@click.option("--logs", "campaign", type=FILE, default=None, help="campaign file: check the logs it was made from")
-@as_json
-def verify(file: Path, campaign: Path | None, as_json: bool) -> None:
-    """Check FILE: content against its id, shape, known model; with --logs also the logs it was made from.
-
-    Exit codes: 0 good, 1 a log or load is not the one it was made from, 2 the file itself cannot be used.
-    """
-    held = load_calibration(file)
-    held.for_core()  # raises where this springscale does not know the model
-    checks = [*_own_checks(held), *(check_against_campaign(held, load_campaign(campaign)) if campaign else ())]
-    is_good = all(check.verdict is not CheckResult.FAULT for check in checks)
-    if as_json:
-        click.echo(json_line({"id": held.id, "is_good": is_good, "checks": [asdict(check) for check in checks]}))
-    else:
-        click.echo("\n".join(f"{check.verdict:5}  {check.what}: {check.text}" for check in checks))
-    sys.exit(0 if is_good else 1)
 
 
 KILOGRAMS = NumberRange(0.0, 100_000.0, min_open=True)  # chosen: no road vehicle has more
@@ -107,26 +64,6 @@ def sprung(
     record = {"vehicle": body.vehicle_keys(), **asdict(body)}
     del record["weights"]
     return record, vehicle_block(body)
-
-
-def _own_checks(held: CalibrationFile) -> tuple[Check, ...]:
-    """Checks that reading the file has already made."""
-    return (
-        Check("content", CheckResult.GOOD, f"matches its id {held.id}"),
-        Check("shape", CheckResult.GOOD, f"version {held.version}"),
-        Check("model", CheckResult.GOOD, f"known to this springscale: {', '.join(held.estimators) or 'no estimator'}"),
-    )
-
-
-def _difference(difference: Difference) -> str:
-    apart = "" if difference.n_std is None else f"   ({difference.n_std:.2g} standard deviations)"
-    return f"{difference.where}: {_plain(difference.one)} -> {_plain(difference.other)}{apart}"
-
-
-def _plain(fact: Any) -> str:
-    if isinstance(fact, list):
-        return f"[{', '.join(map(_plain, fact))}]"
-    return f"{fact:.6g}" if isinstance(fact, float) else "absent" if fact is None else str(fact)
 
 
 def vehicle_block(sprung: Sprung) -> str:
@@ -195,9 +132,44 @@ def _errors(errors: ExpectedErrorsPart) -> str:
     return ", ".join(parts)
 
 
-def _figures(figures: Sequence[FittedFigure]) -> Iterator[str]:
-    for figure in figures:
-        yield f"{figure.name:28}{figure.centre:>12.5g} ± {figure.std:.2g}"
+Figures = list[tuple[str, float, float]]  # name, value, standard deviation
+
+
+def figures_of(file: CalibrationFile) -> dict[str, Figures]:
+    """By part of the file: half-car parameters of cross_spectrum, regressions of ratio_index (constant first)."""
+    figures = {}
+    if file.cross_spectrum is not None:
+        figures["cross_spectrum"] = _half_car(file.cross_spectrum)
+    if file.ratio_index is not None:
+        models = {"payload": file.ratio_index.payload, "front_share": file.ratio_index.front_share}
+        figures |= {f"ratio_index.{target}": _regression(model) for target, model in models.items() if model}
+    return figures
+
+
+def _half_car(part: CrossSpectrumCalibration) -> Figures:
+    """A parameter stored as a logarithm has its standard deviation to first order."""
+    stds = np.sqrt(np.diag(part.covariance)).tolist()
+    rows = zip(part.names, part.parameters.tolist(), stds, strict=True)
+    return [(name, math.exp(x), math.exp(x) * std) if is_positive(name) else (name, x, std) for name, x, std in rows]
+
+
+def _regression(part: RegressionModel) -> Figures:
+    """Constant and coefficients of the unscaled terms, in the target's unit: comparable whatever the scaling.
+
+    The file has them of columns scaled to [-1, 1] by lows l and highs h:
+    b_0 + sum b_i (2 x_i - h_i - l_i) / (h_i - l_i). With T for the step from these b to those of x, Var = s^2 T
+    (X'X)^-1 T'.
+    """
+    span = part.highs - part.lows
+    to_raw = np.diag(np.r_[1.0, 2.0 / span])
+    to_raw[0, 1:] = -(part.highs + part.lows) / span
+    stds = part.residual_std * np.sqrt(np.diag(to_raw @ part.gram_inverse @ to_raw.T))
+    return list(zip(("constant", *part.terms), (to_raw @ part.coefficients).tolist(), stds.tolist(), strict=True))
+
+
+def _figures(figures: Figures) -> Iterator[str]:
+    for name, centre, std in figures:
+        yield f"{name:28}{centre:>12.5g} ± {std:.2g}"
 
 
 def _provenance(held: CalibrationFile) -> Iterator[str]:

@@ -8,8 +8,7 @@ import click
 from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.calibration.judgement.assessment import BatchSet, assess_evaluation
-from gateway.calibration.judgement.evaluation import TARGETS, Errors, ErrorTable, Judged, TargetErrors, error_table
-from gateway.calibration.judgement.verdict import width_of
+from gateway.calibration.judgement.evaluation import Errors, ErrorTable, Judged, TargetErrors, error_table
 from gateway.cli.options import CAMPAIGN, FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.progress import counted
 from gateway.errors import ConfigurationError
@@ -76,20 +75,11 @@ def text_of(table: ErrorTable) -> str:
         _row("front share", errors.front_share),
         *_sideways_lines(errors),
         "",
-        *_widths(table),
         f"{'run':>4}  {'true':>18}{'batches':>9}{'rejected':>10}"
         f"{'payload, mean |e|':>19}{'bias':>10}{'share, mean |e|':>17}{'bias':>10}",
         *(_run_row(first, of_run) for first, of_run in table.runs),
     ]
     return "\n".join(lines)
-
-
-def _widths(table: ErrorTable) -> Iterator[str]:
-    """A verdict on the width of the intervals, and its causes."""
-    widths = [width_of(table.judged, table.errors.of(target), target) for target in TARGETS]
-    if any(widths):
-        yield from (width.sentence for width in widths if width is not None)
-        yield ""
 
 
 def _row(name: str, errors: TargetErrors) -> str:

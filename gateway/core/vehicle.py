@@ -169,11 +169,11 @@ class Vehicle(VehicleFields):
     )
     payload_range_kg: tuple[Kilograms, Kilograms] = field(
         default=(0.0, 450.0),
-        metadata=described("payloads the vehicle may carry, rising; scales percentages, never clips; a plan needs it"),
+        metadata=described("payloads the vehicle may carry, rising; scales percentages, never clips"),
     )
     front_share_range_pct: tuple[Percent, Percent] = field(
         default=(40.0, 60.0),
-        metadata=described("front shares it may have, rising; scales percentages and plans, never clips"),
+        metadata=described("front shares it may have, rising; scales percentages, never clips"),
     )
     kerb_front_axle_kg: WeightKg | None = field(
         default=None,

@@ -1,6 +1,5 @@
 """What springscale estimate says of each batch, of logs that are not quite sound, and of broken sensors."""
 
-import re
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib.resources import files
@@ -18,16 +17,11 @@ from gateway.bus.logs import open_whole_log
 from gateway.bus.logs.candump_write import write_candump
 from gateway.bus.logs.packed import zstd
 from gateway.bus.signals import load_signal_map
-from gateway.calibration.plan.loads import PlacedLoad
-from gateway.calibration.plan.plan import Advice, Expected, LoadPlan
-from gateway.calibration.plan.words import best_next, plan_sentences
 from gateway.cli.estimate import sentence
-from gateway.core.cross_spectrum.predicted import Drive
 from gateway.errors import SpringscaleError
 from gateway.estimate import UNKNOWN, Estimate, Quantity, Weight, Weights
 from gateway.estimate_json import estimate_to_json
 from gateway.records import F64, Signal, Why
-from gateway.reports.calibration.runs import plan_section
 
 DEMO = str(files("gateway") / "demo" / "paper_van.json")
 
@@ -170,27 +164,6 @@ def test_estimate_tells_them_on_standard_error(tmp_path):
     (tmp_path / "a.log.zst").write_bytes(packed[: len(packed) // 2])
     ran = run("estimate", tmp_path / "a.log.zst", "--signals", "springscale:reference")
     assert ran.stderr.startswith(f"{tmp_path / 'a.log.zst'}: the zstd stream is cut off; everything before was read\n")
-
-
-EXPECTED = Expected(payload_std_kg=10.0, front_share_std_pct=0.5, reach_share=0.4)
-PLAN = LoadPlan("van", 3, Drive(600.0, 14.0), EXPECTED, (Advice(PlacedLoad(300.0, 50.0, 1.4), EXPECTED),), None)
-
-
-def spreads(text: str) -> set[float]:
-    return {float(each) for each in re.findall(r"(?:±|\+-)\s*([\d.]+)", text)}
-
-
-def test_a_plan() -> None:
-    said = plan_sentences(PLAN)
-    assert spreads(said) == {20.0, 1.0}
-    assert said.count("(95 %)") == 2
-
-
-def test_a_reports_plan() -> None:
-    (table,) = plan_section(PLAN).tables
-    assert "± spans 95 %" in table.caption
-    assert spreads(" ".join(table.rows[0])) == {19.6, 0.98}
-    assert "(95 %)" in (best_next(PLAN) or "")
 
 
 MAP = ("--signals", "springscale:reference")

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
@@ -10,49 +9,14 @@ from click.testing import CliRunner
 from benchmarks.accuracy import __main__ as command
 from benchmarks.accuracy import coverage
 from benchmarks.accuracy import study as study_module
-from benchmarks.accuracy.advice import Choice, compared
 from benchmarks.accuracy.coverage_table import JudgedBatch
 from benchmarks.accuracy.study import Study
-
-COMPARISON = compared([Choice((1, 2, 3), 4, 5, (7.0, 5.0), (9.0, 8.0), {4: (2.0, 3.0), 5: (8.0, 6.0)})])
-CAMPAIGN = """
-signals = "springscale:reference"
-[vehicle]
-name = "van"
-empty_mass_kg = 1240.0
-wheelbase_m = 2.8
-sensor_position_m = 3.1
-[[runs]]
-log = "can.log"
-payload_kg = 0.0
-"""
-
-
-@pytest.fixture
-def campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A campaign file whose log is not read."""
-    monkeypatch.setattr(command, "inspect", lambda *_, **__: SimpleNamespace(usable=()))
-    (tmp_path / "can.log").touch()
-    (tmp_path / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
-    return str(tmp_path / "campaign.toml")
 
 
 def run(*arguments: str) -> str:
     found = CliRunner().invoke(command.studies, list(arguments), catch_exceptions=False)
     assert found.exit_code == 0, found.output
     return found.stdout
-
-
-def test_the_advice_is_told_and_written(campaign: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        command.on_advice,
-        "advice_of",
-        lambda *_, **__: {"campaign": "van", "with_misses": COMPARISON, "answered": COMPARISON},
-    )
-    assert "| 8.00 | 6.00 |" in run("advice", campaign, "--output", str(tmp_path / "out"))
-    page = (tmp_path / "out/advice.md").read_text(encoding="utf-8")
-    assert "| and the fourth that the plan advises | 2.00 | 3.00 | 2.00 | 3.00 |" in page
-    assert "From each of 1 triples" in page
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ from benchmarks.accuracy.budget.nature import (
     to_one_side,
 )
 from benchmarks.accuracy.budget.response import day_covariance, response_to
+from benchmarks.accuracy.calibrated import calibrated_on
 from benchmarks.accuracy.drives import (
     TRIPS,
     USUAL,
@@ -37,7 +38,6 @@ from benchmarks.accuracy.drives import (
     rows_of,
     without_roll_rate,
 )
-from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cargo import ShapePrior
 from gateway.core.cross_spectrum.estimator import Weighed, weigh

@@ -22,6 +22,7 @@ from benchmarks.accuracy.budget.nature import (
     place_std_m,
     to_one_side,
 )
+from benchmarks.accuracy.calibrated import calibrated_on
 from benchmarks.accuracy.drives import (
     EMPTY_SHARE,
     TRIPS,
@@ -35,7 +36,6 @@ from benchmarks.accuracy.drives import (
 )
 from benchmarks.accuracy.loads import SAYS, Shape, shaped_load
 from gateway.calibration.judgement.coverage import coverage_of, interval_scores
-from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cross_spectrum.drift import MOST_TENSION

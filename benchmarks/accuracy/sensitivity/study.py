@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.accuracy.calibrated import calibrated_on
 from benchmarks.accuracy.coverage_table import JudgedBatch, coverage_table, judged_batches
 from benchmarks.accuracy.drives import TRIPS, USUAL, FreshVan, Scope, driven, fresh_van, unseen_load
 from benchmarks.accuracy.markdown import Column, Row, number, page, table_of, text
@@ -19,7 +20,6 @@ from gateway.calibration.inspection.axes import apart_findings, phase_findings, 
 from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.inspection.loads import compare_loads
 from gateway.calibration.judgement.evaluation import judge
-from gateway.calibration.judgement.learning_curve import calibrated_on
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.change import Rules

@@ -2,5 +2,5 @@
 
 The outcome of a calibration, or batches of known load with a calibration file, come in. Out go the error table (12)
 (``error_table``), the same by what calibration knew of the batches (``Assessment``), the coverage of intervals
-(``coverage_of``), a verdict with reasons (``verdicts_of``) and the errors with fewer known loads (``curve_of``).
+(``coverage_of``) and a verdict with reasons (``verdicts_of``).
 """

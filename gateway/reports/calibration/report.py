@@ -14,16 +14,13 @@ from typing import Any, Final
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.campaign import Campaign
+from gateway.calibration.judgement.advice import GRADE_TEXT, Grade, Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import Assessment, assess_calibration, stated_budget
-from gateway.calibration.judgement.learning_curve import LearningCurve
-from gateway.calibration.judgement.verdict import GRADE_TEXT, Grade, Summary, Verdict, summary_of, verdicts_of
-from gateway.calibration.plan.plan import LoadPlan, plan_next
 from gateway.estimate_json.kinds import budget_to_json
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.half_car import half_car_section
-from gateway.reports.calibration.learning import learning_section
 from gateway.reports.calibration.ratio_index import ratio_index_section
-from gateway.reports.calibration.runs import plan_section, provenance_section, runs_section
+from gateway.reports.calibration.runs import provenance_section, runs_section
 from gateway.reports.calibration.spectra import spectra_section
 from gateway.reports.charts import Section
 from gateway.reports.charts.html import (
@@ -40,31 +37,22 @@ from gateway.words import counted, estimator_name, span
 
 
 def write_calibration_report(
-    directory: Path,
-    campaign: Campaign,
-    outcome: Outcome,
-    on_chart: OnChart = lambda done, of: None,
-    *,
-    curve: LearningCurve | None = None,
+    directory: Path, campaign: Campaign, outcome: Outcome, on_chart: OnChart = lambda done, of: None
 ) -> Path:
-    """Everything known of a calibration, with its learning curve where one was made; the path of report.html."""
+    """Everything known of a calibration; the path of report.html."""
     assessment = assess_calibration(campaign, outcome)
-    plan = plan_next(outcome, campaign.vehicle) if outcome.cross_spectrum else None
-    learning = [learning_section(curve)] if curve else []
-    sections = [*_calibration_sections(outcome, campaign, plan), *learning, *_evaluation_sections(assessment)]
-    return _write(directory, assessment, sections, plan, on_chart, curve)
+    sections = [*_calibration_sections(outcome, campaign), *_evaluation_sections(assessment)]
+    return _write(directory, assessment, sections, on_chart)
 
 
 def write_evaluation_report(directory: Path, assessment: Assessment, on_chart: OnChart = lambda done, of: None) -> Path:
     """How a calibration did on a campaign; the path of report.html."""
-    return _write(directory, assessment, _evaluation_sections(assessment), None, on_chart)
+    return _write(directory, assessment, _evaluation_sections(assessment), on_chart)
 
 
-def _calibration_sections(outcome: Outcome, campaign: Campaign, plan: LoadPlan | None) -> Iterator[Section]:
+def _calibration_sections(outcome: Outcome, campaign: Campaign) -> Iterator[Section]:
     identification = [one.identification for one in outcome.split]
     yield runs_section(outcome)
-    if plan is not None:
-        yield plan_section(plan)
     ratio_index = outcome.ratio_index.calibration if outcome.ratio_index else None
     spectra = spectra_section(identification, ratio_index)
     if spectra is not None:
@@ -80,17 +68,10 @@ def _evaluation_sections(assessment: Assessment) -> list[Section]:
     return [*accuracy, provenance_section(assessment)]
 
 
-def _write(
-    directory: Path,
-    assessment: Assessment,
-    sections: list[Section],
-    plan: LoadPlan | None,
-    on_chart: OnChart,
-    curve: LearningCurve | None = None,
-) -> Path:
+def _write(directory: Path, assessment: Assessment, sections: list[Section], on_chart: OnChart) -> Path:
     made_folder(directory)
-    verdicts = verdicts_of(assessment, plan.now if plan else None)
-    verdict = _verdict_html(verdicts, summary_of(assessment, verdicts, plan))
+    verdicts = verdicts_of(assessment)
+    verdict = _verdict_html(verdicts)
     page = Page(
         assessment.title,
         f"<p>{prose(_subtitle(assessment))}</p>",
@@ -98,8 +79,7 @@ def _write(
         ("verdict", "Skip to the verdict"),
         PLOTLY_FILE if any(charts_of(sections)) else None,
     )
-    numbers = report_json(assessment, verdicts, plan) | {"learning_curve": curve.to_json() if curve else None}
-    return write_report(directory, page, sections, numbers, on_chart)
+    return write_report(directory, page, sections, report_json(assessment, verdicts), on_chart)
 
 
 def _subtitle(assessment: Assessment) -> str:
@@ -113,8 +93,8 @@ def _subtitle(assessment: Assessment) -> str:
     )
 
 
-def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...], plan: LoadPlan | None) -> dict[str, Any]:
-    """The report's numbers: verdicts with reasons, error tables (12) by estimator and set, run verdicts, the plan."""
+def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...]) -> dict[str, Any]:
+    """The report's numbers: verdicts with reasons, error tables (12) by estimator and set, run verdicts."""
     return {
         "calibration_id": assessment.file.id,
         "vehicle": assessment.vehicle.name,
@@ -143,7 +123,6 @@ def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...], plan: Loa
             for one in assessment.judgements
         },
         "error_budget": {one.estimator: budget_to_json(stated_budget(one)) for one in assessment.judgements},
-        "plan": plan.to_json() if plan else None,
     }
 
 
@@ -151,14 +130,13 @@ _RULE_TEXT: Final = {Grade.FIT: "Fit", Grade.RESERVED: "With reservations", Grad
 _GRADE_MARK: Final = {Grade.FIT: "✓", Grade.RESERVED: "!", Grade.UNFIT: "✗"}
 
 
-def _verdict_html(verdicts: Sequence[Verdict], summary: Summary) -> str:
+def _verdict_html(verdicts: Sequence[Verdict]) -> str:
     """The verdict on the estimator that the service runs, with the reasons of all."""
-    running = summary.verdict
+    running = verdicts[0]
     several = ", which the service runs by default" if len(verdicts) > 1 else ""
-    advice = f"<h3>What to drive next</h3><p>{prose(summary.next_run)}</p>" if summary.next_run else ""
     return (
         f'<section id="verdict" class="{running.grade}"><h2>{_mark(running.grade)} {GRADE_TEXT[running.grade]}</h2>'
-        f"<p>By the {escape(estimator_name(running.estimator))}{several}. {prose(summary.accuracy)}</p>{advice}"
+        f"<p>By the {escape(estimator_name(running.estimator))}{several}. {prose(running.accuracy)}</p>"
         f"{''.join(_reasons(verdict) for verdict in verdicts)}</section>"
     )
 

@@ -1,15 +1,12 @@
-"""The runs and their findings, the plan of further runs, and the provenance of every number."""
+"""The runs and their findings, and the provenance of every number."""
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection.finding import Finding, RunVerdict
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.judgement.assessment import Assessment
-from gateway.calibration.plan.plan import Expected, LoadPlan, OffCentreLoad
-from gateway.calibration.plan.words import load_words
-from gateway.estimate import Z95
 from gateway.records import Why
 from gateway.reports.charts import Section, Table
-from gateway.words import NONE, decimal, percent, span
+from gateway.words import NONE, decimal, span
 
 
 def runs_section(outcome: Outcome) -> Section:
@@ -56,39 +53,6 @@ def _findings_table(outcome: Outcome) -> Table | None:
     rows = tuple((run, str(one.severity), _spoken(one), one.text, one.advice) for run, one in findings)
     columns = ("Run", "weight", "what", "as found", "what to do")
     return Table("What was found of the runs", columns, rows) if rows else None
-
-
-def plan_section(plan: LoadPlan) -> Section:
-    """The runs that would teach most, in order."""
-    minutes, kmh = plan.drive.duration_s / 60.0, 3.6 * plan.drive.speed_mps
-    rows = [("now", *_expected(plan.now))] if plan.now else []
-    rows += [
-        (f"{number}. {load_words(step.load)}", *_expected(step.expected)) for number, step in enumerate(plan.advice, 1)
-    ]
-    rows += [(f"least useful: {load_words(plan.least.load)}", *_expected(plan.least.expected))] if plan.least else []
-    columns = ("After driving", "payload", "front share", "loads within reach")
-    caption = f"Expected of a five-minute batch, ± spans 95 %; each run {minutes:.0f} minutes near {kmh:.0f} km/h"
-    text = (
-        "The runs after which loads would be weighed best, each with those above it. These are the half-car's own "
-        "predictions, to first order: they show which run to drive rather than how good the result will be."
-    )
-    paragraphs = (text, *([_sideways(plan.sideways)] if plan.sideways else []))
-    return Section("next", "What to drive next", paragraphs, (), (Table(caption, columns, tuple(rows)),))
-
-
-def _sideways(sideways: OffCentreLoad) -> str:
-    load, left_m = sideways.load, sideways.payload_left_m
-    return (
-        f"One run with a load to one side, such as {load.payload_kg:g} kg {left_m:g} m left of the centre line "
-        f"(payload_left_m = {left_m:g}), would show what such a load does, which so far follows from springs and road "
-        "alone, and the signs of the roll rate and of sensor_offset_left_m."
-    )
-
-
-def _expected(expected: Expected) -> tuple[str, str, str]:
-    reach = percent(expected.reach_share)
-    payload_kg, share_pct = Z95 * expected.payload_std_kg, Z95 * expected.front_share_std_pct
-    return f"± {payload_kg:.1f} kg", f"± {share_pct:.2f} pp", reach
 
 
 def provenance_section(assessment: Assessment) -> Section:

@@ -1,0 +1,234 @@
+"""Fit for use or not: a table of rules over the errors, and what the inspection and the facts say.
+
+    verdicts_of(assessment) -> a verdict an estimator, first that of the one which the service runs
+
+A calibration is as good as its worst rule. docs/calibration.md lists them.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from gateway.calibration.calibrate import Outcome
+from gateway.calibration.inspection.finding import Kind
+from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement
+from gateway.calibration.judgement.coverage import PROMISED, coverage_of
+from gateway.calibration.judgement.evaluation import ErrorTable, Target
+from gateway.config import ESTIMATOR_NAMES
+from gateway.words import decimal, estimator_name
+
+
+class Grade(StrEnum):
+    """From good to bad."""
+
+    FIT = "fit"
+    RESERVED = "fit_with_reservations"
+    UNFIT = "not_fit"
+
+    @property
+    def rank(self) -> int:
+        """0 is best."""
+        return list(Grade).index(self)
+
+
+GRADE_TEXT: Final[Mapping[Grade, str]] = {
+    Grade.FIT: "Fit for use",
+    Grade.RESERVED: "Fit for use with reservations",
+    Grade.UNFIT: "Not fit for use",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """The result of one rule."""
+
+    rule: str
+    grade: Grade
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """One estimator's accuracy in a sentence, and a reason for each rule that applies."""
+
+    estimator: str
+    accuracy: str
+    reasons: tuple[Reason, ...]
+
+    @property
+    def grade(self) -> Grade:
+        """The worst of the reasons."""
+        return max((reason.grade for reason in self.reasons), key=lambda grade: grade.rank, default=Grade.RESERVED)
+
+    @property
+    def text(self) -> str:
+        """The grade, the accuracy, and the reasons for a grade below fit."""
+        below = [f"    {one.text}" for one in self.reasons if one.grade is not Grade.FIT]
+        head = f"{GRADE_TEXT[self.grade]}, by the {estimator_name(self.estimator)}. {self.accuracy}"
+        return "\n".join([head, *below])
+
+
+def _share_rejected(table: ErrorTable) -> float:
+    errors = table.errors
+    return 100.0 * errors.n_rejected / errors.n_batches if errors.n_batches else 100.0
+
+
+def _error(target: Target) -> Callable[[ErrorTable], float | None]:
+    """The mean error with a guess at mid-range for a batch without an answer; None if none was answered."""
+
+    def figure(table: ErrorTable) -> float | None:
+        errors = table.errors.of(target)
+        return None if errors.mean_abs is None else errors.mean_abs_pct_with_misses
+
+    return figure
+
+
+def _uncovered(target: Target) -> Callable[[ErrorTable], float | None]:
+    """The least share of intervals that may miss the truth, as few runs determine it; None with fewer than two runs."""
+
+    def figure(table: ErrorTable) -> float | None:
+        covered = [(hit, one.run) for one in table.judged if (hit := one.compared(target).is_covered) is not None]
+        if len({run for _, run in covered}) < 2:
+            return None
+        return 100.0 * (1.0 - coverage_of([hit for hit, _ in covered], [run for _, run in covered]).high)
+
+    return figure
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A figure in percent that is fit up to ``fit``, and of no use beyond ``most``.
+
+    ``missing`` is the grade if there is no figure; None: then the rule does not apply.
+    """
+
+    name: str
+    what: str
+    figure: Callable[[ErrorTable], float | None]
+    fit: float
+    most: float
+    missing: Grade | None = None
+
+    def judged(self, table: ErrorTable, part: str) -> Reason | None:
+        """The rule applied to the errors of one part of the campaign."""
+        figure = self.figure(table)
+        if figure is None:
+            text = f"{self.what} over the {part}: none was answered."
+            return None if self.missing is None else Reason(self.name, self.missing, text)
+        grade = Grade.FIT if figure <= self.fit else Grade.RESERVED if figure <= self.most else Grade.UNFIT
+        limits = f"fit to {self.fit:g} %, no use beyond {self.most:g} %"
+        return Reason(self.name, grade, f"{self.what} over the {part}: {figure:.1f} % ({limits}).")
+
+
+# All limits are chosen. A guess at mid-range errs by 25 % over evenly spread loads; an interval is half as wide as the
+# range for a mean normal error of 20 %; 95 % intervals with certainly less than 70 % coverage mislead.
+RULES: Final = (
+    Rule(
+        "payload_error",
+        "Mean error of payload, in percent of the range, with a guess at mid-range for a batch without an answer,",
+        _error("payload"), 10.0, 20.0, missing=Grade.UNFIT,
+    ),
+    Rule(
+        "front_share_error",
+        "Mean error of front share, in percent of the range, with a guess at mid-range for a batch without an answer,",
+        _error("front_share"), 10.0, 20.0, missing=Grade.RESERVED,
+    ),
+    Rule(
+        "payload_half_width", "Half of the 95 % interval of payload, in percent of the range,",
+        lambda table: table.errors.payload.half_width_pct, 25.0, 50.0,
+    ),
+    Rule(
+        "front_share_half_width", "Half of the 95 % interval of front share, in percent of the range,",
+        lambda table: table.errors.front_share.half_width_pct, 25.0, 50.0,
+    ),
+    Rule(
+        "payload_coverage", "95 % intervals of payload that miss the truth, at least,",
+        _uncovered("payload"), 100.0 * (1.0 - PROMISED[0]), 30.0,
+    ),
+    Rule(
+        "front_share_coverage", "95 % intervals of front share that miss the truth, at least,",
+        _uncovered("front_share"), 100.0 * (1.0 - PROMISED[0]), 30.0,
+    ),
+    Rule("answered", "Batches without an answer", _share_rejected, 20.0, 50.0),
+)  # fmt: skip
+
+
+def verdicts_of(assessment: Assessment) -> tuple[Verdict, ...]:
+    """A verdict for every estimator judged, first that of the one which the service runs by default."""
+    in_order = sorted(assessment.judgements, key=lambda one: ESTIMATOR_NAMES.index(one.estimator))
+    return tuple(_verdict(assessment, one) for one in in_order)
+
+
+def _verdict(assessment: Assessment, judgement: Judgement) -> Verdict:
+    reasons = [*_of_errors(judgement), *_of_one_load(assessment, judgement.estimator)]
+    if assessment.outcome:
+        reasons += _of_runs(assessment.outcome)
+    return Verdict(judgement.estimator, _accuracy(judgement), tuple(reasons))
+
+
+def _accuracy(judgement: Judgement) -> str:
+    if judgement.unseen is None:
+        return "How well it weighs is not known: no data were kept aside to judge by."
+    errors = judgement.tables[judgement.unseen].errors
+    payload, share = errors.payload, errors.front_share
+    return (
+        f"Over the {PART_NAMES[judgement.unseen]} it weighs payloads to {decimal(payload.mean_abs, ' kg', 1)} on "
+        f"average and {decimal(payload.max_abs, ' kg', 1)} at worst, front shares to "
+        f"{decimal(share.mean_abs, ' pp')} and {decimal(share.max_abs, ' pp')}."
+    )
+
+
+def _of_errors(judgement: Judgement) -> Iterator[Reason]:
+    part = judgement.unseen
+    if part is None:
+        text = "No data were kept aside to judge by: fewer than three runs and no validation part."
+        yield Reason("unseen", Grade.RESERVED, text)
+        return
+    judged = (rule.judged(judgement.tables[part], PART_NAMES[part]) for rule in RULES)
+    yield from (reason for reason in judged if reason is not None)
+
+
+_WARNINGS: Final[Mapping[str, str]] = {
+    "springs_from_priors": "Only one load was driven: it sets the zero; the springs are those of a typical vehicle. "
+    "Weights away from that load are as uncertain as their intervals say.",
+    "intervals_untested": "Fewer than three runs: intervals were widened by a rule of thumb, not tested.",
+}
+
+
+def _of_one_load(assessment: Assessment, estimator: str) -> Iterator[Reason]:
+    """What a fit on few loads takes from elsewhere."""
+    file = assessment.file
+    if estimator == "cross_spectrum":
+        yield from (Reason(name, Grade.RESERVED, text) for name, text in _WARNINGS.items() if name in file.warnings)
+        if file.sister_id is not None and len({run.payload_kg for run in file.provenance.runs}) == 1:
+            text = (
+                "Only one load was driven: the effect of others was inherited from a sister. One known load, weighed, "
+                "confirms it for this vehicle."
+            )
+            yield Reason("inherited", Grade.RESERVED, text)
+
+
+def _of_runs(outcome: Outcome) -> Iterator[Reason]:
+    verdicts = outcome.inspection.verdicts
+    unusable = [one.number for one in verdicts if not one.is_usable]
+    if unusable:
+        grade = Grade.UNFIT if 2 * len(unusable) > len(verdicts) else Grade.RESERVED
+        yield Reason("runs", grade, f"{len(unusable)} of {len(verdicts)} runs cannot be used: {_listed(unusable)}.")
+    mislabelled = [
+        one.number
+        for one in verdicts
+        if one.is_usable and any(finding.kind is Kind.LOAD_DISAGREES for finding in one.findings)
+    ]
+    if mislabelled:
+        text = (
+            f"The other runs find another weight for {_listed(mislabelled)} than the campaign file says: correct the "
+            "load, or calibrate without these runs (--runs)."
+        )
+        yield Reason("labels", Grade.UNFIT, text)
+    for doubt in outcome.doubts:
+        yield Reason("facts", Grade.UNFIT, f"{doubt.sentence[:1].upper()}{doubt.sentence[1:]}.")
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ", ".join(f"run {number}" for number in numbers)
