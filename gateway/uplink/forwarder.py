@@ -38,6 +38,7 @@ class BackOff:
 
 
 LOOK_S: Final = 5.0  # chosen: how often the backlog is counted
+IDLE_S: Final = 5.0  # chosen: how often what waits is counted; a new message is seen at once
 PAGE: Final = 100  # chosen: messages asked for at once
 FIRST_PAUSE_S: Final = 1.0  # chosen: ceiling of the first pause
 

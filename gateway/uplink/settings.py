@@ -122,12 +122,9 @@ HOW_TO_MAKE_ONE = 'echo "whsec_$(openssl rand -base64 32)" > FILE'
 
 @dataclass(frozen=True, slots=True)
 class WebhookSettings:
-    """The address in its parts; ``path`` includes the query. ``kinds`` are the webhook types to send."""
+    """Where to push, and with what. ``kinds`` are the webhook types to send."""
 
-    is_tls: bool
-    host: str
-    port: int
-    path: str
+    url: str
     secret_file: Path
     kinds: tuple[str, ...]
     ca: Path | None = None
@@ -138,13 +135,16 @@ class WebhookSettings:
     @property
     def receiver(self) -> str:
         """The address for people, without the path, which may contain a secret."""
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"{'https' if self.is_tls else 'http'}://{host}:{self.port}"
+        parts = urlsplit(self.url)
+        host = f"[{parts.hostname}]" if ":" in (parts.hostname or "") else parts.hostname
+        return f"{parts.scheme}://{host}:{parts.port or (443 if parts.scheme == 'https' else 80)}"
 
     @property
     def queue(self) -> str:
         """Name of the queue position. It belongs to the address: a new address starts at the first record."""
-        return f"{self.receiver}#{hashlib.sha256(self.path.encode()).hexdigest()[:12]}"
+        parts = urlsplit(self.url)
+        path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
+        return f"{self.receiver}#{hashlib.sha256(path.encode()).hexdigest()[:12]}"
 
     def secrets(self) -> tuple[bytes, ...]:
         """The secrets, read for every attempt, so that they can be changed while the service runs.
@@ -160,7 +160,7 @@ class WebhookSettings:
 
     def tls_context(self) -> ssl.SSLContext | None:
         """Checks the receiver's certificate and name. Raises ConfigurationError for a file that cannot be used."""
-        if not self.is_tls:
+        if not self.url.startswith("https:"):
             return None
         try:
             return ssl.create_default_context(cafile=self.ca)
@@ -172,13 +172,8 @@ def webhook_settings(section: WebhookSection, vehicle: VehicleSection) -> Webhoo
     """The settings of [webhook]; None without a url. Raises ConfigurationError for files that cannot be used."""
     if section.url is None or section.secret_file is None:  # the section asks for both
         return None
-    url = urlsplit(section.url)
-    is_tls = url.scheme == "https"
     settings = WebhookSettings(
-        is_tls=is_tls,
-        host=url.hostname or "",
-        port=url.port or (443 if is_tls else 80),
-        path=(url.path or "/") + (f"?{url.query}" if url.query else ""),
+        url=section.url,
         secret_file=section.secret_file,
         kinds=tuple(kind.removesuffix("s") for kind in section.send),
         ca=section.ca,

@@ -35,7 +35,7 @@ from gateway.uplink.settings import WebhookSettings
 from gateway.uplink.webhook import Webhook
 
 store = Store.open(pathlib.Path(sys.argv[1]))
-settings = WebhookSettings(False, "127.0.0.1", int(sys.argv[2]), "/hook", pathlib.Path(sys.argv[3]), ("alarm", "event"))
+settings = WebhookSettings(f"http://127.0.0.1:{sys.argv[2]}/hook", pathlib.Path(sys.argv[3]), ("alarm", "event"))
 outbox = Outbox(store, settings.queue, only=settings.kinds)
 Webhook(settings, outbox, back_off=BackOff(0.01, 0.05)).start()
 print("started", flush=True)
@@ -55,9 +55,15 @@ class Sending:
 
     def __init__(self, directory: Path, port: int, secret_file: Path, **changed: object) -> None:
         self.store = Store.open(directory)
-        told = {"timeout_s": 5.0, "give_up_s": 3600.0, "kinds": KINDS, "is_tls": False, "host": "127.0.0.1", **changed}
+        told = {
+            "timeout_s": 5.0,
+            "give_up_s": 3600.0,
+            "kinds": KINDS,
+            "url": f"http://127.0.0.1:{port}/hook",
+            **changed,
+        }
         self.clock_s = 0.0
-        settings = WebhookSettings(port=port, path="/hook", secret_file=secret_file, **told)  # type: ignore[arg-type]
+        settings = WebhookSettings(secret_file=secret_file, **told)  # type: ignore[arg-type]
         self.kept: list[tuple[str, dict[str, str]]] = []
         self.webhook = Webhook(
             settings,
@@ -248,8 +254,8 @@ def test_tls_is_checked(tmp_path: Path, secret_file: Path) -> None:
     stranger.cert_pem.write_to_path(str(other))
     tls = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     authority.issue_cert("localhost").configure_cert(tls)
-    known = {"is_tls": True, "host": "localhost"}
     with Receiver(tls=tls) as receiver:
+        known = {"url": f"https://localhost:{receiver.port}/hook"}
         with Sending(tmp_path / "wrong", receiver.port, secret_file, ca=other, **known) as sending:
             tell(sending.store, 0)
             assert wait_until(lambda: "CERTIFICATE_VERIFY_FAILED" in (sending.webhook.report().last_fault or ""))
@@ -272,7 +278,7 @@ def test_a_secret_that_is_gone_is_told_and_taken_up_when_it_is_back(tmp_path: Pa
 def test_every_revision_of_an_alarm_that_is_told_in_time_comes(tmp_path: Path, secret_file: Path) -> None:
     bench = AlarmBench(tmp_path / "state")
     with Receiver() as receiver:
-        settings = WebhookSettings(False, "127.0.0.1", receiver.port, "/hook", secret_file, ("alarm",))
+        settings = WebhookSettings(f"http://127.0.0.1:{receiver.port}/hook", secret_file, ("alarm",))
         outbox = Outbox(bench.store, settings.queue, only=settings.kinds)
         webhook = Webhook(settings, outbox)
         webhook.start()

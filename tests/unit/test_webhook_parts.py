@@ -17,7 +17,7 @@ from gateway.errors import ConfigurationError
 from gateway.records import json_line
 from gateway.uplink.outbox import OutboxMessage
 from gateway.uplink.settings import SecretError, secrets_of, webhook_settings
-from gateway.uplink.webhook import MOST_PAUSE_S, PostVerdict, _seconds, body_of, post_verdict_of, signed
+from gateway.uplink.webhook import MOST_PAUSE_S, body_of, pause_of, signed
 
 VAN = VehicleSection(id="van-17")
 
@@ -47,31 +47,6 @@ def test_what_is_no_secret_is_refused(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("status", "verdict"),
-    [
-        (200, PostVerdict.TAKEN),
-        (202, PostVerdict.TAKEN),
-        (204, PostVerdict.TAKEN),
-        (301, PostVerdict.REFUSED),
-        (400, PostVerdict.REFUSED),
-        (401, PostVerdict.REFUSED),
-        (403, PostVerdict.REFUSED),
-        (404, PostVerdict.REFUSED),
-        (410, PostVerdict.UNWANTED),
-        (413, PostVerdict.UNWANTED),
-        (422, PostVerdict.REFUSED),
-        (429, PostVerdict.AWAY),
-        (500, PostVerdict.REFUSED),
-        (502, PostVerdict.AWAY),
-        (503, PostVerdict.AWAY),
-        (504, PostVerdict.AWAY),
-    ],
-)
-def test_what_a_status_means(status: int, verdict: PostVerdict) -> None:
-    assert post_verdict_of(status) is verdict
-
-
-@pytest.mark.parametrize(
     ("header", "seconds"),
     [
         (None, 0.0),
@@ -86,7 +61,7 @@ def test_what_a_status_means(status: int, verdict: PostVerdict) -> None:
     ],
 )
 def test_retry_after_is_seconds_or_a_date(header: str | None, seconds: float) -> None:
-    assert _seconds(header, now_s=1000.0) == seconds
+    assert pause_of(header, now_s=1000.0) == seconds
 
 
 def test_the_body_says_what_it_is_and_when_it_happened() -> None:
@@ -108,7 +83,7 @@ def secret_file(tmp_path: Path) -> Path:
 def test_an_address_in_its_parts(secret_file: Path) -> None:
     section = WebhookSection(url="https://fleet.example:8443/hooks/van?key=abc", secret_file=secret_file)
     settings = webhook_settings(section, VAN)
-    assert (settings.receiver, settings.path) == ("https://fleet.example:8443", "/hooks/van?key=abc")
+    assert (settings.receiver, settings.url) == ("https://fleet.example:8443", section.url)
     assert settings.kinds == ("alarm", "event")
     assert "abc" not in settings.queue
     assert webhook_settings(WebhookSection(), VAN) is None
