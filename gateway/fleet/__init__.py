@@ -1,10 +1,13 @@
-"""The fleet's subscriber: records that vehicles sent to the broker, in one file, and a page with a line per vehicle.
+"""The fleet's subscriber: the vehicles' records from the broker, in one database, and a page with a line per vehicle.
 
-deploy/fleet and `springscale demo --fleet` use it; it does not run in a vehicle.
+    python -m gateway.fleet.subscriber     # docs/fleet.md; settings from the environment
+
+`springscale demo --fleet` shows it with simulated vehicles. Only this package imports SQLAlchemy; it does not run in a
+vehicle.
 """
 
-from gateway.fleet.book import Message, SqliteBook, address
+from gateway.fleet.book import Book, Message
 from gateway.fleet.lines import Line, line_of
 from gateway.fleet.page import FleetPage, fleet_app
 
-__all__ = ["FleetPage", "Line", "Message", "SqliteBook", "address", "fleet_app", "line_of"]
+__all__ = ["Book", "FleetPage", "Line", "Message", "fleet_app", "line_of"]

@@ -1,152 +1,217 @@
-"""The fleet's records in one SQLite file: every record once, in its last revision."""
+"""The fleet's records in one database, SQLite or PostgreSQL: every record once, in its last revision.
+
+A record that cannot be read or stored is set aside with the reason, and does not stop the others.
+"""
 
 import json
-import sqlite3
+import re
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from datetime import datetime
-from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
-from gateway.fleet.lines import Line, line_of
+import sqlalchemy as sql
+from sqlalchemy.dialects import postgresql, sqlite
 
-_SCHEMA: Final = """
-CREATE TABLE IF NOT EXISTS vehicle (vehicle_id TEXT PRIMARY KEY, record TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS estimate (
-    vehicle_id TEXT, id TEXT, t_end TEXT NOT NULL, is_weighed INTEGER NOT NULL, record TEXT NOT NULL,
-    PRIMARY KEY (vehicle_id, id)
-);
-CREATE INDEX IF NOT EXISTS estimate_of_vehicle ON estimate (vehicle_id, is_weighed, t_end);
-CREATE TABLE IF NOT EXISTS entry (
-    vehicle_id TEXT, id TEXT, kind TEXT NOT NULL, revision INTEGER NOT NULL, is_active INTEGER NOT NULL,
-    record TEXT NOT NULL, PRIMARY KEY (vehicle_id, id)
-);
-CREATE INDEX IF NOT EXISTS entry_that_stands ON entry (vehicle_id, kind, is_active);
-CREATE TABLE IF NOT EXISTS unreadable (received REAL NOT NULL, topic TEXT NOT NULL, fault TEXT NOT NULL, payload BLOB);
-"""
-_ESTIMATE: Final = "INSERT INTO estimate VALUES (?, ?, ?, ?, ?) ON CONFLICT DO NOTHING"
-_ENTRY: Final = """
-INSERT INTO entry VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT (vehicle_id, id) DO UPDATE
-SET (revision, is_active, record) = (excluded.revision, excluded.is_active, excluded.record)
-WHERE excluded.revision > entry.revision
-"""
-_STATUS: Final = """
-INSERT INTO vehicle VALUES (?, ?) ON CONFLICT (vehicle_id) DO UPDATE
-SET record = json_patch(vehicle.record, excluded.record) WHERE excluded.record <> vehicle.record
-"""  # the will has fewer fields than the birth message: fields that it lacks stay as they are
-_VEHICLES: Final = """
-SELECT vehicle_id FROM vehicle UNION SELECT DISTINCT vehicle_id FROM estimate ORDER BY vehicle_id
-"""
-_LATEST: Final = "SELECT record FROM estimate WHERE vehicle_id = ? AND is_weighed = 1 ORDER BY t_end DESC LIMIT 1"
-_STANDING: Final = "SELECT record FROM entry WHERE vehicle_id = ? AND kind = 'alarm' AND is_active = 1 ORDER BY id"
+from gateway.fleet.lines import AlarmRecord, EntryRecord, EstimateRecord, Line, LineAlarm, StatusRecord, line_of
 
+_TABLES: Final = sql.MetaData()
+VEHICLE: Final = sql.Table(
+    "vehicle", _TABLES, sql.Column("vehicle_id", sql.Text, primary_key=True), sql.Column("status", sql.Text)
+)
+ESTIMATE: Final = sql.Table(
+    "estimate",
+    _TABLES,
+    sql.Column("vehicle_id", sql.Text, primary_key=True),
+    sql.Column("id", sql.Text, primary_key=True),
+    sql.Column("t_end_s", sql.Double, nullable=False),  # POSIX time
+    sql.Column("is_weighed", sql.Boolean, nullable=False),
+    sql.Column("stream", sql.Text),  # this and the next two: the record's `sequence`
+    sql.Column("number", sql.BigInteger),
+    sql.Column("previous", sql.BigInteger),
+    sql.Column("record", sql.Text, nullable=False),
+    sql.Index("estimate_of_vehicle", "vehicle_id", "is_weighed", "t_end_s"),
+    sql.Index("estimate_in_sequence", "vehicle_id", "stream", "number"),
+)
+ENTRY: Final = sql.Table(
+    "entry",
+    _TABLES,
+    sql.Column("vehicle_id", sql.Text, primary_key=True),
+    sql.Column("id", sql.Text, primary_key=True),
+    sql.Column("kind", sql.Text, nullable=False),
+    sql.Column("revision", sql.Integer, nullable=False),
+    sql.Column("is_active", sql.Boolean, nullable=False),  # an alarm; false for others
+    sql.Column("record", sql.Text, nullable=False),
+    sql.Index("entry_active", "is_active", "vehicle_id"),
+)
+UNREADABLE: Final = sql.Table(
+    "unreadable",
+    _TABLES,
+    sql.Column("received_s", sql.Double, nullable=False),
+    sql.Column("topic", sql.Text, nullable=False),
+    sql.Column("fault", sql.Text, nullable=False),
+    sql.Column("payload", sql.LargeBinary, nullable=False),
+)
+AWAY: Final = (sql.exc.OperationalError, sql.exc.InterfaceError, sql.exc.ProgrammingError, sql.exc.TimeoutError)
+"""What :meth:`Book.write` raises while the database is away, full, or lacks a table or a right: try again later."""
 
-class Arrived(Protocol):
-    """A message of the broker."""
-
-    @property
-    def topic(self) -> str: ...
-    @property
-    def payload(self) -> bytes: ...
+_ENTRIES: Final[dict[str, type[EntryRecord]]] = {"alarms": AlarmRecord, "events": EntryRecord, "trips": EntryRecord}
+_NAME: Final = re.compile(r"[A-Za-z0-9._-]{1,64}")  # of a vehicle, as deploy/fleet/provision.py has them
+_LATEST: Final = (
+    sql.select(ESTIMATE.c.record)
+    .where(ESTIMATE.c.vehicle_id == VEHICLE.c.vehicle_id, ESTIMATE.c.is_weighed)
+    .order_by(ESTIMATE.c.t_end_s.desc())
+    .limit(1)
+    .scalar_subquery()
+)
+_LINES: Final = sql.select(VEHICLE.c.vehicle_id, VEHICLE.c.status, _LATEST).order_by(VEHICLE.c.vehicle_id)
+_ACTIVE: Final = sql.select(ENTRY.c.vehicle_id, ENTRY.c.record).where(ENTRY.c.is_active).order_by(ENTRY.c.id)
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A message without a broker, for the demonstration."""
+    """A message of the broker, or one made without a broker. It can be acknowledged on its own ``connection`` alone."""
 
     topic: str
     payload: bytes
+    connection: int = 0
+    mid: int = 0
 
 
-def address(branch: str, topic: str) -> tuple[str, str]:
-    """Vehicle and kind of a record, from its topic; ``branch`` has a + at the place of the vehicle's name.
+class Book:
+    """Thread-safe. ``counts`` are of records since the start, by kind."""
 
-    The broker enforces the name, since each vehicle may publish below its own topic only. Raises LookupError.
-    """
-    at, levels = branch.split("/").index("+"), topic.split("/")
-    return levels[at], levels[at + 1]
-
-
-class SqliteBook:
-    """Thread-safe. A message that cannot be read is stored as unreadable and does not stop the others."""
-
-    def __init__(self, path: Path, branch: str, clock_s: Callable[[], float] = time.time) -> None:
-        """Opens or creates the file. Raises sqlite3.Error."""
-        self._branch = branch
-        self._clock_s = clock_s
-        self._lock = threading.Lock()
-        self._database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
-        self._database.executescript(f"PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; {_SCHEMA}")
+    def __init__(self, database: str, branch: str, clock_s: Callable[[], float] = time.time) -> None:
+        """``database`` is a file of SQLite, or the URL of PostgreSQL; ``branch`` has a + at the place of the vehicle's
+        name.
+        """
+        self._branch, self._clock_s = branch, clock_s
+        self._engine = sql.create_engine(_url_of(database), pool_pre_ping=True)
+        if self._engine.dialect.name == "sqlite":
+            sql.event.listen(self._engine, "connect", _make_durable)
+        self._has_tables, self._lock = False, threading.Lock()
         self.counts: Counter[str] = Counter()
 
-    def write(self, arrivals: Sequence[Arrived]) -> None:
-        """Store all messages or none; on disk when this returns. Raises sqlite3.OperationalError if the disk fails."""
-        with self._lock:
-            self._database.execute("BEGIN IMMEDIATE")
-            try:
-                counts = Counter(self._write(arrival) for arrival in arrivals)
-                self._database.execute("COMMIT")
-            except BaseException:
-                self._database.execute("ROLLBACK")
-                raise
-            self.counts += counts
+    def write(self, arrivals: Sequence[Message]) -> list[tuple[str, str]]:
+        """Store all messages; on disk when this returns -> topic and fault of those that were set aside.
+
+        Raises one of ``AWAY``: then it is not known which are stored, and all can be written again.
+        """
+        try:
+            self._write(arrivals)
+        except AWAY:
+            raise
+        except Exception as fault:  # noqa: BLE001 - one of them is at fault, so that each is tried alone
+            if len(arrivals) > 1:
+                return [told for arrival in arrivals for told in self.write([arrival])]
+            return [self._set_aside(arrivals[0], fault)]
+        return []
 
     def lines(self) -> list[Line]:
         """The fleet, a line per vehicle."""
-        with self._lock:
-            return [self._line(vehicle) for (vehicle,) in self._database.execute(_VEHICLES).fetchall()]
+        alarms: dict[str, list[LineAlarm]] = {}
+        with self._connected() as database:
+            for vehicle, record in database.execute(_ACTIVE):
+                alarms.setdefault(vehicle, []).append(LineAlarm.model_validate_json(record))
+            rows = database.execute(_LINES).all()
+        return [
+            line_of(
+                vehicle,
+                status and StatusRecord.model_validate_json(status),
+                estimate and EstimateRecord.model_validate_json(estimate),
+                alarms.get(vehicle, ()),
+                self._clock_s(),
+            )
+            for vehicle, status, estimate in rows
+        ]
+
+    def n_unreadable(self) -> int:
+        """Records that were set aside."""
+        with self._connected() as database:
+            return int(database.execute(sql.select(sql.func.count()).select_from(UNREADABLE)).scalar_one())
 
     def close(self) -> None:
+        self._engine.dispose()
+
+    def _connected(self) -> sql.Connection:
         with self._lock:
-            self._database.close()
+            if not self._has_tables:
+                _TABLES.create_all(self._engine)
+                self._has_tables = True
+        return self._engine.connect()
 
-    def _write(self, arrival: Arrived) -> str:
-        try:
-            vehicle, kind = address(self._branch, arrival.topic)
-            statement, row = _row(vehicle, kind, json.loads(arrival.payload))
-        except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as fault:
-            told = f"{type(fault).__name__}: {fault}"
-            row = (self._clock_s(), arrival.topic, told, arrival.payload)
-            self._database.execute("INSERT INTO unreadable VALUES (?, ?, ?, ?)", row)
-            return "unreadable"
-        return kind if self._database.execute(statement, row).rowcount else "known already"
+    def _write(self, arrivals: Sequence[Message]) -> None:
+        counts: Counter[str] = Counter()
+        with self._connected() as database, database.begin():
+            for arrival in arrivals:
+                kind = ""
+                for statement in self._statements(database, arrival):
+                    kind, is_new = statement[0], bool(database.execute(statement[1]).rowcount)
+                counts[kind if is_new else "known already"] += 1
+        self.counts += counts
 
-    def _line(self, vehicle: str) -> Line:
-        def records(statement: str) -> list[Any]:
-            return [json.loads(text) for (text,) in self._database.execute(statement, (vehicle,)).fetchall()]
+    def _statements(self, database: sql.Connection, arrival: Message) -> Iterator[tuple[str, Any]]:
+        """Kind and statements of a record, the last of which stores it. Raises ValueError or LookupError."""
+        insert = postgresql.insert if self._engine.dialect.name == "postgresql" else sqlite.insert
+        vehicle, kind = self._address(arrival.topic)
+        told = json.loads(arrival.payload, parse_constant=_refuse)
+        text = json.dumps(told, allow_nan=False)  # ASCII, which no database refuses
+        yield kind, insert(VEHICLE).values(vehicle_id=vehicle).on_conflict_do_nothing()
+        if kind == "status":
+            StatusRecord.model_validate_json(text)
+            before = database.execute(sql.select(VEHICLE.c.status).where(VEHICLE.c.vehicle_id == vehicle)).scalar_one()
+            known = {key: field for key, field in told.items() if field is not None}
+            text = json.dumps(json.loads(before or "{}") | known)  # the will has fewer fields than the birth message
+            yield kind, sql.update(VEHICLE).where(VEHICLE.c.vehicle_id == vehicle).values(status=text)
+        elif kind == "estimates":
+            estimate = EstimateRecord.model_validate_json(text)
+            row = {"t_end_s": estimate.t_end.timestamp(), "is_weighed": not estimate.rejected, "record": text}
+            place = estimate.sequence.model_dump() if estimate.sequence else {}
+            yield (
+                kind,
+                insert(ESTIMATE).values(vehicle_id=vehicle, id=estimate.id, **row, **place).on_conflict_do_nothing(),
+            )
+        else:
+            entry = _ENTRIES[kind].model_validate_json(text)
+            is_active = isinstance(entry, AlarmRecord) and entry.is_active
+            row = {"revision": entry.revision, "is_active": is_active, "record": text}
+            yield (
+                kind,
+                insert(ENTRY)
+                .values(vehicle_id=vehicle, id=entry.id, kind=kind.removesuffix("s"), **row)
+                .on_conflict_do_update(
+                    index_elements=["vehicle_id", "id"], set_=row, where=ENTRY.c.revision < entry.revision
+                ),
+            )
 
-        def only(statement: str) -> Any:
-            return next(iter(records(statement)), None)
+    def _address(self, topic: str) -> tuple[str, str]:
+        """Vehicle and kind of a record, from its topic alone: the broker lets each vehicle write below its own name."""
+        at, levels = self._branch.split("/").index("+"), topic.split("/")
+        if not _NAME.fullmatch(levels[at]):
+            raise ValueError("no name of a vehicle")
+        return levels[at], levels[at + 1]
 
-        status = only("SELECT record FROM vehicle WHERE vehicle_id = ?")
-        return line_of(vehicle, status, only(_LATEST), records(_STANDING), self._clock_s())
+    def _set_aside(self, arrival: Message, fault: Exception) -> tuple[str, str]:
+        told = f"{type(fault).__name__}: {fault}".replace("\0", "")[:1000]
+        row = {"received_s": self._clock_s(), "topic": arrival.topic, "fault": told, "payload": arrival.payload}
+        with self._connected() as database, database.begin():
+            database.execute(sql.insert(UNREADABLE).values(**row))
+        self.counts["unreadable"] += 1
+        return arrival.topic, told
 
 
-def _row(vehicle: str, kind: str, told: Any) -> tuple[str, tuple[Any, ...]]:
-    """The statement and its values. Checks all that a line needs, so that the page never fails on a stored record."""
-    if not isinstance(told, dict):
-        raise TypeError("no JSON object")
-    text = json.dumps(told)
-    if kind == "status":
-        str.encode(told["state"])
-        return _STATUS, (vehicle, text)
-    str.encode(told["id"])
-    if kind == "estimates":
-        line_of(vehicle, None, told, (), 0.0)
-        datetime.fromisoformat(told["t_end"])
-        return _ESTIMATE, (vehicle, told["id"], told["t_end"], not list(told["rejected"]), text)
-    if kind not in ("events", "trips", "alarms"):
-        raise LookupError(f"{kind} is no kind of record")
-    if kind == "alarms":
-        line_of(vehicle, None, None, (told,), 0.0)
-    return _ENTRY, (
-        vehicle,
-        told["id"],
-        kind.removesuffix("s"),
-        int(told["revision"]),
-        bool(told.get("is_active")),
-        text,
-    )
+def _url_of(database: str) -> sql.URL:
+    if database.startswith("postgresql:"):
+        return sql.make_url(database).set(drivername="postgresql+psycopg")
+    return sql.URL.create("sqlite", database=database)
+
+
+def _make_durable(connection: Any, _record: Any) -> None:
+    for pragma in ("journal_mode = WAL", "synchronous = FULL"):
+        connection.execute(f"PRAGMA {pragma}")
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"{constant} is no JSON")

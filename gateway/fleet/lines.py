@@ -1,29 +1,85 @@
-"""One vehicle of the fleet as a line of a table, independent of the database."""
+"""What is read of the vehicles' records, and one vehicle as a line of the fleet's table."""
 
-from collections.abc import Iterable, Mapping
-from datetime import datetime
-from typing import Any
+from collections.abc import Iterable
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, StringConstraints
+
+RecordId = Annotated[str, StringConstraints(pattern=r"^[ -~]{1,200}$")]
+Revision = Annotated[int, Field(ge=0, lt=2**31)]
+Number = Annotated[int, Field(ge=0, lt=2**63)]
 
 
-class LineAlarm(BaseModel):
-    """An alarm that stands."""
+class Told(BaseModel):
+    """Part of a vehicle's record; fields that nobody needs here are ignored."""
+
+    model_config = ConfigDict(allow_inf_nan=False)
+
+
+class StatusRecord(Told):
+    """A vehicle's birth message, or its will."""
+
+    state: str
+    vin: str | None = None
+
+
+class WeightRecord(Told):
+    """A weight of an estimate."""
+
+    kg: float | None = None
+    limit_kg: float | None = None
+    is_over_limit: bool | None = None
+
+
+class Sequence(Told):
+    """The place of a record in the vehicle's stream: docs/uplink.md."""
+
+    stream: RecordId
+    number: Number
+    previous: Number
+
+
+class EstimateRecord(Told):
+    """A batch, weighed or not."""
+
+    id: RecordId
+    t_end: AwareDatetime
+    rejected: list[str]
+    vin: str | None = None
+    payload_kg: float | None = None
+    payload_std_kg: float | None = None
+    weights: dict[str, WeightRecord | None] | None = None
+    sequence: Sequence | None = None
+
+
+class EntryRecord(Told):
+    """A load event or a trip in one of its revisions."""
+
+    id: RecordId
+    revision: Revision
+
+
+class LineAlarm(Told):
+    """An active alarm."""
 
     kind: str = Field(examples=["overload"])
     where: str = Field(examples=["rear_axle"])
     t_start: str
 
 
-class Line(BaseModel):
-    """A vehicle by the last batch that was weighed. Unknown is null."""
+class AlarmRecord(EntryRecord, LineAlarm):
+    """An alarm in one of its revisions."""
 
-    model_config = ConfigDict(allow_inf_nan=False)
+    is_active: bool
+
+
+class Line(Told):
+    """A vehicle by the last batch that was weighed. Unknown is null."""
 
     vehicle_id: str
     vin: str | None
     state: str | None = Field(description="online or offline, as it last reported", examples=["online"])
-    t_end: str | None = Field(description="end of the last batch that was weighed, UTC")
+    t_end: AwareDatetime | None = Field(description="end of the last batch that was weighed, UTC")
     age_s: float | None = Field(description="of that batch, by the subscriber's clock")
     payload_kg: float | None
     payload_std_kg: float | None
@@ -38,33 +94,31 @@ class Line(BaseModel):
 
 def line_of(
     vehicle_id: str,
-    status: Mapping[str, Any] | None,
-    estimate: Mapping[str, Any] | None,
-    alarms: Iterable[Mapping[str, Any]],
+    status: StatusRecord | None,
+    estimate: EstimateRecord | None,
+    alarms: Iterable[LineAlarm],
     now_s: float,
 ) -> Line:
-    """A vehicle's line from its last status, the last estimate with an answer, and alarms in their last revision.
+    """A vehicle's line from its last status, the last estimate with an answer, and the active alarms.
 
-    ``now_s`` is POSIX time. Raises ValueError or LookupError for a record of another program.
+    ``now_s`` is POSIX time.
     """
-    weighed = estimate or {}
-    weights: Mapping[str, Mapping[str, Any]] = weighed.get("weights") or {}
-    gross = weights.get("gross") or {}
-    t_end = weighed.get("t_end")
-    payload_kg, gross_kg, limit_kg = weighed.get("payload_kg"), gross.get("kg"), gross.get("limit_kg")
+    weights = (estimate and estimate.weights) or {}
+    gross = weights.get("gross") or WeightRecord()
+    payload_kg = estimate.payload_kg if estimate else None
     return Line(
         vehicle_id=vehicle_id,
-        vin=(status or {}).get("vin") or weighed.get("vin"),
-        state=(status or {}).get("state"),
-        t_end=t_end,
-        age_s=None if t_end is None else max(0.0, now_s - datetime.fromisoformat(t_end).timestamp()),
+        vin=(status and status.vin) or (estimate.vin if estimate else None),
+        state=status.state if status else None,
+        t_end=estimate.t_end if estimate else None,
+        age_s=max(0.0, now_s - estimate.t_end.timestamp()) if estimate else None,
         payload_kg=payload_kg,
-        payload_std_kg=weighed.get("payload_std_kg"),
-        gross_kg=gross_kg,
-        gross_limit_kg=limit_kg,
-        used_share=_used(payload_kg, gross_kg, limit_kg),
-        over=[place for place, weight in weights.items() if weight and weight.get("is_over_limit")],
-        alarms=[LineAlarm.model_validate(one) for one in alarms if one.get("is_active")],
+        payload_std_kg=estimate.payload_std_kg if estimate else None,
+        gross_kg=gross.kg,
+        gross_limit_kg=gross.limit_kg,
+        used_share=_used(payload_kg, gross.kg, gross.limit_kg),
+        over=[place for place, weight in weights.items() if weight and weight.is_over_limit],
+        alarms=list(alarms),
     )
 
 

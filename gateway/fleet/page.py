@@ -2,14 +2,14 @@
 
 import threading
 from collections import Counter
-from collections.abc import Callable
 
 import uvicorn
 from fastapi import FastAPI
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 from starlette.responses import FileResponse, RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
 
+from gateway.fleet.book import Book
 from gateway.fleet.lines import Line
 from gateway.web.access.middleware import SecurityHeaders
 from gateway.web.pages import ASSETS
@@ -19,17 +19,18 @@ class Fleet(BaseModel):
     """Every vehicle that has ever sent a record, by name."""
 
     items: list[Line]
+    n_unreadable: int = Field(description="records that could not be read; the table `unreadable` has them")
 
 
-def fleet_app(lines: Callable[[], list[Line]]) -> FastAPI:
-    """The application; it calls ``lines`` in a worker thread and answers 500 if that raises."""
+def fleet_app(book: Book) -> FastAPI:
+    """The application over a book, which it asks in a worker thread."""
     app = FastAPI(title="Springscale fleet", docs_url=None, redoc_url=None)
     app.add_middleware(SecurityHeaders, counts=Counter())
 
     @app.get("/api/v1/fleet")
     def fleet() -> Fleet:
         """The fleet now, a line per vehicle."""
-        return Fleet(items=lines())
+        return Fleet(items=book.lines(), n_unreadable=book.n_unreadable())
 
     @app.get("/fleet", include_in_schema=False)
     async def page() -> Response:
@@ -48,19 +49,14 @@ class FleetPage:
 
     def __init__(self, app: FastAPI, host: str, port: int) -> None:
         config = uvicorn.Config(
-            app, log_config=None, access_log=False, server_header=False, timeout_graceful_shutdown=1
+            app, host, port, log_config=None, access_log=False, server_header=False, timeout_graceful_shutdown=1
         )
         self._server = uvicorn.Server(config)
-        config.host, config.port = host, port
         self._socket = config.bind_socket()  # here, so that a port in use is reported at once
+        self.port = int(self._socket.getsockname()[1])  # which the system may have chosen
         self._thread = threading.Thread(
             target=self._server.run, kwargs={"sockets": [self._socket]}, name="fleet-page", daemon=True
         )
-
-    @property
-    def port(self) -> int:
-        """The port it listens on, which the system may have chosen."""
-        return int(self._socket.getsockname()[1])
 
     def start(self) -> None:
         self._thread.start()

@@ -10,7 +10,7 @@ from support.browser import expect
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, Watched
 from unit.test_fleet_book import alarm, estimate, message
 
-from gateway.fleet import FleetPage, SqliteBook, fleet_app
+from gateway.fleet import Book, FleetPage, fleet_app
 
 NOW_S = 1_800_000_000.0
 HURRIED = "{ const set = setInterval; window.setInterval = (draw, ms) => set(draw, ms / 20); }"  # nobody has to wait
@@ -18,8 +18,8 @@ ENGLISH = re.compile(r"\b(the|and|of|vehicle|limit|ago|search)\b", re.IGNORECASE
 
 
 @pytest.fixture
-def book(tmp_path: Path) -> Iterator[SqliteBook]:
-    opened = SqliteBook(tmp_path / "fleet.sqlite", "springscale/+", lambda: NOW_S)
+def book(tmp_path: Path) -> Iterator[Book]:
+    opened = Book(str(tmp_path / "fleet.sqlite"), "springscale/+", lambda: NOW_S)
     opened.write([
         message("van-1", "status", state="online", vin="WVWZZZ1KZAW000001"),
         estimate("van-1", 55, 200.0), estimate("van-2", 40, 620.0), alarm("van-2", 1, is_active=True),
@@ -30,16 +30,14 @@ def book(tmp_path: Path) -> Iterator[SqliteBook]:
 
 
 @pytest.fixture
-def url(book: SqliteBook) -> Iterator[str]:
-    page = FleetPage(fleet_app(book.lines), "127.0.0.1", 0)
+def url(book: Book) -> Iterator[str]:
+    page = FleetPage(fleet_app(book), "127.0.0.1", 0)
     page.start()
     yield f"http://127.0.0.1:{page.port}"
     page.stop()
 
 
-def test_those_with_alarms_come_first_and_a_word_finds_one_by_keyboard(
-    url: str, book: SqliteBook, browser: Any
-) -> None:
+def test_those_with_alarms_come_first_and_a_word_finds_one_by_keyboard(url: str, book: Book, browser: Any) -> None:
     watched = Watched(browser)
     page = watched.page
     page.add_init_script(HURRIED)
@@ -51,15 +49,22 @@ def test_those_with_alarms_come_first_and_a_word_finds_one_by_keyboard(
         re.compile(r"van-1WVWZZZ1KZAW000001200 ± 18\skg1,700\skg of 2,000\skg5 min ago"),
         re.compile(r"van-10offlineunknownunknownunknown"),
     ])  # fmt: skip
-    # One evaluation: the page draws its rows anew several times a second here, and a row of two questions may be gone.
     filled = "spans => spans.map(s => s.getBoundingClientRect().width / s.parentElement.getBoundingClientRect().width)"
     assert page.locator(".bar span").evaluate_all(filled) == pytest.approx([1.0, 0.4], abs=0.01)
+    first, second = (rows.nth(n).element_handle() for n in range(2))
     page.keyboard.press("Tab")
     page.keyboard.type("kzaw")
     expect(rows).to_have_count(1)
     expect(page.locator("#said")).to_contain_text("1 of 3 shown")
     book.write([alarm("van-1", 1, is_active=True)])
     expect(rows.locator("li")).to_contain_text("Whole vehicle too heavy")
+    assert second.evaluate("row => row.isConnected && row.innerText.includes('too heavy')")  # changed in its place
+    page.keyboard.press("Control+A")
+    page.keyboard.press("Backspace")
+    expect(rows).to_have_count(3)
+    assert [row.evaluate("row => [...row.parentElement.children].indexOf(row)") for row in (first, second)] == [0, 1]
+    book.write([message("van-1", "trips")])
+    expect(page.locator("#said")).to_contain_text("1 record could not be read.")
     assert page.evaluate("document.activeElement.id") == "search"
     assert {address.split("/")[2] for address in watched.addresses} == {url.split("/")[2]}
     assert watched.complaints == []
@@ -85,8 +90,8 @@ def test_in_german_on_a_phone_and_on_a_desk(url: str, browser: Any, width: int, 
     page.close()
 
 
-def test_a_service_that_is_gone_is_said(browser: Any, book: SqliteBook) -> None:
-    served = FleetPage(fleet_app(book.lines), "127.0.0.1", 0)
+def test_a_service_that_is_gone_is_said(browser: Any, book: Book) -> None:
+    served = FleetPage(fleet_app(book), "127.0.0.1", 0)
     served.start()
     watched = Watched(browser)
     watched.page.add_init_script(HURRIED)

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 from support.broker import needs_mosquitto
-from support.fleet_view import FleetView, fleet_view
+from support.fleet_view import MISSING, FleetView, fleet_view
 from support.patience import PATIENCE_S
 from support.postgres import needs_postgres
 
@@ -100,7 +100,7 @@ def counts(view: FleetView, seconds: float) -> dict[str, Any]:
         "blows": {blow: BLOWS.count(blow) for blow in dict.fromkeys(BLOWS)},
         "estimate_rows": view.count("estimate"),
         "entry_rows": view.count("entry"),
-        "records_missing": view.count("missing"),
+        "records_missing": view.count(f"({MISSING}) AS missing"),
         "ids_doubled": n_rows
         - view.count("(SELECT DISTINCT id FROM estimate UNION ALL SELECT DISTINCT id FROM entry) AS ids"),
         "unreadable": view.count("unreadable"),

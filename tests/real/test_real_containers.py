@@ -40,7 +40,7 @@ def test_a_compose_tool_reads_the_stack(tmp_path: Path) -> None:
     environment = {**os.environ, "PATH": beside}
     read = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path, env=environment)
     assert read.returncode == 0, read.stdout + read.stderr
-    for service in ("mosquitto", "database", "subscriber", "grafana"):
+    for service in ("mosquitto", "database", "subscriber"):
         assert service in read.stdout
 
 

@@ -1,14 +1,12 @@
 """deploy/fleet without containers: a few vehicles, and what breaks. `make fleet-test` does it with fifty."""
 
-import json
 from collections.abc import Iterator
 
 import paho.mqtt.client as mqtt
-import psycopg
 import pytest
 from paho.mqtt.enums import CallbackAPIVersion
 from support.broker import needs_mosquitto
-from support.fleet_view import FLEET, FleetView, fleet_view, provision, write_table
+from support.fleet_view import FleetView, fleet_view, provision, write_table
 from support.patience import wait_until
 from support.postgres import needs_postgres
 
@@ -28,27 +26,13 @@ UNREADABLE = (
     ("estimates", b"no JSON \0"),
     ("estimates", b"[]"),
     ("estimates", b"{}"),
-    ("estimates", b'{"id": "a\\u0000", "t_start": "2026-01-01T00:00:00Z", "t_end": "2026-01-01T00:05:00Z"}'),
-    ("estimates", b'{"id": "a", "t_start": "soon", "t_end": "2026-01-01T00:05:00Z", "rejected": []}'),
-    ("events", b'{"id": "event-1-a", "revision": "one"}'),
+    ("estimates", b'{"id": "a\\u0000", "t_end": "2026-01-01T00:05:00Z", "rejected": []}'),
+    ("events", b'{"id": "event-1-a", "revision": 1000000000000000000000000000000}'),
+    ("status", b'{"state": "online", "vin": 5}'),
     ("elsewhere", b"{}"),
     ("trips", b"[" * 100_000),
 )
 """Branch and payload of what nobody can read."""
-
-
-def queries() -> Iterator[tuple[str, str]]:
-    """Title and SQL of each panel, as Grafana would send it with every vehicle chosen, over a week."""
-    board = json.loads((FLEET / "grafana/dashboards/fleet.json").read_text())
-    (variable,) = board["templating"]["list"]
-    for panel in board["panels"]:
-        (target,) = panel["targets"]
-        sql = target["rawSql"].replace("IN ($vehicle)", f"IN ({variable['query'].replace(' ORDER BY 1', '')})")
-        for column in ("t_end", "received", "before_t_end"):
-            chosen = f"{column} BETWEEN now() - interval '7 days' AND now() + interval '1 day'"
-            sql = sql.replace(f"$__timeFilter({column})", chosen)
-        assert "$" not in sql, sql
-        yield panel["title"], sql
 
 
 def settled(view: FleetView) -> None:
@@ -73,28 +57,10 @@ def test_a_killed_broker_costs_nothing(view: FleetView) -> None:
     settled(view)
 
 
-def test_the_dashboards_queries_run_as_the_role_that_may_only_read(view: FleetView) -> None:
-    """Each query of grafana/dashboards/fleet.json, with Grafana's own words replaced as Grafana does."""
-    with view.database.connect(user="springscale_reader") as connection:
-        found = {title: connection.execute(sql).fetchall() for title, sql in queries()}
-        with pytest.raises(psycopg.errors.InsufficientPrivilege):
-            connection.execute("DELETE FROM estimate")
-    n_vehicles = len(view.vehicles)
-    assert found["Vehicles"] == found["Connected"] == [(n_vehicles,)]
-    assert found["Records that never came"] == found["Unreadable messages"] == [(0,)]
-    assert {row[0] for row in found["The fleet now"]} == {vehicle.id for vehicle in view.vehicles}
-    assert len(found["Payload"]) == view.n_estimates
-    assert sum(row[1] for row in found["Records taken in five minutes"]) == view.n_estimates
-    told = {title for title, rows in found.items() if rows}
-    assert told == set(found) - {"Why batches were not weighed"}  # all were
-
-
-def test_the_page_of_the_fleet_shows_every_vehicle_from_postgresql(view: FleetView) -> None:
+def test_the_page_of_the_fleet_shows_every_vehicle(view: FleetView) -> None:
     lines = view.subscriber.lines()
     assert set(lines) == {vehicle.id for vehicle in view.vehicles}
-    with view.database.connect() as connection:
-        latest = connection.execute("SELECT vehicle_id, payload_kg, gross_kg FROM latest").fetchall()
-    assert [(lines[name]["payload_kg"], lines[name]["gross_kg"]) for name, *_ in latest] == [row[1:] for row in latest]
+    assert all(line["payload_kg"] and line["gross_kg"] and line["state"] == "online" for line in lines.values())
 
 
 def test_a_vehicle_writes_below_its_own_name_alone_and_reads_nothing(view: FleetView) -> None:
@@ -125,6 +91,7 @@ def test_a_vehicle_writes_below_its_own_name_alone_and_reads_nothing(view: Fleet
     assert wait_until(lambda: view.count("unreadable") == len(UNREADABLE))
     with view.database.connect() as connection:
         rows = connection.execute("DELETE FROM unreadable RETURNING topic, payload").fetchall()
+    assert view.subscriber.said.count('"unreadable", "topic"') == len(UNREADABLE)
     assert rows == [(f"springscale/{one.id}/{branch}", payload) for branch, payload in UNREADABLE]
     view.vehicles.drive(5)
     settled(view)

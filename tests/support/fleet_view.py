@@ -4,6 +4,7 @@ import contextlib
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from support.postgres import Postgres, running_postgres
 from support.simulated_vehicles import SimulatedVehicles, VehicleProcesses
 
 FLEET = Path(__file__).parents[2] / "deploy/fleet"
+MISSING = re.search(r"```sql\n(.*?);\n```", (FLEET.parents[1] / "docs/fleet.md").read_text(), re.DOTALL)[1]
 SAVES_EVERY_S = 1  # mosquitto.conf's 30 would make the test as long
 
 
@@ -94,7 +96,7 @@ class FleetBroker:
 
 
 class Subscriber:
-    """deploy/fleet/subscriber/subscriber.py as a process."""
+    """gateway.fleet.subscriber as a process."""
 
     def __init__(self, folder: Path, port: int, database: Postgres) -> None:
         self._log = folder / "subscriber.log"
@@ -116,16 +118,21 @@ class Subscriber:
         """With ``other`` settings than PostgreSQL's where some are given."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
-                [sys.executable, FLEET / "subscriber/subscriber.py"], stderr=log, env={**self._environment, **other}
+                [sys.executable, "-m", "gateway.fleet.subscriber"], stderr=log, env={**self._environment, **other}
             )
 
     def lines(self) -> dict[str, dict[str, Any]]:
         """The fleet as its page has it; empty while it does not answer."""
+        told = self.told()
+        return {line["vehicle_id"]: line for line in told["items"]} if told else {}
+
+    def told(self) -> dict[str, Any] | None:
+        """What the page's API says; None while it does not answer."""
         try:
             with urllib.request.urlopen(f"{self.page}/api/v1/fleet") as answer:
-                return {line["vehicle_id"]: line for line in json.load(answer)["items"]}
+                return json.load(answer)
         except urllib.error.URLError:
-            return {}
+            return None
 
     def kill(self) -> None:
         if self._process is not None:
@@ -158,11 +165,10 @@ class FleetView:
         self.output = provisioned(folder, names, f"127.0.0.1:{port}")
         self.broker = FleetBroker(folder, port)
         self.subscriber = Subscriber(folder, port, database)
-        with database.connect() as connection:
-            connection.execute((FLEET / "database/schema.sql").read_text())
         self.broker.start()
         self.subscriber.start()
         assert wait_until(lambda: '"connected"' in self.subscriber.said), self.subscriber.said
+        assert wait_until(lambda: self.subscriber.told() is not None), self.subscriber.said
         time.sleep(2.0 * SAVES_EVERY_S)  # the broker has saved that somebody wants to hear
         folders = [self.output / "vehicles" / name for name in names]
         self.vehicles = VehicleProcesses(folders, n_processes) if n_processes else SimulatedVehicles(folders)
@@ -192,14 +198,15 @@ class FleetView:
             assert len(kept.entries) == vehicle.n_entries
             with self.database.connect() as connection:
                 rows = connection.execute(
-                    "SELECT id, record->>'vehicle_id' FROM estimate WHERE vehicle_id = %s ORDER BY number", [vehicle.id]
+                    "SELECT id, record::json->>'vehicle_id' FROM estimate WHERE vehicle_id = %s ORDER BY number",
+                    [vehicle.id],
                 ).fetchall()
                 told = connection.execute(
                     "SELECT id, revision FROM entry WHERE vehicle_id = %s ORDER BY id", [vehicle.id]
                 ).fetchall()
             assert rows == [(name, vehicle.id) for name in kept.estimates]
             assert told == sorted(kept.entries)
-        assert (self.count("missing"), self.count("unreadable")) == (0, 0)
+        assert (self.count(f"({MISSING}) AS missing"), self.count("unreadable")) == (0, 0)
 
     def close(self) -> None:
         self.vehicles.stop()

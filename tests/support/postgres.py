@@ -42,7 +42,7 @@ class Postgres:
         self._run("initdb", "--auth=trust", "--username=postgres", "--encoding=UTF8", "--no-sync", "-D", self._cluster)
         self.start()
         with self.connect(**ADMINISTRATOR) as connection:
-            connection.execute(f'CREATE ROLE "{OWNER}" LOGIN CREATEROLE')
+            connection.execute(f'CREATE ROLE "{OWNER}" LOGIN')
             connection.execute(f'CREATE DATABASE fleet OWNER "{OWNER}"')
 
     @property

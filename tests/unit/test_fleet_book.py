@@ -1,4 +1,4 @@
-"""The fleet's book in SQLite: every record once, the newest shown, nothing held up by what cannot be read."""
+"""The fleet's book: every record once, the newest shown, nothing held up by what cannot be read."""
 
 import json
 import sqlite3
@@ -9,8 +9,10 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import create_model
 
-from gateway.fleet import Message, SqliteBook, line_of
+from gateway.fleet import Book, Message
+from gateway.fleet.book import _ENTRIES, AWAY
 
 NOW_S = 1_800_000_000.0
 UNREADABLE = (
@@ -22,7 +24,13 @@ UNREADABLE = (
     ("van-1/estimates", b'{"id": "a", "t_end": "2027-01-15T07:55:00Z", "rejected": [], "payload_kg": 1e999}'),
     ("van-1/estimates", b'{"id": "a", "t_end": "2027-01-15T07:55:00Z", "rejected": [], "payload_kg": NaN}'),
     ("van-1/alarms", b'{"id": "a", "revision": "one"}'),
+    ("van-1/events", b'{"id": "a", "revision": 1000000000000000000000000000000}'),
+    ("van-1/events", b'{"id": "a\\u0000b", "revision": 1}'),
     ("van-1/status", b"{}"),
+    ("van-1/status", b'{"state": "online", "x": NaN}'),
+    ("van-1/status", b'{"state": "online", "x": 1e999}'),
+    ("van-1/status", b'{"state": "online", "vin": 5}'),
+    ("a van/status", b'{"state": "online"}'),
     ("van-1/elsewhere", b"{}"),
     ("van-1", b"{}"),
     ("van-1/trips", b"[" * 100_000),
@@ -30,8 +38,8 @@ UNREADABLE = (
 
 
 @pytest.fixture
-def book(tmp_path: Path) -> Iterator[SqliteBook]:
-    opened = SqliteBook(tmp_path / "fleet.sqlite", "springscale/+", lambda: NOW_S)
+def book(tmp_path: Path) -> Iterator[Book]:
+    opened = Book(str(tmp_path / "fleet.sqlite"), "springscale/+", lambda: NOW_S)
     yield opened
     opened.close()
 
@@ -68,7 +76,7 @@ def alarm(vehicle: str, revision: int, *, is_active: bool) -> Message:
     return message(vehicle, "alarms", id="alarm-1", revision=revision, is_active=is_active, **told)
 
 
-def test_a_line_is_of_the_newest_answer_however_late_an_older_one_comes(book: SqliteBook) -> None:
+def test_a_line_is_of_the_newest_answer_however_late_an_older_one_comes(book: Book) -> None:
     book.write([estimate("van-1", 55, 200.0), estimate("van-1", 50, 100.0), estimate("van-1", 58, 0.0, "too_slow")])
     (line,) = book.lines()
     assert (line.vehicle_id, line.payload_kg, line.gross_kg, line.over) == ("van-1", 200.0, 1700.0, [])
@@ -76,7 +84,7 @@ def test_a_line_is_of_the_newest_answer_however_late_an_older_one_comes(book: Sq
     assert line.age_s == 300.0
 
 
-def test_what_comes_twice_is_one_row_and_the_highest_revision_stays(book: SqliteBook, tmp_path: Path) -> None:
+def test_what_comes_twice_is_one_row_and_the_highest_revision_stays(book: Book, tmp_path: Path) -> None:
     book.write([estimate("van-1", 55, 600.0), alarm("van-1", 2, is_active=True)] * 2)
     book.write([alarm("van-1", 1, is_active=False), estimate("van-1", 55, 1.0)])
     (line,) = book.lines()
@@ -88,26 +96,46 @@ def test_what_comes_twice_is_one_row_and_the_highest_revision_stays(book: Sqlite
         assert looked.execute("SELECT count(*) FROM estimate").fetchone() == (1,)
 
 
-def test_a_death_leaves_what_the_birth_told(book: SqliteBook) -> None:
+def test_a_death_leaves_what_the_birth_told(book: Book) -> None:
     book.write([message("van-1", "status", state="online", vin="WVW1"), message("van-1", "status", state="offline")])
     (line,) = book.lines()
     assert (line.state, line.vin, line.payload_kg, line.age_s, line.used_share) == ("offline", "WVW1", None, None, None)
 
 
-def test_what_cannot_be_read_is_kept_and_holds_up_nothing(book: SqliteBook, tmp_path: Path) -> None:
-    book.write(
-        [*(Message(f"springscale/{topic}", payload) for topic, payload in UNREADABLE), estimate("van-2", 1, 5.0)]
-    )
+def test_what_cannot_be_read_is_set_aside_and_holds_up_nothing(book: Book, tmp_path: Path) -> None:
+    poison = [Message(f"springscale/{topic}", payload) for topic, payload in UNREADABLE]
+    told = book.write([*poison, estimate("van-2", 1, 5.0)])
+    assert [topic for topic, _ in told] == [one.topic for one in poison]
     assert book.counts == {"unreadable": len(UNREADABLE), "estimates": 1}
+    assert book.n_unreadable() == len(UNREADABLE)
     assert [line.vehicle_id for line in book.lines()] == ["van-2"]
     with sqlite3.connect(tmp_path / "fleet.sqlite") as looked:
-        kept = looked.execute("SELECT payload FROM unreadable").fetchall()
-    assert kept == [(payload,) for _, payload in UNREADABLE]
+        kept = looked.execute("SELECT topic, payload FROM unreadable").fetchall()
+    assert kept == [(one.topic, one.payload) for one in poison]
 
 
-def test_it_is_there_after_a_restart(book: SqliteBook, tmp_path: Path) -> None:
+def test_a_record_that_the_database_alone_refuses_is_set_aside(book: Book, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever is not foreseen, here a number that SQLite cannot hold: the others are stored, each once."""
+    boundless = create_model("EntryRecord", id=(str, ...), revision=(int, ...))
+    monkeypatch.setitem(_ENTRIES, "trips", boundless)
+    trips = [message("van-1", "trips", id=f"trip-{n}", revision=10**30 if n == 2 else 1) for n in range(5)]
+    assert [fault.partition(":")[0] for _, fault in book.write(trips)] == ["OverflowError"]
+    assert book.write([trips[0]]) == []
+    assert book.counts == {"unreadable": 1, "trips": 4, "known already": 1}
+
+
+def test_a_database_that_is_away_is_told_to_the_caller(book: Book, tmp_path: Path) -> None:
+    book.write([estimate("van-1", 1, 5.0)])
+    with sqlite3.connect(tmp_path / "fleet.sqlite") as breaking:
+        breaking.execute("DROP TABLE estimate")
+    with pytest.raises(AWAY):
+        book.write([estimate("van-1", 2, 5.0)])
+    assert book.n_unreadable() == 0
+
+
+def test_it_is_there_after_a_restart(book: Book, tmp_path: Path) -> None:
     book.write([estimate("van-1", 55, 200.0)])
-    again = SqliteBook(tmp_path / "fleet.sqlite", "springscale/+", lambda: NOW_S)
+    again = Book(str(tmp_path / "fleet.sqlite"), "springscale/+", lambda: NOW_S)
     assert again.lines() == book.lines()
     again.close()
 
@@ -118,17 +146,13 @@ def test_it_is_there_after_a_restart(book: SqliteBook, tmp_path: Path) -> None:
     )
 )
 def test_order_of_arrival_leaves_no_trace(arrivals: list[Message]) -> None:
-    book = SqliteBook(Path(":memory:"), "springscale/+", lambda: NOW_S)
+    book = Book(":memory:", "springscale/+", lambda: NOW_S)
     book.write(arrivals)
     (line,) = book.lines()
     book.close()
     assert (line.payload_kg, line.alarms) == (30.0, [])
 
 
-def test_a_vehicle_that_is_too_heavy_empty_has_no_share_of_its_room() -> None:
-    told = {
-        "t_end": "2027-01-15T07:55:00Z",
-        "payload_kg": 100.0,
-        "weights": {"gross": {"kg": 2200.0, "limit_kg": 2000.0}},
-    }
-    assert line_of("van", None, told, (), NOW_S).used_share is None
+def test_a_vehicle_that_is_too_heavy_empty_has_no_share_of_its_room(book: Book) -> None:
+    book.write([estimate("van-1", 55, 100.0, limit_kg=1400.0)])
+    assert book.lines()[0].used_share is None

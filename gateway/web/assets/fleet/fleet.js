@@ -10,7 +10,9 @@ const ASK_EVERY_MS = 5000; // chosen: as the other pages
 const OLD_AFTER_S = 24 * 3600; // chosen: not weighed today
 const phrase = speaker(COMMON, FLEET);
 
+const rows = new Map(); // by vehicle: each stays the same element, so that pointer, keyboard and screen reader keep it
 let vehicles = null;
+let nUnreadable = 0;
 
 const alarmText = ({ kind, where }) => capital(alarmName(kind, where));
 
@@ -38,6 +40,30 @@ function line(one) {
   return made("tr", [head, loadCell(one), gross, age, alarms], one.over.length ? "over" : "");
 }
 
+/** The vehicle's row, with those cells written anew whose content has changed. */
+function rowOf(one) {
+  const fresh = line(one);
+  const row = rows.get(one.vehicle_id) ?? fresh;
+  rows.set(one.vehicle_id, row);
+  if (row === fresh) return row;
+  row.className = fresh.className;
+  [...fresh.cells].forEach((now, n) => {
+    if (row.cells[n].outerHTML !== now.outerHTML) {
+      row.cells[n].className = now.className;
+      row.cells[n].replaceChildren(...now.childNodes);
+    }
+  });
+  return row;
+}
+
+/** These rows and no others, in this order; what is in its place stays untouched. */
+function arrange(body, shown) {
+  shown.forEach((row, n) => {
+    if (body.children[n] !== row) body.insertBefore(row, body.children[n] ?? null);
+  });
+  while (body.children.length > shown.length) body.lastElementChild.remove();
+}
+
 const urgency = (one) => 2 * one.alarms.length + one.over.length;
 
 function draw() {
@@ -48,17 +74,18 @@ function draw() {
   const count = (is) => vehicles.filter(is).length;
   const said = { n: vehicles.length, over: count((one) => one.over.length), alarmed: count((one) => one.alarms.length) };
   const found = shown.length < vehicles.length ? `; ${phrase("found", { shown: shown.length, n: vehicles.length })}` : "";
-  write("said", vehicles.length ? `${phrase("summary", said)}${found}.` : phrase("no_vehicle"));
+  const unreadable = nUnreadable ? ` ${phrase("unreadable", { n: nUnreadable })}.` : "";
+  write("said", vehicles.length ? `${phrase("summary", said)}${found}.${unreadable}` : phrase("no_vehicle"));
   element("said").className = "";
   element("fleet").hidden = vehicles.length === 0;
-  element("vehicles").replaceChildren(...shown.map(line));
+  arrange(element("vehicles"), shown.map(rowOf));
 }
 
 async function askNow() {
   try {
     const response = await fetch("/api/v1/fleet", { cache: "no-store" });
     if (!response.ok) throw new Error(`status ${response.status}`);
-    vehicles = (await response.json()).items;
+    ({ items: vehicles, n_unreadable: nUnreadable } = await response.json());
     draw();
   } catch (error) {
     console.info(error.message);

@@ -17,5 +17,6 @@ export const FLEET = {
   of_limit: ["{kg} of {limit}", "{kg} von {limit}"],
   over: ["over the limit: {places}", "über der Grenze: {places}"],
   since: ["since {time}", "seit {time}"],
+  unreadable: ["{n} record could not be read|{n} records could not be read", "{n} Datensatz war nicht lesbar|{n} Datensätze waren nicht lesbar"],
   gone: ["The fleet's service does not answer. These are its last values.", "Der Dienst der Flotte antwortet nicht. Gezeigt wird, was er zuletzt gesendet hat."],
 };
