@@ -76,14 +76,12 @@ vm-image: .venv/.development
 vcan: .venv/.package
 	PATH="$(CURDIR)/$(BIN):$$PATH" deploy/try-on-vcan.sh
 
-# A simulated week in the service at high speed, and three days with crowds at its door over TLS, some minutes of one
-# processor each; then, where `make test-vm` can run, 200
+# A simulated week in the service at high speed, some minutes of one processor; then, where `make test-vm` can run, 200
 # kills of the service and 30 power cuts of its machine at random moments, half an hour.
 SOAK_TESTS := tests/vm/test_4_process_faults.py::test_killed_again_and_again_it_loses_and_doubles_nothing \
 	tests/vm/test_6_power.py
 soak: .venv/.development deb
 	$(BIN)/python -m benchmarks.speed.soak --output build/soak.json
-	$(BIN)/python -m benchmarks.speed.soak_attack --output build/soak_attack.json
 	rm -f build/vm-soak.json
 	SPRINGSCALE_VM_RESULTS=vm-soak.json SPRINGSCALE_KILLS=200 SPRINGSCALE_POWER_CUTS=30 \
 		$(BIN)/python -m pytest -n 2 --dist loadfile $(SOAK_TESTS)

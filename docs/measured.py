@@ -156,7 +156,6 @@ def feed_printed() -> str:
 RECORDED: Final = {
     "vm-results.json": "faults.json",
     "soak.json": "soak.json",
-    "soak_attack.json": "soak_attack.json",
     "vm-soak.json": "soak_faults.json",
 }
 """What a run leaves in build/, and where it is kept."""

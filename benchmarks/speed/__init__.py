@@ -4,5 +4,5 @@
 ``formats`` read logs beside others (``peers``), ``day`` estimates a working day, ``live`` receives, ``service`` is the
 whole service and ``idle`` the parked one, ``web`` serves, ``weigh`` estimates and calibrates, ``archive`` reprocesses,
 ``start`` starts, ``simulator`` drives. Programs of their own are ``feed``, ``feeders``, ``fleet_report``,
-``footprint``, ``soak`` and ``soak_attack``.
+``footprint`` and ``soak``.
 """

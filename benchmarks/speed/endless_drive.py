@@ -1,25 +1,16 @@
-"""A bus that repeats one drive, as fast as the service reads it.
+"""A bus that repeats one drive, as fast as the service reads it."""
 
-``serve_when_told`` is the service on such a bus, in a process of its own without the simulator (soak_attack).
-"""
-
-import sys
 import threading
 import time
 from collections.abc import Iterator
 from itertools import pairwise
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from gateway.bus.frames import empty_frames, take
 from gateway.bus.live.receiver import Burst
-from gateway.config import load_settings
-from gateway.log import set_up_log
 from gateway.records import Frames
-from gateway.service.gateway import Gateway
-from gateway.setup import setup_of
 from gateway.units import NS_PER_S
 
 DAY_S: Final = 86_400  # seconds
@@ -64,17 +55,6 @@ class EndlessDrive:
             self.days_done = day + 1
 
 
-class WaitingDrive(EndlessDrive):
-    """An endless drive that begins on request."""
-
-    begin = threading.Event()
-
-    def receive(self, timeout_s: float) -> Burst:
-        """As EndlessDrive, once it has begun."""
-        self.begin.wait()
-        return super().receive(timeout_s)
-
-
 class ParkedFirst:
     """A receiver: silent at first; then the beginning of a drive, a day before the week; silent again; then the
     week.
@@ -111,24 +91,3 @@ class ParkedFirst:
 
     def close(self) -> None:
         """Nothing to release."""
-
-
-def serve_when_told(config: str, frames: str, hours_a_day: float, n_days: int) -> None:
-    """Serve until SIGTERM; drive once a line has come on standard input, and say "over" when all is processed."""
-    settings = load_settings(Path(config))
-    set_up_log(settings.log.level, under_journald=True)
-    with np.load(frames) as kept:
-        drive = WaitingDrive(Frames(**kept), hours_a_day, n_days)
-
-    def follow(gateway: Gateway) -> None:
-        print(gateway.url, flush=True)
-        sys.stdin.readline()
-        drive.begin.set()
-        while not (drive.is_over and gateway.has_caught_up):
-            time.sleep(0.05)
-        print("over", flush=True)
-
-    def on_started(gateway: Gateway) -> None:
-        threading.Thread(target=follow, args=(gateway,), daemon=True).start()
-
-    Gateway(settings, setup_of(settings), on_started=on_started, open_receiver=lambda: drive).run()

@@ -45,6 +45,7 @@ FILES: Final = (
     ("deploy/springscale.sysctl", "usr/lib/sysctl.d/60-springscale.conf"),
     ("deploy/springscale.toml", "etc/springscale/springscale.toml"),
     ("deploy/network", "usr/share/springscale/network"),
+    ("deploy/Caddyfile", "usr/share/springscale/Caddyfile"),
     ("deploy/grafana", "usr/share/springscale/grafana"),
     ("deploy/prometheus", "usr/share/springscale/prometheus"),
     ("CHANGELOG.md", "usr/share/doc/springscale/CHANGELOG.md"),

@@ -12,7 +12,7 @@ from typing import Final
 from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import FileResponse, HTMLResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, Response, StreamingResponse
 from starlette.staticfiles import StaticFiles
 
 from gateway.web.access.middleware import content_security_policy
@@ -21,6 +21,7 @@ _PLOTLY: Final = distribution("plotly")  # found by its metadata: importlib.reso
 LIBRARY: Final = Path(str(_PLOTLY.locate_file("plotly/package_data/plotly.min.js")))
 LIBRARY_URL: Final = f"/assets/plotly-{_PLOTLY.version}.min.js"
 _KEPT: Final = {"cache-control": "public, max-age=31536000, immutable", "vary": "accept-encoding"}
+PIECE_BYTES: Final = 65_536  # chosen: a slow client holds little more than this in memory
 _MEDIA_TYPE: Final = "text/javascript; charset=utf-8"
 _STYLE_ID: Final = re.compile(rb'getElementById\("([0-9a-f]{64})"\)')
 
@@ -39,7 +40,9 @@ async def library_response(request: Request) -> Response:
     if "gzip" not in request.headers.get("accept-encoding", ""):
         return FileResponse(LIBRARY, media_type=_MEDIA_TYPE, headers=_KEPT)
     packed = await run_in_threadpool(_packed)
-    return Response(packed, media_type=_MEDIA_TYPE, headers={**_KEPT, "content-encoding": "gzip"})
+    pieces = (packed[begin : begin + PIECE_BYTES] for begin in range(0, len(packed), PIECE_BYTES))
+    headers = {**_KEPT, "content-encoding": "gzip", "content-length": str(len(packed))}
+    return StreamingResponse(pieces, media_type=_MEDIA_TYPE, headers=headers)
 
 
 @cache

@@ -1,20 +1,17 @@
 """Who is answered and who is not, and what the refusal tells."""
 
 import logging
-import socket
 import ssl
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import httpx
 import pytest
 import trustme
-from support.patience import PATIENCE_S, wait_until
+from support.patience import PATIENCE_S
 from support.web import Client, Gateway, serving
 
 from gateway.errors import ConfigurationError
-from gateway.web.access import serving as web_serving
 from gateway.web.access.guard import WrongTokens, is_loopback
 from gateway.web.access.serving import Tls, refuse_open_address, server_config
 from gateway.web.access.tokens import Scope, TokenFile
@@ -204,33 +201,6 @@ def test_tls_files_that_cannot_be_used_are_said(tmp_path: Path) -> None:
         pytest.raises(ConfigurationError, match=r"server\.pem.*cannot be used"),
     ):
         server_config(gateway.app, "127.0.0.1", 0, Tls(tmp_path / "server.pem", tmp_path / "absent.pem"))
-
-
-def test_a_handshake_takes_a_place_and_is_soon_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Limits once counted after it: 1100 silent connections kept everybody out."""
-    monkeypatch.setattr(web_serving, "CONNECTIONS_PER_ADDRESS", 10)
-    authority = trustme.CA()
-    pem = tmp_path / "server.pem"
-    authority.issue_cert("localhost", "127.0.0.1").private_key_and_cert_chain_pem.write_to_path(pem)
-    trusting = ssl.create_default_context()
-    authority.configure_trust(trusting)
-    with Gateway(tmp_path / "store") as gateway:
-        config = server_config(gateway.app, "127.0.0.1", 0, Tls(pem, pem))
-        with serving(gateway.app, config) as server, ExitStack() as silent:
-            places = server.uvicorn.server_state.connections
-            address = server.socket.getsockname()
-            for _ in range(40):
-                silent.enter_context(socket.create_connection(address, source_address=("127.0.0.2", 0)))
-            assert wait_until(lambda: len(places) == 10)
-            url = server.url.replace("http://", "https://")
-            assert httpx.get(f"{url}/health/live", verify=trusting, timeout=PATIENCE_S).status_code == 200
-            monkeypatch.setattr(web_serving, "REQUEST_S", 0.1)
-            silent.close()
-            assert wait_until(lambda: not any(place.is_idle and place.client[0] == "127.0.0.2" for place in places))
-            late = silent.enter_context(socket.create_connection(address, source_address=("127.0.0.2", 0)))
-            late.settimeout(PATIENCE_S)
-            with suppress(ConnectionError):
-                assert late.recv(1) == b""  # the handshake it never began is over
 
 
 def test_the_first_token_counts_from_its_first_moment_on(tmp_path: Path) -> None:

@@ -15,7 +15,6 @@ from gateway.service.pipeline import Pipeline
 from gateway.store import Store, StoreReader
 from gateway.uplink import link
 from gateway.uplink.uplink import Uplink
-from gateway.web.access import serving
 from support.patience import PATIENCE_S
 
 CONSTANTS = (
@@ -23,8 +22,6 @@ CONSTANTS = (
     (sink, "SEND_TIMEOUT_S"),
     (asked_service, "TIMEOUT_S"),
     (link, "CONNECT_TIMEOUT_S"),
-    (serving, "REQUEST_S"),
-    (serving, "LINGER_S"),
 )
 ONLY_DEFAULT = (source.LiveSource.stop, Pipeline.stop, RingLog.stop, Uplink.stop, Store.close, StoreReader.__init__)
 

@@ -110,12 +110,15 @@ class Server:
         config.timeout_graceful_shutdown = round(PATIENCE_S)
         self.uvicorn = uvicorn.Server(config)
         self.is_up = threading.Event()
+        self.loop: asyncio.AbstractEventLoop | None = None
         self.thread = threading.Thread(target=self._run)
 
     def _run(self) -> None:
-        asyncio.run(self._serve())
+        with asyncio.Runner(loop_factory=self.uvicorn.config.get_loop_factory()) as runner:  # as the service does
+            runner.run(self._serve())
 
     async def _serve(self) -> None:
+        self.loop = asyncio.get_running_loop()
         serving = asyncio.create_task(self.uvicorn.serve(sockets=[self.socket]))
         while not self.uvicorn.started and not serving.done():
             await asyncio.sleep(0.005)

@@ -190,7 +190,7 @@ def test_a_vehicle_does_without(name: str) -> None:
 
 
 def test_what_the_service_loads_by_name_is_locked() -> None:
-    assert {"httptools", "uvloop"} <= VEHICLE.keys()
+    assert {"h11", "uvloop"} <= VEHICLE.keys()
 
 
 def test_the_workbench_has_all_of_a_vehicle_and_the_extra_at_the_same_versions() -> None:

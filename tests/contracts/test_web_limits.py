@@ -1,0 +1,137 @@
+"""A server under connections that mean no good: bounded, and the others are answered."""
+
+import asyncio
+import logging
+import ssl
+import threading
+import time
+from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import trustme
+from support.patience import PATIENCE_S, wait_until
+from support.web import Gateway, Server, serving
+
+from gateway.web.access.serving import CONNECTIONS, Tls, server_config
+from gateway.web.app import BODY_BYTES
+
+LIVE = b"GET /health/live HTTP/1.1\r\nHost: localhost\r\n\r\n"
+CHUNK = b"8000\r\n" + b"x" * 0x8000 + b"\r\n"
+
+
+def run(tmp_path: Path, scenario: Callable[[Server], Coroutine[Any, Any, None]]) -> None:
+    async def whole(server: Server) -> None:
+        await scenario(server)
+        await asyncio.sleep(0.05)  # aborted connections are closed in the loop's next turns
+
+    with Gateway(tmp_path) as gateway, serving(gateway.app) as server:
+        asyncio.run(whole(server))
+        assert httpx.get(f"{server.url}/api/v1/estimates/latest", timeout=PATIENCE_S).status_code == 200
+
+
+async def said_to(server: Server, *parts: bytes) -> bytes:
+    """What the server says to these bytes until it ends the connection."""
+    reader, writer = await asyncio.open_connection(*server.socket.getsockname())
+    try:
+        for part in parts:
+            writer.write(part)
+        return await asyncio.wait_for(reader.read(), PATIENCE_S)
+    except ConnectionError:
+        return b""
+    finally:
+        writer.transport.abort()
+
+
+def test_every_handshake_works_however_busy_the_loop_is(tmp_path: Path) -> None:
+    """A ClientHello that came before the connection was handed over was thrown away: 1 of 12 handshakes worked."""
+    authority, pem = trustme.CA(), tmp_path / "server.pem"
+    authority.issue_cert("localhost", "127.0.0.1").private_key_and_cert_chain_pem.write_to_path(pem)
+    trusting = ssl.create_default_context()
+    authority.configure_trust(trusting)
+    with Gateway(tmp_path / "store") as gateway:
+        config = server_config(gateway.app, "127.0.0.1", 0, Tls(pem, pem))
+        with serving(gateway.app, config) as server, ThreadPoolExecutor(12) as pool:
+            url = server.url.replace("http://", "https://")
+            begun = threading.Event()
+
+            def be_busy() -> None:
+                begun.set()
+                time.sleep(0.5)  # all say hello meanwhile
+
+            server.loop.call_soon_threadsafe(be_busy)
+            assert begun.wait(PATIENCE_S)
+            ask = lambda _: httpx.get(f"{url}/health/live", verify=trusting, timeout=PATIENCE_S).status_code  # noqa: E731
+            assert list(pool.map(ask, range(12))) == [200] * 12
+
+
+@pytest.mark.parametrize(
+    "request_text",
+    [
+        b"GET /\r\n\r\n",
+        b"\x16\x03\x01\x02\x00\x01\r\n\r\n",  # a TLS hello
+        b"GET /" + b"a" * 40_000,
+        b"GET / HTTP/1.1\r\n" + b"C: d\r\n" * 9000,
+        b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -5\r\n\r\n",
+    ],
+)
+def test_what_is_no_request_ends_with_an_error_and_leaves_no_word_in_the_log(
+    tmp_path: Path, request_text: bytes, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def scenario(server: Server) -> None:
+        assert (await said_to(server, request_text)).startswith(b"HTTP/1.1 400 ")
+
+    run(tmp_path, scenario)
+    assert [record for record in caplog.records if record.levelno > logging.INFO] == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "body"),
+    [(b"Content-Length: 100000000", b""), (b"Transfer-Encoding: chunked\r\nConnection: close", 4 * CHUNK)],
+)
+def test_an_endless_body_is_refused(tmp_path: Path, kind: bytes, body: bytes) -> None:
+    head = b"POST /api/v1/calibration/tare HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+
+    async def scenario(server: Server) -> None:
+        reader, writer = await asyncio.open_connection(*server.socket.getsockname())
+        writer.write(head + kind + b"\r\n\r\n" + body)
+        answer = await asyncio.wait_for(reader.readuntil(b"\r\n"), PATIENCE_S)
+        assert answer.startswith(b"HTTP/1.1 413 ")
+        writer.transport.abort()
+
+    run(tmp_path, scenario)
+
+
+def test_a_body_as_long_as_allowed_is_read(tmp_path: Path) -> None:
+    with Gateway(tmp_path) as gateway, serving(gateway.app) as server:
+        spaces = b"{}".ljust(BODY_BYTES)
+        url, headers = f"{server.url}/api/v1/calibration/tare", {"content-type": "application/json"}
+        assert httpx.post(url, content=spaces, headers=headers, timeout=PATIENCE_S).status_code == 422
+        assert httpx.post(url, content=spaces + b" ", headers=headers, timeout=PATIENCE_S).status_code == 413
+
+
+def test_beyond_the_places_the_answer_is_503_and_places_are_given_back(tmp_path: Path) -> None:
+    async def scenario(server: Server) -> None:
+        address = server.socket.getsockname()
+        crowd = [await asyncio.open_connection(*address) for _ in range(CONNECTIONS)]
+        await asyncio.to_thread(wait_until, lambda: len(server.uvicorn.server_state.connections) == CONNECTIONS)
+        assert (await said_to(server, LIVE)).startswith(b"HTTP/1.1 503 ")
+        for _, writer in crowd:
+            writer.transport.abort()
+        await asyncio.to_thread(wait_until, lambda: not server.uvicorn.server_state.connections)
+
+    run(tmp_path, scenario)
+
+
+def test_many_requests_in_one_breath_are_answered(tmp_path: Path) -> None:
+    async def scenario(server: Server) -> None:
+        reader, writer = await asyncio.open_connection(*server.socket.getsockname())
+        writer.write(LIVE * 100)
+        for _ in range(100):
+            assert (await reader.readuntil(b'{"is_alive":true}')).startswith(b"HTTP/1.1 200")
+        writer.transport.abort()
+
+    run(tmp_path, scenario)
