@@ -86,7 +86,6 @@ class Event(StrEnum):
     COMMISSIONING_UNDONE = "commissioning undone"
     COMMISSIONING_NOT_KEPT = "commissioning not kept"
     COMMISSIONING_SET_ASIDE = "broken commissioning set aside"
-    TOKENS_SET_ASIDE = "broken tokens set aside"
     TOKENS_UNREADABLE = "no token is accepted"
 
 

@@ -80,7 +80,7 @@ class Gateway:
         self._setup_fault = setup_fault
         self._on_started = on_started
         self._tokens = token_file = TokenFile(settings.store.directory / "tokens.json")
-        refuse_open_address(settings.web.host, has_tokens=token_file.are_in_use())
+        refuse_open_address(settings.web.host, has_tokens=token_file.are_required())
         broker = uplink_settings(settings.uplink, settings.vehicle)
         receiver, with_places = webhook_settings(settings.webhook, settings.vehicle), settings.position.forward
         self.store = store_of(settings.store, broker, receiver)

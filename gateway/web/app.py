@@ -1,12 +1,14 @@
 """The web application: one function that puts the parts together."""
 
 from collections import Counter
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
 from typing import Any, Final
 
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from gateway.core.calibrated import CalibratedVehicle
@@ -14,17 +16,17 @@ from gateway.status import Status
 from gateway.store import StoreReader
 from gateway.web import pages
 from gateway.web.access import problems
-from gateway.web.access.guard import Guard, WrongTokens, describe_guard
+from gateway.web.access.guard import Access, bearer
 from gateway.web.access.middleware import HeadAsGet, SecurityHeaders
 from gateway.web.access.tokens import TokenFile
-from gateway.web.live.board import Board, LatestShortcut
+from gateway.web.live.board import LATEST_PATH, Board, LatestResponse
 from gateway.web.routes import service_calls as service
 from gateway.web.routes.alarms import alarms_router
 from gateway.web.routes.cab import cab_router
 from gateway.web.routes.commissioning import commissioning_router
 from gateway.web.routes.history import api_router, events_router, export_router
 from gateway.web.routes.known_weights import known_weights_router
-from gateway.web.routes.monitoring import health_router, metrics_registry
+from gateway.web.routes.monitoring import alive_router, health_router, metrics_registry
 from gateway.web.routes.reasons import reasons_router
 from gateway.web.routes.spectra import spectra_router
 from gateway.web.routes.vehicle import vehicle_router
@@ -37,6 +39,7 @@ from gateway.web.routes.weights import (
     standards_router,
     weights_router,
 )
+from gateway.web.schemas import problem_responses
 
 API_VERSION: Final = "1.0.0"
 BODY_BYTES: Final = 32_768  # chosen: no route but an upload needs a tenth of it
@@ -45,21 +48,10 @@ _DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed whil
 Names end in the unit. Unknown is null. Errors are problem details (RFC 9457)."""
 
 
-@dataclass(frozen=True, slots=True)
-class WebSettings:
-    """Limits of the application.
-
-    After ``n_wrong_tokens_per_min`` wrong tokens from one address, further ones are answered with 429.
-    """
-
-    n_wrong_tokens_per_min: int = 10
-
-
 def create_app(
     board: Board,
     reader: StoreReader,
     status: Callable[[], Status],
-    settings: WebSettings | None = None,
     calibrated: CalibratedVehicle | None = None,
     tokens: TokenFile | None = None,
     known_weights: service.KnownWeightBackend | None = None,
@@ -76,7 +68,6 @@ def create_app(
     There are no routes to a part of the service that is None, but those of the ring log: it may be switched off. Call
     ``board.close()`` before the server stops: it ends the streams.
     """
-    chosen = settings or WebSettings()
     responses: Counter[int] = Counter()
 
     @asynccontextmanager
@@ -84,9 +75,8 @@ def create_app(
         yield
         board.close()
 
-    failures = WrongTokens(chosen.n_wrong_tokens_per_min)
     app = _Application(
-        wrap=lambda inner: SecurityHeaders(HeadAsGet(Guard(LatestShortcut(inner, board), tokens, failures)), responses),
+        wrap=lambda inner: SecurityHeaders(HeadAsGet(inner), responses),
         title="Springscale",
         version=API_VERSION,
         description=_DESCRIPTION,
@@ -96,7 +86,6 @@ def create_app(
         redirect_slashes=False,
         max_body_size=BODY_BYTES,
     )
-    problems.install(app)
     scales = Scales(calibrated)
     metrics = metrics_registry(board, scales, status, responses)
     routers = [
@@ -117,10 +106,13 @@ def create_app(
         health_router(status, metrics),
         *([known_loads_router(known_loads)] if known_loads else ()),
     ]
+    access = Access(tokens)
+    app.router.routes.insert(0, Route(LATEST_PATH, _latest(board, access)))
+    app.include_router(alive_router())
     for router in routers:
-        app.include_router(router)
+        app.include_router(router, dependencies=[Depends(access)], responses=problem_responses(401, 403, 421))
     pages.install(app, KNOWN_LOADS_PATH if known_loads else "")
-    _describe(app, tokens)
+    problems.install(app, [route for router in routers for route in router.routes if isinstance(route, Route)])
     return app
 
 
@@ -135,30 +127,13 @@ class _Application(FastAPI):
         return self._wrap(super().build_middleware_stack())
 
 
-def _summarize(schema: dict[str, Any]) -> None:
-    """Each operation's summary is the first line of its description, not the name of a function."""
-    for path in schema["paths"].values():
-        for operation in path.values():
-            summary, _, rest = operation.pop("description", "").partition("\n")
-            operation["summary"] = summary.rstrip(".") or operation.get("summary", "")
-            if rest.strip():
-                operation["description"] = rest.strip()
+def _latest(board: Board, access: Access) -> Callable[[Request], Awaitable[Response]]:
+    """GET latest without FastAPI's layers, which take longer than the answer; the route of the same path stays declared
+    for the API's description and gives the same answer.
+    """
 
+    async def latest(request: Request) -> Response:
+        await access(request, await bearer(request))
+        return LatestResponse(board, request.scope)
 
-def _describe(app: FastAPI, tokens: TokenFile | None) -> None:
-    """Declare in the description that problems are application/problem+json, and when tokens are needed."""
-    describe = app.openapi
-    told: dict[bool, dict[str, Any]] = {}
-
-    def openapi() -> dict[str, Any]:
-        is_guarded = tokens is not None and tokens.are_required()
-        if is_guarded not in told:
-            app.openapi_schema = None
-            schema = told[is_guarded] = describe()
-            problems.describe_problems(schema)
-            _summarize(schema)
-            if is_guarded:
-                describe_guard(schema)
-        return told[is_guarded]
-
-    app.openapi = openapi  # type: ignore[method-assign]  # FastAPI's documented way to extend the description
+    return latest

@@ -3,6 +3,7 @@
 import json
 import re
 from datetime import UTC, datetime, timedelta, timezone
+from http import HTTPStatus
 from types import GenericAlias
 from typing import Annotated, Any, Final
 
@@ -170,8 +171,6 @@ class Fault(BaseModel):
 class Problem(BaseModel):
     """Problem details (RFC 9457)."""
 
-    model_config = ConfigDict(json_schema_extra={"x-media-type": "application/problem+json"})
-
     type: str = "about:blank"
     title: str = Field(examples=["Unprocessable Content"])
     status: int = Field(examples=[422])
@@ -181,6 +180,12 @@ class Problem(BaseModel):
     errors: list[Fault] | None = None
 
 
+PROBLEM_TYPE: Final = "application/problem+json"
+_PROBLEM: Final[dict[str, Any]] = Problem.model_json_schema()
+_PROBLEM["properties"]["errors"]["anyOf"][0]["items"] = _PROBLEM.pop("$defs")["Fault"]  # it stands in many places
+
+
 def problem_responses(*codes: int) -> dict[int | str, dict[str, Any]]:
     """The ``responses`` of a route that may answer with these problems."""
-    return {code: {"model": Problem} for code in codes}
+    content = {PROBLEM_TYPE: {"schema": _PROBLEM}}
+    return {code: {"description": HTTPStatus(code).phrase, "content": content} for code in codes}

@@ -25,9 +25,6 @@ from gateway.core.alarms.rules import AlarmRules
 from gateway.records import Why
 from gateway.service.alarms import AlarmService
 from gateway.web.access.tokens import Scope, TokenFile
-from gateway.web.app import WebSettings
-
-PATIENT = WebSettings(n_wrong_tokens_per_min=1_000_000)  # schemathesis tries many
 
 
 @pytest.fixture(scope="module")
@@ -49,10 +46,9 @@ def schema(token_file: TokenFile) -> Iterator[BaseSchema]:
         tempfile.TemporaryDirectory() as directory,
         Gateway(
             Path(directory),
-            PATIENT,
-            token_file,
-            KnownWeightBench(Path(directory), 276.0).service,
-            Bench(Path(directory)).desk,
+            tokens=token_file,
+            known_weights=KnownWeightBench(Path(directory), 276.0).service,
+            commissioning=Bench(Path(directory)).desk,
         ) as gateway,
     ):
         gateway.publish(*(make_estimate(n, *([Why.GAP] if n % 3 == 0 else []), with_spectra=True) for n in range(20)))

@@ -63,8 +63,3 @@ def test_what_a_load_epoch_tells_is_described(description: dict[str, Any]) -> No
     figures = {f"epoch_{name}" for name in ("payload_kg", "payload_std_kg", "front_share_pct", "front_share_std_pct")}
     assert figures | {"epoch_n_batches"} <= set(described)
     assert all(one.get("description") for one in described.values())
-
-
-def test_a_summary_is_a_sentence_and_no_function_s_name(description: dict[str, Any]) -> None:
-    summaries = [operation["summary"] for path in description["paths"].values() for operation in path.values()]
-    assert [one for one in summaries if len(one.split()) < 3 or one == one.title()] == []

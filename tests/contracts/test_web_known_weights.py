@@ -218,7 +218,7 @@ def test_no_body_is_met_with_an_error_of_ours_or_spoils_the_next_start(
     directory = tmp_path_factory.mktemp("fuzzed")
     bench = KnownWeightBench(directory)
     app = FastAPI()
-    problems.install(app)
+    problems.install(app, [])
     app.include_router(known_weights_router(bench.service))
     said = {"Content-Type": "application/json"}
     answer = Client(app).request("POST", "/api/v1/calibration/tare", content=json.dumps(body), headers=said)

@@ -222,10 +222,10 @@ PATHS = ("/health/live", "/health/ready", "/api/v1/estimates/latest")
 
 
 @pytest.mark.parametrize("content", [b"{", None], ids=["broken", "a link"])
-@pytest.mark.parametrize("name", ["known_weights.json", "tokens.json"])
 def test_a_broken_side_file_is_told_and_set_aside_while_the_weighing_begins(
-    config: Path, name: str, content: bytes | None
+    config: Path, content: bytes | None
 ) -> None:
+    name = "known_weights.json"
     state = config.parent / "state"
     state.mkdir()
     if content is None:
@@ -246,10 +246,24 @@ def test_a_broken_side_file_is_told_and_set_aside_while_the_weighing_begins(
     (aside,) = state.glob(f"{name}.broken-*")
     assert aside.name in warning
     assert aside.is_symlink() if content is None else aside.read_bytes() == content
-    is_closed = name == "tokens.json"
-    assert seen == ([200, 401, 401] if is_closed else [200, 200, 200])
-    again, warnings = start()  # without tokens nobody gets in until new ones are made
-    assert (again, bool(warnings)) == (seen, is_closed)
+    assert seen == [200, 200, 200]
+    again, warnings = start()
+    assert (again, warnings) == (seen, ())
+
+
+def test_broken_tokens_are_told_and_let_nobody_in_while_the_weighing_begins(config: Path) -> None:
+    state = config.parent / "state"
+    state.mkdir()
+    (state / "tokens.json").write_bytes(b"{")
+
+    def ask(service: Running) -> None:
+        answers = [httpx.get(service.gateway.url + path, trust_env=False).status_code for path in PATHS]
+        assert answers == [200, 401, 401]
+        (warning,) = service.gateway.status().warnings
+        assert "tokens.json" in warning
+
+    serve(config, ask)
+    assert (state / "tokens.json").read_bytes() == b"{"
 
 
 def test_it_runs_on_the_fast_loop_and_tells_its_status_where_no_file_can_be_opened(

@@ -20,7 +20,7 @@ from gateway.status import State, Status
 from gateway.store import Store
 from gateway.web.access.serving import server_config
 from gateway.web.access.tokens import TokenFile
-from gateway.web.app import WebSettings, create_app
+from gateway.web.app import create_app
 from gateway.web.live.board import Board
 from gateway.web.routes.service_calls import CommissioningBackend, KnownWeightBackend, VerificationBackend
 from gateway.web.routes.weights import KnownLoads
@@ -34,7 +34,6 @@ class Gateway:
     def __init__(
         self,
         directory: Path,
-        settings: WebSettings | None = None,
         tokens: TokenFile | None = None,
         known_weights: KnownWeightBackend | None = None,
         commissioning: CommissioningBackend | None = None,
@@ -46,7 +45,6 @@ class Gateway:
         self.status = Status(version="1.2.3", state=State.COLLECTING, uptime_s=5.0, vehicle_id="van-17")
         self.store = Store.open(directory)
         self.board = Board(stale_after_s=900.0, clock=lambda: self.clock_s)
-        self._settings = settings
         self._known: dict[str, Any] = {
             "tokens": tokens,
             "calibrated": calibrated,
@@ -72,7 +70,7 @@ class Gateway:
 
     def _make_app(self) -> FastAPI:
         reader = self.store.reader()
-        return create_app(self.board, reader, lambda: self.status, self._settings, **self._known)
+        return create_app(self.board, reader, lambda: self.status, **self._known)
 
     def __enter__(self) -> "Gateway":
         return self

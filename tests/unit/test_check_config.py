@@ -150,5 +150,5 @@ def test_messages_that_ask_for_a_token_say_which_service_it_is_for(tmp_path: Pat
     with pytest.raises(ConfigurationError, match=r"token list --config FILE"):
         tokens.revoke("nobody")
     (tmp_path / "tokens.json").write_text("{")
-    assert tokens.are_in_use()
+    assert tokens.are_required()
     assert "token create NAME --config FILE" in str(tokens.fault)

@@ -111,31 +111,24 @@ def test_a_file_that_cannot_be_read_lets_nobody_in(path: Path, content: str) -> 
 NOT_UTF8 = b'{"format": "springscale-tokens", "version": 1, "tokens": [{"name": "caf\xe9"}]}'
 
 
-def test_a_broken_file_closes_the_door_and_keeps_it_closed(path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    assert not TokenFile(path).are_in_use()
+def test_a_broken_file_closes_the_door_and_is_not_overwritten(path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    assert not TokenFile(path).are_required()
     lost = TokenFile(path).create("fleet", Scope.READ)
     path.write_bytes(NOT_UTF8)
     service = TokenFile(path)
-    assert service.are_in_use()
-    assert names(caplog) == [Event.TOKENS_SET_ASIDE]
-    (aside,) = path.parent.glob("tokens.json.broken-*")
-    assert aside.read_bytes() == NOT_UTF8
+    assert service.are_required()
+    assert names(caplog) == [Event.TOKENS_UNREADABLE]
     assert service.verify(lost) is None
-    assert TokenFile(path).are_in_use()  # the next start, without the file
-    assert aside.name in (service.fault or "")
+    assert "move it away" in (service.fault or "")
+    with pytest.raises(ConfigurationError, match="move it away"):
+        TokenFile(path).create("fleet", Scope.READ)
+    assert path.read_bytes() == NOT_UTF8
 
+    path.unlink()
+    assert service.are_required()  # until there are new ones
     new = TokenFile(path).create("fleet", Scope.READ)
     assert service.verify(new) is not None
     assert service.fault is None
-    assert aside.exists()
-
-
-def test_the_command_line_sets_a_broken_file_aside_and_asks_once_more(path: Path) -> None:
-    path.parent.mkdir()
-    path.write_bytes(NOT_UTF8)
-    with pytest.raises(ConfigurationError, match=r"set aside as tokens\.json\.broken-"):
-        TokenFile(path).create("fleet", Scope.READ)
-    assert TokenFile(path).create("fleet", Scope.READ)
 
 
 @pytest.mark.parametrize(

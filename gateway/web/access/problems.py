@@ -2,17 +2,17 @@
 
 import http
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Final
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
 
 from gateway.errors import RefusedError, StoreError
-from gateway.web.schemas import Fault, Problem
+from gateway.web.schemas import PROBLEM_TYPE, Fault, Problem
 
-MEDIA_TYPE: Final = "application/problem+json"
 _PLAINER: Final = {  # replacements of pydantic's messages
     "extra_forbidden": "unknown here: /docs lists what is available",
     "model_attributes_type": "send a JSON object, with Content-Type: application/json",
@@ -37,11 +37,20 @@ def problem_response(
         reason=reason,
         errors=None if errors is None else list(errors),
     )
-    return JSONResponse(problem.model_dump(exclude_none=True), status, headers=headers, media_type=MEDIA_TYPE)
+    return JSONResponse(problem.model_dump(exclude_none=True), status, headers=headers, media_type=PROBLEM_TYPE)
 
 
-def install(app: FastAPI) -> None:
-    """Answer every error in ``app`` with problem details."""
+def install(app: FastAPI, routes: Sequence[Route]) -> None:
+    """Answer every error in ``app`` with problem details; ``routes`` tell which methods an address takes."""
+
+    async def not_here(request: Request, _error: Exception) -> Response:
+        path = request.url.path
+        found = {method for route in routes if route.path_regex.match(path) for method in route.methods or ()}
+        allowed = sorted((found or {"GET"}) | ({"HEAD"} if "GET" in found or not found else set()))
+        headers = {"allow": ", ".join(allowed)}
+        return problem_response(405, f"{request.method} is not possible here", path, headers=headers)
+
+    app.add_exception_handler(405, not_here)
     app.add_exception_handler(HTTPException, _http)
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(RefusedError, _refused)
@@ -50,39 +59,12 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(Exception, _unforeseen)
 
 
-def describe_problems(schema: dict[str, Any]) -> None:
-    """Declare in the API's description the media type of problems."""
-    for operations in schema["paths"].values():
-        for operation in operations.values():
-            for code, response in operation["responses"].items():
-                content = response.get("content", {})
-                if int(code) >= 400 and "application/json" in content:
-                    content[MEDIA_TYPE] = content.pop("application/json")
-
-
 async def _http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     detail = error.detail
     if error.status_code == 404 and detail == http.HTTPStatus.NOT_FOUND.phrase:
         detail = "there is nothing at this address: /openapi.json lists what there is"
-    elif error.status_code == 405:
-        detail = f"{request.method} is not possible here"
-    headers = _with_all_methods(request, error.headers)
-    return problem_response(error.status_code, detail, request.url.path, headers=headers)
-
-
-def _with_all_methods(request: Request, headers: Mapping[str, str] | None) -> Mapping[str, str] | None:
-    """Every method of this address; each is a route of its own that knows only itself.
-
-    HEAD is allowed wherever GET is (headers.HeadAsGet), which the routes do not know.
-    """
-    if headers is None or "Allow" not in headers:
-        return headers
-    described = request.app.openapi()["paths"].get(request.url.path, {})
-    allowed = dict.fromkeys([*headers["Allow"].split(", "), *(method.upper() for method in described)])
-    if "GET" in allowed:
-        allowed["HEAD"] = None
-    return {**headers, "Allow": ", ".join(allowed)}
+    return problem_response(error.status_code, detail, request.url.path, headers=error.headers)
 
 
 async def _invalid(request: Request, error: Exception) -> Response:

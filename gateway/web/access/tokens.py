@@ -82,21 +82,19 @@ class TokenFile:
         self._path = path
         self._files = KeptFiles(path.parent)
         self._clock_s = clock_s
-        self._read: tuple[_Stamp, dict[str, Token]] = (None, {})  # the tokens by id, as last read
-        self._asked_at: tuple[_Stamp, bool] | None = None  # whether a token was required in this state of the file
+        self._stamp: _Stamp = None  # of the file as last read
+        self._known: dict[str, Token] = {}  # the tokens by id, as last read
+        self._is_closed = False  # whether a token is required
         self.fault: str | None = None  # why no token is accepted, for the status
 
     def create(self, name: str, scope: Scope, lifetime_s: float | None = None) -> str:
-        """A new token, to be shown this once. Raises ConfigurationError if the name is taken or invalid.
-
-        A broken file is first set aside and reported; the next try begins a new one.
-        """
+        """A new token, to be shown this once. Raises ConfigurationError if the name is taken or invalid."""
         try:
             _named(name)
         except ValueError as fault:
             raise ConfigurationError(f"{name!r}: {fault}") from None
         with self._alone():
-            tokens = self._tokens_or_set_aside()
+            tokens = self.tokens()
             if any(token.name == name for token in tokens):
                 raise ConfigurationError(
                     f"{self._path}: there is a token {name!r} already: revoke it or take another name"
@@ -131,57 +129,20 @@ class TokenFile:
         except FileNotFoundError:
             return ()
         except (OSError, ValidationError) as fault:
-            raise ConfigurationError(f"{self._path} is no token file: {fault}") from None
-
-    def are_in_use(self) -> bool:
-        """Whether a token is required, by the present file; a broken one is set aside here and reported in ``fault``.
-
-        A broken file denies access, and its absence keeps it denied: breaking it must not open the API to all of this
-        machine.
-        """
-        try:
-            tokens = self._tokens_or_set_aside()
-        except ConfigurationError as broken:
-            self.fault = str(broken)
-            return True
-        earlier = self._files.set_aside_earlier(self._path.name)
-        if earlier and self._files.stamp(self._path.name) is None:
-            self.fault = (
-                f"{self._path} was broken and is now {earlier[-1]}: no token is accepted until "
-                "`springscale token create NAME --config FILE` has made new ones, or that file is moved away"
-            )
-            return True
-        return bool(tokens)
+            why = fault.errors()[0]["msg"] if isinstance(fault, ValidationError) else fault
+            raise ConfigurationError(
+                f"{self._path} is no token file ({why}): move it away, then make new tokens with "
+                "`springscale token create NAME --config FILE`"
+            ) from None
 
     def are_required(self) -> bool:
         """Whether requests need a token; fast enough for every request, since it reads the file only after a change.
 
-        A file without tokens requires none. If the file disappears while tokens are in use, a token is still required.
+        A file without tokens requires none. A broken file requires one and accepts none, and so does a file that
+        disappears while tokens are in use: breaking it must not open the API to all of this machine.
         """
-        stamp = self._files.stamp(self._path.name)
-        if self._asked_at is not None and stamp == self._asked_at[0]:
-            return self._asked_at[1]
-        was_asked = self._asked_at is not None and self._asked_at[1]
-        if stamp is None and was_asked:
-            self.fault = self.fault or f"{self._path} has gone while tokens were in use: no token is accepted"
-            are_in_use = True
-        else:
-            are_in_use = self.are_in_use()
-        self._asked_at = (self._files.stamp(self._path.name), are_in_use)
-        return are_in_use
-
-    def _tokens_or_set_aside(self) -> tuple[Token, ...]:
-        """The tokens. Raises ConfigurationError that says where the broken file is now."""
-        try:
-            return self.tokens()
-        except ConfigurationError as fault:
-            broken = str(fault)
-        try:
-            aside = f"set aside as {self._files.set_aside(self._path.name)}"
-        except OSError as refusal:
-            aside = f"and cannot be set aside: {refusal}"
-        log_event(Event.TOKENS_SET_ASIDE, level=logging.ERROR, fault=broken, set_aside=aside)
-        raise ConfigurationError(f"{broken}; {aside}: `springscale token create NAME --config FILE` begins a new one")
+        self._follow()
+        return self._is_closed
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
@@ -196,24 +157,31 @@ class TokenFile:
         """The token of this text; None for any other text, or one that is revoked or expired."""
         prefix, _, rest = text.partition("_")
         token_id, _, secret = rest.partition("_")
-        token = self._known().get(token_id)
+        self._follow()
+        token = self._known.get(token_id)
         expected = _hashed("") if token is None else token.sha256
         is_same = hmac.compare_digest(_hashed(secret), expected)  # as long for a wrong id as for a wrong secret
         is_valid = is_same and prefix == _PREFIX and token is not None and not token.is_expired(self._clock_s())
         return token if is_valid else None
 
-    def _known(self) -> dict[str, Token]:
-        """The tokens by id, read again whenever the file has changed. An unreadable file accepts no token."""
+    def _follow(self) -> None:
+        """Read the tokens again if the file has changed."""
         stamp = self._files.stamp(self._path.name)
-        if stamp != self._read[0]:
-            try:
-                self._read = (stamp, {token.id: token for token in self.tokens()})
-                self.fault = None if self._read[1] else self.fault
-            except ConfigurationError as fault:
-                log_event(Event.TOKENS_UNREADABLE, level=logging.ERROR, fault=str(fault))
-                self._read = (stamp, {})
-                self.fault = f"no token is accepted: {fault}"
-        return self._read[1]
+        if stamp is None and not self._is_closed:
+            return
+        if stamp == self._stamp and (stamp is not None or self.fault is not None):
+            return
+        self._stamp, self._known, self.fault = stamp, {}, None
+        try:
+            self._known = {token.id: token for token in self.tokens()}
+        except ConfigurationError as broken:
+            self.fault = f"no token is accepted: {broken}"
+        else:
+            if stamp is None:
+                self.fault = f"{self._path} has gone while tokens were in use: no token is accepted"
+        if self.fault is not None:
+            log_event(Event.TOKENS_UNREADABLE, level=logging.ERROR, fault=self.fault)
+        self._is_closed = self.fault is not None or bool(self._known)
 
     def _write(self, tokens: tuple[Token, ...]) -> None:
         """Replace the file in one step, readable by its owner alone."""

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from fastapi.sse import ServerSentEvent
 from starlette.responses import Response
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import Scope
 
 from gateway.estimate import Estimate, Weights
 from gateway.estimate_json import estimate_from_json, estimate_to_json
@@ -201,24 +201,6 @@ class LatestResponse(Response):
         is_known = _has(scope, etag)
         headers = {"etag": f"W/{etag}", "cache-control": "no-cache"}
         super().__init__(None if is_known else body, 304 if is_known else 200, headers)
-
-
-class LatestShortcut:
-    """ASGI middleware that answers GET latest before any other layer sees it.
-
-    The route of the same path stays declared for the API's description and gives the same answer; without FastAPI's
-    layers a core serves about twice as many requests.
-    """
-
-    def __init__(self, app: ASGIApp, board: Board) -> None:
-        self._app = app
-        self._board = board
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] == "http" and scope["path"] == LATEST_PATH and scope["method"] == "GET":
-            await LatestResponse(self._board, scope)(scope, receive, send)
-        else:
-            await self._app(scope, receive, send)
 
 
 def _has(scope: Scope, etag: str) -> bool:

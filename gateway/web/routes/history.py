@@ -20,7 +20,6 @@ from gateway.history import BATCHES, HistoryPage
 from gateway.records import json_line
 from gateway.status import Status
 from gateway.store import StoreReader
-from gateway.web.access.problems import MEDIA_TYPE
 from gateway.web.file_response import FORMATS, JsonLines, file_responses, sent_as_file
 from gateway.web.live.board import Board, LatestResponse
 from gateway.web.live.stream import EVENT_SCHEMA
@@ -230,10 +229,7 @@ def api_router(board: Board, reader: StoreReader, status: Callable[[], Status]) 
         response_class=EventSourceResponse,
         responses={
             200: {"content": {EventSourceResponse.media_type: {"itemSchema": EVENT_SCHEMA}}},
-            422: {
-                "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
-                "description": "no cursor",
-            },
+            **problem_responses(422),
         },
     )
     async def stream(subscription: Annotated[Any, Depends(joined)]) -> AsyncIterator[ServerSentEvent]:

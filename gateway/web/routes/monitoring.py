@@ -24,14 +24,21 @@ from gateway.web.routes.weights import LatestWeights, Scales, weigh_latest
 from gateway.web.schemas import Alive, Ready, problem_responses
 
 
-def health_router(status: Callable[[], Status], registry: CollectorRegistry) -> APIRouter:
-    """/health/live, /health/ready, /metrics."""
+def alive_router() -> APIRouter:
+    """/health/live, which tells nothing of the vehicle and needs no token."""
     router = APIRouter(tags=["health"])
 
     @router.get("/health/live", response_model=Alive)
     async def live() -> Response:
         """200 as long as the process answers."""
         return JSONResponse(Alive().model_dump())
+
+    return router
+
+
+def health_router(status: Callable[[], Status], registry: CollectorRegistry) -> APIRouter:
+    """/health/ready, /metrics."""
+    router = APIRouter(tags=["health"])
 
     @router.get("/health/ready", response_model=Ready, responses=problem_responses(503))
     async def ready(request: Request) -> Response:
