@@ -5,7 +5,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -89,7 +89,6 @@ class Outbox:
         self._delivered: str | None = None  # until the store was asked
         self._under_way: str | None = None  # the last message handed out, until it is delivered
         self._news = threading.Event()
-        self._on_news: Callable[[], None] = lambda: None
         self._follower = journal.follow(self._kinds, None, self.tell_news)
         self._is_placed = False
         self._looked: tuple[tuple[str, str | None], float, Delivery] | None = None
@@ -113,10 +112,6 @@ class Outbox:
     def wait(self, timeout_s: float) -> None:
         """Wait until there may be another message, ``tell_news`` is called, or the time is over."""
         self._news.wait(timeout_s)
-
-    def call(self, on_news: Callable[[], None]) -> None:
-        """Call ``on_news`` for each new record as well, in the thread that writes it."""
-        self._on_news = on_news
 
     def delivered(self, message: OutboxMessage) -> None:
         """Store that the receiver has this message and all before it."""
@@ -148,7 +143,6 @@ class Outbox:
     def tell_news(self) -> None:
         """Wake the sender to look for messages; from any thread."""
         self._news.set()
-        self._on_news()
 
     def _take_place(self, epoch: str) -> None:
         """Continue at the position stored in the present database; a new uplink starts at its first record."""

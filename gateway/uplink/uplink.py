@@ -1,22 +1,18 @@
-"""The uplink thread: takes messages from the outbox to the broker, and starts over when the link breaks."""
+"""The uplink: takes messages from the outbox to the broker one at a time, and starts over when the link breaks."""
 
 import logging
-import time
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 from gateway.log import Event, log_event
 from gateway.status import UplinkStatus
-from gateway.uplink.forwarder import PAGE, BackOff, Forwarder
-from gateway.uplink.link import BrokerAnswer, LinkError, MqttLink
+from gateway.uplink.forwarder import IDLE_S, PAGE, BackOff, Forwarder
+from gateway.uplink.link import LinkError, MqttLink
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import UplinkSettings
 
-IDLE_S: Final = 5.0  # chosen: a turn with nothing to do; a new record ends it
-TURN_S: Final = 0.5  # chosen: likewise while an answer is awaited
-ANSWER_TIMEOUT_S: Final = 30.0  # chosen: a broker that takes longer counts as lost
+Connect = Callable[[UplinkSettings, Mapping[str, Any], Callable[[], None]], MqttLink]
 
 
 class Uplink(Forwarder[UplinkStatus]):
@@ -33,7 +29,7 @@ class Uplink(Forwarder[UplinkStatus]):
         settings: UplinkSettings,
         outbox: Outbox,
         birth: Mapping[str, Any],
-        connect: Callable[[UplinkSettings, Mapping[str, Any]], MqttLink] = MqttLink,
+        connect: Connect = MqttLink,
         back_off: BackOff | None = None,
     ) -> None:
         super().__init__(outbox, UplinkStatus(settings.broker), back_off, settings.back_off_max_s)
@@ -43,12 +39,11 @@ class Uplink(Forwarder[UplinkStatus]):
 
     def _deliver(self) -> None:
         """Deliver until stopped. Raises LinkError if the connection breaks."""
-        link = self._connect(self._settings, self._birth)
+        link = self._connect(self._settings, self._birth, self._outbox.tell_news)
         self._report = replace(
             self._report, is_connected=True, n_connections=self._report.n_connections + 1, last_fault=None
         )
         log_event(Event.UPLINK_CONNECTED, broker=self._settings.broker)
-        self._outbox.call(link.wake)
         try:
             self._deliver_in_turn(link)
             link.close()
@@ -57,26 +52,27 @@ class Uplink(Forwarder[UplinkStatus]):
             link.abandon()
             raise
         finally:
-            self._outbox.call(lambda: None)
             self._report = replace(self._report, is_connected=False)
 
     def _deliver_in_turn(self, link: MqttLink) -> None:
-        """Send one message at a time and wait for the broker's acknowledgement, which keeps the order."""
-        waiting: deque[OutboxMessage] = deque()
+        """One message is in flight at a time, which keeps the order."""
         while not self._stopping.is_set():
-            if not waiting:
-                waiting.extend(self._outbox.next_messages(PAGE))
-                self._look()
-            if waiting:
-                self._deliver_one(link, waiting.popleft())
-            else:
-                link.turn(IDLE_S)
+            messages = self._outbox.next_messages(PAGE)
+            self._look()
+            link.check()
+            for message in messages:
+                if not self._deliver_one(link, message):
+                    return
+            if not messages:
+                self._outbox.wait(IDLE_S)  # a new record or the loss of the link ends it
 
-    def _deliver_one(self, link: MqttLink, message: OutboxMessage) -> None:
-        """Send one message and wait for its acknowledgement. Raises LinkError if there is none or it asks to retry."""
-        answer = self._answer_for(link, link.send(message))
-        if answer is None or message.is_extra:  # the refusal of a copy does not matter
-            return
+    def _deliver_one(self, link: MqttLink, message: OutboxMessage) -> bool:
+        """Send one message; False at a stop before its answer. Raises LinkError if the answer asks to retry."""
+        answer = link.send(message, self._stopping.is_set)
+        if answer is None:
+            return False
+        if message.is_extra:  # the refusal of a copy does not matter
+            return True
         report = self._report
         if answer.is_accepted:
             self._report = replace(report, n_delivered=report.n_delivered + 1)
@@ -89,17 +85,7 @@ class Uplink(Forwarder[UplinkStatus]):
             raise LinkError(f"{report.broker} does not take estimates: {answer.reason}")
         self._outbox.delivered(message)
         self._back_off.reset()
-
-    def _answer_for(self, link: MqttLink, mid: int) -> BrokerAnswer | None:
-        """The broker's answer; None if the service was stopped meanwhile. Raises LinkError after ANSWER_TIMEOUT_S."""
-        end_s = time.monotonic() + ANSWER_TIMEOUT_S
-        while not self._stopping.is_set():
-            for answer in link.turn(TURN_S):
-                if answer.mid == mid:
-                    return answer
-            if time.monotonic() > end_s:
-                raise LinkError(f"{self._report.broker} did not acknowledge for {ANSWER_TIMEOUT_S:g} s")
-        return None
+        return True
 
     def _note(self, fault: str) -> None:
         """Report a failure: as a lost connection if there was one, else as a broker that was not reached."""

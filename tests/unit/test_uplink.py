@@ -1,15 +1,11 @@
 """The uplink's own logic against a link that does what the test says."""
 
-import os
 import random
-import resource
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from support.broker import needs_mosquitto, running_broker
 from support.estimates import make_record
 from support.log import fields_of, names
 from support.patience import PATIENCE_S, wait_until
@@ -30,42 +26,34 @@ SETTINGS = UplinkSettings(host="broker.example", port=8883, topic="springscale/v
 
 
 class FakeBroker:
-    """Takes what it is sent; ``answer`` says what to reply to the n-th message, or breaks the link."""
+    """Takes what it is sent; ``answer`` says what to reply to the n-th message, or breaks the link; None: nothing."""
 
     def __init__(self, answer: Callable[[int, OutboxMessage], BrokerAnswer | None]) -> None:
         self.taken: list[OutboxMessage] = []
         self.n_connections = 0
         self._answer = answer
-        self._answers: list[BrokerAnswer] = []
         self._n_sent = 0
 
-    def __call__(self, _settings: UplinkSettings, _birth: Any) -> "FakeBroker":
+    def __call__(self, *_: Any) -> "FakeBroker":
         self.n_connections += 1
-        self._answers = []
         return self
 
-    def send(self, message: OutboxMessage) -> int:
+    def send(self, message: OutboxMessage, is_stopping: Callable[[], bool]) -> BrokerAnswer | None:
         self._n_sent += 1
         answer = self._answer(self._n_sent, message)
-        if answer is not None:
-            if answer.is_accepted:
-                self.taken.append(message)
-            self._answers.append(answer)
-        return self._n_sent
+        if answer is None:
+            wait_until(is_stopping)
+        elif answer.is_accepted:
+            self.taken.append(message)
+        return answer
 
-    def turn(self, timeout_s: float) -> list[BrokerAnswer]:
-        if not self._answers:
-            time.sleep(0.001)
-        answers, self._answers = self._answers, []
-        return answers
-
-    def wake(self) -> None: ...
+    def check(self) -> None: ...
     def close(self) -> None: ...
     def abandon(self) -> None: ...
 
 
-def accepted(n: int, _letter: OutboxMessage) -> BrokerAnswer:
-    return BrokerAnswer(n, True, False, "Success")
+def accepted(_n: int, _letter: OutboxMessage) -> BrokerAnswer:
+    return BrokerAnswer(True, False, "Success")
 
 
 def fill(store: Store, n: int) -> list[str]:
@@ -130,7 +118,7 @@ def test_what_the_broker_may_take_later_is_tried_again(store: Store) -> None:
 
     def answer(n: int, message: OutboxMessage) -> BrokerAnswer:
         reason = next(answers, None)
-        return accepted(n, message) if reason is None else BrokerAnswer(n, False, False, reason)
+        return accepted(n, message) if reason is None else BrokerAnswer(False, False, reason)
 
     broker = FakeBroker(answer)
     uplink = deliver(store, broker, lambda uplink: uplink.report().n_delivered == 3)
@@ -145,7 +133,7 @@ def test_what_the_broker_will_never_take_is_counted_and_holds_nothing_up(
 
     def answer(n: int, message: OutboxMessage) -> BrokerAnswer:
         if message.id == ids[2]:
-            return BrokerAnswer(n, False, True, "Packet too large")
+            return BrokerAnswer(False, True, "Packet too large")
         return accepted(n, message)
 
     broker = FakeBroker(answer)
@@ -172,7 +160,7 @@ def test_what_waits_is_counted_while_there_is_no_link(store: Store, monkeypatch:
     monkeypatch.setattr("gateway.uplink.forwarder.LOOK_S", 0.01)
     fill(store, 3)
 
-    def unreachable(_settings: UplinkSettings, _birth: Any) -> FakeBroker:
+    def unreachable(*_: Any) -> FakeBroker:
         raise LinkError("no route to host")
 
     uplink = Uplink(SETTINGS, Outbox(store, "fleet"), {}, unreachable, BackOff(60.0, 60.0))
@@ -316,10 +304,10 @@ def test_the_log_tells_of_a_link_when_it_comes_and_when_it_goes(store: Store, ca
     fill(store, 3)
     faults = iter(["no route", "no route", "no name", None, None])
 
-    def connect(settings: UplinkSettings, birth: Any) -> FakeBroker:
+    def connect(*_: Any) -> FakeBroker:
         if (fault := next(faults)) is not None:
             raise LinkError(fault)
-        return broker(settings, birth)
+        return broker()
 
     def answer(n: int, message: OutboxMessage) -> BrokerAnswer:
         if n == 2:
@@ -340,25 +328,3 @@ def test_the_log_tells_of_a_link_when_it_comes_and_when_it_goes(store: Store, ca
     ]
     assert fields_of(caplog, Event.UPLINK_NOT_REACHED) == {"broker": "broker.example:8883", "fault": "no name"}
     assert fields_of(caplog, Event.UPLINK_LOST) == {"broker": "broker.example:8883", "fault": "cut"}
-
-
-@needs_mosquitto
-def test_a_link_works_in_a_process_with_more_than_a_thousand_open_files(store: Store, tmp_path: Path) -> None:
-    """select() knows no file beyond 1023: a process of a hundred vehicles' uplinks lost every link at once."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, hard), hard))
-    ids = fill(store, 3)
-    taken = [os.open(os.devnull, os.O_RDONLY) for _ in range(1100)]
-    try:
-        with running_broker(tmp_path) as broker:
-            section = UplinkSection(host="127.0.0.1", port=broker.port, tls=False)
-            settings = uplink_settings(section, VehicleSection(id="van-17"))
-            assert settings is not None
-            uplink = Uplink(settings, Outbox(store, "fleet"), {})
-            uplink.start()
-            assert wait_until(lambda: uplink.report().n_delivered == len(ids)), uplink.report()
-            uplink.stop()
-    finally:
-        for file in taken:
-            os.close(file)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))

@@ -186,12 +186,9 @@ def _bytes_on_the_wire(port: int, messages: Sequence[OutboxMessage]) -> tuple[fl
 def _deliver(links: Sequence[MqttLink], message: OutboxMessage) -> None:
     """One message from each, all answered for."""
     for link in links:
-        link.send(message)
-    for link in links:
-        end_s = time.monotonic() + PATIENCE_S
-        while not any(answer.is_accepted for answer in link.turn(0.1)):
-            if time.monotonic() > end_s:
-                raise SystemExit("the broker did not acknowledge")
+        answer = link.send(message)
+        if answer is None or not answer.is_accepted:
+            raise SystemExit("the broker did not acknowledge")
 
 
 def _settings(port: int, vehicle_id: str) -> UplinkSettings:
