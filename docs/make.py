@@ -37,7 +37,6 @@ PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
     "docs/performance.md": {"conditions": measured.conditions, "speeds": measured.speeds},
     "docs/phone.md": {"output": printed.phone_import},
     "docs/scale.md": scale.PARTS,
-    "docs/traccar.md": {},
 }
 """Pages by their place, and each part between its marks."""
 

@@ -46,7 +46,6 @@ FILES: Final = (
     ("deploy/springscale.toml", "etc/springscale/springscale.toml"),
     ("deploy/network", "usr/share/springscale/network"),
     ("deploy/Caddyfile", "usr/share/springscale/Caddyfile"),
-    ("deploy/grafana", "usr/share/springscale/grafana"),
     ("deploy/prometheus", "usr/share/springscale/prometheus"),
     ("CHANGELOG.md", "usr/share/doc/springscale/CHANGELOG.md"),
 )

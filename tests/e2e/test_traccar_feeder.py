@@ -13,7 +13,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from support.estimates import make_estimate
-from support.patience import PATIENCE_S, wait_until
+from support.patience import wait_until
 from support.ports import free_port
 from support.web import Gateway, serving
 
@@ -91,16 +91,21 @@ def traccar(port: int | None = None) -> Iterator[Traccar]:
 
 
 @contextmanager
-def feeding(url: str, port: int, folder: Path, *more: str) -> Iterator["subprocess.Popen[bytes]"]:
-    options = ["--url", url, "--traccar", f"http://127.0.0.1:{port}", "--device", DEVICE, "--every-s", "0.1"]
-    with (folder / "log").open("ab") as said:
-        command = [sys.executable, ROOT / "deploy/traccar/feeder.py", *options, "--state", folder / "place", *more]
-        feeder = subprocess.Popen(command, stderr=said)
-    try:
-        yield feeder
-    finally:
-        feeder.terminate()
-        assert feeder.wait(PATIENCE_S) == 0, (folder / "log").read_text()
+def feeding(url: str, port: int, folder: Path) -> Iterator[None]:
+    command = [
+        sys.executable,
+        ROOT / "deploy/traccar/feeder.py",
+        url,
+        f"http://127.0.0.1:{port}",
+        DEVICE,
+        folder,
+        "0.1",
+    ]
+    with (folder / "log").open("ab") as said, subprocess.Popen(command, stderr=said) as feeder:
+        try:
+            yield
+        finally:
+            feeder.terminate()
 
 
 @pytest.fixture
@@ -119,7 +124,7 @@ def test_weights_become_attributes_and_what_is_unknown_is_left_out(tmp_path: Pat
     refused = replace(make_estimate(2), rejected=(Why.TOO_SLOW,))
     with traccar() as fake, serving(gateway.app) as service:
         gateway.publish(make_estimate(0), heavy, refused, make_estimate(3))
-        with feeding(service.url, fake.port, tmp_path, "--from-the-start"):
+        with feeding(service.url, fake.port, tmp_path):
             assert wait_until(lambda: len(fake.positions) == 3)
     plain, over, _ = fake.positions
     assert plain.attributes["payload"] == 100.0
@@ -133,7 +138,7 @@ def test_weights_become_attributes_and_what_is_unknown_is_left_out(tmp_path: Pat
 def test_what_was_weighed_while_traccar_was_away_arrives_once_and_in_order(tmp_path: Path, gateway: Gateway) -> None:
     port = free_port()
     with serving(gateway.app) as service:
-        with feeding(service.url, port, tmp_path, "--from-the-start"):
+        with feeding(service.url, port, tmp_path):
             gateway.publish(*(make_estimate(n) for n in range(5)))
             assert wait_until(lambda: (tmp_path / "log").read_text() != "")
             with traccar(port) as fake:
@@ -144,50 +149,18 @@ def test_what_was_weighed_while_traccar_was_away_arrives_once_and_in_order(tmp_p
                 fake.is_failing = False
                 assert wait_until(lambda: len(fake.positions) == 8)
                 payloads = [position.attributes["payload"] for position in fake.positions]
-        with (
-            traccar(port) as again,
-            feeding(service.url, port, tmp_path, "--from-the-start"),
-        ):  # restarted: the place is kept
+        with traccar(port) as again, feeding(service.url, port, tmp_path):  # restarted: the place is kept
             gateway.publish(make_estimate(8))
             assert wait_until(lambda: len(again.positions) >= 1)
             assert [position.attributes["payload"] for position in again.positions] == [108.0]
     assert payloads == [100.0 + n for n in range(8)]
 
 
-def test_without_being_asked_for_it_the_history_is_not_sent(tmp_path: Path, gateway: Gateway) -> None:
-    with traccar() as fake, serving(gateway.app) as service:
-        gateway.publish(make_estimate(0), make_estimate(1))
-        with feeding(service.url, fake.port, tmp_path):
-            assert wait_until((tmp_path / "place/cursor.json").exists)
-            gateway.publish(make_estimate(2))
-            assert wait_until(lambda: len(fake.positions) == 1)
-    assert fake.positions[0].attributes["payload"] == 102.0
-
-
-def test_more_than_a_page_is_sent_whole(tmp_path: Path, gateway: Gateway) -> None:
-    with traccar() as fake, serving(gateway.app) as service:
-        gateway.publish(*(make_estimate(n) for n in range(230)))
-        with feeding(service.url, fake.port, tmp_path, "--from-the-start"):
-            assert wait_until(lambda: len(fake.positions) >= 230)
-    assert [position.attributes["payload"] for position in fake.positions] == [100.0 + n for n in range(230)]
-
-
 def test_a_device_that_traccar_does_not_know_is_named_and_nothing_is_lost(tmp_path: Path, gateway: Gateway) -> None:
     with traccar() as fake, serving(gateway.app) as service:
         fake.devices = set()
         gateway.publish(make_estimate(0))
-        with feeding(service.url, fake.port, tmp_path, "--from-the-start"):
+        with feeding(service.url, fake.port, tmp_path):
             assert wait_until(lambda: f"does not know the device {DEVICE}" in (tmp_path / "log").read_text())
             fake.devices = {DEVICE}
             assert wait_until(lambda: len(fake.positions) == 1)
-        assert (tmp_path / "log").read_text().count("does not know") == 1
-
-
-def test_a_place_that_cannot_be_read_is_told_and_counts_as_none(tmp_path: Path, gateway: Gateway) -> None:
-    (tmp_path / "place").mkdir()
-    (tmp_path / "place/cursor.json").write_text('{"cur')
-    with traccar() as fake, serving(gateway.app) as service:
-        gateway.publish(make_estimate(0))
-        with feeding(service.url, fake.port, tmp_path, "--from-the-start"):
-            assert wait_until(lambda: len(fake.positions) == 1)
-    assert "cannot be read" in (tmp_path / "log").read_text()

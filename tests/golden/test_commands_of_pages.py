@@ -14,7 +14,7 @@ from benchmarks.accuracy.__main__ import studies
 from gateway.cli import springscale
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("hardware", "phone", "feed", "contribute", "kuksa", "traccar", "real-parts")
+PAGES = ("hardware", "phone", "feed", "contribute", "kuksa", "real-parts")
 PROGRAMS = (
     r"(?:springscale|python[\d.]*|sudo|cat|systemctl|echo|make|npm|pip|vspec|databroker|mmdebstrap|podman"
     r"|[\w/-]+/bin/\w+|\w+=\S+ python)"
@@ -34,7 +34,6 @@ RUN_BY = {  # how a command begins: what runs it
     "springscale evaluate my-van.zip": PACK,
     "springscale calibration sprung": "tests/unit/test_vehicle_statics.py",
     "/opt/kuksa-feeder/bin/python deploy/kuksa/feeder.py": "tests/e2e/test_kuksa_feeder.py",
-    "python3 deploy/traccar/feeder.py": "tests/e2e/test_traccar_feeder.py",
     "python -m pytest tests/real": "tests/real/test_real_prometheus.py",
     "SPRINGSCALE_HASS=ha/bin/hass python -m pytest": "tests/real/test_real_home_assistant.py",
     "make test-vm": FEED,

@@ -1,7 +1,7 @@
-"""A real Prometheus scrapes the real service after the demonstration's drive: every query of the dashboard has data.
+"""A real Prometheus scrapes the real service after the demonstration's drive and evaluates every shipped rule.
 
-Runs where `prometheus`, `promtool` and mosquitto are found (support.parts). The panels of uplink, webhook and limits
-have something to show only where these are set, so that the service here has all of them.
+Runs where `prometheus`, `promtool` and mosquitto are found (support.parts). The service has uplink, webhook and limits,
+which rules ask about.
 """
 
 import json
@@ -27,10 +27,6 @@ from gateway.workbench.simulate import demo_drive, frames_of
 
 ROOT = Path(__file__).parents[2]
 RULES = ROOT / "deploy/prometheus/springscale.rules.yml"
-DASHBOARD = json.loads((ROOT / "deploy/grafana/springscale.json").read_text())
-TARGETS = [
-    (panel["title"], target["expr"]) for panel in DASHBOARD["panels"] for target in panel.get("targets", ())
-]  # fmt: skip
 HEAVY_SEED = 2  # the demonstration's second drive carries 400 kg, too much for the limits below
 
 pytestmark = [needs("prometheus"), needs("promtool"), needs_mosquitto]
@@ -165,19 +161,3 @@ def test_every_rule_is_loaded_and_evaluated_without_an_error(scraped: Scraped) -
     assert wait_until(lambda: {rule["health"] for rule in rules()} == {"ok"}), rules()
     written = yaml.safe_load(RULES.read_text())["groups"][0]["rules"]
     assert {rule["name"] for rule in rules()} >= {rule["alert"] for rule in written}
-
-
-@pytest.mark.parametrize(("title", "expression"), TARGETS)
-def test_every_panel_has_something_to_show(title: str, expression: str, scraped: Scraped) -> None:
-    assert wait_until(lambda: bool(scraped.values(expression))), title
-
-
-def test_the_dashboards_are_what_grafanas_own_library_reads() -> None:
-    dashboard = pytest.importorskip(
-        "grafana_foundation_sdk.models.dashboard", reason="grafana-foundation-sdk is not here"
-    )
-    for path in (ROOT / "deploy/grafana/springscale.json", ROOT / "deploy/fleet/grafana/dashboards/fleet.json"):
-        written = json.loads(path.read_text())
-        read = dashboard.Dashboard.from_json(written)
-        assert read.title == written["title"]
-        assert len(read.panels) == len(written["panels"])
