@@ -33,7 +33,6 @@ PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
     "docs/feed.md": {"printed": measured.feed_printed},
     "docs/fleet.md": {"fleet test": measured.fleet_test},
     "docs/hardware.md": {"noise": measured.noise_that_works},
-    "docs/kuksa.md": {},
     "docs/performance.md": {"conditions": measured.conditions, "speeds": measured.speeds},
     "docs/phone.md": {"output": printed.phone_import},
     "docs/scale.md": scale.PARTS,

@@ -14,7 +14,7 @@ from benchmarks.accuracy.__main__ import studies
 from gateway.cli import springscale
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("hardware", "phone", "feed", "contribute", "kuksa", "real-parts")
+PAGES = ("hardware", "phone", "feed", "contribute", "real-parts")
 PROGRAMS = (
     r"(?:springscale|python[\d.]*|sudo|cat|systemctl|echo|make|npm|pip|vspec|databroker|mmdebstrap|podman"
     r"|[\w/-]+/bin/\w+|\w+=\S+ python)"
@@ -33,7 +33,6 @@ RUN_BY = {  # how a command begins: what runs it
     "springscale calibrate my-van.zip": PACK,
     "springscale evaluate my-van.zip": PACK,
     "springscale calibration sprung": "tests/unit/test_vehicle_statics.py",
-    "/opt/kuksa-feeder/bin/python deploy/kuksa/feeder.py": "tests/e2e/test_kuksa_feeder.py",
     "python -m pytest tests/real": "tests/real/test_real_prometheus.py",
     "SPRINGSCALE_HASS=ha/bin/hass python -m pytest": "tests/real/test_real_home_assistant.py",
     "make test-vm": FEED,
@@ -74,9 +73,6 @@ NOT_RUN = {  # how a command begins: what the page says of it
     "echo 'FEED_OPTIONS=": "a real Raspberry Pi",
     "sudo systemctl enable --now springscale-feed": "a real Raspberry Pi",
     "cat /sys/bus/iio": "a real Raspberry Pi",
-    "sudo python3 -m venv /opt/kuksa-feeder": "Not run against a real databroker",
-    "vspec export": "Not run against a real databroker",
-    "databroker --vss": "Not run against a real databroker",
     "python3.13 -m venv ha": "by hand",
     "ha/bin/uv pip install": "by hand",
     "npm install node-red": "by hand",

@@ -149,14 +149,14 @@ def standards_router(board: Board, scales: Scales) -> APIRouter:
 
     @router.get("/vss")
     async def vss() -> list[VssPoint]:
-        """Core VSS paths and those of the Springscale overlay, of the latest estimate."""
+        """The weights of the latest estimate by VSS paths: those of its core, and others of that form."""
         return vss_points(board, scales)
 
     return router
 
 
 def vss_points(board: Board, scales: Scales) -> list[VssPoint]:
-    """Every VSS path that we support, in a fixed order; docs/vss/springscale.vspec describes those of the overlay."""
+    """Every VSS path that we support, in a fixed order."""
     weights, estimate = weigh_latest(board, scales), board.shown().estimate or _NONE
     points = [
         VssPoint(path="Vehicle.CurbWeight", value=_uint16(_kerb_kg(scales)), unit="kg", timestamp=None),
