@@ -25,8 +25,8 @@ from support.patience import PATIENCE_S
 
 from gateway.config import load_settings
 from gateway.core.weights.limits import Limits
-from gateway.web.access.guard import PUBLIC_PATHS
 from gateway.web.access.tokens import Scope, TokenFile
+from gateway.web.routes.monitoring import alive_router
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 IMAGE = (ROOT / "deploy/container/Containerfile").read_text()
@@ -97,7 +97,7 @@ def test_the_image_starts_a_command_that_exists_and_asks_an_address_that_answers
     (probe,) = of("HEALTHCHECK")
     port, path = re.findall(r"127\.0\.0\.1:(\d+)(/[a-z/]+)", probe)[0]
     assert [port] == of("EXPOSE")
-    assert path in PUBLIC_PATHS
+    assert path in {route.path for route in alive_router().routes}
 
 
 @pytest.mark.parametrize("stage", of("FROM"))
