@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gateway.bus.feed.iio import AXES
+from gateway.bus.feed import AXES
 from gateway.cli.options import FILE, Told, prints
 from gateway.offline.phone import Imported
 from gateway.offline.phone import import_recording as import_from

@@ -17,8 +17,7 @@ from support.commands import called, run
 from support.iio import ACCEL_SCALE, GYRO_SCALE, FakeIio, Scan
 from support.patience import PATIENCE_S, wait_until
 
-from gateway.bus.feed import AXES, Feeder, Gpsd, IioDevice, find_devices, turned
-from gateway.bus.feed.feeder import Numbering
+from gateway.bus.feed import AXES, Feeder, Gpsd, IioDevice, Numbering, find_devices, turned
 from gateway.bus.frames import frames_of
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.core.sample_clock import sample_times
@@ -196,7 +195,7 @@ def test_a_device_that_is_gone_ends_the_feed(tmp_path: Path) -> None:
 def test_a_bus_that_is_absent_is_tried_again_and_what_was_dropped_is_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gateway.bus.feed.feeder.QUEUE", 20)
+    monkeypatch.setattr("gateway.bus.feed.QUEUE", 20)
     fake = FakeIio(tmp_path)
     device = IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
     said: list[str] = []
@@ -226,9 +225,9 @@ def test_mount_matrices_of_the_driver_are_applied_before_the_named_axes(tmp_path
     (fake.device / "in_mount_matrix").write_text("0, 1, 0; -1, 0, 0; 0, 0, 1\n")  # the chip is turned on its board
     device = IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
     device.open()
-    samples = device._samples(fake.packed(((100, -200, 300), (0, 0, 0), BEGIN_NS)))
+    samples = device.samples(fake.packed(((100, -200, 300), (0, 0, 0), BEGIN_NS)))
     device.close()
-    assert samples.accel_mps2[0] == pytest.approx(np.array([-200, -100, 300]) * ACCEL_SCALE)
+    assert samples.vectors["accel"][0] == pytest.approx(np.array([-200, -100, 300]) * ACCEL_SCALE)
 
 
 @pytest.mark.parametrize("text", ["1, 0; 0, 1", "a, b, c", "1, 0, 0; 0, 1, 0; 0, 0"])
@@ -246,7 +245,7 @@ def test_a_host_that_no_name_service_can_know_is_a_fault_of_gpsd(host: str) -> N
 
 
 def test_a_line_that_no_parser_takes_is_no_fix() -> None:
-    assert Gpsd("127.0.0.1", 2947)._fix(b"[" * 60_000) is None
+    assert Gpsd("127.0.0.1", 2947).fix_of(b"[" * 60_000) is None
 
 
 @pytest.mark.parametrize(
@@ -268,9 +267,9 @@ def test_every_form_of_a_channel_is_read_as_the_kernel_describes_it(
     (fake.device / "in_accel_scale").write_text("1.0")
     device = IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
     device.open()
-    samples = device._samples(word * 3)
+    samples = device.samples(word * 3)
     device.close()
-    assert samples.accel_mps2[0].tolist() == [expected] * 3
+    assert samples.vectors["accel"][0].tolist() == [expected] * 3
 
 
 def test_numbers_follow_a_rate_that_is_not_the_one_asked_for() -> None:

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.bus.feed.iio import AXES
+from gateway.bus.feed import AXES
 from gateway.bus.frames import merge_frames
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import SHIPPED_PREFIX, Encoder, load_signal_map, shipped_map
