@@ -37,6 +37,7 @@ class Event(StrEnum):
     CALIBRATION_CHANGED = "calibration changed"
     SETUP_REFUSED = "signal map or calibration cannot be used"
     PIPELINE_DIED = "pipeline died"
+    LISTENER_FAILED = "listener failed"
     WEB_DIED = "web server died"
     PART_LATE = "part did not stop in time"
     PIPELINE_LATE = "pipeline did not finish in time"

@@ -60,14 +60,6 @@ class KeptFiles:
             os.rename(name, aside, src_dir_fd=folder, dst_dir_fd=folder)
             return aside
 
-    def set_aside_earlier(self, name: str) -> list[str]:
-        """Names of the files that were set aside under this name, oldest first."""
-        try:
-            with opened_folder(self.directory) as folder:
-                return sorted(other for other in _names(folder) if other.startswith(f"{name}.broken-"))
-        except FileNotFoundError:
-            return []
-
     def stamp(self, name: str) -> tuple[int, int, int] | None:
         """Inode, time and size of the file, which change with its content; None if there is no file."""
         try:

@@ -66,14 +66,29 @@ def overloaded(weights: LatestWeights) -> frozenset[str]:
     return frozenset(where for where in PLACES if getattr(weights, where).is_over_limit)
 
 
-def call_each(*hearers: Callable[[Estimate], None]) -> Callable[[Estimate], None]:
-    """A callback that passes each batch to several listeners."""
+class Listeners:
+    """Passes each batch to listeners by name. What one raises is its own fault: the others and the pipeline go on."""
 
-    def tell(found: Estimate) -> None:
-        for hear in hearers:
-            hear(found)
+    def __init__(self, hearers: Mapping[str, Callable[[Estimate], None]]) -> None:
+        self._hearers = hearers
+        self._faults: dict[str, str] = {}  # of the last batch
 
-    return tell
+    def __call__(self, found: Estimate) -> None:
+        for name, hear in self._hearers.items():
+            try:
+                hear(found)
+            except Exception as failure:  # noqa: BLE001 - whatever it is, weighing does not depend on it
+                if name not in self._faults:
+                    log_event(Event.LISTENER_FAILED, level=logging.ERROR, listener=name, failure=repr(failure))
+                self._faults[name] = repr(failure)
+            else:
+                self._faults.pop(name, None)
+
+    @property
+    def fault(self) -> str | None:
+        """Which failed with the last batch, for people."""
+        told = (f"{name} failed: {failure}; weighing goes on" for name, failure in self._faults.copy().items())
+        return "; ".join(told) or None
 
 
 class StateLog:

@@ -17,7 +17,7 @@ from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event
 from gateway.notify import Notifier
 from gateway.service.alarms import AlarmService, rules_of
-from gateway.service.batch_log import BatchLog, LoadEventLog, StateLog, call_each
+from gateway.service.batch_log import BatchLog, Listeners, LoadEventLog, StateLog
 from gateway.service.part import CLOSE_WITHIN_S, Deadline, Questions, in_own_thread, stop_in_turn
 from gateway.service.parts import (
     board_of,
@@ -99,13 +99,15 @@ class Gateway:
         self.ring_log = ring_log_of(settings, setup)
         subject = setup.subject
         self.alarms = AlarmService(rules_of(settings.alarms), subject, self.store)
+        events = LoadEventLog(setup, self.store)
+        self.listeners = Listeners({"the log of batches": log_batch, "load events": events, "alarms": self.alarms})
         self.pipeline = Pipeline(
             self.source.inbox,
             Decoder(setup.signal_map),
             flow,
             self.store,
             self.board,
-            call_each(log_batch, LoadEventLog(setup, self.store), self.alarms),
+            self.listeners,
             self.ring_log.put if self.ring_log else lambda frames: None,
         )
         self.uplink = uplink_of(broker, setup, self.store, with_places=with_places)
@@ -167,7 +169,7 @@ class Gateway:
     def _warnings(self) -> tuple[str, ...]:
         """Faults that do not stop the weighing, as sentences for people."""
         faults = [self._tokens.fault, self._setup_fault, self._web_fault, self.known_weights.fault]
-        faults.append(self.verification.fault)
+        faults += [self.verification.fault, self.listeners.fault]
         faults += [*(part.fault for part in self._vital), *(part.shown_fault() for part in self._beside)]
         return tuple(fault for fault in faults if fault)
 
