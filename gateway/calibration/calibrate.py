@@ -19,7 +19,6 @@ from gateway.calibration.inspection.finding import Kind, Severity
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.ratio_index.bands import BandChoice
-from gateway.calibration.ratio_index.choice import StructureChoice
 from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
 from gateway.calibration.sister import Sister, sister_of
 from gateway.core.spectrum import roughness_mps2, spectra_of
@@ -55,7 +54,6 @@ def calibrate_inspected(
     *,
     estimators: Sequence[str],
     bands: BandChoice = "campaign",
-    structure: StructureChoice = "auto",
     like: CalibrationFile | None = None,
     command: str = "",
     on_fit: OnFit = lambda name, done, of: None,
@@ -63,7 +61,7 @@ def calibrate_inspected(
     """Fits every named estimator on the identification parts of the runs without a fault.
 
     ``like`` is the calibration of a vehicle of the same model: it replaces the prior of any vehicle.
-    ``bands`` and ``structure`` are the ratio index's: found on the campaign, or named.
+    ``bands`` are the ratio index's: found on the campaign, or the paper's Table 2.
 
     An estimator that these runs do not determine is left out with a warning; raises CalibrationImpossibleError if none
     is left, or if the faults of the runs leave no valid calibration.
@@ -76,7 +74,7 @@ def calibrate_inspected(
     split = inspection.usable
     runs = [one.identification for one in split]
     counted = [batch for run in runs for batch in run.batches if not batch.rejected]
-    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, sister, bands, structure, on_fit)
+    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, sister, bands, on_fit)
     doubts = (
         contradictions(runs, campaign.vehicle, cross_spectrum.calibration, inherited=sister) if cross_spectrum else ()
     )
@@ -100,7 +98,6 @@ def _fit(
     campaign: Campaign,
     sister: Sister | None,
     bands: BandChoice,
-    structure: StructureChoice,
     on_fit: OnFit,
 ) -> tuple[RatioIndexFit | None, CrossSpectrumFit | None, list[str]]:
     """The result of each named estimator, and a warning for each that these runs do not determine."""
@@ -111,9 +108,7 @@ def _fit(
         progress = partial(on_fit, name)
         try:
             if name == "ratio_index":
-                ratio_index = fit_ratio_index(
-                    runs, campaign.vehicle, bands=bands, structure=structure, progress=progress
-                )
+                ratio_index = fit_ratio_index(runs, campaign.vehicle, bands=bands, progress=progress)
             else:
                 cross_spectrum = fit_cross_spectrum(runs, campaign.vehicle, progress, sister)
                 warnings.extend(cross_spectrum.calibration.warnings)

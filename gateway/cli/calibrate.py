@@ -16,7 +16,6 @@ from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.judgement.advice import verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
 from gateway.calibration.ratio_index.bands import BandChoice
-from gateway.calibration.ratio_index.choice import StructureChoice
 from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, require_output_place, window
 from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
@@ -108,13 +107,6 @@ def inspection_json(inspection: Inspection) -> dict[str, object]:
     show_default=True,
     help="of the ratio index: found on these drives, or the paper's Table 2",
 )
-@click.option(
-    "--structure",
-    type=click.Choice(get_args(StructureChoice)),
-    default="auto",
-    show_default=True,
-    help="of the ratio index: single is (9) and (10), joint is (11)",
-)
 @click.option("--check", "only_checks", is_flag=True, help="inspect the drives and write nothing; exits 1 on a refusal")
 @click.option("--report", type=FILE, default=None, help="directory to write a report into: report.html, figures")
 @window
@@ -126,7 +118,6 @@ def calibrate(
     numbers: tuple[int, ...] | None,
     like: Path | None,
     bands: BandChoice,
-    structure: StructureChoice,
     only_checks: bool,
     report: Path | None,
     window_s: float | None,
@@ -156,9 +147,8 @@ def calibrate(
             inspection,
             estimators=estimators or ESTIMATOR_NAMES,
             bands=bands,
-            structure=structure,
             like=sister,
-            command=_command(campaign, estimators, numbers, sister, bands, structure, window_s),
+            command=_command(campaign, estimators, numbers, sister, bands, window_s),
             on_fit=on_share(on_step, estimators or ESTIMATOR_NAMES),
         )
     if output is not None:
@@ -180,7 +170,6 @@ def _command(
     numbers: Sequence[int] | None,
     like: CalibrationFile | None,
     bands: BandChoice,
-    structure: StructureChoice,
     window_s: float | None,
 ) -> str:
     """The options that decide the result: the calibration's id depends on them too.
@@ -191,7 +180,7 @@ def _command(
     words += [word for name in estimators for word in ("--estimator", name)]
     words += [] if numbers is None else ["--runs", ",".join(map(str, numbers))]
     words += [] if like is None else ["--like", like.id]
-    words += ["--bands", bands, "--structure", structure]
+    words += ["--bands", bands]
     words += [] if window_s is None else ["--window-s", f"{window_s:g}"]
     return shlex.join(words)
 

@@ -17,7 +17,6 @@ from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.judgement.evaluation import Judged, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import BandChoice
-from gateway.calibration.ratio_index.choice import StructureChoice
 from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
@@ -175,7 +174,6 @@ def calibrate(
     estimators: Sequence[str],
     numbers: Sequence[int] | None = None,
     bands: BandChoice = "campaign",
-    structure: StructureChoice = "auto",
     command: str = "",
     on_run: OnRun = lambda done, of: None,
 ) -> Outcome:
@@ -184,9 +182,7 @@ def calibrate(
     Raises as :func:`calibrate_inspected` does.
     """
     inspection = inspect(campaign, settings, numbers=numbers, on_run=on_run)
-    return calibrate_inspected(
-        campaign, inspection, estimators=estimators, bands=bands, structure=structure, command=command
-    )
+    return calibrate_inspected(campaign, inspection, estimators=estimators, bands=bands, command=command)
 
 
 def judge_campaign(

@@ -45,30 +45,23 @@ def bands_of(held: CalibrationFile) -> list[tuple[float, float]]:
     return [band for pair in pairs if pair is not None for band in pair]
 
 
-def test_the_papers_bands_and_structure_are_taken_as_named(campaign: Path, tmp_path: Path) -> None:
+def test_the_papers_bands_are_taken_as_named(campaign: Path, tmp_path: Path) -> None:
+    """Four runs are too few for (11), which then gives way to (9) and (10)."""
     paper = [(band.centre_hz, band.width_hz) for pair in PAPER_BANDS.values() for band in pair]
-    done = calibrate(campaign, tmp_path / "paper.json", "--bands", "table2", "--structure", "single")
+    done = calibrate(campaign, tmp_path / "paper.json", "--bands", "table2")
     assert done.exit_code == 0, done.output
     held = load_calibration(tmp_path / "paper.json")
     assert bands_of(held) == paper
     assert held.ratio_index.payload.terms == MODEL_9_PAYLOAD
     assert held.ratio_index.front_share.terms == MODEL_10_FRONT_SHARE
-    assert calibrate(campaign, tmp_path / "own.json", "--structure", "log").exit_code == 0
+    assert calibrate(campaign, tmp_path / "own.json").exit_code == 0
     own = load_calibration(tmp_path / "own.json")
     assert bands_of(own) != paper
     assert own.ratio_index.payload.terms == ("log_ra", "log_rg")
 
 
-def test_a_structure_that_so_few_runs_cannot_carry_is_refused(campaign: Path, tmp_path: Path) -> None:
-    refused = calibrate(campaign, tmp_path / "none.json", "--structure", "joint", "--runs", "1,2,3")
-    assert refused.exit_code == 1
-    assert "no regression (joint) can be made of 3 runs" in str(refused.exception)
-    assert not (tmp_path / "none.json").exists()
-
-
-@pytest.mark.parametrize("option", [("--bands", "widest"), ("--structure", "cubic")])
-def test_an_unknown_name_is_a_usage_error(option: tuple[str, str], campaign: Path, tmp_path: Path) -> None:
-    refused = calibrate(campaign, tmp_path / "none.json", *option)
+def test_an_unknown_name_is_a_usage_error(campaign: Path, tmp_path: Path) -> None:
+    refused = calibrate(campaign, tmp_path / "none.json", "--bands", "widest")
     assert refused.exit_code == 2
     assert "is not one of" in refused.output
 
@@ -129,7 +122,7 @@ def test_every_estimator_tells_its_steps(campaign: Path) -> None:
     calibrate_inspected(loaded, inspection, estimators=ESTIMATOR_NAMES, on_fit=lambda *step: told.append(step))
     for estimator in ESTIMATOR_NAMES:
         steps = [(done, of) for name, done, of in told if name == estimator]
-        assert len(steps) > N_RUNS
+        assert len(steps) >= N_RUNS
         assert {of for _, of in steps} == {steps[-1][0]}
         assert all(before < after for (before, _), (after, _) in pairwise(steps))
 

@@ -10,7 +10,6 @@ from support import half_car_road
 
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import candidate_pairs, rank_correlations
-from gateway.calibration.ratio_index.choice import StructureChoice
 from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
 from gateway.calibration.ratio_index.table import SpectrumTable
 from gateway.core.calibrated import CalibratedVehicle
@@ -18,10 +17,8 @@ from gateway.core.estimator import estimate
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration, indexes_of
 from gateway.core.ratio_index.regression import (
     MODEL_9_PAYLOAD,
-    MODEL_10_FRONT_SHARE,
     MODEL_11_FRONT_SHARE,
     MODEL_11_PAYLOAD,
-    TERMS,
     RegressionModel,
 )
 from gateway.core.vehicle import Vehicle
@@ -67,7 +64,7 @@ def fit() -> RatioIndexFit:
 def test_unseen_loads_are_told_within_the_stated_spread(fit: RatioIndexFit) -> None:
     assert (fit.table.n_runs, len(fit.table.run)) == (7, 14)
     model, shares = fit.calibration.payload, fit.calibration.front_share
-    assert model.residual_std < 60.0  # the loads themselves spread by 160 kg
+    assert model.residual_std < 90.0  # the loads themselves spread by 160 kg
     n_covered = 0
     for i, (kg, pct) in enumerate([(50.0, 51.5), (225.0, 48.0), (320.0, 50.0), (425.0, 51.0)]):
         indexes = indexes_of(batch_of(kg, pct, 1000 + i), fit.calibration)
@@ -130,44 +127,23 @@ def test_without_pitch_rate_the_payload_alone_is_told() -> None:
         replace(run, batches=tuple(replace(b, pitch_rate_radps=np.full(N, np.nan)) for b in run.batches))
         for run in RUNS
     ]
-    for structure, terms in (("single", {"cbrt_ra"}), ("auto", {name for name in TERMS if "rg" not in name})):
-        calibration = fit_ratio_index(silent, VAN, structure=structure).calibration
-        assert set(calibration.payload.terms) <= terms
-        assert (calibration.front_share, calibration.pitch_rate_bands) == (None, None)
+    calibration = fit_ratio_index(silent, VAN).calibration
+    assert calibration.payload.terms == MODEL_9_PAYLOAD
+    assert (calibration.front_share, calibration.pitch_rate_bands) == (None, None)
 
 
-@pytest.mark.parametrize(
-    ("family", "terms"),
-    [
-        ("single", (MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE)),
-        ("joint", (MODEL_11_PAYLOAD, MODEL_11_FRONT_SHARE)),
-    ],
-)
-def test_the_papers_bands_and_structures_can_be_asked_for(
-    family: StructureChoice, terms: tuple[tuple[str, ...], tuple[str, ...]]
-) -> None:
-    fit = fit_ratio_index(RUNS, VAN, bands="table2", structure=family)
+def test_the_papers_bands_come_with_its_joint_structure() -> None:
+    fit = fit_ratio_index(RUNS, VAN, bands="table2")
     assert fit.calibration.acceleration_bands == PAPER_BANDS["acceleration"]
     assert fit.calibration.pitch_rate_bands == PAPER_BANDS["pitch_rate"]
     models = fit.calibration.payload, fit.calibration.front_share
-    assert tuple(model.terms for model in models if model) == terms
-    assert [trial.choice.family for trial in fit.trials] == [family]
-
-
-def test_the_family_that_errs_least_on_unseen_runs_is_taken(fit: RatioIndexFit) -> None:
-    assert {trial.choice.family for trial in fit.trials} == {"single", "log", "joint"}
-    spans = np.array([450.0, 20.0])
-    scores = [float(np.sum((np.array(trial.nested_rms) / spans) ** 2)) for trial in fit.trials]
-    assert scores == sorted(scores)
-    assert fit.payload_errors_kg is not None
-    np.testing.assert_array_equal(fit.payload_errors_kg, fit.chosen.nested_error[0])
+    assert tuple(model.terms for model in models if model) == (MODEL_11_PAYLOAD, MODEL_11_FRONT_SHARE)
 
 
 def test_nested_errors_of_a_run_come_from_a_choice_made_without_it(fit: RatioIndexFit) -> None:
     """The same by hand: calibrate on six runs, estimate the seventh."""
     out = RUNS[2]
-    family = fit.chosen.choice.family
-    without = fit_ratio_index([run for run in RUNS if run is not out], VAN, structure=family).calibration
+    without = fit_ratio_index([run for run in RUNS if run is not out], VAN).calibration
     found = [without.payload.predict(*indexes_of(batch, without))[0] - out.payload_kg for batch in out.batches]
     is_of_run = fit.table.number == out.number
     np.testing.assert_allclose(fit.payload_errors_kg[is_of_run], found, rtol=1e-9, atol=1e-7)
@@ -175,7 +151,7 @@ def test_nested_errors_of_a_run_come_from_a_choice_made_without_it(fit: RatioInd
 
 def test_too_few_runs_for_nesting_still_calibrate() -> None:
     fit = fit_ratio_index(RUNS[:3], VAN)
-    assert fit.chosen.choice.family == "single"
+    assert fit.calibration.payload.terms == MODEL_9_PAYLOAD
     assert fit.payload_errors_kg is not None
     assert np.all(np.isfinite(fit.payload_errors_kg))
     assert fit.front_share_errors_pct is None

@@ -1,4 +1,4 @@
-"""The ratio index over load and share: its curves with the fitted model, its bands, and the regressions tried."""
+"""The ratio index over load and share: its curves with the fitted model, its bands, and its regressions."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -6,14 +6,14 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.fit import FamilyTrial, RatioIndexFit
+from gateway.calibration.ratio_index.fit import RatioIndexFit
 from gateway.calibration.ratio_index.regression import FittedRegression
 from gateway.calibration.ratio_index.table import IndexRows, index_rows
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.records import F64
 from gateway.reports.charts import Axis, Chart, LineMark, Mark, Marker, Panel, Points, Ribbon, Section, Table
-from gateway.words import NONE, decimal
+from gateway.words import NONE
 
 N_ALONG: Final = 60  # chosen: points of a curve
 INTERVAL: Final = "95 % interval of a new batch"
@@ -24,7 +24,7 @@ QUARTILES: Final = "model, the other index at its quartiles"
 def ratio_index_section(
     fit: RatioIndexFit, identification: Sequence[KnownRun], validation: Sequence[KnownRun]
 ) -> Section:
-    """R_a and R_g of every batch, the bands and the regression through them, and the selection of both."""
+    """R_a and R_g of every batch, the bands and the regression through them, and its coefficients."""
     calibration = fit.calibration
     fitted, later = index_rows(identification, calibration), index_rows(validation, calibration)
     panels = []
@@ -45,7 +45,7 @@ def ratio_index_section(
         "Ratio index",
         (),
         (chart,),
-        (_bands_table(calibration), _trials_table(fit), *_model_tables(fit)),
+        (_bands_table(calibration), *_model_tables(fit)),
     )
 
 
@@ -121,40 +121,11 @@ def _band(band: Band) -> str:
 
 
 def _model_tables(fit: RatioIndexFit) -> Iterator[Table]:
-    choice, models = fit.chosen.choice, (fit.calibration.payload, fit.calibration.front_share)
+    choice, models = fit.choice, (fit.calibration.payload, fit.calibration.front_share)
     rows = zip(("payload [kg]", "front share [%]"), choice.regressions, models, strict=True)
     for target, regression, model in rows:
         if regression is not None and model is not None:
             yield _model_table(target, regression, model.residual_std, model.dof)
-
-
-def _trials_table(fit: RatioIndexFit) -> Table:
-    """Every family of regressions with its errors on runs that took no part in the selection."""
-    rows = tuple(
-        (
-            trial.choice.family + (" (chosen)" if trial is fit.chosen else ""),
-            _pairs(trial),
-            *(", ".join(one.model.terms) if one else NONE for one in trial.choice.regressions),
-            *_rms(trial),
-        )
-        for trial in fit.trials
-    )
-    return Table(
-        "Regressions tried: (9) and (10) single, both logarithms, and (11) joint. Errors are root "
-        "mean squares over runs for which bands and terms were chosen again without them",
-        ("Family", "bands", "terms of payload", "terms of share", "payload", "share"),
-        rows,
-    )
-
-
-def _pairs(trial: FamilyTrial) -> str:
-    chosen = [pair for pair in trial.choice.pairs if pair is not None]
-    return "; ".join(" over ".join(f"{band.centre_hz:g} Hz" for band in pair.bands) for pair in chosen)
-
-
-def _rms(trial: FamilyTrial) -> tuple[str, str]:
-    payload_kg, share_pct = (None if np.isnan(rms) else rms for rms in trial.nested_rms)
-    return decimal(payload_kg, " kg", 1), decimal(share_pct, " pp")
 
 
 def _model_table(target: str, regression: FittedRegression, residual_std: float, dof: float) -> Table:
