@@ -78,7 +78,6 @@ class Event(StrEnum):
     WEIGHT_KNOWN = "known weight stated"
     WEIGHT_CONFIRMED = "known weight confirmed"
     WEIGHT_TAKEN_BACK = "known weight taken back"
-    TREND_NOT_KEPT = "drift cannot be followed"
     HISTORY_SET_ASIDE = "broken history set aside"
     COMMISSIONING = "commissioning"
     COMMISSIONED = "commissioned"

@@ -33,7 +33,6 @@ from gateway.service.parts import (
 from gateway.service.pipeline import Pipeline
 from gateway.service.status import StatusReport
 from gateway.service.verification.known_weights import KnownWeightService
-from gateway.service.verification.trend import TrendService
 from gateway.service.verification.verification import VerificationService
 from gateway.setup import Setup
 from gateway.stated.facts import Rule
@@ -125,7 +124,6 @@ class Gateway:
             every_days=settings.verification.every_days,
             on_event=on_event,
         )
-        self.trend = TrendService(directory, subject, ask, self.known_weights.zeros)
         self.status = StatusReport(
             settings,
             setup,
@@ -151,7 +149,6 @@ class Gateway:
             commissioning=self.commissioning,
             known_loads=known_loads,
             verification=self.verification,
-            trend=self.trend,
             alarms=self.alarms.standing,
         )
         web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
@@ -163,7 +160,7 @@ class Gateway:
         self._vital = (self.store, self.pipeline, self.source)  # each tuple in the order of the start
         optional = (self.ring_log, self.uplink, self.webhook)
         present = (part for part in optional if part is not None)
-        self._beside = (self.commissioning, self.keeper, self.trend, *present, self.bus_survey)
+        self._beside = (self.commissioning, self.keeper, *present, self.bus_survey)
         self.needs_restart = False  # with the calibration that was made meanwhile; see life.py
 
     def _warnings(self) -> tuple[str, ...]:

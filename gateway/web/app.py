@@ -30,7 +30,7 @@ from gateway.web.routes.monitoring import alive_router, health_router, metrics_r
 from gateway.web.routes.reasons import reasons_router
 from gateway.web.routes.spectra import spectra_router
 from gateway.web.routes.vehicle import vehicle_router
-from gateway.web.routes.verification import trend_router, verification_router
+from gateway.web.routes.verification import verification_router
 from gateway.web.routes.weights import (
     KNOWN_LOADS_PATH,
     KnownLoads,
@@ -58,7 +58,6 @@ def create_app(
     commissioning: service.CommissioningBackend | None = None,
     known_loads: KnownLoads | None = None,
     verification: service.VerificationBackend | None = None,
-    trend: service.TrendBackend | None = None,
     alarms: Callable[[], str] | None = None,
 ) -> FastAPI:
     """The application over the pipeline's publications (``board``), the store (``reader``) and the service's state
@@ -95,7 +94,6 @@ def create_app(
         spectra_router(board, calibrated),
         *([known_weights_router(known_weights)] if known_weights else ()),
         *([verification_router(verification)] if verification else ()),
-        *([trend_router(trend)] if trend else ()),
         *([commissioning_router(commissioning)] if commissioning else ()),
         export_router(reader),
         events_router(reader),

@@ -9,7 +9,6 @@ from gateway.core.alarms.rules import AlarmRules
 from gateway.errors import RefusedError
 from gateway.service.alarms import AlarmService
 from gateway.service.verification.known_weights import KnownWeightService
-from gateway.service.verification.trend import TrendService
 from gateway.service.verification.verification import VerificationService
 from gateway.setup import Subject
 from gateway.stated.facts import Rule
@@ -51,7 +50,6 @@ def of_no_vehicle(directory: Path, store: Store) -> dict[str, Any]:
             every_days=0.0,
             on_event=lambda kind, detail: None,
         ),
-        "trend": TrendService(directory, NOBODY, ask, lambda: []),
         "alarms": AlarmService(AlarmRules(), NOBODY, store).standing,
         "commissioning": NoCommissioning(),
     }

@@ -359,14 +359,6 @@ def test_the_list_as_it_stood_at_any_time_is_known(bench: KnownWeightBench) -> N
     assert [teaches(t_ns) for t_ns in moments] == [False, False, False, True, True, False]
 
 
-def test_when_it_was_empty_is_followed_as_the_zero(bench: KnownWeightBench) -> None:
-    bench.empty()
-    bench.ticket(0, 280.0)
-    bench.pipeline.weigh(15.0)
-    bench.service.take_back("a", bench.empty()["id"])
-    assert [kg for _, kg in bench.service.zeros()] == [12.0, 15.0]
-
-
 def test_a_load_is_judged_without_what_is_known_of_it(bench: KnownWeightBench) -> None:
     """A verification under a ticket of the same load must not praise the ticket."""
     at_ns = bench.pipeline.flow.weighed.t_end_ns

@@ -18,7 +18,6 @@ from scipy.stats import rankdata
 
 from gateway.archive.fleet.batches import DRIFTING
 from gateway.archive.fleet.weeks import Weeks
-from gateway.calibration.trend import around_the_median, pair_slopes, variance_of_s
 from gateway.estimate import Z95
 from gateway.records import F64, I64, Bool
 
@@ -36,6 +35,35 @@ class DriftTrend:
     high: float
     p: float
     n: int
+
+
+def pair_slopes(x: F64, y: F64) -> F64:
+    """Slopes between any two points (n,) that differ in x, rising."""
+    first, second = np.triu_indices(len(x), 1)
+    apart, rise = x[second] - x[first], y[second] - y[first]
+    slopes: F64 = np.sort(rise[apart != 0.0] / apart[apart != 0.0])
+    return slopes
+
+
+def variance_of_s(x: F64, y: F64) -> float:
+    """Variance of Kendall's S without a trend, with its correction for ties; below 0 with hardly anything but ties."""
+    return (_pairs(len(x)) - sum(map(_pairs, _ties(x))) - sum(map(_pairs, _ties(y)))) / 18.0
+
+
+def around_the_median(slopes: F64, reach: float) -> tuple[float, float]:
+    """The slopes ``reach`` ranks of S on either side of the median, or the outermost ones."""
+    low = max(round((len(slopes) - reach) / 2.0) - 1, 0)
+    high = min(round((len(slopes) + reach) / 2.0), len(slopes) - 1)
+    return float(slopes[low]), float(slopes[high])
+
+
+def _pairs(n: int) -> int:
+    return n * (n - 1) * (2 * n + 5)
+
+
+def _ties(values: F64) -> list[int]:
+    """How often each value occurs."""
+    return [int(n) for n in np.unique(values, return_counts=True)[1]]
 
 
 def trend_of(x: F64, y: F64) -> DriftTrend | None:

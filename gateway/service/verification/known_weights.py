@@ -79,13 +79,6 @@ class KnownWeightService:
             for one in held
         )
 
-    def zeros(self) -> list[tuple[str, float]]:
-        """Times at which the vehicle was empty, with the estimate by the calibration alone (kg); ended entries too,
-        oldest first.
-        """
-        empty = [one for one in self._own() if one.kind is KnownWeightKind.EMPTY]
-        return [(one.at, float(one.observation.off[PAYLOAD])) for one in empty]
-
     def state(self, kinds: Sequence[KnownWeightKind] = ALL_KINDS) -> str:
         """JSON: a KnownWeightState with the entries of these kinds."""
         own = self._own()

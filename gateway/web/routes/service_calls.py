@@ -37,12 +37,6 @@ class VerificationBackend(Protocol):
     def verify(self, by: str, note: str | None, stated: Sequence[StatedWeight]) -> str: ...
 
 
-class TrendBackend(Protocol):
-    """The trend of the vehicle's parameters."""
-
-    def state(self) -> str: ...
-
-
 class CommissioningBackend(Protocol):
     """The commissioning: every step gives the CommissioningState after it."""
 

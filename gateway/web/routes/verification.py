@@ -1,12 +1,10 @@
-"""How well the calibration still holds: known loads compared with the estimates, as dated records and pages to print,
-and the trend of the vehicle's parameters.
-"""
+"""How well the calibration still holds: known loads compared with the estimates, as dated records and pages to print."""
 
 import base64
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Path, Request
 from pydantic import BaseModel, Field
@@ -17,7 +15,7 @@ from gateway.status import VerificationStatus
 from gateway.web.access.middleware import content_security_policy
 from gateway.web.access.problems import problem_response
 from gateway.web.routes.known_weights import Stated
-from gateway.web.routes.service_calls import REFUSALS, By, TrendBackend, VerificationBackend, answered, created
+from gateway.web.routes.service_calls import REFUSALS, By, VerificationBackend, answered, created
 from gateway.web.schemas import Body, problem_responses
 from gateway.words import one_or_more
 
@@ -77,51 +75,6 @@ def verification_router(backend: VerificationBackend) -> APIRouter:
         if record is None:
             return problem_response(404, "there is no such record: the list has all of them", request.url.path)
         return HTMLResponse(verification_page(record), headers={"content-security-policy": POLICY})
-
-    return router
-
-
-TREND_PATH: Final = "/calibration/trend"
-
-
-class PointTold(BaseModel):
-    """A week's mean, by the date of its Monday, or one empty vehicle."""
-
-    t: str
-    number: float
-    n: int = Field(description="batches in it")
-
-
-class ParameterTrend(BaseModel):
-    """Off the calibration: percent; the zero in kg."""
-
-    name: str = Field(examples=["damper_rear"])
-    unit: Literal["%", "kg"]
-    points: list[PointTold]
-    change: float | None = Field(description="from the first point to the last; null: too few points")
-    interval99: tuple[float, float] | None = Field(description="of the change")
-    is_drifting: bool
-    level: float | None = Field(description="where the newest batches stand off the calibration; null: too few of them")
-    level99: tuple[float, float] | None = Field(description="of the level")
-    is_off: bool = Field(
-        description="whether the level is neither chance nor small: dampers from 20 %, a gain from 2 %"
-    )
-
-
-class TrendState(BaseModel):
-    """Of the calibration in use."""
-
-    calibration_id: str | None
-    parameters: list[ParameterTrend]
-
-
-def trend_router(backend: TrendBackend) -> APIRouter:
-    router = APIRouter(prefix="/api/v1", tags=["calibration"])
-
-    @router.get(TREND_PATH, response_model=TrendState)
-    async def parameter_trend() -> Response:
-        """Dampers, the delay's scale, the gyro's gain and the zero over the months: whether they drift or are off."""
-        return await answered(backend.state)
 
     return router
 

@@ -3,7 +3,7 @@
 
 import { follow } from "/assets/dashboard/event-stream.js";
 import { alarmsOf } from "/assets/dashboard/alarm-view.js";
-import { ALARMS, COMMISSIONING, KNOWN_WEIGHTS, Refused, TREND, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
+import { ALARMS, COMMISSIONING, KNOWN_WEIGHTS, Refused, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
 import { known, learn } from "/assets/dashboard/known.js";
 import { explained } from "/assets/dashboard/phrases.js";
 
@@ -53,10 +53,7 @@ const askKnownWeights = async () => learn({ knownWeights: await load(KNOWN_WEIGH
 
 export const askCommissioning = async () => learn({ commissioning: await load(COMMISSIONING) });
 
-async function askVerifications() {
-  const [verifications, trend] = await Promise.all([load(VERIFICATIONS), load(TREND)]);
-  learn({ verifications, trend });
-}
+const askVerifications = async () => learn({ verifications: await load(VERIFICATIONS) });
 
 async function askOnce() {
   const [vehicle, reasons] = await Promise.all([load("/api/v1/vehicle"), load("/api/v1/reasons")]);

@@ -4,7 +4,6 @@ const TOKEN = "springscale-token";
 export const KNOWN_WEIGHTS = "/api/v1/known-weights";
 export const COMMISSIONING = "/api/v1/calibration/commissioning";
 export const VERIFICATIONS = "/api/v1/calibration/verifications";
-export const TREND = "/api/v1/calibration/trend";
 export const ALARMS = "/api/v1/alarms?order=newest_first&limit=50";
 
 export class Refused extends Error {}

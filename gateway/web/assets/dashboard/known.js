@@ -11,7 +11,6 @@ export const known = {
   commissioning: null, // GET /calibration/commissioning
   knownWeights: null, // GET /known-weights
   verifications: null, // GET /calibration/verifications
-  trend: null, // GET /calibration/trend
   alarms: null, // newest first, those that stand among them
   events: null, // load events, newest first
   trips: null, // likewise

@@ -1,11 +1,11 @@
-// Known loads: their last comparison with the estimates, the drift since then, and the form that states one.
+// Known loads: their last comparison with the estimates, and the form that states one.
 
 import { dialog } from "/assets/dashboard/dialog.js";
 import { KNOWN_WEIGHTS, VERIFICATIONS, change, download } from "/assets/dashboard/gateway.js";
 import { learn, show } from "/assets/dashboard/known.js";
 import { button, element, made, typedNumber, write } from "/assets/dashboard/page.js";
 import { phrase } from "/assets/dashboard/phrases.js";
-import { capital, clock, figure, signed } from "/assets/dashboard/words.js";
+import { clock, figure, signed } from "/assets/dashboard/words.js";
 
 const FIELDS = { gross: ["gross_kg"], axles: ["front_axle_kg", "rear_axle_kg"], payload: ["payload_kg", "position_m"] };
 const OPTIONAL = new Set(["position_m"]);
@@ -20,13 +20,6 @@ const recordText = (record) => phrase("record", {
 function due({ due_at, is_due }) {
   if (due_at === null) return phrase("due_any");
   return is_due ? phrase("due_now") : phrase("due_at", { time: clock(due_at) });
-}
-
-function trendText({ name, unit, change, interval99, is_drifting, level, level99, is_off }) {
-  const what = capital(phrase.named("trend", name));
-  if (is_off) return phrase("trend_off", { name: what, level: signed(level, 1, unit), low: signed(level99[0], 1, unit), high: signed(level99[1], 1, unit) });
-  const course = change === null ? phrase("trend_short") : phrase("trend_course", { change: signed(change, 1, unit), low: signed(interval99[0], 1, unit), high: signed(interval99[1], 1, unit) });
-  return phrase(is_drifting ? "trend_drifts" : "trend_line", { name: what, course });
 }
 
 /** The page of a record opens on its own, to be printed. */
@@ -48,11 +41,6 @@ show(({ verifications }) => {
   element("verified-history").hidden = !last;
   element("verified-entries").replaceChildren(...verifications.history.map(entry));
 }, "verifications");
-
-show(({ trend }) => {
-  if (trend === null) return;
-  element("drift").replaceChildren(...trend.parameters.map((one) => made("li", trendText(one), one.is_drifting || one.is_off ? "warning" : "")));
-}, "trend");
 
 /** The uses of a known load; the words `NAME_effect`, `NAME_confirm` and `NAME_done` go with each. */
 const PURPOSES = {
