@@ -1,4 +1,4 @@
-"""How well the calibration still holds: known loads compared with the estimates, as dated records and pages to print."""
+"""How well the calibration still holds: known loads compared with the estimates, as dated records and printable pages."""
 
 import base64
 import hashlib
