@@ -30,7 +30,7 @@ SENTENCES: Final[dict[State, str]] = {
     State.STALE: "No new estimate for a while: the shown one is old.",
     State.READER_FAULT: "The bus cannot be read: see the last fault.",
 }
-OTHERS_ONLY: Final = "The bus is awake (identifiers heard: {}), but none of them is mapped."
+LOOK: Final = "`springscale look` on a recording of the bus shows under which identifiers its devices send."
 
 
 SILENT_AFTER_S: Final = 5.0  # chosen: many times the period of any mapped frame
@@ -52,9 +52,6 @@ class BusStatus(_Told):
     n_inbox_dropped: int = Field(0, description="frames the pipeline did not take in time")
     n_kernel_dropped: int | None = Field(None, description="frames the kernel dropped; null if it does not say")
     last_frame_age_s: float | None = None
-    n_identifiers: int | None = Field(
-        None, description="how many are on the bus, counted while a sensor is silent; null if not counted"
-    )
     last_fault: str | None = None
 
 
@@ -73,10 +70,6 @@ class SignalHealth(_Told):
     rate_hz: float | None = None
     last_age_s: float | None = None
     rejected_share: float | None = Field(None, description="share of its frames that gave no sample")
-    similar: tuple[str, ...] = Field(
-        (),
-        description="while it is silent: unmapped identifiers on the bus that are like its message's",
-    )
 
     @property
     def is_silent(self) -> bool:
@@ -253,11 +246,12 @@ class Status(_Told):
 
     def sentence(self) -> str:
         """The state in words, with any faults."""
-        is_awake = self.state is State.WAITING_FOR_BUS and self.bus.n_identifiers
-        said = [OTHERS_ONLY.format(self.bus.n_identifiers) if is_awake else SENTENCES[self.state]]
+        said = [SENTENCES[self.state]]
         silent = [f"{s.signal.replace('_', ' ')}{self._why_silent(s)}" for s in self.signals if s.is_silent]
-        if silent and (is_awake or self.state is State.SENSOR_FAULT):
+        if silent and self.state is State.SENSOR_FAULT:
             said.append(f"Silent: {', '.join(silent)}.")
+        if self.state is State.SENSOR_FAULT or (self.state is State.WAITING_FOR_BUS and not self.bus.n_frames):
+            said.append(LOOK)
         if self.state is State.READER_FAULT and self.bus.last_fault:
             said.append(f"Last fault: {self.bus.last_fault}.")
         if self.calibration_id is None:
@@ -270,15 +264,12 @@ class Status(_Told):
         return " ".join(said)
 
     def _why_silent(self, silent: SignalHealth) -> str:
-        """No frame of its message and which message resembles it, or frames without a valid sample; empty: it was
-        received.
-        """
+        """No frame of its message, or frames without a valid sample; empty: it was received."""
         counts = {row.reason: row.n for row in self.decode if row.signal == silent.signal}
         n_refused = sum(n for reason, n in counts.items() if reason != "ok")
-        similar = f"similar on the bus: {'; '.join(silent.similar)}" if silent.similar else ""
         if not counts or counts.get("ok"):
-            return f" ({similar})" if similar else ""
+            return ""
         if n_refused:
             reasons = " and ".join(reason.replace("_", " ") for reason, n in counts.items() if n and reason != "ok")
             return f" ({n_refused} frames came, all {reasons})"
-        return f" (no frame of its message{similar and '; ' + similar})"
+        return " (no frame of its message)"

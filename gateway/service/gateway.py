@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from gateway.bus.live.bus_survey import bus_survey_of
 from gateway.bus.live.source import OpenReceiver, SourceState
 from gateway.bus.signals import Decoder
 from gateway.config import Settings
@@ -36,7 +35,6 @@ from gateway.service.verification.known_weights import KnownWeightService
 from gateway.service.verification.verification import VerificationService
 from gateway.setup import Setup
 from gateway.stated.facts import Rule
-from gateway.status import State
 from gateway.uplink.settings import uplink_settings, webhook_settings
 from gateway.web.access.serving import WebServer, refuse_open_address, server_config
 from gateway.web.access.tokens import TokenFile
@@ -90,7 +88,6 @@ class Gateway:
             self.store.write_event("setup_fault", {"fault": setup_fault})
         self.board = board_of(settings.web.stale_after_s, self.store, setup)
         self.source = source_of(settings.bus, setup, open_receiver)
-        self.bus_survey = bus_survey_of(settings.bus.interface, settings.bus.channel, settings.bus.options)
         flow = setup.flow(replace(settings.batch.for_core(is_live=True), position_decimals=settings.position.decimals))
         self.keeper = keeper_of(settings.keep, settings.store, setup)
         self.commissioning = commissioning_of(settings, setup, self.keeper, flow, self.store)
@@ -135,7 +132,6 @@ class Gateway:
             self.webhook,
             self.ring_log,
             self.verification.status,
-            bus_survey=self.bus_survey,
             alarms=self.alarms.summary,
             warnings=self._warnings,
         )
@@ -160,7 +156,7 @@ class Gateway:
         self._vital = (self.store, self.pipeline, self.source)  # each tuple in the order of the start
         optional = (self.ring_log, self.uplink, self.webhook)
         present = (part for part in optional if part is not None)
-        self._beside = (self.commissioning, self.keeper, *present, self.bus_survey)
+        self._beside = (self.commissioning, self.keeper, *present)
         self.needs_restart = False  # with the calibration that was made meanwhile; see life.py
 
     def _warnings(self) -> tuple[str, ...]:
@@ -244,10 +240,6 @@ class Gateway:
         now = self.status()
         log_state(now)
         self.alarms.watch(now)
-        if now.state in (State.WAITING_FOR_BUS, State.SENSOR_FAULT):
-            self.bus_survey.look()  # a silent sensor may send under an identifier that the filters exclude
-        else:
-            self.bus_survey.forget()
         self._notifier.send_status(now.sentence())
 
     def _dead_part(self, serving: asyncio.Task[None]) -> str | None:

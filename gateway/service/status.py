@@ -7,8 +7,6 @@ from functools import partial
 from importlib.metadata import version
 from typing import Final
 
-from gateway.bus.heard import similar_to
-from gateway.bus.live.bus_survey import BusSurvey
 from gateway.bus.live.source import LiveSource, SourceState
 from gateway.bus.ring_log import RingLog
 from gateway.config import Settings
@@ -57,7 +55,6 @@ class StatusReport:
     ring_log: RingLog | None = None
     verification: Callable[[], VerificationStatus] = VerificationStatus
     _: KW_ONLY
-    bus_survey: BusSurvey
     alarms: Callable[[], AlarmsStatus] = AlarmsStatus
     warnings: Callable[[], tuple[str, ...]] = tuple
     version: str = field(init=False, default_factory=partial(version, "springscale"))  # read from a file, once
@@ -144,7 +141,6 @@ class StatusReport:
             n_inbox_dropped=counts.dropped_inbox,
             n_kernel_dropped=counts.dropped_kernel,
             last_frame_age_s=min(ages, default=None),
-            n_identifiers=len(self.bus_survey.heard) or None,
             last_fault=self.source.reason,
         )
 
@@ -168,7 +164,6 @@ class StatusReport:
                     rate_hz=self.pipeline.watch.rate_hz.get(signal),
                     last_age_s=self._age_s(signal),
                     rejected_share=n_rejected / total if total else None,
-                    similar=self._similar(signal),
                 )
             )
         return tuple(health)
@@ -189,12 +184,3 @@ class StatusReport:
         return Standing(
             stood_s=standing.stood_s(), is_load_weighed=shown is not None and standing.is_of_this_load(shown)
         )
-
-    def _similar(self, signal: Signal) -> tuple[str, ...]:
-        """Identifiers in the last survey that resemble a silent signal's message."""
-        age_s = self._age_s(signal)
-        heard = self.bus_survey.heard
-        if not heard or (age_s is not None and age_s < SENSOR_LOST_S):
-            return ()
-        signal_map = self.setup.signal_map
-        return similar_to(signal_map.message_of(signal), signal_map, heard)

@@ -3,12 +3,9 @@
 import csv
 import io
 import json
-import sys
-from datetime import datetime
 from pathlib import Path
 
 import jsonschema_rs
-import pyarrow.parquet as pq
 import pytest
 from support.days import RULES, day
 from support.web import Client, Gateway
@@ -76,32 +73,3 @@ def test_files(gateway):
     assert {row["after_n_batches"] for row in table}
     trips = list(csv.DictReader(io.StringIO(client.get("/api/v1/trips.csv").text)))
     assert sum(float(row["carried_tkm"]) for row in trips) > 0.0
-
-
-@pytest.mark.parametrize("path", ["events", "trips"])
-def test_parquet_holds_what_the_other_files_hold(gateway, path, monkeypatch):
-    """Written in several row groups, each drained before the next."""
-    monkeypatch.setattr("gateway.web.routes.history.ENTRIES_AT_A_TIME", 2)
-    client = Client(gateway.app)
-    answer = client.get(f"/api/v1/{path}.parquet")
-    assert answer.headers["content-type"] == "application/vnd.apache.parquet"
-    file = pq.ParquetFile(io.BytesIO(answer.content))
-    assert file.num_row_groups > 1
-    rows = file.read().to_pylist()
-    told = list(csv.DictReader(io.StringIO(client.get(f"/api/v1/{path}.csv").text)))
-    assert [row["id"] for row in rows] == [row["id"] for row in told]
-    for row, line in zip(rows, told, strict=True):
-        assert list(row) == list(line)
-        for name, cell in row.items():
-            assert (cell is None) is (line[name] == "")
-            if isinstance(cell, float):
-                assert cell == float(line[name])
-        assert row["t_end"] == datetime.fromisoformat(line["t_end"])
-    assert {type(row["revision"]) for row in rows} == {int}
-
-
-def test_without_its_library_parquet_says_what_to_install(gateway, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    answer = Client(gateway.app).get("/api/v1/trips.parquet")
-    assert answer.status_code == 501
-    assert "springscale[archive]" in answer.json()["detail"]

@@ -11,7 +11,7 @@ from support.patience import PATIENCE_S
 from support.web import Client, Gateway
 
 from gateway.records import Why
-from gateway.status import BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, StoreStatus
+from gateway.status import LOOK, BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, StoreStatus
 
 JSON = "application/json"
 
@@ -191,7 +191,8 @@ def test_a_silent_sensor_is_named() -> None:
     heard = {"speed": 0.2, "vertical_acceleration": 75.0, "pitch_rate": None}
     signals = tuple(SignalHealth(signal=name, last_age_s=age_s) for name, age_s in heard.items())
     told = Status(version="1", state=State.SENSOR_FAULT, uptime_s=90.0, calibration_id="sha256:ab", signals=signals)
-    assert told.state_in_words == "The bus is alive, but a sensor is silent. Silent: vertical acceleration, pitch rate."
+    said = "The bus is alive, but a sensor is silent. Silent: vertical acceleration, pitch rate."
+    assert told.state_in_words == f"{said} {LOOK}"
 
 
 @pytest.mark.parametrize("state", State)

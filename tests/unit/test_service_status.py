@@ -14,7 +14,6 @@ from support.estimates import make_estimate
 from support.paper_van import paper_van_config
 from support.ports import free_port
 
-from gateway.bus.live.bus_survey import BusSurvey
 from gateway.bus.live.source import SourceState
 from gateway.config import load_settings
 from gateway.core.calibrated import CalibratedVehicle
@@ -52,7 +51,6 @@ def report(
         "pipeline": SimpleNamespace(watch=SimpleNamespace(last_heard=heard), flow=SimpleNamespace(scheduler=scheduler)),
         "store": None,
         "board": SimpleNamespace(age_s=lambda: estimate_age_s, is_stale=lambda: is_stale),
-        "bus_survey": BusSurvey(None),
     }
     told = StatusReport(**cast(Any, parts))
     told.started_s = now - 60.0  # instead of waiting for a minute

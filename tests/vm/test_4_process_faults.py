@@ -6,7 +6,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from pathlib import Path
 
 import httpx
@@ -14,13 +14,11 @@ import pytest
 from vm.harness.drives import loaded_drive, log_of
 from vm.harness.vehicle import CONFIG, PLAY, SETTINGS, STATE, Answer, Vehicle
 
-from gateway.web.access.serving import CONNECTIONS_PER_ADDRESS
-
 Recovered = Callable[[float], None]
 N_KILLS = int(os.environ.get("SPRINGSCALE_KILLS", "20"))
 COMMIT_EVERY = 4  # of so many kills one falls among commits, the others wherever they fall
 GUEST = Path(__file__).parent / "guest"
-N_SLOW = CONNECTIONS_PER_ADDRESS + 12
+N_SLOW = 50  # of the 100 places that there are
 SHORT_DRIVES = SETTINGS.replace("silence_s = 3.0", "silence_s = 0.5")  # each second of frames is a drive of its own
 
 
@@ -122,8 +120,7 @@ def test_floods_and_slow_clients_cost_no_frame(vehicle: Vehicle, tmp_path: Path)
     with ExitStack() as slow_clients:
         for _ in range(N_SLOW):
             slow = slow_clients.enter_context(socket.create_connection((vehicle.machine.address, 8000), 10.0))
-            with suppress(ConnectionError):  # turned away at the door, as many more than an address may have
-                slow.sendall(b"GET /api/v1/status HTTP/1.1\r\nHost: ")
+            slow.sendall(b"GET /api/v1/status HTTP/1.1\r\nHost: ")
         vehicle.run(f"{PLAY} {vehicle.put_log(log_of(frames, tmp_path / 'drive.log'))}")
         over.set()
         for thread in threads:

@@ -20,7 +20,7 @@ from gateway.history import BATCHES, HistoryPage
 from gateway.records import json_line
 from gateway.status import Status
 from gateway.store import StoreReader
-from gateway.web.file_response import FORMATS, JsonLines, file_responses, sent_as_file
+from gateway.web.file_response import FORMATS, file_responses, sent_as_file
 from gateway.web.live.board import Board, LatestResponse
 from gateway.web.live.stream import EVENT_SCHEMA
 from gateway.web.schemas import EstimatesPage, Instant, Latest, problem_responses
@@ -248,9 +248,10 @@ def export_router(reader: StoreReader) -> APIRouter:
     router = APIRouter(prefix="/api/v1", tags=["export"])
 
     def sent(span: TimeSpan, ending: str, *, with_spectra: bool) -> Awaitable[Response]:
-        file = FORMATS[ending](COLUMNS, csv_cells)
-        name = f"springscale.{ending}"
-        return _sent(reader, BATCHES, span, file, name, BATCHES_AT_A_TIME, with_spectra=with_spectra)
+        def page(cursor: str | None) -> Awaitable[HistoryPage]:
+            return history_page(reader, BATCHES, span, BATCHES_AT_A_TIME, cursor, with_spectra=with_spectra)
+
+        return sent_as_file(page, "springscale", ending, COLUMNS, csv_cells)
 
     @router.get("/export.csv", response_class=Response, responses=file_responses("csv", "the file"))
     async def export_csv(span: Annotated[TimeSpan, Query()]) -> Response:
@@ -281,7 +282,7 @@ def events_router(reader: StoreReader) -> APIRouter:
         for ending in FORMATS:
             router.add_api_route(
                 f"/{path}.{ending}",
-                _whole(reader, kind, f"springscale-{path}.{ending}", ending),
+                _whole(reader, kind, f"springscale-{path}", ending),
                 name=f"{path}_{ending}",
                 description=f"All {path} as one file, each in its last revision.",
                 response_class=Response,
@@ -299,8 +300,10 @@ def _entries(reader: StoreReader, kind: EntryKind) -> Callable[..., Any]:
 
 def _whole(reader: StoreReader, kind: EntryKind, name: str, ending: str) -> Callable[..., Any]:
     async def whole(span: Annotated[TimeSpan, Query()]) -> Response:
-        file = FORMATS[ending](table.COLUMNS[kind], partial(table.cells_of, kind))
-        return await _sent(reader, (kind,), span, file, name, ENTRIES_AT_A_TIME)
+        def page(cursor: str | None) -> Awaitable[HistoryPage]:
+            return history_page(reader, (kind,), span, ENTRIES_AT_A_TIME, cursor)
+
+        return await sent_as_file(page, name, ending, table.COLUMNS[kind], partial(table.cells_of, kind))
 
     return whole
 
@@ -319,12 +322,6 @@ async def history_page(
         return await asyncio.to_thread(reader.page, kinds, limit=limit, cursor=cursor, **span.question(), **more)
     except ValueError as error:
         raise RequestValidationError([{"loc": ("query", "cursor"), "msg": str(error)}]) from None
-
-
-async def _sent(
-    reader: StoreReader, kinds: Sequence[str], span: TimeSpan, file: JsonLines, name: str, limit: int, **more: Any
-) -> Response:
-    return await sent_as_file(lambda cursor: history_page(reader, kinds, span, limit, cursor, **more), file, name)
 
 
 async def _page_by_page(reader: StoreReader, query: EstimatesQuery, first: HistoryPage) -> AsyncIterator[str]:

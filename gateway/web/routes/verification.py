@@ -1,4 +1,4 @@
-"""How well the calibration still holds: known loads compared with the estimates, as dated records and printable pages."""
+"""How well the calibration still holds: known loads compared with the estimates, as dated records and as pages."""
 
 import base64
 import hashlib

@@ -10,6 +10,6 @@ export const silentSignals = (status) => status.signals.filter(isSilent).map((on
 
 /** No frames at all on a bus that had some before; a bus that never had any may not be connected. */
 export function isAsleep({ status, latest }) {
-  if (status?.state !== "waiting_for_bus" || status.bus.n_identifiers) return false;
+  if (status?.state !== "waiting_for_bus") return false;
   return status.bus.n_frames > 0 || Boolean(latest?.id);
 }
