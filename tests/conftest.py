@@ -19,7 +19,6 @@ LONGEST_FIRST = (
     "golden/test_tutorial.py",
     "golden/test_recorded_drives.py",
     "e2e/test_reproduce.py",
-    "unit/test_phone_import.py",
     "e2e/test_web_dashboard.py",
     "scenarios/test_web_memory.py",
     "e2e/test_calibration_report.py",

@@ -20,7 +20,6 @@ from benchmarks.accuracy import (
     delivery,
     disturbances,
     grades,
-    phones,
 )  # fmt: skip
 from benchmarks.accuracy import faults as on_faults
 from benchmarks.accuracy.budget import study as budget
@@ -34,7 +33,7 @@ from gateway.errors import SpringscaleError
 
 STUDIES: Final[tuple[Study[Any], ...]] = (
     coverage.STUDY, budget.STUDY, disturbances.STUDY, grades.STUDY, delivery.STUDY, sensitivity.STUDY,
-    phones.STUDY, availability.STUDY,
+    availability.STUDY,
 )  # fmt: skip
 Command = Callable[..., None]
 _workers = click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes")

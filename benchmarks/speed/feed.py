@@ -1,4 +1,4 @@
-"""The processor time and memory of `springscale feed` and `springscale import`, on a fake device with a FIFO.
+"""The processor time and memory of `springscale feed`, on a fake device with a FIFO.
 
 python -m benchmarks.speed.feed --output docs/feed_cost.json
 """
@@ -12,15 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-import numpy as np
-
 from benchmarks.speed.meter import machine, print_and_write, springscale
-from gateway.sim.drive import rural, urban
-from gateway.sim.obstacles import UnevenRoad
-from gateway.sim.road import iso_road
-from gateway.sim.scenario import simulate_drive
-from gateway.sim.vans import PAPER_VAN
-from gateway.workbench.phones import PHONE, write_export
 
 RATE_HZ: Final = 100.0  # chosen: of the fake device
 SHORT_S: Final = 5.0  # chosen: the difference of both runs is the cost of feeding without the start
@@ -70,19 +62,8 @@ def _feed(for_s: float) -> dict[str, Any]:
         return springscale("feed", *options, "--sysfs", f"{folder}/sys", "--nodes", f"{folder}/dev")
 
 
-def _import() -> dict[str, float]:
-    rng = np.random.default_rng(1)
-    drive = urban(300.0, rng).then(rural(600.0, rng))
-    road = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
-    with TemporaryDirectory() as folder:
-        export = Path(folder) / "phone.zip"
-        write_export(simulate_drive(PAPER_VAN, (), road, drive, PHONE, 1).recording, export, "sensor_logger_android")
-        ran = springscale("import", export, f"{folder}/drive.log", "--json")
-    return {"drive_s": json.loads(ran["output"])["duration_s"], "cpu_s": ran["cpu_s"], "rss_mb": ran["peak_mb"]}
-
-
 def measure() -> dict[str, Any]:
-    """The feed for two lengths of time, and an import."""
+    """The feed for two lengths of time."""
     short, long = _feed(SHORT_S), _feed(LONG_S)
     told = json.loads(long["output"])
     return {
@@ -92,7 +73,6 @@ def measure() -> dict[str, Any]:
         "cpu_pct": 100.0 * (long["cpu_s"] - short["cpu_s"]) / (LONG_S - SHORT_S),
         "rss_mb": long["peak_mb"],
         "machine": machine(),
-        "import": _import(),
     }
 
 

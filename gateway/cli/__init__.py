@@ -30,7 +30,6 @@ _COMMANDS = {
     "events": "What was loaded and unloaded where and when, and the trips between, from log files.",
     "feed": "Send an IMU of Linux IIO and a receiver behind gpsd onto a CAN interface.",
     "fleet-report": "A fleet's data set as pages: each vehicle and what needs attention.",
-    "import": "Make a log from the recording of a phone: Sensor Logger or phyphox.",
     "look": "The content of an unknown log, and a first signal map from it.",
     "record": "Record the mapped frames of a bus into a log.",
     "replay": "Send a log to a bus, paced by its time stamps.",
@@ -41,7 +40,6 @@ _COMMANDS = {
     "token": "Make, list and revoke access tokens for other machines.",
     "verification": "Known loads compared with the estimates of a running service, as dated records.",
 }  # each in the module of its name
-_NAMES = {"import": "import_recording"}  # a module cannot be called import
 
 
 INTERRUPTED = 130  # 128 and the number of SIGINT, as shells have it
@@ -71,7 +69,7 @@ class _Lazy(click.Group):
         """The command itself, imported now; None if there is none of that name."""
         if cmd_name not in _COMMANDS:
             return None
-        name = _NAMES.get(cmd_name, cmd_name.replace("-", "_"))
+        name = cmd_name.replace("-", "_")
         with _without_collections():
             command: click.Command = getattr(import_module(f"gateway.cli.{name}"), name)
         return command

@@ -1,12 +1,29 @@
-"""The notebook runs cell by cell as it stands; its table holds the load that was on board, and its plot shows it."""
+"""The examples run as they stand."""
 
 import json
+import math
+import subprocess
+import sys
+import zipfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-NOTEBOOK = Path(__file__).parents[2] / "examples/weigh_from_arrays.ipynb"
+from gateway.bus.logs import motion_of_log
+from gateway.bus.signals import load_signal_map
+from gateway.records import Signal, joined
+from gateway.sim.drive import rural, urban
+from gateway.sim.obstacles import UnevenRoad
+from gateway.sim.road import iso_road
+from gateway.sim.scenario import simulate_drive
+from gateway.sim.sensors import Mount, Recording, Sensors
+from gateway.sim.vans import PAPER_VAN
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+NOTEBOOK = EXAMPLES / "weigh_from_arrays.ipynb"
+TURNED_DEG = 130.0  # of the phone about up
 TRUTHS_KG = [0.0, 0.0, 0.0, 270.0, 270.0]
 
 
@@ -30,3 +47,38 @@ def test_the_notebook_ends_in_a_table_and_a_plot_of_weights(capsys: pytest.Captu
     (drawn,) = names["figure"].axes
     assert drawn.get_ylabel() == "payload [kg]"
     assert list(drawn.get_lines()[0].get_ydata()) == list(weighed["payload_kg"])
+
+
+def exported(recording: Recording, path: Path) -> None:
+    """A zip as Sensor Logger writes it, of a phone that lies turned."""
+    a = math.radians(TURNED_DEG)
+    turn = np.array([[math.cos(a), math.sin(a), 0.0], [-math.sin(a), math.cos(a), 0.0], [0.0, 0.0, 1.0]])
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, xyz in (("TotalAcceleration", recording.accel_mps2), ("Gyroscope", recording.gyro_radps)):
+            rows = zip(recording.imu_t_ns.tolist(), (xyz @ turn.T).tolist(), strict=True)
+            lines = [f"{t_ns},{t_ns / 1e9},{z},{y},{x}" for t_ns, (x, y, z) in rows]
+            archive.writestr(f"{name}.csv", "\n".join(["time,seconds_elapsed,z,y,x", *lines]))
+        fixes = zip(recording.gps_t_ns.tolist(), recording.gps_speed_mps.tolist(), strict=True)
+        archive.writestr("Location.csv", "\n".join(["time,speed", *(f"{t_ns},{speed}" for t_ns, speed in fixes)]))
+
+
+def test_a_phones_recording_becomes_a_log_in_the_vehicles_axes(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    drive = urban(200.0, rng).then(rural(200.0, rng))
+    road = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
+    driven = simulate_drive(PAPER_VAN, (), road, drive, Sensors(mount=Mount(position_m=2.4, height_m=0.5)), 5).recording
+    exported(driven, tmp_path / "drive.zip")
+    script = [sys.executable, EXAMPLES / "phone.py", tmp_path / "drive.zip", tmp_path / "drive.log"]
+    subprocess.run(script, check=True)
+    motions, report, _ = motion_of_log(tmp_path / "drive.log", load_signal_map("springscale:reference"))
+    motion = joined(list(motions))
+    assert report.frames == 2 * len(driven.imu_t_ns) + len(driven.gps_t_ns)
+    for signal, truth in (
+        (Signal.VERTICAL_ACCELERATION, driven.accel_mps2[:, 2]),
+        (Signal.PITCH_RATE, driven.gyro_radps[:, 1]),
+        (Signal.ROLL_RATE, driven.gyro_radps[:, 0]),
+    ):
+        column = motion.columns[:, motion.signals.index(signal)]
+        read = column[np.isfinite(column)]
+        assert np.corrcoef(read, truth)[0, 1] > 0.99, signal
+        assert np.std(read) == pytest.approx(np.std(truth), rel=0.02)

@@ -14,17 +14,15 @@ from benchmarks.accuracy.__main__ import studies
 from gateway.cli import springscale
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("hardware", "phone", "feed", "contribute", "real-parts")
+PAGES = ("hardware", "feed", "contribute", "real-parts")
 PROGRAMS = (
     r"(?:springscale|python[\d.]*|sudo|cat|systemctl|echo|make|npm|pip|vspec|databroker|mmdebstrap|podman"
     r"|[\w/-]+/bin/\w+|\w+=\S+ python)"
 )
-HOW_TO, PACK, FEED = "tests/e2e/test_phone_how_to.py", "tests/unit/test_campaign_pack.py", "tests/vm/test_9_feed.py"
+PACK, FEED = "tests/unit/test_campaign_pack.py", "tests/vm/test_9_feed.py"
 BY_A_STUDY = "benchmarks"  # what writes numbers that a page shows; run where they are made anew
 RUN_BY = {  # how a command begins: what runs it
-    "springscale import ": HOW_TO,
-    "springscale calibrate campaign.toml --output": HOW_TO,
-    "springscale estimate ": HOW_TO,
+    "python examples/phone.py": "tests/e2e/test_example.py",
     "springscale feed": FEED,
     "springscale look": "tests/unit/test_look.py",
     "springscale record": "tests/unit/test_record_command.py",
@@ -54,8 +52,6 @@ OWN_RUN_BY = {  # of every page: how a command of ours begins, and what runs it
     "springscale events": "tests/unit/test_events_command.py",
     "springscale feed": FEED,
     "springscale fleet-report": "tests/e2e/test_archive_to_report.py",
-    "springscale import": HOW_TO,
-    "springscale line": "tests/unit/test_line_commands.py",
     "springscale look": "tests/unit/test_look.py",
     "springscale record": "tests/unit/test_record_command.py",
     "springscale replay": "tests/e2e/test_cli_simulate.py",
