@@ -7,13 +7,12 @@ from typing import Any
 
 import click
 
-from gateway.bus.heard import Heard
+from gateway.bus.signals import DatabaseMessage
 from gateway.cli.options import FILE, Told, prints
 from gateway.offline.look.draft import write_draft
-from gateway.offline.look.look import Look, MapFit
+from gateway.offline.look.look import Described, Heard, Look, MapFit, SignalReading
 from gateway.offline.look.look import look as look_at
-from gateway.offline.look.readings import Described
-from gateway.records import EXTENDED_ID, JOURNEY
+from gateway.records import EXTENDED_ID
 
 
 @click.command("look")
@@ -47,56 +46,53 @@ def look_text(seen: Look) -> str:
 def _heard(seen: Look) -> Iterator[str]:
     channels = sorted({one.channel for one in seen.heard if one.channel})
     on = f" on {', '.join(channels)}" if channels else ""
-    yield f"{seen.log}: {seen.report.wanted} frames in {seen.duration_s:.0f} s{on}"
-    if seen.report.n_rejected:
-        yield f"  {seen.report.n_rejected} lines could not be read"
-    if seen.report.ended_early:
-        yield f"  the log ended early: {seen.report.ended_early}"
+    yield f"{seen.log}: {seen.report.wanted} frames in {_duration_s(seen):.0f} s{on}"
+    yield from (f"  {remark.removeprefix(f'{seen.log}: ')}" for remark in seen.report.remarks())
     yield ""
     yield f"{'channel':<8} {'identifier':<10} {'per s':>7}  {'bytes':<7} message"
-    names = _names(seen)
-    unknown = 0
+    known = {id(one.heard): one for one in seen.described}
+    unknown = [one for one in seen.heard if id(one) not in known]
     for one in seen.heard:
-        message = names.get(id(one), "")
-        unknown += not message
-        if message or unknown <= MOST_UNKNOWN:
-            lengths = ",".join(map(str, one.lengths))
+        if id(one) in known or one in unknown[:MOST_UNKNOWN]:
+            lengths, message = ",".join(map(str, one.lengths)), _message(known.get(id(one)))
             yield f"{one.channel or '-':<8} {one.name:<10} {one.rate_hz:>7.1f}  {lengths:<7} {message}".rstrip()
-    if unknown > MOST_UNKNOWN:
-        yield f"... and {unknown - MOST_UNKNOWN} identifiers more that no database describes"
+    if len(unknown) > MOST_UNKNOWN:
+        yield f"... and {len(unknown) - MOST_UNKNOWN} identifiers more that no database describes"
     yield from seen.faults
 
 
-def _names(seen: Look) -> dict[int, str]:
-    """The probable meaning of each identifier, by identity."""
-    told = {}
-    for one in seen.described:
-        other_length = "" if one.has_length else f", which has {one.message.length} bytes there"
-        told[id(one.heard)] = f"{one.message.name} ({one.message.source.name}){other_length}"
-    return told
+def _duration_s(seen: Look) -> float:
+    return max(one.duration_s for one in seen.heard)
+
+
+def _message(found: Described | None) -> str:
+    if found is None:
+        return ""
+    other_length = "" if found.has_length else f", which has {found.message.length} bytes there"
+    return f"{found.message.name} ({found.message.source.name}){other_length}"
+
+
+def _accelerations(seen: Look) -> list[SignalReading]:
+    return [reading for reading in seen.readings if reading.quantity == "acceleration" and len(reading.x)]
 
 
 def _readings(seen: Look) -> Iterator[str]:
-    if not seen.accelerations:
-        yield "No acceleration: no database describes one."
-        return
-    yield "Accelerations, usual reading:"
+    readings = _accelerations(seen)
+    yield "Accelerations, usual reading:" if readings else "No acceleration: no database describes one."
     why = {found.reading.name: found.why for found in seen.found}
-    for reading in seen.accelerations:
+    for reading in readings:
         yield f"  {reading.name}: {reading.usual:+.2f} m/s2  {why.get(reading.name, '')}".rstrip()
     if math.isfinite(seen.tilt_deg):
         yield f"  the sensor leans by {seen.tilt_deg:.0f} degrees"
     for found in seen.found:
         if found.reading.quantity != "acceleration":
-            sign = "" if found.role in JOURNEY else f", sign {found.sign:+d}"
-            yield f"{found.role.replace('_', ' ').capitalize()}: {found.reading.name}{sign}: {found.why}"
+            role = found.role.replace("_", " ").capitalize()
+            yield f"{role}: {found.reading.name}, sign {found.sign:+d}: {found.why}"
 
 
 def _fits(seen: Look) -> Iterator[str]:
-    if not seen.fits:
-        yield "None of the signal maps that come with springscale fits."
-        return
-    yield "Signal maps that come with springscale:"
+    none = "None of the signal maps that come with springscale fits."
+    yield "Signal maps that come with springscale:" if seen.fits else none
     for fit in seen.fits[:MOST_FITS]:
         where = f" on {fit.channel}" if fit.channel else ""
         yield f"  springscale:{fit.name}{where}: {_fit(fit)}"
@@ -113,32 +109,28 @@ def _fit(fit: MapFit) -> str:
 
 
 def _verdict(seen: Look) -> Iterator[str]:
-    if not seen.lacking:
-        unsure = " and ".join(seen.unsure_databases)
-        yield (
-            f"This can work, if {unsure} describes your device: only identifiers and lengths say so."
-            if unsure
-            else ("This can work.")
-        )
-        if seen.shipped:
-            yield f'Say signals = "springscale:{seen.shipped.name}", or write your own copy with --output.'
+    if seen.lacking:
+        yield "This cannot work yet:"
+        yield from (f"  {what}" for what in seen.lacking)
         return
-    yield "This cannot work yet:"
-    yield from (f"  {what}" for what in seen.lacking)
+    if unsure := " and ".join(seen.unsure_databases):
+        yield f"This can work, if {unsure} describes your device: only identifiers and lengths say so."
+    else:
+        yield "This can work."
+    if seen.shipped:
+        yield f'Say signals = "springscale:{seen.shipped.name}", or write your own copy with --output.'
 
 
 def look_json(seen: Look) -> dict[str, Any]:
     """The same for programs; numbers in SI."""
-    names = {id(one.heard): one for one in seen.described}
+    known = {id(one.heard): one.message for one in seen.described}
     return {
         "log": str(seen.log),
-        "duration_s": round(seen.duration_s, 3),
+        "duration_s": round(_duration_s(seen), 3),
         "n_frames": seen.report.wanted,
-        "identifiers": [_identifier(one, names.get(id(one))) for one in seen.heard],
-        "accelerations": [
-            {"name": r.name, "usual_mps2": round(r.usual, 3)} for r in seen.accelerations
-        ],
-        "tilt_deg": round(seen.tilt_deg, 1) if math.isfinite(seen.tilt_deg) else None,
+        "identifiers": [_identifier(one, known.get(id(one))) for one in seen.heard],
+        "accelerations": [{"name": r.name, "usual_mps2": round(r.usual, 3)} for r in _accelerations(seen)],
+        "tilt_deg": _number(seen.tilt_deg, 1),
         "signals": {
             str(found.role): {
                 "message": found.reading.described.message.name,
@@ -156,17 +148,21 @@ def look_json(seen: Look) -> dict[str, Any]:
                 "fits": fit.is_whole,
                 "found": list(map(str, fit.found)),
                 "missing": list(map(str, fit.missing)),
-                "vertical_mps2": round(fit.gravity_mps2, 3) if math.isfinite(fit.gravity_mps2) else None,
+                "vertical_mps2": _number(fit.gravity_mps2, 3),
             }
             for fit in seen.fits
         ],
         "can_work": not seen.lacking,
         "unsure_databases": list(seen.unsure_databases),
         "lacking": list(seen.lacking),
-    }  # fmt: skip
+    }
 
 
-def _identifier(one: Heard, known: Described | None) -> dict[str, Any]:
+def _number(x: float, digits: int) -> float | None:
+    return round(x, digits) if math.isfinite(x) else None
+
+
+def _identifier(one: Heard, message: DatabaseMessage | None) -> dict[str, Any]:
     return {
         "channel": one.channel,
         "id": one.name,
@@ -174,6 +170,6 @@ def _identifier(one: Heard, known: Described | None) -> dict[str, Any]:
         "n_frames": one.n_frames,
         "rate_hz": round(one.rate_hz, 2),
         "lengths": list(one.lengths),
-        "message": known.message.name if known else None,
-        "database": known.message.source.name if known else None,
+        "message": message.name if message else None,
+        "database": message.source.name if message else None,
     }

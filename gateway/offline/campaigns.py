@@ -8,7 +8,8 @@ from typing import Final, Literal
 import numpy as np
 
 from gateway.bus.logs import LogReport, motion_of_log
-from gateway.bus.signals import SignalMap, load_signal_map
+from gateway.bus.signals import MappedMessage, SignalMap, id_name, load_signal_map
+from gateway.bus.signals.decode import SignalCounts
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, OnRun, RunTable, chosen_runs, file_sha256
 from gateway.calibration.inspection.campaign import Inspection, inspect_drives
@@ -21,8 +22,6 @@ from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.errors import CalibrationImpossibleError, LogUnreadableError
-from gateway.offline.look.look import why_silent
-from gateway.offline.look.roles import unmapped_roll_rate
 from gateway.records import Batch, Motion, Signal, joined
 from gateway.units import NS_PER_S
 
@@ -124,10 +123,25 @@ def _known_run(campaign: Campaign, number: int, run: RunTable, batches: tuple[Ba
 
 
 def _silent(log: Path, motion: Motion, signal_map: SignalMap) -> dict[Signal, str]:
-    """Why mapped inertial signals have hardly a sample."""
+    """Why mapped inertial signals have hardly a sample. Reads the log once more if there are any."""
     wanted = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE)
     silent = [signal for signal in wanted if signal in motion.signals and len(motion.of(signal)[1]) < 2]
-    return {signal: why_silent(log, signal_map, signal) for signal in silent}
+    if not silent:
+        return {}
+    motions, _, decoder = motion_of_log(log, signal_map)
+    for _ in motions:
+        """The decoder counts what it refuses."""
+    return {signal: _why_silent(decoder.counts[signal], signal_map.message_of(signal)) for signal in silent}
+
+
+def _why_silent(counts: SignalCounts, message: MappedMessage) -> str:
+    named = f"{message.name} ({id_name(message.frame_id)})"
+    if n := sum(counts.rejected.values()):
+        reasons = ", ".join(f"{k} {reason.replace('_', ' ')}" for reason, k in sorted(counts.rejected.items()))
+        return f"{n} frames of {named} came, none valid: {reasons}"
+    if counts.samples:
+        return f"{counts.samples} frames of {named} came, none of them within the run"
+    return f"nothing of {named} came; springscale look shows what did"
 
 
 def _damage(report: LogReport) -> str | None:
@@ -163,8 +177,7 @@ def inspect(
     split = split_runs(campaign, settings, numbers=numbers, on_run=on_run, keeps_unreadable=True)
     signal_map = load_signal_map(campaign.signals)
     has_roll_rate = Signal.ROLL_RATE in signal_map.signals
-    unmapped = None if has_roll_rate else unmapped_roll_rate(signal_map)
-    return inspect_drives(split, campaign.vehicle, settings, has_roll_rate=has_roll_rate, unmapped_roll_rate=unmapped)
+    return inspect_drives(split, campaign.vehicle, settings, has_roll_rate=has_roll_rate)
 
 
 def calibrate(

@@ -101,7 +101,7 @@ def test_what_would_tell_where_loads_lie_to_the_side_is_noted_where_it_is_missin
     notes = ["note:roll_rate_unmapped", "note:sensor_offset_unknown"]
     assert (exit_code, kinds(found)) == (0, {0: notes, 1: [], 2: [], 3: [], 4: []})
     unmapped, unknown = found["campaign_findings"]
-    assert 'signal = "RollRate"' in unmapped["text"]
+    assert "springscale look" in unmapped["text"]
     assert unknown["text"] == "sensor_offset_left_m is 0 ± 0.59 m (95 %)"
 
 

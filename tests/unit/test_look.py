@@ -15,15 +15,11 @@ from support.encoded import encode_signals
 from gateway.bus.frames import merge_frames, message_of
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import load_signal_map
-from gateway.bus.signals.bit_field import BitField, Coding
-from gateway.bus.signals.database import DatabaseSignal
 from gateway.calibration.inspection.finding import Severity
 from gateway.calibration.inspection.rows import rate_findings, row_facts
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
-from gateway.offline.campaigns import read_whole_log
-from gateway.offline.look.look import journey_of, why_silent
-from gateway.offline.look.readings import SignalReading
+from gateway.offline.campaigns import _silent, read_whole_log
 from gateway.offline.look.roles import axis_of
 from gateway.records import EXTENDED_ID, Frames, Signal
 from gateway.status import DecodeCount, SignalHealth, State, Status
@@ -271,46 +267,6 @@ def test_axes_are_told_by_their_names(name: str, axis: str) -> None:
     assert axis_of(name) == axis
 
 
-class Heard:
-    rate_hz = 1.0
-
-
-class Described:
-    heard = Heard()
-
-
-def reading(name: str, quantity: str, x: list[float], scale: float = 1.0) -> SignalReading:
-    field = BitField(0, 32, coding=Coding.SIGNED, scale=scale)
-    signal = DatabaseSignal(name, field, "deg", None, None, {}, None, ())
-    return SignalReading(Described(), signal, quantity, np.arange(len(x), dtype=float), np.array(x))
-
-
-@pytest.mark.parametrize(
-    ("name", "quantity", "x", "role"),
-    [
-        ("Latitude", "angle", [47.1, 47.2], Signal.LATITUDE),
-        ("GPS_Lat", "angle", [47.1, 47.2], Signal.LATITUDE),
-        ("PosLongitude", "angle", [-122.0, -122.1], Signal.LONGITUDE),
-        ("TotalVehicleDistance", "distance", [1000.0, 1000.0, 1125.0], Signal.ODOMETER),
-        ("Odometer", "distance", [5.0, 6.0], Signal.ODOMETER),
-        ("Latitude", "angle", [0.0, 0.0], None),  # no fix
-        ("Latitude", "angle", [95.0, 47.0], None),
-        ("LatitudeStdDev", "angle", [1.0, 2.0], None),
-        ("Heading", "angle", [10.0, 20.0], None),
-        ("Odometer", "distance", [6.0, 5.0], None),
-        ("PositionAccuracy", "distance", [6.0, 7.0], None),
-    ],
-)
-def test_name_unit_and_readings_together_tell_the_role(name, quantity, x, role):
-    found = journey_of([reading(name, quantity, x)])
-    assert [each.role for each in found] == ([] if role is None else [role])
-
-
-def test_the_finest_of_several_is_taken():
-    coarse, fine = reading("TotalDistance", "distance", [1.0, 2.0], 1000.0), reading("TripDistance", "distance", [1, 2])
-    assert [each.reading for each in journey_of([coarse, fine])] == [fine]
-
-
 REFERENCE = load_signal_map("springscale:reference")
 GYRO = 0x121
 Alter = Callable[[Frames], Frames]
@@ -338,12 +294,8 @@ def cut_short(frames: Frames) -> Frames:
 @pytest.mark.parametrize(
     ("alter", "words"),
     [
-        (renumbered(0x125), "nothing of IMU_GYRO (121) came; similar: 125 on can0, 100 times a second, 8 bytes"),
-        (
-            renumbered(0x121 | EXTENDED_ID),
-            "nothing of IMU_GYRO (121) came; similar: 00000121 on can0, 100 times a second, 8 bytes",
-        ),
-        (renumbered(0x700), "nothing of IMU_GYRO (121) came; and no identifier like it"),
+        (renumbered(0x125), "nothing of IMU_GYRO (121) came; springscale look shows what did"),
+        (renumbered(0x121 | EXTENDED_ID), "nothing of IMU_GYRO (121) came; springscale look shows what did"),
         (never_valid, "2000 frames of IMU_GYRO (121) came, none valid: 2000 invalid"),
         (cut_short, "2000 frames of IMU_GYRO (121) came, none valid: 2000 wrong length"),
     ],
@@ -352,9 +304,10 @@ def test_a_silent_sensor_says_why(alter: Alter, words: str, tmp_path: Path) -> N
     log = tmp_path / "drive.log"
     write_candump(alter(bus_drive(20.0, seed=3)), "can0", log)
     silent = (Signal.PITCH_RATE, Signal.ROLL_RATE)  # both come in one message
-    why = {signal: why_silent(log, REFERENCE, signal) for signal in silent}
+    motion, _ = read_whole_log(log, REFERENCE)
+    why = _silent(log, motion, REFERENCE)
     assert why == dict.fromkeys(silent, words)
-    facts = row_facts(read_whole_log(log, REFERENCE)[0], REFERENCE.traits)
+    facts = row_facts(motion, REFERENCE.traits)
     pitch, roll = rate_findings(facts, BatchSettings(), why)
     assert pitch.text == f"pitch_rate has 0 samples in the whole run: {words}"
     assert (pitch.severity, roll.severity) == (Severity.FAULT, Severity.WARNING)

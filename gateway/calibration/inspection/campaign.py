@@ -9,7 +9,7 @@ import numpy as np
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.loads import compare_loads
 from gateway.calibration.inspection.log import SplitRun, same_drive_findings
-from gateway.calibration.inspection.roll import offset_findings, roll_sign_of, unmapped_roll_findings
+from gateway.calibration.inspection.roll import offset_findings, roll_sign_of
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import is_other_rate
@@ -101,14 +101,12 @@ def inspect_drives(
     settings: BatchSettings,
     *,
     has_roll_rate: bool,
-    unmapped_roll_rate: str | None = None,
 ) -> Inspection:
-    """The same, with findings about missing data for lateral places.
-
-    ``unmapped_roll_rate`` names a signal that the map could use as roll rate, if it has none.
-    """
+    """The same, with findings about missing data for lateral places."""
     verdicts, findings = inspect_campaign(drives, vehicle, settings)
-    unmapped = () if has_roll_rate else tuple(unmapped_roll_findings(unmapped_roll_rate))
+    unmapped = (
+        () if has_roll_rate else (Finding.of(Kind.ROLL_RATE_UNMAPPED, "springscale look shows what a log holds"),)
+    )
     return Inspection(tuple(drives), verdicts, (*findings, *unmapped, *offset_findings(vehicle)))
 
 

@@ -140,12 +140,6 @@ def roll_findings(spectra: RollMatrix) -> Iterator[Finding]:
         yield Finding.of(Kind.ROLL_RATE_UNIT, text + slip + perhaps)
 
 
-def unmapped_roll_findings(entry: str | None) -> Iterator[Finding]:
-    """For a signal map without a roll rate; ``entry`` is a possible entry, None if no name suggests one."""
-    found = f"possible entry: {entry}" if entry else "no signal of the pitch rate's message looks like one"
-    yield Finding.of(Kind.ROLL_RATE_UNMAPPED, found)
-
-
 def offset_findings(vehicle: Vehicle) -> Iterator[Finding]:
     """A sensor whose lateral position nobody measured."""
     std_m = vehicle.sensor_left_std_m

@@ -10,10 +10,9 @@ import numpy as np
 from gateway.bus.signals import Coding, DatabaseSignal, load_signal_map, shipped_databases, shipped_map
 from gateway.errors import ConfigurationError, SpringscaleError
 from gateway.files.whole import refusal_told, write_whole, written_whole
-from gateway.offline.look.look import Look
-from gateway.offline.look.readings import Described
+from gateway.offline.look.look import Described, Look
 from gateway.offline.look.roles import FoundRole
-from gateway.records import I64, JOURNEY, Signal
+from gateway.records import I64, Signal
 
 MOSTLY: Final = 0.5  # more often than not
 COUNTED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE)  # timed by the message counter
@@ -81,7 +80,7 @@ def _entry(found: FoundRole) -> Iterator[str]:
     yield f"signal = {_toml(signal.name)}"
     if found.role in (Signal.SPEED, Signal.WHEEL_SPEED):
         yield "latency_s = 0.0 # CHECK: how late the receiver tells it; 0.2 is usual where it sends five times a second"
-    elif found.role not in JOURNEY:
+    else:
         yield f"sign = {found.sign}"
     condition = _valid_when(found.reading.described, signal)
     if condition is not None:

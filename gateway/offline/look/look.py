@@ -1,35 +1,163 @@
-"""Inspects a log: its senders, their probable meaning, the axis with gravity, and whether it suffices."""
+"""Inspects a log: its identifiers, their signals by the databases, the shipped maps that fit, and what is lacking."""
 
-import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from gateway.bus.frames import merge_frames
-from gateway.bus.heard import Heard, heard_of, similar_to
-from gateway.bus.logs import LogReport, motion_of_log, open_whole_log
+from gateway.bus.frames import join, merge_frames, take
+from gateway.bus.logs import LogReport, open_whole_log
 from gateway.bus.signals import (
+    CAN_FD_BYTES,
+    Coding,
+    DatabaseMessage,
+    DatabaseSignal,
     Decoder,
-    MappedMessage,
-    SignalMap,
     id_name,
+    is_j1939_code,
+    j1939_filter,
+    load_messages,
     load_signal_map,
     shipped_databases,
-    shipped_map,
     shipped_maps,
 )
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE
 from gateway.core.settings import BatchSettings
 from gateway.errors import SignalMapError
-from gateway.offline.look.readings import Described, SignalReading, databases_of, described, readings_of
 from gateway.offline.look.roles import FoundRole, roles_of, tilt_deg
-from gateway.records import ASIDE, F64, Signal
-from gateway.units import STANDARD_GRAVITY_MPS2
+from gateway.records import ASIDE, EXTENDED_ID, F64, Frames, Signal
+from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2, TO_SI
 
-NEEDED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
+KEPT_FRAMES: Final = 100_000  # chosen: of one identifier: a quarter of an hour at 100 Hz; counts cover all frames
+LEAST_RATE_HZ: Final = RATE_MIN_SHARE * BatchSettings().rate_hz
+MOST_TILT_DEG: Final = 15.0  # chosen: 3 % of gravity; beyond it the horizontal axes mix in noticeably
+QUANTITIES: Final = ("acceleration", "angular_rate", "speed")
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """One identifier of one channel: the number of its frames, their time span, and the first of them."""
+
+    channel: str | None
+    can_id: int
+    n_frames: int
+    duration_s: float
+    frames: Frames
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames a second, from the first to the last."""
+        return (self.n_frames - 1) / self.duration_s if self.duration_s > 0.0 else 0.0
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """The payload lengths that occur, the most frequent first."""
+        lengths, n_times = np.unique(self.frames.length, return_counts=True)
+        return tuple(int(length) for length in lengths[np.argsort(-n_times, kind="stable")])
+
+    @property
+    def name(self) -> str:
+        """The identifier as candump writes it: three digits, or eight if it has 29 bits."""
+        return id_name(self.can_id)
+
+
+def heard_in(log: Path) -> tuple[tuple[Heard, ...], LogReport]:
+    """Every identifier in order of channel and number. Raises LogUnreadableError if nothing can be read."""
+    chunks, report = open_whole_log(log)
+    of_all = _heard_of(chunks, None)
+    report.require_frames()
+    channels = sorted(report.channels)
+    if len(channels) < 2:
+        return tuple(replace(one, channel=next(iter(channels), None)) for one in of_all), report
+    return tuple(one for each in channels for one in _heard_of(open_whole_log(log, each)[0], each)), report
+
+
+def _heard_of(chunks: Iterable[Frames], channel: str | None) -> list[Heard]:
+    """Every identifier of the frames, all of one channel, ordered by identifier."""
+    spans: dict[int, tuple[int, int, int]] = {}  # number of frames, first and last stamp
+    kept: dict[int, list[Frames]] = {}
+    for frames in chunks:
+        for can_id in np.unique(frames.can_id).tolist():
+            ours = take(frames, frames.can_id == can_id)
+            first_ns, last_ns = int(ours.t_ns.min()), int(ours.t_ns.max())
+            n, before_ns, after_ns = spans.get(can_id, (0, first_ns, last_ns))
+            spans[can_id] = n + len(ours), min(first_ns, before_ns), max(last_ns, after_ns)
+            if n < KEPT_FRAMES:
+                kept.setdefault(can_id, []).append(ours)
+    return [
+        Heard(channel, can_id, n, (last_ns - first_ns) / NS_PER_S, join(kept[can_id], CAN_FD_BYTES))
+        for can_id, (n, first_ns, last_ns) in sorted(spans.items())
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """An identifier and its message by a database; ``by_group`` if only the J1939 group is the same."""
+
+    heard: Heard
+    message: DatabaseMessage
+    by_group: bool
+
+    @property
+    def has_length(self) -> bool:
+        """Whether frames have the length in the database."""
+        return self.message.length in self.heard.lengths
+
+
+@dataclass(frozen=True)
+class SignalReading:
+    """One signal of one identifier: times (n,) from the log's origin and valid samples (n,) in SI."""
+
+    described: Described
+    signal: DatabaseSignal
+    quantity: str
+    t_s: F64
+    x: F64
+
+    @property
+    def name(self) -> str:
+        """MESSAGE.SIGNAL."""
+        return f"{self.described.message.name}.{self.signal.name}"
+
+    @property
+    def rate_hz(self) -> float:
+        return self.described.heard.rate_hz
+
+    @cached_property
+    def usual(self) -> float:
+        """The median, SI; NaN without a sample."""
+        return float(np.median(self.x)) if len(self.x) else float("nan")
+
+
+def described(heard: Sequence[Heard], messages: Sequence[DatabaseMessage]) -> tuple[Described, ...]:
+    """The identifiers with a message: first a message of their length, then the first of all."""
+    found = []
+    for one in heard:
+        same = [Described(one, message, False) for message in messages if message.frame_id == one.can_id]
+        groups = [m for m in messages if m.frame_id & one.can_id & EXTENDED_ID]
+        same += [Described(one, m, True) for m in groups if j1939_filter(m.frame_id).is_for(one.can_id)]
+        if same:
+            found.append(min(same, key=lambda each: (not each.has_length, each.by_group)))
+    return tuple(found)
+
+
+def readings_of(found: Described, origin_ns: int) -> Iterator[SignalReading]:
+    """The signals with a known unit, from frames of the right length."""
+    frames = take(found.heard.frames, found.heard.frames.length == found.message.length)
+    for signal in found.message.signals.values():
+        unit = (signal.unit or "").strip().lower()
+        quantity = next((quantity for quantity in QUANTITIES if unit in TO_SI[quantity]), None)
+        if quantity is None or signal.multiplexer is not None or signal.field.n_bytes > found.message.length:
+            continue
+        bits = signal.field.bits(frames.payload)
+        x = signal.field.physical(bits) * TO_SI[quantity][unit]
+        is_valid = np.isfinite(x)
+        if found.by_group and signal.field.coding is Coding.UNSIGNED:
+            is_valid &= ~is_j1939_code(signal.field, bits)
+        yield SignalReading(found, signal, quantity, (frames.t_ns[is_valid] - origin_ns) / NS_PER_S, x[is_valid])
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +165,6 @@ class MapFit:
     """A shipped map on one channel: the signals found, the missing ones, and the mean of its vertical axis."""
 
     name: str
-    device: str
     channel: str | None
     found: tuple[Signal, ...]
     missing: tuple[Signal, ...]
@@ -47,110 +174,27 @@ class MapFit:
     def is_whole(self) -> bool:
         """Whether both inertial signals come, and gravity is on the mapped axis."""
         has_gravity = abs(self.gravity_mps2 - STANDARD_GRAVITY_MPS2) < GRAVITY_TOLERANCE_MPS2
-        return has_gravity and all(signal in self.found for signal in NEEDED)
+        return has_gravity and {Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE} <= set(self.found)
 
 
 def fits_of(heard: Sequence[Heard]) -> tuple[MapFit, ...]:
     """The maps with at least one signal found, the best first."""
-    fits = [fit for name in shipped_maps() for fit in _fits(name, heard)]
+    fits = []
+    for name in shipped_maps():
+        signal_map = load_signal_map(f"springscale:{name}")
+        wanted = [(message.id_filter, message.length) for message in signal_map.messages]
+        for channel in sorted({one.channel for one in heard}, key=str):
+            on_it = [one for one in heard if one.channel == channel]
+            ours = [one for one in on_it if any(ids.is_for(one.can_id) and n in one.lengths for ids, n in wanted)]
+            motion = Decoder(signal_map).decode(merge_frames([one.frames for one in ours]))
+            found = tuple(signal for signal in motion.signals if len(motion.of(signal)[1]))
+            missing = tuple(signal for signal in motion.signals if signal not in found and signal not in ASIDE)
+            vertical = motion.of(Signal.VERTICAL_ACCELERATION)[1]
+            if found:
+                fits.append(
+                    MapFit(name, channel, found, missing, float(np.median(vertical)) if len(vertical) else np.nan)
+                )
     return tuple(sorted(fits, key=lambda fit: (not fit.is_whole, len(fit.missing), fit.name)))
-
-
-def _fits(name: str, heard: Sequence[Heard]) -> Iterator[MapFit]:
-    signal_map = load_signal_map(f"springscale:{name}")
-    device = shipped_map(name).read_text(encoding="utf-8").splitlines()[0].removeprefix("# ").rstrip(".")
-    for channel in sorted({one.channel for one in heard}, key=str):
-        ours = [one for one in heard if one.channel == channel and _is_mapped(one, signal_map)]
-        if not ours:
-            continue
-        motion = Decoder(signal_map).decode(merge_frames([one.frames for one in ours]))
-        found = tuple(signal for signal in motion.signals if len(motion.of(signal)[1]))
-        missing = tuple(signal for signal in motion.signals if signal not in found and signal not in ASIDE)
-        vertical = motion.of(Signal.VERTICAL_ACCELERATION)[1]
-        if found:
-            yield MapFit(name, device, channel, found, missing, float(np.median(vertical)) if len(vertical) else np.nan)
-
-
-def _is_mapped(one: Heard, signal_map: SignalMap) -> bool:
-    return any(m.id_filter.is_for(one.can_id) and m.length in one.lengths for m in signal_map.messages)
-
-
-def heard_in(log: Path) -> tuple[tuple[Heard, ...], LogReport]:
-    """Every identifier in order of channel and number. Raises LogUnreadableError if nothing can be read."""
-    chunks, report = open_whole_log(log)
-    of_all = heard_of(chunks)
-    report.require_frames()
-    channels = sorted(report.channels)
-    if len(channels) < 2:
-        return tuple(replace(one, channel=next(iter(channels), None)) for one in of_all), report
-    by_channel = [heard_of(open_whole_log(log, channel)[0], channel) for channel in channels]
-    return tuple(one for heard in by_channel for one in heard), report
-
-
-_NO_POSITION: Final = re.compile(r"accura|error|std|dev|valid|ref|dest", re.IGNORECASE)
-_STEP_M: Final = 2000.0  # chosen: between two frames; a larger step is not an odometer's
-
-_LOOKED_FOR: Final[tuple[tuple[Signal, str, re.Pattern[str], Callable[[F64], bool]], ...]] = (
-    (Signal.LATITUDE, "angle", re.compile(r"latitude|(?:^|_)lat(?:_|$)", re.IGNORECASE), lambda x: _is_angle(x, 90.0)),
-    (
-        Signal.LONGITUDE,
-        "angle",
-        re.compile(r"longitude|(?:^|_)lon(?:g)?(?:_|$)", re.IGNORECASE),
-        lambda x: _is_angle(x, 180.0),
-    ),
-    (
-        Signal.ODOMETER,
-        "distance",
-        re.compile(r"odo|mileage|(?:vehicle|total|trip)_?distance|distance_?(?:total|trip)", re.IGNORECASE),
-        lambda x: bool(np.all(np.diff(x) >= 0.0) and np.all(np.diff(x) < _STEP_M)),
-    ),
-)
-
-
-def journey_of(readings: Sequence[SignalReading]) -> tuple[FoundRole, ...]:
-    """Latitude, longitude and odometer, by a signal's name and values; the finest of each."""
-    found = []
-    for role, quantity, name, fits in _LOOKED_FOR:
-        named = [
-            r for r in readings
-            if r.quantity == quantity and name.search(r.signal.name) and not _NO_POSITION.search(r.signal.name)
-        ]  # fmt: skip
-        good = [r for r in named if len(r.x) > 1 and fits(r.x)]
-        if good:
-            finest = min(good, key=lambda r: (abs(r.signal.field.scale), -r.rate_hz))
-            found.append(FoundRole(role, finest, 1, "its name says so, and it reads like one"))
-    return tuple(found)
-
-
-def _is_angle(x: F64, most_deg: float) -> bool:
-    """Whether these are angles; a receiver without a fix mostly sends 0 or a value out of range."""
-    return bool(np.all(np.abs(x) <= most_deg) and np.any(x != 0.0))
-
-
-def why_silent(log: Path, signal_map: SignalMap, signal: Signal) -> str:
-    """The reason in words. Reads the log once or twice more; raises LogUnreadableError as every reader does."""
-    message = signal_map.message_of(signal)
-    motions, _, decoder = motion_of_log(log, signal_map)
-    for _ in motions:
-        pass
-    refused = decoder.counts[signal].rejected
-    if n := sum(refused.values()):
-        reasons = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in sorted(refused.items()))
-        return f"{n} frames of {_named(message)} came, none valid: {reasons}"
-    if decoder.counts[signal].samples:
-        return f"{decoder.counts[signal].samples} frames of {_named(message)} came, none of them within the run"
-    similar = similar_to(message, signal_map, heard_in(log)[0])
-    instead = f"similar: {'; '.join(similar)}" if similar else "and no identifier like it"
-    on = f" on {signal_map.channel}" if signal_map.channel else ""
-    return f"nothing of {_named(message)} came{on}; {instead}"
-
-
-def _named(message: MappedMessage) -> str:
-    return f"{message.name} ({id_name(message.frame_id)})"
-
-
-LEAST_RATE_HZ = RATE_MIN_SHARE * BatchSettings().rate_hz
-MOST_TILT_DEG = 15.0  # chosen: 3 % of gravity; beyond it the horizontal axes mix in noticeably
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +203,6 @@ class Look:
 
     log: Path
     report: LogReport
-    duration_s: float
     heard: tuple[Heard, ...]
     described: tuple[Described, ...]
     fits: tuple[MapFit, ...]
@@ -170,17 +213,11 @@ class Look:
     faults: tuple[str, ...]
 
     @property
-    def accelerations(self) -> tuple[SignalReading, ...]:
-        """Every acceleration with a sample."""
-        return tuple(r for r in self.readings if r.quantity == "acceleration" and len(r.x))
-
-    @property
     def unsure_databases(self) -> tuple[str, ...]:
         """Shipped databases used by the findings, if no shipped map fits as it is."""
-        if any(fit.is_whole for fit in self.fits):
-            return ()
         sources = dict.fromkeys(found.reading.described.message.source for found in self.found)
-        return tuple(path.name for path in sources if path in shipped_databases())
+        is_whole = any(fit.is_whole for fit in self.fits)
+        return () if is_whole else tuple(path.name for path in sources if path in shipped_databases())
 
     @property
     def shipped(self) -> MapFit | None:
@@ -195,24 +232,31 @@ def look(log: Path, databases: Sequence[Path] = ()) -> Look:
     Raises LogUnreadableError if there is no frame in it, SignalMapError for a given database that cannot be read.
     """
     heard, report = heard_in(log)
-    own, faults = databases_of(databases or _near(log))
+    own, faults = _messages_of(databases or _near(log))
     if databases and faults:
         raise SignalMapError(faults[0])
-    shipped, _ = databases_of(shipped_databases())
     by_own = described(heard, own)
     others = [one for one in heard if not any(one is each.heard for each in by_own)]
-    messages = (*by_own, *described(others, shipped))
+    messages = (*by_own, *described(others, _messages_of(shipped_databases())[0]))
     origin_ns = min(int(one.frames.t_ns.min()) for one in heard)
     readings = tuple(reading for one in messages for reading in readings_of(one, origin_ns))
-    chosen = [r for r in readings if r.described in by_own] or readings
-    found = (*roles_of(chosen), *journey_of(chosen))
+    found = roles_of([r for r in readings if r.described in by_own] or readings)
     up = next((each for each in found if each.role is Signal.VERTICAL_ACCELERATION), None)
-    tilt = tilt_deg(readings, up) if up else float("nan")
-    fits = fits_of(heard)
-    return Look(
-        log, report, max(one.duration_s for one in heard), heard, messages, fits, readings, found, tilt,
-        tuple(_lacking(found, fits, readings, tilt)), faults,
-    )  # fmt: skip
+    tilt, fits = tilt_deg(readings, up) if up else float("nan"), fits_of(heard)
+    lacking = tuple(_lacking(found, fits, readings, tilt))
+    return Look(log, report, heard, messages, fits, readings, found, tilt, lacking, faults)
+
+
+def _messages_of(paths: Iterable[Path]) -> tuple[tuple[DatabaseMessage, ...], tuple[str, ...]]:
+    """Every message of the databases, and the faults of unreadable ones."""
+    messages: list[DatabaseMessage] = []
+    faults: list[str] = []
+    for path in paths:
+        try:
+            messages += load_messages(path, [path]).values()
+        except SignalMapError as fault:
+            faults.append(str(fault))
+    return tuple(messages), tuple(faults)
 
 
 def _near(log: Path) -> list[Path]:
@@ -227,24 +271,20 @@ def _lacking(
     found: Sequence[FoundRole], fits: Sequence[MapFit], readings: Sequence[SignalReading], tilt: float
 ) -> Iterator[str]:
     """The obstacles to weighing with this log, and their remedies."""
-    if any(fit.is_whole for fit in fits):
-        whole = next(fit for fit in fits if fit.is_whole)
-        if not {Signal.SPEED, Signal.WHEEL_SPEED} & set(whole.found):
-            yield "no speed: add [signals.speed] from a GNSS receiver or the vehicle"
-        return
+    whole = next((fit for fit in fits if fit.is_whole), None)
     roles = {each.role: each for each in found}
-    up = roles.get(Signal.VERTICAL_ACCELERATION)
-    if not readings:
+    up, pitch = roles.get(Signal.VERTICAL_ACCELERATION), roles.get(Signal.PITCH_RATE)
+    if whole is None and not readings:
         yield "no database describes an acceleration in it: give the DBC of the sensor with --dbc"
         return
-    if up is None:
+    if whole is None and up is None:
         yield "no acceleration reads 9.8 m/s2: the sensor is not in this log, or takes gravity off"
-    elif tilt > MOST_TILT_DEG:
+    if whole is None and tilt > MOST_TILT_DEG:
         yield f"the sensor leans by {tilt:.0f} degrees: mount it level, or have it turn its axes"
-    if up is not None and Signal.PITCH_RATE not in roles:
+    if whole is None and up is not None and pitch is None:
         yield "no pitch rate could be told: drive with some braking, or name it yourself"
-    if not {Signal.SPEED, Signal.WHEEL_SPEED} & roles.keys():
+    if not {Signal.SPEED, Signal.WHEEL_SPEED} & set(whole.found if whole else roles):
         yield "no speed: add [signals.speed] from a GNSS receiver or the vehicle"
-    for each in (up, roles.get(Signal.PITCH_RATE)):
+    for each in (up, pitch) if whole is None else ():
         if each is not None and each.reading.rate_hz < LEAST_RATE_HZ:
             yield f"{each.reading.name} comes {each.reading.rate_hz:.0f} times a second; {LEAST_RATE_HZ:.0f} are needed"
