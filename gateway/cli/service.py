@@ -53,8 +53,14 @@ class Service:
         """The service's answer as JSON. Raises SpringscaleError with its message if it refuses or cannot be reached."""
         content = None if body is None else json_line(body).encode()
         with self.opened(path, method, content) as answer:
-            record: Answer = json.load(answer)
-            return record
+            text, kind = answer.read(), answer.headers.get("content-type", "nothing that has a name")
+        try:
+            record: Answer = json.loads(text)
+        except ValueError:
+            raise SpringscaleError(
+                f"{self.address(path)}: answered with {kind} in place of JSON: is a proxy or another program there?"
+            ) from None
+        return record
 
     @contextmanager
     def opened(

@@ -3,8 +3,11 @@
 Tables about the vehicle, its bus and its batches, the web and the store are here, the others in ``sections``.
 """
 
+import os
+from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, get_args
+from typing import Annotated, Any, Final, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
@@ -25,7 +28,7 @@ from gateway.config.sections import (
 )
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
-from gateway.toml_file import describe_faults, read_toml
+from gateway.toml_file import SIMILAR, describe_faults, read_toml
 
 Section = TypeVar("Section", bound=BaseModel)
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -155,13 +158,16 @@ class LogSection(SettingsSection):
     level: Literal["debug", "info", "warning", "error"] = Field("info", description="least level that is written")
 
 
+PREFIX: Final = "SPRINGSCALE_"  # of variables in the environment
+
+
 class Settings(BaseSettings):
     """springscale.toml. Paths in it are relative to the file."""
 
     model_config = SettingsConfigDict(
         frozen=True,
         extra="forbid",
-        env_prefix="SPRINGSCALE_",
+        env_prefix=PREFIX,
         env_nested_delimiter="__",
         nested_model_default_partial_update=True,
     )
@@ -199,12 +205,25 @@ class Settings(BaseSettings):
 
 def load_settings(path: Path) -> Settings:
     """Settings of ``path`` and the environment, paths made absolute. Raises ConfigurationError naming every fault."""
+    _refuse_misspelt(os.environ)
     tables = read_toml(path)
     try:
         settings = Settings(**tables)
     except ValidationError as fault:
         raise ConfigurationError(describe_faults(path, fault, Settings)) from None
     return _with_absolute_paths(settings, path.resolve().parent)
+
+
+def _refuse_misspelt(environment: Iterable[str]) -> None:
+    """Raise ConfigurationError for variables that look like settings and are none, which pydantic would ignore."""
+    fields = Settings.model_fields
+    keys = [name for name, field in fields.items() if not isinstance(field.default, BaseModel)]
+    for name in environment:
+        table, separator, rest = name.lower().removeprefix(PREFIX.lower()).partition("__")
+        meant = get_close_matches(table, list(fields) if separator else keys, 1, SIMILAR)
+        if name.upper().startswith(PREFIX) and table not in fields and (separator or meant):
+            hint = f"did you mean {PREFIX}{f'{meant[0]}{separator}{rest}'.upper()}?" if meant else "remove it"
+            raise ConfigurationError(f"{name} in the environment is no setting; {hint}")
 
 
 def _with_absolute_paths(settings: Settings, folder: Path) -> Settings:

@@ -75,7 +75,7 @@ class PositionSection(SettingsSection):
         le=7,
         description="decimals of a degree kept: 2 is about 1 km, 4 about 10 m [default: no positions are kept]",
     )
-    forward: bool = Field(False, description="forward kept positions to the broker of [uplink] too")
+    forward: bool = Field(False, description="kept positions also go to [uplink], [webhook] and tokens of scope read")
 
 
 class UplinkSection(SettingsSection):

@@ -5,6 +5,7 @@ ignition, and positions if they are kept.
 """
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -241,6 +242,14 @@ def place_to_json(place: Place) -> dict[str, float] | None:
     if not place.is_known:
         return None
     return {"latitude_deg": place.latitude_deg, "longitude_deg": place.longitude_deg}
+
+
+_PLACE: Final = re.compile(r'\{"latitude_deg":[^{}]*\}')
+
+
+def without_places(text: str) -> str:
+    """JSON of our own in which every position is null."""
+    return _PLACE.sub("null", text)
 
 
 def _place_of(told: Mapping[str, float] | None) -> Place:

@@ -77,7 +77,8 @@ class Gateway:
         self._setup_fault = setup_fault
         self._on_started = on_started
         self._tokens = token_file = TokenFile(settings.store.directory / "tokens.json")
-        refuse_open_address(settings.web.host, has_tokens=token_file.are_required())
+        tls = tls_of(settings)
+        refuse_open_address(settings.web.host, has_tokens=token_file.are_required(), has_tls=tls is not None)
         broker = uplink_settings(settings.uplink, settings.vehicle)
         receiver, with_places = webhook_settings(settings.webhook, settings.vehicle), settings.position.forward
         self.store = store_of(settings.store, broker, receiver)
@@ -146,8 +147,9 @@ class Gateway:
             known_loads=known_loads,
             verification=self.verification,
             alarms=self.alarms.standing,
+            are_places_read=settings.position.forward,
         )
-        web = server_config(app, settings.web.host, settings.web.port, tls_of(settings))
+        web = server_config(app, settings.web.host, settings.web.port, tls)
         self._server = WebServer(web)
         self._notifier = Notifier()
         self._stopping = asyncio.Event()
@@ -170,7 +172,8 @@ class Gateway:
     def url(self) -> str:
         port = self._server.servers[0].sockets[0].getsockname()[1]
         scheme = "https" if self._server.config.is_ssl else "http"
-        return f"{scheme}://{self._settings.web.host}:{port}"
+        host = self._settings.web.host
+        return f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
 
     @property
     def has_caught_up(self) -> bool:

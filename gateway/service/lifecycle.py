@@ -14,6 +14,7 @@ from gateway.errors import ConfigurationError
 from gateway.records import Signal
 from gateway.service.calibration_in_use import commissioned
 from gateway.service.gateway import Gateway, OnStarted
+from gateway.service.parts import tls_of
 from gateway.store import why_no_database
 from gateway.web.access.serving import refuse_open_address
 from gateway.web.access.tokens import TokenFile
@@ -27,7 +28,8 @@ def startable_faults(settings: Settings, signal_map: SignalMap) -> Iterator[str]
     if lacking is not None:
         yield lacking
     try:
-        refuse_open_address(settings.web.host, has_tokens=_has_tokens(settings))
+        has_tls = tls_of(settings) is not None
+        refuse_open_address(settings.web.host, has_tokens=_has_tokens(settings), has_tls=has_tls)
     except ConfigurationError as fault:
         yield str(fault)
     if settings.web.stale_after_s < settings.batch.window_s:

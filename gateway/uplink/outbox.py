@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from gateway.estimate_json import without_places
 from gateway.history import ALARM, ESTIMATE, KINDS, Delivery, JournalRecord
 from gateway.log import Event, log_event
 from gateway.records import json_line
@@ -157,15 +158,16 @@ class Outbox:
     def _message(self, record: JournalRecord) -> OutboxMessage | None:
         """The message of a record; None, and logged, for a record that this program cannot read."""
         try:
-            return message_of_record(record, self._shown(json.loads(record.text)))
+            return message_of_record(record, self._shown(record.text))
         except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as fault:
             log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, seq=record.number, fault=repr(fault))
             return None
 
-    def _shown(self, record: dict[str, Any]) -> dict[str, Any]:
+    def _shown(self, text: str) -> dict[str, Any]:
         """The part of a record that may leave the vehicle: no spectra, and positions only if they are wanted."""
+        record: dict[str, Any] = json.loads(text if self._with_places else without_places(text))
         record.pop("spectra", None)
-        return record if self._with_places else without_places(record)
+        return record
 
     def _with_retained(self, messages: list[OutboxMessage]) -> list[OutboxMessage]:
         """Add a retained copy of the newest estimate under ``latest``, before that estimate."""
@@ -175,17 +177,6 @@ class Outbox:
         again = replace(newest, branch=LATEST, is_retained=True, is_extra=True)
         place = messages.index(newest)
         return [*messages[:place], again, *messages[place:]]
-
-
-def without_places(record: dict[str, Any]) -> dict[str, Any]:
-    """A copy of the object in which every position, at any depth, is null."""
-    return {name: _bare(part) for name, part in record.items()}
-
-
-def _bare(part: Any) -> Any:
-    if isinstance(part, dict):
-        return None if "latitude_deg" in part else without_places(part)
-    return [_bare(one) for one in part] if isinstance(part, list) else part
 
 
 def message_of_record(record: JournalRecord, shown: dict[str, Any]) -> OutboxMessage:

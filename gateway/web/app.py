@@ -59,13 +59,15 @@ def create_app(
     known_loads: KnownLoads | None = None,
     verification: service.VerificationBackend | None = None,
     alarms: Callable[[], str] | None = None,
+    *,
+    are_places_read: bool = False,
 ) -> FastAPI:
     """The application over the pipeline's publications (``board``), the store (``reader``) and the service's state
     (``status``, called in the event loop: quick and thread-safe). ``known_loads`` are shown beside the estimates if
     there are any.
 
-    There are no routes to a part of the service that is None, but those of the ring log: it may be switched off. Call
-    ``board.close()`` before the server stops: it ends the streams.
+    There are no routes to a part of the service that is None. ``are_places_read``: read tokens get positions.
+    Call ``board.close()`` before the server stops: it ends the streams.
     """
     responses: Counter[int] = Counter()
 
@@ -104,7 +106,7 @@ def create_app(
         health_router(status, metrics),
         *([known_loads_router(known_loads)] if known_loads else ()),
     ]
-    access = Access(tokens)
+    access = Access(tokens, are_places_read=are_places_read)
     app.router.routes.insert(0, Route(LATEST_PATH, _latest(board, access)))
     app.include_router(alive_router())
     for router in routers:

@@ -148,16 +148,18 @@ def test_without_tokens_nobody_is_answered_through_a_proxy(tmp_path: Path, name:
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.7", "::", "gateway.local", ""])
-def test_an_open_address_needs_tokens(host: str) -> None:
+def test_an_open_address_needs_tokens_and_tls(host: str) -> None:
     assert not is_loopback(host)
     with pytest.raises(ConfigurationError, match="springscale token create"):
-        refuse_open_address(host, has_tokens=False)
-    refuse_open_address(host, has_tokens=True)
+        refuse_open_address(host, has_tokens=False, has_tls=True)
+    with pytest.raises(ConfigurationError, match="tls_certificate"):
+        refuse_open_address(host, has_tokens=True, has_tls=False)
+    refuse_open_address(host, has_tokens=True, has_tls=True)
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.1", "::1", "localhost"])
 def test_a_local_address_needs_none(host: str) -> None:
-    refuse_open_address(host, has_tokens=False)
+    refuse_open_address(host, has_tokens=False, has_tls=False)
 
 
 def test_tls_and_client_certificates(tmp_path: Path) -> None:

@@ -277,3 +277,14 @@ def test_it_runs_on_the_fast_loop_and_tells_its_status_where_no_file_can_be_open
     version = importlib.metadata.version("springscale")
     Gateway(settings, setup_of(settings), on_started=on_started).run()
     assert seen == [("uvloop", version)]
+
+
+def test_an_ipv6_address_stands_in_brackets(config: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """The log said http://::1:8000, which is no address."""
+    config.write_text(config.read_text().replace("web.port = 0", 'web.port = 0\nweb.host = "::1"'))
+
+    def ask(service: Running) -> None:
+        assert service.gateway.url.startswith("http://[::1]:")
+        assert httpx.get(f"{service.gateway.url}/health/live", trust_env=False).status_code == 200
+
+    serve(config, ask)

@@ -128,10 +128,12 @@ def test_every_fault_is_named_at_once(tmp_path: Path) -> None:
     assert len(str(found.exception).splitlines()) == 3
 
 
-def test_an_open_address_with_a_token_is_good(tmp_path: Path) -> None:
+def test_an_open_address_needs_a_token_and_tls(tmp_path: Path) -> None:
     (tmp_path / "state").mkdir(mode=0o700)
     TokenFile(tmp_path / "state" / "tokens.json").create("fleet", Scope.READ)
-    assert checked(tmp_path, web='host = "0.0.0.0"').exit_code == 0
+    web = 'host = "0.0.0.0"'
+    assert "needs TLS" in str(checked(tmp_path, web=web).exception)  # the token would cross the network in the clear
+    assert checked(tmp_path, web=f'{web}\ntls_certificate = "a.pem"\ntls_key = "a.pem"').exit_code == 0
 
 
 def test_the_help_offers_only_interfaces_that_work() -> None:

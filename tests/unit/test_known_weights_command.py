@@ -1,12 +1,15 @@
 """springscale calibration tare and ticket: whom they ask, and what they say where nobody answers as wanted."""
 
 import json
+import threading
 from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 import pytest
 import trustme
 from click.testing import CliRunner, Result
+from support.commands import called
 from support.known_weights import FakePipeline, KnownWeightBench
 from support.web import Gateway, serving
 
@@ -190,3 +193,26 @@ def test_port_0_and_a_wrong_authority_are_configuration_errors(tmp_path: Path) -
         fault = run("show", *arguments).exception
         assert isinstance(fault, ConfigurationError)
         assert said in str(fault)
+
+
+class ProxyPage(BaseHTTPRequestHandler):
+    """A proxy's own page in place of the service's answer."""
+
+    def do_GET(self) -> None:
+        page = b"<html><body>Log in</body></html>"
+        self.send_response(200)
+        self.send_header("content-type", "text/html")
+        self.send_header("content-length", str(len(page)))
+        self.end_headers()
+        self.wfile.write(page)
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+def test_a_page_in_place_of_an_answer_is_said_to_be_one() -> None:
+    """It was called `cannot reach the service: Expecting value`."""
+    with HTTPServer(("127.0.0.1", 0), ProxyPage) as server:
+        threading.Thread(target=server.handle_request, daemon=True).start()
+        told = called("calibration", "tare", "show", "--url", f"http://127.0.0.1:{server.server_port}")
+    assert "answered with text/html in place of JSON" in str(told.exception)

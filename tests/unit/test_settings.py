@@ -1,6 +1,7 @@
 """springscale.toml and the environment, faults in the terms of who wrote it, and units at the border."""
 
 import math
+import re
 from contextlib import closing
 from pathlib import Path
 from typing import get_args
@@ -65,6 +66,23 @@ def test_the_environment_wins_and_leaves_its_neighbours(tmp_path: Path, monkeypa
     settings = loaded(tmp_path, LEAST + '[web]\nhost = "::1"\nport = 9000')
     assert (settings.web.host, settings.web.port) == ("::1", 8001)
     assert settings.estimator == "ratio_index"
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("SPRINGSCALE_WEBB__PORT", "did you mean SPRINGSCALE_WEB__PORT?"),
+        ("SPRINGSCALE_CALIBRATON", "did you mean SPRINGSCALE_CALIBRATION?"),
+        ("SPRINGSCALE_COLOUR__RED", "remove it"),
+    ],
+)
+def test_a_misspelt_variable_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, meant: str) -> None:
+    """It was ignored, and the default held."""
+    monkeypatch.setenv("SPRINGSCALE_TOKEN", "spr_of_a_command")
+    assert loaded(tmp_path)
+    monkeypatch.setenv(name, "8001")
+    with pytest.raises(ConfigurationError, match=f"{name} in the environment is no setting; {re.escape(meant)}"):
+        loaded(tmp_path)
 
 
 def test_a_fault_in_the_environment_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from vm.harness.vehicle import CONFIG, HEARD, Vehicle
 
 def test_it_is_ready_and_answers_who_shows_a_token(vehicle: Vehicle) -> None:
     assert vehicle.status()["vehicle_id"] == "van-17"
-    anonymous = httpx.get(f"http://{vehicle.machine.address}:8000/api/v1/status", timeout=10.0)
+    anonymous = httpx.get(f"{vehicle.url}/api/v1/status", verify=vehicle.trust, timeout=10.0)
     assert anonymous.status_code == 401
     assert vehicle.run("systemctl show --property ActiveState --value springscale").strip() == "active"
     assert "StatusText=" in vehicle.run("systemctl show --property StatusText springscale")
@@ -34,14 +34,15 @@ def test_it_runs_as_its_own_user_and_writes_to_its_state_only(vehicle: Vehicle) 
 
 
 def test_its_firewall_lets_in_whom_it_was_told_to_and_this_machine(vehicle: Vehicle) -> None:
-    live = f"http://{vehicle.machine.address}:8000/health/live"
-    assert httpx.get(live, timeout=10.0).status_code == 200  # allowed by the drop-in that the tests installed
+    live = f"{vehicle.url}/health/live"
+    assert httpx.get(live, verify=vehicle.trust, timeout=10.0).status_code == 200  # the tests' drop-in lets it in
     change = "systemctl set-property --runtime springscale"
     try:
         vehicle.run(f"{change} IPAddressAllow= IPAddressAllow=localhost")  # as shipped
         with pytest.raises(httpx.TransportError):
-            httpx.get(live, timeout=2.0)
-        vehicle.run("python3 -c 'import urllib.request as r; r.urlopen(\"http://127.0.0.1:8000/health/live\")'")
+            httpx.get(live, verify=vehicle.trust, timeout=2.0)
+        inside = "import ssl, urllib.request as r; s = ssl._create_unverified_context();"
+        vehicle.run(f"python3 -c '{inside} r.urlopen(\"https://127.0.0.1:8000/health/live\", context=s)'")
     finally:
         vehicle.run(f"{change} IPAddressAllow=198.18.0.0/16")
     vehicle.wait_until(lambda status: True)
@@ -66,10 +67,10 @@ def test_systemd_networkd_understands_the_network_files(vehicle: Vehicle) -> Non
 
 def test_a_token_revoked_by_root_is_refused_at_once(vehicle: Vehicle) -> None:
     token = vehicle.run(f"springscale token create other --config {CONFIG}").strip()
-    url, header = f"http://{vehicle.machine.address}:8000/api/v1/status", {"authorization": f"Bearer {token}"}
-    assert httpx.get(url, headers=header, timeout=10.0).status_code == 200
+    url, header = f"{vehicle.url}/api/v1/status", {"authorization": f"Bearer {token}"}
+    assert httpx.get(url, headers=header, verify=vehicle.trust, timeout=10.0).status_code == 200
     vehicle.run(f"springscale token revoke other --config {CONFIG}")
-    assert httpx.get(url, headers=header, timeout=10.0).status_code == 401
+    assert httpx.get(url, headers=header, verify=vehicle.trust, timeout=10.0).status_code == 401
 
 
 def test_it_sends_nothing_and_its_socket_takes_nothing_it_did_not_ask_for(vehicle: Vehicle) -> None:

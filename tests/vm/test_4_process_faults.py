@@ -104,12 +104,12 @@ def test_floods_and_slow_clients_cost_no_frame(vehicle: Vehicle, tmp_path: Path)
     outcomes: list[set[object]] = [set() for _ in range(4)]
 
     def flood(outcome: set[object]) -> None:
-        with httpx.Client(timeout=30.0) as client:
+        with httpx.Client(timeout=30.0, verify=vehicle.trust) as client:
             try:
-                outcome.add(client.get(f"http://{vehicle.machine.address}:8000/health/live").status_code)
+                outcome.add(client.get(f"{vehicle.url}/health/live").status_code)
                 answered.wait(30.0)
                 while not over.is_set():
-                    outcome.add(client.get(f"http://{vehicle.machine.address}:8000/health/live").status_code)
+                    outcome.add(client.get(f"{vehicle.url}/health/live").status_code)
             except (httpx.HTTPError, threading.BrokenBarrierError) as why:
                 outcome.add(repr(why))
 

@@ -37,7 +37,8 @@ class Fitter:
     def say(self, step: str, body: dict[str, Any]) -> dict[str, Any]:
         """One step; what is underway then."""
         response = httpx.post(
-            f"http://{self._vehicle.machine.address}:8000/api/v1/{PATH}{step}",
+            f"{self._vehicle.url}/api/v1/{PATH}{step}",
+            verify=self._vehicle.trust,
             json=body,
             headers={"authorization": f"Bearer {self._token}"},
             timeout=30.0,

@@ -20,13 +20,17 @@ bearer: Final = HTTPBearer(auto_error=False, description=f"Needed as soon as one
 class Access:
     """The dependency of every route that tells something of the vehicle. Raises HTTPException for a refusal."""
 
-    def __init__(self, tokens: TokenFile | None) -> None:
+    def __init__(self, tokens: TokenFile | None, *, are_places_read: bool = False) -> None:
+        """``are_places_read`` is whether a token with scope read gets positions."""
         self._tokens = tokens
+        self._are_places_read = are_places_read
 
     async def __call__(
         self, request: Request, shown: Annotated[HTTPAuthorizationCredentials | None, Security(bearer)]
     ) -> None:
-        """Leaves the name of the token in ``request.state.token_name``."""
+        """Leaves the token's name in ``request.state.token_name``, and whether it gets no positions in
+        ``hides_places``.
+        """
         if self._tokens is None or not self._tokens.are_required():  # the first token counts from its first moment
             _refuse_strangers(request)
             return
@@ -41,6 +45,7 @@ class Access:
             challenge = f'{_CHALLENGE}, error="invalid_token"' if is_shown else _CHALLENGE
             raise HTTPException(401, detail, {"www-authenticate": challenge})
         request.state.token_name = token.name
+        request.state.hides_places = token.scope is Scope.READ and not self._are_places_read
         wanted = Scope.READ if request.method in _SAFE_METHODS else Scope.OPERATE
         if not token.scope.allows(wanted):
             challenge = f'{_CHALLENGE}, error="insufficient_scope", scope="{wanted}"'

@@ -34,12 +34,14 @@ class Tls:
     client_ca: Path | None = None
 
 
-def refuse_open_address(host: str, *, has_tokens: bool) -> None:
-    """Raise ConfigurationError if machines other than this one could ask without a token."""
-    if not has_tokens and not is_loopback(host):
+def refuse_open_address(host: str, *, has_tokens: bool, has_tls: bool) -> None:
+    """Raise ConfigurationError if machines other than this one could ask without a token, or read along."""
+    wanted = [] if has_tokens else ["a token (make one: `springscale token create NAME --config springscale.toml`)"]
+    wanted += [] if has_tls else ["TLS (tls_certificate and tls_key)"]
+    if wanted and not is_loopback(host):
         raise ConfigurationError(
-            f"[web] host = {host!r} can be reached from elsewhere, and there is no token: "
-            'make one with `springscale token create NAME --config springscale.toml`, or set host = "127.0.0.1"'
+            f"[web] host = {host!r} can be reached from elsewhere, and needs {' and '.join(wanted)}; or set "
+            'host = "127.0.0.1" and put a reverse proxy in front (deploy/Caddyfile)'
         )
 
 

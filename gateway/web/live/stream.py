@@ -39,8 +39,11 @@ class Subscription:
     with the number of the newest record at its time.
     """
 
-    def __init__(self, reader: StoreReader, behind: str | None) -> None:
-        """``behind`` is the cursor to resume behind, None for live only."""
+    def __init__(self, reader: StoreReader, behind: str | None, shown: Callable[[str], str] = str) -> None:
+        """``behind`` is the cursor to resume behind, None for live only; ``shown`` turns a record's JSON into what the
+        client may see of it.
+        """
+        self._shown = shown
         self._loop = asyncio.get_running_loop()
         self._news = asyncio.Event()
         self._passing: tuple[int, ServerSentEvent] | None = None
@@ -69,15 +72,18 @@ class Subscription:
             while records := await asyncio.to_thread(self._read):
                 for record in records:
                     if passing is not None and record.number > passing[0]:
-                        yield passing[1]
+                        yield self._seen(passing[1])
                         passing = None
-                    yield ServerSentEvent(event=record.kind, raw_data=record.text, id=record.cursor)
+                    yield self._seen(ServerSentEvent(event=record.kind, raw_data=record.text, id=record.cursor))
             if passing is not None:
-                yield passing[1]
+                yield self._seen(passing[1])
             if is_last:
                 yield _CLOSING
                 return
             await self._news.wait()
+
+    def _seen(self, event: ServerSentEvent) -> ServerSentEvent:
+        return event.model_copy(update={"raw_data": self._shown(event.raw_data or "")})
 
     def _read(self) -> list[JournalRecord]:
         """Some records; none while the disk cannot be read: the next record tries again."""
@@ -122,9 +128,11 @@ class Fanout:
                 subscription.hear(event)
 
     @contextmanager
-    def joined(self, reader: StoreReader, behind: str | None) -> Iterator[Subscription]:
+    def joined(
+        self, reader: StoreReader, behind: str | None, shown: Callable[[str], str] = str
+    ) -> Iterator[Subscription]:
         """A subscription to events from now on, in the loop that will read it."""
-        subscription = Subscription(reader, behind)
+        subscription = Subscription(reader, behind, shown)
         with self._lock:
             self._subscriptions.add(subscription)
             if self._is_closed:

@@ -3,6 +3,7 @@
 import asyncio
 import re
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, Final, Literal
 
@@ -23,6 +24,7 @@ from gateway.store import StoreReader
 from gateway.web.file_response import FORMATS, file_responses, sent_as_file
 from gateway.web.live.board import Board, LatestResponse
 from gateway.web.live.stream import EVENT_SCHEMA
+from gateway.web.routes.service_calls import AsShown, Shown
 from gateway.web.schemas import EstimatesPage, Instant, Latest, problem_responses
 
 JSON: Final = "application/json"
@@ -208,20 +210,22 @@ def api_router(board: Board, reader: StoreReader, status: Callable[[], Status]) 
         return LatestResponse(board, request.scope)
 
     @router.get("/estimates", response_model=EstimatesPage, responses=problem_responses(422, 503))
-    async def estimates(query: Annotated[EstimatesQuery, Query()]) -> Response:
+    async def estimates(query: Annotated[EstimatesQuery, Query()], shown: AsShown) -> Response:
         """Estimates and rejections in the order they were made. Follow next_cursor: nothing is missed or repeated."""
-        first = await history_page(reader, BATCHES, query, min(query.limit, BATCHES_AT_A_TIME), query.cursor)
+        first = await history_page(reader, BATCHES, query, min(query.limit, BATCHES_AT_A_TIME), query.cursor, shown)
         if len(first.items) == query.limit or first.next_cursor is None:
             return Response(f'{{"items":[{",".join(first.items)}{_end(first, first.last_cursor)}', media_type=JSON)
-        return StreamingResponse(_page_by_page(reader, query, first), media_type=JSON)
+        return StreamingResponse(_page_by_page(reader, query, first, shown), media_type=JSON)
 
     @router.get("/status", response_model=Status)
     async def status_now() -> Status:
         """The state of the service, as a sentence and as numbers."""
         return status()
 
-    async def joined(last_event_id: Annotated[Cursor | SkipJsonSchema[None], Header()] = None) -> AsyncIterator[Any]:
-        with board.fanout.joined(reader, last_event_id) as subscription:
+    async def joined(
+        shown: AsShown, last_event_id: Annotated[Cursor | SkipJsonSchema[None], Header()] = None
+    ) -> AsyncIterator[Any]:
+        with board.fanout.joined(reader, last_event_id, shown) as subscription:
             yield subscription
 
     @router.get(
@@ -247,21 +251,21 @@ def export_router(reader: StoreReader) -> APIRouter:
     """All estimates as a file."""
     router = APIRouter(prefix="/api/v1", tags=["export"])
 
-    def sent(span: TimeSpan, ending: str, *, with_spectra: bool) -> Awaitable[Response]:
+    def sent(span: TimeSpan, ending: str, shown: Shown, *, with_spectra: bool) -> Awaitable[Response]:
         def page(cursor: str | None) -> Awaitable[HistoryPage]:
-            return history_page(reader, BATCHES, span, BATCHES_AT_A_TIME, cursor, with_spectra=with_spectra)
+            return history_page(reader, BATCHES, span, BATCHES_AT_A_TIME, cursor, shown, with_spectra=with_spectra)
 
         return sent_as_file(page, "springscale", ending, COLUMNS, csv_cells)
 
     @router.get("/export.csv", response_class=Response, responses=file_responses("csv", "the file"))
-    async def export_csv(span: Annotated[TimeSpan, Query()]) -> Response:
+    async def export_csv(span: Annotated[TimeSpan, Query()], shown: AsShown) -> Response:
         """Comma-separated values (RFC 4180), one batch a line, several reasons of rejection joined by a space."""
-        return await sent(span, "csv", with_spectra=False)
+        return await sent(span, "csv", shown, with_spectra=False)
 
     @router.get("/export.jsonl", response_class=Response, responses=file_responses("jsonl", "the file"))
-    async def export_jsonl(span: Annotated[SpanWithSpectra, Query()]) -> Response:
+    async def export_jsonl(span: Annotated[SpanWithSpectra, Query()], shown: AsShown) -> Response:
         """JSON Lines, one estimate object a line."""
-        return await sent(span, "jsonl", with_spectra=span.spectra)
+        return await sent(span, "jsonl", shown, with_spectra=span.spectra)
 
     return router
 
@@ -292,45 +296,54 @@ def events_router(reader: StoreReader) -> APIRouter:
 
 
 def _entries(reader: StoreReader, kind: EntryKind) -> Callable[..., Any]:
-    async def page(query: Annotated[HistoryQuery, Query()]) -> Response:
-        return Response("{" + await entries_of(reader, kind, query), media_type=JSON)
+    async def page(query: Annotated[HistoryQuery, Query()], shown: AsShown) -> Response:
+        return Response("{" + await entries_of(reader, kind, query, shown), media_type=JSON)
 
     return page
 
 
 def _whole(reader: StoreReader, kind: EntryKind, name: str, ending: str) -> Callable[..., Any]:
-    async def whole(span: Annotated[TimeSpan, Query()]) -> Response:
+    async def whole(span: Annotated[TimeSpan, Query()], shown: AsShown) -> Response:
         def page(cursor: str | None) -> Awaitable[HistoryPage]:
-            return history_page(reader, (kind,), span, ENTRIES_AT_A_TIME, cursor)
+            return history_page(reader, (kind,), span, ENTRIES_AT_A_TIME, cursor, shown)
 
         return await sent_as_file(page, name, ending, table.COLUMNS[kind], partial(table.cells_of, kind))
 
     return whole
 
 
-async def entries_of(reader: StoreReader, kind: str, query: HistoryQuery) -> str:
+async def entries_of(reader: StoreReader, kind: str, query: HistoryQuery, shown: Shown = str) -> str:
     """One page of entries as the rest of a JSON object. Raises RequestValidationError for an invalid cursor."""
-    page = await history_page(reader, (kind,), query, query.limit, query.cursor)
+    page = await history_page(reader, (kind,), query, query.limit, query.cursor, shown)
     return f'"items":[{",".join(page.items)}{_end(page, page.last_cursor)}'
 
 
 async def history_page(
-    reader: StoreReader, kinds: Sequence[str], span: TimeSpan, limit: int, cursor: str | None, **more: Any
+    reader: StoreReader,
+    kinds: Sequence[str],
+    span: TimeSpan,
+    limit: int,
+    cursor: str | None,
+    shown: Shown,
+    **more: Any,
 ) -> HistoryPage:
-    """A page of the history; an invalid cursor is the client's fault."""
+    """A page of the history as the client may see it; an invalid cursor is the client's fault."""
     try:
-        return await asyncio.to_thread(reader.page, kinds, limit=limit, cursor=cursor, **span.question(), **more)
+        page = await asyncio.to_thread(reader.page, kinds, limit=limit, cursor=cursor, **span.question(), **more)
     except ValueError as error:
         raise RequestValidationError([{"loc": ("query", "cursor"), "msg": str(error)}]) from None
+    return replace(page, items=tuple(map(shown, page.items)))
 
 
-async def _page_by_page(reader: StoreReader, query: EstimatesQuery, first: HistoryPage) -> AsyncIterator[str]:
+async def _page_by_page(
+    reader: StoreReader, query: EstimatesQuery, first: HistoryPage, shown: Shown
+) -> AsyncIterator[str]:
     """A long answer, read from the store as fast as the client reads it."""
     page, n_left = first, query.limit - len(first.items)
     newest = first.last_cursor
     yield '{"items":[' + ",".join(first.items)
     while n_left > 0 and page.next_cursor is not None:
-        page = await history_page(reader, BATCHES, query, min(n_left, BATCHES_AT_A_TIME), page.next_cursor)
+        page = await history_page(reader, BATCHES, query, min(n_left, BATCHES_AT_A_TIME), page.next_cursor, shown)
         n_left -= len(page.items)
         if page.items:
             yield "," + ",".join(page.items)

@@ -12,6 +12,7 @@ from fastapi import Depends, Request
 from starlette.responses import Response
 
 from gateway.core.known_weights import KnownWeightKind
+from gateway.estimate_json import without_places
 from gateway.stated.facts import StatedWeight, VehicleAnswers
 from gateway.web.schemas import problem_responses
 
@@ -72,3 +73,14 @@ async def _token_name(request: Request) -> str:
 
 By = Annotated[str, Depends(_token_name)]
 """Name of the client's token."""
+
+
+Shown = Callable[[str], str]
+
+
+async def _shown_to(request: Request) -> Shown:
+    return without_places if getattr(request.state, "hides_places", False) else str
+
+
+AsShown = Annotated[Shown, Depends(_shown_to)]
+"""Turns the JSON of a record into what this client may see of it."""

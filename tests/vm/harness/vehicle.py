@@ -1,12 +1,14 @@
 """The box in the vehicle: the machine with the package under test installed, seen as its owner and as a client."""
 
 import json
+import ssl
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
 import httpx
+import trustme
 from vm.harness.machine import Machine
 
 CONFIG: Final = "/etc/springscale/springscale.toml"
@@ -24,6 +26,8 @@ silence_s = 3.0
 provisional_every_s = 0.0
 [web]
 host = "0.0.0.0"
+tls_certificate = "web.pem"
+tls_key = "web.pem"
 """
 # What docs/deployment.md tells whoever opens the API to a network of his
 FIREWALL: Final = "[Service]\nIPAddressAllow=198.18.0.0/16\n"
@@ -45,6 +49,11 @@ class Vehicle:
         self.run = machine.run
         self._token = ""
         self._is_changed = False
+        authority = trustme.CA()
+        self._certificate = authority.issue_cert(machine.address, "127.0.0.1").private_key_and_cert_chain_pem
+        self.trust = ssl.create_default_context()
+        authority.configure_trust(self.trust)
+        self.url = f"https://{machine.address}:8000"
 
     def is_installed(self) -> bool:
         """Whether the package is there."""
@@ -58,6 +67,8 @@ class Vehicle:
         self.drop_in("firewall", FIREWALL)
         self.drop_in("no-start-limit", NO_START_LIMIT)
         self.run("cp /usr/lib/springscale/gateway/demo/paper_van.json /etc/springscale/vehicle.json")
+        self.machine.write("/etc/springscale/web.pem", self._certificate.bytes())
+        self.run("chgrp springscale /etc/springscale/web.pem; chmod 640 /etc/springscale/web.pem")
         self.configure(SETTINGS)
         self._token = self.run(f"springscale token create test --config {CONFIG}").strip()
         self.run("systemctl enable --now springscale", timeout_s=90.0)
@@ -101,7 +112,8 @@ class Vehicle:
     def get(self, path: str, **query: Any) -> Answer:
         """An answer of the API as an outside client gets it. Raises httpx.TransportError where nobody answers."""
         response = httpx.get(
-            f"http://{self.machine.address}:8000/api/v1/{path}",
+            f"{self.url}/api/v1/{path}",
+            verify=self.trust,
             params=query,
             headers={"authorization": f"Bearer {self._token}"},
             timeout=10.0,
