@@ -14,7 +14,6 @@ from typing import Final
 import measured
 import printed
 import reference
-import scale
 from drawings.rooms import rooms
 from drawings.spectra import spectra
 from made import ROOT, StaleError, filled, keep_up_to_date
@@ -23,7 +22,7 @@ PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
     **{f"docs/{page}": parts for page, parts in reference.PARTS.items()},
     "README.md": {"errors": measured.errors_in_readme},
     "docs/contribute.md": {"packed": printed.campaign_pack},
-    "docs/errors.md": {"errors": measured.errors},
+    "docs/accuracy.md": measured.ACCURACY,
     "docs/faults.md": {
         "faults": measured.faults,
         "figures": measured.fault_figures,
@@ -32,9 +31,7 @@ PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
     },
     "docs/feed.md": {"printed": measured.feed_printed},
     "docs/fleet.md": {"fleet test": measured.fleet_test},
-    "docs/hardware.md": {"noise": measured.noise_that_works},
     "docs/performance.md": {"conditions": measured.conditions, "speeds": measured.speeds},
-    "docs/scale.md": scale.PARTS,
 }
 """Pages by their place, and each part between its marks."""
 

@@ -7,17 +7,15 @@ import json
 import re
 import sys
 import tomllib
-from collections.abc import Mapping, Sequence
 from itertools import groupby
 from textwrap import fill
 from typing import Any, Final
 
 from made import DOCS, ROOT, numbers, table
 
-from gateway.calibration.judgement.coverage import IDEAL_SCORE
-
 sys.path.insert(0, str(ROOT))
-from benchmarks.accuracy.grades import limits  # benchmarks are not installed
+from benchmarks.accuracy import coverage, disturbances  # benchmarks are not installed
+from benchmarks.accuracy import faults as faults_of_sensors
 from benchmarks.speed.table import lines_of
 
 # -- accuracy --
@@ -28,12 +26,6 @@ IN_README: Final = (
     "5 different vans, mixed, on pallets, with roll rate",
     "5 different vans, mixed, another day, with roll rate",
 )
-HEAD: Final = (
-    "| mean error, payload / front share | ratio index | cross spectrum | its 95 % intervals contain the truth "
-    "| half as wide as | score (ideal) | refused |\n|---|---|---|---|---|---|---|"
-)
-
-
 SAMPLE: Final = re.compile(
     r"(?P<mark><!-- (?P<n>\d+) lines of docs/tutorial.md, from: (?P<first>[^\n]+) -->\n)"
     r".*?(?P<end><!-- end of output -->)",
@@ -41,59 +33,18 @@ SAMPLE: Final = re.compile(
 )
 
 
-def errors() -> str:
-    """All rows, of errors.md."""
-    return "\n".join([HEAD, *_error_rows()]) + "\n"
-
-
 def errors_in_readme() -> str:
-    """A few of them."""
-    of_title = {row.split("|")[1].strip(): row for row in _error_rows()}
-    return "\n".join([HEAD, *(of_title[title] for title in IN_README)]) + "\n"
+    """A few kinds of drives."""
+    of_title = coverage.rows(numbers("coverage.json")["lines"])
+    return "\n".join([coverage.HEAD, *(of_title[title] for title in IN_README)]) + "\n"
 
 
-def _error_rows() -> list[str]:
-    """Every row, as Markdown."""
-    coverage = numbers("coverage.json")["lines"]
-    kinds = dict.fromkeys((line["kind"], line["has_roll_rate"]) for line in coverage if line["kind"] != "all")
-    return [_covered(kind, has_roll_rate, coverage) for kind, has_roll_rate in kinds]
-
-
-def _covered(kind: str, has_roll_rate: bool, lines: list[dict[str, Any]]) -> str:
-    of = {line["estimator"]: line for line in lines if (line["kind"], line["has_roll_rate"]) == (kind, has_roll_rate)}
-    ours = of["cross_spectrum"]
-    held = _held(ours["payload_coverage"]["share"], ours["front_share_coverage"]["share"])
-    refused = f"{ours['n_rejected']} of {ours['n_batches']}"
-    title = f"{ours['n_vans']} different vans, {kind}{', with roll rate' if has_roll_rate else ''}"
-    errors, others = _pair(ours, "mean_abs_pct"), _pair(of["ratio_index"], "mean_abs_pct")
-    widths = _widths([_of_line(ours, target, "mean_abs_pct") for target in ("payload", "front_share")])
-    return f"| {title} | {others} | **{errors}** | {held} | {widths} | {refused} |"
-
-
-def _pair(line: Mapping[str, Any], ending: str) -> str:
-    found = [line[f"{what}_{ending}"] for what in ("payload", "front_share")]
-    return " / ".join("none" if pct is None else f"{pct:.1f} %" for pct in found)
-
-
-Widths = tuple[float | None, float | None, float | None]  # half-width, interval score, mean absolute error
-
-
-def _of_line(line: Mapping[str, Any], target: str, mean: str) -> Widths:
-    return line[f"{target}_half_width_pct"], line[f"{target}_interval_score_pct"], line[f"{target}_{mean}"]
-
-
-def _widths(of_both: Sequence[Widths]) -> str:
-    """Two cells: half-widths, and interval scores with what would be ideal."""
-    half_widths = " / ".join("none" if half is None else f"{half:.1f} %" for half, _, _ in of_both)
-    scores = " / ".join(
-        "none" if score is None or mean is None else f"{score:.0f} ({IDEAL_SCORE * mean:.0f})"
-        for _, score, mean in of_both
-    )
-    return f"{half_widths} | {scores}"
-
-
-def _held(payload: float | None, share: float | None) -> str:
-    return " / ".join("none" if held is None else f"{100.0 * held:.0f} %" for held in (payload, share))
+ACCURACY: Final = {
+    "coverage": lambda: coverage.section(numbers("coverage.json")),
+    "disturbances": lambda: disturbances.section(numbers("disturbances.json")),
+    "faults": lambda: faults_of_sensors.section(numbers("sensor-faults.json")),
+}
+"""The parts of docs/accuracy.md."""
 
 
 def with_samples(text: str) -> str:
@@ -109,11 +60,6 @@ def _sample(place: re.Match[str]) -> str:
         raise ValueError(f"docs/tutorial.md has no line that begins with {place['first']!r}, which README.md shows")
     shown = "\n".join(lines[first : first + int(place["n"])])
     return f"{place['mark']}```text\n{shown}\n```\n{place['end']}"
-
-
-def noise_that_works() -> str:
-    """The noisiest sensors that weigh as well as the simulated one."""
-    return limits(numbers("sensor-grades.json"))
 
 
 # -- speed --

@@ -1,6 +1,6 @@
 """The accuracy of the estimators: studies that take minutes, on simulated vans and on a campaign's own runs.
 
-Campaign files and seeds go in; numbers (NAME.json) and their page (NAME.md), which docs/ shows, come out. ``study``
-runs the cases of a study, ``markdown`` writes its page. Run a study by ``python -m benchmarks.accuracy NAME``; the
+``python -m benchmarks.accuracy NAME`` runs a study (``study``) and writes its numbers, NAME.json; docs/accuracy.md
+shows them. The worlds are ``drives.TRIPS``, ``disturbed.DISTURBANCES`` and ``faulty_logs.FAULTS``. The
 wheel has none of it.
 """

@@ -1,9 +1,9 @@
-"""python -m benchmarks.accuracy: studies of calibration and estimation by experiment. Each takes minutes.
+"""python -m benchmarks.accuracy: the studies that docs/accuracy.md shows. Each takes minutes.
 
-    python -m benchmarks.accuracy coverage --vans 12 --seed 20265 --workers 2 --kept build/coverage --output docs
+    python -m benchmarks.accuracy coverage --vans 5 --seed 20265 --workers 2 --kept build/coverage --output docs
 
-prints its page; ``--output`` also writes the numbers (NAME.json) and the page (NAME.md). With ``--kept`` a study that
-was broken off resumes with the cases that were finished.
+prints its table; ``--output`` writes the numbers (NAME.json). With ``--kept`` a study that was broken off resumes with
+the cases that were finished.
 """
 
 import json
@@ -14,31 +14,18 @@ from typing import Any, Final
 
 import click
 
-from benchmarks.accuracy import (
-    availability,
-    coverage,
-    delivery,
-    disturbances,
-    grades,
-)  # fmt: skip
+from benchmarks.accuracy import coverage, disturbances
 from benchmarks.accuracy import faults as on_faults
-from benchmarks.accuracy.budget import study as budget
-from benchmarks.accuracy.sensitivity import study as sensitivity
-from benchmarks.accuracy.sensor_bounds import limits_table
 from benchmarks.accuracy.study import Study
 from gateway.cli.options import FILE
 from gateway.cli.progress import counted
-from gateway.core.cross_spectrum.predicted import Drive
 from gateway.errors import SpringscaleError
 
-STUDIES: Final[tuple[Study[Any], ...]] = (
-    coverage.STUDY, budget.STUDY, disturbances.STUDY, grades.STUDY, delivery.STUDY, sensitivity.STUDY,
-    availability.STUDY,
-)  # fmt: skip
+STUDIES: Final[tuple[Study[Any], ...]] = (coverage.STUDY, disturbances.STUDY)
 Command = Callable[..., None]
 _workers = click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes")
 _kept = click.option("--kept", type=FILE, default=None, help="directory of cases to resume from: read and stored there")
-_output = click.option("--output", type=FILE, default=None, help="directory to write the numbers and their page to")
+_output = click.option("--output", type=FILE, default=None, help="directory to write the numbers to")
 
 
 def _seed(seed: int) -> Callable[[Command], Command]:
@@ -54,7 +41,7 @@ def _add(study: Study[Any]) -> None:
     """The command of a study that needs nothing but its cases."""
 
     @studies.command(study.name, help=study.does)
-    @click.option(f"--{study.counts}", "n", type=click.IntRange(min=study.least), default=study.n, show_default=True)
+    @click.option("--vans", "n", type=click.IntRange(min=2), default=study.n, show_default=True)
     @_seed(study.seed)
     @_workers
     @_kept
@@ -62,7 +49,7 @@ def _add(study: Study[Any]) -> None:
     def _(n: int, seed: int, workers: int, kept: Path | None, output: Path | None) -> None:
         with counted(study.doing) as on_done:
             found = study.run(n, seed, workers=workers, kept=kept, on_done=on_done)
-        _hand_out(study.file or study.name, found, study.page(found), output)
+        _hand_out(study.name, found, study.section(found), output)
 
 
 for one in STUDIES:
@@ -90,26 +77,15 @@ def faults(
     drives = on_faults.Drives(campaign, calibration, runs or None, seed=seed)
     with counted("weighing drives with faulty sensors") as on_case:
         found = on_faults.faults(drives, workers=workers, kept=kept, on_case=on_case)
-    _hand_out("sensor-faults", found, on_faults.faults_page(found), output)
+    _hand_out("sensor-faults", found, on_faults.section(found), output)
 
 
-@studies.command("bounds")
-@click.option("--duration-s", type=click.FloatRange(min=20.0), default=300.0, show_default=True, help="driving seen")
-@click.option("--speed-kmh", type=click.FloatRange(10.0, 200.0), default=50.0, show_default=True, help="steady speed")
-def bounds(duration_s: float, speed_kmh: float) -> None:
-    """Cramer-Rao bounds of payload and front share for the paper's van on its road, by observation and prior
-    knowledge.
-    """
-    click.echo(limits_table(Drive(duration_s, speed_kmh / 3.6)), nl=False)
-
-
-def _hand_out(name: str, found: Mapping[str, Any], page: str, output: Path | None) -> None:
-    """Print the page; with ``output`` also write it and the numbers as files."""
+def _hand_out(name: str, found: Mapping[str, Any], section: str, output: Path | None) -> None:
+    """Print the table; with ``output`` also write the numbers as a file."""
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
         (output / f"{name}.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        (output / f"{name}.md").write_text(page, encoding="utf-8")
-    click.echo(page, nl=False)
+    click.echo(section, nl=False)
 
 
 if __name__ == "__main__":

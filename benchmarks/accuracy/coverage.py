@@ -5,7 +5,7 @@ to 0.4 m off the centre line. Every van is calibrated and judged twice on the sa
 and without.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any, Final
@@ -13,20 +13,9 @@ from typing import Any, Final
 from benchmarks.accuracy.calibrated import calibrated_on
 from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, judged_batches, pooled, roll_in_words
 from benchmarks.accuracy.drives import TRIPS, USUAL, Scope, driven, fresh_van, unseen_load, without_roll_rate
-from benchmarks.accuracy.markdown import (
-    Column,
-    number,
-    page,
-    rejected_cell,
-    share,
-    share_cell,
-    table_of,
-    target_columns,
-    text,
-    width_and_score,
-)
+from benchmarks.accuracy.markdown import share_cell
 from benchmarks.accuracy.study import Study
-from gateway.calibration.judgement.coverage import PROMISED
+from gateway.calibration.judgement.coverage import IDEAL_SCORE, PROMISED
 from gateway.calibration.judgement.evaluation import judge
 from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import CalibrationImpossibleError
@@ -63,70 +52,50 @@ def of_one_van(seed: int, number: int, scope: Scope = USUAL) -> Found:
     return batches, refused
 
 
-def _name(line: Mapping[str, Any]) -> str:
-    return str(line["estimator"]).replace("_", " ")
+def section(found: Mapping[str, Any]) -> str:
+    """The errors of every kind of drive, and whether the intervals hold."""
+    return "\n".join([HEAD, *rows(found["lines"]).values(), "", *_verdicts(found), ""])
 
 
-_CG_WIDTH, _CG_SCORE = width_and_score("cg_left", "mm")
-COLUMNS: Final[tuple[Column, ...]] = (
-    ("Drive", text("kind")),
-    ("Roll rate", lambda line: "yes" if line["has_roll_rate"] else "no"),
-    ("Estimator", _name),
-    ("Runs", text("n_runs")),
-    ("Batches", text("n_batches")),
-    ("Rejected", rejected_cell),
-    *target_columns("payload", "Payload", by_van=True),
-    *target_columns("front_share", "Share", by_van=True),
-    ("Centre of gravity sideways, mean abs. error mm", number("cg_left_mean_abs_mm")),
-    ("95 % covers", share("cg_left_coverage")),
-    ("+- mm", _CG_WIDTH),
-    ("score mm (ideal)", _CG_SCORE),
+HEAD: Final = (
+    "| mean error, payload / front share | ratio index | cross spectrum | its 95 % intervals contain the truth "
+    "| half as wide as | score (ideal) | refused |\n|---|---|---|---|---|---|---|"
 )
 
 
-def coverage_page(found: Mapping[str, Any]) -> str:
-    """The page in Markdown."""
-    refused = [f"- {text}" for text in found["refused"]]
-    return page(
-        "Coverage, and mixed driving",
-        f"coverage --output DIR --vans {len(found['vans'])} --seed {found['seed']}",
-        _protocol(found),
-        "",
-        *table_of(COLUMNS, found["lines"]),
-        "",
-        *_verdicts(found),
-        "",
-        *(["Calibrations that were impossible:", "", *refused, ""] if refused else []),
-    )
+def rows(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """A row for each kind of drive, by its title."""
+    kinds = dict.fromkeys((line["kind"], line["has_roll_rate"]) for line in lines if line["kind"] != ALL_KINDS)
+    of = {(line["kind"], line["has_roll_rate"], line["estimator"]): line for line in lines}
+    return dict(_row(of[*kind, "ratio_index"], of[*kind, "cross_spectrum"]) for kind in kinds)
 
 
-def _protocol(found: Mapping[str, Any]) -> str:
-    return (
-        f"{len(found['vans'])} vans, random variations of the simulator's three types in masses, wheelbases, "
-        "springs, dampers, friction, tyres and places. Each is calibrated on six known loads of ten minutes near "
-        "50 km/h, the loads fixed to the floor, then driven with loads it has not seen: as calibrated; at another "
-        "steady speed between 30 and 110 km/h; mixed: town, country and motorway in one drive, on roads whose "
-        "roughness changes, with potholes; mixed on another day: springs changed by 1.5 %, dampers and tyres by 5 % "
-        "(standard deviations, each axle its own); mixed with the load on pallets that ring at 15 Hz, as no "
-        "calibration saw it; as calibrated and mixed with the load 0.15 to 0.35 m to one side (0 to 0.1 m else). The "
-        "sensor sits up to 0.4 m beside the centre line, its place measured; of every other van nobody noted where the "
-        "known loads stood sideways. Every van is calibrated and judged twice on the same drives: with its roll rate "
-        "mapped, and without. No setting of either estimator was chosen with these vans, roads or seeds. "
-        "Batches of 300 s; errors are percent of the payload each van is rated for and of 20 percentage points; with "
-        "misses, a rejected batch counts as a mid-range answer. Coverage is the share of 95 % intervals that held the "
-        "truth, with its own 95 % limits: batches of one run (of one van) are alike, so the limits are those of as "
-        "many independent batches as scatter like the runs (the vans) do. +- is the mean of half the 95 % intervals. "
-        "The interval score is their width and 40 times what the truth lies outside; in brackets what it would be, "
-        "were errors normal and intervals as wide as they should be. Loads are of every length and height: boxes, "
-        "parcels all over the floor, a filled bay, tall and long ones, pipes, and some with a part on the roof; nobody "
-        "says which."
+def _row(other: Mapping[str, Any], ours: Mapping[str, Any]) -> tuple[str, str]:
+    title = f"{ours['n_vans']} different vans, {ours['kind']}{', with roll rate' if ours['has_roll_rate'] else ''}"
+    held = " / ".join(_percent(100.0 * one["share"] if one else None, 0) for one in _both(ours, "coverage"))
+    widths = " / ".join(_percent(half) for half in _both(ours, "half_width_pct"))
+    scores = " / ".join(
+        "none" if score is None or mean is None else f"{score:.0f} ({IDEAL_SCORE * mean:.0f})"
+        for score, mean in zip(_both(ours, "interval_score_pct"), _both(ours, "mean_abs_pct"), strict=True)
     )
+    errors, others = (" / ".join(map(_percent, _both(line, "mean_abs_pct"))) for line in (ours, other))
+    refused = f"{ours['n_rejected']} of {ours['n_batches']}"
+    return title, f"| {title} | {others} | **{errors}** | {held} | {widths} | {scores} | {refused} |"
+
+
+def _both(line: Mapping[str, Any], ending: str) -> list[Any]:
+    return [line[f"{what}_{ending}"] for what in ("payload", "front_share")]
+
+
+def _percent(number: float | None, digits: int = 1) -> str:
+    return "none" if number is None else f"{number:.{digits}f} %"
 
 
 def _verdicts(found: Mapping[str, Any]) -> list[str]:
     """A line for every estimator: does the pooled coverage fall short?"""
     return [
-        f"- {_name(line)}, {roll_in_words(line['has_roll_rate'])}, all drives, {what}: {_verdict(line[key])}"
+        f"- {line['estimator'].replace('_', ' ')}, {roll_in_words(line['has_roll_rate'])}, all drives, {what}: "
+        f"{_verdict(line[key])}"
         for line in found["lines"]
         if line["kind"] == ALL_KINDS
         for what, key in (("payload", "payload_coverage"), ("share", "front_share_coverage"))
@@ -151,7 +120,7 @@ STUDY: Final = Study(
     doing="calibrating and driving vans",
     of_case=of_one_van,
     numbers=pooled,
-    page=coverage_page,
+    section=section,
     seed=SEED,
     n=12,
 )

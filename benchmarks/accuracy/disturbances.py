@@ -30,7 +30,6 @@ from benchmarks.accuracy.markdown import (
     Row,
     all_but,
     number,
-    page,
     refused_cell,
     table_of,
     text,
@@ -92,29 +91,10 @@ OF_ANY_DRIVE: Final = (Why.TOO_SLOW, Why.SPEED_SPREAD, Why.SPEED_MISSING, Why.NO
 MENDED_WITHIN: Final = 1.25  # chosen: of the undisturbed error
 
 
-def disturbances_page(found: Mapping[str, Any]) -> str:
-    """The page in Markdown."""
+def section(found: Mapping[str, Any]) -> str:
+    """A row for every disturbance, and a verdict."""
     lines = [line for line in found["lines"] if line["kind"] != ALL_KINDS]
-    return page(
-        "Disturbances",
-        f"disturbances --output DIR --vans {len(found['vans'])} --seed {found['seed']}",
-        f"{len(found['vans'])} simulated vans, each calibrated on six known loads. The limits of the misfit and of a "
-        "turned gyro, and the widening by worn dampers, were designed with the first two vans of this seed in view; no "
-        "other setting was. Each van is driven twice with a load within the calibrated ones, as calibrated and mixed "
-        "(town, country, motorway). Every line disturbs the same two drives or, for another sensor, vehicle or load, "
-        "repeats them; the last line carries 1.5 times the rated payload. Sensors are up to 0.4 m off the centre line, "
-        "loads within 0.1 m of it, "
-        "sideways 0.15 to 0.35 m; a line without a roll rate is calibrated without one too. Errors are percent of "
-        "the rated payload and of 20 percentage points, over the batches that were answered. The two columns "
-        "before the widths count batches whose 95 % interval held, and those refused for a reason that is right. "
-        "+- is the mean of half the 95 % intervals; the interval score is their width and 40 times what the truth "
-        "lies outside, in brackets what it would be for normal errors and intervals of the right width.",
-        "",
-        *table_of(COLUMNS, lines),
-        "",
-        *_verdicts(lines),
-        "",
-    )
+    return "\n".join([*table_of(COLUMNS, lines), "", *_verdicts(lines), ""])
 
 
 def held_or_refused(line: Mapping[str, Any], quantity: str) -> float:
@@ -172,7 +152,7 @@ STUDY: Final = Study(
     doing="calibrating, driving and disturbing vans",
     of_case=of_one_van,
     numbers=numbers,
-    page=disturbances_page,
+    section=section,
     seed=SEED,
     n=12,
 )

@@ -221,12 +221,6 @@ class FreshVan:
     test_seed: np.random.SeedSequence
 
 
-def van_of(seed: int, number: int) -> Vehicle:
-    """The ``number``-th van of a study with this seed, without its drives."""
-    van_seed, *_ = np.random.SeedSequence([seed, number]).spawn(5)
-    return draw_van(number, np.random.default_rng(van_seed))
-
-
 def fresh_van(
     scope: Scope, seed: int, number: int, sensors_of: Callable[[Sensors], Sensors] = lambda mounted: mounted
 ) -> FreshVan:

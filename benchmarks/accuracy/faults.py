@@ -1,6 +1,6 @@
 """The effect of ordinary sensor faults on estimates of recorded drives: refused, covered, or wrong.
 
-    faults(Drives(Path("campaign.toml"), Path("vehicle.json"))) -> numbers for faults_page
+    faults(Drives(Path("campaign.toml"), Path("vehicle.json"))) -> numbers for section
 
 Every log is rewritten with every fault (faulty_logs) and weighed as `springscale estimate` does.
 """
@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.accuracy.faulty_logs import Fault, Log, faults_of
-from benchmarks.accuracy.markdown import Column, Row, all_but, page, refused_cell, table_of, text
+from benchmarks.accuracy.markdown import Column, Row, all_but, refused_cell, table_of, text
 from benchmarks.accuracy.study import OnDone, cases_of
 from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
@@ -169,8 +169,8 @@ def _outside(interval: tuple[float, float], true: float) -> float:
 LEAST_SAFE: Final = 0.9  # chosen: of the batches
 
 
-def faults_page(found: Mapping[str, Any]) -> str:
-    """The page in Markdown."""
+def section(found: Mapping[str, Any]) -> str:
+    """The sums, and a row for every fault with an answer outside an interval."""
     lines = found["lines"]
     total = {name: sum(line[name] for line in lines) for name in ("n_batches", "n_refused", "n_held")}
     wrong = [line for line in lines if _n_outside(line)]
@@ -179,26 +179,14 @@ def faults_page(found: Mapping[str, Any]) -> str:
         for line in lines
         if _n_outside(line) > (1.0 - LEAST_SAFE) * line["n_batches"]
     ]
-    return page(
-        "Sensor faults",
-        f"faults {found['campaign']} --calibration FILE --seed {found['seed']} --output DIR",
-        f"What ordinary faults of sensors do to the answers. The logs of {found['n_drives']} recorded drives with "
-        "known loads are rewritten, each time with one fault from the first frame on, and weighed as `springscale "
-        "estimate` weighs them, by a calibration that was made with a sound sensor. A fault is harmless where the "
-        "batch is refused, or where the 95 % intervals of both payload and front share hold the truth. An answer "
-        "outside is the worst that can happen: nobody sees it. The distance outside is given in half-widths of the "
-        f"interval. The {total['n_batches']} batches took {found['cpu_s'] / 60:.0f} minutes of one core.",
-        "",
+    sums = [
         f"- Refused: {total['n_refused']} of {total['n_batches']} batches.",
         f"- Answered, and held by both intervals: {total['n_held']}.",
         f"- Answered outside an interval: {total['n_batches'] - total['n_refused'] - total['n_held']}, under "
-        f"{len(wrong)} of {len(lines)} faults and strengths. The first line has no fault: such answers are among "
-        "the 5 % that an interval of 95 % leaves out of each quantity.",
+        f"{len(wrong)} of {len(lines)} faults and strengths.",
         f"- Refused or held in at least {100.0 * LEAST_SAFE:.0f} % of the batches: {all_but(unsafe)}",
-        "",
-        *table_of(COLUMNS, lines),
-        "",
-    )
+    ]
+    return "\n".join([*sums, "", *table_of(COLUMNS, wrong), ""])
 
 
 def _n_outside(line: Mapping[str, Any]) -> int:

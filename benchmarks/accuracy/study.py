@@ -1,6 +1,6 @@
-"""What every study is: cases that are computed one by one, the numbers made of them, and their page.
+"""What every study is: cases that are computed one by one, the numbers made of them, and their table.
 
-    STUDY = Study("coverage", ..., of_case=of_one_van, numbers=numbers, page=coverage_page)
+    STUDY = Study("coverage", ..., of_case=of_one_van, numbers=numbers, section=section)
     found = STUDY.run(n_cases, seed)
 
 The command line (``__main__``) is made from these objects. Cases run one after another or in several processes, with
@@ -22,12 +22,10 @@ OnDone = Callable[[int, int], None]  # (cases done, cases in all)
 
 @dataclass(frozen=True, slots=True)
 class Study(Generic[Case]):
-    """One study. ``of_case`` computes one case from the seed and its number, independent of all others.
+    """One study. ``of_case`` computes one case, of ``n`` vans, from the seed and its number, independent of all others.
 
-    ``numbers`` makes what the JSON file holds from the seed, how many were asked for and the cases in order; ``page``
-    makes the page from these numbers alone. ``counts`` names the option that says how many vans, days or rounds are
-    asked for (by default ``n``), ``n_cases`` says how many cases that is. ``file`` is the name of the files if it is
-    not the command's, ``kept_as`` begins the name of a stored case.
+    ``numbers`` makes what the JSON file holds from the seed, how many were asked for and the cases in order;
+    ``section`` makes the part of docs/accuracy.md from these numbers alone.
     """
 
     name: str
@@ -35,14 +33,9 @@ class Study(Generic[Case]):
     doing: str
     of_case: Callable[[int, int], Case]
     numbers: Callable[[int, int, Sequence[Case]], dict[str, Any]]
-    page: Callable[[Mapping[str, Any]], str]
+    section: Callable[[Mapping[str, Any]], str]
     seed: int
     n: int
-    counts: str = "vans"
-    least: int = 2
-    n_cases: Callable[[int], int] = int
-    file: str = ""
-    kept_as: str = ""
 
     def run(
         self,
@@ -67,10 +60,10 @@ class Study(Generic[Case]):
     ) -> list[Case]:
         """The result of each case, in order. It does not depend on the number of processes."""
         one, stored = partial(self.of_case, seed), partial(self._stored, seed)
-        return cases_of(one, self.n_cases(n), workers=workers, kept=kept, stored=stored, on_done=on_done)
+        return cases_of(one, n, workers=workers, kept=kept, stored=stored, on_done=on_done)
 
     def _stored(self, seed: int, number: int) -> str:
-        return f"{self.kept_as or self.name}-{seed}-{number}"
+        return f"{self.name}-{seed}-{number}"
 
 
 def cases_of(

@@ -66,7 +66,7 @@ CARRIED: Final[Mapping[Carries, _Row]] = MappingProxyType(
         Carries.MIXED: _Row(LoadExtent(0.9, 0.3, 0.9, 0.35), is_of_floor=True),  # and as many compact loads
     }
 )
-"""Chosen from the dimensions of such goods; `benchmarks.accuracy budget` measures the effect of each row."""
+"""Chosen from the dimensions of such goods."""
 
 HABIT_PART: Final = 0.5  # chosen: part of the variance of log s that all loads of one vehicle share
 

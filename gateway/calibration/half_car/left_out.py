@@ -21,7 +21,7 @@ from gateway.records import F64, Why
 USUAL_PAYLOAD_SHARE: Final = 0.004  # of the empty mass, see below
 USUAL_FRONT_SHARE_PCT: Final = 0.1  # likewise
 USUAL_CG_LEFT_M: Final = 0.005
-"""Model errors of simulated vans that serve no other purpose (`benchmarks.accuracy budget`). That of the place is most
+"""Model errors of simulated vans that serve no other purpose. That of the place is most
 of all an error of the empty vehicle's middle, which runs that are left out have in common and do not show: four vans
 whose middle is on the centre line were calibrated with 1 to 19 mm.
 """
@@ -74,7 +74,7 @@ UNTESTED_MISFITS: Final = 3.0
 worse. Chosen.
 """
 SCORE_MARGIN: Final = 1.5
-"""For other roads and loads than those of calibration. Chosen; `benchmarks.accuracy sensitivity` shows their effect."""
+"""For other roads and loads than those of calibration. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

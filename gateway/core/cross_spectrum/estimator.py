@@ -40,7 +40,7 @@ COHERENCE_BAND_HZ: Final = (1.4, 4.5)  # chosen: where heave and pitch of the bo
 LEAST_COHERENCE: Final = 0.2  # chosen: mean over that band
 LEAST_POWER_SHARE: Final = 0.05  # chosen: of the calibrated amplitude
 MOST_PAYLOAD_STD_SHARE: Final = 0.15  # chosen: of the empty mass; wider is no answer
-# chosen, both; `benchmarks.accuracy sensitivity` tells what hangs on them
+# chosen, both
 UNSEEN_SPEED_SCALE: Final = 0.5  # the natural logarithm of a speed ratio over which model error doubles its variance
 UNSEEN_ROUGHNESS_SCALE: Final = 0.5  # likewise of a ratio of accelerations: friction damps more where less moves
 UNSEEN_PLACE_PART: Final = 0.2

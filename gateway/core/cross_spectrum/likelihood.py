@@ -29,7 +29,7 @@ from gateway.core.vehicle import Load
 from gateway.records import C128, F64
 
 EFFECTIVE_SHARE: Final = 0.5  # chosen: neighbouring Hann bins and half-overlapping segments are correlated
-ROAD_RIPPLE: Final = 0.3  # standard deviation of log s about its line; chosen (`benchmarks.accuracy sensitivity`)
+ROAD_RIPPLE: Final = 0.3  # standard deviation of log s about its line; chosen
 ROAD_SLOPE_STD: Final = 0.3  # chosen: of the line's slope
 MOST_KEPT: Final = 48  # chosen: curvatures kept; a load under eight shapes needs about thirty
 EVIDENCE_WEIGHT: Final = 0.2  # chosen likewise: minutes of driving repeat the same model error

@@ -23,7 +23,7 @@ a wheelbase of 2.8 m.
 """
 EVIDENCE: Final = 0.5
 """Weight of a batch's evidence against calibration and nature, 1 being its statistical weight.
-Chosen on simulated vans that serve no other purpose (`benchmarks.accuracy budget`).
+Chosen on simulated vans that serve no other purpose.
 """
 EVIDENCE_WITHOUT_ROLL: Final = 0.2  # chosen: the same for a sensor that reads roll as heave; as in calibration
 SHAPE_EVIDENCE: Final = 2.0  # chosen likewise: its factor for shapes, with Student's tail
