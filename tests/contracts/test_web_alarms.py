@@ -60,22 +60,6 @@ def test_what_stands_and_what_stood(alarmed: Alarmed) -> None:
     ]
 
 
-def test_the_cursor_leads_through_the_history(alarmed: Alarmed) -> None:
-    for n in range(1, 12):
-        alarmed.bench.weigh(of_load(n, OVER if n % 2 == 0 else 100.0, n_batches=2))
-    client, found, cursor = Client(alarmed.app), [], ""
-    while cursor is not None:
-        page = client.get(f"{URL}?limit=2{cursor and f'&cursor={cursor}'}").json()
-        found += [one["id"] for one in page["items"]]
-        cursor = page["next_cursor"]
-    assert len(found) == len(set(found)) == 6
-
-
-@pytest.mark.parametrize("question", ["cursor=nonsense", "limit=0", "since=when", "colour=red"])
-def test_wrong_questions_are_refused(alarmed: Alarmed, question: str) -> None:
-    assert Client(alarmed.app).get(f"{URL}?{question}").status_code == 422
-
-
 def test_metrics_name_every_alarm_that_is_watched(alarmed: Alarmed) -> None:
     text = Client(alarmed.app).get("/metrics").text
     assert 'springscale_alarm{alarm="overload.gross"} 1.0' in text

@@ -1,7 +1,6 @@
 """The table of an archive: what an estimate says, column by column, and only what receipts vouch for."""
 
 import io
-import json
 import sys
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -104,7 +103,3 @@ def test_what_a_vehicle_lacks_is_told_with_how_to_get_it(monkeypatch: pytest.Mon
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(ConfigurationError, match=r"pip install 'springscale\[archive\]'"):
         parquet_of([])
-
-
-def test_a_receipt_is_json_for_people() -> None:
-    assert json.loads(text_of({"job": "a"})) == {"format": "springscale-receipt", "version": 1, "job": "a"}

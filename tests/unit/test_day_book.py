@@ -12,7 +12,6 @@ from support.patience import PATIENCE_S
 from gateway.core.change import Rules
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
-from gateway.history import ENTRIES
 from gateway.service.batch_log import LoadEventLog
 from gateway.setup import load_setup
 from gateway.store import Store
@@ -48,12 +47,3 @@ def test_a_restart_after_the_clock_was_put_back_doubles_and_forgets_nothing(tmp_
     run(tmp_path, whole[:cut])
     stored = run(tmp_path, whole[cut:])
     assert stored == {entry.id: entry.record for entry in told(whole, Rules()).values()}
-
-
-def test_what_was_told_is_sent_to_whoever_listens(tmp_path: Path) -> None:
-    with closing(Store.open(tmp_path)) as store:
-        book = LoadEventLog(load_setup("springscale:reference"), store)
-        for one in WHOLE:
-            book(one)
-        sent = store.follow(ENTRIES, None, lambda: None).read(1000)
-    assert {record.kind for record in sent} == {"event", "trip"}

@@ -7,14 +7,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.fleet import DAY_S, MONDAY_S, row, week, write_table
 
 from gateway.archive import place_of
-from gateway.archive.fleet.batches import DRIFTING, Batches, read_batches
+from gateway.archive.fleet.batches import Batches, read_batches
 from gateway.archive.fleet.sensors import Health, Share, troubles_of
 from gateway.archive.fleet.weeks import monday_of, weeks_of
 from gateway.estimate import Z95
@@ -104,14 +103,6 @@ def test_weeks_are_counted_as_by_hand(rows: list[dict[str, Any]]) -> None:
         assert {cause: weeks.n_refused_by[cause][k] for cause in Cause} == told["causes"]
 
 
-def test_what_nobody_knows_stays_unknown() -> None:
-    weeks = weeks_of(batches_of(week(0, 3, "too_slow")))
-    assert weeks.n.tolist() == [3]
-    assert weeks.n_answered.tolist() == [0]
-    assert np.isnan([weeks.payload_mean_kg[0], weeks.payload_low_kg[0], weeks.payload_upper_quartile_kg[0]]).all()
-    assert all(np.isnan(weeks.medians[name]).all() for name in DRIFTING)
-
-
 def test_a_batch_that_tells_the_share_alone_takes_the_mean_from_no_week() -> None:
     told = row(MONDAY_S + 3600.0, payload_kg=200.0, payload_std_kg=10.0, payload_own_std_kg=None)
     share_alone = row(MONDAY_S + 7200.0, payload_kg=None, payload_std_kg=None, payload_own_std_kg=None)
@@ -186,7 +177,3 @@ def test_only_reasons_of_the_sensors_are_troubles() -> None:
 )
 def test_the_interval_of_a_share_is_wilsons(n_bad: int, n: int, low: float, high: float) -> None:
     assert Share(n_bad, n).interval95 == pytest.approx((low, high), abs=1e-4)  # as R's binom.confint has them
-
-
-def test_nothing_driven_is_nothing_known() -> None:
-    assert Share(0, 0).interval95 == (0.0, 1.0)

@@ -51,13 +51,6 @@ def test_what_is_wanted_comes_in_order_and_once(store: Store, only: tuple[str, .
     assert drained(outbox(store, *only), limit) == []  # as after a restart
 
 
-def test_estimates_too(store: Store) -> None:
-    tell(store, *MIXED)
-    found = drained(outbox(store, "estimate", "alarm"), 3)
-    assert [each for each in found if each.startswith("alarm")] == ["alarm-1-1", "alarm-2-1"]
-    assert len(found) == 6
-
-
 def test_what_nobody_wants_is_passed_over_on_disk_so_that_age_may_remove_it(store: Store) -> None:
     tell(store, *["estimate"] * 7, "trip-1")
     box = outbox(store, "alarm")

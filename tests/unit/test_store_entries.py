@@ -1,7 +1,6 @@
 """Load events and trips in the store: last revisions only, one row of numbers with the estimates, nothing lost."""
 
 import json
-import sqlite3
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from support.estimates import make_record
 from support.patience import PATIENCE_S
 
 from gateway.history import BATCHES
-from gateway.store import Retention, Store
+from gateway.store import Store
 from gateway.uplink.outbox import Outbox
 
 
@@ -77,23 +76,6 @@ def test_times_choose(store):
     assert revisions(store, since_ns=10, until_ns=30) == [("event-1-abc", 1), ("event-2-abc", 1)]
 
 
-@pytest.mark.parametrize("newest_first", [False, True])
-def test_a_broken_entry_does_not_end_the_pages(tmp_path, newest_first):
-    with closing(Store.open(tmp_path)) as store:
-        for n in range(7):
-            write(store, entry(n))
-        assert store.flush(PATIENCE_S)
-        with closing(sqlite3.connect(tmp_path / "springscale.db")) as connection, connection:
-            connection.execute("UPDATE journal SET text = '{' || text WHERE id = 'event-3-abc'")
-        seen, cursor = [], None
-        while True:
-            page = store.reader().entries(limit=2, cursor=cursor, newest_first=newest_first)
-            seen += [json.loads(text)["id"] for text in page.items]
-            if (cursor := page.next_cursor) is None:
-                break
-        assert sorted(seen) == [f"event-{n}-abc" for n in (0, 1, 2, 4, 5, 6)]
-
-
 def test_estimates_are_linked_past_the_entries_between(tmp_path):
     with closing(Store.open(tmp_path)) as store:
         first = store.write_estimate(make_record(0))
@@ -105,29 +87,6 @@ def test_estimates_are_linked_past_the_entries_between(tmp_path):
         follower.close()
         assert (one.cursor, other.cursor) == (first, second)
         assert other.previous == one.number
-
-
-def test_entries_outlive_a_restart_and_numbers_go_on(tmp_path):
-    with closing(Store.open(tmp_path)) as store:
-        store.write_estimate(make_record(0))
-        before = write(store, entry(1))
-    with closing(Store.open(tmp_path)) as store:
-        assert revisions(store) == [("event-1-abc", 1)]
-        after = write(store, entry(1, 2))
-        assert store.flush(PATIENCE_S)
-        assert int(after.partition("-")[2]) > int(before.partition("-")[2])
-        assert revisions(store) == [("event-1-abc", 2)]
-
-
-def test_retention_removes_them_for_their_age(tmp_path):
-    now = [1_800_000_000_000_000_000]
-    with closing(Store.open(tmp_path, Retention(max_age_s=100.0), clock_ns=lambda: now[0])) as store:
-        write(store, entry(1))
-        assert store.flush(PATIENCE_S)
-        now[0] += 200_000_000_000
-        write(store, entry(2))
-        assert store.flush(PATIENCE_S)
-        assert revisions(store) == [("event-2-abc", 1)]
 
 
 @pytest.mark.parametrize("with_places", [False, True])
@@ -148,16 +107,3 @@ def test_the_outbox_hands_out_both_in_order_and_positions_only_where_asked(tmp_p
         outbox.delivered(letters[1])
         outbox.rewind()
         assert [one.id for one in outbox.next_messages(100)] == [one.id for one in letters[2:]]
-
-
-def test_small_pages_of_the_outbox_lose_nothing(tmp_path):
-    with closing(Store.open(tmp_path)) as store:
-        for n in range(7):
-            store.write_estimate(make_record(n))
-            for k in range(n % 3):
-                write(store, entry(10 * n + k))
-        assert store.flush(PATIENCE_S)
-        outbox, ids = Outbox(store, "there"), []
-        while letters := outbox.next_messages(2):
-            ids += [one.id for one in letters]
-        assert len(ids) == len(set(ids)) == 7 + 6

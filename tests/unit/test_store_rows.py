@@ -11,7 +11,6 @@ from support.patience import PATIENCE_S
 from gateway.errors import StoreError
 from gateway.history import SERVICE
 from gateway.records import Why
-from gateway.status import StoreState
 from gateway.store import Retention, Store
 from gateway.units import NS_PER_S
 
@@ -34,12 +33,6 @@ def test_the_same_estimate_twice_is_one_row(store: Store) -> None:
     assert store.reader().estimates().items == texts(make_record(1), make_record(2))
     assert store.health().n_duplicates == 1
     assert store.health().n_written == 2
-
-
-def test_a_cursor_of_write_goes_on_behind_that_row(store: Store) -> None:
-    cursors = write(store, *(make_record(n) for n in range(4)))
-    assert store.reader().estimates(cursor=cursors[1]).items == texts(make_record(2), make_record(3))
-    assert store.reader().estimates(cursor=cursors[3]).items == ()
 
 
 def test_pages_follow_one_another_in_both_directions(store: Store) -> None:
@@ -173,9 +166,3 @@ def test_the_oldest_go_when_the_size_is_reached(tmp_path: Path) -> None:
 def test_a_store_that_cannot_hold_anything_is_refused() -> None:
     with pytest.raises(StoreError, match="max_bytes at least"):
         Retention(max_bytes=10)
-
-
-def test_health_of_a_fresh_store(store: Store) -> None:
-    health = store.health()
-    assert (health.state, health.reason, health.n_written, health.n_held) == (StoreState.OK, None, 0, 0)
-    assert store.is_alive()
