@@ -1,8 +1,12 @@
 """The demonstration: simulator, bus, service, database, and what it tells of a load it was not told."""
 
 import json
+import sys
 
-from support.commands import run
+import pytest
+from support.commands import called, run
+
+from gateway.errors import ConfigurationError
 
 
 def test_the_demo_weighs_the_van_before_and_after_loading() -> None:
@@ -28,3 +32,12 @@ def test_a_fleet_is_shown_by_one_command() -> None:
     assert "gross" in heavy["over"]
     assert [(alarm["kind"], alarm["where"]) for alarm in heavy["alarms"]] == [("overload", "gross")]
     assert heavy["used_share"] > 1.0 > light["used_share"] > 0.0
+
+
+def test_a_fleet_wants_its_extra_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.startswith(("gateway.fleet", "gateway.cli.demo_fleet"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "sqlalchemy", None)
+    found = called("demo", "--fleet", "1", "--once")
+    assert isinstance(found.exception, ConfigurationError)
+    assert "pip install 'springscale[fleet]'" in str(found.exception)
