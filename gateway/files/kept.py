@@ -1,7 +1,7 @@
-"""Files in the service's own directory, accessed through its file descriptor without following links.
+"""Files in the service's own directory: whole or not at all, and no link, pipe or device in place of one.
 
-The service account may be compromised, and root works in the directory too (`sudo springscale token create`). So a
-link, a pipe or a device is never opened, new files are created exclusively, and root first becomes the owner.
+The service account may be compromised, and root works in the directory too (`sudo springscale token create`): root
+first becomes the owner of the directory.
 """
 
 import errno
@@ -11,10 +11,10 @@ import os
 import stat
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import Final
 
 MOST_BYTES: Final = 16_000_000  # chosen: many times a file of known weights or a campaign
 LOCK_TIMEOUT_S: Final = 10.0  # chosen: many times what a writer holds it
@@ -29,8 +29,16 @@ class KeptFiles:
 
     def read(self, name: str) -> bytes:
         """The content of a plain file. Raises FileNotFoundError if there is none."""
-        with opened_folder(self.directory) as folder, open_plain(folder, name) as opened:
-            content = opened.read(MOST_BYTES + 1)
+        flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+        try:
+            opened = os.open(self.directory / name, flags)
+        except OSError as fault:
+            raise type(fault)(fault.errno, fault.strerror, name) from None
+        if not stat.S_ISREG(os.fstat(opened).st_mode):
+            os.close(opened)
+            raise OSError(errno.EINVAL, "is no plain file", name)
+        with os.fdopen(opened, "rb") as file:
+            content = file.read(MOST_BYTES + 1)
         if len(content) > MOST_BYTES:
             raise OSError(errno.EFBIG, f"is longer than {MOST_BYTES} bytes", name)
         return content
@@ -38,27 +46,24 @@ class KeptFiles:
     def write(self, name: str, content: bytes) -> None:
         """Replace the file in one step, readable by its owner alone; on disk when this returns."""
         self.directory.mkdir(parents=True, exist_ok=True)
-        fresh = f".{name}.new"
-        with opened_folder(self.directory) as folder:
-            with suppress(FileNotFoundError):  # left by a kill
-                os.unlink(fresh, dir_fd=folder)
-            with create_plain(folder, fresh, 0o600) as file:
-                if os.geteuid() == 0:  # the file is new, so nobody else owns it
-                    owner = os.fstat(folder)
-                    os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
-                write_all(file, content)
-                os.fsync(file.fileno())
-            os.rename(fresh, name, src_dir_fd=folder, dst_dir_fd=folder)
+        fresh = self.directory / f".{name}.new"
+        fresh.unlink(missing_ok=True)  # left by a kill
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+        with os.fdopen(os.open(fresh, flags, 0o600), "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        fresh.rename(self.directory / name)
+        with _opened(self.directory) as folder:
             os.fsync(folder)  # so that the new name survives a power cut
 
     def set_aside(self, name: str) -> str:
         """Rename whatever is at ``name`` -> the new name."""
-        with opened_folder(self.directory) as folder:
-            stem = f"{name}.broken-{datetime.now(UTC):%Y%m%dT%H%M%S}"
-            taken = _names(folder)
-            aside = next(one for n in itertools.count() if (one := f"{stem}-{n}" if n else stem) not in taken)
-            os.rename(name, aside, src_dir_fd=folder, dst_dir_fd=folder)
-            return aside
+        stem = f"{name}.broken-{datetime.now(UTC):%Y%m%dT%H%M%S}"
+        names = (f"{stem}-{n}" if n else stem for n in itertools.count())
+        aside = next(one for one in names if not os.path.lexists(self.directory / one))
+        (self.directory / name).rename(self.directory / aside)
+        return aside
 
     def stamp(self, name: str) -> tuple[int, int, int] | None:
         """Inode, time and size of the file, which change with its content; None if there is no file."""
@@ -73,7 +78,7 @@ class KeptFiles:
         """Hold the lock of this directory among processes. Raises TimeoutError if another process keeps it."""
         self.directory.mkdir(parents=True, exist_ok=True)
         end_s = time.monotonic() + LOCK_TIMEOUT_S
-        with opened_folder(self.directory) as folder:
+        with _opened(self.directory) as folder:
             while True:
                 try:
                     fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -86,40 +91,13 @@ class KeptFiles:
 
 
 @contextmanager
-def opened_folder(directory: Path) -> Iterator[int]:
-    """File descriptor of a directory, independent of later changes to its path. Raises OSError."""
+def _opened(directory: Path) -> Iterator[int]:
+    """The file descriptor of a directory. Raises OSError."""
     folder = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         yield folder
     finally:
         os.close(folder)
-
-
-def open_plain(folder: int, name: str) -> BinaryIO:
-    """A plain file in an open directory; no link is followed. Raises OSError, FileNotFoundError if there is none."""
-    file = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
-    if not stat.S_ISREG(os.fstat(file).st_mode):
-        os.close(file)
-        raise OSError(errno.EINVAL, "is no plain file", name)
-    return os.fdopen(file, "rb")
-
-
-def create_plain(folder: int, name: str, mode: int) -> BinaryIO:
-    """A new file in an open directory, unbuffered. Raises OSError, also if the name exists already."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-    return os.fdopen(os.open(name, flags, mode, dir_fd=folder), "wb", buffering=0)
-
-
-def write_all(file: BinaryIO, content: bytes) -> None:
-    """Write the whole content, since an unbuffered file may write less at a time. Raises OSError."""
-    rest = memoryview(content)
-    while rest:
-        rest = rest[file.write(rest) :]
-
-
-def _names(folder: int) -> set[str]:
-    with os.scandir(folder) as entries:
-        return {entry.name for entry in entries}
 
 
 def become_owner_of(directory: Path) -> None:
