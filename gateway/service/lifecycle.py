@@ -26,7 +26,7 @@ def startable_faults(settings: Settings, signal_map: SignalMap) -> Iterator[str]
     yield from _store_that_cannot_be_written(settings.store.directory)
     lacking = what_lacks(settings.bus.interface)
     if lacking is not None:
-        yield lacking
+        yield f"[bus] {lacking}"
     try:
         has_tls = tls_of(settings) is not None
         refuse_open_address(settings.web.host, has_tokens=_has_tokens(settings), has_tls=has_tls)

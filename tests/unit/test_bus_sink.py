@@ -148,3 +148,10 @@ def test_a_channel_that_is_missing_is_explained_as_the_service_explains_it(monke
     monkeypatch.setattr(can, "Bus", missing)
     with pytest.raises(BusError, match=r"cannot send on socketcan vcan9: the interface does not exist"):
         BusSink("socketcan", "vcan9")
+
+
+def test_an_unknown_interface_of_a_command_blames_no_setting():
+    """`springscale replay --interface x` blamed [bus], which it does not read."""
+    with pytest.raises(BusError, match="interface 'x' is unknown; known are ") as refused:
+        BusSink("x", "can0")
+    assert "[bus]" not in str(refused.value)

@@ -57,7 +57,7 @@ NOWHERE = ("--url", "http://127.0.0.1:9")
         ("calibration", "sprung", "--rear-axle-kg", "700", "--front-axle-kg"),
         ("commission", "start", *NOWHERE, "--sensor-m"),
         ("demo", "--once", "--speed"),
-        ("record", "bus", "a.log", "--signals", "x", "--interface", "virtual", "--channel", "x", "--for-s"),
+        ("record", "a.log", "--signals", "x", "--interface", "virtual", "--channel", "x", "--for-s"),
         ("simulate", "campaign", "paper", "somewhere", "--longest-s"),
     ],
 )

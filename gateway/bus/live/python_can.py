@@ -96,7 +96,7 @@ class PythonCanReceiver:
         except (ValueError, LookupError) as fault:
             # python-can's parsers raise whatever int() or an index raises on noise
             self._fault = can.CanOperationError(
-                f"what the adapter sends cannot be read ({fault}): check its cable and its speed ([bus] options)"
+                f"what the adapter sends cannot be read ({fault}): check its cable and its speed"
             )
         if self._fault is not None and not messages:
             raise self._fault
@@ -136,7 +136,7 @@ def open_python_can(
     except can.CanInterfaceNotImplementedError as fault:
         raise BusError(f"interface {interface!r} cannot be used here: {fault}; is its driver installed?") from fault
     except (TypeError, ValueError) as fault:
-        raise BusError(f"interface {interface!r} does not take these [bus] options: {fault}") from fault
+        raise BusError(f"interface {interface!r} does not take these options: {fault}") from fault
     if interface != "socketcan":
         return PythonCanReceiver(bus, width)
     kernel_socket: socket.socket = bus.socket  # type: ignore[attr-defined] # of SocketcanBus
@@ -173,14 +173,14 @@ def what_lacks(interface: str) -> str | None:
     Drivers of adapters are not checked: only opening the channel would show that.
     """
     if interface not in can.VALID_INTERFACES:
-        return f"[bus] interface {interface!r} is unknown; known are {', '.join(sorted(can.VALID_INTERFACES))}"
+        return f"interface {interface!r} is unknown; known are {', '.join(sorted(can.VALID_INTERFACES))}"
     module, package = _PACKAGES.get(interface, ("can", "python-can"))
     if interface in _WINDOWS_ONLY and sys.platform != "win32":
-        return f"[bus] interface {interface!r} exists on Windows only; choose another"
+        return f"interface {interface!r} exists on Windows only; choose another"
     if interface == "socketcan" and not hasattr(socket, "AF_CAN"):
-        return "[bus] interface 'socketcan' exists on Linux only; choose another"
+        return "interface 'socketcan' exists on Linux only; choose another"
     if importlib.util.find_spec(module) is None:
-        return f"[bus] interface {interface!r} needs the Python package {package}: pip install {package}"
+        return f"interface {interface!r} needs the Python package {package}: pip install {package}"
     return None
 
 
