@@ -29,7 +29,7 @@ TOLD_EVERY_S: Final = 5.0  # chosen: between two lines of progress
 )
 @click.option("--scheduler", default=None, help="address of a Dask scheduler, tcp://HOST:PORT [default: this computer]")
 @click.option("--workers", type=click.IntRange(1), default=None, help="processes on this computer [default: its cores]")
-@click.option("--dry-run", is_flag=True, help="print how much there is and how long it will take; write nothing")
+@click.option("--dry-run", is_flag=True, help="print how much there is to do; write nothing")
 @click.option("--keep-going", is_flag=True, help="end with 0 although logs could not be read or jobs failed")
 @click.option("--retry-failed", is_flag=True, help="also try those jobs again that gave no result")
 @as_json
@@ -51,14 +51,13 @@ def reprocess(
     if scheduler is not None and workers is not None:
         raise click.UsageError("give --scheduler ADDRESS or --workers N, not both")
     dataset, manifest = place_of(output), load_manifest(archive)
-    with local_workers(workers) if scheduler is None else workers_of(scheduler) as at_work:
-        if dry_run:
-            ahead = forecast(look(manifest, dataset), at_work.n_workers)
-            click.echo(json_line(ahead.to_json()) if as_json else forecast_in_words(ahead))
-            return
-        with StatusLine() as line:
-            tell = _Progress() if as_json else lambda progress: line.show(how_far(progress))
-            summary = reprocess_archive(manifest, dataset, at_work, tell, retry_failed=retry_failed)
+    if dry_run:
+        ahead = forecast(look(manifest, dataset))
+        click.echo(json_line(asdict(ahead)) if as_json else forecast_in_words(ahead))
+        return
+    with local_workers(workers) if scheduler is None else workers_of(scheduler) as at_work, StatusLine() as line:
+        tell = _Progress() if as_json else lambda progress: line.show(how_far(progress))
+        summary = reprocess_archive(manifest, dataset, at_work, tell, retry_failed=retry_failed)
     click.echo(json_line(summary.to_json()) if as_json else summary_in_words(summary, output))
     if not (summary.is_good or (keep_going and not summary.lost)):
         sys.exit(1)
@@ -90,20 +89,14 @@ def how_far(progress: Progress) -> str:
 
 def forecast_in_words(ahead: Forecast) -> str:
     lines = [
-        f"{counted(ahead.n_vehicles, 'vehicle')}, {counted(ahead.n_logs, 'log')}, {size(ahead.size)}",
+        f"{counted(ahead.n_vehicles, 'vehicle')}, {counted(ahead.n_logs, 'log')}, {size(ahead.bytes)}",
         f"{counted(ahead.n_jobs, 'job')}: {ahead.n_done} done, {ahead.n_failed} failed before, "
         f"{ahead.n_jobs - ahead.n_done - ahead.n_failed} to do",
     ]
     if ahead.n_new_logs:
         new = counted(ahead.n_new_logs, "log")
         lines.append(f"not scanned yet: {new}; the scan shows their jobs")
-    lines.append(f"to read: {size(ahead.size_to_do)}")
-    if ahead.rate is not None and ahead.remaining_s is not None and ahead.size_to_do:
-        source = "as earlier jobs went" if ahead.is_timed_before else "as one log went just now"
-        lines.append(
-            f"about {duration(ahead.remaining_s)} on {counted(ahead.n_workers, 'worker')}, "
-            f"each reading {size(ahead.rate)}/s ({source})"
-        )
+    lines.append(f"to read: {size(ahead.bytes_to_do)}")
     return "\n".join(lines)
 
 

@@ -4,7 +4,6 @@ clock that is put right, change it."""
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -221,20 +220,6 @@ def test_a_delivery_after_it_is_told_as_without_it(ahead_min):
     assert found["stops"]
 
 
-def test_a_delivery_after_it_is_told_with_the_first_batch_that_weighs_it():
-    whole = put_right(400.0, 400.0, 220.0, ahead=4, batches=4)
-    assert min(n for n, entry in told_with(whole) if entry.kind == "event") == 8
-
-
-def test_the_stop_after_it_counts_as_likely_as_without_it():
-    """A change as small as this is told for the door that opened; rolling it would be noise."""
-    legs = {"batches": 2, "door": True}
-    (expected,) = changes(day(300.0, 300.0, 264.0, **legs))
-    (found,) = changes(put_right(300.0, 300.0, 264.0, ahead=2, **legs))
-    assert [stop["door_opened"] for stop in found["stops"]] == [True]
-    assert (found["t_start"], found["t_end"]) == (expected["t_start"], expected["t_end"])
-
-
 def test_trips_before_and_after_it_are_told_and_all_but_the_last_are_over():
     found = trips(put_right(300.0, 300.0, 300.0, ahead=1))
     assert [trip["is_over"] for trip in found] == [True, True, False]
@@ -281,21 +266,6 @@ def test_what_is_old_stays_as_it_was_told_whatever_the_clock_did(monkeypatch):
     assert len({entry.id for _, entry in revisions}) == 1
     assert max(n for n, _ in revisions) <= 31
     assert not revisions[-1][1].record["is_withdrawn"]
-
-
-def test_put_right_at_a_stop_the_door_that_opened_is_of_that_stop():
-    first, second = put_right(300.0, 264.0, ahead=1)
-    second = replace(second, way=replace(second.way, before=Watched(True, None)))
-    (found,) = changes([first, second])
-    assert [stop["door_opened"] for stop in found["stops"]] == [True]
-
-
-def test_revisions_rise_by_one_each():
-    found: dict[str, list[int]] = {}
-    for _, entry in told_with(put_right(0.0, 500.0, 320.0, 200.0, ahead=4, batches=3)):
-        found.setdefault(entry.id, []).append(entry.revision)
-    assert len(found) > 3
-    assert all(other == one + 1 for revisions in found.values() for one, other in pairwise(revisions))
 
 
 def test_a_trip_adds_up_what_was_carried():

@@ -149,15 +149,3 @@ def test_without_it_nothing_that_was_delivered_comes_again(six: Store, clock: Cl
     delivered(outbox, 4, clock)
     outbox.rewind()
     assert [letter.id for letter in outbox.next_messages(9)] == IDS[4:]
-
-
-def test_a_replaced_database_is_not_asked_for_the_old_ones_places(six: Store, clock: Clock, tmp_path: Path) -> None:
-    outbox = Outbox(six, "fleet", repeat_s=10.0)
-    delivered(outbox, 4, clock)
-    another = Store.open(tmp_path / "another")
-    another.write_estimate(make_record(9))
-    assert another.flush(PATIENCE_S)
-    outbox._journal, outbox._follower = another, another.follow(outbox._kinds, outbox._follower.place, lambda: None)
-    outbox.rewind()
-    assert [letter.id for letter in outbox.next_messages(9)] == [make_record(9)["id"]]
-    another.close()
