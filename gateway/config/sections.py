@@ -83,7 +83,7 @@ class UplinkSection(SettingsSection):
 
     host: str | None = Field(None, min_length=1, description="the broker; without it nothing is forwarded")
     port: int | None = Field(None, ge=1, le=65535, description="its port [default: 8883 with TLS, 1883 without]")
-    tls: bool = Field(True, description="encrypted, the broker's certificate checked")
+    tls: bool = Field(True, description="encrypted, the broker's certificate checked; without it on this machine alone")
     ca: Path | None = Field(
         None, description="PEM file of the authority that signed the broker's certificate [default: the system's]"
     )
@@ -119,8 +119,8 @@ class UplinkSection(SettingsSection):
             raise ValueError("certificate and key belong together: give both or neither")
         if self.password_file is not None and self.username is None:
             raise ValueError("password_file needs username")
-        if self.password_file is not None and not self.tls and self.host not in _LOCAL:
-            raise ValueError("a password would cross the network in the clear: set tls = true")
+        if self.host is not None and not self.tls and self.host not in _LOCAL:
+            raise ValueError("estimates would cross the network in the clear: set tls = true")
         return self
 
 

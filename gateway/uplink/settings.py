@@ -13,8 +13,6 @@ from gateway.config import VehicleSection
 from gateway.config.sections import UplinkSection, WebhookSection
 from gateway.errors import ConfigurationError
 
-MOST_NAME_BYTES: Final = 65_535  # MQTT 5, 1.5.4: the length has two bytes
-
 
 class UplinkSettings(UplinkSection):
     """A broker and how to reach it: the section with its open choices made for this vehicle.
@@ -59,11 +57,9 @@ class UplinkSettings(UplinkSection):
         if self.password_file is None:
             return None
         try:
-            password = self.password_file.read_text(encoding="utf-8").strip()
+            return self.password_file.read_text(encoding="utf-8").strip()
         except (OSError, UnicodeDecodeError) as fault:
             raise ConfigurationError(f"[uplink] password_file {self.password_file} cannot be read: {fault}") from None
-        _check_name("password_file's password", password)
-        return password
 
 
 def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSettings | None:
@@ -89,9 +85,6 @@ def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSe
         raise ConfigurationError(
             f"[uplink] home_assistant {section.home_assistant!r}: MQTT allows no +, # or NUL there"
         )
-    names = {"topic": f"{topic}/estimates", "client_id": settings.client_id, "username": settings.username}
-    for name, text in names.items():
-        _check_name(name, text)
     settings.tls_context()  # a wrong file is reported at the start
     settings.password()
     require_own_id("[uplink] host", vehicle, "two of them would cut each other's link")
@@ -105,16 +98,6 @@ def require_own_id(key: str, vehicle: VehicleSection, why: str) -> None:
             f"{key} is set, but [vehicle] id is {vehicle.id!r}, that of every vehicle that was given none: "
             f"{why}; set [vehicle] id to a name of its own"
         )
-
-
-def _check_name(name: str, text: str | None) -> None:
-    """MQTT writes the length of a name in two bytes, and the name in UTF-8 (MQTT 5, 1.5.4)."""
-    try:
-        n_bytes = len((text or "").encode())
-    except UnicodeEncodeError:
-        raise ConfigurationError(f"[uplink] {name} is no text that UTF-8 can hold") from None
-    if n_bytes > MOST_NAME_BYTES:
-        raise ConfigurationError(f"[uplink] {name} has {n_bytes} bytes, MQTT allows {MOST_NAME_BYTES}: make it shorter")
 
 
 HOW_TO_MAKE_ONE = 'echo "whsec_$(openssl rand -base64 32)" > FILE'

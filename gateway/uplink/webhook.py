@@ -13,7 +13,6 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from email.utils import parsedate_to_datetime
 from importlib.metadata import version
 from typing import Any, Final
 
@@ -57,16 +56,10 @@ def body_of(message: OutboxMessage) -> bytes:
     return json_line({"type": message.kind, "timestamp": happened, "data": record}).encode()
 
 
-def pause_of(retry_after: str | None, now_s: float) -> float:
-    """Pause of a Retry-After header, given in seconds or as a date (RFC 9110, 10.2.3); 0 if it cannot be read."""
-    try:
-        wait_s = float(int(retry_after or "0"))
-    except ValueError:
-        try:
-            wait_s = parsedate_to_datetime(retry_after or "").timestamp() - now_s
-        except (ValueError, OverflowError):  # a year or a zone that no machine number holds
-            return 0.0
-    return min(max(wait_s, 0.0), MOST_PAUSE_S)
+def pause_of(retry_after: str | None) -> float:
+    """Pause of a Retry-After header in seconds (RFC 9110, 10.2.3); 0 if there is none, or a date."""
+    told = (retry_after or "").strip()
+    return min(float(told), MOST_PAUSE_S) if told.isdecimal() else 0.0
 
 
 class Webhook(Forwarder[WebhookStatus]):
@@ -150,7 +143,7 @@ class Webhook(Forwarder[WebhookStatus]):
             client.stream("POST", s.url, content=body, headers=headers) as answer,  # redirections are not followed
         ):
             told = f"{s.receiver} answered {answer.status_code} {answer.reason_phrase}".rstrip()
-            return answer.status_code, told, pause_of(answer.headers.get("Retry-After"), time.time())
+            return answer.status_code, told, pause_of(answer.headers.get("Retry-After"))
 
     def _bury(self, message: OutboxMessage, reason: str) -> None:
         """Give up on the message; it stays in the history of the vehicle."""

@@ -266,20 +266,6 @@ def test_a_setting_that_cannot_work_is_told_at_the_start(section: dict[str, Any]
         uplink_settings(UplinkSection(**section), VehicleSection(id="van-17"))
 
 
-@pytest.mark.parametrize("key", ["topic", "client_id", "username"])
-@pytest.mark.parametrize(("text", "said"), [("x" * 65_536, "MQTT allows 65535"), ("\udc00", "UTF-8")])
-def test_a_name_that_mqtt_cannot_write_is_refused(key: str, text: str, said: str) -> None:
-    with pytest.raises(ConfigurationError, match=rf"{key} .*{said}"):
-        uplink_settings(UplinkSection.model_construct(**{**KNOWN, key: text}), VehicleSection(id="van-17"))
-
-
-def test_a_password_that_mqtt_cannot_write_is_told(tmp_path: Path) -> None:
-    (tmp_path / "secret").write_text("x" * 65_536)
-    section = UplinkSection(host="b", username="van", password_file=tmp_path / "secret")
-    with pytest.raises(ConfigurationError, match=r"password .*MQTT allows 65535"):
-        uplink_settings(section, VehicleSection(id="van-17"))
-
-
 def test_a_vehicle_without_a_name_of_its_own_is_given_no_uplink() -> None:
     for vehicle in (VehicleSection(), VehicleSection(id="vehicle")):
         with pytest.raises(ConfigurationError, match=r"set \[vehicle\] id"):
@@ -291,7 +277,7 @@ def test_a_vehicle_without_a_name_of_its_own_is_given_no_uplink() -> None:
     [
         ({"host": "b", "key": "k.pem"}, "belong together"),
         ({"host": "b", "password_file": "p"}, "needs username"),
-        ({"host": "b", "username": "u", "password_file": "p", "tls": False}, "in the clear"),
+        ({"host": "b", "tls": False}, "in the clear"),
     ],
 )
 def test_settings_that_contradict_each_other_are_refused(section: dict[str, Any], said: str) -> None:
