@@ -1,19 +1,14 @@
 """Requests of commands to a running service: address, token, certificates, and its error messages."""
 
 import functools
-import json
 import ssl
-import urllib.error
-import urllib.request
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
-from http.client import HTTPException, HTTPResponse
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final
 
 import click
+import httpx
 
 from gateway.cli.options import FILE, Told, config, prints
 from gateway.config import load_settings
@@ -51,42 +46,37 @@ class Service:
 
     def ask(self, path: str, method: str = "GET", body: Mapping[str, Any] | None = None) -> Answer:
         """The service's answer as JSON. Raises SpringscaleError with its message if it refuses or cannot be reached."""
-        content = None if body is None else json_line(body).encode()
-        with self.opened(path, method, content) as answer:
-            text, kind = answer.read(), answer.headers.get("content-type", "nothing that has a name")
+        answer = self._answer(path, method, body)
         try:
-            record: Answer = json.loads(text)
+            record: Answer = answer.json()
         except ValueError:
+            kind = answer.headers.get("content-type", "something")
             raise SpringscaleError(
-                f"{self.address(path)}: answered with {kind} in place of JSON: is a proxy or another program there?"
+                f"{answer.url}: answered with {kind} in place of JSON: is a proxy or another program there?"
             ) from None
         return record
 
-    @contextmanager
-    def opened(
-        self,
-        path: str,
-        method: str = "GET",
-        content: bytes | None = None,
-        more: Mapping[str, str] = MappingProxyType({}),
-    ) -> Iterator[HTTPResponse]:
-        """The answer as a stream; ``more`` are headers. Raises as ``ask`` does, also during reading."""
-        address = self.address(path)
-        headers = {"Accept": "application/json, */*;q=0.5", "Content-Type": "application/json", **more}
-        if self.token:
-            headers["Authorization"] = f"Bearer {self.token}"
-        opener = self._opener()
-        try:
-            request = urllib.request.Request(address, content, headers, method=method)
-            with opener.open(request, timeout=TIMEOUT_S) as answer:
-                yield answer
-        except urllib.error.HTTPError as refusal:
-            raise SpringscaleError(f"{address}: {_said(refusal)}") from None
-        except (OSError, ValueError, HTTPException) as fault:  # not reachable, not trusted, or not HTTP
-            raise SpringscaleError(f"{address}: cannot reach the service: {_why(fault)}") from None
+    def page(self, path: str) -> bytes:
+        """A page as the service sends it. Raises as ``ask`` does."""
+        return self._answer(path).content
 
-    def _opener(self) -> urllib.request.OpenerDirector:
-        """An opener without a proxy that checks certificates and sends the client certificate if there is one."""
+    def _answer(self, path: str, method: str = "GET", body: Mapping[str, Any] | None = None) -> httpx.Response:
+        address, context = self.address(path), self._context()
+        headers = {"accept": "application/json, */*;q=0.5", "content-type": "application/json"}
+        if self.token:
+            headers["authorization"] = f"Bearer {self.token}"
+        try:
+            content = None if body is None else json_line(body).encode()
+            with httpx.Client(verify=context, timeout=TIMEOUT_S, trust_env=False) as client:
+                answer = client.request(method, address, content=content, headers=headers)
+        except (httpx.HTTPError, httpx.InvalidURL, ValueError) as fault:  # not reachable, not trusted, or not HTTP
+            raise SpringscaleError(f"{address}: cannot reach the service: {_why(fault)}") from None
+        if answer.is_error:
+            raise SpringscaleError(f"{address}: {_said(answer)}")
+        return answer
+
+    def _context(self) -> ssl.SSLContext:
+        """Checks certificates, and shows the client certificate if there is one."""
         try:
             context = ssl.create_default_context(cafile=self.ca)
         except OSError as fault:
@@ -98,9 +88,7 @@ class Service:
                 context.load_cert_chain(self.certificate, self.key)
             except OSError as fault:  # ssl.SSLError is one
                 raise ConfigurationError(f"{self.certificate}: no certificate with its key: {fault}") from None
-        return urllib.request.build_opener(
-            urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=context)
-        )
+        return context
 
 
 def only_one(ids: Iterable[str], begin: str, what: str, command: str) -> str:
@@ -160,20 +148,19 @@ def _configured_address(config_path: Path) -> str:
     return f"{scheme}://{f'[{host}]' if ':' in host else host}:{web.port}"
 
 
-def _said(refusal: urllib.error.HTTPError) -> str:
+def _said(answer: httpx.Response) -> str:
     """Detail and reason of a problem; the status if something else answered."""
     try:
-        problem = json.load(refusal)
+        problem = answer.json()
         return f"{problem['detail']}" + (f" ({problem['reason']})" if problem.get("reason") else "")
     except (ValueError, KeyError, TypeError):
-        return f"answered {refusal.code} {refusal.reason}"
+        return f"answered {answer.status_code} {answer.reason_phrase}"
 
 
 def _why(fault: Exception) -> str:
-    reason = getattr(fault, "reason", fault)
-    if isinstance(reason, ConnectionRefusedError):
+    if isinstance(fault, httpx.ConnectError) and "refused" in str(fault):
         return (
             "nothing is listening there: is the service running? "
             "With a new calibration it restarts, which takes a few seconds"
         )
-    return str(reason)
+    return str(fault)

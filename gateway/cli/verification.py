@@ -77,8 +77,7 @@ def export(service: Service, record_id: str, output: Path) -> None:
     """Write one record as a page to print: RECORD_ID as `show` prints it, or its first letters."""
     ids = [entry["id"] for entry in service.ask(PATH)["history"]]
     found = only_one(ids, record_id, "records", "springscale verification show")
-    with service.opened(f"{PATH}/{found}") as answer:
-        page = answer.read()
+    page = service.page(f"{PATH}/{found}")
     with refusal_told(output, SpringscaleError), written_whole(output) as file:
         file.write(page)
     click.echo(f"{output}: record {found[:19]}")
