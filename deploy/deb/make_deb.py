@@ -1,7 +1,7 @@
 """Builds the Debian packages from the locked requirements, without root: `make deb`.
 
 springscale            what a vehicle needs: the service, its tools, estimators and calibration
-springscale-workbench  what only a desk needs: simulator, demo, reproduction, reports (numba, matplotlib, plotly)
+springscale-workbench  what only a desk needs: simulator, demo, reproduction, reports (numba, matplotlib)
 
 Both hold one relocatable tree, /usr/lib/springscale, with every dependency at its locked version: nothing of the
 system's Python packages is used. Wheels are chosen for Debian 12 on the architecture asked for, and all else is the
@@ -32,7 +32,7 @@ PYTHON: Final = f"python{sys.version_info.major}.{sys.version_info.minor}"
 
 VEHICLE_LOCK: Final = PROJECT / "requirements.txt"
 DESK_LOCK: Final = PROJECT / "requirements-workbench.txt"  # all of the vehicle's, and more
-UNIMPORTED: Final = frozenset(("narwhals", "plotly"))  # of the vehicle's: only reports import them, ...
+UNIMPORTED: Final = frozenset(("narwhals", "plotly"))  # in the vehicle's lock, but nobody imports them ...
 STAYING: Final = ("plotly/package_data/plotly.min.js", "plotly-*.dist-info/*")  # ... the dashboard shows this one file
 PINNED: Final = re.compile(r"^([a-z0-9][a-z0-9._-]*)==", re.MULTILINE)
 SOURCES: Final = ("gateway", "dbc", "pyproject.toml", "README.md", "LICENSE")
@@ -139,16 +139,18 @@ def install(tree: Path, architecture: str) -> None:
 
 
 def part(tree: Path, desk: Path) -> None:
-    """Move what only the workbench needs from one tree to the other."""
+    """Move what only the workbench needs from one tree to the other, and remove what nobody imports."""
     names = of_desk()
     for found in distributions(path=[str(tree)]):
         if normal_name(found) in names:
             move(found, tree, desk)
+        elif normal_name(found) in UNIMPORTED:
+            move(found, tree, None)
 
 
 def of_desk() -> frozenset[str]:
     """Names of the distributions that a vehicle does without."""
-    return pinned(DESK_LOCK) - pinned(VEHICLE_LOCK) | UNIMPORTED
+    return pinned(DESK_LOCK) - pinned(VEHICLE_LOCK)
 
 
 def pinned(lock: Path) -> frozenset[str]:
@@ -156,15 +158,18 @@ def pinned(lock: Path) -> frozenset[str]:
     return frozenset(PINNED.findall(lock.read_text()))
 
 
-def move(found: Distribution, tree: Path, desk: Path) -> None:
-    """The files of one distribution, wherever it recorded them, but for those that stay."""
+def move(found: Distribution, tree: Path, desk: Path | None) -> None:
+    """The files of one distribution, wherever it recorded them, but for those that stay; None: nowhere."""
     for file in found.files or ():
         source = tree / file
         if any(fnmatch(str(file), pattern) for pattern in STAYING):
             continue
         if source.is_file() and tree in source.resolve().parents:
-            (desk / file).parent.mkdir(parents=True, exist_ok=True)
-            source.rename(desk / file)
+            if desk is None:
+                source.unlink()
+            else:
+                (desk / file).parent.mkdir(parents=True, exist_ok=True)
+                source.rename(desk / file)
             remove_empty(source.parent, tree)
 
 

@@ -45,7 +45,7 @@ _COMMANDS = {
 INTERRUPTED = 130  # 128 and the number of SIGINT, as shells have it
 
 # Commands that a vehicle does not need: the extra "workbench", in Debian a package of its own.
-_WORKBENCH = frozenset({"matplotlib", "numba", "plotly"})
+_WORKBENCH = frozenset({"matplotlib", "numba"})
 _DEBIAN_TREE = Path("/usr/lib/springscale")
 
 

@@ -50,9 +50,7 @@ def test_a_phone_without_a_network_shows_every_chart_and_scrolls_one_way(
     page.on("pageerror", lambda fault: faults.append(str(fault)))
     page.on("requestfailed", lambda request: faults.append(request.url))
     page.goto(f"file://{report / page_of}")
-    page.wait_for_function(
-        "document.querySelectorAll('.live .main-svg').length >= document.querySelectorAll('.live').length"
-    )
+    page.wait_for_function("[...document.images].every((one) => one.complete && one.naturalWidth > 0)")
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
     assert faults == []
     page.close()

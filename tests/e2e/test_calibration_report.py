@@ -58,7 +58,6 @@ def test_the_page_is_well_formed_and_headings_descend_by_one(page: Page) -> None
 
 
 def test_all_it_needs_lies_in_its_directory(made: Path, page: Page) -> None:
-    assert "plotly.min.js" in page.fetched
     for source in [*page.fetched, *(link for link in page.links if not link.startswith("#"))]:
         assert not re.match(r"[a-z]+:|//", source)
         assert (made / "report" / source).stat().st_size > 1000
@@ -70,13 +69,6 @@ def test_every_picture_says_what_is_to_be_seen(page: Page) -> None:
     assert len(page.alts) > 10
     assert all(len(alt) > 40 for alt in page.alts)
     assert len(set(page.alts)) == len(page.alts)
-
-
-def test_every_chart_can_be_drawn_live(made: Path, page: Page) -> None:
-    text = (made / "report" / "report.html").read_text(encoding="utf-8")
-    charts = [json.loads(found) for found in re.findall(r'<script type="application/json">(.*?)</script>', text)]
-    assert len(charts) == len(page.alts)
-    assert all(chart["data"] and "height" in chart["layout"] for chart in charts)
 
 
 @pytest.mark.parametrize("estimator", ["cross_spectrum", "ratio_index"])
@@ -189,42 +181,9 @@ def test_one_sensor_reports_what_it_can(tmp_path: Path) -> None:
     assert {"ratio-index", "accuracy-ratio-index"} <= set(page.ids)
 
 
-def live_charts(page_text: str) -> dict[str, Any]:
-    """What plotly is given, by the figure's name."""
-    figure = r'<figure id="figure-([^"]+)">.*?<script type="application/json">(.*?)</script>'
-    return {name: json.loads(spec) for name, spec in re.findall(figure, page_text, re.DOTALL)}
-
-
-def look_of(trace: Mapping[str, Any]) -> str:
-    """What an eye tells one trace from another by."""
-    marker = trace.get("marker", {})
-    is_line = trace.get("mode") == "lines"
-    look = [trace["line"].get("color"), trace["line"].get("dash"), trace.get("fillcolor")] if is_line else []
-    return json.dumps([trace["type"], trace.get("mode"), *look, marker.get("color"), marker.get("symbol")])
-
-
-def test_one_meaning_has_one_colour_and_one_colour_one_meaning(made: Path) -> None:
-    charts = live_charts((made / "report" / "report.html").read_text())
-    assert len(charts) > 6
-    looks_by_name: dict[str, set[str]] = {}
-    for name, chart in charts.items():
-        names_by_look: dict[str, set[str]] = {}
-        for trace in chart["data"]:
-            if trace.get("name"):
-                names_by_look.setdefault(look_of(trace), set()).add(trace["name"])
-                looks_by_name.setdefault(trace["name"].removesuffix(" part"), set()).add(look_of(trace))
-        assert {look: names for look, names in names_by_look.items() if len(names) > 1} == {}, name
-    assert {name: looks for name, looks in looks_by_name.items() if len(looks) > 1} == {}
-
-
 def test_its_charts_fit_a_phone(made: Path, browser: Any) -> None:
     page = browser.new_page(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
     page.goto((made / "report" / "report.html").as_uri())
-    page.wait_for_selector("#figure-spectra_acceleration .main-svg")
-    widths = page.evaluate(
-        "[...document.querySelectorAll('.live')].filter((e) => e.offsetWidth).map((e) => e.scrollWidth)"
-    )
-    assert len(widths) > 4
-    assert max(widths) <= 390
+    page.wait_for_function("[...document.images].every((one) => one.complete && one.naturalWidth > 0)")
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     page.close()

@@ -209,7 +209,8 @@ def test_no_lock_contradicts_another(name: str) -> None:
 
 def test_the_debian_packages_part_along_the_locks() -> None:
     assert set(FOR_DESKS) <= of_desk()
-    assert of_desk() & VEHICLE.keys() == UNIMPORTED == {"narwhals", "plotly"}
+    assert not of_desk() & VEHICLE.keys()
+    assert VEHICLE.keys() >= UNIMPORTED
 
 
 def planned(*arguments: str) -> str:

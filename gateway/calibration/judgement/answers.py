@@ -30,11 +30,6 @@ class Answers:
         """Estimated minus true."""
         return self.estimated - self.true
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """A label for each."""
-        return tuple(f"run {number}" for number in self.run)
-
 
 def answers_of(judged: Sequence[Judged], target: Target) -> Answers:
     """Payload in kg or front share in percent; batches without an answer are left out."""

@@ -90,7 +90,7 @@ def _sets(judgement: Judgement, target: Target) -> list[tuple[BatchSet, Answers]
 
 def _points(part: BatchSet, answers: Answers, x: F64, y: F64, half: F64 | None = None) -> Points:
     low, high = (None, None) if half is None else (y - half, y + half)
-    return Points(x, y, PART_NAMES[part], _COLOURS[part], _MARKERS.get(part, "square"), low, high, answers.notes)
+    return Points(x, y, PART_NAMES[part], _COLOURS[part], _MARKERS.get(part, "square"), low, high)
 
 
 def _estimated_over_true(judgement: Judgement, targets: Sequence[Target]) -> Chart | None:
@@ -164,8 +164,7 @@ def _in_order(part: BatchSet, answers: Answers, dof: float | None) -> Points:
     z = standardised(answers, dof)
     order = np.argsort(z, kind="stable")
     expected = ndtri((np.arange(len(z)) + 0.5) / len(z))
-    notes = tuple(answers.notes[i] for i in order)
-    return Points(expected, z[order], PART_NAMES[part], _COLOURS[part], _MARKERS.get(part, "square"), notes=notes)
+    return Points(expected, z[order], PART_NAMES[part], _COLOURS[part], _MARKERS.get(part, "square"))
 
 
 def _coverage(judgement: Judgement, targets: Sequence[Target]) -> Chart | None:

@@ -212,7 +212,7 @@ def knowledge_chart(known: Sequence[Known]) -> Chart:
 def _panel(title: str, members: Sequence[Known]) -> Panel:
     left_over = 100.0 * np.array([one.left_over for one in members])[::-1]
     places = tuple(_short(one.name) for one in members)[::-1]
-    marks = (Rule(100.0, is_vertical=True), Points(left_over, np.arange(len(members), dtype=float), notes=places))
+    marks = (Rule(100.0, is_vertical=True), Points(left_over, np.arange(len(members), dtype=float)))
     return Panel(Axis("left over [%]", limits=(0.0, 105.0)), Axis("", places=places), marks, title)
 
 

@@ -73,16 +73,10 @@ def _points(name: str, fitted: IndexRows, later: IndexRows, *, of_payload: bool)
             label,
             colour,
             marker,
-            notes=_notes(rows),
         )
         for rows, label, colour, marker in sets
         if len(rows.run)
     ]
-
-
-def _notes(rows: IndexRows) -> tuple[str, ...]:
-    columns = zip(rows.run, rows.payload_kg, rows.front_share_pct, strict=True)
-    return tuple(f"run {run}: {payload_kg:g} kg, {share_pct:.1f} %" for run, payload_kg, share_pct in columns)
 
 
 def _curves(name: str, rows: IndexRows, model: RegressionModel) -> list[Mark]:

@@ -24,10 +24,8 @@ from gateway.reports.calibration.runs import provenance_section, runs_section
 from gateway.reports.calibration.spectra import spectra_section
 from gateway.reports.charts import Section
 from gateway.reports.charts.html import (
-    PLOTLY_FILE,
     OnChart,
     Page,
-    charts_of,
     made_folder,
     prose,
     sections_html,
@@ -77,7 +75,6 @@ def _write(directory: Path, assessment: Assessment, sections: list[Section], on_
         f"<p>{prose(_subtitle(assessment))}</p>",
         verdict + sections_html(sections),
         ("verdict", "Skip to the verdict"),
-        PLOTLY_FILE if any(charts_of(sections)) else None,
     )
     return write_report(directory, page, sections, report_json(assessment, verdicts), on_chart)
 

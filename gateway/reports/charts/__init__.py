@@ -1,7 +1,6 @@
-"""Charts as plain records of numbers, and two ways to draw them: ``still`` by matplotlib, ``live`` by plotly.
+"""Charts as plain records of numbers; ``still`` draws them by matplotlib, ``html`` makes the pages.
 
-Reports describe their sections, charts and tables with these records; the renderers know nothing about the numbers. The
-same record gives the SVG file and the interactive chart.
+Reports describe their sections, charts and tables with these records; the renderer knows nothing about the numbers.
 """
 
 from dataclasses import dataclass
@@ -68,7 +67,7 @@ class LineMark:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """Markers at x, y (n,); low and high (n,) are the ends of an interval around y; ``notes`` describe each marker."""
+    """Markers at x, y (n,); low and high (n,) are the ends of an interval around y."""
 
     x: F64
     y: F64
@@ -77,7 +76,6 @@ class Points:
     marker: Marker = "circle"
     low: F64 | None = None
     high: F64 | None = None
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,10 +125,7 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """Panels, at most ``most_columns`` in a row. ``name`` is the file name; ``alt`` describes the chart in words.
-
-    ``has_still`` is false if no picture is drawn because a table beside the chart has the same numbers.
-    """
+    """Panels, at most ``most_columns`` in a row. ``name`` is the file name; ``alt`` describes the chart in words."""
 
     name: str
     caption: str
@@ -138,7 +133,6 @@ class Chart:
     panels: tuple[Panel, ...]
     most_columns: int = 2
     row_height_px: int = 340
-    has_still: bool = True
 
     @property
     def n_columns(self) -> int:

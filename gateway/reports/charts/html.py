@@ -1,6 +1,6 @@
 """A report's directory: sections, charts and tables as HTML, with figures and numbers beside it.
 
-The pages load nothing from other hosts and can be read without scripts; plotly.min.js, if present, draws the charts.
+The pages have no scripts and load nothing from other hosts.
 """
 
 import json
@@ -14,30 +14,24 @@ from typing import Any, Final
 
 from gateway.errors import ConfigurationError
 from gateway.reports.charts import Cell, Chart, ChartLink, Section, Table
-from gateway.reports.charts.live import plotly_json, plotly_script
 from gateway.reports.charts.still import save_still
 
-PLOTLY_FILE: Final = "plotly.min.js"
+FIGURES: Final = "figures"  # the folder beside a page
 OnChart = Callable[[int, int], None]  # (charts drawn, charts in all)
 
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A document: its head and the contents of ``main`` (HTML). ``skip_to`` is the anchor of the main content.
-
-    ``plotly`` is the relative URL of plotly's script; None if the page has no interactive chart.
-    """
+    """A document: its head and the contents of ``main`` (HTML). ``skip_to`` is the anchor of the main content."""
 
     title: str
     header: str
     main: str
     skip_to: tuple[str, str]
-    plotly: str | None = PLOTLY_FILE
 
 
 def document(page: Page) -> str:
     """The complete document; it loads nothing from other hosts."""
-    script = f'<script src="{page.plotly}"></script><script>{_asset("report.js")}</script>' if page.plotly else ""
     anchor, words = page.skip_to
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
@@ -46,7 +40,7 @@ def document(page: Page) -> str:
         f"<title>{escape(page.title)}</title><style>{_asset('report.css')}</style></head><body>"
         f'<a class="skip" href="#{anchor}">{escape(words)}</a>'
         f"<header><h1>{escape(page.title)}</h1>{page.header}</header>"
-        f"<main>{page.main}</main>{script}</body></html>\n"
+        f"<main>{page.main}</main></body></html>\n"
     )
 
 
@@ -57,17 +51,20 @@ def write_report(
     numbers: Mapping[str, Any],
     on_chart: OnChart = lambda done, of: None,
 ) -> Path:
-    """Write report.html, its numbers as report.json, plotly and the charts' figures; return the path of report.html."""
-    charts = list(charts_of(sections))
-    for done, chart in enumerate(charts, 1):
-        save_still(chart, directory / "figures")
-        on_chart(done, len(charts))
-    (directory / PLOTLY_FILE).write_text(plotly_script(), encoding="utf-8")
+    """Write report.html, its numbers as report.json and the charts' figures; return the path of report.html."""
     text = json.dumps(numbers, indent=1, allow_nan=False, ensure_ascii=False)
     (directory / "report.json").write_text(text + "\n", encoding="utf-8")
-    report = directory / "report.html"
-    report.write_text(document(page), encoding="utf-8")
-    return report
+    return write_page(directory / "report.html", page, sections, on_chart)
+
+
+def write_page(path: Path, page: Page, sections: Sequence[Section], on_chart: OnChart = lambda done, of: None) -> Path:
+    """Write a page and its charts' figures, which lie in a folder beside it."""
+    charts = list(charts_of(sections))
+    for done, chart in enumerate(charts, 1):
+        save_still(chart, path.parent / FIGURES)
+        on_chart(done, len(charts))
+    path.write_text(document(page), encoding="utf-8")
+    return path
 
 
 def made_folder(directory: Path) -> None:
@@ -89,8 +86,7 @@ def charts_of(sections: Sequence[Section]) -> Iterator[Chart]:
 def sections_html(sections: Sequence[Section]) -> str:
     """The table of contents and the sections."""
     links = "".join(f'<li><a href="#{one.anchor}">{escape(one.heading)}</a></li>' for one in sections)
-    live = {chart.name: plotly_json(chart) for chart in charts_of(sections)}
-    body = "".join(section_html(one, live) for one in sections)
+    body = "".join(map(section_html, sections))
     return f'<nav aria-label="Contents"><ul>{links}</ul></nav>{body}'
 
 
@@ -103,34 +99,27 @@ def _asset(name: str) -> str:
     return files("gateway.reports").joinpath("assets", name).read_text(encoding="utf-8")
 
 
-def section_html(section: Section, live: Mapping[str, str]) -> str:
-    """One section as HTML; ``live`` maps chart names to plotly's JSON."""
+def section_html(section: Section) -> str:
     paragraphs = "".join(f"<p>{prose(text)}</p>" for text in section.paragraphs)
     items: list[Chart | Table] = [*section.charts, *section.tables]
-    body = "".join(_item(item, live) for item in items)
+    body = "".join(map(_item, items))
     folded = "".join(
-        f"<details><summary>{escape(summary)}</summary>{''.join(_item(item, live) for item in inside)}</details>"
+        f"<details><summary>{escape(summary)}</summary>{''.join(map(_item, inside))}</details>"
         for summary, inside in section.folded
     )
     heading = f"<h2>{escape(section.heading)}</h2>"
     return f'<section id="{section.anchor}">{heading}{paragraphs}{body}{folded}</section>'
 
 
-def _item(item: Chart | Table, live: Mapping[str, str]) -> str:
-    return _figure(item, live) if isinstance(item, Chart) else table_html(item)
+def _item(item: Chart | Table) -> str:
+    return _figure(item) if isinstance(item, Chart) else table_html(item)
 
 
-def _figure(chart: Chart, live: Mapping[str, str]) -> str:
-    """The static picture, if there is one, and the JSON from which plotly draws the chart on screen."""
-    spec = live[chart.name].replace("<", "\\u003c")  # so that no text can end the element
-    alt, picture = escape(chart.alt), f"figures/{chart.name}"
-    still = f'<div class="wide"><img src="{picture}.svg" alt="{alt}"></div>' if chart.has_still else ""
-    files = f' <a href="{picture}.svg">SVG</a> <a href="{picture}.png">PNG</a>' if chart.has_still else ""
+def _figure(chart: Chart) -> str:
+    picture = f"{FIGURES}/{chart.name}.svg"
     return (
-        f'<figure id="figure-{chart.name}">{still}'
-        f'<div class="wide live" role="img" aria-label="{alt}" hidden></div>'
-        f'<script type="application/json">{spec}</script>'
-        f"<figcaption>{prose(chart.caption)}{files}</figcaption></figure>"
+        f'<figure id="figure-{chart.name}"><div class="wide"><img src="{picture}" alt="{escape(chart.alt)}"></div>'
+        f'<figcaption>{prose(chart.caption)} <a href="{picture}">SVG</a></figcaption></figure>'
     )
 
 

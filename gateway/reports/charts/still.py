@@ -1,4 +1,4 @@
-"""Static charts by matplotlib: SVG and PNG for print, slides and pages without scripts.
+"""Charts by matplotlib: SVG for pages, and PNG beside it for the paper's figures.
 
 The figures have no global state and are saved reproducibly: the same numbers give the same bytes.
 """
@@ -37,14 +37,19 @@ def panels(n_rows: int = 1, n_columns: int = 1, height_in: float = 3.2) -> tuple
 def save(figure: Figure, directory: Path, name: str) -> str:
     """Write NAME.svg and NAME.png; return the SVG element for use in a page."""
     directory.mkdir(parents=True, exist_ok=True)
+    drawn = _svg_of(figure, name)
+    (directory / f"{name}.svg").write_text(drawn, encoding="utf-8")
+    with mpl.rc_context(_STYLE):
+        figure.savefig(directory / f"{name}.png", dpi=110, metadata={"Software": None})
+    return drawn[drawn.index("<svg") :]
+
+
+def _svg_of(figure: Figure, name: str) -> str:
     text = io.StringIO()
     style: Any = {**_STYLE, "svg.hashsalt": name}
     with mpl.rc_context(style):
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
-        figure.savefig(directory / f"{name}.png", dpi=110, metadata={"Software": None})
-    drawn = text.getvalue()
-    (directory / f"{name}.svg").write_text(drawn, encoding="utf-8")
-    return drawn[drawn.index("<svg") :]
+    return text.getvalue()
 
 
 _INCHES_PER_PX: Final = 1.0 / 105.0  # chosen: size of letters in print
@@ -54,8 +59,9 @@ _LEGEND_COLUMNS: Final = 5  # chosen
 
 
 def save_still(chart: Chart, directory: Path) -> None:
-    """Write NAME.svg and NAME.png; the same bytes for the same chart."""
-    save(draw(chart), directory, chart.name)
+    """Write NAME.svg; the same bytes for the same chart."""
+    directory.mkdir(parents=True, exist_ok=True)
+    (directory / f"{chart.name}.svg").write_text(_svg_of(draw(chart), chart.name), encoding="utf-8")
 
 
 def draw(chart: Chart) -> Figure:

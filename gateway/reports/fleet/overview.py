@@ -260,8 +260,7 @@ def _drift_panel(fleet: FleetSummary, name: str) -> Panel | None:
         if chosen:
             at = np.array([float(k) for k, _, _ in chosen])
             slopes, low, high = np.array([[d.judged.slope, d.judged.low, d.judged.high] for _, d, _ in chosen]).T
-            names = tuple(f"{vehicle}, {drift.judged.n} weeks" for _, drift, vehicle in chosen)
-            marks.append(Points(at, slopes, label, colour, "circle", low, high, names))
+            marks.append(Points(at, slopes, label, colour, "circle", low, high))
     return Panel(Axis("vehicles"), Axis("a year"), tuple(marks), NAMES[name])
 
 

@@ -15,12 +15,11 @@ from gateway.archive.fleet.fleet import FleetSummary, FleetVehicle
 from gateway.archive.fleet.sensors import Share, Trouble
 from gateway.reports.charts import Section
 from gateway.reports.charts.html import (
-    PLOTLY_FILE,
     Page,
-    document,
     made_folder,
     prose,
     sections_html,
+    write_page,
     write_report,
 )
 from gateway.reports.fleet.overview import Look, fleet_sections, looks_of
@@ -38,8 +37,8 @@ def write_fleet_report(
     made_folder(directory / "vehicles")
     for done, vehicle in enumerate(fleet.vehicles):
         on_page(done, len(fleet.vehicles) + 1)
-        page = directory / "vehicles" / page_of(vehicle.name)
-        page.write_text(document(_vehicle_page(vehicle)), encoding="utf-8")
+        sections = vehicle_sections(vehicle)
+        write_page(directory / "vehicles" / page_of(vehicle.name), _vehicle_page(vehicle, sections), sections)
     looks = looks_of(fleet)
     sections = fleet_sections(fleet, looks)
     in_short = (
@@ -52,19 +51,19 @@ def write_fleet_report(
     return report
 
 
-def _vehicle_page(vehicle: FleetVehicle) -> Page:
+def _vehicle_page(vehicle: FleetVehicle, sections: Sequence[Section]) -> Page:
     calibrated = ", ".join(vehicle.calibrations) or "without a calibration"
     text = (
         f"{vehicle.first} to {vehicle.last}: {whole(vehicle.n)} batches, {percent(vehicle.n_answered, vehicle.n)} of "
         f"them answered. Calibration: {calibrated}."
     )
     head = f'<p><a href="../report.html">The fleet</a></p><p>{prose(text)}</p>'
-    return _page(vehicle.name, head, vehicle_sections(vehicle), "loads", f"../{PLOTLY_FILE}")
+    return _page(vehicle.name, head, sections, "loads")
 
 
-def _page(title: str, head: str, sections: Sequence[Section], first: str, plotly: str = PLOTLY_FILE) -> Page:
+def _page(title: str, head: str, sections: Sequence[Section], first: str) -> Page:
     heading = next(section.heading for section in sections if section.anchor == first)
-    return Page(title, head, sections_html(sections), (first, f"Skip to: {heading}"), plotly)
+    return Page(title, head, sections_html(sections), (first, f"Skip to: {heading}"))
 
 
 def fleet_json(fleet: FleetSummary, looks: Sequence[Look], source: str) -> dict[str, Any]:

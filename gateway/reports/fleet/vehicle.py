@@ -18,6 +18,7 @@ from gateway.reports.fleet.text import (
     drift_told,
     kg,
     over_limit,
+    page_of,
     percent,
     share,
     slope,
@@ -35,11 +36,15 @@ def vehicle_sections(vehicle: FleetVehicle) -> list[Section]:
     return [_loads(vehicle), _refusals(vehicle), _parameters(vehicle), _sensors(vehicle)]
 
 
+def _named(vehicle: FleetVehicle, what: str) -> str:
+    """The name of a chart: the figures of all vehicles lie in one folder."""
+    return f"{page_of(vehicle.name).removesuffix('.html')}_{what}"
+
+
 def _loads(vehicle: FleetVehicle) -> Section:
     weeks = vehicle.weeks
     x = weeks.number.astype(float)
     known = np.isfinite(weeks.payload_mean_kg)
-    notes = tuple(f"week of {one}, n = {n}" for one, n in zip(weeks.mondays, weeks.n_answered.tolist(), strict=True))
     marks: list[Mark] = [
         *(
             Ribbon(x[run], weeks.payload_lower_quartile_kg[run], weeks.payload_upper_quartile_kg[run], "middle half")
@@ -53,7 +58,6 @@ def _loads(vehicle: FleetVehicle) -> Section:
             "circle",
             weeks.payload_low_kg[known],
             weeks.payload_high_kg[known],
-            tuple(note for note, is_known in zip(notes, known, strict=True) if is_known),
         ),
     ]
     rows = tuple(
@@ -69,13 +73,12 @@ def _loads(vehicle: FleetVehicle) -> Section:
     )
     columns = ("Week of", "batches", "answered", "mean load (95 %)", "middle half", "over a limit")
     chart = Chart(
-        "loads",
+        _named(vehicle, "loads"),
         f"Load by week: the mean over the answered batches with its 95 % interval, and the middle half of what was "
         f"carried. {whole(vehicle.n_answered)} batches of {whole(vehicle.n)}.",
         "Mean load of each week with its interval; the table below holds the numbers.",
         (Panel(time_axis(weeks.number.tolist()), Axis("load [kg]"), tuple(marks)),),
         1,
-        has_still=False,
     )
     text = (
         "A week's interval counts in full the error that its batches have in common (calibration, changes of the "
@@ -94,13 +97,12 @@ def _refusals(vehicle: FleetVehicle) -> Section:
         Points(x, 100.0 * weeks.n_refused_by[cause] / weeks.n, str(cause), k) for k, cause in enumerate(causes)
     )
     chart = Chart(
-        "refused",
+        _named(vehicle, "refused"),
         f"Share of each week's batches that were refused, by where the reason lies; {whole(vehicle.n)} batches.",
         "Share of batches refused in each week by cause; the table below holds the sums.",
         (Panel(time_axis(weeks.number.tolist()), Axis("refused [%]", limits=(0.0, 105.0)), lines),),
         1,
         _SHOWN,
-        has_still=False,
     )
     rows = tuple(
         (reason, whole(n), percent(n, vehicle.n), *reason_told(reason))
@@ -136,13 +138,12 @@ def _parameters(vehicle: FleetVehicle) -> Section:
         *(f"{NAMES[name]}: {drift_told(drift)}." for name, drift in vehicle.believed_drifts.items()),
     )
     chart = Chart(
-        "parameters",
+        _named(vehicle, "parameters"),
         "Weekly medians, and the slope since the last calibration where there are weeks enough.",
         "Weekly medians of each parameter; the table below holds the slopes.",
         panels,
         2,
         _SHOWN,
-        has_still=False,
     )
     columns = ("Parameter", "slope (95 %)", "without the fleet's", "weeks", "believed")
     table = Table("Drift of parameters", columns, rows)
@@ -154,12 +155,7 @@ def _parameter_panel(vehicle: FleetVehicle, name: str) -> Panel:
     weeks = vehicle.weeks
     medians, known = weeks.medians[name], np.isfinite(weeks.medians[name])
     x = weeks.number.astype(float)
-    notes = tuple(
-        f"week of {monday}, n = {n}"
-        for monday, n, is_known in zip(weeks.mondays, weeks.n_medians[name].tolist(), known, strict=True)
-        if is_known
-    )
-    marks: list[Mark] = [Points(x[known], medians[known], "weekly median", 0, notes=notes)]
+    marks: list[Mark] = [Points(x[known], medians[known], "weekly median", 0)]
     if (drift := vehicle.drifts.get(name)) is not None:
         judged = known & (weeks.number >= vehicle.calibrated_week)
         ends = x[judged][[0, -1]]

@@ -217,8 +217,8 @@ def page(experiments: Experiments, rows: Sequence[tuple[str, ...]], drawings: Se
     )
     quick = "" if extent.is_whole else f"<p><strong>{QUICK}</strong></p>"
     title = f"Section 4, reproduced{'' if extent.is_whole else ': a quick try'}"
-    main = "".join(section_html(one, {}) for one in sections) + plates
-    return document(Page(title, f"{quick}<p>{prose(text)}</p>", main, ("numbers", "Skip to the numbers"), plotly=None))
+    main = "".join(section_html(one) for one in sections) + plates
+    return document(Page(title, f"{quick}<p>{prose(text)}</p>", main, ("numbers", "Skip to the numbers")))
 
 
 def _findings(experiments: Experiments) -> Section:
