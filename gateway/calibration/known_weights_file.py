@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
-from gateway.calibration.file.hashed import content_id
+from gateway.calibration.file.calibration_file import content_id
 from gateway.core.known_weights import Knowledge, Observation
 from gateway.errors import ConfigurationError
 from gateway.estimate_json import posterior_from_json

@@ -2,7 +2,7 @@
 
 from typing import Final, Literal
 
-from gateway.calibration.file.hashed import content_id
+from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.known_weight import StatedLoad
 from gateway.core.vehicle import Vehicle
 from gateway.stated.facts import AxleErrorTold, LoadTold, Part, Rule, VerificationRecord

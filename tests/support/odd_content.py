@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from gateway.calibration.file.hashed import content_id
+from gateway.calibration.file.calibration_file import content_id
 from gateway.errors import CalibrationFileError
 
 N_TRIALS = 120

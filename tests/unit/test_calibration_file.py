@@ -10,8 +10,7 @@ import pytest
 from support.calibrated import calibration_file
 
 import gateway
-from gateway.calibration.file.calibration_file import load_calibration
-from gateway.calibration.file.hashed import content_id
+from gateway.calibration.file.calibration_file import content_id, load_calibration
 from gateway.errors import CalibrationFileError
 
 Change = Callable[[dict[str, Any]], Any]
@@ -147,3 +146,15 @@ def test_a_number_that_is_not_finite_is_refused(tmp_path: Path, number: str) -> 
     assert '"residual_std": 10.0' in text
     path.write_text(text.replace('"residual_std": 10.0', f'"residual_std": {number}'))
     assert "does not match its id" in fault_of(path)
+
+
+def test_a_file_that_lacks_an_optional_field_keeps_the_id_it_was_stored_under(tmp_path: Path) -> None:
+    """Tickets, tares and estimates name it by this id, whatever fields today's files have besides."""
+    path = written(tmp_path, lambda c: c.pop("sister_id"))
+    stored = json.loads(path.read_text())["id"]
+    assert stored != calibration_file().id
+    held = load_calibration(path)
+    assert held.id == held.for_core().id == stored
+    again = tmp_path / "again.json"
+    again.write_text(held.to_json())
+    assert load_calibration(again).id == stored

@@ -1,11 +1,12 @@
 """The calibration file. Written by the tool, never by hand."""
 
+import hashlib
+import json
 from pathlib import Path
-from typing import ClassVar, Final, Literal, Self
+from typing import Any, Final, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
-from gateway.calibration.file.hashed import FileWords, HashedFile, checked_file, read_content
 from gateway.calibration.file.parts import ExpectedErrorsPart, ProvenancePart, SeenPart
 from gateway.calibration.file.sane import absurd
 from gateway.core.calibrated import CalibratedVehicle
@@ -16,16 +17,19 @@ from gateway.core.ratio_index.regression import TERMS
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError
 from gateway.schema import check_shapes
-from gateway.toml_file import Read
+from gateway.stated.facts import Part
+from gateway.toml_file import Read, describe_faults
 
 FORMAT: Final = "springscale-calibration"
 VERSION: Final = 11  # of the format
 
 
-class CalibrationFile(HashedFile):
+Content = dict[str, Any]
+
+
+class CalibrationFile(Part):
     """The whole file except its id."""
 
-    words: ClassVar[FileWords] = FileWords("calibration file", "calibrate again", "springscale calibrate")
     format: Literal["springscale-calibration"] = FORMAT
     version: Literal[11] = VERSION
     vehicle: Vehicle
@@ -40,6 +44,20 @@ class CalibrationFile(HashedFile):
     )
     warnings: tuple[str, ...] = ()
     provenance: ProvenancePart
+    _stored: Content | None = PrivateAttr(None)  # what was read: today's fields may be more
+
+    @property
+    def id(self) -> str:
+        """sha256 of the canonical JSON of everything in the file but the id itself; estimates name it."""
+        return content_id(self._content)
+
+    def to_json(self) -> str:
+        """The file's text, id first: what was read, if it was."""
+        return json.dumps({"id": self.id, **self._content}, indent=1, allow_nan=False) + "\n"
+
+    @property
+    def _content(self) -> Content:
+        return self._stored or self.model_dump(mode="json")
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
@@ -85,17 +103,66 @@ class CalibrationFile(HashedFile):
         return tuple(name for name, part in held.items() if part is not None)
 
 
-def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> CalibrationFile:
-    """Reads; checks version, hash and shape.
+def content_id(content: Content) -> str:
+    """sha256:... over the canonical JSON of ``content`` (keys sorted, no spaces), its own id left out."""
+    rest = {key: part for key, part in content.items() if key != "id"}
+    text = json.dumps(rest, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
 
-    Raises CalibrationFileError saying what to do.
-    """
+
+def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> CalibrationFile:
+    """Reads; checks version, hash and shape. Raises CalibrationFileError saying what to do."""
     path = Path(path)
-    held = checked_file(path, read_content(path, read), CalibrationFile)
+    content = _checked(path, _content_of(path, read))
+    del content["id"]
     try:
+        held = CalibrationFile.model_validate(content)
         held.require_known()
         if (fault := absurd(held)) is not None:
             raise CalibrationFileError(fault)
     except CalibrationFileError as fault:
         raise CalibrationFileError(f"{path}: {fault}") from None
+    except ValidationError as fault:
+        raise CalibrationFileError(describe_faults(path, fault, CalibrationFile)) from None
+    held._stored = content
     return held
+
+
+def _checked(path: Path, content: Content) -> Content:
+    """The content, if its format, version and hash are right."""
+    if content.get("format") != FORMAT:
+        raise CalibrationFileError(f"{path}: not a springscale calibration file (format is {content.get('format')!r})")
+    if content.get("version") != VERSION:
+        raise CalibrationFileError(
+            f"{path}: calibration file version {content.get('version')!r}, this springscale reads version {VERSION}: "
+            "calibrate again with `springscale calibrate`"
+        )
+    if not _matches_its_id(content):
+        raise CalibrationFileError(
+            f"{path}: content does not match its id: the file was changed after it was written; restore it or "
+            "calibrate again"
+        )
+    return content
+
+
+def _matches_its_id(content: Content) -> bool:
+    """False for a file that was changed since it was written."""
+    try:
+        return bool(content.get("id") == content_id(content))
+    except ValueError:  # a number that is not finite, which is never written
+        return False
+
+
+def _content_of(path: Path, read: Read) -> Content:
+    """A file's JSON object. Raises CalibrationFileError if it is none."""
+    try:
+        content = json.loads(read(path).decode("utf-8"))
+    except FileNotFoundError:
+        raise CalibrationFileError(f"{path}: no such calibration file") from None
+    except (OSError, UnicodeDecodeError) as fault:
+        raise CalibrationFileError(f"{path}: cannot be read: {fault}") from None
+    except (ValueError, RecursionError) as fault:  # a number of 5000 digits and brackets 5000 deep are no JSON for us
+        raise CalibrationFileError(f"{path}: not valid JSON: {fault}") from None
+    if not isinstance(content, dict):
+        raise CalibrationFileError(f"{path}: not a springscale calibration file")
+    return content
