@@ -1,7 +1,6 @@
 """What a release, deploy/ and the locks say agrees with the program, and a Debian package holds its own code only."""
 
 import json
-import os
 import re
 import shlex
 import shutil
@@ -25,7 +24,6 @@ from support.patience import PATIENCE_S
 
 from gateway.config import load_settings
 from gateway.core.weights.limits import Limits
-from gateway.web.access.tokens import Scope, TokenFile
 from gateway.web.routes.monitoring import alive_router
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -169,14 +167,6 @@ def test_the_sandbox_scores_below_one_and_a_half_and_what_remains_is_explained()
 
 def test_a_configuration_fault_is_not_tried_again() -> None:
     assert "\nRestartPreventExitStatus=2\n" in UNIT
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a file away")
-def test_a_token_made_by_root_can_be_read_by_the_service(tmp_path: Path) -> None:
-    os.chown(tmp_path, 12345, 12346)
-    TokenFile(tmp_path / "tokens.json").create("fleet", Scope.READ)
-    made = (tmp_path / "tokens.json").stat()
-    assert (made.st_uid, made.st_gid, made.st_mode & 0o777) == (12345, 12346, 0o600)
 
 
 VEHICLE = pins("requirements.txt")
