@@ -1,4 +1,4 @@
-"""Common parts of the page generators: filled marks and sentences, tables, and comparison.
+"""Common parts of the page generators: filled marks and sentences, and tables.
 
 Prose lives in the pages. Two marks stand for what a program writes:
 
@@ -14,31 +14,24 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
-
-from pydantic import TypeAdapter
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 SENTENCES = re.compile(
     r"(?P<mark><!-- from (?P<file>[\w.]+\.json): (?P<template>.*?) -->\n).*?(?P<end><!-- end -->)", re.DOTALL
 )
-NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e-?\d+)?")
 
 
 class StaleError(Exception):
     """A page that is not up to date."""
 
 
-def keep_up_to_date(page: Path, text: str, *, is_check: bool, tolerance: float = 0.0) -> None:
-    """Write ``page``, or with ``is_check`` raise StaleError if it differs.
-
-    Numbers computed by simulation may differ by ``tolerance``, as machines round differently.
-    """
+def keep_up_to_date(page: Path, text: str, *, is_check: bool) -> None:
+    """Write ``page``, or with ``is_check`` raise StaleError if it differs."""
     if not is_check:
         page.write_text(text, encoding="utf-8")
-    elif not page.is_file() or not agrees(page.read_text(encoding="utf-8"), text, lambda number: tolerance):
+    elif not page.is_file() or page.read_text(encoding="utf-8") != text:
         raise StaleError(f"{page.relative_to(ROOT)} does not say what its source does: run `make docs`")
 
 
@@ -72,39 +65,6 @@ def table(heading: str, rows: Iterable[Sequence[str]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def agrees(one: str, other: str, tolerance: Callable[[str], float]) -> bool:
-    """True if only numbers differ, each by at most ``tolerance`` of the number as printed."""
-    if NUMBER.sub("#", one) != NUMBER.sub("#", other):
-        return False
-    pairs = zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
-    return all(here == there or abs(float(here) - float(there)) <= tolerance(here) for here, there in pairs)
-
-
-def key_table(model: type, *without: str) -> str:
-    """A table of TOML keys: default, limits and description of every field of ``model`` except those named.
-
-    ``model`` is a pydantic model or an annotated dataclass; required keys come first.
-    """
-    schema = TypeAdapter(model).json_schema()
-    required = schema.get("required", ())
-    rows = (
-        (
-            f"`{name}`",
-            "required" if name in required else default_of(key.get("default", _none_of(key))),
-            limits_of(key, schema.get("$defs", {})),
-            key["description"],
-        )
-        for name, key in sorted(schema["properties"].items(), key=lambda one: one[0] not in required)
-        if name not in without
-    )
-    return table("key | default | limits | meaning", rows)
-
-
-def _none_of(key: dict[str, Any]) -> dict[str, Any] | None:
-    """The default that a schema omits because a factory makes it: an empty table."""
-    return {} if key.get("type") == "object" else None
-
-
 def default_of(default: Any) -> str:
     """The value of an absent key, as TOML writes it."""
     if default is None:
@@ -114,19 +74,3 @@ def default_of(default: Any) -> str:
     if isinstance(default, tuple | list):
         return f"`{list(default)}`"
     return f"`{default}`" if isinstance(default, int | float) or default == {} else f'`"{default}"`'
-
-
-def limits_of(schema: dict[str, Any], named: Mapping[str, Any] = MappingProxyType({})) -> str:
-    """The limits of a key by its JSON schema, in words; empty without any."""
-    if "$ref" in schema:
-        return limits_of(named.get(schema["$ref"].rsplit("/", 1)[-1], {}), named)
-    if "anyOf" in schema:
-        return limits_of(next(one for one in schema["anyOf"] if one.get("type") != "null"), named)
-    if "prefixItems" in schema:
-        return f"two numbers, each {limits_of(schema['prefixItems'][0])}"
-    if "enum" in schema:
-        return " or ".join(f'`"{one}"`' if isinstance(one, str) else f"`{one}`" for one in schema["enum"])
-    if schema.get("minLength") or schema.get("minItems"):
-        return "not empty"
-    words = {"minimum": "from", "exclusiveMinimum": "above", "maximum": "to", "exclusiveMaximum": "below"}
-    return " ".join(f"{word} {schema[name]:,g}".replace(",", " ") for name, word in words.items() if name in schema)

@@ -12,16 +12,12 @@ from pathlib import Path
 from typing import Final
 
 import measured
-import printed
 import reference
-from drawings.rooms import rooms
-from drawings.spectra import spectra
 from made import ROOT, StaleError, filled, keep_up_to_date
 
 PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
     **{f"docs/{page}": parts for page, parts in reference.PARTS.items()},
     "README.md": {"errors": measured.errors_in_readme},
-    "docs/contribute.md": {"packed": printed.campaign_pack},
     "docs/accuracy.md": measured.ACCURACY,
     "docs/faults.md": {
         "faults": measured.faults,
@@ -37,12 +33,8 @@ PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
 
 WHOLE: Final[Mapping[str, Callable[[], str]]] = {
     "docs/calibration.schema.json": reference.schema_text,
-    "docs/images/rooms.svg": rooms,
-    "docs/images/spectra.svg": spectra,
 }
-"""Files that one function writes. The other drawings are edited by hand."""
-
-TOLERANCE_PX: Final = 1.0  # chosen: of drawings, which machines round differently
+"""Files that one function writes."""
 
 
 def pages() -> list[str]:
@@ -56,11 +48,6 @@ def text_of(page: str) -> str:
         return WHOLE[page]()
     text = filled((ROOT / page).read_text(encoding="utf-8"), PARTS[page])
     return measured.with_samples(text) if page == "README.md" else text
-
-
-def tolerance_of(page: str) -> float:
-    """Permitted difference of a number between machines."""
-    return TOLERANCE_PX if page.endswith(".svg") else 0.0
 
 
 def main() -> None:
@@ -78,7 +65,7 @@ def main() -> None:
     stale = []
     for page in asked.page or pages():
         try:
-            keep_up_to_date(ROOT / page, text_of(page), is_check=asked.check, tolerance=tolerance_of(page))
+            keep_up_to_date(ROOT / page, text_of(page), is_check=asked.check)
         except StaleError as fault:
             stale.append(str(fault))
     if stale:

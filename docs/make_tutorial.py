@@ -13,13 +13,15 @@ import re
 import socket
 import subprocess
 import sys
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
-from made import ROOT, agrees
+from made import ROOT
 
+NUMBER: Final = re.compile(r"-?\d+(?:\.\d+)?(?:e-?\d+)?")
 PAGE: Final = Path(__file__).with_name("tutorial.md")
 PORT: Final = "8000"
 MARK: Final = "@@ block"
@@ -60,6 +62,14 @@ def is_same(kept: str, printed: str, rule: str | None) -> bool:
     if rule is not None:
         kept, printed = (re.sub(rule, "...", text) for text in (kept, printed))
     return agrees(kept, printed, _last_digit)
+
+
+def agrees(one: str, other: str, tolerance: Callable[[str], float]) -> bool:
+    """True if only numbers differ, each by at most ``tolerance`` of the number as printed."""
+    if NUMBER.sub("#", one) != NUMBER.sub("#", other):
+        return False
+    pairs = zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
+    return all(here == there or abs(float(here) - float(there)) <= tolerance(here) for here, there in pairs)
 
 
 def with_outputs(page: str) -> str:

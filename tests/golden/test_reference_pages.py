@@ -11,9 +11,10 @@ import reference
 from pydantic import TypeAdapter
 from support.half_car_road import batch_over_road, weighed
 
-from gateway.archive.manifest import ManifestFile
+from gateway.archive.dataset import columns
+from gateway.archive.manifest import ManifestFile, VehicleEntry
 from gateway.bus.signals import SignalMapFile, load_signal_map
-from gateway.bus.signals.signal_map import SignalEntry
+from gateway.bus.signals.signal_map import SignalEntry, shipped_maps
 from gateway.calibration.campaign import CampaignTable, RunTable, load_campaign
 from gateway.calibration.file.calibration_file import load_calibration
 from gateway.core.vehicle import Vehicle
@@ -24,9 +25,15 @@ from gateway.stated.facts import VehicleAnswers
 from gateway.units import TO_SI
 
 ROOT = Path(__file__).parents[2]
-SIGNAL_MAP, CAMPAIGN, ESTIMATE = (
-    (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("signal-map.md", "campaign.md", "estimate.md")
+SIGNAL_MAP, CAMPAIGN, ESTIMATE, ARCHIVE = (
+    (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    for name in ("signal-map", "campaign", "estimate", "archive")
 )
+
+
+def named_in(page: str) -> list[str]:
+    """Everything between backquotes."""
+    return re.findall(r"`([^`\n]+)`", page)
 
 
 def examples_of(page: str) -> list[str]:
@@ -40,8 +47,27 @@ def test_every_key_is_described(table: type) -> None:
 
 
 def test_every_signal_and_every_unit_is_there() -> None:
-    assert set(reference.MEANINGS) == set(Signal)
-    assert set(reference.SI_UNITS) == set(TO_SI)
+    assert set(named_in(SIGNAL_MAP)) >= {*Signal, *(unit for units in TO_SI.values() for unit in units if unit)}
+    assert set(named_in(SIGNAL_MAP)) >= {f"springscale:{name}" for name in shipped_maps()}
+
+
+@pytest.mark.parametrize(
+    ("page", "tables"),
+    [
+        (SIGNAL_MAP, (SignalMapFile, SignalEntry)),
+        (CAMPAIGN, (CampaignTable, Vehicle, RunTable)),
+        (ARCHIVE, (ManifestFile, VehicleEntry)),
+    ],
+    ids=["signal map", "campaign", "archive"],
+)
+def test_every_key_is_on_its_page(page: str, tables: tuple[type, ...]) -> None:
+    rows = {line.split("`")[1] for line in page.splitlines() if line.startswith("| `")}
+    keys = {name for table in tables for name in TypeAdapter(table).json_schema()["properties"]}
+    assert keys - rows <= {"signals", "vehicle", "runs", "vehicles", "batch"}  # these are tables themselves
+
+
+def test_every_column_of_a_data_set_is_on_its_page() -> None:
+    assert set(columns()) <= set(named_in(ARCHIVE))
 
 
 @pytest.mark.parametrize("example", examples_of(SIGNAL_MAP))

@@ -1,1 +1,0 @@
-"""The drawings of the documents, each a module with one function that gives its SVG."""
