@@ -1,6 +1,7 @@
 """A draft of a signal map from the findings, with the evidence for each, for a person to check."""
 
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -18,7 +19,6 @@ MOSTLY: Final = 0.5  # more often than not
 COUNTED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE)  # timed by the message counter
 COUNTER_BITS: Final = range(2, 33)  # chosen: one bit is a toggle
 FIX_3D: Final = 3  # usual code of a three-dimensional GNSS fix
-_COUNTER_WORDS: Final = ("counter", "count", "alive", "sequence", "seq")
 
 
 def write_draft(seen: Look, output: Path) -> tuple[Path, ...]:
@@ -82,40 +82,32 @@ def _entry(found: FoundRole) -> Iterator[str]:
         yield "latency_s = 0.0 # CHECK: how late the receiver tells it; 0.2 is usual where it sends five times a second"
     else:
         yield f"sign = {found.sign}"
-    condition = _valid_when(found.reading.described, signal)
-    if condition is not None:
-        yield f"valid_when = {{ {_toml_key(condition[0])} = {condition[1]} }}"
-    counter = _counter(found.reading.described)
-    if counter is not None and found.role in COUNTED:
+    if (condition := _valid_when(found.reading.described, signal)) is not None:
+        yield f"valid_when = {{ {_toml(condition[0])} = {condition[1]} }}"
+    if found.role in COUNTED and (counter := _counter(found.reading.described)) is not None:
         yield f"counter = {_toml(counter)}"
 
 
 def _valid_when(described: Described, signal: DatabaseSignal) -> tuple[str, int] | None:
     """The only flag of the message that says "valid" and is mostly set, or a GNSS fix that is mostly complete."""
-    raw = {other.name: _raw(described, other) for other in described.message.signals.values() if other is not signal}
-    fields = {name: described.message.signals[name].field for name in raw}
-    valid = [
-        name for name, bits in raw.items()
-        if fields[name].length == 1 and "valid" in name.lower() and "invalid" not in name.lower()
-        and float(np.mean(bits == 1)) > MOSTLY
-    ]  # fmt: skip
+    others = [other for other in described.message.signals.values() if other is not signal]
+    flags = [each for each in others if each.field.length == 1 and re.search(r"(?i)(?<!in)valid", each.name)]
+    valid = [each.name for each in flags if float(np.mean(_raw(described, each) == 1)) > MOSTLY]
     if len(valid) == 1:
         return valid[0], 1
-    for name, bits in raw.items():
-        if name.lower().startswith("fix") and bits.max() == FIX_3D and float(np.mean(bits == FIX_3D)) > MOSTLY:
-            return name, FIX_3D
-    return None
+    fixes = {each.name: _raw(described, each) for each in others if each.name.lower().startswith("fix")}
+    whole = [name for name, bits in fixes.items() if bits.max() == FIX_3D and np.mean(bits == FIX_3D) > MOSTLY]
+    return (whole[0], FIX_3D) if whole else None
 
 
 def _counter(described: Described) -> str | None:
     """The signal of the message that usually advances by one from frame to frame."""
     for signal in described.message.signals.values():
-        is_named = any(word in signal.name.lower() for word in _COUNTER_WORDS)
-        if not is_named or signal.field.length not in COUNTER_BITS or signal.field.coding is Coding.FLOAT:
-            continue
-        steps = np.diff(_raw(described, signal)) % (1 << signal.field.length)
-        if len(steps) and float(np.mean(steps == 1)) > MOSTLY:
-            return signal.name
+        is_number = signal.field.length in COUNTER_BITS and signal.field.coding is not Coding.FLOAT
+        if is_number and re.search(r"(?i)count|alive|seq", signal.name):
+            steps = np.diff(_raw(described, signal)) % (1 << signal.field.length)
+            if len(steps) and float(np.mean(steps == 1)) > MOSTLY:
+                return signal.name
     return None
 
 
@@ -128,7 +120,3 @@ def _raw(described: Described, signal: DatabaseSignal) -> I64:
 def _toml(text: str) -> str:
     quoted = text.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{quoted}"'
-
-
-def _toml_key(name: str) -> str:
-    return name if name.replace("_", "").isalnum() and name.isascii() else _toml(name)
