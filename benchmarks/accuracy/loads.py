@@ -12,7 +12,6 @@ from typing import Final
 
 import numpy as np
 
-from gateway.core.vehicle import Carries
 from gateway.sim.vehicle import Load, Vehicle
 
 FLOOR_M: Final = 0.6  # chosen: above the road, of the vans' load floors
@@ -71,14 +70,3 @@ _EXTENTS: Final[dict[Shape, Callable[[float, float, float], tuple[float, float]]
     Shape.ROOF: lambda one, other, floor_m: ((0.5 + 0.4 * one) * floor_m, 0.5 + 0.4 * other),
 }
 """Length and height (m) from two numbers between 0 and 1 and the floor's length."""
-
-SAYS: Final = {
-    Shape.BOX: Carries.PALLETS,
-    Shape.PARCELS: Carries.PARCELS,
-    Shape.BAY: Carries.PARCELS,
-    Shape.TALL: Carries.TOOLS,
-    Shape.LONG: Carries.LONG_GOODS,
-    Shape.PIPES: Carries.LONG_GOODS,
-    Shape.ROOF: Carries.PARCELS,
-}
-"""The fitter's answer for a vehicle that carries only this shape; with Shape.ROOF it also has a roof rack."""

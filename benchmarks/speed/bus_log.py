@@ -12,13 +12,11 @@ from gateway.bus.frames import join, merge_frames
 from gateway.bus.logs import open_whole_log
 from gateway.bus.logs.candump_write import append_candump
 from gateway.bus.logs.packed import zstd
-from gateway.bus.signals import shipped_map
 from gateway.records import EXTENDED_ID, Frames
 
 FRAMES_PER_S: Final = 2500  # chosen: a bus of 500 kbit/s, well used
 N_IDS: Final = 60  # chosen
 START_NS: Final = 1_760_146_908_000_000_000  # arbitrary, in 2025
-DATABASE: Final = shipped_map("reference").with_name("springscale_reference.dbc")
 FORMATS: Final = (".log", ".log.gz", ".log.zst", ".log.xz", ".mf4")  # the others are read by python-can itself
 
 
