@@ -72,7 +72,7 @@ def test_what_is_no_number_is_a_usage_error(command: tuple[str, ...], text: str)
     [
         (("campaign", "pack", "a.log", "--output", "a.zip"), "campaign.toml: cannot be read: Not a directory"),
         (("reprocess", "a.log", "--output", "out", "--dry-run"), "a.log: has no archive.toml"),
-        (("verification", "show", "--url", "http://[::1"), "cannot reach the service: Invalid IPv6 URL"),
+        (("verification", "show", "--url", "http://[::1"), "cannot reach the service: Invalid port"),
         (("check-config", "deep.toml"), "deep.toml: not valid TOML"),
         (("check-config", "long.toml"), "long.toml: not valid TOML"),
         (("check-config", "nul.toml"), "nul.toml: store.directory: contains a NUL character"),
