@@ -1,21 +1,29 @@
 """springscale record: a bus recorded into a log, without a service."""
 
 import contextlib
+import gzip
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO, Final, cast
 
 import click
 
+from gateway.bus.frames import widened
 from gateway.bus.live.source import LiveSource
-from gateway.bus.ring_log import record_to_file
+from gateway.bus.logs.candump_write import append_candump
 from gateway.bus.signals import load_signal_map
 from gateway.cli import options
 from gateway.cli.options import FILE, NumberRange, Told, prints
 from gateway.cli.progress import StatusLine
 from gateway.errors import SpringscaleError
 from gateway.files.whole import refusal_told
+from gateway.records import Frames
+
+FLUSH_S: Final = 10.0  # chosen: a killed recording loses as much
+DRAIN_S: Final = 0.2  # chosen: how soon a stop takes effect
 
 
 @click.command("record")
@@ -29,16 +37,16 @@ def record(log: Path, signals: str, interface: str, channel: str, for_s: float |
     """Record the mapped frames of a bus into LOG (candump text, compressed if it ends in .gz)."""
     signal_map = load_signal_map(signals)
     source = LiveSource(interface, channel, signal_map)
-    stop = threading.Event()
-    with StatusLine() as status, _until_told(stop), refusal_told(log, SpringscaleError):
-        n_frames = record_to_file(
-            source,
-            signal_map.channel or channel,
-            log,
-            stop,
-            duration_s=for_s,
-            on_frames=lambda n: status.show(f"{n} frames"),
-        )
+    n_frames, due_s = 0, time.monotonic() + FLUSH_S
+    with StatusLine() as status, refusal_told(log, SpringscaleError), _new(log) as file:
+        for frames in _received(source, for_s):
+            if frames is not None:
+                append_candump(widened(frames, int(frames.length.max())), signal_map.channel or channel, file)
+                n_frames += len(frames)
+                status.show(f"{n_frames} frames")
+            if time.monotonic() >= due_s:
+                file.flush()
+                due_s = time.monotonic() + FLUSH_S
     counts = source.counts()
     n_dropped = counts.dropped_inbox + counts.dropped_kernel
     if not n_frames:
@@ -47,12 +55,32 @@ def record(log: Path, signals: str, interface: str, channel: str, for_s: float |
     return told, f"{log}: {n_frames} frames, {n_dropped} lost"
 
 
+def _new(log: Path) -> BinaryIO:
+    """Raises OSError, also if the file exists."""
+    return cast(BinaryIO, gzip.open(log, "xb", 6)) if log.suffix.lower() == ".gz" else log.open("xb")
+
+
+def _received(source: LiveSource, for_s: float | None) -> Iterator[Frames | None]:
+    """The frames of a source until a stop or so long, then those still in its inbox; None after a quiet while."""
+    end_s = None if for_s is None else time.monotonic() + for_s
+    source.start()
+    try:
+        with _stop_told() as stop:
+            while not (stop.is_set() or (end_s is not None and time.monotonic() >= end_s) or source.failure):
+                yield source.inbox.drain(DRAIN_S)
+    finally:
+        source.stop()
+    while (frames := source.inbox.drain(0.0)) is not None:
+        yield frames
+
+
 @contextlib.contextmanager
-def _until_told(stop: threading.Event) -> Iterator[None]:
+def _stop_told() -> Iterator[threading.Event]:
     """Let Ctrl-C and SIGTERM end the recording instead of the program, so that received frames are written."""
+    stop = threading.Event()
     before = {number: signal.signal(number, lambda *_: stop.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield
+        yield stop
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

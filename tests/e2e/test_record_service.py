@@ -46,7 +46,7 @@ def test_what_was_recorded_is_weighed_as_it_was_live(tmp_path: Path, log: Path) 
         assert f'springscale_record_frames_total{{outcome="written"}} {service.gateway.pipeline.n_frames}.0' in metrics
 
     serve(config, play)
-    kept = tmp_path / "state" / "record" / "current.log"
+    kept = tmp_path / "state" / "record" / "00000001.log"
     live = stored(config)
     assert len(counted(live)) == 3
     assert estimated(config, kept)[:3] == live[:3]
@@ -107,7 +107,7 @@ from support.patience import wait_until
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 drive = white_noise(20.0, {START_NS}, seed=1)
 folder = pathlib.Path(sys.argv[1])
-log = RingLog(folder, "can0", 10**9, 0, write_s=0.0, retry_s=0.01)
+log = RingLog(folder, "can0", 10**9, 0, write_s=0.01)
 log.start()
 log.put(drive)
 assert wait_until(lambda: log.status().n_frames_written)

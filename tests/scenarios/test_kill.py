@@ -59,7 +59,7 @@ import itertools, pathlib, sys
 from gateway.bus.ring_log import RingLog
 from support.bus_drive import white_noise
 
-log = RingLog(pathlib.Path(sys.argv[1]), "can0", 10**9, 0, write_s=0.0)
+log = RingLog(pathlib.Path(sys.argv[1]), "can0", 10**9, 0, write_s=0.001)
 log.start()
 drive = white_noise(20.0, 1_790_000_000_000_000_000, seed=1)
 for n in itertools.count(1):

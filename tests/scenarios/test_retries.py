@@ -18,7 +18,7 @@ from support.patience import PATIENCE_S, wait_until
 from support.ports import free_port
 from support.receiver import SECRET_TEXT, Receiver, cut, status
 
-from gateway.bus import feed, ring_log
+from gateway.bus import feed
 from gateway.bus.feed import Feeder, Gpsd
 from gateway.bus.live import source as live
 from gateway.bus.live.source import LiveSource
@@ -221,9 +221,9 @@ def a_gpsd_that_hangs_up(folder: Path, patch: pytest.MonkeyPatch) -> Iterator[Tr
 @contextmanager
 def a_disk_that_takes_no_frames(folder: Path, patch: pytest.MonkeyPatch) -> Iterator[Tried]:
     (folder / "record").write_text("a file where the folder should be")
-    tries = Tries(ring_log._Files)
-    patch.setattr(ring_log, "_Files", tries)
-    log = RingLog(folder / "record", "can0", 10**9, 0, write_s=0.0, retry_s=0.001)
+    log = RingLog(folder / "record", "can0", 10**9, 0, write_s=0.001)
+    tries = Tries(log._write_held)
+    patch.setattr(log, "_write_held", tries)
     log.start()
     log.put(frames_of([(1000, 0x120, bytes(8))]))
     yield lambda: tries.n

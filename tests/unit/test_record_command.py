@@ -1,6 +1,8 @@
 """springscale record: every mapped frame of a bus in a log."""
 
 import gzip
+import os
+import signal
 import threading
 from importlib.resources import files
 from pathlib import Path
@@ -9,52 +11,20 @@ import pytest
 from click.testing import Result
 from support.bus_drive import START_NS, white_noise
 from support.commands import called
-from support.patience import wait_until
+from support.patience import PATIENCE_S, wait_until
 
-from gateway.bus import ring_log
 from gateway.bus.live.source import LiveSource, SourceCounts
 from gateway.bus.logs.open import open_log
-from gateway.bus.ring_log import record_to_file
 from gateway.bus.signals import load_signal_map
 from gateway.bus.sink import BusSink
+from gateway.cli import record
 from gateway.errors import SpringscaleError
 
 SIGNAL_MAP = load_signal_map("springscale:reference")
 DRIVE = white_noise(20.0, START_NS, seed=1)
 
 
-def test_every_mapped_frame_is_in_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ring_log, "FLUSH_S", 0.0)
-    source, stop = LiveSource("virtual", tmp_path.name, SIGNAL_MAP, silence_s=0.05), threading.Event()
-
-    def play() -> None:
-        assert wait_until(lambda: source.state == "bus_silent")  # it is open, then
-        with BusSink("virtual", tmp_path.name) as sink:
-            sink.send(DRIVE)
-        wait_until(lambda: source.counts().frames == len(DRIVE))
-        stop.set()
-
-    player = threading.Thread(target=play)
-    player.start()
-    heard: list[int] = []
-    path = tmp_path / "drive.log.gz"
-    assert record_to_file(source, "can0", path, stop, on_frames=heard.append) == len(DRIVE)
-    player.join()
-    chunks, report = open_log(path, SIGNAL_MAP)
-    assert sum(map(len, chunks)) == len(DRIVE) == heard[-1]
-    assert report.ended_early is None
-
-
-def test_what_came_as_it_was_stopped_is_counted_too(tmp_path: Path) -> None:
-    source, stop = LiveSource("virtual", tmp_path.name, SIGNAL_MAP), threading.Event()
-    source.inbox.put(DRIVE)
-    stop.set()
-    heard: list[int] = []
-    assert record_to_file(source, "can0", tmp_path / "drive.log.gz", stop, on_frames=heard.append) == len(DRIVE)
-    assert heard == [len(DRIVE)]
-
-
-def recorded(log: Path, signals: str = "springscale:reference") -> Result:
+def recorded(log: Path, signals: str = "springscale:reference", for_s: float = 0.3) -> Result:
     """By ``springscale record`` from a virtual bus named after the log's folder."""
     return called(
         "record",
@@ -62,12 +32,40 @@ def recorded(log: Path, signals: str = "springscale:reference") -> Result:
         "--signals",
         signals,
         "--for-s",
-        0.3,
+        for_s,
         "--interface",
         "virtual",
         "--channel",
         log.parent.name,
     )
+
+
+def test_every_mapped_frame_is_in_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(record, "FLUSH_S", 0.0)
+    source = LiveSource("virtual", tmp_path.name, SIGNAL_MAP, silence_s=0.05)
+    monkeypatch.setattr(record, "LiveSource", lambda *_: source)
+
+    def play() -> None:
+        assert wait_until(lambda: source.state == "bus_silent")  # it is open, then
+        with BusSink("virtual", tmp_path.name) as sink:
+            sink.send(DRIVE)
+        wait_until(lambda: source.counts().frames == len(DRIVE))
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    player = threading.Thread(target=play)
+    player.start()
+    found = recorded(tmp_path / "drive.log.gz", for_s=PATIENCE_S)
+    player.join()
+    assert found.output.endswith(f"{len(DRIVE)} frames, 0 lost\n")
+    chunks, report = open_log(tmp_path / "drive.log.gz", SIGNAL_MAP)
+    assert sum(map(len, chunks)) == len(DRIVE)
+    assert report.ended_early is None
+
+
+def test_what_came_as_it_was_stopped_is_counted_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(LiveSource, "start", lambda _: None)
+    monkeypatch.setattr(LiveSource, "stop", lambda source: source.inbox.put(DRIVE))
+    assert recorded(tmp_path / "drive.log.gz").output.endswith(f"{len(DRIVE)} frames, 0 lost\n")
 
 
 @pytest.mark.parametrize(

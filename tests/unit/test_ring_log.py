@@ -67,7 +67,7 @@ def test_what_was_put_is_what_is_read(tmp_path: Path) -> None:
 
 def test_runs_are_kept_one_behind_the_other(tmp_path: Path) -> None:
     recorded(tmp_path, take(DRIVE, slice(0, 1000)), take(DRIVE, slice(1000, None)))
-    assert [path.name for path in files(tmp_path)] == ["00000001.log", "current.log"]
+    assert [path.name for path in files(tmp_path)] == ["00000001.log", "00000002.log"]
     assert same(read(*files(tmp_path)), DRIVE)
 
 
@@ -98,8 +98,8 @@ def test_a_clock_that_steps_back_changes_no_order_and_no_stamp(tmp_path: Path) -
 
 def test_a_power_cut_costs_the_last_line(tmp_path: Path) -> None:
     recorded(tmp_path, DRIVE)
-    content = (tmp_path / "current.log").read_bytes()
-    (tmp_path / "current.log").write_bytes(content[:-20] + bytes(100))
+    content = (tmp_path / "00000001.log").read_bytes()
+    (tmp_path / "00000001.log").write_bytes(content[:-20] + bytes(100))
     recorded(tmp_path, DRIVE)
     assert len(read(*files(tmp_path))) == 2 * len(DRIVE) - 1
 
@@ -107,7 +107,7 @@ def test_a_power_cut_costs_the_last_line(tmp_path: Path) -> None:
 def test_a_disk_that_refuses_is_waited_for(tmp_path: Path) -> None:
     directory = tmp_path / "record"
     directory.write_text("a file where the folder should be")
-    log = RingLog(directory, "can0", 10**9, 0, write_s=0.0, retry_s=0.01)
+    log = RingLog(directory, "can0", 10**9, 0, write_s=0.01)
     log.start()
     log.put(DRIVE)
     assert wait_until(lambda: log.fault is not None)
@@ -122,7 +122,7 @@ def test_a_disk_that_refuses_is_waited_for(tmp_path: Path) -> None:
 def test_what_waits_is_bounded_and_the_rest_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ring_log, "HELD_FRAMES", 3 * len(DRIVE))
     (tmp_path / "record").write_text("")
-    log = RingLog(tmp_path / "record", "can0", 10**9, 0, write_s=0.0, retry_s=PATIENCE_S)
+    log = RingLog(tmp_path / "record", "can0", 10**9, 0, write_s=0.01)
     log.start()
     for _ in range(5):
         log.put(DRIVE)
@@ -138,7 +138,14 @@ def test_a_disk_with_little_room_is_left_alone(tmp_path: Path) -> None:
     log.put(DRIVE)
     log.stop(PATIENCE_S)
     assert "free_mb" in str(log.fault)
-    assert ((tmp_path / "record").exists(), log.status().n_frames_dropped) == (False, len(DRIVE))
+    assert (files(tmp_path / "record"), log.status().n_frames_dropped) == ([], len(DRIVE))
+
+
+def test_files_without_a_frame_are_not_kept(tmp_path: Path) -> None:
+    """A disk that refuses leaves an empty file at every attempt."""
+    (tmp_path / "00000007.log").touch()
+    recorded(tmp_path, DRIVE)
+    assert [path.name for path in files(tmp_path)] == ["00000008.log"]
 
 
 def test_foreign_files_are_neither_counted_nor_removed(tmp_path: Path) -> None:
@@ -184,7 +191,7 @@ def release(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
 
 
 def test_no_thread_waits_for_the_disk(tmp_path: Path, release: threading.Event) -> None:
-    log = RingLog(tmp_path, "can0", 10**9, 0, write_s=0.0)
+    log = RingLog(tmp_path, "can0", 10**9, 0, write_s=0.01)
     log.start()
     log.put(DRIVE)
     log.put(DRIVE)  # returns though the disk does not
