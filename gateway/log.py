@@ -70,7 +70,7 @@ class Event(StrEnum):
     UPLINK_REFUSED = "uplink refused an estimate"
     WEBHOOK_CONNECTED = "webhook taken again"
     WEBHOOK_FAILED = "webhook not taken"
-    WEBHOOK_REFUSED = "webhook: giving up on a message"
+    WEBHOOK_REFUSED = "webhook gives up on a message"
     BATCH_NOT_KEPT = "batch not kept"
     RECORD_REFUSED = "frames not recorded"
     RECORD_RECOVERED = "frames recorded again"

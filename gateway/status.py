@@ -154,15 +154,6 @@ class UplinkStatus:
 
 
 @dataclass(frozen=True, slots=True)
-class DeadLetter:
-    """A message that the webhook gave up."""
-
-    id: str
-    reason: str
-    at: str
-
-
-@dataclass(frozen=True, slots=True)
 class WebhookStatus:
     """How alarms and events get to the webhook's receiver; counts begin at the start, except those that the store
     keeps.
@@ -172,7 +163,6 @@ class WebhookStatus:
     n_delivered: Annotated[int, Field(description="answered with 2xx")] = 0
     n_failed: Annotated[int, Field(description="attempts that were not")] = 0
     n_dead: Annotated[int, Field(description="messages given up: refused for good, or for too long")] = 0
-    dead: Annotated[tuple[DeadLetter, ...], Field(description="the last of them, the newest at the end")] = ()
     n_waiting: Annotated[int, Field(description="still to be delivered; as of a few seconds ago")] = 0
     waiting_age_s: Annotated[
         float | None, Field(description="of the oldest of them, since its receipt; null: none waits")

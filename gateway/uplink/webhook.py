@@ -18,17 +18,14 @@ from typing import Any, Final
 
 from gateway.errors import ConfigurationError
 from gateway.history import ESTIMATE, Delivery
-from gateway.log import Event, OnEvent, log_event
-from gateway.records import iso_utc, json_line
-from gateway.status import DeadLetter, WebhookStatus
+from gateway.log import Event, OnEvent, log_event, tell_event
+from gateway.records import json_line
+from gateway.status import WebhookStatus
 from gateway.uplink.forwarder import IDLE_S, PAGE, BackOff, Forwarder
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import WebhookSettings
 
 MOST_PAUSE_S: Final = 3600.0  # chosen: whatever Retry-After says
-TRIES: Final = 3  # chosen: attempts for a message that the receiver will never take
-SHOWN: Final = 20  # chosen: dead letters
-DEAD_LETTER: Final = "webhook_dead_letter"  # as the store keeps it
 UNWANTED: Final = frozenset({410, 413})  # gone for good, too large: the receiver will never take this very message
 NO_ANSWER: Final = 0
 AWAY: Final = frozenset({NO_ANSWER, 408, 425, 429, 502, 503, 504})  # RFC 9110, 8470 and 6585: later it may succeed
@@ -56,18 +53,12 @@ def body_of(message: OutboxMessage) -> bytes:
     return json_line({"type": message.kind, "timestamp": happened, "data": record}).encode()
 
 
-def pause_of(retry_after: str | None) -> float:
-    """Pause of a Retry-After header in seconds (RFC 9110, 10.2.3); 0 if there is none, or a date."""
-    told = (retry_after or "").strip()
-    return min(float(told), MOST_PAUSE_S) if told.isdecimal() else 0.0
-
-
 class Webhook(Forwarder[WebhookStatus]):
     """Runs until :meth:`stop`. Delivers at least once and in order: a message waits until the one before it is done.
 
-    A message is done when the receiver accepted it, or when it is dead: 410 or 413 came ``TRIES`` times, or only
-    refusals for ``give_up_s``. All other failures are retried with growing pauses, which are reset only by an accepted
-    message. A message in flight when the service is killed may arrive twice, with the same id.
+    A message is done when the receiver accepted it, or when it is dead: 410 or 413 came, or only refusals for
+    ``give_up_s``. All other failures are retried with growing pauses, which only an accepted message resets. A message
+    in flight when the service is killed may arrive twice, with the same id.
     """
 
     NAME = "webhook"
@@ -93,7 +84,7 @@ class Webhook(Forwarder[WebhookStatus]):
 
     def _done(self, message: OutboxMessage) -> bool:
         """Try until the message is accepted or dead; False if the service was stopped before."""
-        n_unwanted, refused_since_s = 0, None
+        refused_since_s = None
         while not self._stopping.is_set():
             status, told, wait_s = self._posted(message)
             if 200 <= status < 300:
@@ -104,54 +95,44 @@ class Webhook(Forwarder[WebhookStatus]):
                 return True
             self._note(told)
             self._report = replace(self._report, n_failed=self._report.n_failed + 1)
-            n_unwanted += status in UNWANTED
             now_s = self._clock_s()
-            if status in AWAY or refused_since_s is None:
-                refused_since_s = None if status in AWAY else now_s
-            refused_s = 0.0 if refused_since_s is None else now_s - refused_since_s
-            if n_unwanted >= TRIES or refused_s >= self._settings.give_up_s:
-                self._bury(message, told)
+            refused_since_s = None if status in AWAY else refused_since_s or now_s
+            if status in UNWANTED or now_s - (refused_since_s or now_s) >= self._settings.give_up_s:
+                dead = {"receiver": self._settings.receiver, "id": message.id, "reason": told}
+                tell_event(Event.WEBHOOK_REFUSED, dead, self._on_event, logging.ERROR)  # it stays in the history
+                self._report = replace(self._report, n_dead=self._report.n_dead + 1)
                 return True
             self._pause(max(self._back_off.next_s(), wait_s))
         return False
 
     def _posted(self, message: OutboxMessage) -> tuple[int, str, float]:
-        """One attempt -> HTTP status or NO_ANSWER, what happened, and the pause that the receiver asks for."""
+        """One attempt -> HTTP status or NO_ANSWER, what happened, and the seconds that Retry-After asks for."""
         import httpx  # noqa: PLC0415 # a tenth of a second at every start, which few vehicles need
 
-        try:
-            body = body_of(message)
-            marks = signed(self._settings.secrets(), message.id, int(time.time()), body)
-            return asyncio.run(self._post(body, marks))
-        except ConfigurationError as fault:
-            told = str(fault)
-        except (TimeoutError, httpx.TimeoutException):
-            told = f"{self._settings.receiver}: its answer took too long"
-        except (httpx.HTTPError, OSError) as fault:
-            told = f"{self._settings.receiver}: {_root_of(fault)}"
-        return NO_ANSWER, told, 0.0
-
-    async def _post(self, body: bytes, marks: dict[str, str]) -> tuple[int, str, float]:
-        """A total time limit ends an answer that drips: httpx's own begins again with every byte."""
-        import httpx  # noqa: PLC0415 # as above
-
         s = self._settings
-        headers = {"Content-Type": "application/json", "User-Agent": f"springscale/{version('springscale')}", **marks}
-        async with (
-            asyncio.timeout(2.0 * s.timeout_s),
-            httpx.AsyncClient(verify=self._tls or False, timeout=s.timeout_s, trust_env=False) as client,
-            client.stream("POST", s.url, content=body, headers=headers) as answer,  # redirections are not followed
-        ):
-            told = f"{s.receiver} answered {answer.status_code} {answer.reason_phrase}".rstrip()
-            return answer.status_code, told, pause_of(answer.headers.get("Retry-After"))
 
-    def _bury(self, message: OutboxMessage, reason: str) -> None:
-        """Give up on the message; it stays in the history of the vehicle."""
-        dead = DeadLetter(message.id, reason, iso_utc(time.time_ns()))
-        told = {"receiver": self._settings.receiver, "id": message.id, "reason": reason}
-        log_event(Event.WEBHOOK_REFUSED, level=logging.ERROR, **told)
-        self._on_event(DEAD_LETTER, told)
-        self._report = replace(self._report, n_dead=self._report.n_dead + 1, dead=(*self._report.dead, dead)[-SHOWN:])
+        async def post() -> httpx.Response:
+            body = body_of(message)
+            headers = {"Content-Type": "application/json", "User-Agent": f"springscale/{version('springscale')}"}
+            headers |= signed(s.secrets(), message.id, int(time.time()), body)
+            async with (
+                asyncio.timeout(2.0 * s.timeout_s),  # ends an answer that drips: httpx's begins again with every byte
+                httpx.AsyncClient(verify=self._tls or False, timeout=s.timeout_s, trust_env=False) as client,
+                client.stream("POST", s.url, content=body, headers=headers) as answer,  # follows no redirection
+            ):
+                return answer
+
+        try:
+            answer = asyncio.run(post())
+        except ConfigurationError as fault:
+            return NO_ANSWER, str(fault), 0.0
+        except (TimeoutError, httpx.TimeoutException):
+            return NO_ANSWER, f"{s.receiver}: its answer took too long", 0.0
+        except (httpx.HTTPError, OSError) as fault:
+            return NO_ANSWER, f"{s.receiver}: {_root_of(fault)}", 0.0
+        told = f"{s.receiver} answered {answer.status_code} {answer.reason_phrase}".rstrip()
+        wait = answer.headers.get("Retry-After", "")
+        return answer.status_code, told, min(float(wait), MOST_PAUSE_S) if wait.isdecimal() else 0.0
 
     def _n_pruned(self, found: Delivery) -> int:
         return found.n_pruned_entries + (found.n_pruned if ESTIMATE in self._settings.kinds else 0)

@@ -17,7 +17,7 @@ from gateway.errors import ConfigurationError
 from gateway.records import json_line
 from gateway.uplink.outbox import OutboxMessage
 from gateway.uplink.settings import SecretError, secrets_of, webhook_settings
-from gateway.uplink.webhook import MOST_PAUSE_S, body_of, pause_of, signed
+from gateway.uplink.webhook import body_of, signed
 
 VAN = VehicleSection(id="van-17")
 
@@ -44,21 +44,6 @@ def test_an_older_secret_signs_too() -> None:
 def test_what_is_no_secret_is_refused(text: str) -> None:
     with pytest.raises(SecretError):
         secrets_of(text)
-
-
-@pytest.mark.parametrize(
-    ("header", "seconds"),
-    [
-        (None, 0.0),
-        ("17", 17.0),
-        ("999999", MOST_PAUSE_S),
-        ("-3", 0.0),
-        ("soon", 0.0),
-        ("Thu, 01 Jan 1970 00:17:10 GMT", 0.0),
-    ],
-)
-def test_retry_after_is_a_number_of_seconds(header: str | None, seconds: float) -> None:
-    assert pause_of(header) == seconds
 
 
 def test_the_body_says_what_it_is_and_when_it_happened() -> None:
