@@ -18,11 +18,10 @@ import select
 import socket
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -45,11 +44,13 @@ LONGEST_LINE: Final = 1 << 16  # chosen: far longer than a report of gpsd
 HOLE: Final = 2.5  # chosen: periods without a sample after which samples count as lost, not late
 USUAL_OF: Final = 101  # chosen: pauses whose median is the usual one: a second at 100 Hz
 NO_PLACE_DEG: Final = -214.7483648  # value of the database for a position without a fix
+Samples = tuple[I64, dict[str, F64]]  # t_ns (n,), and by kind m/s2 or rad/s (n, 3) in the vehicle's axes
+Rows = dict[str, dict[str, float]]  # by message and signal
 AXES: Final = {
     f"{sign}{axis}": (-1.0 if sign else 1.0) * np.eye(3)[i] for sign in ("", "-") for i, axis in enumerate("xyz")
 }
 KINDS: Final = ("accel", "anglvel")
-_TYPE: Final = re.compile(r"(be|le):([su])(\d+)/(\d+)(?:X1)?(?:>>(\d+))?\s*$")
+_TYPE: Final = re.compile(r"(be|le):([su])(\d+)/(8|16|32|64)(?:X1)?(?:>>(\d+))?\s*$")
 _MESSAGES: Final = {  # message, signals, counter (of eight bits), valid bit, and the signals' unit
     "accel": ("IMU_ACCEL", ("AccelX", "AccelY", "AccelZ"), "AccelCounter", "AccelValid", 1.0),
     "anglvel": ("IMU_GYRO", ("RollRate", "PitchRate", "YawRate"), "GyroCounter", "GyroValid", np.pi / 180.0),
@@ -65,31 +66,6 @@ def turned(forward: str, up: str) -> F64:
     return rows
 
 
-class _Channel(NamedTuple):
-    """The position of one channel in a scan, and the meaning of its bits."""
-
-    dtype: np.dtype[np.generic]
-    at: int
-    shift: int
-    unused_bits: int
-    add: float
-    scale: float
-
-    def raw(self, scans: np.ndarray) -> np.ndarray:
-        """Whole numbers (n,) of scans (n, bytes)."""
-        raw = np.ascontiguousarray(scans[:, self.at : self.at + self.dtype.itemsize]).view(self.dtype)[:, 0]
-        raw = raw.astype(np.int64 if self.dtype.kind == "i" else np.uint64) >> self.shift
-        whole: np.ndarray = (raw << self.unused_bits) >> self.unused_bits  # an arithmetic shift if it is signed
-        return whole if self.unused_bits else raw
-
-
-class Samples(NamedTuple):
-    """One read of a device: t_ns (n,), and by kind m/s2 or rad/s (n, 3) in the vehicle's axes."""
-
-    t_ns: I64
-    vectors: dict[str, F64]
-
-
 class IioDevice:
     """One device: opened, its buffer enabled, read until closed. turn (3, 3): rows forward, left, up in its axes."""
 
@@ -97,44 +73,33 @@ class IioDevice:
         """Raises ConfigurationError unless it is an inertial unit with a buffer."""
         self.folder, self._node = folder, nodes / folder.name
         self.name = self._text("name") or folder.name
-        self._turn, self._wanted_hz = turn, rate_hz
+        self._turn, self.rate_hz = turn, rate_hz
         self.kinds = tuple(k for k in KINDS if all(self._text(f"scan_elements/in_{k}_{axis}_en") for axis in "xyz"))
         if not self.kinds:
             raise ConfigurationError(
                 f"{folder}: has no buffered accelerometer or gyroscope: is its driver loaded, and its interrupt wired?"
             )
         self.has_stamps = self._text("scan_elements/in_timestamp_en") is not None
-        self._rates = ("sampling_frequency", *(f"in_{kind}_sampling_frequency" for kind in self.kinds))
-        self._channels: dict[str, _Channel] = {}
-        self._turns: dict[str, F64] = {}
-        self._scan_bytes, self._file, self._rest = 0, -1, b""
-
-    @property
-    def rate_hz(self) -> float:
-        """As the driver reports it, else as requested."""
-        for name in self._rates:
-            with contextlib.suppress(ValueError):
-                return float(self._text(name) or "")
-        return self._wanted_hz
+        self._scan, self._turns, self._file, self._rest = np.dtype([]), dict[str, tuple[F64, F64]](), -1, b""
+        self._shifts: dict[str, tuple[int, int]] = {}
 
     def open(self) -> None:
         """Choose the channels, set the rate and start the buffer.
 
         Raises BusError if the kernel refuses, ConfigurationError for a channel or a mount matrix that cannot be read.
         """
-        wanted = {f"in_{kind}_{axis}_en" for kind in self.kinds for axis in "xyz"} | {"in_timestamp_en"}
+        channels = [f"in_{kind}_{axis}" for kind in self.kinds for axis in "xyz"] + ["in_timestamp"]
+        rates = ["sampling_frequency", *(f"in_{kind}_sampling_frequency" for kind in self.kinds)]
+        known = [path.name for path in (self.folder / "scan_elements").glob("*_en")]
+        settings = {f"scan_elements/{name}": str(int(name.removesuffix("_en") in channels)) for name in known}
+        settings |= {name: f"{self._nearest(name):g}" for name in rates}
+        settings |= {"current_timestamp_clock": "realtime", "buffer/length": str(BUFFER_SCANS), "buffer/watermark": "1"}
         try:
-            self._write("buffer/enable", "0")
-            for path in (self.folder / "scan_elements").glob("*_en"):
-                path.write_text("1" if path.name in wanted else "0")
-            for name in self._rates:
-                self._write(name, f"{self._nearest(name):g}", is_optional=True)
-            self._write("current_timestamp_clock", "realtime", is_optional=True)
-            self._write("buffer/length", str(BUFFER_SCANS))
-            self._write("buffer/watermark", "1", is_optional=True)
-            self._channels, self._scan_bytes = self._laid_out()
-            self._turns = {kind: self._turn @ self._mount(kind) for kind in self.kinds}
-            self._write("buffer/enable", "1")
+            self._write({"buffer/enable": "0"} | settings)
+            self._lay_out(name for name in channels if f"{name}_en" in known)
+            self._turns = {kind: self._turn_of(kind) for kind in self.kinds}
+            self.rate_hz = next((float(text) for name in rates if (text := self._text(name))), self.rate_hz)
+            self._write({"buffer/enable": "1"})
             self._file = os.open(self._node, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as fault:
             raise BusError(
@@ -146,14 +111,14 @@ class IioDevice:
             os.close(self._file)
             self._file = -1
         with contextlib.suppress(OSError):
-            self._write("buffer/enable", "0")
+            self._write({"buffer/enable": "0"})
 
     def read(self, timeout_s: float) -> Samples | None:
         """The samples since the last read; None if there are none. Raises BusError at the device's end."""
         if not select.select([self._file], [], [], timeout_s)[0]:
             return None
         try:
-            got = os.read(self._file, self._scan_bytes * MOST_SCANS)
+            got = os.read(self._file, self._scan.itemsize * MOST_SCANS)
         except BlockingIOError:
             return None
         except OSError as fault:
@@ -161,71 +126,76 @@ class IioDevice:
         if not got:
             raise BusError(f"{self._node}: the device is gone")
         whole = self._rest + got
-        n_bytes = len(whole) // self._scan_bytes * self._scan_bytes
+        n_bytes = len(whole) // self._scan.itemsize * self._scan.itemsize
         self._rest = whole[n_bytes:]
         return self.samples(whole[:n_bytes]) if n_bytes else None
 
     def samples(self, whole: bytes) -> Samples:
         """The samples of whole scans."""
-        scans = np.frombuffer(whole, np.uint8).reshape(-1, self._scan_bytes)
-        t_ns = np.full(len(scans), time.time_ns(), np.int64)
-        if self.has_stamps:
-            t_ns = self._channels["in_timestamp"].raw(scans).astype(np.int64)
+        scans = np.frombuffer(whole, self._scan)
+        columns = {}
+        for name, (shift, unused_bits) in self._shifts.items():
+            raw = scans[name].astype(np.int64 if scans[name].dtype.kind == "i" else np.uint64) >> shift
+            columns[name] = (raw << unused_bits) >> unused_bits  # an arithmetic shift if it is signed
+        now_ns = np.full(len(scans), time.time_ns(), np.int64)
+        t_ns = columns["in_timestamp"].astype(np.int64) if self.has_stamps else now_ns
         vectors = {}
-        for kind in self.kinds:
-            axes = [self._channels[f"in_{kind}_{axis}"] for axis in "xyz"]
-            chip = np.column_stack([(each.raw(scans).astype(np.float64) + each.add) * each.scale for each in axes])
-            vectors[kind] = chip @ self._turns[kind].T
-        return Samples(t_ns, vectors)
+        for kind, (add, turn) in self._turns.items():
+            chip = np.column_stack([columns[f"in_{kind}_{axis}"] for axis in "xyz"]).astype(np.float64)
+            vectors[kind] = (chip + add) @ turn.T
+        return t_ns, vectors
+
+    def _turn_of(self, kind: str) -> tuple[F64, F64]:
+        """What to add to the chip's numbers (3,), and what then turns them into the vehicle's axes and SI (3, 3)."""
+
+        def told(what: str, default: str) -> F64:  # in_accel_x_scale, or in_accel_scale for all three
+            return np.array(
+                [self._text(f"in_{kind}_{axis}_{what}", f"in_{kind}_{what}") or default for axis in "xyz"], float
+            )
+
+        return told("offset", "0"), self._turn @ self._mount(kind) * told("scale", "1")
 
     def _mount(self, kind: str) -> F64:
         """The mount matrix (3, 3); the identity if the driver has none. Raises ConfigurationError."""
-        text = self._text(f"in_{kind}_mount_matrix") or self._text("in_mount_matrix") or "1,0,0;0,1,0;0,0,1"
+        text = self._text(f"in_{kind}_mount_matrix", "in_mount_matrix") or "1,0,0;0,1,0;0,0,1"
         try:
             return np.array([float(x) for row in text.split(";") for x in row.split(",")]).reshape(3, 3)
         except ValueError:
-            raise ConfigurationError(
-                f"{self.folder}: its mount matrix is {text!r}, which is no 3 by 3 numbers"
-            ) from None
+            raise ConfigurationError(f"{self.folder}: mount matrix is {text!r}, which is no 3 by 3 numbers") from None
 
-    def _laid_out(self) -> tuple[dict[str, _Channel], int]:
-        """Every enabled channel in the order of its index, and the bytes of a scan."""
-        names = [path.name.removesuffix("_en") for path in (self.folder / "scan_elements").glob("*_en")]
-        enabled = [name for name in names if self._text(f"scan_elements/{name}_en") == "1"]
-        at, widest, channels = 0, 1, {}
+    def _lay_out(self, enabled: Iterable[str]) -> None:
+        """The scan as an aligned structure: every enabled channel in the order of its index."""
+        fields = []
         for name in sorted(enabled, key=lambda each: int(self._text(f"scan_elements/{each}_index") or 0)):
             text = self._text(f"scan_elements/{name}_type") or ""
             found = _TYPE.match(text)
-            if found is None or int(found[4]) not in (8, 16, 32, 64):
+            if found is None:
                 raise ConfigurationError(f"{self.folder}: scan_elements/{name}_type says {text!r}: not supported")
-            n_bytes = int(found[4]) // 8
-            at += -at % n_bytes
-            dtype = np.dtype(f"{'>' if found[1] == 'be' else '<'}{'i' if found[2] == 's' else 'u'}{n_bytes}")
-            add, scale = self._number(name, "offset", 0.0), self._number(name, "scale", 1.0)
-            channels[name] = _Channel(dtype, at, int(found[5] or 0), 64 - int(found[3]), add, scale)
-            at, widest = at + n_bytes, max(widest, n_bytes)
-        return channels, at + -at % widest
-
-    def _number(self, name: str, what: str, default: float) -> float:
-        """in_accel_x_scale, or in_accel_scale for all three."""
-        found = self._text(f"{name}_{what}") or self._text(f"{name.rpartition('_')[0]}_{what}")
-        return default if found is None else float(found)
+            order, sign, bits, storage_bits, shift = found.groups()
+            fields.append(
+                (name, f"{'>' if order == 'be' else '<'}{'i' if sign == 's' else 'u'}{int(storage_bits) // 8}")
+            )
+            self._shifts[name] = int(shift or 0), 64 - int(bits)
+        self._scan = np.dtype(fields, align=True)
 
     def _nearest(self, name: str) -> float:
         """The requested rate, or the lowest available one above it, else the highest."""
         told = self._text(f"{name}_available") or ""
         if not told or told.startswith("["):
-            return self._wanted_hz
+            return self.rate_hz
         rates = sorted(float(each) for each in told.split())
-        return next((rate for rate in rates if rate >= 0.99 * self._wanted_hz), rates[-1])
+        return next((rate for rate in rates if rate >= 0.99 * self.rate_hz), rates[-1])
 
-    def _text(self, name: str) -> str | None:
-        path = self.folder / name
-        return path.read_text().strip() if path.is_file() else None
+    def _text(self, *names: str) -> str | None:
+        """The content of the first of these files that exists."""
+        paths = (self.folder / name for name in names)
+        return next((path.read_text().strip() for path in paths if path.is_file()), None)
 
-    def _write(self, name: str, text: str, *, is_optional: bool = False) -> None:
-        if not is_optional or (self.folder / name).is_file():
-            (self.folder / name).write_text(text)
+    def _write(self, texts: dict[str, str]) -> None:
+        """Write those files that the driver has."""
+        for path, text in ((self.folder / name, text) for name, text in texts.items()):
+            if path.is_file():
+                path.write_text(text)
 
 
 def find_devices(turn: F64, rate_hz: float, sysfs: Path = SYSFS, nodes: Path = NODES) -> Iterator[IioDevice]:
@@ -239,16 +209,6 @@ def find_devices(turn: F64, rate_hz: float, sysfs: Path = SYSFS, nodes: Path = N
                 yield device
 
 
-class Fix(NamedTuple):
-    """One report of gpsd; speed and position are finite or None. mode as in the database: 0, 2 or 3."""
-
-    mode: int
-    speed_mps: float | None
-    latitude_deg: float | None
-    longitude_deg: float | None
-    n_satellites: int
-
-
 class Gpsd:
     """One connection to gpsd; opened again by the next read after it broke."""
 
@@ -259,7 +219,7 @@ class Gpsd:
         self._rest = b""
         self._n_satellites = 0
 
-    def read(self, timeout_s: float) -> list[Fix]:
+    def read(self, timeout_s: float) -> list[Rows]:
         """Fixes that came within ``timeout_s``. Raises BusError if gpsd does not answer or hangs up."""
         try:
             if self._socket is None:
@@ -285,8 +245,8 @@ class Gpsd:
             self._socket.close()
         self._socket, self._rest = None, b""
 
-    def fix_of(self, line: bytes) -> Fix | None:
-        """None unless it is a fix: other reports, and lines that are not JSON."""
+    def fix_of(self, line: bytes) -> Rows | None:
+        """The messages of a fix; None for other reports, and lines that are not JSON."""
         report: Any = None
         with contextlib.suppress(ValueError, RecursionError):
             report = json.loads(line)
@@ -296,11 +256,13 @@ class Gpsd:
             self._n_satellites = min(max(report["uSat"], 0), 64)
         if report.get("class") != "TPV":
             return None
-        mode = report["mode"] if report.get("mode") in (2, 3) else 0
-        known = report if mode else {}
+        known = report if report.get("mode") in (2, 3) else {}
         speed_mps = _within(known.get("speed"), 0.0, 200.0)
         place = _within(known.get("lat"), -90.0, 90.0), _within(known.get("lon"), -180.0, 180.0)
-        return Fix(mode, speed_mps, *place, self._n_satellites)
+        latitude, longitude = (NO_PLACE_DEG if None in place else float(x or 0.0) for x in place)
+        mode = 0.0 if speed_mps is None else float(known["mode"])
+        speed = {"Speed": speed_mps or 0.0, "Fix": mode, "Satellites": float(self._n_satellites)}
+        return {"GPS_SPEED": speed, "GPS_POSITION": {"Latitude": latitude, "Longitude": longitude}}
 
 
 def _within(told: Any, least: float, most: float) -> float | None:
@@ -328,21 +290,18 @@ class Numbering:
         self.n_lost = 0
         self._number = -1
         self._last_ns: int | None = None
-        self._usual_ns: deque[int] = deque([round(1e9 / rate_hz)], maxlen=USUAL_OF)
+        self._usual_ns = np.array([1e9 / rate_hz])
 
     def of(self, t_ns: I64) -> I64:
         """Sample numbers (n,) of these rising times; a gap counts as the samples that would have filled it."""
-        numbers = np.empty(len(t_ns), np.int64)
-        for i, now_ns in enumerate(t_ns.tolist()):
-            wait_ns = now_ns - self._last_ns if self._last_ns is not None else 0
-            period_ns = int(np.median(self._usual_ns))
-            n_missing = round(wait_ns / period_ns) - 1 if wait_ns > HOLE * period_ns else 0
-            if not n_missing and wait_ns > 0:
-                self._usual_ns.append(wait_ns)
-            self.n_lost += n_missing
-            self._number += 1 + n_missing
-            self._last_ns = now_ns
-            numbers[i] = self._number
+        waits_ns = np.diff(t_ns, prepend=t_ns[0] if self._last_ns is None else self._last_ns)
+        period_ns = np.median(self._usual_ns)
+        n_missing = np.where(waits_ns > HOLE * period_ns, np.round(waits_ns / period_ns) - 1.0, 0.0).astype(np.int64)
+        usual = waits_ns[(n_missing == 0) & (waits_ns > 0)]
+        self._usual_ns = np.concatenate((self._usual_ns, usual))[-USUAL_OF:]
+        numbers: I64 = self._number + np.cumsum(1 + n_missing)
+        self.n_lost += int(n_missing.sum())
+        self._number, self._last_ns = int(numbers[-1]), int(t_ns[-1])
         return numbers
 
 
@@ -367,40 +326,36 @@ class Feeder:
         """Feed; on_tick about twice a second. Raises BusError if a device cannot be opened or has gone."""
         threads = [threading.Thread(target=self._read_imu, args=(each,), name=each.name) for each in self._devices]
         threads += [threading.Thread(target=self._read_gps, args=(self._gps,), name="gpsd")] if self._gps else []
-        try:
+        with contextlib.ExitStack() as at_the_end:
             for device in self._devices:
+                at_the_end.callback(device.close)
                 device.open()
             for thread in threads:
+                at_the_end.callback(thread.join)
                 thread.start()
+            at_the_end.callback(self._stopping.set)
             while not self._stopping.is_set():
                 on_tick(self.state)
                 try:
                     with BusSink(*self._place) as sink:
-                        self._send_until_stopped(sink, on_tick)
+                        while not self._stopping.is_set():
+                            self._send(sink)
+                            on_tick(self.state)
                 except BusError as fault:
                     self._note("bus", str(fault))
                     self._stopping.wait(RETRY_S)
-        finally:
-            self._stopping.set()
-            for thread in threads:
-                if thread.ident is not None:
-                    thread.join()
-            for device in self._devices:
-                device.close()
         if self._ended is not None:
             raise self._ended
 
-    def _send_until_stopped(self, sink: BusSink, on_tick: Callable[[FeedState], None]) -> None:
-        """Send queued frames until stopped; on_tick every READ_S. Raises BusError if the bus fails."""
-        while not self._stopping.is_set():
-            until_s = time.monotonic() + READ_S
-            with contextlib.suppress(queue.Empty):
-                while not self._stopping.is_set() and (left_s := until_s - time.monotonic()) > 0.0:
-                    frames = self._queue.get(timeout=left_s)
-                    sink.send(frames)
-                    self.state.n_sent += len(frames)
-                    self._note("bus", None)
-            on_tick(self.state)
+    def _send(self, sink: BusSink) -> None:
+        """Send queued frames for READ_S. Raises BusError if the bus fails."""
+        until_s = time.monotonic() + READ_S
+        with contextlib.suppress(queue.Empty):
+            while not self._stopping.is_set() and (left_s := until_s - time.monotonic()) > 0.0:
+                frames = self._queue.get(timeout=left_s)
+                sink.send(frames)
+                self.state.n_sent += len(frames)
+                self._note("bus", None)
 
     def _read_imu(self, device: IioDevice) -> None:
         numbering = Numbering(device.rate_hz)
@@ -415,44 +370,37 @@ class Feeder:
 
     def _inertial(self, device: IioDevice, samples: Samples, numbering: Numbering) -> Frames:
         """Frames of samples, and their counts. Without stamps of the kernel they are numbered one by one."""
-        begun, n = self.state.n_samples.get(device.name, 0), len(samples.t_ns)
-        numbers = numbering.of(samples.t_ns) if device.has_stamps else begun + np.arange(n)
-        parts = []
-        for kind, vectors in samples.vectors.items():
+        (t_ns, vectors_of), begun = samples, self.state.n_samples.get(device.name, 0)
+        n = len(t_ns)
+        numbers = numbering.of(t_ns) if device.has_stamps else begun + np.arange(n)
+        rows = {}
+        for kind, vectors in vectors_of.items():
             message, names, counter, valid, unit = _MESSAGES[kind]
-            columns = {name: vectors[:, i] / unit for i, name in enumerate(names)}
-            columns |= {counter: (numbers % 256).astype(np.float64), valid: np.ones(n)}
-            parts.append(self._encoder.encode(message, samples.t_ns, columns))
-        for z in samples.vectors["accel"][:, 2].tolist() if "accel" in samples.vectors else []:
+            rows[message] = {name: vectors[:, i] / unit for i, name in enumerate(names)}
+            rows[message] |= {counter: (numbers % 256).astype(np.float64), valid: np.ones(n)}
+        for z in vectors_of["accel"][:, 2].tolist() if "accel" in vectors_of else []:
             before = self.state.gravity_mps2  # the slow mean of the axis that should point up
             self.state.gravity_mps2 = z if np.isnan(before) else before + (z - before) / 500.0
         self.state.n_samples[device.name] = begun + n
         self.state.n_lost[device.name] = numbering.n_lost
         self.state.last_sample_s = time.monotonic()
-        return merge_frames(parts)
+        return self._encoded(t_ns, rows)
 
     def _read_gps(self, gps: Gpsd) -> None:
         while not self._stopping.is_set():
             try:
-                for fix in gps.read(READ_S):
-                    self._hand_on(self._fix(fix, np.array([time.time_ns()], np.int64)))
-                    self.state.n_fixes += fix.mode > 0
+                for rows in gps.read(READ_S):
+                    columns = {name: {k: np.array([x]) for k, x in row.items()} for name, row in rows.items()}
+                    self._hand_on(self._encoded(np.array([time.time_ns()], np.int64), columns))
+                    self.state.n_fixes += rows["GPS_SPEED"]["Fix"] > 0.0
                 self._note(gps.name, None)
             except BusError as fault:
                 self._note(gps.name, str(fault))
                 self._stopping.wait(RETRY_S)
         gps.close()
 
-    def _fix(self, fix: Fix, now_ns: I64) -> Frames:
-        """Frames of speed with fix type, and of position."""
-        mode = fix.mode if fix.speed_mps is not None else 0
-        told = {"Speed": fix.speed_mps or 0.0, "Fix": float(mode), "Satellites": float(fix.n_satellites)}
-        place = {"Latitude": fix.latitude_deg, "Longitude": fix.longitude_deg}
-        here = {name: NO_PLACE_DEG if None in place.values() else float(x or 0.0) for name, x in place.items()}
-        parts = [("GPS_SPEED", told), ("GPS_POSITION", here)]
-        return merge_frames(
-            [self._encoder.encode(name, now_ns, {k: np.array([x]) for k, x in row.items()}) for name, row in parts]
-        )
+    def _encoded(self, t_ns: I64, rows: dict[str, dict[str, F64]]) -> Frames:
+        return merge_frames([self._encoder.encode(name, t_ns, columns) for name, columns in rows.items()])
 
     def _hand_on(self, frames: Frames) -> None:
         try:

@@ -227,7 +227,7 @@ def test_mount_matrices_of_the_driver_are_applied_before_the_named_axes(tmp_path
     device.open()
     samples = device.samples(fake.packed(((100, -200, 300), (0, 0, 0), BEGIN_NS)))
     device.close()
-    assert samples.vectors["accel"][0] == pytest.approx(np.array([-200, -100, 300]) * ACCEL_SCALE)
+    assert samples[1]["accel"][0] == pytest.approx(np.array([-200, -100, 300]) * ACCEL_SCALE)
 
 
 @pytest.mark.parametrize("text", ["1, 0; 0, 1", "a, b, c", "1, 0, 0; 0, 1, 0; 0, 0"])
@@ -269,7 +269,7 @@ def test_every_form_of_a_channel_is_read_as_the_kernel_describes_it(
     device.open()
     samples = device.samples(word * 3)
     device.close()
-    assert samples.vectors["accel"][0].tolist() == [expected] * 3
+    assert samples[1]["accel"][0].tolist() == [expected] * 3
 
 
 def test_numbers_follow_a_rate_that_is_not_the_one_asked_for() -> None:
