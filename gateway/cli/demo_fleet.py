@@ -3,6 +3,7 @@
 import time
 from collections import deque
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -18,13 +19,12 @@ from gateway.core.alarms.watch import AlarmWatch
 from gateway.core.flow import Identity
 from gateway.core.settings import BatchSettings
 from gateway.estimate_json import estimate_to_json
-from gateway.fleet import Book, FleetPage, Message, fleet_app
+from gateway.fleet import Book, Message, fleet_app, served
 from gateway.records import json_line
 from gateway.setup import Setup
 from gateway.units import NS_PER_S
 from gateway.workbench.simulate import demo_drive, frames_of
 
-BRANCH: Final = "springscale/+"
 ROUND_S: Final = 1800.0  # chosen: from the start of one drive to the start of the next
 APART_S: Final = 240.0  # chosen: one van starts that much before the next
 PAUSE_S: Final = 0.2  # chosen: between two looks for records that are due
@@ -42,12 +42,10 @@ def fleet_demo(n_vans: int, setup: Setup, port: int, speed: float, *, once: bool
         return began_s + speed * (time.monotonic() - began)
 
     with TemporaryDirectory(prefix="springscale-fleet-") as folder:
-        book = Book(str(Path(folder) / "fleet.sqlite"), BRANCH, clock_s)
-        page = FleetPage(fleet_app(book), "127.0.0.1", 0 if once else port)
-        page.start()
-        try:
+        book = Book(str(Path(folder) / "fleet.sqlite"), clock_s)
+        with closing(book), served(fleet_app(book), "127.0.0.1", 0 if once else port) as at:
             if not once:
-                click.echo(f"Fleet: http://127.0.0.1:{page.port}/fleet   (Ctrl-C ends)")
+                click.echo(f"Fleet: http://127.0.0.1:{at}/fleet   (Ctrl-C ends)")
                 click.echo(f"Vans appear as their drives are simulated; later ones run {speed:g} times real time.")
             vans = [_Van(k, setup, began_s - ROUND_S - APART_S * k) for k in range(n_vans)]
             while True:
@@ -56,10 +54,7 @@ def fleet_demo(n_vans: int, setup: Setup, port: int, speed: float, *, once: bool
                 if once:
                     break
                 time.sleep(PAUSE_S)
-            click.echo("".join(f"{line.model_dump_json()}\n" for line in book.lines()), nl=False)
-        finally:
-            page.stop()
-            book.close()
+            click.echo("".join(f"{line.model_dump_json()}\n" for line in book.fleet().items), nl=False)
 
 
 class _Van:
@@ -96,4 +91,4 @@ class _Van:
                     yield estimate.t_end_ns, self._message("alarms", alarm_to_json(alarm))
 
     def _message(self, kind: str, record: dict[str, Any]) -> Message:
-        return Message(BRANCH.replace("+", self._id) + f"/{kind}", json_line(record).encode())
+        return Message(f"springscale/{self._id}/{kind}", json_line(record).encode())

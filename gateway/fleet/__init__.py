@@ -7,7 +7,6 @@ vehicle.
 """
 
 from gateway.fleet.book import Book, Message
-from gateway.fleet.lines import Line, line_of
-from gateway.fleet.page import FleetPage, fleet_app
+from gateway.fleet.page import fleet_app, served
 
-__all__ = ["Book", "FleetPage", "Line", "Message", "fleet_app", "line_of"]
+__all__ = ["Book", "Message", "fleet_app", "served"]

@@ -7,6 +7,7 @@ The broker keeps what comes while this is away (a session without end), and hand
 primary keys make one row of it. Where the database is away, nothing is acknowledged.
 """
 
+import contextlib
 import json
 import queue
 import signal
@@ -23,13 +24,14 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from pydantic_settings import BaseSettings
 
-from gateway.fleet.book import AWAY, Book, Message
-from gateway.fleet.page import FleetPage, fleet_app
+from gateway.fleet.book import AWAY, BRANCH, Book, Message
+from gateway.fleet.page import fleet_app, served
 
+USER: Final = "fleet-subscriber"  # as deploy/fleet/mosquitto/acl has it
 NEVER: Final = 0xFFFFFFFF  # MQTT 5, 3.1.2.11.2: a session that does not expire
 UNDER_WAY: Final = 2000  # chosen: messages the broker hands out before one of them is acknowledged
 MOST_AT_ONCE: Final = 500  # chosen: messages of one transaction
-LONGEST_PAUSE_S: Final = 30.0  # chosen: between two tries of a database that is away
+PAUSE_S: Final = 5.0  # chosen: between two tries of a database that is away
 TOLD_EVERY_S: Final = 60.0  # chosen
 
 
@@ -39,9 +41,7 @@ class Settings(BaseSettings):
     mqtt_host: str
     mqtt_port: int = 8883
     mqtt_ca: str | None = None  # absent: the system's authorities
-    mqtt_username: str = "fleet-subscriber"
     mqtt_password_file: Path
-    mqtt_topic: str = "springscale/+"  # the branch of all vehicles, + where each has its name
     fleet_database: str = "fleet.sqlite"  # or postgresql://...
     fleet_host: str = "127.0.0.1"  # of the page, which asks nobody for a token: keep a proxy that does before it
     fleet_port: int = 8080
@@ -51,25 +51,19 @@ class Link:
     """The broker's messages in a queue; paho's own thread connects again whenever the connection breaks."""
 
     def __init__(self, settings: Settings) -> None:
-        self._settings = settings
+        """Begin to connect and to receive."""
         self._arrivals: queue.SimpleQueue[Message] = queue.SimpleQueue()
         self._connection = 0
-        self._client = mqtt.Client(CallbackAPIVersion.VERSION2, settings.mqtt_username, protocol=mqtt.MQTTv5)
-        self._client.manual_ack_set(True)
+        self._client = mqtt.Client(CallbackAPIVersion.VERSION2, USER, protocol=mqtt.MQTTv5, manual_ack=True)
         self._client.reconnect_delay_set(1, 30)
-        self._client.username_pw_set(settings.mqtt_username, settings.mqtt_password_file.read_text().strip())
+        self._client.username_pw_set(USER, settings.mqtt_password_file.read_text().strip())
         self._client.tls_set_context(ssl.create_default_context(cafile=settings.mqtt_ca))
         self._client.on_connect = self._on_connect
         self._client.on_disconnect = lambda *_: tell("disconnected")
         self._client.on_message = self._on_message
-
-    def start(self) -> None:
-        """Begin to connect and to receive."""
         session = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]  # paho's
-        session.SessionExpiryInterval = NEVER
-        session.ReceiveMaximum = UNDER_WAY
-        host, port = self._settings.mqtt_host, self._settings.mqtt_port
-        self._client.connect_async(host, port, clean_start=False, properties=session)
+        session.SessionExpiryInterval, session.ReceiveMaximum = NEVER, UNDER_WAY
+        self._client.connect_async(settings.mqtt_host, settings.mqtt_port, clean_start=False, properties=session)
         self._client.loop_start()
 
     def stop(self) -> None:
@@ -80,12 +74,10 @@ class Link:
     def some(self, timeout_s: float) -> list[Message]:
         """What has come, at most one transaction's worth; waits for the first."""
         found: list[Message] = []
-        try:
+        with contextlib.suppress(queue.Empty):
             found.append(self._arrivals.get(timeout=timeout_s))
             while len(found) < MOST_AT_ONCE:
                 found.append(self._arrivals.get_nowait())
-        except queue.Empty:
-            pass
         return found
 
     def acknowledge(self, arrivals: list[Message]) -> None:
@@ -98,7 +90,7 @@ class Link:
         self._connection += 1
         tell("connected", answer=str(code), session_present=bool(flags.session_present))
         if not code.is_failure:
-            client.subscribe(f"{self._settings.mqtt_topic}/#", qos=1)
+            client.subscribe(f"{BRANCH}/#", qos=1)
 
     def _on_message(self, _client: mqtt.Client, _userdata: Any, message: mqtt.MQTTMessage) -> None:
         self._arrivals.put(Message(message.topic, bytes(message.payload), self._connection, message.mid))
@@ -113,7 +105,7 @@ def tell(event: str, **fields: Any) -> None:
 def serve(link: Link, book: Book, stopping: threading.Event) -> None:
     """Write what comes, then acknowledge it, until told to stop."""
     waiting: list[Message] = []
-    pause_s, told_s = 1.0, time.monotonic()
+    told_s = time.monotonic()
     while not stopping.is_set():
         waiting = waiting or link.some(0.5)
         try:
@@ -121,11 +113,10 @@ def serve(link: Link, book: Book, stopping: threading.Event) -> None:
                 tell("unreadable", topic=topic, fault=fault)
         except AWAY as away:
             tell("database away", fault=str(away).partition("\n")[0], waiting=len(waiting))
-            stopping.wait(pause_s)
-            pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
+            stopping.wait(PAUSE_S)
             continue
         link.acknowledge(waiting)
-        waiting, pause_s = [], 1.0
+        waiting = []
         if time.monotonic() - told_s > TOLD_EVERY_S:
             told_s = time.monotonic()
             tell("written", **book.counts)
@@ -137,17 +128,14 @@ def main() -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopping.set())
     settings = Settings()
-    link, book = Link(settings), Book(settings.fleet_database, settings.mqtt_topic)
-    page = FleetPage(fleet_app(book), settings.fleet_host, settings.fleet_port)
-    page.start()
-    link.start()
-    try:
-        serve(link, book, stopping)
-    finally:
-        link.stop()
-        page.stop()
-        book.close()
-        tell("written", **book.counts)
+    book = Book(settings.fleet_database)
+    with contextlib.closing(book), served(fleet_app(book), settings.fleet_host, settings.fleet_port):
+        link = Link(settings)
+        try:
+            serve(link, book, stopping)
+        finally:
+            link.stop()
+    tell("written", **book.counts)
 
 
 if __name__ == "__main__":

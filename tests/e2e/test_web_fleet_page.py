@@ -10,7 +10,7 @@ from support.browser import expect
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, Watched
 from unit.test_fleet_book import alarm, estimate, message
 
-from gateway.fleet import Book, FleetPage, fleet_app
+from gateway.fleet import Book, fleet_app, served
 
 NOW_S = 1_800_000_000.0
 HURRIED = "{ const set = setInterval; window.setInterval = (draw, ms) => set(draw, ms / 20); }"  # nobody has to wait
@@ -19,7 +19,7 @@ ENGLISH = re.compile(r"\b(the|and|of|vehicle|limit|ago|search)\b", re.IGNORECASE
 
 @pytest.fixture
 def book(tmp_path: Path) -> Iterator[Book]:
-    opened = Book(str(tmp_path / "fleet.sqlite"), "springscale/+", lambda: NOW_S)
+    opened = Book(str(tmp_path / "fleet.sqlite"), lambda: NOW_S)
     opened.write([
         message("van-1", "status", state="online", vin="WVWZZZ1KZAW000001"),
         estimate("van-1", 55, 200.0), estimate("van-2", 40, 620.0), alarm("van-2", 1, is_active=True),
@@ -31,10 +31,8 @@ def book(tmp_path: Path) -> Iterator[Book]:
 
 @pytest.fixture
 def url(book: Book) -> Iterator[str]:
-    page = FleetPage(fleet_app(book), "127.0.0.1", 0)
-    page.start()
-    yield f"http://127.0.0.1:{page.port}"
-    page.stop()
+    with served(fleet_app(book), "127.0.0.1", 0) as port:
+        yield f"http://127.0.0.1:{port}"
 
 
 def test_those_with_alarms_come_first_and_a_word_finds_one_by_keyboard(url: str, book: Book, browser: Any) -> None:
@@ -91,13 +89,11 @@ def test_in_german_on_a_phone_and_on_a_desk(url: str, browser: Any, width: int, 
 
 
 def test_a_service_that_is_gone_is_said(browser: Any, book: Book) -> None:
-    served = FleetPage(fleet_app(book), "127.0.0.1", 0)
-    served.start()
     watched = Watched(browser)
     watched.page.add_init_script(HURRIED)
-    watched.page.goto(f"http://127.0.0.1:{served.port}/fleet")
-    expect(watched.page.locator("#vehicles tr")).to_have_count(3)
-    served.stop()
+    with served(fleet_app(book), "127.0.0.1", 0) as port:
+        watched.page.goto(f"http://127.0.0.1:{port}/fleet")
+        expect(watched.page.locator("#vehicles tr")).to_have_count(3)
     expect(watched.page.locator("#said")).to_have_text(re.compile("does not answer"))
     expect(watched.page.locator("#vehicles tr")).to_have_count(3)
     watched.page.close()

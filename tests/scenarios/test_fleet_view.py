@@ -60,7 +60,10 @@ def test_a_killed_broker_costs_nothing(view: FleetView) -> None:
 def test_the_page_of_the_fleet_shows_every_vehicle(view: FleetView) -> None:
     lines = view.subscriber.lines()
     assert set(lines) == {vehicle.id for vehicle in view.vehicles}
-    assert all(line["payload_kg"] and line["gross_kg"] and line["state"] == "online" for line in lines.values())
+    for line in lines.values():
+        assert line["estimate"]["payload_kg"]
+        assert line["estimate"]["weights"]["gross"]["kg"]
+        assert line["status"]["state"] == "online"
 
 
 def test_a_vehicle_writes_below_its_own_name_alone_and_reads_nothing(view: FleetView) -> None:
@@ -160,5 +163,5 @@ def test_without_postgresql_a_file_takes_its_place(view: FleetView) -> None:
     view.subscriber.start(FLEET_DATABASE=str(view.folder / "fleet.sqlite"))
     view.vehicles.drive(5)
     ids = {vehicle.id for vehicle in view.vehicles}
-    assert wait_until(lambda: {name for name, line in view.subscriber.lines().items() if line["payload_kg"]} >= ids)
+    assert wait_until(lambda: {name for name, line in view.subscriber.lines().items() if line["estimate"]} >= ids)
     assert (view.folder / "fleet.sqlite").exists()

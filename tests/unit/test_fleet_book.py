@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from pydantic import create_model
 
 from gateway.fleet import Book, Message
-from gateway.fleet.book import _ENTRIES, AWAY
+from gateway.fleet.book import AWAY
+from gateway.fleet.records import KINDS, Entry
 
 NOW_S = 1_800_000_000.0
 UNREADABLE = (
@@ -39,7 +40,7 @@ UNREADABLE = (
 
 @pytest.fixture
 def book(tmp_path: Path) -> Iterator[Book]:
-    opened = Book(str(tmp_path / "fleet.sqlite"), "springscale/+", lambda: NOW_S)
+    opened = Book(str(tmp_path / "fleet.sqlite"), lambda: NOW_S)
     yield opened
     opened.close()
 
@@ -78,8 +79,8 @@ def alarm(vehicle: str, revision: int, *, is_active: bool) -> Message:
 
 def test_a_line_is_of_the_newest_answer_however_late_an_older_one_comes(book: Book) -> None:
     book.write([estimate("van-1", 55, 200.0), estimate("van-1", 50, 100.0), estimate("van-1", 58, 0.0, "too_slow")])
-    (line,) = book.lines()
-    assert (line.vehicle_id, line.payload_kg, line.gross_kg, line.over) == ("van-1", 200.0, 1700.0, [])
+    (line,) = book.fleet().items
+    assert (line.vehicle_id, line.estimate.payload_kg, line.estimate.weights["gross"].kg) == ("van-1", 200.0, 1700.0)
     assert line.used_share == pytest.approx(200.0 / 500.0)
     assert line.age_s == 300.0
 
@@ -87,19 +88,20 @@ def test_a_line_is_of_the_newest_answer_however_late_an_older_one_comes(book: Bo
 def test_what_comes_twice_is_one_row_and_the_highest_revision_stays(book: Book, tmp_path: Path) -> None:
     book.write([estimate("van-1", 55, 600.0), alarm("van-1", 2, is_active=True)] * 2)
     book.write([alarm("van-1", 1, is_active=False), estimate("van-1", 55, 1.0)])
-    (line,) = book.lines()
-    assert (line.payload_kg, line.over, [one.kind for one in line.alarms]) == (600.0, ["gross"], ["overload"])
+    (line,) = book.fleet().items
+    assert (line.estimate.payload_kg, [one.kind for one in line.alarms]) == (600.0, ["overload"])
     assert line.used_share == pytest.approx(600.0 / 500.0)
     book.write([alarm("van-1", 3, is_active=False)])
-    assert book.lines()[0].alarms == []
+    assert book.fleet().items[0].alarms == []
     with sqlite3.connect(tmp_path / "fleet.sqlite") as looked:
         assert looked.execute("SELECT count(*) FROM estimate").fetchone() == (1,)
 
 
 def test_a_death_leaves_what_the_birth_told(book: Book) -> None:
     book.write([message("van-1", "status", state="online", vin="WVW1"), message("van-1", "status", state="offline")])
-    (line,) = book.lines()
-    assert (line.state, line.vin, line.payload_kg, line.age_s, line.used_share) == ("offline", "WVW1", None, None, None)
+    (line,) = book.fleet().items
+    assert (line.status.state, line.status.vin) == ("offline", "WVW1")
+    assert (line.estimate, line.age_s, line.used_share) == (None, None, None)
 
 
 def test_what_cannot_be_read_is_set_aside_and_holds_up_nothing(book: Book, tmp_path: Path) -> None:
@@ -107,8 +109,8 @@ def test_what_cannot_be_read_is_set_aside_and_holds_up_nothing(book: Book, tmp_p
     told = book.write([*poison, estimate("van-2", 1, 5.0)])
     assert [topic for topic, _ in told] == [one.topic for one in poison]
     assert book.counts == {"unreadable": len(UNREADABLE), "estimates": 1}
-    assert book.n_unreadable() == len(UNREADABLE)
-    assert [line.vehicle_id for line in book.lines()] == ["van-2"]
+    assert book.fleet().n_unreadable == len(UNREADABLE)
+    assert [line.vehicle_id for line in book.fleet().items] == ["van-2"]
     with sqlite3.connect(tmp_path / "fleet.sqlite") as looked:
         kept = looked.execute("SELECT topic, payload FROM unreadable").fetchall()
     assert kept == [(one.topic, one.payload) for one in poison]
@@ -116,8 +118,8 @@ def test_what_cannot_be_read_is_set_aside_and_holds_up_nothing(book: Book, tmp_p
 
 def test_a_record_that_the_database_alone_refuses_is_set_aside(book: Book, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever is not foreseen, here a number that SQLite cannot hold: the others are stored, each once."""
-    boundless = create_model("EntryRecord", id=(str, ...), revision=(int, ...))
-    monkeypatch.setitem(_ENTRIES, "trips", boundless)
+    boundless = create_model("Boundless", __base__=Entry, revision=(int, ...))
+    monkeypatch.setitem(KINDS, "trips", boundless)
     trips = [message("van-1", "trips", id=f"trip-{n}", revision=10**30 if n == 2 else 1) for n in range(5)]
     assert [fault.partition(":")[0] for _, fault in book.write(trips)] == ["OverflowError"]
     assert book.write([trips[0]]) == []
@@ -130,13 +132,14 @@ def test_a_database_that_is_away_is_told_to_the_caller(book: Book, tmp_path: Pat
         breaking.execute("DROP TABLE estimate")
     with pytest.raises(AWAY):
         book.write([estimate("van-1", 2, 5.0)])
-    assert book.n_unreadable() == 0
+    with sqlite3.connect(tmp_path / "fleet.sqlite") as looked:
+        assert looked.execute("SELECT count(*) FROM unreadable").fetchone() == (0,)
 
 
 def test_it_is_there_after_a_restart(book: Book, tmp_path: Path) -> None:
     book.write([estimate("van-1", 55, 200.0)])
-    again = Book(str(tmp_path / "fleet.sqlite"), "springscale/+", lambda: NOW_S)
-    assert again.lines() == book.lines()
+    again = Book(str(tmp_path / "fleet.sqlite"), lambda: NOW_S)
+    assert again.fleet().items == book.fleet().items
     again.close()
 
 
@@ -146,13 +149,13 @@ def test_it_is_there_after_a_restart(book: Book, tmp_path: Path) -> None:
     )
 )
 def test_order_of_arrival_leaves_no_trace(arrivals: list[Message]) -> None:
-    book = Book(":memory:", "springscale/+", lambda: NOW_S)
+    book = Book(":memory:", lambda: NOW_S)
     book.write(arrivals)
-    (line,) = book.lines()
+    (line,) = book.fleet().items
     book.close()
-    assert (line.payload_kg, line.alarms) == (30.0, [])
+    assert (line.estimate.payload_kg, line.alarms) == (30.0, [])
 
 
 def test_a_vehicle_that_is_too_heavy_empty_has_no_share_of_its_room(book: Book) -> None:
     book.write([estimate("van-1", 55, 100.0, limit_kg=1400.0)])
-    assert book.lines()[0].used_share is None
+    assert book.fleet().items[0].used_share is None

@@ -14,13 +14,15 @@ const rows = new Map(); // by vehicle: each stays the same element, so that poin
 let vehicles = null;
 let nUnreadable = 0;
 
+const vinOf = (one) => one.status?.vin ?? one.estimate?.vin ?? "";
+const overOf = (one) => Object.entries(one.estimate?.weights ?? {}).filter(([, weight]) => weight?.is_over_limit).map(([place]) => place);
 const alarmText = ({ kind, where }) => capital(alarmName(kind, where));
 
 function loadCell(one) {
   const bar = made("div", [made("span")], "bar");
   bar.setAttribute("aria-hidden", "true"); // the number says it
   bar.style.setProperty("--used", `${Math.min(100, 100 * (one.used_share ?? 0))}%`);
-  const weight = made("span", withStd(one.payload_kg, one.payload_std_kg, 0, "kg"), "weight");
+  const weight = made("span", withStd(one.estimate?.payload_kg ?? null, one.estimate?.payload_std_kg ?? null, 0, "kg"), "weight");
   return made("td", one.used_share === null ? [weight] : [weight, bar], "load");
 }
 
@@ -31,13 +33,15 @@ function alarmItem(alarm) {
 function line(one) {
   const head = made("th", [one.vehicle_id]);
   head.scope = "row";
-  const beside = [one.vin, one.state === "offline" ? phrase("offline") : ""].filter(Boolean).join(", ");
+  const beside = [vinOf(one), one.status?.state === "offline" ? phrase("offline") : ""].filter(Boolean).join(", ");
   if (beside) head.append(made("small", beside));
-  const gross = made("td", one.gross_limit_kg === null ? figure(one.gross_kg, 0, "kg") : phrase("of_limit", { kg: figure(one.gross_kg, 0, "kg"), limit: figure(one.gross_limit_kg, 0, "kg") }));
-  if (one.over.length) gross.append(made("small", phrase("over", { places: one.over.map(placeName).join(", ") }), "alarmed"));
+  const { kg = null, limit_kg: limit = null } = one.estimate?.weights?.gross ?? {};
+  const gross = made("td", limit === null ? figure(kg, 0, "kg") : phrase("of_limit", { kg: figure(kg, 0, "kg"), limit: figure(limit, 0, "kg") }));
+  const over = overOf(one);
+  if (over.length) gross.append(made("small", phrase("over", { places: over.map(placeName).join(", ") }), "alarmed"));
   const age = made("td", one.age_s === null ? UNKNOWN : ago(one.age_s), one.age_s > OLD_AFTER_S ? "aged" : "");
   const alarms = made("td", [made("ul", one.alarms.map(alarmItem))]);
-  return made("tr", [head, loadCell(one), gross, age, alarms], one.over.length ? "over" : "");
+  return made("tr", [head, loadCell(one), gross, age, alarms], over.length ? "over" : "");
 }
 
 /** The vehicle's row, with those cells written anew whose content has changed. */
@@ -64,15 +68,15 @@ function arrange(body, shown) {
   while (body.children.length > shown.length) body.lastElementChild.remove();
 }
 
-const urgency = (one) => 2 * one.alarms.length + one.over.length;
+const urgency = (one) => 2 * one.alarms.length + overOf(one).length;
 
 function draw() {
   if (vehicles === null) return;
   const sought = element("search").value.trim().toLowerCase();
-  const shown = vehicles.filter((one) => `${one.vehicle_id} ${one.vin ?? ""} ${one.alarms.map(alarmText).join(" ")}`.toLowerCase().includes(sought));
+  const shown = vehicles.filter((one) => `${one.vehicle_id} ${vinOf(one)} ${one.alarms.map(alarmText).join(" ")}`.toLowerCase().includes(sought));
   shown.sort((a, b) => urgency(b) - urgency(a) || a.vehicle_id.localeCompare(b.vehicle_id, undefined, { numeric: true }));
   const count = (is) => vehicles.filter(is).length;
-  const said = { n: vehicles.length, over: count((one) => one.over.length), alarmed: count((one) => one.alarms.length) };
+  const said = { n: vehicles.length, over: count((one) => overOf(one).length), alarmed: count((one) => one.alarms.length) };
   const found = shown.length < vehicles.length ? `; ${phrase("found", { shown: shown.length, n: vehicles.length })}` : "";
   const unreadable = nUnreadable ? ` ${phrase("unreadable", { n: nUnreadable })}.` : "";
   write("said", vehicles.length ? `${phrase("summary", said)}${found}.${unreadable}` : phrase("no_vehicle"));
