@@ -1,4 +1,4 @@
-"""The content of an archive and its progress, without processing anything."""
+"""The content of an archive: every vehicle's logs, and the jobs that follow from them."""
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -8,7 +8,6 @@ from typing import Final
 from gateway.archive.jobs import ArchiveJob, plan
 from gateway.archive.manifest import Assignment, Manifest
 from gateway.archive.places import Location, PlaceError
-from gateway.archive.receipts import slots_done, slots_failed
 from gateway.archive.survey import Facts, LogFile, keep_facts, known_facts, logs_of
 from gateway.errors import ConfigurationError
 
@@ -71,7 +70,7 @@ def look(manifest: Manifest, dataset: Location) -> Inventory:
     """List every vehicle's logs. Raises ConfigurationError if there are none, PlaceError for the data set."""
     vehicles = sorted({assignment.vehicle for assignment in manifest.assignments})
     with ThreadPoolExecutor(AT_A_TIME) as asking:  # a store takes its time for each, and many at once
-        listed = list(asking.map(lambda assignment: _listed(manifest, assignment), manifest.assignments))
+        listed = list(asking.map(_listed, manifest.assignments))
         facts = dict(zip(vehicles, asking.map(lambda vehicle: known_facts(dataset, vehicle), vehicles), strict=True))
     logs = [found if isinstance(found, list) else [] for found in listed]
     pairs = zip(manifest.assignments, listed, strict=True)
@@ -79,45 +78,13 @@ def look(manifest: Manifest, dataset: Location) -> Inventory:
     if not any(logs) and not lost:
         raise ConfigurationError(
             f"{manifest.where}: not one log in the folders of its vehicles, the first of which is "
-            f"{manifest.assignments[0].logs}; see logs and pattern there"
+            f"{manifest.assignments[0].logs}; see logs there"
         )
     return Inventory(manifest, dataset, logs, facts, lost)
 
 
-def _listed(manifest: Manifest, assignment: Assignment) -> list[LogFile] | PlaceError:
+def _listed(assignment: Assignment) -> list[LogFile] | PlaceError:
     try:
-        return logs_of(manifest, assignment)
+        return logs_of(assignment)
     except PlaceError as fault:
         return fault
-
-
-@dataclass(frozen=True, slots=True)
-class Forecast:
-    """The remaining work. ``n_new_logs`` were not surveyed, so their jobs are not yet in ``n_jobs``."""
-
-    n_vehicles: int
-    n_logs: int
-    bytes: int
-    n_new_logs: int
-    n_jobs: int
-    n_done: int
-    n_failed: int
-    bytes_to_do: int
-
-
-def forecast(inventory: Inventory) -> Forecast:
-    """The jobs that a run would execute. Writes nothing."""
-    dataset, jobs = inventory.dataset, inventory.jobs()
-    done, failed = set(slots_done(dataset)), set(slots_failed(dataset))
-    seen = {one.log.key for job in jobs for one in job.logs}
-    return Forecast(
-        n_vehicles=inventory.n_vehicles,
-        n_logs=len(inventory.all_logs),
-        bytes=inventory.size,
-        n_new_logs=sum(len(logs) for _, logs in inventory.unknown()),
-        n_jobs=len(jobs),
-        n_done=sum(job.slot in done for job in jobs),
-        n_failed=sum(job.slot in failed - done for job in jobs),
-        bytes_to_do=sum(job.size for job in jobs if job.slot not in done | failed)
-        + sum(log.size for log in inventory.all_logs if log.key not in seen),
-    )

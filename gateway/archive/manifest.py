@@ -4,7 +4,6 @@ span of time.
 TOML. Paths in it are relative to the manifest, which may be in an object store.
 """
 
-import fnmatch
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, time
@@ -16,7 +15,6 @@ from typing import Annotated, Any, Final
 from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from gateway.archive.places import Location, place_of
-from gateway.bus.logs import is_named_as_log
 from gateway.calibration.known_weights_file import KnownWeights, known_weights_of
 from gateway.config import BatchSection, EstimatorName
 from gateway.config.sections import OF_CALIBRATION, LimitKg
@@ -103,9 +101,6 @@ class ManifestFile(Means):
     """The whole file."""
 
     logs: str = Field(".", description="folder below which the vehicles' folders are, or a URL")
-    pattern: str | None = Field(
-        None, description="which files are logs, e.g. *.txt.gz [default: those with the suffix of a log, packed or not]"
-    )
     batch: BatchSection = BatchSection()
     vehicles: tuple[VehicleEntry, ...] = Field((), description="one table a vehicle and span of time")
 
@@ -130,14 +125,6 @@ class Manifest:
     where: str
     assignments: tuple[Assignment, ...]
     settings: BatchSettings
-    pattern: str | None
-
-    def is_log(self, path: str) -> bool:
-        """Whether a file in a vehicle's folder is one of its logs."""
-        name = path.rpartition("/")[2]
-        if self.pattern is not None:
-            return fnmatch.fnmatchcase(name, self.pattern)
-        return not name.startswith(".") and is_named_as_log(name)
 
 
 def load_manifest(named: str) -> Manifest:
@@ -151,7 +138,7 @@ def load_manifest(named: str) -> Manifest:
     _require_distinct(entries, where)
     load = lru_cache(maxsize=None)(_Loader(base).setup)
     found = tuple(_assignment(base, told, entry, load, f"{where}: vehicles[{i}]") for i, entry in enumerate(entries, 1))
-    return Manifest(str(where), found, told.batch.for_core(), told.pattern)
+    return Manifest(str(where), found, told.batch.for_core())
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Folders on this computer or in an object store (s3://, gs://, az://), through obstore.
+"""Folders on this computer or in an object store (s3://), through obstore.
 
 place = place_of("s3://fleet/logs")
 place.create("a/b.json", b"...")      # False if it exists: the store decides atomically
@@ -21,7 +21,7 @@ from gateway.errors import ConfigurationError, SpringscaleError
 if TYPE_CHECKING:
     from obstore.store import ObjectStore
 
-SCHEMES: Final = ("file", "s3", "gs", "az")
+SCHEMES: Final = ("file", "s3")
 MISSING: Final = (
     "reading and writing archives needs packages that a vehicle does not: pip install 'springscale[archive]'"
 )

@@ -10,7 +10,7 @@ JOB is the hash of all inputs of the table. A listing alone gives vehicle, month
 import hashlib
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -52,13 +52,6 @@ class Slot:
         return f"{FAILED}/{self.folder}/{name}.json"
 
 
-Wanted = Callable[[Slot], bool]
-
-
-def every(slot: Slot) -> bool:
-    return True
-
-
 def slots_done(dataset: Location) -> list[Slot]:
     """Every job with a receipt, by a listing."""
     return _slots(dataset.items(RECEIPTS))
@@ -75,17 +68,16 @@ def failure_files(dataset: Location) -> list[tuple[Slot, str]]:
     return [(Slot(one["vehicle"], one["month"], one["job"].partition("-")[0]), path) for one, path in named if one]
 
 
-def trusted_tables(dataset: Location | Path | str, is_wanted: Wanted = every) -> list[str]:
+def trusted_tables(dataset: Location | Path | str) -> list[str]:
     """The Parquet files covered by receipts, as paths or URLs for polars, DuckDB and pyarrow."""
     place = _place(dataset)
-    slots = filter(is_wanted, slots_done(place))
-    return [str(place.local(slot.table) or f"{place.url}/{slot.table}") for slot in slots]
+    return [str(place.local(slot.table) or f"{place.url}/{slot.table}") for slot in slots_done(place)]
 
 
-def receipts(dataset: Location | Path | str, is_wanted: Wanted = every) -> list[dict[str, Any]]:
+def receipts(dataset: Location | Path | str) -> list[dict[str, Any]]:
     """The content of every receipt, in order of vehicle and month."""
     place = _place(dataset)
-    return [json.loads(place.read(slot.receipt)) for slot in filter(is_wanted, slots_done(place))]
+    return [json.loads(place.read(slot.receipt)) for slot in slots_done(place)]
 
 
 def failures(dataset: Location | Path | str) -> list[dict[str, Any]]:

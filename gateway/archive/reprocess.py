@@ -69,10 +69,6 @@ def done_by(
             yield under_way.pop(future), future
 
 
-def unseen(progress: Progress) -> None:
-    """Ignore the progress."""
-
-
 @dataclass(slots=True)
 class Summary:
     """The result of a run. ``outcomes`` are those of the jobs that it tried; ``n_already`` had a receipt before."""
@@ -129,9 +125,7 @@ def reprocess(
     manifest: Manifest,
     dataset: Location,
     workers: Workers,
-    on_progress: OnProgress = unseen,
-    *,
-    retry_failed: bool = False,
+    on_progress: OnProgress = lambda _: None,
 ) -> Summary:
     """Run every job of the archive without a receipt.
 
@@ -143,8 +137,7 @@ def reprocess(
     _survey(inventory, workers, on_progress)
     jobs = inventory.jobs()
     done, failed = set(slots_done(dataset)), set(slots_failed(dataset))
-    skipped = done if retry_failed else done | failed
-    to_do = [job for job in jobs if job.slot not in skipped]
+    to_do = [job for job in jobs if job.slot not in done | failed]
     summary = Summary(
         n_vehicles=inventory.n_vehicles,
         n_logs=len(inventory.all_logs),

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from gateway.archive.manifest import Assignment, Manifest
+from gateway.archive.manifest import Assignment
 from gateway.archive.places import Location, PlaceError
-from gateway.bus.logs import open_whole_log
+from gateway.bus.logs import is_named_as_log, open_whole_log
 from gateway.errors import ConfigurationError, LogUnreadableError, ReaderMissingError
 
 KNOWN: Final = "logs"  # folder of the data set
@@ -55,11 +55,17 @@ class Surveyed:
     lost: dict[str, str]
 
 
-def logs_of(manifest: Manifest, assignment: Assignment) -> list[LogFile]:
+def logs_of(assignment: Assignment) -> list[LogFile]:
     """The logs in a vehicle's folder, by name. Raises PlaceError."""
     place, shown = assignment.logs, assignment.shown
-    found = (item for item in place.items() if manifest.is_log(item.path))
+    found = (item for item in place.items() if is_log(item.path))
     return [LogFile(place, item.path, f"{shown}/{item.path}", item.size, item.stamp) for item in found]
+
+
+def is_log(path: str) -> bool:
+    """Whether a file is a log by its name: it has the suffix of one, packed or not."""
+    name = path.rpartition("/")[2]
+    return not name.startswith(".") and is_named_as_log(name)
 
 
 def survey(logs: Sequence[LogFile]) -> Surveyed:

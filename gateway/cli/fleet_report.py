@@ -20,7 +20,7 @@ def fleet_report(dataset: str, output: Path) -> Told:
 
     Loads over time with intervals, refused batches by reason, drifts beyond the fleet's seasons and beyond chance,
     faulty sensors: report.html with what needs attention, a page for each vehicle, and report.json. DATASET is a folder
-    or a URL (s3://, gs://, az://). Only batches with a receipt are counted.
+    or a URL (s3://). Only batches with a receipt are counted.
     """
     with counted("reading vehicles") as on_step:
         fleet = fleet_of(place_of(dataset), lambda done, of: on_step(done, 2 * of + 1))

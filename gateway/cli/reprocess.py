@@ -1,13 +1,10 @@
 """springscale reprocess: a fleet's archive of logs to a data set of estimates, on all cores or on a cluster."""
 
 import sys
-import time
-from dataclasses import asdict
 from typing import Final
 
 import click
 
-from gateway.archive.inventory import Forecast, forecast, look
 from gateway.archive.manifest import load_manifest
 from gateway.archive.places import place_of
 from gateway.archive.reprocess import Progress, Summary
@@ -19,61 +16,32 @@ from gateway.cli.progress import StatusLine
 from gateway.records import json_line
 from gateway.words import counted
 
-TOLD_EVERY_S: Final = 5.0  # chosen: between two lines of progress
-
 
 @click.command("reprocess")
 @click.argument("archive")
-@click.option(
-    "--output", required=True, help="folder of the data set, here or in an object store (s3://, gs://, az://)"
-)
+@click.option("--output", required=True, help="folder of the data set, here or in an object store (s3://)")
 @click.option("--scheduler", default=None, help="address of a Dask scheduler, tcp://HOST:PORT [default: this computer]")
 @click.option("--workers", type=click.IntRange(1), default=None, help="processes on this computer [default: its cores]")
-@click.option("--dry-run", is_flag=True, help="print how much there is to do; write nothing")
-@click.option("--keep-going", is_flag=True, help="end with 0 although logs could not be read or jobs failed")
-@click.option("--retry-failed", is_flag=True, help="also try those jobs again that gave no result")
 @as_json
 def reprocess(
     archive: str,
     output: str,
     scheduler: str | None,
     workers: int | None,
-    dry_run: bool,
-    keep_going: bool,
-    retry_failed: bool,
     as_json: bool,
 ) -> None:
     """Reprocesses every log of ARCHIVE: a manifest (.toml), or a folder with an archive.toml in it.
 
-    Jobs with a receipt are not done again, so that a stopped run resumes. With --json, progress
-    comes as JSON lines on standard error. See docs/archive.md.
+    Jobs with a receipt are not done again, so that a stopped run resumes. See docs/archive.md.
     """
     if scheduler is not None and workers is not None:
         raise click.UsageError("give --scheduler ADDRESS or --workers N, not both")
     dataset, manifest = place_of(output), load_manifest(archive)
-    if dry_run:
-        ahead = forecast(look(manifest, dataset))
-        click.echo(json_line(asdict(ahead)) if as_json else forecast_in_words(ahead))
-        return
     with local_workers(workers) if scheduler is None else workers_of(scheduler) as at_work, StatusLine() as line:
-        tell = _Progress() if as_json else lambda progress: line.show(how_far(progress))
-        summary = reprocess_archive(manifest, dataset, at_work, tell, retry_failed=retry_failed)
+        summary = reprocess_archive(manifest, dataset, at_work, lambda progress: line.show(how_far(progress)))
     click.echo(json_line(summary.to_json()) if as_json else summary_in_words(summary, output))
-    if not (summary.is_good or (keep_going and not summary.lost)):
+    if not summary.is_good:
         sys.exit(1)
-
-
-class _Progress:
-    """A line of JSON on standard error every few seconds, for a scheduler that watches the run."""
-
-    def __init__(self) -> None:
-        self._next_s = 0.0
-
-    def __call__(self, progress: Progress) -> None:
-        """Print the progress if it is time to, or at the last piece."""
-        if time.monotonic() >= self._next_s or progress.n_done == progress.n_total:
-            self._next_s = time.monotonic() + TOLD_EVERY_S
-            click.echo(json_line(asdict(progress) | {"remaining_s": progress.remaining_s}), err=True)
 
 
 MOST_TOLD: Final = 10  # chosen: failures, one line each; the data set has them all
@@ -87,19 +55,6 @@ def how_far(progress: Progress) -> str:
     return f"{progress.what}: {share}, {size(progress.rate)}/s{left}"
 
 
-def forecast_in_words(ahead: Forecast) -> str:
-    lines = [
-        f"{counted(ahead.n_vehicles, 'vehicle')}, {counted(ahead.n_logs, 'log')}, {size(ahead.bytes)}",
-        f"{counted(ahead.n_jobs, 'job')}: {ahead.n_done} done, {ahead.n_failed} failed before, "
-        f"{ahead.n_jobs - ahead.n_done - ahead.n_failed} to do",
-    ]
-    if ahead.n_new_logs:
-        new = counted(ahead.n_new_logs, "log")
-        lines.append(f"not scanned yet: {new}; the scan shows their jobs")
-    lines.append(f"to read: {size(ahead.bytes_to_do)}")
-    return "\n".join(lines)
-
-
 def summary_in_words(summary: Summary, output: str) -> str:
     batches = sum(outcome.n_batches for outcome in summary.outcomes)
     weighed = sum(outcome.n_weighed for outcome in summary.outcomes)
@@ -111,7 +66,7 @@ def summary_in_words(summary: Summary, output: str) -> str:
         f"took {duration(summary.took_s)}; the data set is in {output}",
     ]
     if counts["failed_before"]:
-        lines.append(f"failed in an earlier run: {counts['failed_before']}; --retry-failed tries them again")
+        lines.append(f"failed in an earlier run: {counts['failed_before']}; to try them again, remove {output}/failed")
     failures = [
         reason for outcome in summary.outcomes for reason in outcome.failures if outcome.status is not JobStatus.LOST
     ]

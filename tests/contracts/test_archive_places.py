@@ -73,5 +73,5 @@ def test_a_bucket_that_is_not_there_is_told_in_one_line(bucket: str) -> None:
 
 
 def test_another_scheme_is_refused_with_those_there_are() -> None:
-    with pytest.raises(ConfigurationError, match=r"ftp://x/y: ftp:// is not read here; there are file, s3, gs, az"):
+    with pytest.raises(ConfigurationError, match=r"ftp://x/y: ftp:// is not read here; there are file, s3, and paths"):
         place_of("ftp://x/y")

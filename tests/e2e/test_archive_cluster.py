@@ -64,7 +64,7 @@ def test_a_fleet_on_a_cluster_that_loses_a_worker(tmp_path: Path, bucket: str, s
     assert tables_of(together) == tables_of(alone)
     assert {len(rows_of(together, slot)) for slot in slots_done(together)[:5]} == {1}
     assert failures(together) == []
-    [told] = receipts(together, lambda slot: slot.vehicle == "van-010")
+    [told] = [one for one in receipts(together) if one["vehicle"] == "van-010"]
     assert [one["log"] for one in told["logs"]] == ["van-010/1.log", "van-010/2.log"]
 
     before = {item.path: item.stamp for item in together.items()}

@@ -1,6 +1,7 @@
 """Runs over an archive that go wrong, stop, or meet what has changed: no lie, no loss, nothing done twice."""
 
 import gzip
+import shutil
 from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
@@ -10,11 +11,11 @@ import pytest
 from support.archive import MIDNIGHT_NS, Here, S, write_drive, write_manifest
 
 from gateway.archive import Location, PlaceError, failures, place_of, receipts, rows_of, slots_done
-from gateway.archive.inventory import forecast, look
+from gateway.archive.inventory import look
 from gateway.archive.jobs import ArchiveJob
 from gateway.archive.manifest import load_manifest
 from gateway.archive.reprocess import Summary, reprocess
-from gateway.archive.run import JobStatus, fail, run
+from gateway.archive.run import JobStatus, run
 from gateway.archive.workers import WorkerKilledError
 from gateway.errors import ConfigurationError, ReaderMissingError
 
@@ -74,7 +75,7 @@ def test_a_poison_log_is_told_and_the_rest_goes_on(archive: Path) -> None:
     [told] = failures(archive / "dataset")
     assert told["log"] == "van-1/0.log"
     assert told["reason"].startswith("van-1/0.log: holds no CAN frame")
-    [receipt] = receipts(archive / "dataset", lambda slot: slot.vehicle == "van-1")
+    [receipt] = [one for one in receipts(archive / "dataset") if one["vehicle"] == "van-1"]
     assert [one["log"] for one in receipt["logs"]] == ["van-1/1.log"]
     assert [one["log"] for one in receipt["failed_logs"]] == ["van-1/0.log"]
     assert done(archive).is_good  # it is told once; nothing else can be made of the same bytes
@@ -89,7 +90,8 @@ def test_a_vehicle_of_poison_logs_alone_gets_no_receipt(archive: Path) -> None:
     assert sorted(str(told["log"]) for told in failures(archive / "dataset")) == ["None", "van-1/0.log", "van-1/1.log"]
     again = done(archive)
     assert (again.counts["failed_before"], again.counts["failed"]) == (1, 0)
-    assert done(archive, retry_failed=True).counts["failed"] == 1
+    shutil.rmtree(archive / "dataset/failed")  # as docs/archive.md says
+    assert done(archive).counts["failed"] == 1
 
 
 def test_a_log_cut_in_the_middle_counts_as_far_as_it_goes(archive: Path) -> None:
@@ -97,7 +99,7 @@ def test_a_log_cut_in_the_middle_counts_as_far_as_it_goes(archive: Path) -> None
     (archive / "van-1" / "1.log").unlink()
     (archive / "van-1" / "1.log.gz").write_bytes(packed[: len(packed) // 2])
     assert done(archive).is_good
-    [receipt] = receipts(archive / "dataset", lambda slot: slot.vehicle == "van-1")
+    [receipt] = [one for one in receipts(archive / "dataset") if one["vehicle"] == "van-1"]
     assert [one["ended_early"] is None for one in receipt["logs"]] == [True, False]
 
 
@@ -147,16 +149,8 @@ def test_a_job_that_kills_its_workers_is_told_as_failed(archive: Path) -> None:
     [told] = failures(archive / "dataset")
     assert (told["vehicle"], told["log"], told["reason"]) == ("van-1", None, "3 processes died over it")
     assert done(archive).counts["failed_before"] == 1
-    assert done(archive, retry_failed=True).counts["done"] == 1
-    assert failures(archive / "dataset") == []  # a receipt has taken its place
-
-
-def test_a_job_of_which_one_run_failed_and_another_did_not_is_done(archive: Path) -> None:
-    done(archive)
-    inventory = look(load_manifest(str(archive)), dataset_of(archive))
-    fail(inventory.jobs()[0], "told by a run that went on meanwhile")
-    ahead = forecast(inventory)
-    assert (ahead.n_jobs, ahead.n_done, ahead.n_failed) == (2, 2, 0)
+    shutil.rmtree(archive / "dataset/failed")  # as docs/archive.md says
+    assert done(archive).counts["done"] == 1
 
 
 def test_a_library_that_is_missing_ends_the_run_and_blames_no_log(
@@ -261,18 +255,5 @@ def test_a_folder_out_of_reach_takes_nothing_back(archive: Path, monkeypatch: py
 
 def test_an_archive_without_logs_is_told_with_where_they_were_looked_for(tmp_path: Path) -> None:
     write_manifest(tmp_path, "van-1")
-    with pytest.raises(ConfigurationError, match=r"not one log in the folders of its vehicles, .*van-1; see logs and"):
+    with pytest.raises(ConfigurationError, match=r"not one log in the folders of its vehicles, .*van-1; see logs"):
         done(tmp_path)
-
-
-def test_a_forecast_tells_how_much_and_writes_nothing(archive: Path) -> None:
-    manifest = load_manifest(str(archive))
-    ahead = forecast(look(manifest, dataset_of(archive)))
-    assert (ahead.n_vehicles, ahead.n_logs, ahead.n_new_logs, ahead.n_jobs) == (2, 4, 4, 0)
-    assert ahead.bytes_to_do == ahead.bytes == sum(log.stat().st_size for log in archive.glob("van-*/*.log"))
-    assert not (archive / "dataset").exists()
-    done(archive)
-    write_drive(archive / "van-1" / "2.log", MIDNIGHT_NS + 2 * HOUR, 21.0)
-    later = forecast(look(manifest, dataset_of(archive)))
-    assert (later.n_logs, later.n_new_logs, later.n_jobs, later.n_done) == (5, 1, 1, 1)
-    assert later.bytes_to_do == sum(log.stat().st_size for log in archive.glob("van-1/*.log"))

@@ -85,7 +85,6 @@ def test_readers_trust_receipts_only(tmp_path: Path) -> None:
     assert [told["job"] for told in receipts(tmp_path)] == ["abc"]
     assert sorted(told["reason"] for told in failures(tmp_path)) == ["holds no CAN frame", "killed its worker"]
     assert [row["payload_kg"] for row in rows_of(place, SLOT, ["payload_kg"])] == [100.0, None]
-    assert trusted_tables(tmp_path, lambda slot: slot.month == "2026-04") == []
 
 
 def test_the_documented_queries_read_it(tmp_path: Path) -> None:

@@ -172,7 +172,7 @@ def test_the_hash_of_the_code_holds_every_module_that_a_job_loads(tmp_path: Path
     """Whatever a process that ran a job has loaded of the package; the web server is not of it."""
     write_drive(tmp_path / "van" / "1.log", MIDNIGHT_NS, 21.0)
     manifest = load_manifest(str(write_manifest(tmp_path, "van")))
-    [log] = logs_of(manifest, manifest.assignments[0])
+    [log] = logs_of(manifest.assignments[0])
     [job] = plan(place_of(tmp_path / "dataset"), manifest.assignments[0], [log], survey([log]).facts, manifest.settings)
     (tmp_path / "job").write_bytes(pickle.dumps(job))
     ran = subprocess.run([sys.executable, "-c", RUN_ONE_JOB, tmp_path], capture_output=True, text=True, check=True)

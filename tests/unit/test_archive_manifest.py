@@ -7,6 +7,7 @@ from support.archive import MIDNIGHT_NS, object_store, uploaded, write_manifest
 
 from gateway.archive import place_of
 from gateway.archive.manifest import FOREVER_NS, load_manifest
+from gateway.archive.survey import is_log
 from gateway.errors import ConfigurationError
 
 
@@ -102,14 +103,10 @@ def test_a_fault_is_told_with_its_place_and_how_to_mend_it(tmp_path: Path, text:
         load_manifest(str(tmp_path))
 
 
-def test_names_and_pattern_tell_what_is_a_log(tmp_path: Path) -> None:
-    manifest = load_manifest(str(write_manifest(tmp_path, "van-1")))
+def test_names_tell_what_is_a_log() -> None:
     names = ("a.log", "b/c.LOG.gz", "d.mf4", "truth.csv", "notes.txt", ".e.log")
-    assert [name for name in names if manifest.is_log(name)] == [
+    assert [name for name in names if is_log(name)] == [
         "a.log",
         "b/c.LOG.gz",
         "d.mf4",
     ]
-    manifest = load_manifest(str(write_manifest(tmp_path, "van-1", more='pattern = "*.txt"\n')))
-    assert manifest.is_log("day/1.txt")
-    assert not manifest.is_log("a.log")

@@ -71,7 +71,7 @@ def test_what_is_no_number_is_a_usage_error(command: tuple[str, ...], text: str)
     ("command", "said"),
     [
         (("campaign", "pack", "a.log", "--output", "a.zip"), "campaign.toml: cannot be read: Not a directory"),
-        (("reprocess", "a.log", "--output", "out", "--dry-run"), "a.log: has no archive.toml"),
+        (("reprocess", "a.log", "--output", "out"), "a.log: has no archive.toml"),
         (("verification", "show", "--url", "http://[::1"), "cannot reach the service: Invalid port"),
         (("check-config", "deep.toml"), "deep.toml: not valid TOML"),
         (("check-config", "long.toml"), "long.toml: not valid TOML"),
