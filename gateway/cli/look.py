@@ -10,9 +10,8 @@ import click
 from gateway.bus.signals import DatabaseMessage
 from gateway.cli.options import FILE, Told, prints
 from gateway.offline.look.draft import write_draft
-from gateway.offline.look.look import Described, Heard, Look, MapFit, SignalReading
+from gateway.offline.look.look import Described, Heard, Look, MapFit
 from gateway.offline.look.look import look as look_at
-from gateway.records import EXTENDED_ID
 
 
 @click.command("look")
@@ -35,7 +34,6 @@ def look(log: Path, databases: tuple[Path, ...], output: Path | None) -> Told:
 
 
 MOST_UNKNOWN = 12  # chosen: lines of identifiers that nothing describes
-MOST_FITS = 4  # chosen: signal maps that are listed, the best
 
 
 def look_text(seen: Look) -> str:
@@ -46,7 +44,7 @@ def look_text(seen: Look) -> str:
 def _heard(seen: Look) -> Iterator[str]:
     channels = sorted({one.channel for one in seen.heard if one.channel})
     on = f" on {', '.join(channels)}" if channels else ""
-    yield f"{seen.log}: {seen.report.wanted} frames in {_duration_s(seen):.0f} s{on}"
+    yield f"{seen.log}: {seen.report.wanted} frames in {max(one.duration_s for one in seen.heard):.0f} s{on}"
     yield from (f"  {remark.removeprefix(f'{seen.log}: ')}" for remark in seen.report.remarks())
     yield ""
     yield f"{'channel':<8} {'identifier':<10} {'per s':>7}  {'bytes':<7} message"
@@ -61,10 +59,6 @@ def _heard(seen: Look) -> Iterator[str]:
     yield from seen.faults
 
 
-def _duration_s(seen: Look) -> float:
-    return max(one.duration_s for one in seen.heard)
-
-
 def _message(found: Described | None) -> str:
     if found is None:
         return ""
@@ -72,12 +66,8 @@ def _message(found: Described | None) -> str:
     return f"{found.message.name} ({found.message.source.name}){other_length}"
 
 
-def _accelerations(seen: Look) -> list[SignalReading]:
-    return [reading for reading in seen.readings if reading.quantity == "acceleration" and len(reading.x)]
-
-
 def _readings(seen: Look) -> Iterator[str]:
-    readings = _accelerations(seen)
+    readings = [reading for reading in seen.readings if reading.quantity == "acceleration" and len(reading.x)]
     yield "Accelerations, usual reading:" if readings else "No acceleration: no database describes one."
     why = {found.reading.name: found.why for found in seen.found}
     for reading in readings:
@@ -93,7 +83,7 @@ def _readings(seen: Look) -> Iterator[str]:
 def _fits(seen: Look) -> Iterator[str]:
     none = "None of the signal maps that come with springscale fits."
     yield "Signal maps that come with springscale:" if seen.fits else none
-    for fit in seen.fits[:MOST_FITS]:
+    for fit in seen.fits:
         where = f" on {fit.channel}" if fit.channel else ""
         yield f"  springscale:{fit.name}{where}: {_fit(fit)}"
 
@@ -125,16 +115,11 @@ def look_json(seen: Look) -> dict[str, Any]:
     """The same for programs; numbers in SI."""
     known = {id(one.heard): one.message for one in seen.described}
     return {
-        "log": str(seen.log),
-        "duration_s": round(_duration_s(seen), 3),
-        "n_frames": seen.report.wanted,
         "identifiers": [_identifier(one, known.get(id(one))) for one in seen.heard],
-        "accelerations": [{"name": r.name, "usual_mps2": round(r.usual, 3)} for r in _accelerations(seen)],
-        "tilt_deg": _number(seen.tilt_deg, 1),
+        "tilt_deg": round(seen.tilt_deg, 1) if math.isfinite(seen.tilt_deg) else None,
         "signals": {
             str(found.role): {
-                "message": found.reading.described.message.name,
-                "signal": found.reading.signal.name,
+                "name": found.reading.name,
                 "sign": found.sign,
                 "is_sure": found.is_sure,
                 "why": found.why,
@@ -146,9 +131,8 @@ def look_json(seen: Look) -> dict[str, Any]:
                 "name": f"springscale:{fit.name}",
                 "channel": fit.channel,
                 "fits": fit.is_whole,
-                "found": list(map(str, fit.found)),
                 "missing": list(map(str, fit.missing)),
-                "vertical_mps2": _number(fit.gravity_mps2, 3),
+                "vertical_mps2": round(fit.gravity_mps2, 3) if math.isfinite(fit.gravity_mps2) else None,
             }
             for fit in seen.fits
         ],
@@ -158,15 +142,10 @@ def look_json(seen: Look) -> dict[str, Any]:
     }
 
 
-def _number(x: float, digits: int) -> float | None:
-    return round(x, digits) if math.isfinite(x) else None
-
-
 def _identifier(one: Heard, message: DatabaseMessage | None) -> dict[str, Any]:
     return {
         "channel": one.channel,
         "id": one.name,
-        "is_extended": bool(one.can_id & EXTENDED_ID),
         "n_frames": one.n_frames,
         "rate_hz": round(one.rate_hz, 2),
         "lengths": list(one.lengths),

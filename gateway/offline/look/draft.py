@@ -1,5 +1,6 @@
 """A draft of a signal map from the findings, with the evidence for each, for a person to check."""
 
+import json
 import os
 import re
 from collections.abc import Iterator
@@ -118,5 +119,4 @@ def _raw(described: Described, signal: DatabaseSignal) -> I64:
 
 
 def _toml(text: str) -> str:
-    quoted = text.replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{quoted}"'
+    return json.dumps(text, ensure_ascii=False)  # a basic string of TOML

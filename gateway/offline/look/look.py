@@ -34,6 +34,7 @@ from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2, TO_SI
 KEPT_FRAMES: Final = 100_000  # chosen: of one identifier: a quarter of an hour at 100 Hz; counts cover all frames
 LEAST_RATE_HZ: Final = RATE_MIN_SHARE * BatchSettings().rate_hz
 MOST_TILT_DEG: Final = 15.0  # chosen: 3 % of gravity; beyond it the horizontal axes mix in noticeably
+KINDS: Final = (".dbc", ".kcd", ".arxml", ".sym")  # databases by their suffix
 QUANTITIES: Final = ("acceleration", "angular_rate", "speed")
 
 
@@ -190,11 +191,10 @@ def fits_of(heard: Sequence[Heard]) -> tuple[MapFit, ...]:
             found = tuple(signal for signal in motion.signals if len(motion.of(signal)[1]))
             missing = tuple(signal for signal in motion.signals if signal not in found and signal not in ASIDE)
             vertical = motion.of(Signal.VERTICAL_ACCELERATION)[1]
-            if found:
-                fits.append(
-                    MapFit(name, channel, found, missing, float(np.median(vertical)) if len(vertical) else np.nan)
-                )
-    return tuple(sorted(fits, key=lambda fit: (not fit.is_whole, len(fit.missing), fit.name)))
+            fits.append(MapFit(name, channel, found, missing, float(np.median(vertical)) if len(vertical) else np.nan))
+    return tuple(
+        sorted((fit for fit in fits if fit.found), key=lambda fit: (not fit.is_whole, len(fit.missing), fit.name))
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,8 +262,7 @@ def _messages_of(paths: Iterable[Path]) -> tuple[tuple[DatabaseMessage, ...], tu
 def _near(log: Path) -> list[Path]:
     """Databases beside a log or else in the parent folder, as campaigns have a folder per drive."""
     folder = log.resolve().parent
-    places = [(place, kinds) for kinds in (("dbc",), ("kcd", "arxml", "sym")) for place in (folder, folder.parent)]
-    each = (sorted(path for kind in kinds for path in place.glob(f"*.{kind}")) for place, kinds in places)
+    each = (sorted(path for path in place.glob("*") if path.suffix in KINDS) for place in (folder, folder.parent))
     return next((found for found in each if found), [])
 
 

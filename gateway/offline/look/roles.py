@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2
-from gateway.records import F64, Signal
+from gateway.records import Signal
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
@@ -104,14 +104,14 @@ def axis_of(name: str) -> str:
 def _forward(readings: "Sequence[SignalReading]", up: FoundRole, speed: FoundRole | None) -> FoundRole | None:
     """The horizontal acceleration that correlates with the change of speed."""
     beside = [r for r in readings if _is_beside(r, up.reading)]
-    if speed is None or not beside:
+    if speed is None:
         return None
-    found = [(correlation, r) for r in beside if math.isfinite(correlation := _with_braking(r, speed.reading))]
+    found = [
+        (correlation, r) for r in beside if abs(correlation := _with_braking(r, speed.reading)) > LEAST_CORRELATION
+    ]
     if not found:
         return None
     correlation, best = max(found, key=lambda pair: abs(pair[0]))
-    if abs(correlation) < LEAST_CORRELATION:
-        return None
     where = "forward" if correlation > 0.0 else "rearward"
     why = f"points {where}: goes with the change of speed (correlation {correlation:+.2f})"
     return FoundRole(Signal.LONGITUDINAL_ACCELERATION, best, 1 if correlation > 0.0 else -1, why)
@@ -119,7 +119,7 @@ def _forward(readings: "Sequence[SignalReading]", up: FoundRole, speed: FoundRol
 
 def _with_braking(acceleration: "SignalReading", speed: "SignalReading") -> float:
     """Correlation with the slope of the speed, second by second while the vehicle moves; NaN if it hardly does."""
-    if len(speed.t_s) < LEAST_MOVING_S or len(acceleration.t_s) < LEAST_MOVING_S:
+    if min(len(speed.t_s), len(acceleration.t_s)) < LEAST_MOVING_S:
         return math.nan
     begin_s, end_s = max(speed.t_s[0], acceleration.t_s[0]), min(speed.t_s[-1], acceleration.t_s[-1])
     n = int(end_s - begin_s)
@@ -127,21 +127,15 @@ def _with_braking(acceleration: "SignalReading", speed: "SignalReading") -> floa
         return math.nan
     speed_mps = np.interp(begin_s + 0.5 + np.arange(n), speed.t_s, speed.x)
     slope = np.gradient(np.convolve(speed_mps, np.full(3, 1.0 / 3.0), mode="same"))
-    mean = _second_by_second(acceleration.t_s - begin_s, acceleration.x, n)
+    second = np.floor(acceleration.t_s - begin_s).astype(int)
+    sums = (np.bincount(second.clip(-1, n) + 1, weights, n + 2)[1:-1] for weights in (acceleration.x, None))
+    with np.errstate(invalid="ignore"):
+        mean = np.divide(*sums)  # NaN in a second without a sample
     counts = (speed_mps > MOVING_MPS) & np.isfinite(mean)
     counts[[0, -1]] = False
     if np.count_nonzero(counts) < LEAST_MOVING_S or np.ptp(slope[counts]) == 0.0 or np.ptp(mean[counts]) == 0.0:
         return math.nan
     return float(np.corrcoef(mean[counts], slope[counts])[0, 1])
-
-
-def _second_by_second(t_s: F64, x: F64, n: int) -> F64:
-    """(n,) mean of the samples of each second; NaN without any."""
-    second = np.floor(t_s).astype(int)
-    inside = (second >= 0) & (second < n)
-    n_samples = np.bincount(second[inside], minlength=n)
-    total = np.bincount(second[inside], x[inside], minlength=n)
-    return np.where(n_samples > 0, total / np.maximum(n_samples, 1), np.nan)
 
 
 def _rate(
@@ -165,14 +159,14 @@ def _crossed(one: tuple[str, int], other: tuple[str, int]) -> tuple[str, int]:
 
 def _speed(readings: "Iterable[SignalReading]") -> FoundRole | None:
     """Speed over ground if there is one, else of the wheels."""
-    named = [r for r in readings if r.quantity == "speed" and _is_speed(r)]
+    named = [
+        r
+        for r in readings
+        if r.quantity == "speed" and _SPEED.search(r.name) and not _NO_SPEED.search(r.signal.name)
+        and len(r.x) and np.min(r.x) > -1.0 and np.max(r.x) < FASTEST_MPS
+    ]  # fmt: skip
     if not named:
         return None
     best = min(named, key=lambda r: ("wheel" in r.name.lower(), "navig" not in r.name.lower(), -r.rate_hz))
     role = Signal.WHEEL_SPEED if "wheel" in best.name.lower() else Signal.SPEED
     return FoundRole(role, best, 1, f"up to {np.max(best.x) * 3.6:.0f} km/h")
-
-
-def _is_speed(reading: "SignalReading") -> bool:
-    is_named = _SPEED.search(reading.name) and not _NO_SPEED.search(reading.signal.name)
-    return bool(is_named and len(reading.x) and np.min(reading.x) > -1.0 and np.max(reading.x) < FASTEST_MPS)
