@@ -1,5 +1,6 @@
 """systemd's readiness protocol (sd_notify(3)): datagrams to NOTIFY_SOCKET, never blocking."""
 
+import contextlib
 import os
 import socket
 
@@ -11,7 +12,6 @@ class Notifier:
         address = environment.get("NOTIFY_SOCKET", "")
         self._address = "\0" + address[1:] if address.startswith("@") else address
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) if address else None
-        self.n_unsent = 0
         self._status = ""
 
     def send_status(self, sentence: str) -> None:
@@ -21,14 +21,12 @@ class Notifier:
             self.send(STATUS=sentence)
 
     def send(self, **fields: str) -> None:
-        """One datagram, e.g. READY="1". A full or vanished socket is counted, never waited for."""
+        """One datagram, e.g. READY="1". A full or vanished socket is never waited for."""
         if self._socket is None:
             return
         text = "\n".join(f"{key}={said}" for key, said in fields.items())
-        try:
+        with contextlib.suppress(OSError):
             self._socket.sendto(text.encode(), self._address)
-        except OSError:
-            self.n_unsent += 1
 
     def close(self) -> None:
         """Close the socket."""

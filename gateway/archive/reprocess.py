@@ -18,7 +18,7 @@ from gateway.archive.manifest import Manifest
 from gateway.archive.places import Location
 from gateway.archive.receipts import Slot, failure_files, slots_done, slots_failed
 from gateway.archive.run import JobOutcome, JobStatus, fail, run
-from gateway.archive.survey import Facts, LogFile, Surveyed, in_goes, survey
+from gateway.archive.survey import Facts, LogFile, SurveyedLog, survey
 from gateway.archive.workers import WorkerKilledError, Workers
 from gateway.errors import ConfigurationError
 
@@ -155,32 +155,26 @@ def reprocess(
 
 def _survey(inventory: Inventory, workers: Workers, on_progress: OnProgress) -> None:
     """Survey every new log; each vehicle's facts are stored when it is complete."""
-    goes = [(vehicle, go) for vehicle, logs in inventory.unknown() for go in in_goes(logs)]
-    total, done, begun_s = sum(log.size for _, go in goes for log in go), 0, time.monotonic()
-    left = Counter(vehicle for vehicle, _ in goes)
+    new = [(vehicle, log) for vehicle, logs in inventory.unknown() for log in logs]
+    total, done, begun_s = sum(log.size for _, log in new), 0, time.monotonic()
+    left = Counter(vehicle for vehicle, _ in new)
     found: defaultdict[str, Facts] = defaultdict(dict)
-    for n, ((vehicle, go), answer) in enumerate(done_by(workers, _surveyed, goes), 1):
-        told = _of_survey(go, answer)
-        found[vehicle] |= told.facts
-        inventory.lost |= told.lost
+    for n, ((vehicle, log), answer) in enumerate(done_by(workers, _surveyed, new), 1):
+        try:
+            found[vehicle][log.key] = answer.result()
+        except ConfigurationError:
+            raise
+        except Exception as fault:  # noqa: BLE001 - whatever happened to a worker, the other vehicles go on
+            inventory.lost[log.name] = str(fault) or repr(fault)
         left[vehicle] -= 1
         if not left[vehicle]:
-            inventory.learn(vehicle, found.pop(vehicle))
-        done += sum(log.size for log in go)
-        on_progress(Progress("looking", done, total, n, len(goes), time.monotonic() - begun_s))
+            inventory.learn(vehicle, found.pop(vehicle, {}))
+        done += log.size
+        on_progress(Progress("looking", done, total, n, len(new), time.monotonic() - begun_s))
 
 
-def _surveyed(go: tuple[str, tuple[LogFile, ...]]) -> Surveyed:
-    return survey(go[1])
-
-
-def _of_survey(go: tuple[LogFile, ...], answer: "Future[Surveyed]") -> Surveyed:
-    try:
-        return answer.result()
-    except ConfigurationError:
-        raise
-    except Exception as fault:  # noqa: BLE001 - whatever happened to a worker, the other vehicles go on
-        return Surveyed({}, {log.name: str(fault) or repr(fault) for log in go})
+def _surveyed(new: tuple[str, LogFile]) -> SurveyedLog:
+    return survey(new[1])
 
 
 def _weigh(jobs: Sequence[ArchiveJob], workers: Workers, summary: Summary, on_progress: OnProgress) -> None:

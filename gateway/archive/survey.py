@@ -5,18 +5,16 @@ valid as long as the log's size and stamp are unchanged.
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.archive.manifest import Assignment
-from gateway.archive.places import Location, PlaceError
+from gateway.archive.places import Location
 from gateway.bus.logs import is_named_as_log, open_whole_log
 from gateway.errors import ConfigurationError, LogUnreadableError, ReaderMissingError
 
 KNOWN: Final = "logs"  # folder of the data set
-MOST_LOGS: Final = 32  # chosen: surveyed in one task
-MOST_BYTES: Final = 64_000_000  # chosen, likewise
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,14 +45,6 @@ class SurveyedLog:
 Facts = dict[str, SurveyedLog]  # by LogFile.key
 
 
-@dataclass(frozen=True, slots=True)
-class Surveyed:
-    """The result of one task: facts, and unreachable logs with reasons."""
-
-    facts: Facts
-    lost: dict[str, str]
-
-
 def logs_of(assignment: Assignment) -> list[LogFile]:
     """The logs in a vehicle's folder, by name. Raises PlaceError."""
     place, shown = assignment.logs, assignment.shown
@@ -66,30 +56,6 @@ def is_log(path: str) -> bool:
     """Whether a file is a log by its name: it has the suffix of one, packed or not."""
     name = path.rpartition("/")[2]
     return not name.startswith(".") and is_named_as_log(name)
-
-
-def survey(logs: Sequence[LogFile]) -> Surveyed:
-    """Read every log once; unreachable ones are listed as lost. Raises ConfigurationError without a library."""
-    facts: Facts = {}
-    lost: dict[str, str] = {}
-    for log in logs:
-        try:
-            facts[log.key] = _facts_of(log)
-        except (FileNotFoundError, PlaceError) as fault:
-            lost[log.name] = str(fault)
-    return Surveyed(facts, lost)
-
-
-def in_goes(logs: Iterable[LogFile]) -> Iterator[tuple[LogFile, ...]]:
-    """Logs in groups of a suitable size for a task."""
-    group: list[LogFile] = []
-    for log in logs:
-        group.append(log)
-        if len(group) >= MOST_LOGS or sum(one.size for one in group) >= MOST_BYTES:
-            yield tuple(group)
-            group = []
-    if group:
-        yield tuple(group)
 
 
 def known_facts(dataset: Location, vehicle: str) -> Facts:
@@ -111,7 +77,8 @@ def _path(vehicle: str) -> str:
     return f"{KNOWN}/vehicle={vehicle}.json"
 
 
-def _facts_of(log: LogFile) -> SurveyedLog:
+def survey(log: LogFile) -> SurveyedLog:
+    """Read a log once. Raises FileNotFoundError, PlaceError, or ConfigurationError without a library."""
     with log.place.fetched(log.path) as fetched:
         try:
             chunks, report = open_whole_log(fetched.path)

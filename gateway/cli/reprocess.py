@@ -49,7 +49,7 @@ MOST_TOLD: Final = 10  # chosen: failures, one line each; the data set has them 
 
 def how_far(progress: Progress) -> str:
     """ "weighing: 12 of 340 jobs, 1.2 of 34.0 GB, 52 MB/s, 11 min left" """
-    pieces = "jobs" if progress.what == "weighing" else "groups of logs"
+    pieces = "jobs" if progress.what == "weighing" else "logs"
     share = f"{progress.n_done} of {progress.n_total} {pieces}, {size(progress.done)} of {size(progress.total)}"
     left = "" if progress.remaining_s is None else f", {duration(progress.remaining_s)} left"
     return f"{progress.what}: {share}, {size(progress.rate)}/s{left}"

@@ -38,7 +38,7 @@ def test_a_long_log_takes_no_more_memory_than_a_short_one(tmp_path: Path) -> Non
     manifest = load_manifest(str(write_manifest(tmp_path, "short", "long")))
     inventory = look(manifest, place_of(tmp_path / "dataset"))
     for vehicle, logs in inventory.unknown():
-        inventory.learn(vehicle, survey(logs).facts)
+        inventory.learn(vehicle, {log.key: survey(log) for log in logs})
     long, short = inventory.jobs()
     assert long.size - short.size > 15_000_000
     held, held_longer = most_bytes_held(short), most_bytes_held(long)

@@ -16,6 +16,7 @@ from gateway.archive.jobs import ArchiveJob
 from gateway.archive.manifest import load_manifest
 from gateway.archive.reprocess import Summary, reprocess
 from gateway.archive.run import JobStatus, run
+from gateway.archive.survey import LogFile, SurveyedLog, survey
 from gateway.archive.workers import WorkerKilledError
 from gateway.errors import ConfigurationError, ReaderMissingError
 
@@ -211,16 +212,13 @@ def test_new_inputs_take_the_place_of_the_old_once_they_are_done(archive: Path) 
 def test_a_vehicle_with_a_log_out_of_reach_is_not_weighed_without_it(
     archive: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from gateway.archive import survey
-
-    def unreachable(log: survey.LogFile) -> survey.SurveyedLog:
+    def unreachable(log: LogFile) -> SurveyedLog:
         if log.name == "van-1/1.log":
             raise PlaceError(f"{log.name}: timed out")
-        return facts_of(log)
+        return survey(log)
 
-    facts_of = survey._facts_of
     with monkeypatch.context() as breaking:
-        breaking.setattr(survey, "_facts_of", unreachable)
+        breaking.setattr("gateway.archive.reprocess.survey", unreachable)
         summary = done(archive)
     assert summary.lost == {"van-1/1.log": "van-1/1.log: timed out"}
     assert {slot.vehicle for slot in slots_done(dataset_of(archive))} == {"van-2"}

@@ -14,10 +14,10 @@ from support.archive import MIDNIGHT_NS, S, write_drive, write_manifest
 from support.calibrated import calibration_file
 from support.known_weights import with_all_sources
 
-from gateway.archive import Location, place_of
+from gateway.archive import place_of
 from gateway.archive.jobs import PACKAGE, ArchiveJob, _imported, code_id, hash_of, plan, software
 from gateway.archive.manifest import Assignment, Manifest, load_manifest
-from gateway.archive.survey import LogFile, SurveyedLog, in_goes, logs_of, survey
+from gateway.archive.survey import LogFile, SurveyedLog, logs_of, survey
 from gateway.calibration.known_weights_file import KnownWeight, KnownWeights
 from gateway.core.known_weights import Knowledge
 from gateway.core.settings import BatchSettings
@@ -173,7 +173,8 @@ def test_the_hash_of_the_code_holds_every_module_that_a_job_loads(tmp_path: Path
     write_drive(tmp_path / "van" / "1.log", MIDNIGHT_NS, 21.0)
     manifest = load_manifest(str(write_manifest(tmp_path, "van")))
     [log] = logs_of(manifest.assignments[0])
-    [job] = plan(place_of(tmp_path / "dataset"), manifest.assignments[0], [log], survey([log]).facts, manifest.settings)
+    facts = {log.key: survey(log)}
+    [job] = plan(place_of(tmp_path / "dataset"), manifest.assignments[0], [log], facts, manifest.settings)
     (tmp_path / "job").write_bytes(pickle.dumps(job))
     ran = subprocess.run([sys.executable, "-c", RUN_ONE_JOB, tmp_path], capture_output=True, text=True, check=True)
     loaded = {Path(line) for line in ran.stdout.splitlines()}
@@ -200,12 +201,3 @@ def test_a_changed_module_makes_another_software(tmp_path: Path, module: str) ->
     with (copy / f"{module}.py").open("a") as file:
         file.write("# changed\n")
     assert code_id(copy) != code_id()
-
-
-def test_logs_are_surveyed_in_groups_worth_a_turn() -> None:
-    def logs(*sizes: int) -> list[LogFile]:
-        return [LogFile(Location("file:///x"), f"{n}", f"{n}", size, "") for n, size in enumerate(sizes)]
-
-    assert [len(go) for go in in_goes(logs(*[1] * 70))] == [32, 32, 6]
-    assert [len(go) for go in in_goes(logs(60_000_000, 60_000_000, 1))] == [2, 1]
-    assert list(in_goes([])) == []
