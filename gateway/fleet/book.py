@@ -9,6 +9,7 @@ import threading
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from typing import Any, Final, NamedTuple
 
 import sqlalchemy as sql
@@ -136,7 +137,7 @@ class Book:
     def close(self) -> None:
         self._engine.dispose()
 
-    def _begun(self) -> Any:
+    def _begun(self) -> AbstractContextManager[sql.Connection]:
         """A connection in a transaction, which the end of the block commits; the first makes the tables."""
         with self._lock:
             if not self._has_tables:
