@@ -1,0 +1,407 @@
+"""The vehicle's response against statics, symmetry and four wheels of their own."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.special
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.four_wheels import FourWheels
+from support.model_road import (
+    BAND_HZ,
+    GROUND,
+    LEFT,
+    QUIET,
+    RATE_HZ,
+    UNCOUPLED,
+    VAN,
+    batch_of,
+    motion_of,
+    paths_of,
+    theta_of,
+)
+
+from gateway.core.vehicle import Load
+from gateway.model import car
+from gateway.model.car import LEAST_LEFT, LEVELS, MOST, MOST_APART, natural, numbers_about, numbers_of, roll_share_front
+from gateway.model.expected import Expected, Groups, log_stroke_speeds
+from gateway.model.response import Frequencies, Motion
+from gateway.model.spectra import Mount, Reading, cross_spectra_of, log_amplitude_of
+from gateway.model.table import INDEX, NAMES, N
+from gateway.model.tracks import coherence_of, coherence_slope_of
+from gateway.records import C128, F64
+
+FREQ_HZ = np.array([0.8, 1.5, 2.4, 4.0, 8.0, 12.0])
+OMEGA = 2.0 * np.pi * FREQ_HZ
+HEAVY = 1e4
+"""So many times as heavy and stiff as a van, the rounding of a payload's place vanishes (car.INVERSE_PAYLOAD_KG)."""
+HEAVY_GROUND = replace(GROUND, empty_mass_kg=HEAVY * GROUND.empty_mass_kg)
+PAYLOAD_KG, POSITION_M = 320.0 * HEAVY, 2.1
+FIRM = {"payload_mode_hz": 1e9, "payload_damping_ratio": 1e-9}
+SQUARE = {"gyro_yaw_rad": 0.0, "sensor_left_m": 0.3, "empty_left_m": 0.01, "damper_against_rear": 1.1}
+MOVABLE = {"twist_level": 1.2, "damper_friction_rear": 0.3, "damper_digression_front": 0.2, "accelerometer_gain": 0.02}
+HALF, ROLLING = theta_of(**MOVABLE), theta_of(with_roll=True, **MOVABLE, **LEFT)
+LOADED = (300.0, 0.47, 0.06)
+
+
+def heavy_theta(slope_per_kn: float, **units: float) -> F64:
+    """ROLLING's like, firm, heavy and, at its usual movement, without friction."""
+    vehicle = replace(VAN, empty_mass_kg=HEAVY * VAN.empty_mass_kg)
+    slopes = {"spring_slope_front_per_kn": slope_per_kn / HEAVY, "spring_slope_rear_per_kn": 1.5 * slope_per_kn / HEAVY}
+    return theta_of(with_roll=True, vehicle=vehicle, **FIRM, **(SQUARE | slopes | units))
+
+
+def off(theta: F64, left_m: float, speed_mps: float = 14.0) -> float:
+    """How far the model is from four wheels: the largest difference over the largest reading of the same sensor."""
+    wheels = FourWheels(theta, HEAVY_GROUND, PAYLOAD_KG, POSITION_M, left_m)
+    expected = wheels.paths(FREQ_HZ, speed_mps)
+    found = paths_of(theta, wheels.load, FREQ_HZ, 3, speed_mps, HEAVY_GROUND)
+    return float(np.max(np.abs(found - expected) / np.max(np.abs(expected), axis=(1, 2), keepdims=True)))
+
+
+@pytest.mark.parametrize("left_m", [0.0, 0.3, -0.45])
+@pytest.mark.parametrize("driveline_kg", [1e-20, 40.0 * HEAVY])
+def test_on_even_springs_it_is_the_car_on_four_wheels(left_m: float, driveline_kg: float) -> None:
+    """With the longitudinal force of both drivelines, at any speed."""
+    coupled = {"driveline_front_kg": driveline_kg, "driveline_rear_kg": 0.5 * driveline_kg}
+    assert off(heavy_theta(0.0, accelerometer_gain=0.05, **coupled), left_m, 21.0) < 1e-8
+
+
+def test_without_roll_it_is_the_same_car_in_the_middle() -> None:
+    theta = heavy_theta(0.1, empty_left_m=0.0, sensor_left_m=0.0, driveline_rear_kg=30.0 * HEAVY)
+    wheels = FourWheels(theta, HEAVY_GROUND, PAYLOAD_KG, POSITION_M, 0.0)
+    half = paths_of(theta[:N], wheels.load[:2], FREQ_HZ, 2, 14.0, HEAVY_GROUND)
+    np.testing.assert_allclose(half, wheels.paths(FREQ_HZ)[:2, :2], rtol=1e-7)
+
+
+def test_springs_that_stiffen_turn_heave_into_roll_to_first_order() -> None:
+    """What is left out is of second order: half as uneven, a quarter as far off. Even springs would be off by far."""
+    far, near = (off(heavy_theta(0.08, empty_left_m=0.0), left_m) for left_m in (0.4, 0.2))
+    assert 1e-5 < far < 0.02
+    assert near == pytest.approx(far / 4.0, rel=0.25)
+    stiffening = heavy_theta(0.08)
+    wheels = FourWheels(stiffening, HEAVY_GROUND, PAYLOAD_KG, POSITION_M, 0.4)
+    front_npm, rear_npm = 2.0 * wheels.level_springs_npm[::2]
+    even = heavy_theta(0.0, spring_front_npm=front_npm, spring_rear_npm=rear_npm)
+    expected, plain = wheels.paths(FREQ_HZ), paths_of(even, wheels.load, FREQ_HZ, 3, 14.0, HEAVY_GROUND)
+    scale = np.max(np.abs(expected), axis=(1, 2), keepdims=True)
+    assert np.max(np.abs(plain - expected) / scale) > 5.0 * off(stiffening, 0.4)
+
+
+@pytest.mark.parametrize("slope_per_kn", [0.0, 0.08])
+@pytest.mark.parametrize("left_m", [0.3, -0.2])
+def test_the_axles_share_a_steady_moment_as_statics_has_it(slope_per_kn: float, left_m: float) -> None:
+    theta = heavy_theta(slope_per_kn)
+    wheels = FourWheels(theta, HEAVY_GROUND, PAYLOAD_KG, POSITION_M, left_m)
+    front, rear = wheels.more_on_the_left_n
+    assert roll_share_front(theta, wheels.load, HEAVY_GROUND) == pytest.approx(front / (front + rear), rel=1e-9)
+
+
+def test_the_responses_of_groups_follow_their_speed() -> None:
+    """To first order about their mean: half as far from it, a quarter as far off."""
+    theta = theta_of(driveline_front_kg=30.0, driveline_rear_kg=60.0)
+    batches = [
+        batch_of(*np.random.default_rng(i).standard_normal((2, 4000)), speed_mps=v) for i, v in enumerate((11, 17))
+    ]
+    spectra = cross_spectra_of(batches, Reading(VAN.wheelbase_m, BAND_HZ, 256))
+    still = replace(spectra, log_amplitude=np.zeros_like(spectra.log_amplitude))
+    misses = []
+    for apart in (1.0, 0.5):
+        delays_s = still.delay_s.mean() * (1.0 + apart * (still.delay_s / still.delay_s.mean() - 1.0))
+        groups = Groups(replace(still, delay_s=delays_s), GROUND)
+        found = Expected(theta[None], np.array([[300.0], [0.47]]), groups).paths[:, :, 0]
+        exact = [paths_of(theta, LOADED[:2], still.freq_hz, 2, float(GROUND.wheelbase_m / d)) for d in delays_s[:, 0]]
+        unmoved = paths_of(theta, LOADED[:2], still.freq_hz, 2, groups.speed_mps)
+        misses.append(np.abs(found - np.array(exact).transpose(1, 2, 0, 3)).max())
+        assert misses[-1] < 0.1 * np.abs(unmoved[:, :, None] - np.array(exact).transpose(1, 2, 0, 3)).max()
+    assert misses[1] == pytest.approx(misses[0] / 4.0, rel=0.3)
+
+
+@pytest.mark.parametrize("load", [(0.0, 0.52, 0.0), LOADED], ids=["empty", "loaded on the left"])
+@pytest.mark.parametrize(("left_m", "right_m"), [(1.0, 1.0), (1.0, 0.0), (0.3, -0.5)])
+def test_slowly_the_body_follows_both_tracks(load: tuple[float, ...], left_m: float, right_m: float) -> None:
+    """Heave is the tracks' mean and roll their difference over the width, whatever lies where on uneven springs."""
+    slow_hz, omega = np.array([1e-3]), 2e-3 * np.pi
+    theta = theta_of(with_roll=True, spring_slope_rear_per_kn=0.2, **(LEFT | {"gyro_yaw_rad": 0.0}))
+    paths = paths_of(theta, load, slow_hz, 3)[:, :, 0]
+    mean, half_difference = (left_m + right_m) / 2.0, (left_m - right_m) / 2.0
+    acceleration, pitch_rate, roll_rate = mean * paths[:, :2].sum(axis=1) + half_difference * paths[:, 2:].sum(axis=1)
+    roll = (left_m - right_m) / (2.0 * GROUND.half_track_m)
+    assert acceleration / -(omega**2) == pytest.approx(mean + 0.3 * roll, abs=1e-4)
+    assert pitch_rate / (1j * omega) == pytest.approx(0.0, abs=1e-4)
+    assert roll_rate / (1j * omega) == pytest.approx(roll, abs=1e-4)
+    lever = VAN.sensor_position_m / VAN.wheelbase_m
+    half = paths_of(theta[:N], load[:2], slow_hz)[:, :, 0]
+    np.testing.assert_allclose(half[0] / -(omega**2), [1.0 - lever, lever], atol=1e-3)
+    np.testing.assert_allclose(half[1] / (1j * omega) * VAN.wheelbase_m, [-1.0, 1.0], rtol=1e-3)
+
+
+@settings(max_examples=30)
+@given(
+    cg_left_m=st.floats(-0.15, 0.15),
+    payload_kg=st.floats(0.0, 600.0),
+    front_share=st.floats(0.35, 0.6),
+    sensor_left_m=st.floats(-0.6, 0.6),
+    yaw_rad=st.floats(-0.1, 0.1),
+    slope=st.floats(-0.1, 0.3),
+)
+def test_in_the_mirror_left_is_right(
+    cg_left_m: float, payload_kg: float, front_share: float, sensor_left_m: float, yaw_rad: float, slope: float
+) -> None:
+    """Mirrored, roll turns over where both tracks are alike; where one is against the other, all but roll does."""
+    placed = {"spring_slope_rear_per_kn": slope, "sensor_left_m": sensor_left_m, "gyro_yaw_rad": yaw_rad}
+    one = theta_of(with_roll=True, **(LEFT | placed))
+    other = one.copy()
+    other[[INDEX[name] for name in ("empty_left_m", "gyro_yaw_rad", "sensor_left_m")]] *= -1.0
+    sign = np.array([1.0, 1.0, -1.0])[:, None, None] * np.array([1.0, 1.0, -1.0, -1.0])[:, None]
+    here = paths_of(one, (payload_kg, front_share, cg_left_m), FREQ_HZ, 3)
+    mirrored = sign * paths_of(other, (payload_kg, front_share, -cg_left_m), FREQ_HZ, 3)
+    scale = np.abs(here).max(axis=(1, 2), keepdims=True)
+    np.testing.assert_allclose(mirrored / scale, here / scale, atol=1e-9)
+
+
+@settings(max_examples=30)
+@given(payload_kg=st.floats(-60.0, 500.0), position=st.floats(0.1, 0.9))
+def test_a_vehicle_alike_at_both_ends_with_a_mirrored_load_pitches_the_other_way(
+    payload_kg: float, position: float
+) -> None:
+    ground = replace(GROUND, empty_front_share=0.5)
+    ends = {
+        f"{kind}_{end}{unit}": number
+        for kind, unit, number in (
+            ("spring", "_npm", 65e3),
+            ("damper", "_nspm", 4e3),
+            ("damper_mount", "_npm", 7e5),
+            ("tyre", "_npm", 37e4),
+            ("unsprung", "_kg", 85.0),
+            ("driveline", "_kg", 1e-20),
+        )
+        for end in ("front", "rear")
+    }
+    theta = theta_of(sensor_position_m=0.5 * GROUND.wheelbase_m, **ends)
+    share = (0.5 * ground.empty_mass_kg + (1.0 - position) * payload_kg) / (ground.empty_mass_kg + payload_kg)
+    one, mirrored = (paths_of(theta, (payload_kg, each), FREQ_HZ, 2, 14.0, ground) for each in (share, 1.0 - share))
+    np.testing.assert_allclose(one[0], mirrored[0, ::-1], rtol=1e-9)
+    np.testing.assert_allclose(one[1], -mirrored[1, ::-1], rtol=1e-9)
+
+
+def test_a_payload_on_a_soft_floor_feels_heavier_below_its_mode() -> None:
+    """At 8 Hz a load ringing at 14 Hz weighs half as much again: 1 / (1 - (8/14)^2) = 1.48."""
+    soft, firm = (
+        theta_of(payload_mode_hz=hz, payload_damping_ratio=1e-6, payload_gyration_m2=1e-9) for hz in (14.0, 1e6)
+    )
+    heavier = 300.0 / (1.0 - (8.0 / 14.0) ** 2)
+    at_hz = np.array([8.0])
+    at_soft, at_firm = paths_of(soft, (300.0, 0.52), at_hz), paths_of(firm, (heavier, 0.52), at_hz)
+    assert at_soft[0, 0] == pytest.approx(at_firm[0, 0], rel=0.02)
+
+
+def springs_npm(theta: F64, added_kn: float) -> F64:
+    """(2,) front and rear, the load on the rear axle alone."""
+    payload_kg = added_kn * 1000.0 / 9.80665
+    share = GROUND.empty_front_share * GROUND.empty_mass_kg / (GROUND.empty_mass_kg + payload_kg)
+    return numbers_of(natural(theta)[None], np.array([[payload_kg], [share]]), GROUND)[car.SPRING, 0, car.USUAL_LEVEL]
+
+
+def test_springs_stiffen_by_the_exponential_of_slope_and_bends() -> None:
+    """A slope of 0.1 per kN and a bend of 0.5 beyond 0.2 of half the empty weight, 1.216 kN."""
+    theta = theta_of(spring_slope_rear_per_kn=0.1, spring_bend_rear_1_per_kn=0.5)
+    bend_kn = 0.2 * 0.5 * 1240.0 * 9.80665e-3
+    empty = springs_npm(theta, 0.0)
+    for added_kn in (0.5, 2.0):
+        front, rear = springs_npm(theta, added_kn) / empty
+        assert front == pytest.approx(1.0)
+        assert rear == pytest.approx(np.exp(0.1 * added_kn + 0.5 * max(added_kn - bend_kn, 0.0)))
+
+
+@pytest.mark.parametrize(("payload_kg", "felt"), [(3000.0, 0.9999), (car.INVERSE_PAYLOAD_KG, 0.5), (0.0, 0.0)])
+def test_the_place_of_a_load_fades_with_its_mass(payload_kg: float, felt: float) -> None:
+    """All of it over the rear axle: (R - F)^2 / 4 L would be L / 4, and the mass felt between the axles nothing."""
+    share = GROUND.empty_front_share * GROUND.empty_mass_kg / (GROUND.empty_mass_kg + payload_kg)
+    numbers = numbers_of(natural(HALF)[None], np.array([[payload_kg], [share]]), GROUND)
+    assert numbers[car.CARRIED][2, 0, 0] == pytest.approx(payload_kg / 4.0 * (1.0 - felt), abs=1e-3)
+
+
+def rates_at_levels(**units: float) -> tuple[F64, F64]:
+    """(5,) rear damper and rear spring at each of LEVELS, over those without friction and digression."""
+    numbers, plain = (
+        numbers_of(natural(theta_of(**one))[None], np.array([[0.0], [0.52]]), GROUND)[:, 0]
+        for one in (units, dict.fromkeys(("damper_friction_rear", "spring_friction_rear"), 0.0))
+    )
+    damper, spring = (numbers[of][1] / plain[of][1] for of in (car.DAMPER, car.SPRING))
+    return damper, spring
+
+
+@given(share=st.floats(-0.2, 1.0), power=st.floats(-0.3, 0.5))
+def test_a_rate_goes_with_one_less_p_and_p_over_s_and_a_damper_s_with_s_to_the_less_q(
+    share: float, power: float
+) -> None:
+    damper, spring = rates_at_levels(
+        damper_friction_rear=share, spring_friction_rear=0.5 * share, damper_digression_rear=power
+    )
+    s = np.exp(LEVELS[:, 1])
+    np.testing.assert_allclose(damper, np.maximum(LEAST_LEFT, 1.0 - share + share / s) * s**-power)
+    np.testing.assert_allclose(spring, 1.0 - 0.5 * share + 0.5 * share / s)
+    assert damper[car.USUAL_LEVEL] == pytest.approx(1.0)
+
+
+amplitudes, factors = st.floats(-2.0, 2.0), st.floats(-3.0, 3.0)
+
+
+@given(front=amplitudes, rear=amplitudes, a=factors, b=factors, c=factors, d=factors, e=factors)
+def test_between_levels_parabolas_are_met_exactly(
+    front: float, rear: float, a: float, b: float, c: float, d: float, e: float
+) -> None:
+    """One of what both axles have in common, one of what sets them apart."""
+
+    def value(front: F64, rear: F64) -> F64:
+        u = np.clip(0.5 * (front + rear), -MOST, MOST)
+        v = np.clip(0.5 * (front - rear), -MOST_APART, MOST_APART)
+        return np.asarray(a + b * u + c * u**2 + d * v + e * v**2)
+
+    met = car.level_weights(np.array([[front, rear]])) @ value(*LEVELS.T)
+    assert met[0] == pytest.approx(float(value(np.array(front), np.array(rear))), abs=1e-9)
+
+
+@given(ratio=st.floats(0.1, 10.0))
+def test_twice_the_movement_is_one_logarithm_of_two_more(ratio: float) -> None:
+    a, g = np.array([0.3, 2.0, 0.1]), np.array([0.01, 0.4, 0.02])
+    moved = log_amplitude_of(ratio**2 * a, ratio**2 * g) - log_amplitude_of(a, g)
+    assert moved == pytest.approx(np.log(ratio))
+
+
+@pytest.mark.parametrize(("theta", "n_sensors"), [(HALF, 2), (ROLLING, 2), (ROLLING, 3)])
+def test_slopes_are_what_a_small_change_of_each_number_does(theta: F64, n_sensors: int) -> None:
+    loaded = LOADED if len(theta) > N else LOADED[:2]
+    numbers = numbers_of(natural(theta)[None], np.array(loaded)[:, None], GROUND)
+
+    def paths(moved: F64) -> C128:
+        return Motion(moved, GROUND, Frequencies(FREQ_HZ), n_sensors, 14.0).paths
+
+    slopes = Motion(numbers, GROUND, Frequencies(FREQ_HZ), n_sensors, 14.0).slopes(np.arange(len(numbers))).copy()
+    for i in range(len(numbers)):
+        step = np.zeros_like(numbers)
+        step[i] = 1e-5 * max(abs(numbers[i, 0, 0]), 0.1)
+        expected = (paths(numbers + step) - paths(numbers - step)) / (2.0 * step[i, 0, 0])
+        np.testing.assert_allclose(slopes[i], expected, rtol=1e-5, atol=2e-7 * np.abs(expected).max(), err_msg=str(i))
+
+
+def test_some_slopes_are_those_of_all() -> None:
+    numbers = numbers_of(natural(ROLLING)[None], np.array(LOADED)[:, None], GROUND)
+    motion = Motion(numbers, GROUND, Frequencies(FREQ_HZ), 3, 14.0)
+    every = motion.slopes(np.arange(len(numbers))).copy()
+    for wanted in ([1, 5, 14], [25, 28, 29, 30], [12, 35], [10, 33]):
+        np.testing.assert_array_equal(motion.slopes(np.array(wanted)), every[wanted])
+
+
+@pytest.mark.parametrize("theta", [HALF, ROLLING], ids=["upright", "rolling"])
+@pytest.mark.parametrize("payload_kg", [0.0, 320.0])
+def test_numbers_move_with_each_entry_as_a_small_change_does(theta: F64, payload_kg: float) -> None:
+    load, n = np.array((payload_kg, *LOADED[1:]))[: 3 if len(theta) > N else 2], len(theta)
+    entries = [*sorted(i for i in car.IN_MOTION if i < n), *range(n, n + len(load))]
+    directions, far = numbers_about(natural(theta), load, GROUND, entries)
+    slopes = directions @ far
+    whole = np.r_[theta, load]
+
+    def numbers(at: F64) -> F64:
+        return numbers_of(natural(at[:n])[None], at[n:, None], GROUND)[:, 0].T
+
+    for column, entry in enumerate(entries):
+        step = np.zeros_like(whole)
+        step[entry] = 1e-5 if entry != n else 1e-3
+        expected = (numbers(whole + step) - numbers(whole - step)) / (2.0 * step[entry])
+        name = NAMES[entry] if entry < n else f"load {entry - n}"
+        scale = np.abs(numbers(whole)) + 1.0
+        np.testing.assert_allclose(slopes[..., column] / scale, expected / scale, rtol=1e-4, atol=1e-7, err_msg=name)
+
+
+def test_a_gain_multiplies_what_the_accelerometer_reads() -> None:
+    plain, louder = (paths_of(theta_of(accelerometer_gain=gain), LOADED[:2], FREQ_HZ) for gain in (0.0, 0.1))
+    np.testing.assert_allclose(louder[0], np.exp(0.1) * plain[0], rtol=1e-12)
+    np.testing.assert_array_equal(louder[1], plain[1])
+
+
+def test_what_the_springs_push_is_what_the_body_weighs_times_its_acceleration() -> None:
+    """Newton's law, both axles together: a firm payload, a sensor over the centre of gravity, no driveline."""
+    share = 0.46
+    theta = theta_of(sensor_position_m=(1.0 - share) * GROUND.wheelbase_m, **FIRM, **UNCOUPLED)
+    motion = motion_of(theta, (400.0, share), FREQ_HZ)
+    numbers = natural(theta)
+    added_kn = np.array([share * 1640.0 - 0.52 * 1240.0, (1.0 - share) * 1640.0 - 0.48 * 1240.0]) * 9.80665e-3
+    push = np.zeros((2, len(FREQ_HZ)), complex)
+    for axle, end in enumerate(("front", "rear")):
+        spring, slope, damper, mount = (
+            numbers[INDEX[name]]
+            for name in (
+                f"spring_{end}_npm",
+                f"spring_slope_{end}_per_kn",
+                f"damper_{end}_nspm",
+                f"damper_mount_{end}_npm",
+            )
+        )
+        damped = 1j * OMEGA * damper
+        rate = spring * np.exp(slope * added_kn[axle]) + damped / (1.0 + damped / mount)
+        push -= rate * motion.strokes()[axle, :, 0, car.USUAL_LEVEL]
+    np.testing.assert_allclose(push, 1640.0 * motion.paths[0, :, 0, car.USUAL_LEVEL], rtol=1e-6)
+
+
+def test_on_a_road_of_long_waves_no_spring_moves() -> None:
+    """What stretches them then is the body's inertia, which vanishes with frequency squared."""
+    one = np.abs(motion_of(HALF, LOADED[:2], np.array([0.01, 0.1])).strokes()[0, 0, 0, car.USUAL_LEVEL])
+    assert one[1] < 0.01
+    assert one[0] / one[1] == pytest.approx(0.01, rel=0.1)
+
+
+@pytest.mark.parametrize("speed_mps", [7.0, 22.0])
+def test_springs_move_as_fast_as_four_wheels_make_them(speed_mps: float) -> None:
+    """Told from the body's sensors alone; no part of the model is in what is compared."""
+    theta = theta_of(with_roll=True, sensor_left_m=0.0, track_offset_m=1e-9, **QUIET, **UNCOUPLED, **FIRM)
+    wheels = FourWheels(theta, GROUND, 1e-9, 1.0, 0.0)
+    n = 15_000
+    freq_hz = np.fft.rfftfreq(n, 1.0 / RATE_HZ)[1:]
+    rng = np.random.default_rng(int(speed_mps))
+    road = 1e-2 * (rng.standard_normal(len(freq_hz)) + 1j * rng.standard_normal(len(freq_hz))) / freq_hz
+    grid_hz = np.geomspace(freq_hz[0], freq_hz[-1], 600)
+
+    def driven(paths: C128) -> F64:
+        smooth = [
+            [np.interp(freq_hz, grid_hz, each.real) + 1j * np.interp(freq_hz, grid_hz, each.imag) for each in one]
+            for one in paths
+        ]
+        later = np.exp(-2j * np.pi * freq_hz * GROUND.wheelbase_m / speed_mps)
+        inside = (freq_hz > 0.3) & (freq_hz < 22.0)
+        return np.array([(one[0] + later * one[1]) * road * inside for one in smooth])
+
+    acceleration, pitch_rate = (np.fft.irfft(np.r_[0.0, one], n) for one in driven(wheels.paths(grid_hz)[:2]))
+    within = (freq_hz > BAND_HZ[0]) & (freq_hz < BAND_HZ[1])
+    speed = np.abs(2.0 * np.pi * freq_hz * driven(wheels.strokes(grid_hz)))[:, within] / n
+    spectra = cross_spectra_of(
+        [batch_of(acceleration, pitch_rate, speed_mps=speed_mps)], Reading(VAN.wheelbase_m, BAND_HZ, 256)
+    )
+    told = log_stroke_speeds(spectra, theta[:N], Load(0.0, 52.0), GROUND)
+    told_mps = np.sqrt(np.average(np.exp(2.0 * told), axis=0, weights=spectra.n_segments[:, 0]))
+    np.testing.assert_allclose(told_mps, np.sqrt(2.0 * np.sum(speed**2, axis=1)), rtol=0.06)
+
+
+@settings(max_examples=30)
+@given(left_m=st.floats(-0.8, 0.8), yaw_rad=st.floats(-0.05, 0.05), lag_s=st.floats(-0.01, 0.01))
+def test_levelled_readings_are_those_of_a_sensor_on_the_centre_line(
+    left_m: float, yaw_rad: float, lag_s: float
+) -> None:
+    """Of every path of a car that rolls, up to the square of the yaw."""
+    placed = {"sensor_left_m": left_m, "gyro_yaw_rad": yaw_rad}
+    here = theta_of(with_roll=True, gyro_lag_s=lag_s, **(LEFT | placed))
+    square = theta_of(with_roll=True, gyro_lag_s=lag_s, **(LEFT | dict.fromkeys(placed, 0.0)))
+    read, wanted = (paths_of(one, LOADED, FREQ_HZ, 3) for one in (here, square))
+    levelled = np.stack(Mount(left_m, yaw_rad, lag_s).levelled(read, FREQ_HZ))
+    scale = np.max(np.abs(np.concatenate([read, wanted], axis=1)), axis=(1, 2), keepdims=True)
+    assert np.max(np.abs(levelled - wanted) / scale) < 1e-9 + 2.0 * yaw_rad**2
+    np.testing.assert_array_equal(np.stack(Mount(0.0, 0.0, lag_s).levelled(read, FREQ_HZ)), read)
+
+
+@given(x=st.floats(1e-3, 60.0))
+def test_two_tracks_are_as_coherent_as_bessel_functions_say(x: float) -> None:
+    """x K1(x), and its slope by log x, -x^2 K0(x)."""
+    assert coherence_of(np.log([x]))[0] == pytest.approx(x * scipy.special.k1(x), rel=1e-8)
+    assert coherence_slope_of(np.log([x]))[0] == pytest.approx(-(x**2) * scipy.special.k0(x), rel=1e-8)

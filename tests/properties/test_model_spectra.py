@@ -1,0 +1,143 @@
+"""Spectra of batches: what leaves a trace in them, and the noise of the sensors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.model_road import BAND_HZ, RATE_HZ, VAN, batch_of, batch_over_road, theta_of
+
+from gateway.core.vehicle import Load
+from gateway.model.spectra import (
+    Mount,
+    Reading,
+    as_read,
+    cross_spectra_of,
+    expected_floor,
+    floor_of,
+    level,
+    mount_of,
+    noise_over,
+    usual_floor,
+    why_no_spectra,
+)
+from gateway.model.table import INDEX, N
+from gateway.records import Batch, Why
+
+READING = Reading(VAN.wheelbase_m, BAND_HZ, 256)
+ROLL_READING = replace(READING, with_roll=True)
+HALF = theta_of()
+DENSITY = 8.7e-4  # rad/s/sqrt(Hz): a gyro of 0.05 deg/s/sqrt(Hz)
+
+
+def test_a_scaled_batch_gives_the_same_spectra() -> None:
+    batch = batch_over_road(HALF, Load(200.0, 50.0), 2, duration_s=60.0)
+    quieter = batch_of(0.5 * batch.vertical_acceleration_mps2, 0.5 * batch.pitch_rate_radps)
+    one, other = (cross_spectra_of([each], READING) for each in (batch, quieter))
+    np.testing.assert_allclose(one.parts, other.parts, rtol=1e-9, atol=1e-12)
+    assert other.acceleration_rms_mps2 == pytest.approx(0.5 * one.acceleration_rms_mps2)
+
+
+def test_masked_samples_leave_no_trace() -> None:
+    batch = batch_over_road(HALF, Load(200.0, 50.0), 3, duration_s=120.0)
+    kept = (np.arange(len(batch.usable)) < 2000) | (np.arange(len(batch.usable)) > 2400)
+    spoilt = np.where(kept, batch.vertical_acceleration_mps2, np.nan)
+    masked = replace(batch, usable=kept)
+    one, other = (
+        cross_spectra_of([each], READING) for each in (masked, replace(masked, vertical_acceleration_mps2=spoilt))
+    )
+    np.testing.assert_array_equal(one.parts, other.parts)
+
+
+def test_several_stretches_are_one_drive() -> None:
+    batch = batch_over_road(HALF, Load(200.0, 50.0), 3, duration_s=120.0)
+    n = len(batch.usable) // 2
+    halves = [
+        batch_of(batch.vertical_acceleration_mps2[part], batch.pitch_rate_radps[part])
+        for part in (slice(0, n), slice(n, None))
+    ]
+    apart = cross_spectra_of(halves, READING)
+    cut = replace(batch, usable=np.arange(2 * n) != n)
+    assert apart.n_total in (cross_spectra_of([cut], READING).n_total, cross_spectra_of([cut], READING).n_total + 1)
+
+
+def noisy(density: float) -> Batch:
+    """A drive whose gyro adds white noise of this density."""
+    batch = batch_over_road(HALF, Load(200.0, 50.0), 60, duration_s=120.0)
+    noise = density * np.sqrt(RATE_HZ / 2.0) * np.random.default_rng(60).standard_normal(len(batch.usable))
+    return replace(batch, pitch_rate_radps=batch.pitch_rate_radps + noise)
+
+
+def test_a_floor_is_the_density_of_white_noise_and_deaf_to_tones() -> None:
+    batch = noisy(0.0)
+    n = len(batch.usable)
+    white = DENSITY * np.sqrt(RATE_HZ / 2.0) * np.random.default_rng(1).standard_normal(n)
+    alone = replace(batch, pitch_rate_radps=white + 0.01 * np.sin(2.0 * np.pi * 18.0 * np.arange(n) / RATE_HZ))
+    assert np.sqrt(floor_of(alone)[1]) == pytest.approx(DENSITY, rel=0.2)
+    assert np.isnan(floor_of(replace(alone, usable=np.zeros(n, bool)))).all()
+
+
+def test_vibration_grows_with_the_road_and_noise_does_not() -> None:
+    usual = ((1.0, 3.0), (1.0, 1.0))
+    np.testing.assert_allclose(expected_floor(usual, 0.5), (3.0, 1.0))
+    np.testing.assert_allclose(expected_floor(usual, 4.0), (9.0, 1.0))
+    np.testing.assert_allclose(noise_over(np.array([30.0, 5.0, 9.0]), expected_floor(usual, 4.0)), (0.0, 4.0, 0.0))
+
+
+def test_the_quietest_and_the_loudest_batch_are_the_usual_floor() -> None:
+    batches = [noisy(0.0), noisy(DENSITY)]
+    floors = np.array([floor_of(batch) for batch in batches])
+    assert usual_floor(batches, with_roll=True) == tuple(zip(floors.min(axis=0), floors.max(axis=0), strict=True))
+    assert usual_floor([], with_roll=True) is None
+
+
+def test_the_noise_of_the_roll_rate_reaches_a_sensor_that_is_brought_to_the_centre_line() -> None:
+    freq_hz = np.array([2.0, 10.0])
+    placed = replace(ROLL_READING, mount=Mount(0.4, 0.1, 0.0))
+    found = as_read(np.array([1.0, 2.0, 3.0]), placed, freq_hz, with_roll=True)
+    np.testing.assert_allclose(found[0], 1.0 + 3.0 * (2.0 * np.pi * freq_hz * 0.4) ** 2)
+    np.testing.assert_allclose(found[1:], [[2.03, 2.03], [3.0, 3.0]])
+    np.testing.assert_allclose(as_read(np.array([1.0, 2.0, 3.0]), placed, freq_hz, with_roll=False), [[1, 1], [2, 2]])
+
+
+def test_the_roll_rate_is_used_if_most_segments_have_it() -> None:
+    batch = batch_over_road(theta_of(with_roll=True), Load(200.0, 50.0), 4, duration_s=120.0)
+    n = len(batch.usable)
+    for kept, has_roll in ((1.0, True), (0.8, True), (0.4, False)):
+        rate = np.where(np.arange(n) < kept * n, batch.roll_rate_radps, np.nan)
+        found = cross_spectra_of([replace(batch, roll_rate_radps=rate)], ROLL_READING)
+        assert found.has_roll is has_roll
+        assert found.without_roll.parts.shape[0] == 4
+    assert not cross_spectra_of([batch], READING).has_roll
+
+
+def test_fewer_frequencies_are_those_of_the_whole_band() -> None:
+    whole = cross_spectra_of([batch_over_road(theta_of(with_roll=True), Load(200.0, 50.0), 4)], ROLL_READING)
+    part = whole.within((2.0, 5.0))
+    inside = (whole.freq_hz[1:-1] >= 2.0) & (whole.freq_hz[1:-1] <= 5.0)
+    np.testing.assert_array_equal(part.freq_hz[1:-1], whole.freq_hz[1:-1][inside])
+    np.testing.assert_array_equal(part.parts, whole.parts[..., inside])
+    np.testing.assert_array_equal(part.delay_phase[:, 1:-1], whole.delay_phase[:, 1:-1][:, inside])
+
+
+def test_a_sensor_is_where_the_parameters_say() -> None:
+    theta = theta_of(with_roll=True, sensor_left_m=0.25, gyro_yaw_rad=0.03, gyro_lag_s=0.004)
+    assert mount_of(theta) == Mount(0.25, 0.03, 0.004)
+    assert mount_of(level(theta)) == Mount(0.0, 0.0, 0.004)
+    assert theta[INDEX["sensor_left_m"]] == 0.25
+    assert mount_of(theta[:N]) is None
+
+
+def test_why_a_batch_has_no_spectra() -> None:
+    batch = batch_over_road(HALF, Load(200.0, 50.0), 4, duration_s=60.0)
+    n = len(batch.usable)
+    nothing = np.full(n, np.nan)
+    rng = np.random.default_rng(1)
+    for spoilt, why in (
+        (replace(batch, usable=np.arange(n) < 700), Why.TOO_SHORT),
+        (replace(batch, usable=np.arange(n) % 250 != 0, shares={Why.TOO_SLOW: 0.1, Why.GAP: 0.01}), Why.TOO_SLOW),
+        (replace(batch, vertical_acceleration_mps2=nothing), Why.ACCELERATION_MISSING),
+        (replace(batch, pitch_rate_radps=nothing), Why.PITCH_RATE_MISSING),
+        (replace(batch, speed_mps=14.0 + 3.0 * rng.standard_normal(n)), Why.SPEED_SPREAD),
+    ):
+        assert cross_spectra_of([spoilt], READING) is None
+        assert why_no_spectra(spoilt, READING) is why
