@@ -66,7 +66,7 @@ CARRIED: Final[Mapping[Carries, _Row]] = MappingProxyType(
         Carries.MIXED: _Row(LoadExtent(0.9, 0.3, 0.9, 0.35), is_of_floor=True),  # and as many compact loads
     }
 )
-"""Chosen from the dimensions of such goods."""
+"""Chosen from the dimensions of such goods; `benchmarks.accuracy budget` measures the effect of each row."""
 
 HABIT_PART: Final = 0.5  # chosen: part of the variance of log s that all loads of one vehicle share
 
@@ -95,6 +95,40 @@ class ShapePrior:
     def variance(self) -> float:
         """Variance of log s."""
         return float(self.probability @ (self.log_s - self.mean) ** 2)
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeHypothesis:
+    """A kind of load shapes: normally distributed logarithm of s (m2), and the probability of the kind."""
+
+    name: str
+    log_s: float
+    std: float
+    probability: float
+
+
+def shape_hypotheses(vehicle: Vehicle, known_s_m2: float, known_std: float) -> tuple[ShapeHypothesis, ...]:
+    """The kinds of shape that the vehicle's loads may have: compact like known loads, or spread out.
+
+    ``known_s_m2`` is s of the known loads as calibrated, ``known_std`` the standard deviation of its logarithm. If the
+    fitter stated what is carried, there is one kind.
+    """
+    logs, weights = np.log([s for s, _ in _points(vehicle)]), np.array([weight for _, weight in _points(vehicle)])
+    weights = weights / weights.sum()
+    mean = float(weights @ logs)
+    std = float(np.sqrt(weights @ (logs - mean) ** 2 + SMOOTHING**2))
+    if is_said(vehicle):
+        return (ShapeHypothesis("stated", mean, std, 1.0),)
+    compact_std = float(np.hypot(COMPACT_SCATTER, known_std))
+    return (
+        ShapeHypothesis("compact", log(known_s_m2), compact_std, 1.0 - SPREAD_PART),
+        ShapeHypothesis("spread", mean, std, SPREAD_PART),
+    )
+
+
+def known_shape(known_s_m2: float, known_std: float) -> tuple[ShapeHypothesis, ...]:
+    """The load has the shape of the known loads."""
+    return (ShapeHypothesis("known", log(known_s_m2), known_std, 1.0),)
 
 
 def is_said(vehicle: Vehicle) -> bool:
