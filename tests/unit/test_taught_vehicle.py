@@ -1,0 +1,150 @@
+"""A vehicle that learns from drives and statements, on exact spectra of a known half-car."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from support.half_car_road import KNOWN, VAN, batch_over_road
+
+from gateway.calibration.statements import NOTHING_KNOWN, Statement, StatementSource, empty, load_prior_of
+from gateway.calibration.vehicle import Taught, TaughtDrive, teach
+from gateway.core.cargo import known_shape, shape_hypotheses
+from gateway.errors import CalibrationImpossibleError
+from gateway.estimate import Estimate
+from gateway.model.spectra import cross_spectra_of
+from gateway.model.weigh import by_cross_spectrum, mixture_of, posterior_of, weigh
+from gateway.records import Batch, Why
+
+
+def stated(payload_kg: float, share_pct: float) -> Statement:
+    return Statement(
+        source=StatementSource.KNOWN,
+        payload_kg=payload_kg,
+        front_share_pct=share_pct,
+        left_m=0.0,
+        is_compact=True,
+    )
+
+
+def drive(i: int, statement: Statement, load: tuple[float, float], speed_mps: float = 14.0) -> TaughtDrive:
+    return TaughtDrive(f"drive {i}", (batch_over_road(*load, seed=10 * i, speed_mps=speed_mps),), statement)
+
+
+@cache
+def known() -> Taught:
+    return teach([drive(i, stated(*load), load) for i, load in enumerate(KNOWN)], VAN)
+
+
+def estimated(batch: Batch, taught: Taught) -> Estimate:
+    blank = Estimate(batch.t_start_ns, batch.t_end_ns, "cross_spectrum")
+    return by_cross_spectrum(batch, taught.model, known_shape(*taught.model.known_shape), blank)
+
+
+@pytest.mark.parametrize("load", [(60.0, 51.0), (200.0, 50.0), (350.0, 46.0)])
+def test_known_loads_teach_a_vehicle_that_weighs_others(load: tuple[float, float]) -> None:
+    told = estimated(batch_over_road(*load, seed=99), known())
+    assert told.counted, told.rejected
+    assert told.payload.interval95[0] < load[0] < told.payload.interval95[1]
+    assert told.payload.number == pytest.approx(load[0], abs=25.0)
+    assert told.front_share.number == pytest.approx(load[1], abs=0.8)
+
+
+def test_an_unlabelled_drive_is_weighed_by_what_the_others_teach() -> None:
+    drives = [drive(i, stated(*load), load) for i, load in enumerate(KNOWN)]
+    drives.append(drive(9, NOTHING_KNOWN, (180.0, 49.0)))
+    found = teach(drives, VAN).loads[-1]
+    assert found.load.payload_kg == pytest.approx(180.0, abs=30.0)
+    assert np.isnan(found.without_kg)
+
+
+def test_one_empty_drive_and_drives_of_which_nothing_is_said_teach_a_vehicle() -> None:
+    loads = ((0.0, 52.0), (300.0, 47.0), (150.0, 54.0), (400.0, 50.0))
+    said = (empty(), NOTHING_KNOWN, NOTHING_KNOWN, NOTHING_KNOWN)
+    speeds = (14.0, 11.0, 17.0, 20.0)
+    drives = [drive(i, one, load, v) for i, (one, load, v) in enumerate(zip(said, loads, speeds, strict=True))]
+    taught = teach(drives, VAN)
+    for found, load in zip(taught.loads, loads, strict=True):
+        assert abs(found.load.payload_kg - load[0]) < max(3.0 * found.payload_std_kg, 10.0)
+    told = estimated(batch_over_road(220.0, 50.0, seed=98), taught)
+    assert told.counted, told.rejected
+    assert told.payload.interval95[0] < 220.0 < told.payload.interval95[1]
+
+
+def test_a_statement_that_its_drive_contradicts_is_held_and_no_other() -> None:
+    drives = [drive(i, stated(*load), load) for i, load in enumerate((*KNOWN, (120.0, 53.0)))]
+    drives[2] = drive(2, stated(0.0, 52.0), KNOWN[2])
+    found = teach(drives, VAN).loads
+    assert [one.is_held for one in found] == [False, False, True, False, False]
+    assert found[2].load.payload_kg == pytest.approx(KNOWN[2][0], abs=40.0)
+
+
+def test_each_statement_is_told_what_its_drive_says_without_it() -> None:
+    """That is its verification: the drive knows the load from the others' vehicle alone."""
+    for found, (payload_kg, _) in zip(known().loads, KNOWN, strict=True):
+        assert abs(found.without_kg - payload_kg) < 3.0 * found.without_std_kg
+        assert found.payload_std_kg < found.without_std_kg
+
+
+def test_the_sources_of_error_add_up_to_the_answer() -> None:
+    """The columns' squares and the batch's own covariance are the covariance of the answer with its parameters."""
+    model = replace(known().model, model_std=(0.0, 0.0, 0.0), spread=(1.0, 1.0, 1.0))
+    spectra = cross_spectra_of([batch_over_road(200.0, 50.0, seed=97)], model.reading)
+    assert spectra is not None
+    mixture = mixture_of(spectra, model, known_shape(*model.known_shape))
+    posterior = posterior_of(mixture, model, 1.0, 0.0042)
+    of_peak = mixture.best.covariance[-2:, -2:] * np.outer([1.0, 100.0], [1.0, 100.0])
+    found = posterior.covariance - sum(
+        column.T @ column for name, column in posterior.sources.items() if name == "sideways"
+    )
+    if len(mixture.peaks) == 1:
+        np.testing.assert_allclose(found, of_peak, rtol=1e-4)
+    assert np.all(np.linalg.eigvalsh(posterior.own) > 0.0)
+
+
+def test_a_reversed_gyro_is_recognised() -> None:
+    told = estimated(batch_over_road(200.0, 50.0, seed=96, pitch_sign=-1.0), known())
+    assert told.rejected == (Why.WRONG_SIGN,)
+
+
+def test_a_vehicle_that_hardly_moves_is_not_weighed() -> None:
+    quiet = batch_over_road(200.0, 50.0, seed=95, shaken_mps2=0.005)
+    assert weigh(quiet, known().model, known_shape(*known().model.known_shape)) is Why.NOT_ENOUGH_EXCITATION
+
+
+def test_the_same_batch_gives_the_same_answer() -> None:
+    batch = batch_over_road(200.0, 50.0, seed=94)
+    assert estimated(batch, known()) == estimated(batch, known())
+
+
+def test_drives_without_steady_driving_teach_nothing() -> None:
+    short = TaughtDrive("short", (batch_over_road(0.0, 52.0, seed=1, duration_s=4.0),), empty())
+    with pytest.raises(CalibrationImpossibleError, match="enough steady driving"):
+        teach([short], VAN)
+
+
+@pytest.mark.parametrize(
+    ("statement", "payload_kg", "payload_std_kg"),
+    [
+        (empty(), 0.0, 5.1),
+        (Statement(payload_kg=310.0, payload_plus_minus_kg=25.0), 310.0, 12.8),
+        (NOTHING_KNOWN, 202.5, 315.0),
+    ],
+)
+def test_plus_minus_is_half_a_95_percent_interval(
+    statement: Statement, payload_kg: float, payload_std_kg: float
+) -> None:
+    prior = load_prior_of(statement, replace(VAN, payload_range_kg=(0.0, 450.0)))
+    assert prior.payload_kg == pytest.approx(payload_kg)
+    assert prior.payload_std_kg == pytest.approx(payload_std_kg, rel=0.01)
+
+
+def test_a_place_that_is_not_known_leaves_the_share_wide() -> None:
+    unknown = load_prior_of(Statement(payload_kg=300.0), VAN)
+    placed = load_prior_of(Statement(payload_kg=300.0, position_m=1.4), VAN)
+    assert unknown.front_share_std > 5.0 * placed.front_share_std
+
+
+def test_what_the_fitter_states_of_the_goods_leaves_one_kind_of_shape() -> None:
+    assert [one.name for one in shape_hypotheses(VAN, 0.1, 0.3)] == ["compact", "spread"]
+    assert [one.name for one in shape_hypotheses(replace(VAN, payload_length_m=2.0), 0.1, 0.3)] == ["stated"]
