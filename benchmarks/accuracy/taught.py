@@ -1,0 +1,170 @@
+"""What a vehicle learns from drives and statements, tried on recorded drives.
+
+    python -m benchmarks.accuracy.taught DATA [--splits 3]
+
+DATA holds campaigns with a roll rate (campaign_roll.toml). Known loads teach a vehicle that weighs the other sets;
+then, in random splits, one steady empty drive and four mixed drives teach one, of which nothing is said or whose
+kilograms a delivery note states, and the other mixed drives are weighed. Prints payload and front share, each with mean
+error, bias, share held by the 95 % interval, half-width and interval score, in percent of the payload range and of 20
+points.
+"""
+
+import argparse
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from gateway.calibration.campaign import load_campaign
+from gateway.calibration.known_run import KnownRun
+from gateway.calibration.statements import NOTHING_KNOWN, Statement, StatementSource, empty
+from gateway.calibration.vehicle import TaughtDrive, teach
+from gateway.core.cargo import shape_hypotheses
+from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Vehicle
+from gateway.estimate import Estimate
+from gateway.model.vehicle import VehicleModel
+from gateway.model.weigh import by_cross_spectrum
+from gateway.offline.campaigns import split_runs
+from gateway.quantity import Z95
+from gateway.records import F64
+
+KNOWN_AND_TESTS: Final = {
+    "known_loads": ("mixed", "speeds", "sideways", "shapes"),
+    "second_van/known_loads": ("second_van/mixed",),
+    "solid_axles/known_loads": ("solid_axles/mixed",),
+}
+NOTE_PLUS_MINUS: Final = 25.0 / 450.0  # of the payload range, half a 95 % interval
+SHARE_SPAN_PCT: Final = 20.0
+SEED: Final = 7
+
+
+def runs_of(folder: Path) -> tuple[Vehicle, list[KnownRun], list[KnownRun]]:
+    """The vehicle, the first parts of a campaign's drives, and the last."""
+    campaign = load_campaign(folder / "campaign_roll.toml")
+    split = split_runs(campaign, BatchSettings())
+    return campaign.vehicle, [one.identification for one in split], [one.validation for one in split]
+
+
+def whole(first: Sequence[KnownRun], last: Sequence[KnownRun]) -> list[KnownRun]:
+    """Whole drives."""
+    return [replace(one, batches=(*one.batches, *other.batches)) for one, other in zip(first, last, strict=True)]
+
+
+def known(run: KnownRun) -> Statement:
+    """The load of a calibration drive, as weighed and placed."""
+    return Statement(
+        source=StatementSource.KNOWN,
+        payload_kg=run.payload_kg,
+        front_share_pct=run.front_share_pct,
+        left_m=run.payload_left_m,
+        is_compact=True,
+    )
+
+
+def note(run: KnownRun, span_kg: float, rng: np.random.Generator) -> Statement:
+    """A delivery note: kilograms with an error, and no place."""
+    plus_minus_kg = NOTE_PLUS_MINUS * span_kg
+    said_kg = max(0.0, run.payload_kg + float(rng.normal(0.0, plus_minus_kg / Z95)))
+    return Statement(source=StatementSource.DELIVERY_NOTE, payload_kg=said_kg, payload_plus_minus_kg=plus_minus_kg)
+
+
+def taught(runs: Sequence[KnownRun], said: Sequence[Statement], vehicle: Vehicle) -> VehicleModel:
+    """The vehicle that these drives teach."""
+    drives = [TaughtDrive(run.name, run.batches, one) for run, one in zip(runs, said, strict=True)]
+    return teach(drives, vehicle).model
+
+
+def weighed(runs: Sequence[KnownRun], model: VehicleModel, vehicle: Vehicle) -> tuple[list[F64], Counter[str]]:
+    """Rows of truth, answer and interval (8,) of every batch that is answered, and the reasons of the others."""
+    shapes = shape_hypotheses(vehicle, *model.known_shape)
+    rows: list[F64] = []
+    refused: Counter[str] = Counter()
+    for run in runs:
+        for batch in run.batches:
+            if batch.rejected:
+                continue
+            told = by_cross_spectrum(batch, model, shapes, Estimate(batch.t_start_ns, batch.t_end_ns, "cross_spectrum"))
+            if told.rejected:
+                refused[str(told.rejected[0])] += 1
+                continue
+            by_share = vehicle.empty_front_share_std_pct * vehicle.empty_mass_kg
+            share = told.front_share.widened(by_share / (vehicle.empty_mass_kg + told.payload.number))
+            payload = (run.payload_kg, told.payload.number, *told.payload.interval95)
+            rows.append(np.array([*payload, run.front_share_pct, share.number, *share.interval95]))
+    return rows, refused
+
+
+def row(name: str, rows: Sequence[F64], refused: Counter[str], span_kg: float) -> str:
+    """One line of the table."""
+    if not rows:
+        return f"{name:34} all refused: {dict(refused)}"
+    figures = []
+    for columns, span in ((slice(0, 4), span_kg), (slice(4, 8), SHARE_SPAN_PCT)):
+        true, answer, low, high = np.array(rows)[:, columns].T
+        missed = np.maximum(0.0, np.maximum(low - true, true - high))
+        held = np.mean((low <= true) & (true <= high))
+        error, bias, half = np.mean(np.abs(answer - true)), np.mean(answer - true), np.mean(high - low) / 2.0
+        score = np.mean(high - low + 40.0 * missed)
+        of_span = [f"{100.0 * x / span:6.2f}" for x in (error, bias, half, score)]
+        figures.append(f"{of_span[0]} {of_span[1]} held {held:.2f} half {of_span[2]} score {of_span[3]}")
+    return f"{name:34} n {len(rows):3d} refused {sum(refused.values())} | {' | '.join(figures)}"
+
+
+def on_known_loads(data: Path) -> None:
+    """Calibrate on known loads and weigh their last thirds and the other sets."""
+    for name, tests in KNOWN_AND_TESTS.items():
+        vehicle, first, last = runs_of(data / name)
+        span_kg = vehicle.payload_range_kg[1] - vehicle.payload_range_kg[0]
+        model = taught(first, [known(run) for run in first], vehicle)
+        print(row(f"{name}, last thirds", *weighed(last, model, vehicle), span_kg), flush=True)
+        for test in tests:
+            _, *both = runs_of(data / test)
+            print(row(test, *weighed(whole(*both), model, vehicle), span_kg), flush=True)
+
+
+def on_ordinary_drives(data: Path, n_splits: int) -> None:
+    """One steady empty drive and four mixed ones teach; the other mixed drives test, beside ten known loads."""
+    for name, (mixed, *_) in KNOWN_AND_TESTS.items():
+        vehicle, *both = runs_of(data / name)
+        steady, (_, *parts) = whole(*both), runs_of(data / mixed)
+        drives = whole(*parts)
+        span_kg = vehicle.payload_range_kg[1] - vehicle.payload_range_kg[0]
+        rng = np.random.default_rng(SEED)
+        by_known = taught(steady, [known(run) for run in steady], vehicle)
+        rows: dict[str, list[F64]] = {"ten known loads": [], "nothing said": [], "delivery notes": []}
+        refused: dict[str, Counter[str]] = {kind: Counter() for kind in rows}
+        for _ in range(n_splits):
+            order = rng.permutation(len(drives)).tolist()
+            teaching = [drives[i] for i in order[:4]]
+            tests = [drives[i] for i in order[4:]] or teaching[3:]
+            said = {
+                "nothing said": [NOTHING_KNOWN] * len(teaching),
+                "delivery notes": [note(run, span_kg, rng) for run in teaching],
+            }
+            models = {"ten known loads": by_known} | {
+                kind: taught([steady[0], *teaching], [empty(), *each], vehicle) for kind, each in said.items()
+            }
+            for kind, model in models.items():
+                found, why = weighed(tests, model, vehicle)
+                rows[kind] += found
+                refused[kind] += why
+        for kind, found in rows.items():
+            print(row(f"{mixed}: {kind}", found, refused[kind], span_kg), flush=True)
+
+
+def main() -> None:
+    """Print both tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", type=Path, help="folder of recorded campaigns")
+    parser.add_argument("--splits", type=int, default=3, help="random splits of the mixed drives")
+    asked = parser.parse_args()
+    on_known_loads(asked.data)
+    on_ordinary_drives(asked.data, asked.splits)
+
+
+if __name__ == "__main__":
+    main()
