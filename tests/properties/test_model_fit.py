@@ -125,5 +125,9 @@ def test_a_prior_without_precision_changes_nothing() -> None:
 
 
 def test_a_search_that_cannot_reach_what_is_worth_it_is_given_up() -> None:
-    prior, drives = drives_of(3, [2], 2)
-    assert not fit.most_probable(np.full(2, 30.0), prior, drives, worth=-1e6).is_converged
+    prior, drives = drives_of(3, [2], 2, bend=1.0)
+    start = np.full(2, 300.0)
+    assert fit.most_probable(start, prior, drives).is_converged
+    given_up = fit.most_probable(start, prior, drives, worth=-1e6)
+    assert not given_up.is_converged
+    assert given_up.cost > fit.most_probable(start, prior, drives).cost
