@@ -105,18 +105,3 @@ def test_masked_samples_leave_no_trace() -> None:
     one = cross_spectra_of([replace(batch, usable=masked)], READING)
     other = cross_spectra_of([replace(batch, usable=masked, vertical_acceleration_mps2=spoilt)], READING)
     np.testing.assert_array_equal(one.cross, other.cross)
-
-
-def test_the_bound_shrinks_with_the_root_of_time() -> None:
-    from benchmarks.accuracy.sensor_bounds import cramer_rao
-    from gateway.calibration.half_car.fit import calibrate_cross_spectrum
-    from gateway.calibration.known_run import KnownRun
-    from gateway.core.cross_spectrum.predicted import Drive
-
-    run = KnownRun(1, "empty", 0.0, 52.0, (batch_over_road(0.0, 52.0, seed=4),))
-    calibration = calibrate_cross_spectrum([run], VAN)
-    short = cramer_rao(calibration, 200.0, 50.0, Drive(300.0, 14.0))
-    long = cramer_rao(calibration, 200.0, 50.0, Drive(1200.0, 14.0))
-    assert long.payload_std_kg == pytest.approx(short.payload_std_kg / 2.0, rel=0.1)
-    unsure = cramer_rao(calibration, 200.0, 50.0, Drive(300.0, 14.0), {"spring_rear_npm": 0.1})
-    assert unsure.payload_std_kg > short.payload_std_kg
