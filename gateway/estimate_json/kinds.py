@@ -84,12 +84,14 @@ def weights_to_json(weights: Weights) -> dict[str, dict[str, Any]]:
 
 
 def _weight(weight: Weight) -> dict[str, Any]:
+    """One place; whether it is over its limit follows from the number that is shown, which is rounded."""
+    kg, limit_kg = rounded(weight.kg, 7), weight.limit_kg
     return {
-        "kg": rounded(weight.kg, 7),
+        "kg": kg,
         "std_kg": rounded(weight.std_kg, 7),
         "interval95_kg": _interval(weight.interval95_kg),
-        "limit_kg": weight.limit_kg,
-        "is_over_limit": weight.is_over_limit,
+        "limit_kg": limit_kg,
+        "is_over_limit": kg is not None and limit_kg is not None and kg > limit_kg,
         "lacks": None if weight.lacks is None else str(weight.lacks),
         "is_unsprung_estimated": weight.is_unsprung_estimated,
     }

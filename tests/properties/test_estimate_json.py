@@ -170,3 +170,11 @@ def test_what_is_refused_tells_no_number_of_the_load(estimate: Estimate, why: Wh
 def test_no_name_is_given_twice() -> None:
     assert len({one.name for one in FIELDS}) == len(FIELDS)
     assert len(set(COLUMNS)) == len(COLUMNS)
+
+
+def test_a_weight_is_over_its_limit_if_the_number_that_is_shown_is() -> None:
+    """100000.76 kg are shown as 100000.8: a limit of 100000.78 is exceeded by what is shown, and stays so read back."""
+    limited = Estimate(0, 1, "x", weights=Weights(gross=Weight(100_000.76, 1.0, 100_000.78, None)))
+    told = estimate_to_json(limited)
+    assert told["weights"]["gross"]["is_over_limit"]
+    assert json_line(estimate_to_json(read_back(told))) == json_line(told)

@@ -151,5 +151,4 @@ def test_batches_without_an_answer_are_left_out_and_the_rest_keeps_its_place() -
     assert found.run.tolist() == [2]
     assert found.error.tolist() == [10.0]
     assert found.half95.tolist() == [20.0]
-    assert found.notes == ("run 2",)
     assert len(answers_of([Judged(2, "b", 100.0, 50.0, good)], "front_share").run) == 0
