@@ -110,6 +110,10 @@ class _Drive:
         """Of all three sensors as measured."""
         return self._whittle(self.spectra.within(ROLL_BAND_HZ))
 
+    def read(self, reading: Reading) -> CrossSpectra:
+        """The drive's spectra, computed as ``reading`` says."""
+        return grouped(self._segments, reading)
+
     def _whittle(self, spectra: CrossSpectra) -> Whittle:
         return Whittle(spectra, self.ground, EVIDENCE)
 
@@ -155,7 +159,7 @@ class _Drive:
         """
         one = copy(self)
         one.roll = level(theta)[N:]
-        flat = grouped(self._segments, replace(self.spectra.reading, mount=mount_of(theta))).without_roll
+        flat = self.read(replace(self.spectra.reading, mount=mount_of(theta))).without_roll
         if usual_mps is not None:
             flat, one.spectra = (self._stroking(each, theta[:N], usual_mps, load) for each in (flat, self.spectra))
         one.whittle = self._whittle(flat)
@@ -252,8 +256,6 @@ class Prior:
 
     mean: F64
     covariance: F64
-    usual_log_amplitude: float | None = None
-    usual_stroke_mps: tuple[float, float] | None = None
     like: VehicleModel | None = None
 
     @classmethod
@@ -273,7 +275,7 @@ class Prior:
         scatter = np.diag([rows[i].line ** 2 for i in shared])
         mean[shared] = sister.parameters[shared]
         covariance[np.ix_(shared, shared)] = sister.covariance[np.ix_(shared, shared)] + scatter
-        return cls(mean, covariance, sister.usual_log_amplitude, sister.usual_stroke_mps, sister)
+        return cls(mean, covariance, sister)
 
 
 def teach(
@@ -548,7 +550,7 @@ def _fitted(known: Sequence[_Drive], prior: Prior, step: Callable[[], None]) -> 
         found = fit.most_probable(found.common, upright, _at(seen, priors, found.own), FINE)
         return _Fitted(seen, priors, found, None, prior, None)
     of_roll = fit.Gaussian.of(prior.mean[N:], prior.covariance[N:, N:])
-    usual_mps = prior.usual_stroke_mps
+    usual_mps = prior.like.usual_stroke_mps if prior.like else None
     rolling = _roll(seen, found, of_roll, prior.mean[N:])
     for _ in range(TURNS - 1):
         if usual_mps is None:
@@ -639,9 +641,7 @@ def _directions(model: VehicleModel, vehicle: Vehicle, fitted: _Fitted) -> F64:
     shapes = shape_hypotheses(vehicle, *model.known_shape)
     rows = []
     for one in fitted.seen:
-        spectra = replace(one.spectra, reading=model.reading)
-        brought = grouped(one._segments, model.reading)
-        answers = answers_by_vehicle(mixture_of(replace(brought, noise=spectra.noise), model, shapes), model)
+        answers = answers_by_vehicle(mixture_of(one.read(model.reading), model, shapes), model)
         rows.append(answers / SCALES[: len(answers), None])
     values, vectors = np.linalg.eigh(model.covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))

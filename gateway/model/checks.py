@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
+from gateway.core.reach import beyond
 from gateway.core.vehicle import Load
-from gateway.model.reach import beyond
 from gateway.model.spectra import CrossSpectra, why_no_spectra
 from gateway.model.table import INDEX, UPRIGHT
 from gateway.model.vehicle import VehicleModel

@@ -29,7 +29,7 @@ from gateway.calibration.judgement.assessment import judged_left_out
 from gateway.calibration.ratio_index.regression import fit_regression
 from gateway.calibration.ratio_index.table import index_rows
 from gateway.core.cross_spectrum.estimator import MISFIT_ON_OTHER_ROADS, MISFIT_QUANTILE, most_misfit_at
-from gateway.core.cross_spectrum.reach import beyond
+from gateway.core.reach import beyond
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Load
 from gateway.offline.campaigns import calibrate

@@ -12,8 +12,8 @@ from gateway.calibration.inheritance import ModelLimits
 from gateway.core.cross_spectrum.calibration import SCORE, CrossSpectrumCalibration
 from gateway.core.cross_spectrum.drift import MOST_TENSION
 from gateway.core.cross_spectrum.estimator import MISFIT_ON_OTHER_ROADS, MISFIT_QUANTILE, weigh
-from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.late import special
+from gateway.core.reach import beyond
 from gateway.posterior import Posterior, Source
 from gateway.quantity import Z95
 from gateway.records import F64, Why

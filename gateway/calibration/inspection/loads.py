@@ -22,8 +22,8 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.cross_spectrum.likelihood import Point
 from gateway.core.cross_spectrum.located import locate
 from gateway.core.cross_spectrum.model.parameters import PARAMETERS
-from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.search import Found
+from gateway.core.reach import beyond
 from gateway.core.vehicle import Load, Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64

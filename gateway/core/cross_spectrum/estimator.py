@@ -22,7 +22,6 @@ from gateway.core.cross_spectrum.lateral import with_roll_share
 from gateway.core.cross_spectrum.located import Located, locate
 from gateway.core.cross_spectrum.measured import CrossSpectra, cross_spectra_of, why_no_spectra
 from gateway.core.cross_spectrum.model.parameters import INDEX
-from gateway.core.cross_spectrum.reach import beyond
 from gateway.core.cross_spectrum.sensor_change import (
     MOST_GRAVITY_CHANGE_MPS2,
     gain_of,
@@ -32,6 +31,7 @@ from gateway.core.cross_spectrum.sensor_change import (
     is_gyro_turned,
     off_calibration,
 )
+from gateway.core.reach import beyond
 from gateway.estimate import Estimate
 from gateway.posterior import PAYLOAD, Posterior, Source
 from gateway.records import F64, Batch, Why
