@@ -18,6 +18,7 @@ from gateway.cli import options
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
 from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Vehicle
 from gateway.errors import ConfigurationError, NothingWeighedError
 from gateway.estimate import Estimate
 from gateway.estimate_json import COLUMNS, estimate_to_json, table_row
@@ -66,19 +67,23 @@ def estimate(
     if not no_known_weights:
         setup = with_known_weights(setup, known_weights, state)
     lines = partial(_csv, has_logs=len(logs) > 1) if as_csv else _json_lines if as_json else _sentences
-    reasons = Counter[Why | None]()
+    reasons, unlike = Counter[Why | None](), Counter[Why]()
 
     def found() -> Found:
         for log in logs:
             for weighed in with_remainders([log], setup, settings, on_read=_tell):
                 reasons.update(weighed.rejected or [None])
+                if setup.calibration is not None and _is_at_seen_speed(weighed, setup.calibration):
+                    unlike.update(UNLIKE.intersection(weighed.rejected))
                 if not weighed.is_remainder:
                     yield log if len(logs) > 1 else None, weighed
 
     for line in lines(found()):
         click.echo(line)
     if setup.calibration is not None and not reasons.pop(None, 0):
-        raise NothingWeighedError("\n".join([_in_words(reasons), *_other_vehicle(reasons, setup.calibration)]))
+        is_unlike = 2 * unlike.total() > reasons.total()
+        other = [_other_vehicle(setup.calibration.vehicle)] if is_unlike else []
+        raise NothingWeighedError("\n".join([_in_words(reasons), *other]))
 
 
 Found = Iterable[tuple[Path | None, Estimate]]  # the log, if there are several
@@ -95,19 +100,23 @@ def _in_words(reasons: Counter[Why | None]) -> str:
 
 
 UNLIKE: Final = frozenset({Why.MODEL_MISFIT, Why.NO_SOLUTION, Why.AMBIGUOUS, Why.OUT_OF_RANGE, Why.SENSOR_CHANGED})
-"""Reasons that the calibration of another vehicle gives for a drive."""
+"""Reasons that the calibration of another vehicle gives for a drive at the speeds that it has seen."""
+
+NEW_SPEED: Final = 0.2  # chosen: relative, beyond the speeds of calibration; there the right vehicle is refused too
 
 
-def _other_vehicle(reasons: Counter[Why | None], calibration: CalibrationFile) -> Iterator[str]:
+def _is_at_seen_speed(weighed: Estimate, calibration: CalibrationFile) -> bool:
+    slowest_mps, fastest_mps = calibration.seen.speed_mps
+    return slowest_mps / (1.0 + NEW_SPEED) <= weighed.mean_speed_mps <= fastest_mps * (1.0 + NEW_SPEED)
+
+
+def _other_vehicle(vehicle: Vehicle) -> str:
     """The likely cause, if most batches look like another vehicle's."""
-    n_unlike = sum(n for why, n in reasons.items() if why in UNLIKE)
-    if 2 * n_unlike > reasons.total():
-        vehicle = calibration.vehicle
-        yield (
-            f"  The likely cause: this is not the log of the vehicle that was calibrated, {vehicle.name} (wheelbase "
-            f"{vehicle.wheelbase_m:g} m, {vehicle.empty_mass_kg:.0f} kg sprung), or its springs, tyres or sensor were "
-            "changed since."
-        )
+    return (
+        f"  The likely cause: this is not the log of the vehicle that was calibrated, {vehicle.name} (wheelbase "
+        f"{vehicle.wheelbase_m:g} m, {vehicle.empty_mass_kg:.0f} kg sprung), or its springs, tyres or sensor were "
+        "changed since."
+    )
 
 
 def _sentences(found: Found) -> Iterator[str]:

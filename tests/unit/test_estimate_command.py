@@ -72,6 +72,14 @@ def test_what_the_road_or_a_sensor_did_is_not_laid_on_the_calibration(
     assert "likely cause" not in str(said(monkeypatch, log, *slow[1:]))  # a half is not most
 
 
+def test_a_speed_that_calibration_never_saw_is_not_laid_on_the_vehicle(
+    monkeypatch: pytest.MonkeyPatch, log: Path
+) -> None:
+    fast = [replace(make_estimate(n, Why.MODEL_MISFIT), mean_speed_mps=30.0) for n in range(3)]
+    assert "likely cause" not in str(said(monkeypatch, log, *fast))
+    assert "likely cause" in str(said(monkeypatch, log, *(replace(one, mean_speed_mps=14.0) for one in fast)))
+
+
 def test_one_batch_that_was_weighed_is_enough(monkeypatch: pytest.MonkeyPatch, log: Path) -> None:
     answer = make_estimate(1).answered(posterior_of(270.0, 48.0, 6.0, 0.2))
     assert said(monkeypatch, log, make_estimate(0, Why.MODEL_MISFIT), answer) is None

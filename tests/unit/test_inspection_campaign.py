@@ -8,7 +8,7 @@ from support.known_runs import LOADS, campaign, known_run
 
 from gateway.calibration.inspection.campaign import Inspection, inspect_campaign, load_findings
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
-from gateway.calibration.inspection.loads import _Labelled, compare_loads
+from gateway.calibration.inspection.loads import _Compared, compare_loads
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.known_run import KnownRun
@@ -67,12 +67,13 @@ def test_two_exchanged_labels_are_found_whichever_they_are(i: int, j: int, runs:
 def test_after_one_exchanged_pair_the_others_are_asked_again(
     runs: list[KnownRun], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def next_pair(labelled: _Labelled) -> tuple[int, int, float] | None:
-        numbers = [known.run.number for known in labelled.known]
+    def next_pair(compared: _Compared) -> dict[int, Finding] | None:
+        numbers = [known.run.number for known in compared.known]
         told = [pair for pair in ((1, 3), (2, 4)) if set(pair) <= set(numbers)]
-        return (numbers.index(told[0][0]), numbers.index(told[0][1]), 99.0) if told else None
+        text = "runs {} and {}".format(*told[0]) if told else ""
+        return {numbers.index(one): Finding.of(Kind.LOADS_SWAPPED, text) for one in told[0]} if told else None
 
-    monkeypatch.setattr(_Labelled, "swapped_pair", next_pair)
+    monkeypatch.setattr(_Compared, "swapped", next_pair)
     findings = list(compare_loads([*runs, known_run(5, 100.0, 1.4, seed=7)], VAN))
     assert [number for number, _ in findings] == [1, 3, 2, 4]
     assert "runs 2 and 4" in findings[-1][1].text

@@ -11,12 +11,16 @@ import pytest
 from support.bus_drive import bus_drive
 from support.commands import called, printed
 from support.encoded import encode_signals
+from support.half_car_road import VAN
 
 from gateway.bus.frames import merge_frames, message_of
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import load_signal_map
-from gateway.calibration.inspection.finding import Severity
-from gateway.calibration.inspection.rows import rate_findings, row_facts
+from gateway.calibration.inspection.finding import Kind, Severity
+from gateway.calibration.inspection.log import LogFacts, SplitRun
+from gateway.calibration.inspection.rows import row_facts
+from gateway.calibration.inspection.run import inspect_run
+from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.offline.campaigns import _silent, read_whole_log
@@ -307,8 +311,9 @@ def test_a_silent_sensor_says_why(alter: Alter, words: str, tmp_path: Path) -> N
     motion, _ = read_whole_log(log, REFERENCE)
     why = _silent(log, motion, REFERENCE)
     assert why == dict.fromkeys(silent, words)
-    facts = row_facts(motion, REFERENCE.traits)
-    pitch, roll = rate_findings(facts, BatchSettings(), why)
+    nothing = KnownRun(1, "drive.log", 0.0, 50.0, ())
+    split = SplitRun(nothing, nothing, row_facts(motion, REFERENCE.traits), log=LogFacts(silent=why))
+    pitch, roll = inspect_run(split, VAN, BatchSettings(), (Kind.SENSOR_SILENT,)).findings
     assert pitch.text == f"pitch_rate has 0 samples in the whole run: {words}"
     assert (pitch.severity, roll.severity) == (Severity.FAULT, Severity.WARNING)
     assert roll.text == f"roll_rate has 0 samples in the whole run: {words}"

@@ -2,19 +2,22 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
+from math import isfinite
 from typing import Final
 
 import numpy as np
 
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.loads import compare_loads
-from gateway.calibration.inspection.log import SplitRun, same_drive_findings
-from gateway.calibration.inspection.roll import offset_findings, roll_sign_of
+from gateway.calibration.inspection.log import SplitRun
+from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.calibrated import is_other_rate
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
+from gateway.quantity import Z95
 
 SPEED_DIFFERS_BY: Final = 0.2  # chosen: of the median run's speed
 BEYOND_RANGE_BY: Final = 0.25  # chosen: of the range
@@ -22,6 +25,10 @@ SMOOTHER_BY: Final = 4.0  # chosen: factor of the vertical acceleration
 ALIKE_SHARE: Final = 0.05  # of the empty mass: the scatter of the ratio index over five minutes
 SHARES_ALIKE_PCT: Final = 1.0  # chosen: twice the default error of the empty share
 TOGETHER: Final = 0.97  # chosen: correlation above which payload and share cannot be separated
+HARDLY_KNOWN_M: Final = 0.1  # chosen: standard deviation; a tape gives 0.02
+
+OfRun = Iterator[tuple[int, Finding]]
+"""Findings with the number of the run that each is about."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,44 +84,53 @@ def inspect_campaign(
 ) -> tuple[tuple[RunVerdict, ...], tuple[Finding, ...]]:
     """A verdict for every run in the order given, and the findings about the campaign as a whole."""
     verdicts = {one.identification.number: inspect_run(one, vehicle, settings) for one in drives}
-    for number, finding in (*same_drive_findings(drives), *_beyond_range(drives, vehicle), *_beside_the_others(drives)):
-        verdicts[number] = _with(verdicts[number], finding)
-    sound = [
-        one.identification for one in drives if one.has_identification and verdicts[one.identification.number].is_usable
-    ]
-    for number, finding in compare_loads(sound, vehicle):
-        verdicts[number] = _with(verdicts[number], finding)
-    usable = [run for run in sound if verdicts[run.number].is_usable]
-    roll_sign = roll_sign_of(usable, vehicle)
+
+    def usable() -> list[KnownRun]:
+        runs = [one.identification for one in drives if one.has_identification]
+        return [run for run in runs if verdicts[run.number].is_usable]
+
+    def tell(found: OfRun) -> None:
+        for number, finding in found:
+            verdicts[number] = replace(verdicts[number], findings=(*verdicts[number].findings, finding))
+
+    for check in (_same_drive, _beyond_range, _beside_the_others):
+        tell(check(drives, vehicle))
+    tell(compare_loads(usable(), vehicle))
+    roll_sign = roll_sign_of(usable(), vehicle)
     if roll_sign is not None and roll_sign.sign < 0:
-        for run in usable:
-            verdicts[run.number] = _with(verdicts[run.number], Finding.of(Kind.ROLL_RATE_SIGN, roll_sign.why))
-    findings = list(load_findings(usable, vehicle))
+        tell((run.number, Finding.of(Kind.ROLL_RATE_SIGN, roll_sign.why)) for run in usable())
+    findings = list(load_findings(usable(), vehicle))
     if roll_sign is not None and roll_sign.sign == 0:
         findings.append(Finding.of(Kind.ROLL_RATE_SIGN_UNTOLD, roll_sign.why))
     return tuple(verdicts.values()), tuple(findings)
 
 
 def inspect_drives(
-    drives: Sequence[SplitRun],
-    vehicle: Vehicle,
-    settings: BatchSettings,
-    *,
-    has_roll_rate: bool,
+    drives: Sequence[SplitRun], vehicle: Vehicle, settings: BatchSettings, *, has_roll_rate: bool
 ) -> Inspection:
     """The same, with findings about missing data for lateral places."""
-    verdicts, findings = inspect_campaign(drives, vehicle, settings)
-    unmapped = (
-        () if has_roll_rate else (Finding.of(Kind.ROLL_RATE_UNMAPPED, "springscale look shows what a log holds"),)
-    )
-    return Inspection(tuple(drives), verdicts, (*findings, *unmapped, *offset_findings(vehicle)))
+    verdicts, found = inspect_campaign(drives, vehicle, settings)
+    findings = list(found)
+    if not has_roll_rate:
+        findings.append(Finding.of(Kind.ROLL_RATE_UNMAPPED, "springscale look shows what a log holds"))
+    if (std_m := vehicle.sensor_left_std_m) > HARDLY_KNOWN_M:
+        text = f"sensor_offset_left_m is {vehicle.sensor_left_m:g} ± {Z95 * std_m:.2g} m (95 %)"
+        findings.append(Finding.of(Kind.SENSOR_OFFSET_UNKNOWN, text))
+    return Inspection(tuple(drives), verdicts, tuple(findings))
 
 
-def _with(verdict: RunVerdict, finding: Finding) -> RunVerdict:
-    return replace(verdict, findings=(*verdict.findings, finding))
+def _same_drive(drives: Sequence[SplitRun], vehicle: Vehicle) -> OfRun:
+    """Runs that are the same piece of the same log: all but the first; all of them if loads differ."""
+    for one, other in combinations(drives, 2):
+        if one.log.is_of_same_drive(other.log):
+            numbers = (one.identification.number, other.identification.number)
+            is_same_load = one.run.load == other.run.load
+            text = f"runs {numbers[0]} and {numbers[1]} are the same drive"
+            for number in numbers[1:] if is_same_load else numbers:
+                yield number, Finding.of(Kind.SAME_DRIVE, text if is_same_load else f"{text} with two different loads")
 
 
-def _beyond_range(drives: Sequence[SplitRun], vehicle: Vehicle) -> Iterator[tuple[int, Finding]]:
+def _beyond_range(drives: Sequence[SplitRun], vehicle: Vehicle) -> OfRun:
     low_kg, high_kg = vehicle.payload_range_kg
     for one in drives:
         payload_kg = one.identification.payload_kg
@@ -123,19 +139,23 @@ def _beyond_range(drives: Sequence[SplitRun], vehicle: Vehicle) -> Iterator[tupl
             yield one.identification.number, Finding.of(Kind.LOAD_BEYOND_RANGE, text)
 
 
-def _beside_the_others(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Finding]]:
+def _beside_the_others(drives: Sequence[SplitRun], vehicle: Vehicle) -> OfRun:
     """Runs at another speed, on a far smoother road, or sampled at another rate than the median run."""
     counted = [(one.identification.number, [b for b in one.batches if not b.rejected]) for one in drives]
-    runs = [(number, batches) for number, batches in counted if batches]
-    if len(runs) < 3:
-        return
-    speeds_mps = [float(np.mean([b.mean_speed_mps for b in batches])) for _, batches in runs]
-    shaking_mps2 = [
-        float(np.mean([np.std(b.vertical_acceleration_mps2[b.usable]) for b in batches])) for _, batches in runs
+    rows = [
+        (
+            number,
+            float(np.mean([b.mean_speed_mps for b in batches])),
+            float(np.mean([np.std(b.vertical_acceleration_mps2[b.usable]) for b in batches])),
+            float(np.median([b.sensor_rate_hz for b in batches])),
+        )
+        for number, batches in counted
+        if batches
     ]
-    rates_hz = [float(np.median([b.sensor_rate_hz for b in batches])) for _, batches in runs]
-    usual_mps, usual_mps2, usual_hz = (float(np.median(of_runs)) for of_runs in (speeds_mps, shaking_mps2, rates_hz))
-    for (number, _), speed_mps, shakes_mps2, rate_hz in zip(runs, speeds_mps, shaking_mps2, rates_hz, strict=True):
+    if len(rows) < 3:
+        return
+    _, usual_mps, usual_mps2, usual_hz = np.median(np.array(rows), axis=0).tolist()
+    for number, speed_mps, shakes_mps2, rate_hz in rows:
         if is_other_rate(rate_hz, usual_hz, usual_hz):
             text = f"the sensors send {rate_hz:.3g} times a second, those of the median run {usual_hz:.3g} times"
             yield number, Finding.of(Kind.RATE_DIFFERS, text)
@@ -149,18 +169,19 @@ def _beside_the_others(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Findin
 
 def load_findings(runs: Sequence[KnownRun], vehicle: Vehicle) -> Iterator[Finding]:
     """Whether these loads and positions separate payload from front share, and both from chance."""
-    if not runs:
+    known = [run for run in runs if isfinite(run.payload_kg) and isfinite(run.front_share_pct)]
+    if not known:
         return
-    loads = sorted({(run.payload_kg, round(run.front_share_pct, 2)) for run in runs})
+    loads = sorted({(run.payload_kg, round(run.front_share_pct, 2)) for run in known})
     payload_kg, share_pct = (np.array(column) for column in zip(*loads, strict=True))
     if np.ptp(payload_kg) == 0.0:
-        yield Finding.of(Kind.ONE_LOAD_ONLY, f"{payload_kg[0]:g} kg in every run that can be used")
+        if len(known) == len(runs):
+            yield Finding.of(Kind.ONE_LOAD_ONLY, f"{payload_kg[0]:g} kg in every run that can be used")
         return
     if np.ptp(payload_kg) < ALIKE_SHARE * vehicle.empty_mass_kg:
         text = f"{payload_kg.min():g} to {payload_kg.max():g} kg on a vehicle of {vehicle.empty_mass_kg:g} kg"
         yield Finding.of(Kind.LOADS_ALIKE, text)
     if np.ptp(share_pct) < SHARES_ALIKE_PCT:
-        text = f"{share_pct.min():.1f} to {share_pct.max():.1f} %"
-        yield Finding.of(Kind.SHARES_ALIKE, text)
+        yield Finding.of(Kind.SHARES_ALIKE, f"{share_pct.min():.1f} to {share_pct.max():.1f} %")
     elif len(loads) >= 3 and abs(correlation := float(np.corrcoef(payload_kg, share_pct)[0, 1])) > TOGETHER:
         yield Finding.of(Kind.LOAD_AND_SHARE_TOGETHER, f"their correlation is {correlation:.2f}")

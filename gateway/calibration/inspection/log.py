@@ -1,10 +1,8 @@
-"""A drive as it is inspected, and findings about its log: is it readable, and is it used for this drive only?"""
+"""A drive as it is inspected: its two parts, and what reading its log showed."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import combinations
 
-from gateway.calibration.inspection.finding import Finding, Kind
 from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.known_run import KnownRun
 from gateway.records import Batch, Signal
@@ -27,16 +25,11 @@ class LogFacts:
     damage: str | None = None
     silent: Mapping[Signal, str] = field(default_factory=dict)
 
-
-def log_findings(facts: LogFacts) -> Iterator[Finding]:
-    """At most one fault: no log, or no piece of it; or a warning that some of it was lost."""
-    if facts.unreadable is not None:
-        yield Finding.of(Kind.LOG_UNREADABLE, facts.unreadable)
-    elif facts.span_ns is None:
-        text = f"the log lasts {facts.duration_s:.0f} s, and the run begins at {facts.start_s:g} s"
-        yield Finding.of(Kind.CUT_AWAY, text)
-    elif facts.damage is not None:
-        yield Finding.of(Kind.LOG_DAMAGED, facts.damage)
+    def is_of_same_drive(self, other: "LogFacts") -> bool:
+        """Whether both are of one log and their pieces of it overlap."""
+        if not self.sha256 or self.sha256 != other.sha256 or self.span_ns is None or other.span_ns is None:
+            return False
+        return self.span_ns[0] < other.span_ns[1] and other.span_ns[0] < self.span_ns[1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,26 +50,9 @@ class SplitRun:
     @property
     def batches(self) -> tuple[Batch, ...]:
         """Those to inspect."""
-        return (self.identification if self.has_identification else self.validation).batches
+        return self.run.batches
 
     @property
     def run(self) -> KnownRun:
         """The part to inspect."""
         return self.identification if self.has_identification else self.validation
-
-
-def same_drive_findings(drives: Sequence[SplitRun]) -> Iterator[tuple[int, Finding]]:
-    """Runs, by number, that are the same piece of the same log: all but the first; all of them if loads differ."""
-    for one, other in combinations(drives, 2):
-        if _is_same_drive(one.log, other.log):
-            numbers = (one.identification.number, other.identification.number)
-            is_same_load = one.run.load == other.run.load
-            text = f"runs {numbers[0]} and {numbers[1]} are the same drive"
-            for number in numbers[1:] if is_same_load else numbers:
-                yield number, Finding.of(Kind.SAME_DRIVE, text if is_same_load else f"{text} with two different loads")
-
-
-def _is_same_drive(one: LogFacts, other: LogFacts) -> bool:
-    if not one.sha256 or one.sha256 != other.sha256 or one.span_ns is None or other.span_ns is None:
-        return False
-    return one.span_ns[0] < other.span_ns[1] and other.span_ns[0] < one.span_ns[1]
