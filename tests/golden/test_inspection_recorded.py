@@ -53,6 +53,12 @@ def test_a_real_car_raises_neither_fault_nor_warning(trip: str) -> None:
         assert [one for one in found if not one.startswith("note:")] == []
 
 
+def test_no_run_of_a_short_vehicle_with_solid_axles_is_refused() -> None:
+    """Its body rolls little beside the pitch, less than a wrong axis moves in other vehicles."""
+    found = findings("solid_axles/known_loads/campaign_roll.toml")
+    assert {one for each in found.values() for one in each} <= {"warning:speed_missing"}
+
+
 @pytest.mark.parametrize(
     ("folder", "campaign", "log", "old", "new", "expected"),
     [
@@ -82,6 +88,7 @@ def test_a_spoiled_signal_map_is_named(
         ("known_loads", "campaign_roll", 7, "RollRate", "PitchRate", ["rates_swapped"]),
         ("known_loads", "campaign_roll", 7, "PitchRate", "PitchRate", ["roll_rate_axis"]),
         ("known_loads", "campaign_roll", 7, "PitchRate", "YawRate", ["roll_rate_axis"]),
+        ("solid_axles/known_loads", "campaign_roll", 10, "PitchRate", "YawRate", ["roll_rate_axis"]),
         ("real_drive", "campaign_trip_a", 1, "AngularRateZ", "AngularRateY", []),
         ("real_drive", "campaign_trip_a", 1, "AngularRateY", "AngularRateZ", ["rates_swapped"]),
         ("real_drive", "campaign_trip_a", 1, "AngularRateZ", "AngularRateX", ["roll_rate_axis"]),
@@ -92,7 +99,7 @@ def test_a_roll_rate_at_the_wrong_place_is_named(
 ) -> None:
     source = recordings() / folder
     text = (source / "signals_roll.toml").read_text(encoding="utf-8")
-    of_pitch, of_roll = ("PitchRate", "RollRate") if folder == "known_loads" else ("AngularRateZ", "AngularRateY")
+    of_pitch, of_roll = ("AngularRateZ", "AngularRateY") if folder == "real_drive" else ("PitchRate", "RollRate")
     assert f'"{of_pitch}"' in text
     assert f'"{of_roll}"' in text
     head, tail = text.split("[signals.roll_rate]")

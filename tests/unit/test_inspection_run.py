@@ -29,8 +29,9 @@ from gateway.calibration.inspection.log import LogFacts, SplitRun
 from gateway.calibration.inspection.rows import RowFacts, gravity_in, row_facts
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
+from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
-from gateway.records import Motion, Signal
+from gateway.records import Motion, Signal, Why
 from gateway.sim.drive import Drive, constant, urban
 from gateway.sim.vans import PAPER_VAN, VANS
 from gateway.sim.vehicle import Load
@@ -290,6 +291,20 @@ def test_a_signal_that_is_not_mapped_is_named(kept: tuple[int, ...], said: list[
 def test_lost_frames_are_a_warning() -> None:
     motion = without_rows(drive(130.0), 30.0, 36.0)
     assert "warning:gaps" in kinds(verdict_on(motion, stated(PAPER_VAN, 3.2), TRAITS))
+
+
+def test_a_drive_that_is_kept_for_validation_has_lost_nothing_that_it_has() -> None:
+    settings = BatchSettings(window_s=120.0)
+    motion = driven(PAPER_VAN, steady(), REAR_M)
+    scheduler = Scheduler(settings, TRAITS)
+    batches = tuple(
+        replace(one, shares={Why.TOO_SLOW: 0.45, Why.SPEED_MISSING: 0.3})
+        for one in (*scheduler.feed(motion), *scheduler.flush())
+    )
+    assert not all(one.rejected for one in batches)
+    nothing = KnownRun(1, "a.log", 0.0, 50.0, ())
+    kept = SplitRun(nothing, replace(nothing, batches=batches), has_identification=False)
+    assert inspect_run(kept, EMPTY, settings).is_usable
 
 
 SOUND = LogFacts("a" * 64, 900.0, 0.0, (0, 900))

@@ -2,6 +2,7 @@
 
 Drives cut in two come in (``SplitRun``: batches, facts of the rows and of the log); an ``Inspection`` goes out: a
 verdict with findings for every run, findings about all runs together, and the reason if no calibration is possible.
-Logs, rows, axes and signs, and loads are checked in this order; a fault excludes its run from the calibration.
-The table of kinds (``finding``) has the words and the advice for each; docs/findings.md is made from it.
+The checks of one run are a table (``run``) of looks at its log, its rows and its cross-spectra; those of all runs
+together are in ``campaign``. A fault excludes its run from the calibration. The table of kinds (``finding``) has the
+advice for each; docs/findings.md says what it means, too.
 """
