@@ -1,6 +1,6 @@
 """The half-car that explains drives best if every load is what was stated of it; the load of some may be left free.
 
-No drive deviates from its vehicle here, so a fit takes a second: it compares statements, and calibrates nothing.
+A fit takes a second: it compares statements, and calibrates nothing.
 """
 
 from collections.abc import Collection, Sequence
@@ -16,43 +16,67 @@ from gateway.core.vehicle import Load, Vehicle
 from gateway.model import fit
 from gateway.model.car import Ground
 from gateway.model.spectra import CrossSpectra, Reading, grouped, segments_of
-from gateway.model.table import N
+from gateway.model.table import OWN, UPRIGHT, N, covariance_of
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64
 
 TOLERANCE: Final = 0.1  # chosen: in log posterior
-FREE: Final = fit.Gaussian(np.zeros(2), np.zeros((2, 2)))
-"""The prior of a free load: none."""
+K: Final = len(OWN)
+_OWN: Final = list(OWN)
+_DEVIATES: Final = np.linalg.inv(covariance_of([UPRIGHT[i] for i in OWN], "day", "load", "batch"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StatedRun:
-    """The likelihood of one drive, by the vehicle (N,) and, if free, by payload (kg) and front share (0..1)."""
+    """The likelihood of one drive, by the vehicle (N,) and by what is the drive's own: the deviations (K,) from that
+    vehicle, then payload (kg) and front share (0..1); each may be left out.
+    """
 
     run: KnownRun
     load: Load
     whittle: Whittle
 
-    def point(self, theta: F64, own: F64) -> Point:
-        """The vehicle with the free load, or with the stated one."""
-        return Point(theta, float(own[0]), float(own[1])) if len(own) else Point.of(theta, self.load)
+    def theta(self, common: F64, own: F64) -> F64:
+        """(N,) the vehicle of this drive."""
+        theta = common.copy()
+        if len(own) >= K:
+            theta[_OWN] += own[:K]
+        return theta
+
+    def point(self, common: F64, own: F64) -> Point:
+        """The vehicle of this drive with its own load, or with the stated one."""
+        load = own[K:] if len(own) >= K else own
+        theta = self.theta(common, own)
+        return Point(theta, float(load[0]), float(load[1])) if len(load) else Point.of(theta, self.load)
 
     def cost(self, common: F64, own: F64) -> float:
         """See gateway.model.fit."""
-        if len(own) and not (
-            abs(own[0]) < MOST_LOAD_SHARE * self.whittle.ground.empty_mass_kg and 0.05 < own[1] < 0.95
-        ):
-            return np.inf
-        return self.whittle.cost(self.point(common, own))
+        point = self.point(common, own)
+        most_kg = MOST_LOAD_SHARE * self.whittle.ground.empty_mass_kg
+        return (
+            self.whittle.cost(point) if abs(point.payload_kg) < most_kg and 0.05 < point.front_share < 0.95 else np.inf
+        )
 
     def curvature(self, common: F64, own: F64) -> tuple[F64, F64]:
         """See gateway.model.fit."""
-        found = self.whittle.curvature(self.point(common, own), range(N + len(own)))
-        return found.gradient, found.information
+        n_load = len(own) - K if len(own) >= K else len(own)
+        chosen = [*range(N), *(OWN if len(own) >= K else ()), *range(N, N + n_load)]
+        found = self.whittle.curvature(self.point(common, own), range(N + n_load))
+        return found.gradient[chosen], found.information[np.ix_(chosen, chosen)]
 
     def saying(self, load: Load) -> "StatedRun":
         """The same drive with another statement."""
         return replace(self, load=load)
+
+    def own(self, *, deviates: bool, is_free: bool) -> fit.Drive:
+        """The drive in a fit, with what is its own."""
+        n = K * deviates + 2 * is_free
+        precision, start = np.zeros((n, n)), np.zeros(n)
+        if deviates:
+            precision[:K, :K] = _DEVIATES
+        if is_free:
+            start[-2:] = self.load.payload_kg, self.load.front_share
+        return fit.Drive(self, fit.Gaussian(np.zeros(n), precision), start)
 
 
 def stated_load(run: KnownRun, vehicle: Vehicle) -> Load:
@@ -81,12 +105,11 @@ def stated_runs(runs: Sequence[KnownRun], vehicle: Vehicle, reading: Reading | N
     return [stated_run(run, grouped(segments, first), vehicle) for run, segments in known]
 
 
-def fitted(runs: Sequence[StatedRun], prior: fit.Gaussian, start: F64, free: Collection[int] = ()) -> fit.Found:
-    """The most probable vehicle (N,) from ``start``, the loads of the runs ``free`` (by place) being unknown."""
-    drives = [
-        fit.Drive(one, FREE, np.array([one.load.payload_kg, one.load.front_share]))
-        if i in free
-        else fit.Drive(one, fit.NOTHING, fit.NOTHING.mean)
-        for i, one in enumerate(runs)
-    ]
+def fitted(
+    runs: Sequence[StatedRun], prior: fit.Gaussian, start: F64, free: Collection[int] = (), *, deviates: bool = False
+) -> fit.Found:
+    """The most probable vehicle (N,) from ``start``, the loads of the runs ``free`` (by place) being unknown.
+    ``deviates``: each drive's vehicle differs from it as the table of parameters says.
+    """
+    drives = [one.own(deviates=deviates, is_free=i in free) for i, one in enumerate(runs)]
     return fit.most_probable(start, prior, drives, TOLERANCE)

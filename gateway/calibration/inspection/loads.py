@@ -1,9 +1,9 @@
 """Are the loads of a campaign those that were driven? Each statement is compared with what the other runs say.
 
 A half-car is fitted to all runs as stated. Two runs are called swapped only if exchanging their loads explains all runs
-far better; a single run is doubted if all runs are explained far better with its load free, and the vehicle of the
-others finds another load. Evidence is the natural logarithm of the factor by which the drives become more probable, at
-the calibration's own small weight of evidence.
+far better. A single run is doubted if all runs are explained far better with its load free, the vehicle of the others
+finds another load, and no deviation that a drive may have from its vehicle explains that. Evidence is the natural
+logarithm of the factor by which the drives become more probable, at the calibration's own small weight of evidence.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,7 +22,7 @@ from gateway.model.table import UPRIGHT, N, prior_of
 from gateway.model.whittle import Point
 from gateway.records import F64
 
-SUSPICIOUS: Final = 5.0  # chosen: evidence against some statement, below which nothing is compared any further
+SUSPICIOUS: Final = 5.0  # chosen: evidence against a statement, below which nothing is compared any further
 LEAST_EVIDENCE: Final = 20.0  # chosen: of a swap, e^20
 PAIRS_TRIED: Final = 4  # chosen: the likeliest pairs; each costs a fit
 FEW_RUNS: Final = 4  # chosen: so few runs can bend the fit to wrong statements, so all pairs are tried
@@ -82,7 +82,7 @@ class _Compared:
         """
         if max(self._evidence) < SUSPICIOUS:
             return None
-        tried = {pair: self._found.cost - fitted(self._exchanged(*pair), self._prior, self._found.common).cost
+        tried = {pair: self._found.cost - self._fitted(self._exchanged(*pair)).cost
                  for pair in self._likely_pairs()}  # fmt: skip
         for (i, j), evidence in sorted(tried.items(), key=lambda one: -one[1]):
             if evidence > LEAST_EVIDENCE and (said := self._confirmed(i, j)) is not None:
@@ -121,9 +121,12 @@ class _Compared:
 
     def _weighed(self, i: int, runs: Sequence[StatedRun], free: Sequence[int]) -> tuple[Load, F64]:
         """Run i by the vehicle of the runs that are not ``free``, with the deviations (2,) of payload and share."""
-        found = fitted(runs, self._prior, self._found.common, free)
+        found = self._fitted(runs, free)
         payload_kg, share = found.own[i].tolist()
         return Load(payload_kg, 100.0 * share), np.sqrt(np.diag(found.own_covariances[i]))
+
+    def _fitted(self, runs: Sequence[StatedRun], free: Sequence[int] = (), *, deviates: bool = False) -> fit.Found:
+        return fitted(runs, self._prior, self._found.common, free, deviates=deviates)
 
     def doubted(self) -> dict[int, Finding] | None:
         """The run whose statement the others contradict most, if they contradict one."""
@@ -137,10 +140,16 @@ class _Compared:
             weighed, std = self._weighed(i, runs, (i,))
             off = np.abs(np.array([weighed.payload_kg - stated.payload_kg, weighed.front_share - stated.front_share]))
             allowed = np.array([DOUBT_PAYLOAD_SHARE * self.vehicle.empty_mass_kg, DOUBT_FRONT_SHARE])
-            if np.any((off > allowed) & (off > DOUBT_STDS * std)):
+            is_off = np.any((off > allowed) & (off > DOUBT_STDS * std))
+            if is_off and self._is_beyond_a_day(i, runs):
                 text = f"the other runs weigh this one at {_load(weighed)}, but the file states {_load(stated)}"
                 return {i: Finding.of(Kind.LOAD_DISAGREES, text)}
         return None
+
+    def _is_beyond_a_day(self, i: int, runs: Sequence[StatedRun]) -> bool:
+        """Whether the doubt stays if every drive's vehicle deviates as vehicles do from day to day and load to load."""
+        as_stated = self._fitted(self.known, deviates=True)
+        return as_stated.cost - self._fitted(runs, (i,), deviates=True).cost > SUSPICIOUS
 
 
 def _load(load: Load) -> str:

@@ -33,7 +33,7 @@ BY_CG: Final = 1.7  # b, the middle of the measured 0.6 to 2.7 (above)
 BY_CG_STD: Final = 0.5  # a quarter of the measured range
 LEVER_STD_M: Final = 0.05  # the measured scatter from run to run (above)
 LEVER_SHARE: Final = 0.25  # half the measured spread of the lever arm over the sensor's place (above)
-LEAST_SCORE: Final = 4.0  # chosen: root of the difference of chi-squared between the two signs
+LEAST_SCORE: Final = 5.0  # chosen: root of the difference of chi-squared between the two signs, e^12.5 in odds
 SELDOM: Final = 1e-3  # chosen: probability of doubting what is stated
 _EXCHANGED: Final = [0, 2, 1, 5, 6, 3, 4, 7, 8]  # parts of spectra; the conjugate of the last is not needed
 
@@ -93,11 +93,11 @@ def roll_sign_of(runs: Sequence[KnownRun], vehicle: Vehicle) -> RollSign | None:
         float(off @ np.linalg.solve(covariance, off)) for off in (seen_m - expected_m, seen_m + expected_m)
     )
     places = f"sensor_offset_left_m = {sensor_m:g} and payload_left_m"
+    if min(right, inverted) > special.chdtri(len(rows), SELDOM):
+        return RollSign(0, f"acceleration and roll rate fit {places} with neither sign: one of them is stated wrong")
     if abs(inverted - right) < LEAST_SCORE**2:
         sits = f"the sensor sits {sensor_m:g} ± {Z95 * vehicle.sensor_left_std_m:.2g} m left of the centre line"
         return RollSign(0, f"{sits}, and no load is known to be far enough to one side")
-    if min(right, inverted) > special.chdtri(len(rows), SELDOM):
-        return RollSign(0, f"acceleration and roll rate fit {places} with neither sign: one of them is stated wrong")
     side = "the side" if right < inverted else "the other side than that"
     return RollSign(
         1 if right < inverted else -1, f"acceleration and roll rate put sensor and loads on {side} of {places}"
