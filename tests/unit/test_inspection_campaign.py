@@ -121,6 +121,14 @@ def test_a_run_sampled_at_another_rate_calibrates_nothing(runs: list[KnownRun]) 
     assert Kind.RATE_DIFFERS in [finding.kind for finding in verdicts[-1].findings]
 
 
+def test_runs_whose_load_nobody_knows_are_inspected_and_compared_with_no_other(runs: list[KnownRun]) -> None:
+    unknown = [replace(run, payload_kg=float("nan"), front_share_pct=float("nan")) for run in runs[1:]]
+    verdicts, findings = inspect_campaign([inspected(run) for run in (runs[0], *unknown)], VAN, SETTINGS)
+    assert ([one.findings for one in verdicts], findings) == ([()] * 4, ())
+    faulty = tuple(RunVerdict(n, "a.log", (FAULT,) if n == 1 else ()) for n in range(1, 5))
+    assert Inspection(tuple(inspected(run) for run in (runs[0], *unknown)), faulty, ()).refusal is None
+
+
 FAULT = Finding.of(Kind.PITCH_RATE_SIGN, "it is turned")
 WARNING = Finding.of(Kind.SMOOTH_ROAD, "it is smooth")
 

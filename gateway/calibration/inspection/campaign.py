@@ -60,7 +60,8 @@ class Inspection:
             )
         if not left:
             return "no run can be used"
-        if len(_payloads_kg(left)) == 1 < len(_payloads_kg(stated)):
+        left_kg, stated_kg = ({one.identification.payload_kg for one in runs} for runs in (left, stated))
+        if len(left_kg) == 1 < len(stated_kg) and all(isfinite(kg) for kg in left_kg):
             return f"faults leave only runs with {left[0].identification.payload_kg:g} kg, which is no scale"
         return None
 
@@ -73,10 +74,6 @@ class Inspection:
             what = f"run {verdict.number}" if verdict.is_usable else f"run {verdict.number} left out"
             warnings += [f"{what}: {one.kind}: {one.text}" for one in verdict.findings if one.severity is kept]
         return tuple(warnings)
-
-
-def _payloads_kg(runs: Sequence[SplitRun]) -> set[float]:
-    return {one.identification.payload_kg for one in runs}
 
 
 def inspect_campaign(

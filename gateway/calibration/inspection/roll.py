@@ -109,6 +109,8 @@ def _rolled(run: KnownRun, vehicle: Vehicle) -> tuple[float, float, float] | Non
     spectra = cross_spectra_of(run.batches, reading_of(vehicle))
     if spectra is None or not spectra.has_roll:
         return None
-    payload_kg = run.payload_kg if isfinite(run.payload_kg) else 0.0
+    payload_kg = (
+        run.payload_kg if isfinite(run.payload_kg) else vehicle.payload_range_kg[1]
+    )  # an unknown one may be any
     std_m = run.payload_left_std_m * payload_kg / (vehicle.empty_mass_kg + payload_kg)
     return lever_m(spectra), cg_left_m(vehicle, payload_kg, run.payload_left_m or 0.0), std_m
