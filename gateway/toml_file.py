@@ -41,7 +41,7 @@ def read_toml(
 ) -> dict[str, Any]:
     """The tables of ``path``. Raises ``error`` naming the file, and the line where its syntax breaks."""
     try:
-        tables = tomllib.loads(read(path).decode("utf-8"))
+        tables = tomllib.loads(read(path).decode("utf-8-sig"))
     except FileNotFoundError:
         raise error(f"{path}: no such file") from None
     except IsADirectoryError:

@@ -181,7 +181,8 @@ def _in_order(logs: Sequence[LogFile], facts: Facts, span_ns: tuple[int, int]) -
     for log, told in known:
         start_ns = start_ns if told.first_ns is None else told.first_ns
         found.append(JobLog(log, told, start_ns))
-    return sorted((one for one in found if span_ns[0] <= one.start_ns < span_ns[1]), key=lambda one: one.start_ns)
+    here = (one for one in found if not one.start_ns or span_ns[0] <= one.start_ns < span_ns[1])  # 0: nobody knows
+    return sorted(here, key=lambda one: one.start_ns)
 
 
 def hash_of(inputs: Mapping[str, Any]) -> str:
@@ -193,7 +194,7 @@ def hash_of(inputs: Mapping[str, Any]) -> str:
 def signals_id(setup: Setup) -> str:
     """Hash of a signal map's content with its databases resolved, without names and comments."""
     held = setup.signal_map
-    content = repr((held.channel, held.j1939, [(m, sorted(m.fields.items())) for m in held.messages]))
+    content = repr((held.channel, held.j1939, str(held.zone), [(m, sorted(m.fields.items())) for m in held.messages]))
     return "sha256:" + hashlib.sha256(content.encode()).hexdigest()
 
 

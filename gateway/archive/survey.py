@@ -8,6 +8,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
+from zoneinfo import ZoneInfo
 
 from gateway.archive.manifest import Assignment
 from gateway.archive.places import Location
@@ -26,11 +27,12 @@ class LogFile:
     name: str
     size: int
     stamp: str
+    zone: ZoneInfo | None = None
 
     @property
     def key(self) -> str:
-        """Unique for each log and content."""
-        return f"{self.place.url}/{self.path} {self.size} {self.stamp}"
+        """Unique for each log, content and zone of its date."""
+        return f"{self.place.url}/{self.path} {self.size} {self.stamp} {self.zone or 'UTC'}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +51,8 @@ def logs_of(assignment: Assignment) -> list[LogFile]:
     """The logs in a vehicle's folder, by name. Raises PlaceError."""
     place, shown = assignment.logs, assignment.shown
     found = (item for item in place.items() if is_log(item.path))
-    return [LogFile(place, item.path, f"{shown}/{item.path}", item.size, item.stamp) for item in found]
+    zone = assignment.setup.signal_map.zone
+    return [LogFile(place, item.path, f"{shown}/{item.path}", item.size, item.stamp, zone) for item in found]
 
 
 def is_log(path: str) -> bool:
@@ -81,10 +84,16 @@ def survey(log: LogFile) -> SurveyedLog:
     """Read a log once. Raises FileNotFoundError, PlaceError, or ConfigurationError without a library."""
     with log.place.fetched(log.path) as fetched:
         try:
-            chunks, report = open_whole_log(fetched.path)
+            chunks, report = open_whole_log(fetched.path, zone=log.zone)
             first_ns = next((int(chunk.t_ns[0]) for chunk in chunks if len(chunk)), None)
             if first_ns is None:
                 report.require_frames()
+            elif not report.is_dated:
+                noted = "".join(f"; {note}" for note in report.notes)
+                raise LogUnreadableError(
+                    f"{log.name}: has no date{noted}: nothing tells which month and calibration it belongs to; "
+                    "weigh it with springscale estimate"
+                )
         except ReaderMissingError as fault:  # no fault of the log
             raise ConfigurationError(str(fault).replace(str(fetched.path), log.name)) from None
         except LogUnreadableError as fault:

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from gateway.bus.frames import in_order, payload_rows, take
 from gateway.bus.logs.candump_line import LineFrame, LineShape, NotData, learn_shape, read_line
 from gateway.bus.logs.packed import BLOCK_BYTES, LineBlock, line_blocks
-from gateway.bus.logs.report import LogReject, Selection
+from gateway.bus.logs.report import SHOWN_CHARS, LogReject, Selection
 from gateway.bus.signals import IdFilter
+from gateway.bus.text import OR_CP1252
 from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 
 KEPT_SHAPES: Final = 32  # chosen: shapes of lines that are remembered
@@ -148,7 +149,7 @@ class _CandumpReader:
             if self._report.keeps_lines_of(content):
                 n_before = int(np.count_nonzero(block.text[block.start : hit] == ord("\n")))
                 line_number = self._report.lines + n_before + 1
-            self._report.reject(content, line_number)
+            self._report.reject(content, line_number, shown(line))
         elif content is NotData.REMOTE_FRAME:
             self._report.remote_frames += 1
         elif isinstance(content, LineFrame) and self._selection.has(content.channel.decode(), 1):
@@ -166,7 +167,8 @@ class _CandumpReader:
             if line.strip():
                 content = read_line(line)
                 reason = content if isinstance(content, LogReject) else LogReject.GARBLED
-                self._report.reject(reason, self._report.lines + int(i) + 1)
+                self._report.reject(reason, self._report.lines + int(i) + 1, shown(line))
+                self._report.frames += 1
 
 
 class _Finder:
@@ -210,6 +212,11 @@ def _line_around(block: LineBlock, at: int) -> bytes:
     begin = around.rfind(b"\n", 0, at - first) + 1
     end = around.find(b"\n", at - first) + 1
     return around[begin : end or None]
+
+
+def shown(line: bytes) -> str:
+    """The beginning of a line for people."""
+    return line.strip(b"\0 \t\r\n")[: 2 * SHOWN_CHARS].decode("utf-8", OR_CP1252)
 
 
 def _one_frame(line: LineFrame, width: int) -> Frames:

@@ -1,49 +1,53 @@
-"""Logs that python-can reads message by message (.blf .asc .trc .csv .db), as columns of the wanted frames."""
+"""Logs that python-can reads message by message (.blf .asc .trc .csv .db), as columns of the wanted frames.
+
+python-can reads the frames; the header of a text log (date, zone, number base, kind of stamps) is read here, because
+python-can takes the computer's own zone, knows two languages, and passes over what it does not understand.
+"""
 
 import io
+import re
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, tzinfo
 from itertools import islice
 from typing import Final, TextIO, cast
 
 import can
 from can.io.generic import MessageReader
 
-from gateway.bus.frames import LAST_SECOND, frames_of, message_id
+from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of, message_id, stamp_to_ns
 from gateway.bus.logs.packed import is_packed, open_log_file, unpacked_path, unpacked_suffix
 from gateway.bus.logs.report import LogReject, LogReport, Selection
+from gateway.bus.logs.wall_clock import date_in, days_since_1899
+from gateway.bus.text import OR_CP1252
+from gateway.errors import LogUnreadableError
 from gateway.records import Frames
+from gateway.units import NS_PER_S
 
 CHUNK_MESSAGES: Final = 4096  # chosen: of python-can in memory
-
-# The header for a python-can reader that is restarted in the middle of a file
-_TEXT_READERS: Final[Mapping[str, tuple[Callable[[TextIO], MessageReader], tuple[str, ...]]]] = {
-    ".asc": (lambda file: can.ASCReader(file, relative_timestamp=False), ("internal events logged\n",)),
-    ".csv": (can.CSVReader, ("timestamp,arbitration_id,extended,remote,error,dlc,data\n",)),
-    ".trc": (can.TRCReader, ()),
-}
-MESSAGE_SUFFIXES: Final = (*_TEXT_READERS, ".blf", ".db")
+LONGEST_LINE: Final = 1 << 16  # chosen: characters of a line that are read at once
 
 
 def read_message_log(selection: Selection) -> Iterator[Frames]:
     """The selected frames in order of arrival, in chunks.
 
-    Stamps are good to the microsecond, absolute if the format is (.asc in this machine's local time, as its writers
-    mean it). A text line that cannot be read is rejected and skipped; a damaged .blf or .db is read up to there, and
-    the report says why. Raises LogUnreadableError if not even the beginning can be read.
+    Stamps are good to the microsecond, absolute if the format is. A text line that cannot be read is rejected and
+    skipped; a damaged .blf or .db is read up to there, and the report says why. Raises LogUnreadableError if not even
+    the beginning can be read.
     """
-    report, suffix = selection.report, unpacked_suffix(selection.path)
-    binary = {".blf": _blf_messages, ".db": _database_messages}
-    ours = _ours(binary[suffix](report) if suffix in binary else _text_messages(suffix, report), selection)
+    suffix = unpacked_suffix(selection.path)
+    read = {".blf": _blf_messages, ".db": _database_messages}.get(suffix)
+    messages = read(selection.report, selection.zone) if read else _TEXTS[suffix](selection).messages()
+    ours = _ours(messages, selection)
     chunks = iter(lambda: list(islice(ours, CHUNK_MESSAGES)), [])
     yield from selection.given_out((frames_of(chunk, selection.width) for chunk in chunks), 1)
 
 
-def _ours(messages: Iterator[can.Message], selection: Selection) -> Iterator[can.Message]:
-    """Data messages of our identifiers and channel; the others are counted."""
+def _ours(messages: Iterator[tuple[can.Message, int]], selection: Selection) -> Iterator[can.Message]:
+    """Data messages of our identifiers and channel, each moved by its nanoseconds; the others are counted."""
     report = selection.report
     is_mapped: dict[int, bool] = {}
-    for message in messages:
+    for message, start_ns in messages:
         if message.is_error_frame:
             report.error_frames += 1
             continue
@@ -57,70 +61,218 @@ def _ours(messages: Iterator[can.Message], selection: Selection) -> Iterator[can
             report.remote_frames += 1
         elif not selection.has(message.channel, 1):
             continue
-        elif not abs(message.timestamp) <= LAST_SECOND:
-            report.reject(LogReject.BAD_TIME)
+        elif not abs(message.timestamp + start_ns / NS_PER_S) <= LAST_SECOND:
+            report.reject(LogReject.BAD_TIME, report.lines or None)
         else:
+            message.timestamp = ExactStamp(stamp_to_ns(message.timestamp) + start_ns)
             yield message
 
 
-class _ResumableLines:
-    """Lines of a text log for a python-can reader, numbered, with lines inserted before the rest."""
+class _RestartError(Exception):
+    """A reader begins anew with another header."""
 
-    def __init__(self, file: TextIO) -> None:
-        self._file = file
+
+class _TextLog:
+    """Lines of a text log for a python-can reader; a reader that fails at a line is restarted behind it.
+
+    A line that should hold a frame and gives none is counted.
+    """
+
+    reader: Callable[[TextIO], MessageReader]
+
+    def __init__(self, selection: Selection) -> None:
+        self.report, self.zone = selection.report, selection.zone
+        self.start_ns = 0
+        self.header: list[str] = []  # for a reader that is restarted
         self._inserted: deque[str] = deque()
-        self.number = 0
-        self.is_exhausted = False
+        self._text: TextIO = io.StringIO()
+        self._is_at_end = False
+        self._line, self._is_awaited = "", False  # the last one, and whether it should give a message
 
-    def insert(self, lines: Sequence[str]) -> None:
-        self._inserted.extend(lines)
+    def accepted(self, line: str) -> str | None:
+        """The line as the reader gets it; None for one that the reader need not see."""
+        return line
 
-    def __iter__(self) -> "_ResumableLines":
+    def holds_frame(self, line: str) -> bool:
+        """Whether a line that the reader gets should hold a frame."""
+        return bool(line.strip())
+
+    def messages(self) -> Iterator[tuple[can.Message, int]]:
+        """Each message, and the nanoseconds from 1970 to the zero of its stamp."""
+        report = self.report
+        with open_log_file(report.path) as stream:
+            self._text = io.TextIOWrapper(stream, encoding="utf-8-sig", errors=OR_CP1252)
+            try:
+                while not self._is_at_end:
+                    yield from self._until_failure()
+            except (EOFError, OSError) as fault:
+                report.ended_early = str(fault)
+
+    def _until_failure(self) -> Iterator[tuple[can.Message, int]]:
+        try:
+            for message in self.reader(cast(TextIO, self)):
+                self._is_awaited = False
+                yield message, self.start_ns
+            self._count_awaited()
+        except (EOFError, OSError, LogUnreadableError):
+            raise
+        except _RestartError:
+            """The header has changed."""
+        except Exception:  # noqa: BLE001 # python-can's parsers raise whatever a garbled line makes int() or split() raise
+            self._is_awaited = False
+            self.reject(LogReject.GARBLED, self._line)
+        self._inserted.extend(self.header)
+
+    def _count_awaited(self) -> None:
+        if self._is_awaited:
+            self._is_awaited = False
+            self.reject(LogReject.NO_FRAME, self._line)
+
+    def reject(self, reason: LogReject, line: str) -> None:
+        self.report.reject(reason, self.report.lines, line.strip())
+        self.report.frames += 1
+
+    def __iter__(self) -> "_TextLog":
         return self
 
     def __next__(self) -> str:
-        if self._inserted:
-            return self._inserted.popleft()
-        line = self._file.readline()
-        if not line:
-            self.is_exhausted = True
-            raise StopIteration
-        self.number += 1
-        return line
+        self._count_awaited()
+        while True:
+            if self._inserted:
+                return self._inserted.popleft()
+            self._line = self._text.readline(LONGEST_LINE)
+            if not self._line:
+                self._is_at_end = True
+                raise StopIteration
+            self.report.lines += 1
+            accepted = self.accepted(self._line)
+            if accepted is not None:
+                self._is_awaited = self.holds_frame(accepted)
+                return accepted
 
     def close(self) -> None:
-        self._file.close()
+        """The reader closes what it was given; the file stays open for the next one."""
 
 
-def _text_messages(suffix: str, report: LogReport) -> Iterator[can.Message]:
-    """Messages of a text log; a reader that fails at a line is restarted behind it."""
-    make_reader, header = _TEXT_READERS[suffix]
-    with open_log_file(report.path) as stream:
-        text = io.TextIOWrapper(stream, encoding="utf-8", errors="replace")
-        lines = _ResumableLines(text)
-        reader = make_reader(cast(TextIO, lines))
-        while not lines.is_exhausted:
-            try:
-                yield from reader
-            except (EOFError, OSError) as fault:
-                report.ended_early = str(fault)
-                return
-            except Exception:  # noqa: BLE001 # python-can's parsers raise whatever a garbled line makes int() or split() raise
-                report.reject(LogReject.GARBLED, lines.number)
-                lines.insert(header)
-            finally:
-                report.lines = lines.number
+class _AscLog(_TextLog):
+    """Vector's text: lines of ``STAMP CHANNEL IDENTIFIER Rx d LENGTH BYTES``. The header may say that stamps count from
+    the line before.
+    """
+
+    reader = can.ASCReader
+    _DATE = re.compile(r"\s*(?:date|begin\s+triggerblock)\b\s*(.*)", re.IGNORECASE)
+    _BASE = re.compile(r"\s*base\s+(hex|dec)\b(?:\s+timestamps\s+(absolute|relative))?", re.IGNORECASE)
+    _STAMP = re.compile(r"\s*(-?\d{1,12})(?:\.(\d{1,9})\d*)?(?=\s)")
+    _FRAME = re.compile(r"\s*-?\d\S*\s+(?:CANFD\s+\d+|\d+)\s+(?:.*\s)?(?:[RT]x|TxRq|ErrorFrame)\b", re.IGNORECASE)
+
+    def __init__(self, selection: Selection) -> None:
+        super().__init__(selection)
+        self._is_relative = False
+        self._sum_ns = 0
+        self._state_base("hex")
+        self._inserted.extend(self.header)
+
+    def _state_base(self, base: str) -> None:
+        self.header = [f"base {base} timestamps absolute\n", "internal events logged\n"]
+
+    def accepted(self, line: str) -> str | None:
+        if date := self._DATE.match(line):
+            if date[1].strip():
+                self.start_ns = self.report.begin_at(date_in(date[1]), self.zone, date[1].strip())
+            return None
+        if base := self._BASE.match(line):
+            self._state_base(base[1].lower())
+            self._is_relative = (base[2] or "").lower() == "relative"
+            raise _RestartError
+        stamp = self._STAMP.match(line)
+        if stamp is None or stamp[1].startswith("-"):
+            if self.holds_frame(line):
+                self.reject(LogReject.BAD_TIME, line)
+            return None
+        if self._is_relative:
+            self._sum_ns += int(stamp[1]) * NS_PER_S + int((stamp[2] or "0").ljust(9, "0"))
+            return f"{self._sum_ns // NS_PER_S}.{self._sum_ns % NS_PER_S:09d}{line[stamp.end() :]}"
+        return line
+
+    def holds_frame(self, line: str) -> bool:
+        return self._FRAME.match(line) is not None
 
 
-def _blf_messages(report: LogReport) -> Iterator[can.Message]:
+class _TrcLog(_TextLog):
+    """PEAK's text. Lines of the header begin with a semicolon; the version decides the columns."""
+
+    reader = can.TRCReader
+    VERSIONS: Final = ("1.0", "1.1", "1.3", "2.0", "2.1")
+
+    def accepted(self, line: str) -> str | None:
+        if not line.startswith(";"):
+            return line
+        name, _, told = (part.strip() for part in line[1:].partition("="))
+        if name == "$STARTTIME":
+            days = float(told) if re.fullmatch(r"\d{1,6}(\.\d*)?", told) else -1.0
+            self.start_ns = self.report.begin_at(days_since_1899(days) if days > 0 else None, self.zone, told)
+        elif name == "$FILEVERSION" and told not in self.VERSIONS:
+            raise LogUnreadableError(
+                f"{self.report.path}: line {self.report.lines}: is a .trc of version {told}; read are "
+                f"{', '.join(self.VERSIONS)}: convert it with PEAK's converter"
+            )
+        elif line.startswith(";$"):
+            self.header.append(line)
+            return line
+        elif "start time:" in line.lower() and self.report.start_ns is None and (date := date_in(line)) is not None:
+            self.start_ns = self.report.begin_at(date, self.zone, line)
+        return None
+
+    def holds_frame(self, line: str) -> bool:
+        return not line.startswith(";") and bool(line.strip())
+
+
+class _CsvLog(_TextLog):
+    """python-can's table."""
+
+    reader = can.CSVReader
+    COLUMNS: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
+    _OTHERS: Final = (
+        ("time stamp,id,", "SavvyCAN's (GVRET): save it there as a candump log, .asc or .trc"),
+        ("timestamp.*candata|.*databytes", "CANedge's or asammdf's: read the .mf4 itself"),
+        ("timestamp[;\t]", "python-can's with another separator: save it with commas and points"),
+    )
+
+    def accepted(self, line: str) -> str | None:
+        if self.report.lines > 1:
+            return line
+        if line.strip().lower() != self.COLUMNS:
+            known = (what for form, what in self._OTHERS if re.match(form, line.strip(), re.IGNORECASE))
+            raise LogUnreadableError(
+                f"{self.report.path}: line 1: the table is not python-can's, whose columns are {self.COLUMNS}; it is "
+                f"{next(known, repr(line.strip()[:60]))}"
+            )
+        self.header = [line]
+        return line
+
+    def holds_frame(self, line: str) -> bool:
+        return self.report.lines > 1 and bool(line.strip())
+
+
+_TEXTS: Final[dict[str, type[_TextLog]]] = {".asc": _AscLog, ".csv": _CsvLog, ".trc": _TrcLog}
+MESSAGE_SUFFIXES: Final = (*_TEXTS, ".blf", ".db")
+
+
+def _blf_messages(report: LogReport, zone: tzinfo | None) -> Iterator[tuple[can.Message, int]]:
     with report.until_damage(".blf"), open_log_file(report.path) as stream:
         n_bytes = None if is_packed(stream) else report.path.stat().st_size  # a packed one says itself where it is cut
         reader = can.BLFReader(stream)
-        yield from reader
+        as_utc_ns, shift_ns = round(reader.start_timestamp * 1000) * 1_000_000, 0
+        if reader.start_timestamp:
+            date = datetime.fromtimestamp(as_utc_ns // NS_PER_S, UTC).replace(tzinfo=None)
+            shift_ns = report.begin_at(date, zone, str(date)) - as_utc_ns // NS_PER_S * NS_PER_S
+        for message in reader:
+            yield message, shift_ns
         if n_bytes is not None and n_bytes < reader.file_size:
             raise EOFError("the file is cut off: shorter than its header says")
 
 
-def _database_messages(report: LogReport) -> Iterator[can.Message]:
+def _database_messages(report: LogReport, zone: tzinfo | None) -> Iterator[tuple[can.Message, int]]:
     with report.until_damage(".db"), unpacked_path(report.path) as unpacked, can.SqliteReader(unpacked) as reader:
-        yield from reader
+        for message in reader:
+            yield message, 0

@@ -60,7 +60,8 @@ def _tables(mdf: "MDF", selection: Selection) -> list[Iterator[Frames]]:
     """The wanted data frames of each table of CAN frames; remote and error frames are counted."""
     from asammdf.blocks.v4_constants import BUS_TYPE_CAN  # noqa: PLC0415 # as above
 
-    start_ns = round(mdf.header.start_time.timestamp() * 1e6) * 1000
+    date = mdf.header.start_time  # naive if the file states no zone
+    start_ns = selection.report.begin_at(date, selection.zone, str(date)) if mdf.header.abs_time else 0
     found = []
     for number in range(len(mdf.groups)):
         group = mdf.groups[number]

@@ -1,13 +1,14 @@
 """Any log file as the wanted frames of a signal map."""
 
 from collections.abc import Iterator, Sequence
+from datetime import tzinfo
 from pathlib import Path
 from typing import Final
 
 from gateway.bus.logs.candump import read_candump
 from gateway.bus.logs.message_log import MESSAGE_SUFFIXES, read_message_log
 from gateway.bus.logs.mf4 import read_mf4
-from gateway.bus.logs.packed import PACKED_SUFFIXES, unpacked_suffix
+from gateway.bus.logs.packed import PACKED_SUFFIXES, open_log_file, unpacked_suffix
 from gateway.bus.logs.report import LogReport, Selection
 from gateway.bus.signals import CAN_FD_BYTES, EVERY_IDENTIFIER, Decoder, IdFilter, SignalMap
 from gateway.errors import LogUnreadableError
@@ -18,9 +19,12 @@ READERS: Final = {
     **dict.fromkeys(MESSAGE_SUFFIXES, read_message_log),
     ".mf4": read_mf4,
 }
+TEXTS: Final = frozenset(READERS.keys() - {".blf", ".db", ".mf4"})
 UNMISTAKABLE: Final = frozenset(READERS.keys() - {".txt", "", ".csv", ".db"})
 
 OTHER_KINDS: Final = {
+    b"\xff\xfe": "UTF-16; save it as UTF-8",
+    b"\xfe\xff": "UTF-16; save it as UTF-8",
     b"\x89PNG": "a PNG image",
     b"\xff\xd8\xff": "a JPEG image",
     b"GIF8": "a GIF image",
@@ -47,16 +51,18 @@ def open_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Frames],
     asammdf, .blf .asc .trc .csv .db through python-can; each may be packed. Raises LogUnreadableError if the file is
     missing or of an unknown kind.
     """
-    return _open(Path(path), signal_map.filters, signal_map.channel, signal_map.payload_width)
+    return _open(Path(path), signal_map.filters, signal_map.channel, signal_map.payload_width, signal_map.zone)
 
 
-def open_whole_log(path: Path | str, channel: str | None = None) -> tuple[Iterator[Frames], LogReport]:
+def open_whole_log(
+    path: Path | str, channel: str | None = None, zone: tzinfo | None = None
+) -> tuple[Iterator[Frames], LogReport]:
     """As open_log, with every data frame of any identifier, CAN FD included."""
-    return _open(Path(path), EVERY_IDENTIFIER, channel, CAN_FD_BYTES)
+    return _open(Path(path), EVERY_IDENTIFIER, channel, CAN_FD_BYTES, zone)
 
 
 def _open(
-    path: Path, filters: Sequence[IdFilter], channel: str | None, width: int
+    path: Path, filters: Sequence[IdFilter], channel: str | None, width: int, zone: tzinfo | None
 ) -> tuple[Iterator[Frames], LogReport]:
     suffix = unpacked_suffix(path)
     if path.is_dir():
@@ -68,9 +74,9 @@ def _open(
         raise LogUnreadableError(
             f"{path}: cannot tell the kind of log from {suffix!r}; known are {known}, and each with {packed}"
         )
-    if READERS[suffix] is read_candump:
+    if suffix in TEXTS:
         _require_no_other_kind(path)
-    selection = Selection(LogReport(path), filters, channel, width)
+    selection = Selection(LogReport(path), filters, channel, width, zone)
     return READERS[suffix](selection), selection.report
 
 
@@ -84,9 +90,9 @@ def motion_of_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Mot
 def _require_no_other_kind(path: Path) -> None:
     """Text may be damaged; a file that begins like another kind never was a text log."""
     try:
-        with path.open("rb") as stream:
+        with open_log_file(path) as stream:
             start = stream.read(LONGEST_START)
-    except OSError:
+    except (OSError, EOFError, LogUnreadableError):
         return  # the reader says why it cannot be read
     for first, kind in OTHER_KINDS.items():
         if start.startswith(first):

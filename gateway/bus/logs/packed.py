@@ -1,5 +1,6 @@
 """The bytes of logs: packed ones (gzip, zstd, xz, by the first bytes) inflated during reading, text as whole lines."""
 
+import codecs
 import io
 import lzma
 import shutil
@@ -199,6 +200,8 @@ def line_blocks(report: LogReport, block_bytes: int = BLOCK_BYTES) -> Iterator[L
         while True:
             free = memoryview(buffer)[MARGIN + carried : MARGIN + block_bytes]
             n_read = _fill(stream, free, report)
+            if not report.lines and buffer.startswith(codecs.BOM_UTF8, MARGIN):
+                buffer[MARGIN : MARGIN + len(codecs.BOM_UTF8)] = bytes(len(codecs.BOM_UTF8))  # as a hole is
             end_of_text = MARGIN + carried + n_read
             is_last = n_read < len(free)
             if is_last and buffer[end_of_text - 1] != ord("\n"):
@@ -216,6 +219,7 @@ def line_blocks(report: LogReport, block_bytes: int = BLOCK_BYTES) -> Iterator[L
                 return
             if not end and not is_overlong:
                 report.reject(LogReject.OVERLONG_LINE, report.lines + 1)
+                report.frames += 1
                 is_overlong = True
             carried = 0 if is_overlong else end_of_text - end
             buffer[MARGIN : MARGIN + carried] = buffer[end : end + carried]

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import datetime, tzinfo
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
@@ -11,14 +12,21 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.bus.frames import gathered
+from gateway.bus.logs.wall_clock import FIRST_DATED_NS, LATE_START_S, ns_since_1970
 from gateway.bus.signals import IdFilter
 from gateway.errors import LogUnreadableError
-from gateway.records import I64, U32, Bool, Frames
+from gateway.records import I64, U32, Bool, Frames, iso_utc
+from gateway.units import NS_PER_S
 
 KEPT_LINE_NUMBERS: Final = 5  # chosen: what a person looks at
 NAMED_CHANNELS: Final = 8  # chosen: likewise
 KEPT_CHANNELS: Final = 32  # chosen: in memory; damaged lines name any number
 CHUNK_FRAMES: Final = 32_768  # chosen: given out at once: large enough that the decoder's own steps cost little
+SHOWN_CHARS: Final = 60  # chosen: of a line that cannot be read
+TELLING_SHARE: Final = 0.01  # chosen: of a log's frames; so many unreadable ones are the cause if none can be used
+AS_CANDUMP: Final = "candump logs are recorded with candump -L"
+JUDGED_FRAMES: Final = 1000  # chosen: least number whose stamps are judged
+MOST_PER_S: Final = 100_000.0  # chosen: several times what a bus of 1 Mbit/s can carry (ISO 11898-1: 21,000 frames)
 
 
 class LogReject(StrEnum):
@@ -35,22 +43,52 @@ class LogReject(StrEnum):
     OVERLONG_LINE = "overlong_line"
 
 
+_KNOWN_LINES: Final = (
+    (r"\(\d{4}-\d\d-\d\d", "stamps are dates (candump -tA): record with candump -L alone"),
+    (r"\(-?\d+,\d+\)|-?\d+,\d+\s+\d+\s", "stamps have a decimal comma: write a point"),
+    (r"\(\d{11,}[.)]|\d{11,}\.?\d*,", "stamps are not seconds since 1970, but a fraction of it such as milliseconds"),
+    (r"\(-|\s*-\d", "the stamp is negative"),
+    (r"\d+\)\s+-?\d+,\d+\s", "stamps have a decimal comma: write a point"),
+    (r"\(?\d+(\.\d+)?\)?\s+\S+\s+[0-9A-F]{3,8}\s+\[\d+\]|\w+\s+[0-9A-F]{3,8}\s+\[\d+\]",
+     "this is candump's output for the screen: record with candump -L"),
+    (r"\S.*\(\d+\.\d+\) \S+ [0-9A-F]{3,8}#", "something is written before the stamp, as in a system's log: cut it off"),
+    (r"date \S|\d+\.\d+\s+\d+\s+[0-9A-F]+x?\s+[RT]x\b", "this is the text of an .asc log: name it so"),
+    (r";|\d+\)\s+\d", "this is the text of a .trc log: name it so"),
+    (r"[^,;]+([,;][^,;]*){3,}", "this is a table: only python-can's own can be read, as .csv"),
+    (r"\d+\.\d+\s+\S+\s+\w+\s+[RT]x\b", "messages have names instead of identifiers: export the log with numbers"),
+)  # fmt: skip
+"""Lines that other tools and settings write, and what to do: the first that fits is told."""
+
+
 @dataclass(slots=True)
 class RejectedLines:
-    """How many lines were refused for one reason, and the numbers of the first of them, counted from 1."""
+    """How many lines were refused for one reason, the numbers of the first of them, counted from 1, and the first."""
 
     count: int = 0
     first_lines: list[int] = field(default_factory=list)
+    text: str = ""
+
+    def told(self, reason: LogReject, suffix: str) -> str:
+        """ "1000, first in line 1: stamps have a decimal comma: write a point: '(1627274455,0125) can0 120#00'" """
+        where = f", first in line {self.first_lines[0]}" if self.first_lines else ""
+        fitting = (what for form, what in _KNOWN_LINES if re.match(form, self.text, re.IGNORECASE))
+        known = next((what for what in fitting if f" {suffix} " not in f"{what} "), None)
+        if known is None and reason is LogReject.BAD_TIME:
+            known = "stamps are not seconds since 1970"
+        what = f": {known}" if known else ""
+        return f"{self.count}{where}{what}" + (f": {self.text[:SHOWN_CHARS]!r}" if self.text else "")
 
 
 @dataclass(slots=True)
 class LogReport:
     """Counts of a log, filled while it is read.
 
-    ``frames`` counts everything that looks like a frame, of any identifier; ``wanted`` the frames given out.
-    ``other_channel``, ``remote_frames`` and ``out_of_order`` are among the wanted identifiers. ``lines`` stays 0 for
-    binary formats, whose rejects carry no line numbers. ``ended_early`` says why a damaged file could not be read to
-    its end.
+    ``frames`` counts everything that looks like a frame or should be one, of any identifier; ``wanted`` the frames
+    given out. ``other_channel``, ``remote_frames`` and ``out_of_order`` are among the wanted identifiers. ``lines``
+    stays 0 for binary formats, whose rejects carry no line numbers. ``ended_early`` says why a damaged file could not
+    be read to its end.
+
+    ``start_ns`` is the date of the log's header, if it has one; ``has_wall_clock`` tells that this date states no zone.
     """
 
     path: Path
@@ -64,26 +102,63 @@ class LogReport:
     channels: set[str] = field(default_factory=set)
     rejects: dict[LogReject, RejectedLines] = field(default_factory=dict)
     ended_early: str | None = None
-    _last_t_ns: int | None = None
+    start_ns: int | None = None
+    has_wall_clock: bool = False
+    zone: tzinfo | None = None
+    notes: list[str] = field(default_factory=list)
+    first_ns: int | None = None
+    _last_t_ns: int = 0
+    _span_ns: tuple[int, int] = (0, 0)
+    _n_whole_seconds: int = 0
 
     def keeps_lines_of(self, reason: LogReject) -> bool:
         """Whether the number of a further line refused for ``reason`` would still be kept."""
         return reason not in self.rejects or len(self.rejects[reason].first_lines) < KEPT_LINE_NUMBERS
 
-    def reject(self, reason: LogReject, line: int | None = None, *, n: int = 1) -> None:
-        """Count a refused line, or ``n`` of them without line numbers."""
+    def reject(self, reason: LogReject, line: int | None = None, text: str = "", *, n: int = 1) -> None:
+        """Count a refused line, or ``n`` of them without line numbers. They are among ``frames``."""
         if n == 0:
             return
+        told = self.rejects.setdefault(reason, RejectedLines(text=text))
         if line is not None and self.keeps_lines_of(reason):
-            self.rejects.setdefault(reason, RejectedLines()).first_lines.append(line)
-        self.rejects.setdefault(reason, RejectedLines()).count += n
+            told.first_lines.append(line)
+        told.count += n
+
+    def begin_at(self, date: datetime | None, zone: tzinfo | None, told: str) -> int:
+        """Take the date of the header, which says ``told``; nanoseconds since 1970, 0 without one."""
+        if date is None:
+            note = f"its date {told[:SHOWN_CHARS]!r} cannot be read"
+            self.notes += [] if note in self.notes else [note]
+            return self.start_ns or 0
+        self.has_wall_clock, self.zone = date.tzinfo is None, zone
+        self.start_ns = ns_since_1970(date, zone)
+        return self.start_ns
 
     def count_wanted(self, t_ns: I64) -> None:
         """Count frames that are given out, at least one, by their stamps in order of arrival."""
-        before = t_ns[0] if self._last_t_ns is None else self._last_t_ns
-        self.out_of_order += int(np.count_nonzero(np.diff(t_ns, prepend=before) < 0))
+        least, most = int(t_ns.min()), int(t_ns.max())
+        if self.first_ns is None:
+            self.first_ns = self._last_t_ns = int(t_ns[0])
+            self._span_ns = least, most
+        self.out_of_order += int(np.count_nonzero(np.diff(t_ns, prepend=self._last_t_ns) < 0))
         self.wanted += len(t_ns)
+        self._n_whole_seconds += int(np.count_nonzero(t_ns % NS_PER_S == 0))
         self._last_t_ns = int(t_ns[-1])
+        self._span_ns = min(least, self._span_ns[0]), max(most, self._span_ns[1])
+
+    @property
+    def _suffix(self) -> str:
+        return next((end for end in self.path.suffixes if end.lower() in (".asc", ".trc", ".csv")), "-").lower()
+
+    @property
+    def is_dated(self) -> bool:
+        """Whether its stamps are dates; those of a log without frames are not."""
+        return self.first_ns is not None and self.first_ns >= FIRST_DATED_NS
+
+    @property
+    def other_identifiers(self) -> int:
+        """Frames that no filter wants: what is left of all."""
+        return self.frames - self.wanted - self.other_channel - self.remote_frames - self.n_rejected
 
     @property
     def n_rejected(self) -> int:
@@ -104,11 +179,43 @@ class LogReport:
         if self.ended_early:
             yield f"{self.path}: {self.ended_early}; everything before was read"
         for reason, lines in self.rejects.items():
-            where = f", first in line {lines.first_lines[0]}" if lines.first_lines else ""
-            yield f"{self.path}: left out, {str(reason).replace('_', ' ')}: {lines.count}{where}"
+            yield f"{self.path}: left out, {str(reason).replace('_', ' ')}: {lines.told(reason, self._suffix)}"
         if len(self.channels) > 1 and not self.other_channel:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
             yield f"{self.path}: mapped frames are on {seen}; if these are one bus twice, name one in the map"
+        for note in self.notes:
+            yield f"{self.path}: {note}"
+        yield from self._remarks_on_time()
+
+    def _remarks_on_time(self) -> Iterator[str]:
+        if self.first_ns is None:
+            return
+        if not self.is_dated:
+            yield f"{self.path}: has no date: times count from 1970-01-01T00:00:00Z in place of the true start"
+        elif self.has_wall_clock and self.zone is None:
+            yield (
+                f"{self.path}: its date states no zone, it is read as UTC; if that is wrong, state time_zone in the "
+                "signal map"
+            )
+        late_s = 0.0 if self.start_ns is None else (self.first_ns - self.start_ns) / NS_PER_S
+        if late_s > LATE_START_S:
+            yield (
+                f"{self.path}: its first frame comes {late_s / 3600.0:.1f} h after the date of its header, "
+                f"{iso_utc(self.start_ns or 0)}: do its stamps count from another instant?"
+            )
+
+    def _why_no_times(self) -> str | None:
+        """Why the stamps of the wanted frames cannot be their times; None if they can."""
+        span_s = (self._span_ns[1] - self._span_ns[0]) / NS_PER_S
+        if self.wanted < JUDGED_FRAMES:
+            return None
+        if not self.is_dated and 8 * self.out_of_order > self.wanted:
+            return "its stamps are the pauses between frames (candump -td): record with candump -L alone"
+        if self.wanted > 10.0 * span_s and self._n_whole_seconds == self.wanted:
+            return f"its {self.wanted} stamps are whole seconds: a spreadsheet has cut them off?"
+        if self.wanted > MOST_PER_S * span_s:
+            return f"it has {self.wanted} frames in {span_s:.3g} s by its stamps, which no bus carries"
+        return None
 
     @contextmanager
     def until_damage(self, kind: str) -> Iterator[None]:
@@ -127,21 +234,29 @@ class LogReport:
             self.ended_early = why if isinstance(fault, EOFError | OSError) else f"the file is damaged: {why}"
 
     def require_frames(self) -> None:
-        """After reading: raise LogUnreadableError, saying why, if not one wanted frame was found."""
+        """After reading: raise LogUnreadableError, saying why, if no wanted frame was found or their stamps are no
+        times.
+        """
+        if (why := self._why_unusable()) is not None:
+            raise LogUnreadableError(f"{self.path}: {why}")
+
+    def _why_unusable(self) -> str | None:
         if self.wanted:
-            return
+            return self._why_no_times()
         if self.other_channel:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
-            raise LogUnreadableError(
-                f"{self.path}: the mapped frames are on {seen} only; correct channel in the signal map"
-            )
+            return f"the mapped frames are on {seen} only; correct channel in the signal map"
+        if self.n_rejected > TELLING_SHARE * self.frames:
+            reason, lines = max(self.rejects.items(), key=lambda each: each[1].count)
+            why = f"left out, {str(reason).replace('_', ' ')}: {lines.told(reason, self._suffix)}"
+            return f"no frame can be read; {why}" + ("" if self._suffix != "-" else f"; {AS_CANDUMP}")
         if self.frames:
-            raise LogUnreadableError(
-                f"{self.path}: none of its {self.frames} frames has an identifier of the signal map; "
+            return (
+                f"none of its {self.frames} frames has an identifier of the signal map; "
                 "is it the map of this vehicle? springscale look shows what is in it"
             )
         why = f" ({self.ended_early})" if self.ended_early else ""
-        raise LogUnreadableError(f"{self.path}: holds no CAN frame{why}; candump logs are recorded with candump -L")
+        return f"holds no CAN frame{why}; {AS_CANDUMP}"
 
 
 def is_same_channel(recorded: object, wanted: str | None) -> bool:
@@ -160,13 +275,14 @@ def is_same_channel(recorded: object, wanted: str | None) -> bool:
 class Selection:
     """The frames that pass one of ``filters``, of ``channel`` or of all, with payload rows of ``width`` bytes.
 
-    ``report`` names the log and counts what is read of it.
+    ``report`` names the log and counts what is read of it. ``zone`` holds for dates that state none; None: UTC.
     """
 
     report: LogReport
     filters: Sequence[IdFilter]
     channel: str | None
     width: int
+    zone: tzinfo | None = None
 
     @property
     def path(self) -> Path:

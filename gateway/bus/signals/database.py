@@ -1,7 +1,6 @@
 """CAN databases through cantools, reduced to what decoding needs. The only module of the room that imports cantools."""
 
 import difflib
-import io
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from cantools.database.can import Signal as CantoolsSignal
 from cantools.database.errors import UnsupportedDatabaseFormatError
 
 from gateway.bus.signals.bit_field import BitField, Coding
+from gateway.bus.text import text_of
 from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID
 from gateway.toml_file import Read
@@ -21,7 +21,7 @@ from gateway.toml_file import Read
 _LONG_SIGNAL = re.compile(rb"^\s*SG_\s+(\w+)[^:\n]*:\s*\d+\s*\|\s*0*[1-9]\d{3,}\s*@", re.MULTILINE)
 _FRAME_ID = re.compile(rb"^\s*BO_\s+0*(\d+)\s", re.MULTILINE)
 
-ENCODINGS: Final = {"dbc": "cp1252", "sym": "cp1252", "kcd": "utf-8", "arxml": "utf-8", "cdd": "utf-8"}  # as cantools'
+KINDS: Final = ("dbc", "sym", "kcd", "arxml", "cdd")
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +76,8 @@ def _load(map_path: Path, path: Path, read: Read) -> list[CantoolsMessage]:
     if not path.is_file():
         raise SignalMapError(f"{map_path}: dbc: no such file: {path}; paths are relative to the map")
     kind = path.suffix.removeprefix(".").lower()
-    if kind not in ENCODINGS:
-        raise SignalMapError(f"{map_path}: dbc: {path}: its name must end in .{', .'.join(ENCODINGS)}")
+    if kind not in KINDS:
+        raise SignalMapError(f"{map_path}: dbc: {path}: its name must end in .{', .'.join(KINDS)}")
     try:
         content = read(path)
     except OSError as fault:
@@ -85,8 +85,7 @@ def _load(map_path: Path, path: Path, read: Read) -> list[CantoolsMessage]:
     _refuse_absurd(map_path, path, content)
     try:
         # not strict: vendors' databases with overlapping signals are common, and a field is checked when it is mapped
-        text = io.TextIOWrapper(io.BytesIO(content), ENCODINGS[kind], errors="replace").read()
-        database = cantools.database.load_string(text, kind, strict=False)
+        database = cantools.database.load_string(text_of(content), kind, strict=False)
     except (UnsupportedDatabaseFormatError, cantools.Error, UnicodeDecodeError) as fault:
         raise SignalMapError(f"{map_path}: dbc: {path} cannot be read as a CAN database: {fault}") from None
     if not isinstance(database, cantools.database.can.Database):

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
+from zoneinfo import ZoneInfo
 
 import numpy as np
 
@@ -100,12 +101,14 @@ class SignalMap:
     """A signal map and its databases, resolved.
 
     ``channel`` filters log files (a live channel comes from the service's configuration); None accepts every channel.
+    ``zone`` holds for dates of logs that state none; None: UTC.
     """
 
     name: str
     channel: str | None
     j1939: bool
     messages: tuple[MappedMessage, ...]
+    zone: ZoneInfo | None = None
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:

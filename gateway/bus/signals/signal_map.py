@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Final, Literal
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -206,6 +207,9 @@ class SignalMapFile(BaseModel):
 
     dbc: list[str] = Field(min_length=1, description="databases (DBC, KCD, ARXML, SYM), relative to this file")
     channel: str | None = Field(None, description="read only frames of this channel from log files")
+    time_zone: str | None = Field(
+        None, description="zone of logs whose date states none, such as Europe/Berlin; without it UTC"
+    )
     j1939: bool = Field(False, description="match 29-bit identifiers by PGN, whatever the source address")
     signals: dict[Signal, SignalEntry] = Field(min_length=1, description="our signals")
 
@@ -233,7 +237,16 @@ def load_signal_map(path: Path | str, read: Read = Path.read_bytes) -> SignalMap
         mapped.setdefault(entry.message, []).append(resolved)
     messages = tuple(_mapped_message(databases[m], tuple(signals), wanted.j1939) for m, signals in mapped.items())
     _require_distinct(messages, file_path)
-    return SignalMap(str(path), wanted.channel, wanted.j1939, messages)
+    return SignalMap(str(path), wanted.channel, wanted.j1939, messages, _zone(file_path, wanted.time_zone))
+
+
+def _zone(path: Path, name: str | None) -> ZoneInfo | None:
+    try:
+        return None if name is None else ZoneInfo(name)
+    except (ValueError, OSError, ZoneInfoNotFoundError):
+        raise SignalMapError(
+            f"{path}: time_zone: no zone is called {name!r} on this computer; write one as Europe/Berlin, or UTC"
+        ) from None
 
 
 def shipped_maps() -> tuple[str, ...]:
