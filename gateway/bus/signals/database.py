@@ -2,6 +2,7 @@
 
 import difflib
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,20 +34,21 @@ class DatabaseSignal:
     unit: str | None
     minimum: float | None
     maximum: float | None
-    choices: Mapping[str, int]
+    choices: Mapping[str, tuple[int, ...]]
     multiplexer: str | None
     multiplexer_ids: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class DatabaseMessage:
-    """One message; ``frame_id`` carries EXTENDED_ID for a 29-bit identifier."""
+    """One message; ``frame_id`` carries EXTENDED_ID for a 29-bit identifier, ``twins`` are names of several signals."""
 
     name: str
     frame_id: int
     length: int
     signals: Mapping[str, DatabaseSignal]
     source: Path
+    twins: frozenset[str] = frozenset()
 
 
 def load_messages(map_path: Path, paths: Sequence[Path], read: Read = Path.read_bytes) -> dict[str, DatabaseMessage]:
@@ -108,11 +110,15 @@ def _refuse_absurd(map_path: Path, path: Path, text: bytes) -> None:
 def _message(message: CantoolsMessage, path: Path) -> DatabaseMessage:
     frame_id = message.frame_id | (EXTENDED_ID if message.is_extended_frame else 0)
     signals = {signal.name: _signal(signal) for signal in message.signals}
-    return DatabaseMessage(message.name, frame_id, message.length, signals, path)
+    twins = frozenset(name for name, n in Counter(signal.name for signal in message.signals).items() if n > 1)
+    return DatabaseMessage(message.name, frame_id, message.length, signals, path, twins)
 
 
 def _signal(signal: CantoolsSignal) -> DatabaseSignal:
     conversion = signal.conversion
+    choices: dict[str, tuple[int, ...]] = {}
+    for raw, text in (conversion.choices or {}).items():
+        choices[str(text)] = (*choices.get(str(text), ()), int(raw))
     coding = Coding.FLOAT if conversion.is_float else Coding.SIGNED if signal.is_signed else Coding.UNSIGNED
     field = BitField(
         start=signal.start,
@@ -128,7 +134,7 @@ def _signal(signal: CantoolsSignal) -> DatabaseSignal:
         unit=signal.unit,
         minimum=signal.minimum,
         maximum=signal.maximum,
-        choices={str(text): int(raw) for raw, text in (conversion.choices or {}).items()},
+        choices=choices,
         multiplexer=signal.multiplexer_signal,
         multiplexer_ids=tuple(signal.multiplexer_ids or ()),
     )

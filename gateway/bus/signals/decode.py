@@ -35,6 +35,7 @@ class SampleReader:
 
     def __init__(self, mapped: MappedSignal) -> None:
         self._mapped = mapped
+        self._named_codes = np.array(mapped.named_codes, np.uint64)
         self._is_float = mapped.field.coding is Coding.FLOAT
         slack = 0.0 if self._is_float else RANGE_TOLERANCE_STEPS * mapped.resolution
         self._low = mapped.minimum - slack if np.isfinite(mapped.minimum) else -np.inf
@@ -67,6 +68,8 @@ class SampleReader:
             yield Rejected.MULTIPLEXED_OUT, _fails(condition, payload)
         if self._mapped.rejects_j1939_codes:
             yield Rejected.NOT_AVAILABLE, is_j1939_code(self._mapped.field, bits)
+        if self._mapped.named_codes:
+            yield Rejected.NOT_AVAILABLE, np.isin(bits, self._named_codes)
         for condition in self._mapped.valid_when:
             yield Rejected.INVALID, _fails(condition, payload)
         if self._is_float:

@@ -54,7 +54,8 @@ class MappedSignal:
     """One of our signals: SI = (number x scale + offset) x to_si; the factor carries unit and sign.
 
     ``minimum`` and ``maximum`` are SI, NaN if there is no limit. ``rejects_j1939_codes`` is true if SAE J1939-71
-    reserves the highest raw numbers for "error" and "not available". ``counter`` counts the frames.
+    reserves the highest raw numbers for "error" and "not available"; ``named_codes`` are raw bits that the database
+    gives a name. ``counter`` counts the frames.
     """
 
     signal: Signal
@@ -67,6 +68,7 @@ class MappedSignal:
     multiplexed_by: tuple[Condition, ...]
     valid_when: tuple[Condition, ...]
     rejects_j1939_codes: bool
+    named_codes: tuple[int, ...] = ()
     counter: BitField | None = None
 
     @property

@@ -86,8 +86,14 @@ def resolve_signal(
         multiplexed_by=_multiplexers(where, named, message),
         valid_when=tuple(_condition(where, name, allowed, message) for name, allowed in entry.valid_when.items()),
         rejects_j1939_codes=(j1939 and bool(message.frame_id & EXTENDED_ID) and named.field.coding is Coding.UNSIGNED),
+        named_codes=() if QUANTITIES[signal] == "state" else _named_codes(named),
         counter=None if entry.counter is None else _counter(f"{where}.counter", entry.counter, message),
     )
+
+
+def _named_codes(signal: DatabaseSignal) -> tuple[int, ...]:
+    """Raw bits that the database gives a name, such as Error: a measured signal has numbers, a name is none."""
+    return tuple(sorted({_bits_of(raw, signal.field) for raws in signal.choices.values() for raw in raws}))
 
 
 def _counter(where: str, name: str, message: DatabaseMessage) -> BitField:
@@ -107,6 +113,11 @@ def _counter(where: str, name: str, message: DatabaseMessage) -> BitField:
 
 
 def _find(where: str, name: str, message: DatabaseMessage) -> DatabaseSignal:
+    if name in message.twins:
+        raise SignalMapError(
+            f"{where}: message {message.name!r} has several signals {name!r}; rename all but one in "
+            f"{message.source.name}"
+        )
     if name in message.signals:
         return message.signals[name]
     raise SignalMapError(f"{where}: message {message.name!r} has no signal {name!r}; {closest(name, message.signals)}")
@@ -176,23 +187,24 @@ def _condition(where: str, name: str, allowed: Accepted | list[Accepted], messag
     choices = allowed if isinstance(allowed, list) else [allowed]
     if not choices:
         raise SignalMapError(f"{key}.{name}: an empty list allows no frame; name the values under which this counts")
-    return Condition(judged.field, tuple(_allowed_bits(f"{key}.{name}", choice, judged) for choice in choices))
+    bits = [each for choice in choices for each in _allowed_bits(f"{key}.{name}", choice, judged)]
+    return Condition(judged.field, tuple(dict.fromkeys(bits)))
 
 
-def _allowed_bits(where: str, allowed: Accepted, signal: DatabaseSignal) -> int:
-    """The raw bits of a physical number, or of a named choice of the database."""
+def _allowed_bits(where: str, allowed: Accepted, signal: DatabaseSignal) -> tuple[int, ...]:
+    """The raw bits of a physical number, or all those that the database calls so."""
     field = signal.field
     if isinstance(allowed, str):
         if allowed not in signal.choices:
             raise SignalMapError(f"{where}: no value is called {allowed!r}; {closest(allowed, signal.choices)}")
-        return _bits_of(signal.choices[allowed], field)
+        return tuple(_bits_of(raw, field) for raw in signal.choices[allowed])
     if field.coding is Coding.FLOAT:
         raise SignalMapError(f"{where}: {signal.name!r} is a float, which cannot be compared for equality")
     steps, (low, high) = (allowed - field.offset) / field.scale, field.raw_range
     raw = round(steps) if low - 1 < steps < high + 1 else low - 1  # beyond, and NaN: no step of the signal
     if not low <= raw <= high or not math.isclose(raw * field.scale + field.offset, allowed, abs_tol=1e-9):
         raise SignalMapError(f"{where}: {signal.name!r} can never be {allowed!r}")
-    return _bits_of(raw, field)
+    return (_bits_of(raw, field),)
 
 
 def _bits_of(raw: int, field: BitField) -> int:

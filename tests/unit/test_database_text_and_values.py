@@ -1,0 +1,81 @@
+"""Databases as their tools write them: their text, names that occur twice, and values that have names."""
+
+import codecs
+
+import numpy as np
+import pytest
+
+from gateway.bus.signals import Decoder, load_signal_map
+from gateway.errors import SignalMapError
+from gateway.records import Frames, Signal
+
+DBC = """VERSION ""
+NS_ :
+BS_:
+BU_: A
+BO_ 512 BOX: 8 A
+ SG_ Accel : 0|16@1- (0.001,0) [-100|100] "m/s^2" A
+ SG_ Rate : 16|16@1- (0.01,0) [0|0] "°/s" A
+ SG_ Twin : 32|8@1+ (1,0) [0|0] "m/s" A
+ SG_ Twin : 40|8@1+ (1,0) [0|0] "m/s" A
+ SG_ State : 48|8@1+ (1,0) [0|0] "" A
+VAL_ 512 Accel 32766 "Error" -32768 "SNA" ;
+VAL_ 512 State 1 "ready" 3 "ready" 2 "off" ;
+"""
+MAP = """dbc = ["a.dbc"]
+[signals.vertical_acceleration]
+message = "BOX"
+signal = "Accel"
+valid_when = { State = "ready" }
+[signals.pitch_rate]
+message = "BOX"
+signal = "Rate"
+"""
+
+
+def decoded(tmp_path, raw_accel, state):
+    (tmp_path / "a.dbc").write_bytes(DBC.encode())
+    (tmp_path / "a.toml").write_text(MAP)
+    payload = np.zeros((1, 8), np.uint8)
+    payload[0, :2] = np.frombuffer(np.int16(raw_accel).tobytes(), np.uint8)
+    payload[0, 6] = state
+    decoder = Decoder(load_signal_map(tmp_path / "a.toml"))
+    frames = Frames(np.array([1]), np.array([512], np.uint32), np.array([8], np.uint8), payload)
+    return decoder.decode(frames).of(Signal.VERTICAL_ACCELERATION)[1], decoder.counts[Signal.VERTICAL_ACCELERATION]
+
+
+TEXTS = {
+    "UTF-8": DBC.encode(),
+    "UTF-8 with a mark": codecs.BOM_UTF8 + DBC.encode(),
+    "cp1252": DBC.encode("cp1252"),
+    "cp1252 and UTF-8 in one file": DBC.encode() + 'CM_ "°";\n'.encode("cp1252"),
+    "UTF-16": DBC.encode("utf-16"),
+    "CRLF": DBC.replace("\n", "\r\n").encode(),
+}
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+@pytest.mark.parametrize("mark", [b"", codecs.BOM_UTF8])
+def test_a_database_is_read_in_the_text_that_its_tool_writes(kind, mark, tmp_path):
+    (tmp_path / "a.dbc").write_bytes(TEXTS[kind])
+    (tmp_path / "a.toml").write_bytes(mark + MAP.encode())
+    traits = load_signal_map(tmp_path / "a.toml").traits[Signal.PITCH_RATE]
+    assert traits.resolution == pytest.approx(np.radians(0.01))
+
+
+@pytest.mark.parametrize(("state", "n"), [(1, 1), (3, 1), (2, 0), (0, 0)])
+def test_a_named_state_means_every_raw_value_of_the_name(state, n, tmp_path):
+    assert len(decoded(tmp_path, 9810, state)[0]) == n
+
+
+@pytest.mark.parametrize("raw", [32766, -32768])
+def test_a_named_code_of_a_measured_signal_is_no_measurement(raw, tmp_path):
+    samples, counts = decoded(tmp_path, raw, 1)
+    assert (len(samples), dict(counts.rejected)) == (0, {"not_available": 1})
+
+
+def test_a_signal_name_that_occurs_twice_is_refused_where_it_is_mapped(tmp_path):
+    (tmp_path / "a.dbc").write_text(DBC)
+    (tmp_path / "a.toml").write_text(MAP.replace('"Rate"', '"Twin"'))
+    with pytest.raises(SignalMapError, match=r"pitch_rate\.signal: message 'BOX' has several signals 'Twin'"):
+        load_signal_map(tmp_path / "a.toml")
