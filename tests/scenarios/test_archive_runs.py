@@ -157,7 +157,7 @@ def test_a_job_that_kills_its_workers_is_told_as_failed(archive: Path) -> None:
 def test_a_library_that_is_missing_ends_the_run_and_blames_no_log(
     archive: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def missing(*log: Any) -> Any:
+    def missing(*log: Any, **zone: Any) -> Any:
         raise ReaderMissingError("install springscale[mdf]")
 
     for reader in ("gateway.archive.survey.open_whole_log", "gateway.archive.drives.motion_of_log"):

@@ -148,19 +148,19 @@ def remarks(path, channel=None):
 
 
 def test_nothing_is_said_of_a_sound_log(log_of):
-    assert remarks(log_of(*(LINE.format(i, "can0") for i in range(9)))) == []
+    assert remarks(log_of(*(LINE.format(1_790_000_000 + i, "can0") for i in range(9)))) == []
 
 
 def test_lines_left_out_are_counted_by_reason(log_of):
-    path = log_of(LINE.format(1, "can0"), "(2.0) can0 120#011\n", "nonsense\n", "nonsense\n")
+    path = log_of(LINE.format(1_790_000_000, "can0"), "(2.0) can0 120#011\n", "nonsense\n", "nonsense\n")
     assert set(remarks(path)) == {
-        f"{path}: left out, half byte: 1, first in line 2",
-        f"{path}: left out, no frame: 2, first in line 3",
+        f"{path}: left out, half byte: 1, first in line 2: '(2.0) can0 120#011'",
+        f"{path}: left out, no frame: 2, first in line 3: 'nonsense'",
     }
 
 
 def test_frames_of_several_channels_are_told_unless_one_is_named(log_of):
-    path = log_of(LINE.format(1, "can0"), LINE.format(1, "can1"))
+    path = log_of(*(LINE.format(1_790_000_000, name) for name in ("can0", "can1")))
     assert remarks(path) == [
         f"{path}: mapped frames are on can0, can1; if these are one bus twice, name one in the map"
     ]

@@ -249,7 +249,7 @@ class LogReport:
         if self.n_rejected > TELLING_SHARE * self.frames:
             reason, lines = max(self.rejects.items(), key=lambda each: each[1].count)
             why = f"left out, {str(reason).replace('_', ' ')}: {lines.told(reason, self._suffix)}"
-            return f"no frame can be read; {why}" + ("" if self._suffix != "-" else f"; {AS_CANDUMP}")
+            return f"holds no CAN frame that can be read; {why}" + ("" if self._suffix != "-" else f"; {AS_CANDUMP}")
         if self.frames:
             return (
                 f"none of its {self.frames} frames has an identifier of the signal map; "
