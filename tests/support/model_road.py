@@ -102,8 +102,9 @@ def batch_by(
 ) -> Batch:
     """Constant speed, over a random road whose density falls as frequency to the power ``waviness``.
 
-    ``paths_at`` gives the readings (p, s, m) per unit of road; ``shaken_mps2`` is the acceleration's standard deviation,
-    ``noise`` a share of each signal's. ``slack`` is the part of each sensor's power that comes by no modelled path.
+    ``paths_at`` gives the readings (p, s, m) per unit of road; ``shaken_mps2`` is the acceleration's standard
+    deviation, ``noise`` a share of each signal's. ``slack`` is the part of each sensor's power that comes by no
+    modelled path.
     """
     rng = np.random.default_rng(seed)
     n = int(duration_s * RATE_HZ)

@@ -151,7 +151,8 @@ def spectra_of(batch: Batch, model: VehicleModel) -> CrossSpectra:
 
 def weighed(batch: Batch, model: VehicleModel) -> Weighed:
     """A load of the known shape, however badly it fits."""
-    found = weigh(batch, model, known_shape(*model.known_shape))
+    with np.errstate(all="ignore"):  # as the estimator does
+        found = weigh(batch, model, known_shape(*model.known_shape))
     assert not isinstance(found, Why), found
     return found
 
@@ -159,4 +160,5 @@ def weighed(batch: Batch, model: VehicleModel) -> Weighed:
 def estimated(batch: Batch, model: VehicleModel) -> Estimate:
     """A load of the known shape, or why it is refused."""
     blank = Estimate(batch.t_start_ns, batch.t_end_ns, "cross_spectrum")
-    return by_cross_spectrum(batch, model, known_shape(*model.known_shape), blank)
+    with np.errstate(all="ignore"):
+        return by_cross_spectrum(batch, model, known_shape(*model.known_shape), blank)
