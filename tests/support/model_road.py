@@ -1,5 +1,6 @@
 """A vehicle of the model's parameters on a random road, its sensors' signals made in the frequency domain."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -75,20 +76,50 @@ def batch_over_road(
     noise: float = 0.02,
     shaken_mps2: float = 0.8,
     ground: Ground = GROUND,
+    waviness: float = 2.0,
+    slack: float = 0.0,
 ) -> Batch:
-    """Constant speed; ``shaken_mps2`` is the acceleration's standard deviation, ``noise`` a share of each signal's."""
-    rng = np.random.default_rng(seed)
+    """A drive of the vehicle theta (n,) at constant speed; see ``batch_by``."""
     rolls = len(theta) > len(UPRIGHT)
+    loaded = (load.payload_kg, load.front_share, cg_left_m)[: 3 if rolls else 2]
+
+    def paths(freq_hz: F64) -> C128:
+        return paths_of(theta, loaded, freq_hz, 3 if rolls else 2, speed_mps, ground)
+
+    return batch_by(paths, seed, duration_s, speed_mps, noise, shaken_mps2, ground, waviness, slack)
+
+
+def batch_by(
+    paths_at: Callable[[F64], C128],
+    seed: int,
+    duration_s: float = 300.0,
+    speed_mps: float = 14.0,
+    noise: float = 0.02,
+    shaken_mps2: float = 0.8,
+    ground: Ground = GROUND,
+    waviness: float = 2.0,
+    slack: float = 0.0,
+) -> Batch:
+    """Constant speed, over a random road whose density falls as frequency to the power ``waviness``.
+
+    ``paths_at`` gives the readings (p, s, m) per unit of road; ``shaken_mps2`` is the acceleration's standard deviation,
+    ``noise`` a share of each signal's. ``slack`` is the part of each sensor's power that comes by no modelled path.
+    """
+    rng = np.random.default_rng(seed)
     n = int(duration_s * RATE_HZ)
     freq_hz = np.fft.rfftfreq(n, 1.0 / RATE_HZ)[1:]
-    mean, apart = (rng.standard_normal((2, len(freq_hz))) + 1j * rng.standard_normal((2, len(freq_hz)))) / freq_hz
-    loaded = (load.payload_kg, load.front_share, cg_left_m)[: 3 if rolls else 2]
-    paths = paths_of(theta, loaded, freq_hz, 3 if rolls else 2, speed_mps, ground)
+    mean, apart = rng.standard_normal((2, len(freq_hz))) + 1j * rng.standard_normal((2, len(freq_hz)))
+    mean, apart = mean * freq_hz ** (-0.5 * waviness), apart * freq_hz ** (-0.5 * waviness)
+    paths = paths_at(freq_hz)
     later = np.exp(-2j * np.pi * freq_hz * ground.wheelbase_m / speed_mps)
     sensed = (paths[:, 0] + paths[:, 1] * later) * mean
-    if rolls:
+    if paths.shape[1] > 2:
         alike = np.exp(-2.0 * np.pi * freq_hz / speed_mps * ground.half_track_m)
         sensed = sensed + (paths[:, 2] + paths[:, 3] * later) * apart * np.sqrt((1.0 - alike) / (1.0 + alike))
+    if slack:
+        unlike = rng.standard_normal((2, *paths.shape[:1], 2, len(freq_hz)))
+        strength = np.abs(paths[:, :2]) * freq_hz ** (-0.5 * waviness) * slack**0.5
+        sensed = sensed + ((unlike[0] + 1j * unlike[1]) * strength).sum(axis=1)
     sensed = np.pad(sensed * ((freq_hz > 0.5) & (freq_hz < 22.0)), ((0, 0), (1, 0)))
     signals = np.fft.irfft(sensed, n, axis=1)
     signals *= shaken_mps2 / signals[0].std()

@@ -1,0 +1,162 @@
+"""A known vehicle of the model's parameters, its drives, and what known loads teach of it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gateway.calibration.statements import Statement, StatementSource
+from gateway.calibration.vehicle import TaughtDrive, teach
+from gateway.core.cargo import known_shape
+from gateway.core.vehicle import Load, Vehicle
+from gateway.estimate import Estimate
+from gateway.model.car import Ground
+from gateway.model.spectra import CrossSpectra, cross_spectra_of
+from gateway.model.table import INDEX, NAMES, ROWS, covariance_of
+from gateway.model.vehicle import VehicleModel
+from gateway.model.weigh import Weighed, by_cross_spectrum, weigh
+from gateway.records import F64, Batch, Why
+from support.kept import kept
+from support.model_road import VAN, batch_over_road, theta_of
+
+FLAT_VAN = replace(VAN, track_width_m=None, sensor_offset_left_std_m=1e-3)
+"""A vehicle of which nobody stated a width: its roll rate is not used."""
+KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))  # payload (kg), front share (%)
+USUAL_SLACK = 0.03
+UNITS = {
+    "spring_front_npm": 62e3,
+    "spring_rear_npm": 70e3,
+    "spring_slope_front_per_kn": 0.02,
+    "spring_slope_rear_per_kn": 0.04,
+    "damper_front_nspm": 3.9e3,
+    "damper_rear_nspm": 4.1e3,
+    "damper_mount_front_npm": 8e5,
+    "damper_mount_rear_npm": 7e5,
+    "damper_friction_front": 0.0,
+    "damper_friction_rear": 0.0,
+    "spring_friction_front": 0.0,
+    "spring_friction_rear": 0.0,
+    "tyre_front_npm": 3.6e5,
+    "tyre_rear_npm": 3.8e5,
+    "unsprung_front_kg": 82.0,
+    "unsprung_rear_kg": 88.0,
+    "pitch_inertia_kgm2": 2200.0,
+    "payload_gyration_m2": 0.1,
+    "payload_mode_hz": 28.0,
+    "driveline_front_kg": 5.0,
+    "driveline_rear_kg": 10.0,
+    "roll_inertia_kgm2": 480.0,
+    "payload_roll_gyration_m2": 0.12,
+    "anti_roll_front_npm": 24e3,
+    "anti_roll_rear_npm": 9e3,
+    "damper_against_front": 0.9,
+    "damper_against_rear": 1.1,
+    "sensor_left_m": 0.3,
+    "gyro_yaw_rad": 0.02,
+    "empty_left_m": 0.01,
+}
+"""No two axles or sides alike."""
+
+
+def car(*, with_roll: bool = False, **changed: float) -> F64:
+    """The vehicle's vector, with these parameters in the units that end their names."""
+    return theta_of(with_roll=with_roll, **(UNITS | changed))
+
+
+def times(theta: F64, **factors: float) -> F64:
+    """The vector with these positive parameters multiplied."""
+    changed = theta.copy()
+    for name, factor in factors.items():
+        changed[INDEX[name]] += np.log(factor)
+    return changed
+
+
+def left_of(payload_kg: float, left_m: float = 0.0) -> float:
+    """The centre of gravity left of the centre line, with the payload there."""
+    empty_kg = VAN.empty_mass_kg
+    return (empty_kg * UNITS["empty_left_m"] + payload_kg * left_m) / (empty_kg + payload_kg)
+
+
+def drive_of(
+    load: tuple[float, float], seed: int, *, with_roll: bool = False, theta: F64 | None = None, **road: float
+) -> Batch:
+    """A drive with payload (kg) and front share (%), with the slack that the table expects.
+
+    The payload stands on the centre line unless ``road`` says else.
+    """
+    theta = car(with_roll=with_roll) if theta is None else theta
+    batch = batch_over_road(theta, Load(*load), seed, **({"cg_left_m": left_of(load[0]), "slack": USUAL_SLACK} | road))
+    return batch if with_roll else replace(batch, roll_rate_radps=None)
+
+
+def stated(payload_kg: float, share_pct: float, plus_minus_kg: float = 4.0) -> Statement:
+    """A weighed load in a known place on the centre line, as compact as the others."""
+    return Statement(
+        source=StatementSource.KNOWN,
+        payload_kg=payload_kg,
+        payload_plus_minus_kg=plus_minus_kg,
+        front_share_pct=share_pct,
+        left_m=0.0,
+        is_compact=True,
+    )
+
+
+def known_drives(*, with_roll: bool = False, **road: float) -> list[TaughtDrive]:
+    """One for each of KNOWN."""
+    return [
+        TaughtDrive(f"drive {i}", (drive_of(load, 10 * i, with_roll=with_roll, **road),), stated(*load))
+        for i, load in enumerate(KNOWN)
+    ]
+
+
+@kept
+def taught(*, with_roll: bool = False) -> VehicleModel:
+    """By the known loads."""
+    return teach(known_drives(with_roll=with_roll), VAN if with_roll else FLAT_VAN).model
+
+
+def as_if_taught(theta: F64, vehicle: Vehicle = VAN) -> VehicleModel:
+    """As if a fit had ended with these parameters, all as sure as vehicles of one line are alike."""
+    rows = ROWS[: len(theta)]
+    return VehicleModel(
+        empty_mass_kg=vehicle.empty_mass_kg,
+        empty_front_share_pct=vehicle.empty_front_share_pct,
+        wheelbase_m=vehicle.wheelbase_m,
+        band_hz=(1.1, 14.0),
+        n_segment=256,
+        names=NAMES[: len(theta)],
+        parameters=theta,
+        covariance=0.01 * covariance_of(rows, "line") + 1e-10 * np.eye(len(rows)),
+        directions=np.zeros((len(theta), 0)),
+        model_std=(5.0, 0.1, 0.005),
+        spread=(1.0, 1.0, 1.0),
+        misfit_limit=100.0,
+        acceleration_rms_mps2=0.6,
+        pitch_rate_rms_radps=0.03,
+        speed_seen_mps=(10.0, 20.0),
+        taught_loads=tuple(Load(kg, share) for kg in (0.0, 500.0) for share in (38.0, 62.0)),
+        usual_log_amplitude=0.0,
+        track_width_m=vehicle.track_width_m,
+        sensor_left_m=vehicle.sensor_left_m,
+        sensor_left_std_m=vehicle.sensor_left_std_m,
+        least_slack=Ground.of(vehicle, with_roll=len(theta) > len(rows)).least_slack,
+    )
+
+
+def spectra_of(batch: Batch, model: VehicleModel) -> CrossSpectra:
+    """As this vehicle reads them."""
+    found = cross_spectra_of([batch], model.reading)
+    assert found is not None
+    return found
+
+
+def weighed(batch: Batch, model: VehicleModel) -> Weighed:
+    """A load of the known shape, however badly it fits."""
+    found = weigh(batch, model, known_shape(*model.known_shape))
+    assert not isinstance(found, Why), found
+    return found
+
+
+def estimated(batch: Batch, model: VehicleModel) -> Estimate:
+    """A load of the known shape, or why it is refused."""
+    blank = Estimate(batch.t_start_ns, batch.t_end_ns, "cross_spectrum")
+    return by_cross_spectrum(batch, model, known_shape(*model.known_shape), blank)
