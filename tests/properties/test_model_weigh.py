@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.four_wheels import FourWheels
-from support.model_road import BAND_HZ, GROUND, RATE_HZ, VAN, batch_by, theta_of
+from support.model_road import BAND_HZ, GROUND, VAN, batch_by
 from support.taught_van import (
     FLAT_VAN,
-    UNITS,
     as_if_taught,
     car,
     drive_of,
@@ -23,12 +22,11 @@ from support.taught_van import (
 from gateway.calibration.vehicle import teach
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.core.vehicle import Load
-from gateway.model import fit
 from gateway.model import car as equations
-from gateway.model.car import Ground
+from gateway.model import fit
 from gateway.model.sensors import GAIN_STD
 from gateway.model.spectra import CrossSpectra, Reading, cross_spectra_of, level
-from gateway.model.table import INDEX, NAMES, ROWS, N
+from gateway.model.table import INDEX, N
 from gateway.model.vehicle import VehicleModel
 from gateway.model.weigh import EVIDENCE_WITHOUT_ROLL, Mixture, hypotheses_of, mixture_of, posterior_of
 from gateway.model.whittle import Point, Whittle

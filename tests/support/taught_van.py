@@ -109,9 +109,9 @@ def known_drives(*, with_roll: bool = False, **road: float) -> list[TaughtDrive]
 
 
 @kept
-def taught(*, with_roll: bool = False) -> VehicleModel:
+def taught(*, with_roll: bool = False, slack: float = USUAL_SLACK) -> VehicleModel:
     """By the known loads."""
-    return teach(known_drives(with_roll=with_roll), VAN if with_roll else FLAT_VAN).model
+    return teach(known_drives(with_roll=with_roll, slack=slack), VAN if with_roll else FLAT_VAN).model
 
 
 def as_if_taught(theta: F64, vehicle: Vehicle = VAN) -> VehicleModel:
