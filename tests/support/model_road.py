@@ -102,7 +102,7 @@ def batch_by(
 ) -> Batch:
     """Constant speed, over a random road whose density falls as frequency to the power ``waviness``.
 
-    ``paths_at`` gives the readings (p, s, m) per unit of road; ``shaken_mps2`` is the acceleration's standard deviation,
+    ``paths_at`` gives the readings (p, s, m) per unit of road; ``shaken_mps2`` is the deviation of the acceleration,
     ``noise`` a share of each signal's. ``slack`` is the part of each sensor's power that comes by no modelled path.
     """
     rng = np.random.default_rng(seed)
