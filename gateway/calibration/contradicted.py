@@ -1,6 +1,6 @@
 """Contradictions between a drive and the stated facts of the vehicle: its weight, its wheelbase, its model, its sensor.
 
-    contradictions(runs, vehicle, calibration, inherited) -> the doubts, none if all agrees
+    contradictions(runs, vehicle, model, sister) -> the doubts, none if all agrees
 
 A fit takes the stated facts for true, and bends springs and dampers until the drive fits. Their shift, compared with
 its expected size (the prior: of a sister, or of any vehicle), reveals a false fact. With prior N(m, P), posterior N(x,
@@ -21,16 +21,16 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car.known_spectra import known_spectra
-from gateway.calibration.half_car.most_probable_vehicle import fit_half_car
-from gateway.calibration.half_car.prior import Inherited, Prior, prior_of
+from gateway.calibration.as_stated import StatedRun, fitted, stated_runs
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.model.parameters import INDEX, PARAMETERS, upright
+from gateway.calibration.vehicle import Prior
 from gateway.core.late import special
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import unsprung_kg
-from gateway.estimate import Z95
+from gateway.model.fit import Gaussian
+from gateway.model.table import FRONT, INDEX, REAR, N
+from gateway.model.vehicle import VehicleModel
+from gateway.quantity import Z95
 from gateway.records import F64
 from gateway.stated.doubt import Doubt, DoubtKind
 
@@ -43,71 +43,65 @@ LOOKED_STDS: Final = 3.0  # chosen: of the time between the axles; beyond it the
 FREE_SCALE_STD: Final = 0.1  # chosen: of that time, if the wheelbase is in doubt
 LEAST_SCALE: Final = 0.02  # chosen: of a wheelbase; tyres and a receiver's speed explain less
 
-_N: Final = len(PARAMETERS)
+_AXLES: Final = (FRONT, REAR)
 _OF_AXLE: Final = ("spring_{}_npm", "damper_{}_nspm", "damper_mount_{}_npm", "tyre_{}_npm", "unsprung_{}_kg")
-_AXLES: Final = ("front", "rear")
-_BUILT: Final = [INDEX[name.format(axle)] for axle in _AXLES for name in _OF_AXLE] + [INDEX["pitch_inertia_kgm2"]]
-_DELAY: Final = INDEX["delay_scale"]
-_SENSOR: Final = INDEX["sensor_position_m"]
+_INERTIA, _DELAY, _SENSOR = (INDEX[name] for name in ("pitch_inertia_kgm2", "delay_scale", "sensor_position_m"))
+_BUILT: Final = [INDEX[name.format(axle)] for axle in _AXLES for name in _OF_AXLE] + [_INERTIA]
 
 
 @dataclass(frozen=True, slots=True)
 class _Fitted:
-    """A fit and the prior that it started from."""
+    """A fit and the prior that it started from, without roll."""
 
-    prior: Prior
+    prior: Gaussian
     x: F64
     covariance: F64
 
     def amount(self, directions: F64) -> tuple[F64, F64]:
-        """b (k,) of a false fact that moves the parameters along ``directions`` (p, k), and its covariance (k, k)."""
+        """b (k,) of a false fact that moves the parameters along ``directions`` (N, k), and its covariance (k, k)."""
         precision = self.prior.precision
         information = directions.T @ (precision - precision @ self.covariance @ precision) @ directions
         covariance: F64 = np.asarray(np.linalg.inv(information), float)
-        return np.asarray(covariance @ directions.T @ precision @ (self.x - self.prior.mean), float), covariance
+        return np.asarray(covariance @ directions.T @ self.prior.pull(self.x), float), covariance
 
-    def without_prior(self, i: int) -> tuple[float, float]:
-        """Parameter ``i`` from the drive alone, with its standard deviation."""
-        before, after = self.prior.covariance[i, i], self.covariance[i, i]
-        moved = float(before / max(before - after, 1e-9 * before))
-        mean = float(self.prior.mean[i])
-        return mean + (float(self.x[i]) - mean) * moved, sqrt(after * moved)
-
-    def stds_off(self, i: int) -> float:
-        """Distance of parameter ``i`` from its prior, in standard deviations of that distance."""
-        before, after = self.prior.covariance[i, i], self.covariance[i, i]
-        return float((self.x[i] - self.prior.mean[i]) / sqrt(max(before - after, 1e-9 * before)))
+    def alone(self, i: int) -> tuple[float, float, float]:
+        """Parameter ``i`` from the drive alone, its standard deviation, and its distance from the prior in standard
+        deviations of that distance.
+        """
+        direction = np.eye(N)[:, [i]]
+        (off,), ((variance,),) = self.amount(direction)
+        before = 1.0 / self.prior.precision[i, i]
+        return float(self.prior.mean[i] + off), sqrt(max(variance - before, 0.0)), float(off / sqrt(variance))
 
 
 def contradictions(
-    runs: Sequence[KnownRun],
-    vehicle: Vehicle,
-    calibration: CrossSpectrumCalibration,
-    inherited: Inherited | None = None,
+    runs: Sequence[KnownRun], vehicle: Vehicle, model: VehicleModel, sister: VehicleModel | None = None
 ) -> tuple[Doubt, ...]:
-    """Contradictions between the drives of ``calibration`` and the statements of ``vehicle``."""
-    prior = (inherited.prior_of if inherited else prior_of)(vehicle, with_roll=False).upright
-    fitted = _Fitted(prior, upright(calibration.parameters), calibration.covariance[:_N, :_N])
-    found = list(_sensor(fitted, vehicle))
-    if abs(fitted.stds_off(_DELAY)) > LOOKED_STDS:
-        fitted = _with_free_wheelbase(runs, vehicle, inherited, fitted)
-        found += _wheelbase(fitted, vehicle)
-    found += _weight(fitted, vehicle)
-    if inherited is not None and not any(one.kind is not DoubtKind.DRIVEN_SENSOR for one in found):
-        found += _model(fitted)
+    """Contradictions between the drives that taught ``model`` and the statements of ``vehicle``, those of the loads
+    taken for true. ``sister``: the vehicle from which it inherited. None if no load is stated.
+    """
+    known = stated_runs(runs, vehicle, model.reading)
+    if not known:
+        return ()
+    whole = Prior.of_sister(sister, vehicle, with_roll=False) if sister else Prior.of_any(vehicle, with_roll=False)
+    fit = _fit(known, Gaussian.of(whole.mean, whole.covariance), model.parameters[:N])
+    found = list(_sensor(fit, vehicle))
+    if abs(fit.alone(_DELAY)[2]) > LOOKED_STDS:
+        precision = (
+            fit.prior.precision.copy()
+        )  # with the time between the axles free: a wrong wheelbase bends much else
+        precision[_DELAY, _DELAY] = FREE_SCALE_STD**-2.0
+        fit = _fit(known, Gaussian(fit.prior.mean, precision), fit.x)
+        found += _wheelbase(fit, vehicle)
+    found += _weight(fit, vehicle)
+    if sister is not None and not any(one.kind is not DoubtKind.DRIVEN_SENSOR for one in found):
+        found += _model(fit)
     return tuple(found)
 
 
-def _with_free_wheelbase(
-    runs: Sequence[KnownRun], vehicle: Vehicle, inherited: Inherited | None, fitted: _Fitted
-) -> _Fitted:
-    """The fit again, the time between the axles free: a wrong wheelbase bends much else."""
-    precision = fitted.prior.precision.copy()
-    precision[_DELAY, _DELAY] = FREE_SCALE_STD**-2.0
-    prior = Prior(fitted.prior.mean, precision)
-    known = known_spectra(runs, vehicle, with_roll=False, usual=inherited.usual if inherited else None)
-    found = fit_half_car(known, prior, fitted.x)
-    return _Fitted(prior, found.x, found.covariance)
+def _fit(known: Sequence[StatedRun], prior: Gaussian, start: F64) -> _Fitted:
+    found = fitted(known, prior, start)
+    return _Fitted(prior, found.common, found.covariance)
 
 
 def _wheelbase(free: _Fitted, vehicle: Vehicle) -> Iterator[Doubt]:
@@ -117,47 +111,35 @@ def _wheelbase(free: _Fitted, vehicle: Vehicle) -> Iterator[Doubt]:
         yield Doubt.of(DoubtKind.DRIVEN_WHEELBASE, found_m=found_m, within_m=Z95 * said_m * std, said_m=said_m)
 
 
-def _sensor(fitted: _Fitted, vehicle: Vehicle) -> Iterator[Doubt]:
-    if abs(fitted.stds_off(_SENSOR)) > DOUBTED_STDS:
-        found_m, std_m = fitted.without_prior(_SENSOR)
+def _sensor(fit: _Fitted, vehicle: Vehicle) -> Iterator[Doubt]:
+    found_m, std_m, stds_off = fit.alone(_SENSOR)
+    if abs(stds_off) > DOUBTED_STDS:
         yield Doubt.of(DoubtKind.DRIVEN_SENSOR, found_m=found_m, within_m=Z95 * std_m, said_m=vehicle.sensor_position_m)
 
 
-def _weight(fitted: _Fitted, vehicle: Vehicle) -> Iterator[Doubt]:
+def _weight(fit: _Fitted, vehicle: Vehicle) -> Iterator[Doubt]:
     """Both axles together: a load aboard, wrong or exchanged weights, pounds."""
-    off, covariance = fitted.amount(_axle_directions(vehicle))
+    directions, share = np.zeros((N, len(_AXLES))), vehicle.empty_front_share
+    for column, axle in enumerate(_AXLES):
+        directions[[INDEX[name.format(axle)] for name in _OF_AXLE], column] = -1.0
+    directions[_INERTIA] = (-share, share - 1.0)
+    off, covariance = fit.amount(directions)
     covariance = covariance + STATED_STD**2 * np.eye(len(_AXLES))
     if off @ np.linalg.solve(covariance, off) <= special.chdtri(len(_AXLES), SELDOM):
         return
-    shares = (vehicle.empty_front_share, 1.0 - vehicle.empty_front_share)
     unsprung = np.nan_to_num(unsprung_kg(vehicle))  # nobody stated them: the weights are of what is sprung
-    said = [share * vehicle.empty_mass_kg + kg for share, kg in zip(shares, unsprung, strict=True)]
-    front, rear = (
-        (share * vehicle.empty_mass_kg * exp(log) + kg, share * vehicle.empty_mass_kg * exp(log) * sqrt(variance))
-        for share, kg, log, variance in zip(shares, unsprung, off, np.diag(covariance), strict=True)
-    )
-    yield Doubt.of(
-        DoubtKind.DRIVEN_WEIGHT,
-        front_kg=front[0],
-        front_95_kg=Z95 * front[1],
-        rear_kg=rear[0],
-        rear_95_kg=Z95 * rear[1],
-        said_front_kg=said[0],
-        said_rear_kg=said[1],
-    )
+    numbers = {}
+    for axle, sprung_kg, kg, log, variance in zip(
+        _AXLES, np.array([share, 1.0 - share]) * vehicle.empty_mass_kg, unsprung, off, np.diag(covariance), strict=True
+    ):
+        numbers[f"{axle}_kg"] = sprung_kg * exp(log) + kg
+        numbers[f"{axle}_95_kg"] = Z95 * sprung_kg * exp(log) * sqrt(variance)
+        numbers[f"said_{axle}_kg"] = sprung_kg + kg
+    yield Doubt.of(DoubtKind.DRIVEN_WEIGHT, **numbers)
 
 
-def _axle_directions(vehicle: Vehicle) -> F64:
-    """(p, 2) apparent change of the parameters if front and rear axle carry more than was stated."""
-    directions = np.zeros((_N, len(_AXLES)))
-    for column, axle in enumerate(_AXLES):
-        directions[[INDEX[name.format(axle)] for name in _OF_AXLE], column] = -1.0
-    directions[INDEX["pitch_inertia_kgm2"]] = (-vehicle.empty_front_share, vehicle.empty_front_share - 1.0)
-    return directions
-
-
-def _model(fitted: _Fitted) -> Iterator[Doubt]:
+def _model(fit: _Fitted) -> Iterator[Doubt]:
     """Whether it is of its sister's model at all: all figures that such vehicles share, each by itself."""
-    off, covariance = fitted.amount(np.eye(_N)[:, _BUILT])
+    off, covariance = fit.amount(np.eye(N)[:, _BUILT])
     if off @ np.linalg.solve(SISTERS_DIFFER * covariance, off) > special.chdtri(len(_BUILT), SELDOM_SISTER):
         yield Doubt.of(DoubtKind.DRIVEN_SISTER)

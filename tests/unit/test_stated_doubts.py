@@ -1,18 +1,20 @@
 """Answers that are unlikely, or that a drive contradicts: asked about, with what was probably meant."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import pytest
 from support.half_car_road import CAR, VAN
-from support.known_runs import SIBLING, calibrated_on_loads, known_run
+from support.known_runs import LOADS, SIBLING, known_run
 
 from gateway.calibration.commissioning.answers import doubts_of
 from gateway.calibration.contradicted import contradictions
-from gateway.calibration.half_car.fit import fit_cross_spectrum
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.sister import Sister
+from gateway.calibration.statements import Statement
+from gateway.calibration.vehicle import TaughtDrive, teach
 from gateway.core.vehicle import Vehicle
+from gateway.model.vehicle import VehicleModel
 from gateway.stated.doubt import Doubt, DoubtKind, meant_by
 from gateway.stated.facts import VehicleAnswers
 
@@ -143,9 +145,22 @@ OTHER_MODEL = replace(
 )
 
 
+def taught_by(runs: Sequence[KnownRun], vehicle: Vehicle, sister: VehicleModel | None = None) -> VehicleModel:
+    """The vehicle that these runs teach, their loads as stated."""
+    drives = [
+        TaughtDrive(
+            str(run.number),
+            run.batches,
+            Statement(payload_kg=run.payload_kg, front_share_pct=run.front_share_pct, is_compact=True),
+        )
+        for run in runs
+    ]
+    return teach(drives, vehicle, sister).model
+
+
 @pytest.fixture(scope="module")
-def sister() -> Sister:
-    return Sister("a", VAN, calibrated_on_loads(seed=1))
+def sister() -> VehicleModel:
+    return taught_by([known_run(i, *load, seed=1) for i, load in enumerate(LOADS)], VAN)
 
 
 @pytest.fixture(scope="module")
@@ -157,50 +172,47 @@ def said_empty(run: KnownRun, vehicle: Vehicle) -> KnownRun:
     return replace(run, payload_kg=0.0, front_share_pct=vehicle.empty_front_share_pct)
 
 
-def doubted(run: KnownRun, sister: Sister | None, **false: Any) -> tuple[Doubt, ...]:
+def doubted(run: KnownRun, sister: VehicleModel | None, **false: Any) -> tuple[Doubt, ...]:
     vehicle = replace(VAN, **false)
     claimed = said_empty(run, vehicle)
-    known = None if sister is None else replace(sister, vehicle=vehicle)
-    return contradictions(
-        [claimed], vehicle, fit_cross_spectrum([claimed], vehicle, inherited=known).calibration, known
-    )
+    return contradictions([claimed], vehicle, taught_by([claimed], vehicle, sister), sister)
 
 
 def kinds(doubts: tuple[Doubt, ...]) -> list[DoubtKind]:
     return [one.kind for one in doubts]
 
 
-def test_true_facts_are_not_doubted(sister: Sister, empty: KnownRun) -> None:
+def test_true_facts_are_not_doubted(sister: VehicleModel, empty: KnownRun) -> None:
     assert doubted(empty, sister) == ()
     assert doubted(empty, None) == ()
 
 
-def test_a_load_aboard_is_weighed_by_the_sister(sister: Sister) -> None:
+def test_a_load_aboard_is_weighed_by_the_sister(sister: VehicleModel) -> None:
     (doubt,) = doubted(known_run(1, 300.0, 2.0, seed=8, car=SIBLING), sister)
     assert doubt.kind is DoubtKind.DRIVEN_WEIGHT
     gross_kg = doubt.numbers["front_kg"] + doubt.numbers["rear_kg"]
     assert gross_kg == pytest.approx(VAN.empty_mass_kg + 300.0, abs=90.0)
 
 
-def test_weights_of_another_vehicle_are_doubted(sister: Sister, empty: KnownRun) -> None:
+def test_weights_of_another_vehicle_are_doubted(sister: VehicleModel, empty: KnownRun) -> None:
     assert kinds(doubted(empty, sister, empty_front_share_pct=40.0)) == [DoubtKind.DRIVEN_WEIGHT]
     assert kinds(doubted(empty, sister, empty_mass_kg=1000.0)) == [DoubtKind.DRIVEN_WEIGHT]
 
 
 @pytest.mark.parametrize("factor", [0.93, 1.07])
-def test_a_wrong_wheelbase_is_measured(sister: Sister, empty: KnownRun, factor: float) -> None:
+def test_a_wrong_wheelbase_is_measured(sister: VehicleModel, empty: KnownRun, factor: float) -> None:
     found = {one.kind: one for one in doubted(empty, sister, wheelbase_m=factor * VAN.wheelbase_m)}
     measured = found[DoubtKind.DRIVEN_WHEELBASE].numbers
     assert measured["found_m"] == pytest.approx(VAN.wheelbase_m, abs=0.06)
 
 
-def test_a_sensor_elsewhere_is_found(sister: Sister, empty: KnownRun) -> None:
+def test_a_sensor_elsewhere_is_found(sister: VehicleModel, empty: KnownRun) -> None:
     for known in (sister, None):
         (doubt,) = doubted(empty, known, sensor_position_m=2.4)
         assert doubt.kind is DoubtKind.DRIVEN_SENSOR
         assert doubt.numbers["found_m"] == pytest.approx(VAN.sensor_position_m, abs=0.1)
 
 
-def test_another_model_is_told_from_its_sister(sister: Sister) -> None:
+def test_another_model_is_told_from_its_sister(sister: VehicleModel) -> None:
     found = kinds(doubted(known_run(1, 0.0, None, seed=9, car=OTHER_MODEL), sister))
     assert set(found) & {DoubtKind.DRIVEN_SISTER, DoubtKind.DRIVEN_WEIGHT}
