@@ -181,11 +181,6 @@ def _default(field: FieldInfo) -> str:
 # -- the schema of a calibration file --
 
 DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
-_ID: Final[dict[str, str]] = {
-    "type": "string",
-    "pattern": "^sha256:[0-9a-f]{64}$",
-    "description": "sha256 of the canonical JSON (keys sorted, no spaces, ASCII) of everything but this id",
-}
 
 
 class _WithoutFieldTitles(GenerateJsonSchema):
@@ -203,10 +198,8 @@ def calibration_schema() -> dict[str, Any]:
         "$schema": DIALECT,
         **model,
         "title": "Springscale calibration file",
-        "description": "What known-load drives taught of one vehicle. Units stand at the end of a name, "
-        "unknown is null. Written by the tool, never by hand: the id is the hash of the content.",
-        "properties": {"id": _ID, **model["properties"]},
-        "required": ["id", *model["required"]],
+        "description": "What drives taught of one vehicle. Units stand at the end of a name, "
+        "unknown is null. Written by the tool, never by hand; its id is the sha256 of the file's bytes.",
     }
 
 

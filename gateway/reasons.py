@@ -191,12 +191,6 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             "make sure that the calibration is this vehicle's; look for a changed tyre, spring or sensor mount; "
             "calibrate again",
         ),
-        Why.SOFT_LOAD: Explanation(
-            Cause.ANSWER,
-            "a heavy part of the load swings on a soft support behind the rear axle, as bicycles on a tow bar do; the "
-            "vehicle does not feel its whole weight",
-            "fasten the carrier so that it does not swing, or take it off",
-        ),
         Why.NO_SOLUTION: Explanation(
             Cause.ANSWER,
             "the search for the load did not settle, or its numbers broke down",

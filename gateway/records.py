@@ -101,7 +101,6 @@ class Why(StrEnum):
     SENSOR_NOISY = "sensor_noisy"
     WRONG_SIGN = "wrong_sign"
     LOAD_CHANGED = "load_changed"
-    SOFT_LOAD = "soft_load"
 
 
 @dataclass(frozen=True, slots=True)

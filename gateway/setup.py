@@ -7,13 +7,13 @@ from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.calibration.known_weights_file import load_known_weights
 from gateway.config import Settings
-from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.flow import Flow, Identity
 from gateway.core.known_weights import Knowledge
 from gateway.core.settings import BatchSettings
 from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError
 from gateway.toml_file import Read
+from gateway.weighing.calibrated import CalibratedVehicle
+from gateway.weighing.flow import Flow, Identity
 
 NO_OTHER = Limits()  # than the calibration's
 NOBODY = Identity()  # a log without a configuration belongs to no named vehicle

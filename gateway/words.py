@@ -1,5 +1,6 @@
 """Numbers with their units and nouns, names, and texts in sections, for people."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
@@ -27,6 +28,11 @@ def in_sections(head: Sequence[str], sections: Mapping[str, Iterable[str]]) -> s
 def decimal(number: float | None, unit: str = "", digits: int = 2) -> str:
     """A number with so many digits after the point; a dash for None."""
     return NONE if number is None else f"{number:.{digits}f}{unit}"
+
+
+def known(number: float | None, unit: str = "", form: str = "g") -> str:
+    """A number in this format; a dash if nobody knows it: None or NaN."""
+    return NONE if number is None or math.isnan(number) else f"{number:{form}}{unit}"
 
 
 def percent(share: float | None) -> str:

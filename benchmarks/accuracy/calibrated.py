@@ -2,12 +2,19 @@
 
 from collections.abc import Sequence
 
-from gateway.calibration.half_car.fit import calibrate_cross_spectrum
+from gateway.calibration.calibrate import drive_name
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.ratio_index.fit import fit_ratio_index
-from gateway.core.calibrated import CalibratedVehicle
+from gateway.calibration.vehicle import TaughtDrive, teach
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
+from gateway.model.vehicle import VehicleModel
+from gateway.weighing.calibrated import CalibratedVehicle
+
+
+def taught_by(runs: Sequence[KnownRun], vehicle: Vehicle) -> VehicleModel:
+    """The vehicle that these runs teach. Raises CalibrationImpossibleError if they allow none."""
+    return teach([TaughtDrive(drive_name(run.number), run.batches, run.statement) for run in runs], vehicle).model
 
 
 def calibrated_on(runs: Sequence[KnownRun], vehicle: Vehicle, estimator: str) -> CalibratedVehicle:
@@ -24,6 +31,6 @@ def calibrated_on(runs: Sequence[KnownRun], vehicle: Vehicle, estimator: str) ->
         payload_seen_kg=(min(payloads_kg), max(payloads_kg)),
         front_share_seen_pct=(min(shares_pct), max(shares_pct)),
         ratio_index=fit_ratio_index(runs, vehicle).calibration if is_ratio_index else None,
-        cross_spectrum=None if is_ratio_index else calibrate_cross_spectrum(runs, vehicle),
+        cross_spectrum=None if is_ratio_index else taught_by(runs, vehicle),
         sensor_rate_seen_hz=sensor_rate_seen_hz(with_batches),
     )

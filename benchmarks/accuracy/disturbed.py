@@ -279,7 +279,7 @@ DISTURBANCES: Final[Mapping[str, Disturbance]] = MappingProxyType(
             Disturbance(
                 "60 kg more on a soft tow bar",
                 world=_on_tow_bar(resonance_hz=3.0, damping_ratio=0.1),
-                reasons=(*_BEYOND, Why.SOFT_LOAD),
+                reasons=_BEYOND,
             ),
             Disturbance("load beyond the calibrated", is_overloaded=True, reasons=_BEYOND),
         )

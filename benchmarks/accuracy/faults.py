@@ -5,6 +5,7 @@
 Every log is rewritten with every fault (faulty_logs) and weighed as `springscale estimate` does.
 """
 
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -149,7 +150,8 @@ def _weighed(drives: Drives, run: RunTable, fault: Fault, rng: np.random.Generat
         rewritten = Path(folder) / "can.log"
         write_candump(fault.rewrite(log, rng).frames, setup.signal_map.channel or "can0", rewritten)
         found = [one for one in estimates_of_logs([rewritten], setup) if Why.TOO_SHORT not in one.rejected]
-    batches = tuple(_judged(one, run.payload_kg, campaign.front_share_pct(run)) for one in found)
+    payload_kg = math.nan if run.payload_kg is None else run.payload_kg
+    batches = tuple(_judged(one, payload_kg, campaign.front_share_pct(run)) for one in found)
     return Case(time.process_time() - begun_s, batches)
 
 

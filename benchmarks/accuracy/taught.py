@@ -54,17 +54,6 @@ def whole(first: Sequence[KnownRun], last: Sequence[KnownRun]) -> list[KnownRun]
     return [replace(one, batches=(*one.batches, *other.batches)) for one, other in zip(first, last, strict=True)]
 
 
-def known(run: KnownRun) -> Statement:
-    """The load of a calibration drive, as weighed and placed."""
-    return Statement(
-        source=StatementSource.KNOWN,
-        payload_kg=run.payload_kg,
-        front_share_pct=run.front_share_pct,
-        left_m=run.payload_left_m,
-        is_compact=True,
-    )
-
-
 def note(run: KnownRun, span_kg: float, rng: np.random.Generator) -> Statement:
     """A delivery note: kilograms with an error, and no place."""
     plus_minus_kg = NOTE_PLUS_MINUS * span_kg
@@ -119,7 +108,7 @@ def on_known_loads(data: Path) -> None:
     for name, tests in KNOWN_AND_TESTS.items():
         vehicle, first, last = runs_of(data / name)
         span_kg = vehicle.payload_range_kg[1] - vehicle.payload_range_kg[0]
-        model = taught(first, [known(run) for run in first], vehicle)
+        model = taught(first, [run.statement for run in first], vehicle)
         print(row(f"{name}, last thirds", *weighed(last, model, vehicle), span_kg), flush=True)
         for test in tests:
             _, *both = runs_of(data / test)
@@ -134,7 +123,7 @@ def on_ordinary_drives(data: Path, n_splits: int) -> None:
         drives = whole(*parts)
         span_kg = vehicle.payload_range_kg[1] - vehicle.payload_range_kg[0]
         rng = np.random.default_rng(SEED)
-        by_known = taught(steady, [known(run) for run in steady], vehicle)
+        by_known = taught(steady, [run.statement for run in steady], vehicle)
         rows: dict[str, list[F64]] = {"ten known loads": [], "nothing said": [], "delivery notes": []}
         refused: dict[str, Counter[str]] = {kind: Counter() for kind in rows}
         for _ in range(n_splits):

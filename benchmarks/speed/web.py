@@ -26,7 +26,6 @@ from benchmarks.speed import live
 from benchmarks.speed.meter import command_of, free_port
 from gateway.bus.live.source import LiveSource, opener_of
 from gateway.bus.signals import Decoder, load_signal_map
-from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
@@ -38,6 +37,7 @@ from gateway.units import NS_PER_S
 from gateway.web.access.serving import server_config
 from gateway.web.app import create_app
 from gateway.web.live.board import Board
+from gateway.weighing.flow import Flow, Identity
 
 LATEST = b"GET /api/v1/estimates/latest HTTP/1.1\r\nHost: localhost\r\n\r\n"
 STREAM = b"GET /api/v1/stream HTTP/1.1\r\nHost: localhost\r\n\r\n"

@@ -22,14 +22,14 @@ from gateway.calibration.commissioning.job import JOB, RESULT, Drive, Job, Resul
 from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of, packed
 from gateway.config import ESTIMATOR_NAMES
 from gateway.config.sections import CommissioningSection
-from gateway.core.estimator import estimate
-from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.estimate import Estimate
 from gateway.offline.campaigns import batches_of_motion, read_whole_log
 from gateway.records import Batch, Motion
 from gateway.setup import load_setup
 from gateway.toml_file import checked, read_toml
+from gateway.weighing.estimator import estimate
+from gateway.weighing.flow import Flow, Identity
 from gateway.workbench.simulate import demo_drive, frames_of
 
 PROGRAM: Final = (sys.executable, "-m", "gateway.calibration.commissioning.work")

@@ -24,22 +24,16 @@ SCHEMA_VERSION: Final = 1  # of the columns
 
 DIAGNOSTICS: Final[Mapping[str, str]] = {
     "reach": "distance of the load beyond the known ones, in parts of the empty sprung mass; 0 among them",
-    "misfit": "likelihood ratio per degree of freedom against free matrices: about 1 if the model fits",
+    "misfit": "likelihood ratio against free matrices, over what chance gives: about 1 if the model fits",
     "n_segments": "segments that were averaged",
     "amplitude_ratio": "movement of the vehicle, relative to the usual one in calibration",
     "damper_front_ratio": "front dampers' rate over the calibrated",
     "damper_rear_ratio": "rear dampers' rate over the calibrated",
-    "damper_front_freed_ratio": "front dampers' rate over the calibrated, if the search is free to find worn ones",
-    "damper_rear_freed_ratio": "the same for the rear dampers",
     "delay_scale": "relative delay of the rear axle beyond wheelbase and speed",
-    "tension": "deviation of the vehicle from its calibration: chi-squared of five; refused above 25.7",
-    "sensor_position_score": "pull to another place or gain of the sensor, in standard deviations; refused beyond 6",
-    "sensor_noise_score": "slope towards more noise in the acceleration, as roll makes it, in the same unit; refused "
-    "above 6",
-    "soft_mass_score": "slope towards a mass on a soft support behind the rear axle, in the same unit; refused above 5 "
-    "if it weighs more than 10 kg",
-    "soft_mass_kg": "that mass, as one step of the search finds it",
-    "soft_mass_hz": "the frequency at which it swings",
+    "tension": "deviation of the vehicle from its calibration: chi-squared of its parameters; refused above 60",
+    "sensor_position_deviation": "of the sensor's place from the calibrated one, in standard deviations; refused "
+    "beyond 6",
+    "sensor_noise_deviation": "of the accelerometer's noise, as roll makes it, in the same unit; refused above 6",
     "noise_acceleration_ratio": "noise of the accelerometer from 16.5 to 20 Hz relative to the greatest expected: "
     "from 2 on the model includes it",
     "noise_pitch_rate_ratio": "the same for the pitch rate",
@@ -47,7 +41,7 @@ DIAGNOSTICS: Final[Mapping[str, str]] = {
     "gyro_gain_ratio": "gain of the gyro over that in calibration, measured in bends; refused beyond 3.5 standard "
     "deviations from 1",
     "gyro_gain_ratio_std": "its standard deviation",
-    "payload_gyration_m2": "squared radius of gyration in pitch of the load, as the fit began with it",
+    "payload_gyration_m2": "squared radius of gyration in pitch of the load",
     "payload_mode_hz": "frequency at which the payload rings on its floor",
     "payload_damping_ratio": "damping of its floor or mount, relative to critical",
     "delay_s": "mean time from axle to axle",

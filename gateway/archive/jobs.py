@@ -23,12 +23,12 @@ from gateway.archive.places import Location
 from gateway.archive.receipts import Slot
 from gateway.archive.survey import Facts, LogFile, SurveyedLog
 from gateway.calibration.known_weights_file import KnownWeights
-from gateway.core.flow import Identity
 from gateway.core.known_weights import Knowledge
 from gateway.core.settings import BatchSettings
 from gateway.records import ns_of
 from gateway.setup import Setup
 from gateway.units import NS_PER_S
+from gateway.weighing.flow import Identity
 
 PACKAGE: Final = Path(__file__).parents[1]
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 
@@ -11,18 +11,20 @@ import numpy as np
 from gateway.calibration.campaign import Campaign, file_sha256
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.file.calibration_file import CalibrationFile
-from gateway.calibration.file.parts import ExpectedErrorsPart, ProvenancePart, RunPart, SeenPart
-from gateway.calibration.half_car.fit import CrossSpectrumFit, fit_cross_spectrum
-from gateway.calibration.inheritance import Seen
+from gateway.calibration.file.parts import DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
 from gateway.calibration.inspection.campaign import Inspection
-from gateway.calibration.inspection.finding import Kind, Severity
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
-from gateway.calibration.sister import Sister, sister_of
+from gateway.calibration.sister import require_alike, sister_in
+from gateway.calibration.vehicle import FoundLoad, Taught, TaughtDrive, teach
 from gateway.core.spectrum import roughness_mps2, spectra_of
+from gateway.core.vehicle import Load
 from gateway.errors import CalibrationImpossibleError
+from gateway.model.vehicle import VehicleModel
+from gateway.quantity import Z95
 from gateway.records import F64, Batch
 from gateway.stated.doubt import Doubt
 
@@ -39,7 +41,7 @@ class Outcome:
     file: CalibrationFile
     inspection: Inspection
     ratio_index: RatioIndexFit | None = None
-    cross_spectrum: CrossSpectrumFit | None = None
+    cross_spectrum: Taught | None = None
     doubts: tuple[Doubt, ...] = ()
 
     @property
@@ -68,26 +70,27 @@ def calibrate_inspected(
     """
     if inspection.refusal is not None:
         raise CalibrationImpossibleError(_refused(campaign, inspection, inspection.refusal))
-    sister = sister_of(like) if like else None
-    if sister is not None:
+    sister = None
+    if like is not None:
+        sister = sister_in(like)
+        require_alike(like.vehicle, campaign.vehicle)
         inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)
     split = inspection.usable
     runs = [one.identification for one in split]
     counted = [batch for run in runs for batch in run.batches if not batch.rejected]
     ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, sister, bands, on_fit)
-    doubts = (
-        contradictions(runs, campaign.vehicle, cross_spectrum.calibration, inherited=sister) if cross_spectrum else ()
-    )
+    doubts = contradictions(runs, campaign.vehicle, cross_spectrum.model, sister) if cross_spectrum else ()
+    inspection = _with_disagreements(inspection, runs, cross_spectrum)
     warnings += [f"{one.kind}: {one.sentence}" for one in doubts]
     file = CalibrationFile(
         vehicle=campaign.vehicle,
-        seen=_seen(runs, counted, sister.seen if sister and cross_spectrum else None),
-        cross_spectrum=cross_spectrum.calibration if cross_spectrum else None,
+        seen=_seen(runs, counted, cross_spectrum),
+        cross_spectrum=cross_spectrum.model if cross_spectrum else None,
         ratio_index=ratio_index.calibration if ratio_index else None,
-        sister_id=sister.id if sister and cross_spectrum else None,
-        expected_errors=_expected_errors(ratio_index=ratio_index, cross_spectrum=cross_spectrum),
+        sister_id=like.id if like and cross_spectrum else None,
+        expected_errors=_expected_errors(ratio_index, cross_spectrum),
         warnings=(*inspection.warnings, *warnings),
-        provenance=_provenance(campaign, split, command),
+        provenance=_provenance(campaign, split, cross_spectrum, command),
     )
     return Outcome(file, inspection, ratio_index, cross_spectrum, doubts)
 
@@ -96,22 +99,26 @@ def _fit(
     estimators: Sequence[str],
     runs: Sequence[KnownRun],
     campaign: Campaign,
-    sister: Sister | None,
+    sister: VehicleModel | None,
     bands: BandChoice,
     on_fit: OnFit,
-) -> tuple[RatioIndexFit | None, CrossSpectrumFit | None, list[str]]:
+) -> tuple[RatioIndexFit | None, Taught | None, list[str]]:
     """The result of each named estimator, and a warning for each that these runs do not determine."""
     ratio_index: RatioIndexFit | None = None
-    cross_spectrum: CrossSpectrumFit | None = None
+    cross_spectrum: Taught | None = None
     warnings: list[str] = []
     for name in estimators:
         progress = partial(on_fit, name)
         try:
             if name == "ratio_index":
-                ratio_index = fit_ratio_index(runs, campaign.vehicle, bands=bands, progress=progress)
+                known = [run for run in runs if run.has_payload and run.has_place]
+                if not known:
+                    raise CalibrationImpossibleError("no run has a known payload and place")
+                ratio_index = fit_ratio_index(known, campaign.vehicle, bands=bands, progress=progress)
             else:
-                cross_spectrum = fit_cross_spectrum(runs, campaign.vehicle, progress, sister)
-                warnings.extend(cross_spectrum.calibration.warnings)
+                drives = [TaughtDrive(drive_name(run.number), run.batches, run.statement) for run in runs]
+                cross_spectrum = teach(drives, campaign.vehicle, sister, progress)
+                warnings.extend(cross_spectrum.model.warnings)
         except CalibrationImpossibleError as fault:
             warnings.append(f"{name}: {fault}")
     if ratio_index is None and cross_spectrum is None:
@@ -130,60 +137,109 @@ def _refused(campaign: Campaign, inspection: Inspection, why: str) -> str:
     return "\n".join([f"{campaign.path}: {why}", *dict.fromkeys(faults)])
 
 
-def _seen(runs: Sequence[KnownRun], counted: Sequence[Batch], of_sister: Seen | None) -> SeenPart:
-    """The ranges covered by the runs with a batch, and by those of its sister."""
+def drive_name(number: int) -> str:
+    """The name by which a fit knows a run."""
+    return f"run {number}"
+
+
+def _found(runs: Sequence[KnownRun], taught: Taught | None) -> dict[int, FoundLoad]:
+    """What the fit found of each run's load, by number."""
+    by_name = {one.name: one for one in taught.loads} if taught else {}
+    return {run.number: by_name[name] for run in runs if (name := drive_name(run.number)) in by_name}
+
+
+def _with_disagreements(inspection: Inspection, runs: Sequence[KnownRun], taught: Taught | None) -> Inspection:
+    """With a warning for each run whose statement the fit held, because its drive contradicts it beyond chance."""
+    found = _found(runs, taught)
+    verdicts = []
+    for verdict in inspection.verdicts:
+        one = found.get(verdict.number)
+        is_told = any(finding.kind is Kind.LOAD_DISAGREES for finding in verdict.findings)
+        if one is not None and one.is_held and not is_told:
+            said = next(run for run in runs if run.number == verdict.number)
+            text = (
+                f"the campaign says {said.described}, the drive shows {one.load.payload_kg:.0f} ± "
+                f"{Z95 * one.payload_std_kg:.0f} kg; the statement taught nothing"
+            )
+            told = replace(verdict, findings=(*verdict.findings, Finding.of(Kind.LOAD_DISAGREES, text)))
+            verdicts.append(told)
+        else:
+            verdicts.append(verdict)
+    return replace(inspection, verdicts=tuple(verdicts))
+
+
+def _seen(runs: Sequence[KnownRun], counted: Sequence[Batch], taught: Taught | None) -> SeenPart:
+    """The ranges covered by the runs with a batch, and by those of its sister; unknown loads as the fit found them."""
     driven = [run for run in runs if any(not batch.rejected for batch in run.batches)]
+    loads = [run.load for run in driven]
+    speeds_mps = [batch.mean_speed_mps for batch in counted]
+    if taught is not None:
+        found = _found(driven, taught)
+        of_sister = taught.model.taught_loads[: -len(taught.loads)]
+        loads = [*of_sister, *(_known_or_found(run, found.get(run.number)) for run in driven)]
+        speeds_mps = [*speeds_mps, *taught.model.speed_seen_mps]
     return SeenPart(
-        payload_kg=_span([*(run.payload_kg for run in driven), *(of_sister.payload_seen_kg if of_sister else ())]),
-        front_share_pct=_span(
-            [*(run.front_share_pct for run in driven), *(of_sister.front_share_seen_pct if of_sister else ())]
-        ),
-        speed_mps=_span([*(b.mean_speed_mps for b in counted), *(of_sister.speed_seen_mps if of_sister else ())]),
+        payload_kg=_span([load.payload_kg for load in loads]),
+        front_share_pct=_span([load.front_share_pct for load in loads]),
+        speed_mps=_span(speeds_mps),
         roughness_mps2=_roughness_span(counted),
         sensor_rate_hz=sensor_rate_seen_hz(runs),
     )
 
 
+def _known_or_found(run: KnownRun, found: FoundLoad | None) -> Load:
+    if found is None or (run.has_payload and run.has_place and not found.is_held):
+        return run.load
+    return found.load
+
+
 def _span(numbers: Sequence[float]) -> tuple[float, float]:
-    return min(numbers), max(numbers)
+    """The least and the largest of those that are known."""
+    known = [one for one in numbers if math.isfinite(one)]
+    return min(known), max(known)
 
 
 def _roughness_span(batches: Sequence[Batch]) -> tuple[float, float] | None:
     """None if no batch has an unbroken stretch for a spectrum."""
     roughness = [roughness_mps2(spectra_of(batch), batch.mean_speed_mps) for batch in batches]
-    known = [one for one in roughness if math.isfinite(one)]
-    return _span(known) if known else None
+    return _span(roughness) if any(math.isfinite(one) for one in roughness) else None
 
 
-def _expected_errors(**fits: RatioIndexFit | CrossSpectrumFit | None) -> dict[str, ExpectedErrorsPart]:
-    return {
-        name: ExpectedErrorsPart(
-            payload_rms_kg=_rms(fit.payload_errors_kg), front_share_rms_pct=_rms(fit.front_share_errors_pct)
-        )
-        for name, fit in fits.items()
-        if fit is not None
-    }
+def _expected_errors(ratio_index: RatioIndexFit | None, taught: Taught | None) -> dict[str, ExpectedErrorsPart]:
+    errors: dict[str, ExpectedErrorsPart] = {}
+    if ratio_index is not None:
+        errors["ratio_index"] = _rms_of(ratio_index.payload_errors_kg, ratio_index.front_share_errors_pct)
+    if taught is not None:
+        rows = np.array([one.error[:2] for one in taught.errors]).reshape(-1, 2)
+        errors["cross_spectrum"] = _rms_of(rows[:, 0], rows[:, 1])
+    return errors
+
+
+def _rms_of(payload_kg: F64 | None, front_share_pct: F64 | None) -> ExpectedErrorsPart:
+    return ExpectedErrorsPart(payload_rms_kg=_rms(payload_kg), front_share_rms_pct=_rms(front_share_pct))
 
 
 def _rms(errors: F64 | None) -> float | None:
-    return None if errors is None else float(np.sqrt(np.mean(errors**2)))
+    known = np.empty(0) if errors is None else errors[np.isfinite(errors)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else None
 
 
-def _provenance(campaign: Campaign, split: Sequence[SplitRun], command: str) -> ProvenancePart:
+def _provenance(campaign: Campaign, split: Sequence[SplitRun], taught: Taught | None, command: str) -> ProvenancePart:
+    found = _found([one.identification for one in split], taught)
     return ProvenancePart(
         software=f"springscale {version('springscale')}",
         command=command,
         campaign_sha256=file_sha256(campaign.path),
-        runs=tuple(
-            RunPart(
-                number=one.identification.number,
-                log=one.identification.name,
+        drives=tuple(
+            DrivePart(
+                number=run.number,
+                log=run.name,
                 sha256=one.log.sha256,
-                payload_kg=one.identification.payload_kg,
-                front_share_pct=one.identification.front_share_pct,
-                payload_left_m=one.identification.payload_left_m,
-                n_batches=len([batch for batch in one.identification.batches if not batch.rejected]),
+                n_batches=len([batch for batch in run.batches if not batch.rejected]),
+                statement=run.statement,
+                found=FoundPart.of(found[run.number]) if run.number in found else None,
             )
             for one in split
+            if (run := one.identification)
         ),
     )

@@ -1,6 +1,7 @@
-"""The campaign file: which known-load drives were recorded, with which vehicle."""
+"""The campaign file: which drives were recorded, with which vehicle and load."""
 
 import hashlib
+import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -8,8 +9,14 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gateway.calibration.axle_weights import AxleWeights, sprung_of
+from gateway.calibration.known_run import KnownRun
+from gateway.calibration.statements import (
+    KNOWN_PLACE_PLUS_MINUS_M,
+    KNOWN_PLUS_MINUS_KG,
+    KNOWN_SHARE_PLUS_MINUS_PCT,
+    UNKNOWN_LEFT_STD_M,
+)
 from gateway.core.vehicle import (
-    PAYLOAD_LEFT_STD_M,
     Kilograms,
     Metres,
     MetresLeft,
@@ -21,6 +28,7 @@ from gateway.core.vehicle import (
 )
 from gateway.core.weights.on_the_road import unsprung_kg
 from gateway.errors import CampaignError
+from gateway.records import Batch
 from gateway.toml_file import checked, read_toml
 
 OnRun = Callable[[int, int], None]  # (runs done, runs in all)
@@ -34,14 +42,26 @@ class _Table(BaseModel):
 
 
 class RunTable(_Table):
-    """[[runs]]: one drive with a known load."""
+    """[[runs]]: one drive and what is known of its load."""
 
     log: Path = Field(
         description="its log: candump text, .asc, .blf, .mf4, .trc or .csv, each also as .gz, .zst or .xz"
     )
-    payload_kg: Kilograms = Field(description="load in addition to the empty vehicle: L; 0 for an empty run")
+    payload_kg: Kilograms | None = Field(
+        None, description="load in addition to the empty vehicle: L; 0 for an empty run; absent: unknown"
+    )
+    payload_plus_minus_kg: float = Field(
+        KNOWN_PLUS_MINUS_KG,
+        gt=0.0,
+        le=100_000.0,
+        description="half the 95 % interval of `payload_kg`; 25 or more for a delivery note",
+    )
     payload_position_m: Metres | None = Field(
-        None, description="its centre of gravity behind the front axle: d; a loaded run needs it or `front_share_pct`"
+        None,
+        description="its centre of gravity behind the front axle: d; absent, and no `front_share_pct`: unknown",
+    )
+    payload_position_plus_minus_m: float = Field(
+        KNOWN_PLACE_PLUS_MINUS_M, gt=0.0, le=20.0, description="half the 95 % interval of `payload_position_m`"
     )
     front_share_pct: Percent | None = Field(
         None, description="share of the whole sprung mass on the front axle, in place of the position"
@@ -49,7 +69,7 @@ class RunTable(_Table):
     payload_left_m: MetresLeft | None = Field(
         None,
         description="its centre of gravity left of the vehicle's centre line, negative: right of it; absent: about "
-        f"there, with a standard deviation of {PAYLOAD_LEFT_STD_M:g} m",
+        f"there, with a standard deviation of {UNKNOWN_LEFT_STD_M:g} m",
     )
     split: Literal["identification", "validation"] | None = Field(
         None, description="use the whole run for this alone; absent: cut at `identification_fraction`"
@@ -61,8 +81,9 @@ class RunTable(_Table):
 
     @model_validator(mode="after")
     def _is_complete(self) -> "RunTable":
-        if self.payload_kg > 0.0 and self.payload_position_m is None and self.front_share_pct is None:
-            raise ValueError("a loaded run needs payload_position_m (metres behind the front axle) or front_share_pct")
+        places = ("payload_position_m", "front_share_pct", "payload_left_m", "payload_plus_minus_kg")
+        if self.payload_kg is None and (stated := [name for name in places if name in self.model_fields_set]):
+            raise ValueError(f"{stated[0]} says nothing without payload_kg: state it, or leave both out")
         if self.payload_position_m is not None and self.front_share_pct is not None:
             raise ValueError("give payload_position_m or front_share_pct, not both")
         if self.end_s is not None and self.end_s <= self.start_s:
@@ -109,10 +130,30 @@ class Campaign:
         return self.path.parent / run.log
 
     def front_share_pct(self, run: RunTable) -> float:
-        """The run's true share of the sprung mass on the front axle, equation (3)."""
+        """The run's true share of the sprung mass on the front axle, equation (3); NaN if it is not known."""
         if run.front_share_pct is not None:
             return run.front_share_pct
+        if run.payload_kg is None or (run.payload_kg > 0.0 and run.payload_position_m is None):
+            return math.nan
         return front_share_pct(self.vehicle, run.payload_kg, run.payload_position_m)
+
+    def known_run(self, number: int, run: RunTable, batches: tuple[Batch, ...]) -> KnownRun:
+        """The batches of a run with what is known of its load."""
+        payload_kg = math.nan if run.payload_kg is None else run.payload_kg
+        share_plus_minus_pct = KNOWN_SHARE_PLUS_MINUS_PCT
+        if "payload_position_plus_minus_m" in run.model_fields_set and payload_kg > 0.0:
+            arm = run.payload_position_plus_minus_m / self.vehicle.wheelbase_m
+            share_plus_minus_pct = 100.0 * arm * payload_kg / (self.vehicle.empty_mass_kg + payload_kg)
+        return KnownRun(
+            number,
+            str(run.log),
+            payload_kg,
+            self.front_share_pct(run),
+            batches,
+            run.payload_left_m,
+            run.payload_plus_minus_kg,
+            share_plus_minus_pct,
+        )
 
 
 def load_campaign(path: Path) -> Campaign:
@@ -163,29 +204,31 @@ def _range_faults(vehicle: Vehicle) -> Iterator[str]:
 
 
 def _faults(campaign: Campaign, run: RunTable) -> Iterator[str]:
+    if not campaign.log_of(run).is_file():
+        yield f"log: {run.log}: no such file"
+    if run.payload_kg is None:
+        return
     if _is_in_tonnes(run.payload_kg, campaign.vehicle):
         yield (
             f"payload_kg: {run.payload_kg:g} kg is no load of a vehicle of {campaign.vehicle.empty_mass_kg:g} kg: "
             f"write {1000.0 * run.payload_kg:g} if these are tonnes, 0 if it was empty"
         )
-    if not campaign.log_of(run).is_file():
-        yield f"log: {run.log}: no such file"
     share_pct = campaign.front_share_pct(run)
-    if not 0.0 < share_pct < 100.0:
+    if share_pct <= 0.0 or share_pct >= 100.0:
         yield (
             f"payload_position_m: {run.payload_kg:g} kg at {run.payload_position_m:g} m would put {share_pct:.0f} % of "
             "the weight on the front axle and lift the other; it is measured from the front axle rearwards"
         )
-    yield from _sideways_faults(campaign.vehicle, run)
+    if run.payload_left_m is not None and campaign.vehicle.track_width_m is not None:
+        yield from _sideways_faults(campaign.vehicle, run.payload_kg, run.payload_left_m)
 
 
-def _sideways_faults(vehicle: Vehicle, run: RunTable) -> Iterator[str]:
-    if run.payload_left_m is None or vehicle.track_width_m is None:
-        return
-    share_pct = left_share_pct(cg_left_m(vehicle, run.payload_kg, run.payload_left_m), vehicle.track_width_m)
+def _sideways_faults(vehicle: Vehicle, payload_kg: float, left_m: float) -> Iterator[str]:
+    track_m = vehicle.track_width_m or math.nan
+    share_pct = left_share_pct(cg_left_m(vehicle, payload_kg, left_m), track_m)
     if not 0.0 < share_pct < 100.0:
         yield (
-            f"payload_left_m: {run.payload_kg:g} kg at {run.payload_left_m:g} m would put {share_pct:.0f} % of the "
+            f"payload_left_m: {payload_kg:g} kg at {left_m:g} m would put {share_pct:.0f} % of the "
             "weight on the left wheels and lift the others; it is measured from the centre line to the left"
         )
 

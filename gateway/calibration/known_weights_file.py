@@ -4,13 +4,14 @@ It is beside the database and separate from the calibration file, which no known
 computed from the list (core.known_weights), so that each can be taken back. Only the service writes it, atomically.
 """
 
+import hashlib
+import json
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
-from gateway.calibration.file.calibration_file import content_id
 from gateway.core.known_weights import Knowledge, Observation
 from gateway.errors import ConfigurationError
 from gateway.estimate_json import posterior_from_json
@@ -21,6 +22,12 @@ from gateway.toml_file import describe_faults
 
 FILE_NAME: Final = "known_weights.json"
 MOST_KNOWN_WEIGHTS: Final = 200  # chosen: beyond it the oldest withdrawn ones are dropped
+
+
+def content_id(content: dict[str, Any]) -> str:
+    """sha256:... over the canonical JSON of ``content``: keys sorted, no spaces."""
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
 
 
 class KnownWeight(KnownWeightFields):

@@ -22,8 +22,8 @@ UNKNOWN_LEFT_STD_M: Final = 0.15  # chosen: of its place across
 EMPTY_PLUS_MINUS_KG: Final = 10.0  # chosen: driver and tank differ
 KNOWN_PLUS_MINUS_KG: Final = 4.0  # chosen: of a weighed known load
 KNOWN_PLACE_PLUS_MINUS_M: Final = 0.05  # chosen: of a measured place
+KNOWN_SHARE_PLUS_MINUS_PCT: Final = 0.4  # the same as a front share, of a load of a quarter of the vehicle
 LEAST_SHARE_STD: Final = 0.002  # chosen: 0..1, of any stated place
-LEAST_RANGE_SHARE: Final = 0.33  # chosen: of the empty mass, what any vehicle may carry
 
 
 class StatementSource(StrEnum):
@@ -50,7 +50,7 @@ class Statement:
     position_m: float | None = None
     position_plus_minus_m: float = KNOWN_PLACE_PLUS_MINUS_M
     front_share_pct: float | None = None
-    front_share_plus_minus_pct: float = 0.4
+    front_share_plus_minus_pct: float = KNOWN_SHARE_PLUS_MINUS_PCT
     left_m: float | None = None
     left_plus_minus_m: float = 0.04
     is_compact: bool = False
@@ -97,7 +97,7 @@ class LoadPrior:
 
 def load_prior_of(statement: Statement, vehicle: Vehicle) -> LoadPrior:
     """The prior of a drive's load that a statement makes."""
-    most_kg = max(vehicle.payload_range_kg[1], LEAST_RANGE_SHARE * vehicle.empty_mass_kg)
+    most_kg = vehicle.largest_payload_kg
     if statement.payload_kg is None:
         payload_kg, payload_std_kg = (part * most_kg for part in UNKNOWN_PART)
     else:

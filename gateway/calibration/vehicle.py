@@ -680,3 +680,15 @@ def _left_out(one: _Drive, model: VehicleModel) -> list[LeftOut]:
             )
         )
     return found
+
+
+def information_of(spectra: CrossSpectra, point: Point, ground: Ground, statement: Statement, vehicle: Vehicle) -> F64:
+    """(N, N) what one more drive with these spectra, without a roll rate, would add to the vehicle's precision.
+
+    The drive's own deviations and its load, of which ``statement`` is known, are eliminated as in the fit.
+    """
+    whole = Whittle(spectra, ground, EVIDENCE).curvature(point, range(N + 2)).information
+    own, prior = [*OWN, N, N + 1], _own_prior(load_prior_of(statement, vehicle), vehicle)
+    across = whole[:N, own]
+    told = whole[:N, :N] - across @ np.linalg.solve(whole[np.ix_(own, own)] + prior.precision, across.T)
+    return np.asarray(0.5 * (told + told.T), float)

@@ -2,8 +2,8 @@
 
 from typing import Final, Literal
 
-from gateway.calibration.file.calibration_file import content_id
 from gateway.calibration.known_weight import StatedLoad
+from gateway.calibration.known_weights_file import content_id
 from gateway.core.vehicle import Vehicle
 from gateway.stated.facts import AxleErrorTold, LoadTold, Part, Rule, VerificationRecord
 

@@ -23,6 +23,7 @@ from gateway.errors import CalibrationImpossibleError, ConfigurationError
 from gateway.files.whole import refusal_told, write_whole
 from gateway.offline.campaigns import inspect
 from gateway.records import json_line
+from gateway.words import known
 
 
 def inspection_sentences(inspection: Inspection) -> str:
@@ -61,7 +62,7 @@ def _run_line(one: SplitRun, verdict: RunVerdict) -> str:
     n_validating = len(batches) - n_identifying
     driven = f"{n_identifying} batches for fitting, {n_validating} for validation, {seconds:.0f} s can be used"
     words = "left out" if not verdict.is_usable else "sound" if not verdict.findings else "usable"
-    load = f"{one.identification.payload_kg:g} kg"
+    load = known(one.identification.payload_kg, " kg") if one.identification.has_payload else "load unknown"
     return f"run {verdict.number} {verdict.name} ({load}): {words}; {driven}"
 
 
@@ -241,8 +242,8 @@ def _sentences(file: CalibrationFile, output: Path | None, said: Sequence[str]) 
     """The finished calibration in sentences, without the warnings that were printed already (``said``)."""
     low, high = file.seen.payload_kg
     lines = [
-        f"{output or 'no file written'}: {', '.join(file.estimators)}; payloads {low:g} to {high:g} kg, "
-        f"{len(file.provenance.runs)} runs, {sum(run.n_batches for run in file.provenance.runs)} batches",
+        f"{output or 'no file written'}: {', '.join(file.estimators)}; payloads {low:.4g} to {high:.4g} kg, "
+        f"{len(file.provenance.drives)} runs, {sum(one.n_batches for one in file.provenance.drives)} batches",
         f"id {file.id}",
         *([f"prior from its sister {file.sister_id}"] if file.sister_id else []),
         *(f"warning: {warning}" for warning in file.warnings if warning not in said),

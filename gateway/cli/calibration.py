@@ -13,11 +13,12 @@ from gateway.calibration.file.calibration_file import CalibrationFile, load_cali
 from gateway.calibration.file.parts import ExpectedErrorsPart
 from gateway.cli.known_weights import tare_commands, ticket_commands
 from gateway.cli.options import FILE, NumberRange, Told, prints
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.model.parameters import is_positive
 from gateway.core.ratio_index.regression import RegressionModel
+from gateway.model.table import LOG, ROWS
+from gateway.model.vehicle import VehicleModel
+from gateway.quantity import Z95
 from gateway.stated.facts import DIVISION_KG
-from gateway.words import in_sections
+from gateway.words import in_sections, known
 
 
 @click.group("calibration")
@@ -136,21 +137,22 @@ Figures = list[tuple[str, float, float]]  # name, value, standard deviation
 
 
 def figures_of(file: CalibrationFile) -> dict[str, Figures]:
-    """By part of the file: half-car parameters of cross_spectrum, regressions of ratio_index (constant first)."""
+    """By part of the file: the vehicle's parameters of cross_spectrum, regressions of ratio_index (constant first)."""
     figures = {}
     if file.cross_spectrum is not None:
-        figures["cross_spectrum"] = _half_car(file.cross_spectrum)
+        figures["cross_spectrum"] = _parameters(file.cross_spectrum)
     if file.ratio_index is not None:
         models = {"payload": file.ratio_index.payload, "front_share": file.ratio_index.front_share}
         figures |= {f"ratio_index.{target}": _regression(model) for target, model in models.items() if model}
     return figures
 
 
-def _half_car(part: CrossSpectrumCalibration) -> Figures:
+def _parameters(part: VehicleModel) -> Figures:
     """A parameter stored as a logarithm has its standard deviation to first order."""
     stds = np.sqrt(np.diag(part.covariance)).tolist()
+    is_log = {row.name: row.scale == LOG for row in ROWS}
     rows = zip(part.names, part.parameters.tolist(), stds, strict=True)
-    return [(name, math.exp(x), math.exp(x) * std) if is_positive(name) else (name, x, std) for name, x, std in rows]
+    return [(name, math.exp(x), math.exp(x) * std) if is_log[name] else (name, x, std) for name, x, std in rows]
 
 
 def _regression(part: RegressionModel) -> Figures:
@@ -177,8 +179,10 @@ def _provenance(held: CalibrationFile) -> Iterator[str]:
     yield made.software
     yield made.command
     yield f"campaign sha256 {made.campaign_sha256}"
-    for run in made.runs:
-        yield (
-            f"run {run.number:<3} {run.payload_kg:7.1f} kg {run.front_share_pct:6.2f} %  {run.n_batches:3} batches  "
-            f"{run.log}  sha256 {run.sha256[:12]}..."
-        )
+    for drive in made.drives:
+        said = drive.statement
+        stated = f"{known(said.payload_kg, ' kg', '.1f'):>10} {known(said.front_share_pct, ' %', '.2f'):>8}"
+        yield f"run {drive.number:<3}{stated}  {drive.n_batches:3} batches  {drive.log}  sha256 {drive.sha256[:12]}..."
+        if drive.found is not None:
+            note = "; the statement disagrees and taught nothing" if drive.found.is_held else ""
+            yield f"       found {drive.found.payload_kg:.1f} ± {Z95 * drive.found.payload_std_kg:.1f} kg{note}"

@@ -7,6 +7,7 @@ import click
 from gateway.cli.options import FILE, Told, prints
 from gateway.cli.progress import counted
 from gateway.offline.bundle import pack as pack_into
+from gateway.words import known
 
 
 @click.group("campaign")
@@ -27,6 +28,9 @@ def pack(folder: Path, output: Path, with_position: bool) -> Told:
     """
     with counted("reading drives") as on_run:
         packed = pack_into(folder, output, with_position=with_position, on_run=on_run)
-    runs = [f"{run.log}: {run.payload_kg:g} kg, {run.duration_s:.0f} s, {run.n_frames} frames" for run in packed.runs]
+    runs = [
+        f"{run.log}: {known(run.payload_kg, ' kg')}, {run.duration_s:.0f} s, {run.n_frames} frames"
+        for run in packed.runs
+    ]
     permission = packed.contribution.permission
     return packed.to_json(), "\n".join([*runs, f"Written: {output}, {permission.licence} by {permission.given_by}"])

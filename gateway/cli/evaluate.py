@@ -14,6 +14,7 @@ from gateway.cli.progress import counted
 from gateway.errors import ConfigurationError
 from gateway.offline.campaigns import Split, judge_campaign
 from gateway.records import json_line
+from gateway.words import known
 
 
 @click.command("evaluate")
@@ -114,7 +115,7 @@ def _percent(share: float | None, width: int) -> str:
 
 def _run_row(first: Judged, errors: Errors) -> str:
     truth, payload, share = (
-        f"{first.payload_kg:g} kg at {first.front_share_pct:.1f} %",
+        f"{known(first.payload_kg, ' kg')} at {known(first.front_share_pct, ' %', '.1f')}",
         errors.payload,
         errors.front_share,
     )

@@ -33,7 +33,7 @@ from gateway.toml_file import SIMILAR, describe_faults, read_toml
 Section = TypeVar("Section", bound=BaseModel)
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 
-EstimatorName = Literal["cross_spectrum", "ratio_index"]  # those of core.estimator, which loads too much for this
+EstimatorName = Literal["cross_spectrum", "ratio_index"]  # those of weighing.estimator, which loads too much for this
 ESTIMATOR_NAMES: tuple[EstimatorName, ...] = get_args(EstimatorName)
 
 

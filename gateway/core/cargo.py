@@ -19,7 +19,6 @@ from typing import Final
 import numpy as np
 
 from gateway.core.vehicle import Carries, Vehicle
-from gateway.records import F64
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,32 +70,6 @@ CARRIED: Final[Mapping[Carries, _Row]] = MappingProxyType(
 HABIT_PART: Final = 0.5  # chosen: part of the variance of log s that all loads of one vehicle share
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ShapePrior:
-    """Probabilities (m,) of the logarithm of s (m,), s in m2; they add up to 1. ``habit`` (0 to 1) is the part of its
-    variance that all loads of the vehicle share.
-    """
-
-    log_s: F64
-    probability: F64
-    habit: float
-
-    @property
-    def mean(self) -> float:
-        """Mean of log s."""
-        return float(self.probability @ self.log_s)
-
-    @property
-    def median(self) -> float:
-        """Median of log s."""
-        return float(np.interp(0.5, np.cumsum(self.probability), self.log_s))
-
-    @property
-    def variance(self) -> float:
-        """Variance of log s."""
-        return float(self.probability @ (self.log_s - self.mean) ** 2)
-
-
 @dataclass(frozen=True, slots=True)
 class ShapeHypothesis:
     """A kind of load shapes: normally distributed logarithm of s (m2), and the probability of the kind."""
@@ -134,24 +107,6 @@ def known_shape(known_s_m2: float, known_std: float) -> tuple[ShapeHypothesis, .
 def is_said(vehicle: Vehicle) -> bool:
     """Whether the fitter stated anything about the shape of loads."""
     return vehicle.payload_length_m is not None or vehicle.carries not in (None, Carries.MIXED)
-
-
-def shape_prior(vehicle: Vehicle, known_s_m2: float, known_std: float) -> ShapePrior:
-    """The prior of a load's shape.
-
-    ``known_s_m2`` is s of the known loads as calibrated, ``known_std`` the standard deviation of its logarithm. If
-    nobody stated what is carried, half of all loads are taken to be like those.
-    """
-    log_s = np.linspace(log(0.002), log(0.4), 96) + 2.0 * log(vehicle.wheelbase_m)
-    density = np.zeros_like(log_s)
-    for s, weight in _points(vehicle):
-        density += weight * np.exp(-0.5 * ((log_s - log(s)) / SMOOTHING) ** 2)
-    density /= density.sum()
-    if not is_said(vehicle):
-        compact_std = float(np.hypot(COMPACT_SCATTER, known_std))
-        compact = np.exp(-0.5 * ((log_s - log(known_s_m2)) / compact_std) ** 2)
-        density = SPREAD_PART * density + (1.0 - SPREAD_PART) * compact / compact.sum()
-    return ShapePrior(log_s, density, HABIT_PART)
 
 
 def _points(vehicle: Vehicle) -> Iterator[tuple[float, float]]:

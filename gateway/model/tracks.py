@@ -32,7 +32,7 @@ def coherence_slope_of(log_x: F64) -> F64:
 
 def _of_grid(log_x: F64, column: int) -> F64:
     """x K1(x) or x^2 K0(x)."""
-    log_x = np.minimum(np.maximum(log_x, _LEAST), _MOST)
+    log_x = np.fmin(np.fmax(log_x, _LEAST), _MOST)  # no number, at no speed, meets a spectrum that is none either
     since = (log_x - _LEAST) / GRID
     i = since.astype(np.intp)
     since -= i

@@ -584,6 +584,7 @@ def _diagnostics(found: Weighed, model: VehicleModel) -> dict[str, float]:
         "delay_scale": of("delay_scale"),
         "tension": signs.tension,
         "sensor_position_deviation": signs.deviation("sensor_position_m"),
+        "sensor_noise_deviation": signs.deviation("noise_acceleration_m2ps3"),
         **dict(zip(NOISE_RATIOS, found.noise.loudness.tolist(), strict=False)),
         "payload_gyration_m2": math.exp(of("payload_gyration_m2")),
         "payload_mode_hz": math.exp(of("payload_mode_hz")),

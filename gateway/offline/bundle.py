@@ -113,7 +113,7 @@ class PackedRun:
 
     number: int
     log: str
-    payload_kg: float
+    payload_kg: float | None
     duration_s: float
     n_frames: int
 

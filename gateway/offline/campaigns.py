@@ -18,12 +18,12 @@ from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.judgement.evaluation import Judged, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import BandChoice
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.errors import CalibrationImpossibleError, LogUnreadableError
 from gateway.records import Batch, Motion, Signal, joined
 from gateway.units import NS_PER_S
+from gateway.weighing.calibrated import CalibratedVehicle
 
 
 def read_whole_log(log: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]:
@@ -87,7 +87,7 @@ def split_runs(
         except LogUnreadableError as fault:
             if not keeps_unreadable:
                 raise
-            blank = _known_run(campaign, number, run, ())
+            blank = campaign.known_run(number, run, ())
             drives.append(SplitRun(blank, blank, log=LogFacts(unreadable=str(fault))))
     on_run(len(runs), len(runs))
     return drives
@@ -104,7 +104,7 @@ def _split_run(
     both = [rows_within(motion, stretch) if stretch and len(motion) else motion.part(0, 0) for stretch in stretches]
     for rows in both:
         batches = batches_of_motion(rows, signal_map, settings)
-        parts.append(_known_run(campaign, number, run, batches))
+        parts.append(campaign.known_run(number, run, batches))
     log_facts = LogFacts(
         sha256=file_sha256(log),
         duration_s=float(np.ptp(whole.t_ns)) / NS_PER_S,
@@ -115,11 +115,6 @@ def _split_run(
     )
     facts = row_facts(both[0] if stretches[0] else both[1], signal_map.traits)
     return SplitRun(parts[0], parts[1], facts, stretches[0] is not None, log_facts)
-
-
-def _known_run(campaign: Campaign, number: int, run: RunTable, batches: tuple[Batch, ...]) -> KnownRun:
-    share_pct = campaign.front_share_pct(run)
-    return KnownRun(number, str(run.log), run.payload_kg, share_pct, batches, run.payload_left_m)
 
 
 def _silent(log: Path, motion: Motion, signal_map: SignalMap) -> dict[Signal, str]:

@@ -14,13 +14,13 @@ from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.core.change import Rules
 from gateway.core.events.entry import Entry
 from gateway.core.events.ledger import Ledger
-from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.errors import ArraysError, LogUnreadableError
 from gateway.estimate import Estimate
 from gateway.records import F64, Motion, Signal
 from gateway.setup import Setup
 from gateway.units import NS_PER_S
+from gateway.weighing.flow import Flow, Identity
 
 AS_THE_SERVICE: Final = BatchSettings()
 

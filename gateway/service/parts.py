@@ -7,10 +7,8 @@ from gateway.bus.live.source import LiveSource, OpenReceiver
 from gateway.bus.ring_log import RingLog
 from gateway.calibration.file.calibration_file import load_calibration
 from gateway.calibration.kept.shelf import FOLDER, Shelf, ShelfLimits
-from gateway.calibration.sister import sister_of
 from gateway.config import BusSection, Settings, StoreSection
 from gateway.config.sections import KeepSection
-from gateway.core.flow import Flow
 from gateway.log import Event, log_event
 from gateway.service.calibration_in_use import why_not_allowed
 from gateway.service.commissioning.empty_drive import ServiceVehicle
@@ -26,6 +24,7 @@ from gateway.uplink.webhook import Webhook
 from gateway.web.access.serving import Tls
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import Scales
+from gateway.weighing.flow import Flow
 
 
 def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with_places: bool) -> Uplink | None:
@@ -100,7 +99,7 @@ def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow
             why_not_allowed=why_not_allowed(settings),
             is_name_fixed=own_name is not None,
             like=settings.commissioning.like,
-            sister=sister_of(like).vehicle if like else None,
+            sister=like.vehicle if like else None,
         ),
         on_event=store.write_event,
     )

@@ -12,17 +12,18 @@ from typing import Final
 
 from gateway.bus.live.receiver import Inbox
 from gateway.bus.signals import Decoder
-from gateway.core.cross_spectrum.floor import NOISY_RATIO, SENSOR_OF
-from gateway.core.flow import Flow
 from gateway.core.fusion import WeighedLoad
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.log import Event, log_event
+from gateway.model.sensors import NOISE_RATIOS
+from gateway.model.spectra import NOISY_RATIO
 from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.records import Frames, Why
 from gateway.service.signal_watch import SignalWatch, StandingWatch
 from gateway.store import Store
 from gateway.web.live.board import Board, boot_clock_s
+from gateway.weighing.flow import Flow
 
 DRAIN_S = 0.5  # chosen: longest wait for frames, and so the delay with which the end of a drive is noticed
 ASLEEP_DRAIN_S = 2.0  # chosen: the same between drives
@@ -149,7 +150,7 @@ class Pipeline(ThreadPart):
         if math.isfinite(found.roll_usable_share) and not found.is_remainder:
             is_lost = found.roll_usable_share < ROLL_RATE_KNOWN_SHARE
             self.roll_rate_fault = ROLL_RATE_LOST.format(found.roll_usable_share) if is_lost else None
-        if not SENSOR_OF.keys().isdisjoint(found.diagnostics):
+        if not NOISE_RATIOS.keys().isdisjoint(found.diagnostics):
             self.noise_fault = noise_fault(found)
         if found.is_provisional or found.is_remainder:
             self.counts["n_provisional" if found.is_provisional else "n_remainders"] += 1
@@ -160,7 +161,7 @@ class Pipeline(ThreadPart):
 
 def noise_fault(found: Estimate) -> str | None:
     """Which sensor has become noisy and how much, as a sentence; None if none has."""
-    ratio, name = max((found.diagnostics.get(key, 0.0), name) for key, name in SENSOR_OF.items())
+    ratio, name = max((found.diagnostics.get(key, 0.0), name) for key, name in NOISE_RATIOS.items())
     return NOISY.format(name, ratio) if ratio > NOISY_RATIO else None
 
 

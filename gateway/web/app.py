@@ -11,7 +11,6 @@ from starlette.responses import Response
 from starlette.routing import Route
 from starlette.types import ASGIApp
 
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.status import Status
 from gateway.store import StoreReader
 from gateway.web import pages
@@ -40,6 +39,7 @@ from gateway.web.routes.weights import (
     weights_router,
 )
 from gateway.web.schemas import problem_responses
+from gateway.weighing.calibrated import CalibratedVehicle
 
 API_VERSION: Final = "1.0.0"
 BODY_BYTES: Final = 32_768  # chosen: no route but an upload needs a tenth of it

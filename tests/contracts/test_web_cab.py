@@ -10,10 +10,10 @@ from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded
 from support.estimates import posterior_of
 from support.web import Client, Gateway
 
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.fusion import epoch_of
 from gateway.records import Why
 from gateway.status import AlarmsStatus, OwnReading, Standing, State
+from gateway.weighing.calibrated import CalibratedVehicle
 
 
 @pytest.fixture

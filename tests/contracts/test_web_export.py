@@ -9,12 +9,12 @@ import pytest
 from support.estimates import make_estimate, make_record
 from support.web import Client, Gateway
 
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
 from gateway.estimate_json import COLUMNS, estimate_to_json
 from gateway.records import Why
 from gateway.status import SignalHealth
+from gateway.weighing.calibrated import CalibratedVehicle
 
 N_ROWS = 1203  # several pages of the store, the last one not full
 

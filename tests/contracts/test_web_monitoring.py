@@ -13,7 +13,6 @@ from prometheus_client.parser import text_string_to_metric_families
 from support.estimates import make_estimate
 from support.web import Client, Gateway
 
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Quantity
 from gateway.status import (
@@ -28,6 +27,7 @@ from gateway.status import (
     UplinkStatus,
     WebhookStatus,
 )
+from gateway.weighing.calibrated import CalibratedVehicle
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 RULES = [

@@ -13,13 +13,13 @@ from support.half_car_road import batch_over_road
 from support.web import Client, Gateway
 
 from gateway.calibration.file.calibration_file import load_calibration
-from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.spectrum import spectra_of
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import spectra_from_json
+from gateway.model.displayed import Fitted, modelled_spectra
 from gateway.records import Spectra, Why
 from gateway.web.live.board import Board
+from gateway.weighing.calibrated import CalibratedVehicle
 
 SPEED_MPS = 14.0
 

@@ -9,13 +9,13 @@ import pytest
 from support.estimates import make_estimate, posterior_of
 from support.web import Client, Gateway
 
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import weighed
 from gateway.estimate import Estimate, Quantity
 from gateway.quantities import QUANTITIES
 from gateway.records import Why
 from gateway.web.app import create_app
+from gateway.weighing.calibrated import CalibratedVehicle
 
 VIN = "VF1" + "0" * 14
 VAN = Vehicle(

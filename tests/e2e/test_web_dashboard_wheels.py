@@ -13,12 +13,12 @@ from support.browser import expect
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Watched, demo_calibration, weighed
 from support.web import Gateway, serving
 
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.fusion import epoch_of
 from gateway.core.vehicle import cg_left_m
 from gateway.core.weights import on_the_road as weights
 from gateway.estimate import Estimate
 from gateway.posterior import Posterior
+from gateway.weighing.calibrated import CalibratedVehicle
 
 PAYLOAD_KG, LEFT_M = 270.0, 0.3  # 54 kg more on the left wheels, 32.4 of them in front
 ALONG, ACROSS = (290 - 96) / 2.8, 2 * 58 / 1.5  # pixels per metre of the drawing

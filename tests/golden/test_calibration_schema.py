@@ -32,9 +32,10 @@ def test_the_shipped_calibration_keeps_to_it() -> None:
 
 
 WRONG: list[Callable[[dict[str, Any]], Any]] = [
-    lambda c: c.pop("id"),
+    lambda c: c.pop("vehicle"),
     lambda c: c.update(id="abc"),
-    lambda c: c.update(version=1),
+    lambda c: c.update(version=2),
+    lambda c: c["provenance"]["drives"][0].pop("statement"),
     lambda c: c.update(colour="red"),
     lambda c: c["seen"].pop("roughness_mps2"),
     lambda c: c["vehicle"].update(wheelbase_m="2.8"),

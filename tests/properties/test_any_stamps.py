@@ -9,21 +9,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.calibrated import ratio_index_calibration
 from support.drives import SIGNALS, T0_NS, drive
-from support.half_car_road import VAN, batch_over_road
+from support.half_car_road import VAN, batch_over_road, taught_by
 
 from gateway.bus.frames import LAST_SECOND
-from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
 from gateway.core.batch import BatchWindow, build_batch
-from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.estimator import ESTIMATORS, estimate
-from gateway.core.flow import Flow, Identity
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.records import I64, Batch, Motion, Why, json_line
 from gateway.units import NS_PER_S
+from gateway.weighing.calibrated import CalibratedVehicle
+from gateway.weighing.estimator import ESTIMATORS, estimate
+from gateway.weighing.flow import Flow, Identity
 
 SETTINGS = BatchSettings(window_s=20.0, provisional_every_s=7.0)
 MOST_BYTES = 64_000_000
@@ -39,7 +38,7 @@ def calibrated() -> CalibratedVehicle:
         (0.0, 0.0),
         (0.0, 0.0),
         ratio_index=ratio_index_calibration(),
-        cross_spectrum=calibrate_cross_spectrum([known], VAN),
+        cross_spectrum=taught_by([known]),
     )
 
 

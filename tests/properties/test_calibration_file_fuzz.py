@@ -1,4 +1,4 @@
-"""A calibration file of any content, its hash made to fit, is used or refused in words: nothing else."""
+"""A calibration file of any content is used or refused in words: nothing else."""
 
 import json
 import re

@@ -9,54 +9,61 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.half_car_road import RATE_HZ, VAN, batch_of, batch_over_road, calibrated_on_known_loads, weighed
-from support.rolling_road import WIDE_VAN, batch_over_two_tracks, calibrated_with_roll
+from support import model_road
+from support.half_car_road import RATE_HZ, VAN, batch_of, batch_over_road, calibrated_on_known_loads, taught_by, weighed
+from support.kept import kept
+from support.model_road import LEFT, QUIET, theta_of
 
-from gateway.core.calibrated import CalibratedVehicle
+from gateway.calibration.known_run import KnownRun
 from gateway.core.change import Rules
-from gateway.core.cross_spectrum import estimator as cross_spectrum
-from gateway.core.cross_spectrum import search
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.likelihood import Curvature
-from gateway.core.estimator import estimate
-from gateway.core.flow import Flow, Identity
 from gateway.core.fusion import fused_epoch
 from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Load
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
+from gateway.model import fit, weigh
+from gateway.model.vehicle import VehicleModel
 from gateway.records import F64, Batch, Motion, Signal, Why
+from gateway.weighing.calibrated import CalibratedVehicle
+from gateway.weighing.estimator import estimate
+from gateway.weighing.flow import Flow, Identity
 
 GOOD = batch_over_road(200.0, 50.0, seed=3, duration_s=60.0)
 LARGEST_FLOAT32 = 3.4e38  # what a signal of 32 bits can say
 
 
 @pytest.fixture(scope="module")
-def calibration() -> CrossSpectrumCalibration:
+def calibration() -> VehicleModel:
     return calibrated_on_known_loads()
 
 
 @pytest.fixture(scope="module")
-def credulous(calibration: CrossSpectrumCalibration) -> CrossSpectrumCalibration:
+def credulous(calibration: VehicleModel) -> VehicleModel:
     """The same without its gates: whatever moves, however badly it fits, is weighed to the end."""
-    return replace(
-        calibration,
-        acceleration_rms_mps2=1e-300,
-        pitch_rate_rms_radps=1e-300,
-        misfit_limit=math.inf,
-        most_position_score=math.inf,
-        most_noise_score=math.inf,
-    )
+    return replace(calibration, acceleration_rms_mps2=1e-300, pitch_rate_rms_radps=1e-300, misfit_limit=math.inf)
 
 
 @pytest.fixture(scope="module")
-def rolling() -> CrossSpectrumCalibration:
-    return calibrated_with_roll()
+def rolling() -> VehicleModel:
+    return taught_on_two_tracks()
 
 
-def rolled(calibration: CrossSpectrumCalibration) -> Estimate:
+def over_two_tracks(load: Load, seed: int) -> Batch:
+    return model_road.batch_over_road(theta_of(with_roll=True, **QUIET, **LEFT), load, seed, duration_s=120.0)
+
+
+@kept
+def taught_on_two_tracks() -> VehicleModel:
+    """A short drive with each of two loads."""
+    loads = (Load(0.0, 52.0), Load(300.0, 46.0))
+    runs = [KnownRun(i, f"run {i}", *load, (over_two_tracks(load, 50 + i),)) for i, load in enumerate(loads)]
+    return taught_by(runs, model_road.VAN)
+
+
+def rolled(calibration: VehicleModel) -> Estimate:
     """What a good batch with a roll rate tells."""
-    calibrated = CalibratedVehicle("sha256:ab", WIDE_VAN, (0.0, 0.0), (0.0, 0.0), cross_spectrum=calibration)
-    return estimate(batch_over_two_tracks(200.0, 48.0, 0.0, seed=7, duration_s=120.0), calibrated, "cross_spectrum")
+    calibrated = CalibratedVehicle("sha256:ab", model_road.VAN, (0.0, 300.0), (40.0, 60.0), cross_spectrum=calibration)
+    return estimate(over_two_tracks(Load(200.0, 48.0), seed=7), calibrated, "cross_spectrum")
 
 
 def stretches(n: int) -> st.SearchStrategy[list[slice]]:
@@ -115,7 +122,7 @@ def is_told(found: Estimate) -> bool:
 @settings(max_examples=60)
 @given(batch=ugly_batches(), has_gates=st.booleans())
 def test_an_ugly_batch_is_weighed_or_refused(
-    calibration: CrossSpectrumCalibration, credulous: CrossSpectrumCalibration, batch: Batch, has_gates: bool
+    calibration: VehicleModel, credulous: VehicleModel, batch: Batch, has_gates: bool
 ) -> None:
     assert is_told(weighed(batch, calibration if has_gates else credulous))
 
@@ -132,13 +139,13 @@ def ugly_rows(draw: st.DrawFn) -> Motion:
 
 @settings(max_examples=25)
 @given(rows=ugly_rows())
-def test_ugly_frames_are_weighed_or_refused(calibration: CrossSpectrumCalibration, rows: Motion) -> None:
+def test_ugly_frames_are_weighed_or_refused(calibration: VehicleModel, rows: Motion) -> None:
     calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 0.0), (0.0, 0.0), cross_spectrum=calibration)
     flow = Flow(BatchSettings(window_s=60.0), {}, calibrated, "cross_spectrum", Identity())
     assert all(is_told(found) for found in (*flow.feed(rows), *flow.flush()))
 
 
-def test_a_batch_at_no_speed_is_refused(calibration: CrossSpectrumCalibration) -> None:
+def test_a_batch_at_no_speed_is_refused(calibration: VehicleModel) -> None:
     """The time from axle to axle is infinite, and the search meets numbers that are none."""
     found = weighed(replace(GOOD, speed_mps=np.zeros_like(GOOD.speed_mps)), calibration)
     assert found.rejected == (Why.NO_SOLUTION,)
@@ -164,7 +171,7 @@ def indefinite(matrix: F64) -> F64:
     ids=["inv", "solve", "eigh", "an indefinite inverse"],
 )
 def test_a_routine_that_fails_refuses_the_batch(
-    calibration: CrossSpectrumCalibration,
+    calibration: VehicleModel,
     monkeypatch: pytest.MonkeyPatch,
     room: object,
     routine: str,
@@ -180,56 +187,18 @@ def test_a_routine_that_fails_refuses_the_batch(
 
 
 def test_a_search_that_runs_out_of_steps_refuses_the_batch(
-    credulous: CrossSpectrumCalibration, monkeypatch: pytest.MonkeyPatch
+    credulous: VehicleModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(search, "MOST_STEPS", 1)
+    monkeypatch.setattr(fit, "MOST_STEPS", 1)
     assert weighed(GOOD, credulous).rejected == (Why.NO_SOLUTION,)
 
 
-def test_a_lag_without_a_fixed_point_refuses_the_batch(
-    rolling: CrossSpectrumCalibration, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_lag_without_a_fixed_point_refuses_the_batch(rolling: VehicleModel, monkeypatch: pytest.MonkeyPatch) -> None:
     assert rolled(rolling).counted
-    monkeypatch.setattr(cross_spectrum, "MOST_LAG_LEFT_S", -1.0)  # no change is small enough
+    monkeypatch.setattr(weigh, "MOST_LAG_LEFT_S", -1.0)  # no change is small enough
     assert rolled(rolling).rejected == (Why.NO_SOLUTION,)
 
 
-def test_an_answer_that_is_no_number_in_one_place_is_none(rolling: CrossSpectrumCalibration) -> None:
+def test_an_answer_that_is_no_number_in_one_place_is_none(rolling: VehicleModel) -> None:
     """Payload and share are sound, the error of the lateral place is not: weights of wheels would be none."""
     assert rolled(replace(rolling, model_std=(*rolling.model_std[:2], math.nan))).rejected == (Why.NO_SOLUTION,)
-
-
-def bowl(x: F64) -> float:
-    return float(np.sum(np.cosh(x - 1.0)))
-
-
-def of_bowl(x: F64) -> Curvature:
-    return Curvature(np.sinh(x - 1.0), np.diag(np.cosh(x - 1.0)))
-
-
-def sought(curvature: Callable[[F64], Curvature]) -> search.Found:
-    flat = np.zeros((2, 2))
-    return search.most_probable(np.array([4.0, -3.0]), np.zeros(2), flat, bowl, curvature)
-
-
-def test_a_search_that_settles_says_so() -> None:
-    found = sought(of_bowl)
-    assert found.is_converged
-    np.testing.assert_allclose(found.x, 1.0, atol=0.1)
-
-
-def test_a_search_from_its_answer_has_settled() -> None:
-    """No step is better, and none should be."""
-    found = search.most_probable(np.ones(2), np.zeros(2), np.zeros((2, 2)), bowl, of_bowl)
-    assert found.is_converged
-    np.testing.assert_array_equal(found.x, 1.0)
-
-
-def test_a_search_that_runs_out_of_steps_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(search, "MOST_STEPS", 2)
-    assert not sought(of_bowl).is_converged
-
-
-def test_a_search_that_climbs_says_so() -> None:
-    """A slope that does not belong to the cost: no step along it is better."""
-    assert not sought(lambda x: Curvature(-of_bowl(x).gradient, of_bowl(x).information)).is_converged

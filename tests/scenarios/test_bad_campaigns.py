@@ -171,7 +171,7 @@ def test_twenty_seconds_are_too_short_and_the_rest_goes_on(folder: Path, tmp_pat
     assert "run 2 04_" in done.stdout
     assert "left out" in done.stdout
     held = load_calibration(tmp_path / "v.json")
-    assert [run.number for run in held.provenance.runs] == [1, 3, 4]
+    assert [run.number for run in held.provenance.drives] == [1, 3, 4]
     assert [one for one in held.warnings if one.startswith("run 2 left out: too_short: ")]
 
 

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from support.sideways_drives import SENSORS, VEHICLE, driven, known_drives
 
+from benchmarks.accuracy.calibrated import taught_by
 from benchmarks.accuracy.drives import without_roll_rate
-from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
-from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.estimator import estimate
 from gateway.core.vehicle import cg_left_m
 from gateway.estimate import Estimate, Quantity
+from gateway.model.vehicle import VehicleModel
 from gateway.records import Batch, Why
 from gateway.sim.vehicle import Load
+from gateway.weighing.calibrated import CalibratedVehicle
+from gateway.weighing.estimator import estimate
 
 SIDES = ((300.0, 1.2, 0.3), (300.0, 1.2, -0.3), (180.0, 2.3, 0.35), (420.0, 1.8, -0.25))
 
 
-def weighed(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
-    calibrated = CalibratedVehicle("sha256:ab", VEHICLE, (0.0, 0.0), (0.0, 0.0), cross_spectrum=calibration)
+def weighed(batch: Batch, calibration: VehicleModel) -> Estimate:
+    calibrated = CalibratedVehicle("sha256:ab", VEHICLE, (0.0, 420.0), (40.0, 60.0), cross_spectrum=calibration)
     return estimate(batch, calibrated, "cross_spectrum")
 
 
@@ -39,13 +39,13 @@ def known() -> list[KnownRun]:
 
 
 @pytest.fixture(scope="module")
-def rolling(known: list[KnownRun]) -> CrossSpectrumCalibration:
-    return calibrate_cross_spectrum(known, VEHICLE)
+def rolling(known: list[KnownRun]) -> VehicleModel:
+    return taught_by(known, VEHICLE)
 
 
 @pytest.fixture(scope="module")
-def unrolled(known: list[KnownRun]) -> CrossSpectrumCalibration:
-    return calibrate_cross_spectrum([without_roll_rate(run) for run in known], VEHICLE)
+def unrolled(known: list[KnownRun]) -> VehicleModel:
+    return taught_by([without_roll_rate(run) for run in known], VEHICLE)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def sideways() -> dict[tuple[float, float, float], KnownRun]:
 def test_a_load_to_the_side_is_weighed_and_found(
     side: tuple[float, float, float],
     sideways: dict[tuple[float, float, float], KnownRun],
-    rolling: CrossSpectrumCalibration,
+    rolling: VehicleModel,
 ) -> None:
     payload_kg, _, left_m = side
     run = sideways[side]
@@ -77,8 +77,8 @@ def test_a_load_to_the_side_is_weighed_and_found(
 def test_without_a_roll_rate_the_interval_is_wider_and_holds(
     side: tuple[float, float, float],
     sideways: dict[tuple[float, float, float], KnownRun],
-    rolling: CrossSpectrumCalibration,
-    unrolled: CrossSpectrumCalibration,
+    rolling: VehicleModel,
+    unrolled: VehicleModel,
 ) -> None:
     batch = sideways[side].batches[0]
     with_roll, without = weighed(batch, rolling), weighed(replace(batch, roll_rate_radps=None), unrolled)
@@ -89,7 +89,7 @@ def test_without_a_roll_rate_the_interval_is_wider_and_holds(
 
 
 def test_a_roll_rate_that_is_lost_is_done_without(
-    sideways: dict[tuple[float, float, float], KnownRun], rolling: CrossSpectrumCalibration
+    sideways: dict[tuple[float, float, float], KnownRun], rolling: VehicleModel
 ) -> None:
     """Known in a fifth of the batch, or in none of it: the same answer, wider than with it, that places nothing."""
     side = SIDES[0]
@@ -107,7 +107,7 @@ def test_a_roll_rate_that_is_lost_is_done_without(
 
 
 def test_an_unseen_sideways_load_costs_surety_and_no_refusal_where_the_load_is_central(
-    known: list[KnownRun], rolling: CrossSpectrumCalibration
+    known: list[KnownRun], rolling: VehicleModel
 ) -> None:
     """Tracks that differ shake a sensor off the centre line by themselves: no other sensor, and no other vehicle."""
     found = [weighed(replace(run.batches[0], roll_rate_radps=None), rolling) for run in known]
@@ -117,7 +117,7 @@ def test_an_unseen_sideways_load_costs_surety_and_no_refusal_where_the_load_is_c
 
 
 def test_a_roll_rate_that_is_lost_for_a_moment_is_still_used(
-    sideways: dict[tuple[float, float, float], KnownRun], rolling: CrossSpectrumCalibration
+    sideways: dict[tuple[float, float, float], KnownRun], rolling: VehicleModel
 ) -> None:
     batch = sideways[SIDES[0]].batches[0]
     assert batch.roll_rate_radps is not None
@@ -130,7 +130,7 @@ def test_a_roll_rate_that_is_lost_for_a_moment_is_still_used(
 
 @pytest.mark.parametrize("turned_deg", [-10.0, 10.0])
 def test_roll_that_leaks_into_a_turned_gyro_is_no_noise(
-    turned_deg: float, sideways: dict[tuple[float, float, float], KnownRun], rolling: CrossSpectrumCalibration
+    turned_deg: float, sideways: dict[tuple[float, float, float], KnownRun], rolling: VehicleModel
 ) -> None:
     """The noise of a batch is free: without a watch on it, it would hide the roll."""
     batch, by = sideways[SIDES[0]].batches[0], np.deg2rad(turned_deg)
@@ -145,7 +145,7 @@ def test_roll_that_leaks_into_a_turned_gyro_is_no_noise(
 
 
 def test_a_gyro_that_is_noisy_is_not_taken_for_a_turned_one(
-    sideways: dict[tuple[float, float, float], KnownRun], rolling: CrossSpectrumCalibration
+    sideways: dict[tuple[float, float, float], KnownRun], rolling: VehicleModel
 ) -> None:
     batch = sideways[SIDES[0]].batches[0]
     noise = 5.0 * SENSORS.imu.gyro.noise_density * (batch.rate_hz / 2.0) ** 0.5

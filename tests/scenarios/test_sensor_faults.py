@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from gateway.bus.signals import Decoder, load_signal_map
-from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.estimate import Estimate
 from gateway.offline.campaigns import batches_of_motion
@@ -20,6 +19,7 @@ from gateway.sim.scenario import START_NS, simulate_drive
 from gateway.sim.sensors import REFERENCE, Recording
 from gateway.sim.vans import PAPER_VAN
 from gateway.sim.vehicle import Load
+from gateway.weighing.flow import Flow, Identity
 from gateway.workbench.wiring import Wiring
 
 WINDOW_S = 120.0

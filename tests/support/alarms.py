@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from gateway.core.alarms.rules import AlarmRules
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.fusion import epoch_of
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import weighed
@@ -16,6 +15,7 @@ from gateway.service.alarms import AlarmService
 from gateway.setup import Subject
 from gateway.store import Store
 from gateway.web.live.board import Board
+from gateway.weighing.calibrated import CalibratedVehicle
 from support.days import at, batch
 from support.estimates import posterior_of
 

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.events.entry import EntryKind
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
 from gateway.records import iso_utc, json_line
 from gateway.status import Standing, State, Status
+from gateway.weighing.calibrated import CalibratedVehicle
 from support.estimates import make_estimate, posterior_of
 from support.web import Gateway
 

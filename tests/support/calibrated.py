@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from gateway.calibration.file.calibration_file import CalibrationFile, content_id
+from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 
@@ -57,8 +57,8 @@ def calibration_file(payload_kg: float = 200.0, front_share_pct: float = 48.0) -
     absent = ("unsprung_front_kg", "unsprung_rear_kg", "kerb_front_axle_kg", "kerb_rear_axle_kg", "wheel_radius_m")
     absent += ("front_axle_limit_kg", "rear_axle_limit_kg", "front_wheel_limit_kg", "rear_wheel_limit_kg")
     absent += ("track_width_m",)
-    run = {"number": 1, "log": "a.log", "sha256": "0" * 64, "payload_kg": 0.0, "front_share_pct": 50.0, "n_batches": 2}
-    run["payload_left_m"] = None
+    drive = {"number": 1, "log": "a.log", "sha256": "0" * 64, "n_batches": 2, "found": None}
+    drive["statement"] = {"source": "known", "payload_kg": 0.0, "front_share_pct": 50.0}
     return CalibrationFile.model_validate(
         {
             "vehicle": vehicle | dict.fromkeys(absent),
@@ -74,7 +74,7 @@ def calibration_file(payload_kg: float = 200.0, front_share_pct: float = 48.0) -
                 "software": "springscale test",
                 "command": "springscale calibrate",
                 "campaign_sha256": "1" * 64,
-                "runs": [run],
+                "drives": [drive],
             },
         }
     )
@@ -84,4 +84,4 @@ def calibration_text(file: CalibrationFile | None = None, **vehicle: float | Non
     """The same as a file, the vehicle's figures changed so."""
     told: dict[str, Any] = json.loads((file or calibration_file()).to_json())
     told["vehicle"] |= vehicle
-    return json.dumps({**told, "id": content_id(told)})
+    return json.dumps(told)

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from gateway.calibration.file.calibration_file import load_calibration
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.fusion import epoch_of
 from gateway.core.spectrum import spectra_of
 from gateway.estimate import Estimate
 from gateway.records import Why, iso_utc
 from gateway.status import BusStatus, SignalHealth, State, Status, StoreStatus, UplinkStatus
 from gateway.web.routes.weights import KnownLoadTold
+from gateway.weighing.calibrated import CalibratedVehicle
 from support.estimates import WINDOW_NS, make_estimate, posterior_of
 from support.half_car_road import batch_over_road
 from support.patience import PATIENCE_S

@@ -1,22 +1,26 @@
-"""A batch of exact spectra: sensors of a known half-car over a random road, made in the frequency domain."""
+"""A batch of exact spectra: sensors of a known half-car over a random road, and what known loads teach of it."""
+
+from dataclasses import replace
 
 import numpy as np
 
-from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.known_run import KnownRun
-from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cross_spectrum import by_cross_spectrum
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.model.half_car import Axle, HalfCar, frequency_response
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS, has_roll, is_positive, names_of
-from gateway.core.estimator import estimate
-from gateway.core.vehicle import Vehicle
+from gateway.calibration.vehicle import TaughtDrive, teach
+from gateway.core.vehicle import Load, Vehicle
 from gateway.estimate import Estimate
+from gateway.model.car import Ground
+from gateway.model.table import INDEX, NAMES
+from gateway.model.vehicle import VehicleModel
 from gateway.records import F64, Batch
+from gateway.weighing.calibrated import CalibratedVehicle
+from gateway.weighing.estimator import estimate
+from support import model_road
 from support.kept import kept
+from support.model_road import QUIET, UNCOUPLED, paths_of, theta_of
+
+RATE_HZ = model_road.RATE_HZ
 
 KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))  # payload (kg), front share (%)
-RATE_HZ = 50.0
 VAN = Vehicle(
     name="van",
     empty_mass_kg=1240.0,
@@ -25,57 +29,62 @@ VAN = Vehicle(
     sensor_position_m=3.1,
     sensor_offset_left_std_m=1e-3,  # a half-car has no width
 )
-CAR = HalfCar(
-    empty_mass_kg=1240.0,
-    empty_front_share=0.52,
-    wheelbase_m=2.8,
-    front=Axle(62e3, 0.02, (), (), 3.9e3, 8e5, 3.6e5, 82.0),
-    rear=Axle(70e3, 0.04, (), (), 4.1e3, 7e5, 3.8e5, 88.0),
+GROUND = Ground.of(VAN)
+CAR = theta_of(
+    vehicle=VAN,
+    **dict.fromkeys(QUIET, 1e-30),
+    **UNCOUPLED,
+    spring_front_npm=62e3,
+    spring_rear_npm=70e3,
+    spring_slope_front_per_kn=0.02,
+    spring_slope_rear_per_kn=0.04,
+    damper_front_nspm=3.9e3,
+    damper_rear_nspm=4.1e3,
+    damper_mount_front_npm=8e5,
+    damper_mount_rear_npm=7e5,
+    tyre_front_npm=3.6e5,
+    tyre_rear_npm=3.8e5,
+    unsprung_front_kg=82.0,
+    unsprung_rear_kg=88.0,
     pitch_inertia_kgm2=2200.0,
-    sensor_position_m=3.1,
     payload_gyration_m2=0.1,
     payload_mode_hz=28.0,
     payload_damping_ratio=0.15,
-    gyro_lag_s=0.0,
+    track_offset_m=1e-6,
+    **dict.fromkeys((f"{kind}_friction_{end}" for kind in ("spring", "damper") for end in ("front", "rear")), 0.0),
 )
 
 
-def parameters_of(car: HalfCar) -> F64:
-    """The car as the model's vector (p,), next to no slack or noise."""
-    known = {name: getattr(car, name) for name in PARAMETERS if hasattr(car, name)}
-    for end, axle in (("front", car.front), ("rear", car.rear)):
-        known |= {
-            f"spring_{end}_npm": axle.spring_npm,
-            f"spring_slope_{end}_per_kn": axle.spring_slope_per_kn,
-            f"damper_{end}_nspm": axle.damper_nspm,
-            f"damper_mount_{end}_npm": axle.damper_mount_npm,
-            f"tyre_{end}_npm": axle.tyre_npm,
-            f"unsprung_{end}_kg": axle.unsprung_kg,
-        }
-    usual = dict.fromkeys(PARAMETERS, 0.0) | {name: 1e-30 for name in PARAMETERS if is_positive(name)}
-    return np.array([np.log(x) if is_positive(name) else x for name, x in (usual | known).items()])
+def times(car: F64, **factors: float) -> F64:
+    """The car with these positive parameters multiplied."""
+    changed = car.copy()
+    for name, factor in factors.items():
+        changed[INDEX[name]] += np.log(factor)
+    return changed
 
 
-def as_if_fitted(theta: F64, std: F64, vehicle: Vehicle = VAN) -> CrossSpectrumCalibration:
+def as_if_fitted(theta: F64, std: F64, vehicle: Vehicle = VAN) -> VehicleModel:
     """As if a fit had ended with these parameters and standard deviations (n,)."""
-    return CrossSpectrumCalibration(
+    loads = tuple(Load(kg, share) for kg in (0.0, 420.0) for share in (40.0, 60.0))
+    return VehicleModel(
         empty_mass_kg=vehicle.empty_mass_kg,
         empty_front_share_pct=vehicle.empty_front_share_pct,
         wheelbase_m=vehicle.wheelbase_m,
         band_hz=(1.1, 14.0),
         n_segment=256,
-        names=names_of(theta),
+        names=NAMES[: len(theta)],
         parameters=theta,
         covariance=np.diag(std**2),
         directions=np.zeros((len(theta), 0)),
         model_std=(10.0, 0.2, 0.002),
+        spread=(1.0, 1.0, 1.0),
         misfit_limit=3.0,
         acceleration_rms_mps2=0.5,
         pitch_rate_rms_radps=0.05,
-        payload_seen_kg=(0.0, 420.0),
-        front_share_seen_pct=(40.0, 60.0),
         speed_seen_mps=(12.0, 15.0),
-        track_width_m=vehicle.track_width_m if has_roll(theta) else None,
+        taught_loads=loads,
+        usual_log_amplitude=0.0,
+        track_width_m=vehicle.track_width_m,
     )
 
 
@@ -89,7 +98,7 @@ def batch_over_road(
     waviness: float = 2.0,
     pitch_sign: float = 1.0,
     incoherent: float = 0.0,
-    car: HalfCar = CAR,
+    car: F64 = CAR,
     shaken_mps2: float = 0.8,
 ) -> Batch:
     """Constant speed; ``shaken_mps2`` is the acceleration's standard deviation, ``noise`` a share of each signal's.
@@ -100,11 +109,10 @@ def batch_over_road(
     n = int(duration_s * RATE_HZ)
     freq_hz = np.fft.rfftfreq(n, 1.0 / RATE_HZ)[1:]
     road = (rng.standard_normal(len(freq_hz)) + 1j * rng.standard_normal(len(freq_hz))) * freq_hz ** (-waviness / 2)
-    r = frequency_response(car, payload_kg, front_share_pct / 100.0, freq_hz)
-    later = np.exp(-2j * np.pi * freq_hz * car.wheelbase_m / speed_mps)
-    in_band = (freq_hz > 0.5) & (freq_hz < 22.0)
-    acceleration = _in_time((r.acceleration_front + r.acceleration_rear * later) * road * in_band, n)
-    pitch_rate = _in_time((r.pitch_rate_front + r.pitch_rate_rear * later) * road * in_band, n)
+    paths = paths_of(car, (payload_kg, front_share_pct / 100.0), freq_hz, speed_mps=speed_mps, ground=GROUND)
+    later = np.exp(-2j * np.pi * freq_hz * VAN.wheelbase_m / speed_mps)
+    sensed = (paths[:, 0] + paths[:, 1] * later) * road * ((freq_hz > 0.5) & (freq_hz < 22.0))
+    acceleration, pitch_rate = np.fft.irfft(np.pad(sensed, ((0, 0), (1, 0))), n, axis=1)
     scale = shaken_mps2 / acceleration.std()
     acceleration, pitch_rate = acceleration * scale, pitch_rate * scale
     unrelated = pitch_rate.std() * rng.standard_normal(n)
@@ -118,24 +126,7 @@ def batch_over_road(
 
 def batch_of(acceleration_mps2: F64, pitch_rate_radps: F64, speed_mps: F64) -> Batch:
     """A batch whose every sample is usable."""
-    n = len(speed_mps)
-    return Batch(
-        t_start_ns=0,
-        t_end_ns=int(n / RATE_HZ * 1e9),
-        drive_start_ns=0,
-        rate_hz=RATE_HZ,
-        vertical_acceleration_mps2=acceleration_mps2,
-        pitch_rate_radps=pitch_rate_radps,
-        speed_mps=speed_mps,
-        usable=np.ones(n, bool),
-        gravity_mps2=9.81,
-        gap_share=0.0,
-        shares={},
-    )
-
-
-def _in_time(spectrum: F64, n: int) -> F64:
-    return np.fft.irfft(np.r_[0.0, spectrum], n)
+    return model_road.batch_of(acceleration_mps2, pitch_rate_radps, speed_mps=speed_mps)
 
 
 def run_over_road(number: int, payload_kg: float, share_pct: float) -> KnownRun:
@@ -144,19 +135,19 @@ def run_over_road(number: int, payload_kg: float, share_pct: float) -> KnownRun:
     return KnownRun(number, f"run {number}", payload_kg, share_pct, batches)
 
 
+def taught_by(runs: list[KnownRun], vehicle: Vehicle = VAN) -> VehicleModel:
+    """The vehicle that these runs teach."""
+    return teach([TaughtDrive(f"run {one.number}", one.batches, one.statement) for one in runs], vehicle).model
+
+
 @kept
-def calibrated_on_known_loads() -> CrossSpectrumCalibration:
+def calibrated_on_known_loads() -> VehicleModel:
     """Two batches of each of four loads."""
-    return calibrate_cross_spectrum([run_over_road(i, *load) for i, load in enumerate(KNOWN)], VAN)
+    return taught_by([run_over_road(i, *load) for i, load in enumerate(KNOWN)])
 
 
-def weighed(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
-    """What the cross spectrum tells of the batch, with no limit to the loads."""
-    calibrated = CalibratedVehicle("sha256:ab", VAN, (0.0, 0.0), (0.0, 0.0), cross_spectrum=calibration)
+def weighed(batch: Batch, model: VehicleModel) -> Estimate:
+    """What the cross spectrum tells of the batch, whatever the loads seen."""
+    vehicle = replace(VAN, payload_range_kg=(0.0, 2000.0))
+    calibrated = CalibratedVehicle("sha256:ab", vehicle, (0.0, 0.0), (0.0, 0.0), cross_spectrum=model)
     return estimate(batch, calibrated, "cross_spectrum")
-
-
-def weighed_as_known(batch: Batch, calibration: CrossSpectrumCalibration) -> Estimate:
-    """The same of a load that is known to have the shape of the known loads."""
-    blank = Estimate(batch.t_start_ns, batch.t_end_ns, "cross_spectrum")
-    return by_cross_spectrum(batch, calibration, None, blank)

@@ -1,22 +1,15 @@
 """Known-load drives of the half-car of support.half_car_road, as calibration reads them."""
 
-from dataclasses import replace
-
-from gateway.calibration.half_car.fit import calibrate_cross_spectrum
 from gateway.calibration.inspection.log import LogFacts, SplitRun
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.model.half_car import HalfCar
 from gateway.core.vehicle import front_share_pct
-from support.half_car_road import CAR, VAN, batch_over_road
+from gateway.model.vehicle import VehicleModel
+from gateway.records import F64
+from support.half_car_road import CAR, VAN, batch_over_road, taught_by, times
 from support.kept import kept
 
 LOADS = ((0.0, None), (200.0, 0.5), (300.0, 1.4), (400.0, 2.6))  # payload, metres behind the front axle
-SIBLING = replace(
-    CAR,
-    front=replace(CAR.front, spring_npm=0.97 * CAR.front.spring_npm, damper_nspm=1.1 * CAR.front.damper_nspm),
-    rear=replace(CAR.rear, spring_npm=1.03 * CAR.rear.spring_npm, tyre_npm=0.96 * CAR.rear.tyre_npm),
-)
+SIBLING = times(CAR, spring_front_npm=0.97, damper_front_nspm=1.1, spring_rear_npm=1.03, tyre_rear_npm=0.96)
 
 
 def known_run(
@@ -26,7 +19,7 @@ def known_run(
     seed: int,
     n_batches: int = 1,
     duration_s: float = 200.0,
-    car: HalfCar = CAR,
+    car: F64 = CAR,
 ) -> KnownRun:
     """One drive at 14 m/s."""
     share_pct = front_share_pct(VAN, payload_kg, position_m)
@@ -52,6 +45,6 @@ def campaign(seed: int = 1) -> tuple[SplitRun, ...]:
 
 
 @kept
-def calibrated_on_loads(seed: int, car: HalfCar = CAR) -> CrossSpectrumCalibration:
+def calibrated_on_loads(seed: int) -> VehicleModel:
     """One drive with each of LOADS."""
-    return calibrate_cross_spectrum([known_run(i, *load, seed=seed, car=car) for i, load in enumerate(LOADS)], VAN)
+    return taught_by([known_run(i, *load, seed=seed) for i, load in enumerate(LOADS)])

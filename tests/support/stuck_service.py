@@ -7,9 +7,9 @@ import numpy as np
 import scipy.fft
 
 from gateway.cli import main
-from gateway.core.flow import Flow
 from gateway.estimate import Estimate
 from gateway.service import gateway
+from gateway.weighing.flow import Flow
 
 N_THREADS = 3  # so that one of them is inside whenever the process ends
 

@@ -13,7 +13,6 @@ import httpx
 import uvicorn
 from fastapi import FastAPI
 
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
 from gateway.status import State, Status
@@ -24,6 +23,7 @@ from gateway.web.app import create_app
 from gateway.web.live.board import Board
 from gateway.web.routes.service_calls import CommissioningBackend, KnownWeightBackend, VerificationBackend
 from gateway.web.routes.weights import KnownLoads
+from gateway.weighing.calibrated import CalibratedVehicle
 from support.absent import of_no_vehicle
 from support.patience import PATIENCE_S
 

@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.drives import drive
+from support.half_car_road import CAR, as_if_fitted
 
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.bends import Bends, gyro_gain_of, joined_gains
-from gateway.core.cross_spectrum.sensor_change import gyro_gain_ratio, is_gyro_gain_changed
 from gateway.core.settings import BatchSettings
+from gateway.model.sensors import gyro_gain_ratio, is_changed
+from gateway.model.vehicle import VehicleModel
 from gateway.records import Batch, Motion, Signal
 from gateway.sim.drive import rural
 from gateway.sim.road import iso_road
@@ -82,10 +84,12 @@ def test_several_batches_tell_more() -> None:
 
 def test_a_gain_is_changed_beyond_chance_and_temperature() -> None:
     calibrated = (1.002, 0.002)
-    assert is_gyro_gain_changed(gyro_gain_ratio((1.002 * 1.05, 0.006), calibrated))
-    assert not is_gyro_gain_changed(gyro_gain_ratio((1.002 * 1.02, 0.006), calibrated))
+    model, batch = of_gain(calibrated), batch_of(drive(100.0))
+    assert is_changed(replace(batch, gyro_gain=(1.002 * 1.05, 0.006)), model)
+    assert not is_changed(replace(batch, gyro_gain=(1.002 * 1.02, 0.006)), model)
     assert gyro_gain_ratio(None, calibrated) is None
-    assert not is_gyro_gain_changed(gyro_gain_ratio((1.5, 0.006), None))
+    assert not is_changed(batch, model)
+    assert not is_changed(replace(batch, gyro_gain=(1.5, 0.006)), of_gain(None))
 
 
 def test_a_simulated_van_on_a_country_road_tells_its_gyros_gain() -> None:
@@ -98,7 +102,12 @@ def test_a_simulated_van_on_a_country_road_tells_its_gyros_gain() -> None:
     assert healthy.gyro_gain[0] == pytest.approx(1.0, abs=0.015)
     told = gyro_gain_ratio(changed.gyro_gain, healthy.gyro_gain)
     assert told[0] == pytest.approx(1.05, abs=0.01)
-    assert is_gyro_gain_changed(told)
+    assert is_changed(changed, of_gain(healthy.gyro_gain))
+
+
+def of_gain(gain: tuple[float, float] | None) -> VehicleModel:
+    """A calibrated vehicle whose drives gave the gyro this gain."""
+    return replace(as_if_fitted(CAR, np.ones(len(CAR))), gyro_gain=gain)
 
 
 def amplified(rows: Motion, by: float) -> Motion:

@@ -7,6 +7,7 @@ import pytest
 from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.commissioning.answers import vehicle_table
 from gateway.calibration.known_run import KnownRun
+from gateway.calibration.statements import KNOWN_SHARE_PLUS_MINUS_PCT
 from gateway.core.vehicle import (
     MEASURED_OFFSET_STD_M,
     PAYLOAD_LEFT_NOTED_STD_M,
@@ -82,6 +83,34 @@ def test_shares_follow_from_positions_unless_they_are_given(tmp_path: Path) -> N
     assert stated == 47.5
 
 
+def test_a_run_of_which_nothing_is_said_has_an_unknown_load(tmp_path: Path) -> None:
+    campaign = loaded(tmp_path, campaign_text('signals = "s"', None, EMPTY_RUN, {"log": '"a.log"'}))
+    run = campaign.known_run(2, campaign.runs[1], ())
+    assert (run.has_payload, run.has_place, run.described) == (False, False, "an unknown load")
+    assert (run.statement.payload_kg, run.statement.front_share_pct, run.statement.source) == (None, None, None)
+    assert not run.statement.is_compact
+
+
+def test_a_load_without_a_place_is_a_note(tmp_path: Path) -> None:
+    note = {"log": '"a.log"', "payload_kg": "310.0", "payload_plus_minus_kg": "25.0"}
+    campaign = loaded(tmp_path, campaign_text('signals = "s"', None, note))
+    run = campaign.known_run(1, campaign.runs[0], ())
+    assert (run.has_payload, run.has_place, run.described) == (True, False, "310 kg")
+    assert (run.statement.payload_kg, run.statement.payload_plus_minus_kg) == (310.0, 25.0)
+    assert run.statement.front_share_pct is None
+    assert not run.statement.is_compact
+
+
+def test_the_doubt_of_a_place_is_that_of_the_share(tmp_path: Path) -> None:
+    """0.28 m of a wheelbase of 2.8 m move a tenth of the payload from one axle to the other."""
+    rough = LOADED_RUN | {"payload_position_plus_minus_m": "0.28"}
+    campaign = loaded(tmp_path, campaign_text('signals = "s"', None, rough, LOADED_RUN))
+    doubtful, usual = (campaign.known_run(i, run, ()).statement for i, run in enumerate(campaign.runs, 1))
+    assert doubtful.front_share_plus_minus_pct == pytest.approx(100.0 * 27.0 / 1510.0)
+    assert usual.front_share_plus_minus_pct == KNOWN_SHARE_PLUS_MINUS_PCT
+    assert usual.is_compact
+
+
 def test_a_sensor_whose_place_to_the_side_is_not_stated_is_unsure(tmp_path: Path) -> None:
     def placed(**keys: str) -> tuple[float, float]:
         vehicle = loaded(tmp_path, campaign_text(vehicle=keys)).vehicle
@@ -128,9 +157,12 @@ FAULTS = [
     (campaign_text(vehicle={"empty_front_share_pct": "0.5e3"}), "vehicle.empty_front_share_pct: "),
     (campaign_text(vehicle={"payload_range_kg": "[450.0, 0.0]"}), "payload_range_kg must rise"),
     (campaign_text(vehicle={"carries": '"elephants"'}), "vehicle.carries"),
-    (campaign_text('signals = "s"', None, {"log": '"a.log"'}), "runs[1].payload_kg: missing"),
+    (
+        campaign_text('signals = "s"', None, {"log": '"a.log"', "payload_position_m": "0.5"}),
+        "payload_position_m says nothing without payload_kg: state it, or leave both out",
+    ),
+    (campaign_text('signals = "s"', None, LOADED_RUN | {"payload_plus_minus_kg": "0"}), "payload_plus_minus_kg: "),
     (campaign_text('signals = "s"', None, EMPTY_RUN, LOADED_RUN | {"payload_kg": "-5.0"}), "runs[2].payload_kg: "),
-    (campaign_text('signals = "s"', None, EMPTY_RUN | {"payload_kg": "90.0"}), "needs payload_position_m"),
     (campaign_text('signals = "s"', None, LOADED_RUN | {"front_share_pct": "48.0"}), "not both"),
     (campaign_text('signals = "s"', None, EMPTY_RUN | {"start_s": "9.0", "end_s": "5.0"}), "end_s must be after"),
     (campaign_text('signals = "s"', None, EMPTY_RUN | {"split": '"test"'}), "runs[1].split: "),
@@ -176,7 +208,8 @@ def test_each_fault_is_named(tmp_path: Path, text: str, said: str) -> None:
 
 
 def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
-    faults = fault_of(tmp_path, campaign_text('signals = ""', {"wheelbase_m": "-1.0"}, EMPTY_RUN, {"log": '"a.log"'}))
+    text = campaign_text('signals = ""', {"wheelbase_m": "-1.0"}, EMPTY_RUN | {"payload_kg": "-1"})
+    faults = fault_of(tmp_path, text)
     assert len(faults.splitlines()) == 3
 
 

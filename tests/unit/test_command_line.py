@@ -125,7 +125,7 @@ def test_a_drive_that_fails_ends_the_command_with_what_it_was(monkeypatch: pytes
 HEAVY = ("scipy", "asammdf", "pandas", "matplotlib", "numba", "pyarrow")
 
 
-FITTING = ("gateway.calibration.half_car", "gateway.calibration.ratio_index", "gateway.calibration.line")
+FITTING = ("gateway.calibration.ratio_index", "gateway.calibration.inspection", "gateway.calibration.calibrate")
 
 
 def python(code: str) -> str:

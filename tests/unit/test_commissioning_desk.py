@@ -238,7 +238,7 @@ def test_the_vehicle_may_be_answered_anew_and_what_was_driven_stays(driving: Ben
 def test_what_a_sister_shares_need_not_be_typed(tmp_path: Path, typed: dict[str, Any], payload_kg: float) -> None:
     sister = json.loads((Path(str(files("gateway"))) / "demo" / "paper_van.json").read_text())
     sister["vehicle"] |= {"payload_range_kg": [0.0, 900.0], "gross_limit_kg": 2300.0, "track_width_m": 1.6}
-    held = CalibrationFile.model_validate({key: part for key, part in sister.items() if key != "id"})
+    held = CalibrationFile.model_validate(sister)
     bench = Bench(tmp_path / "state", replaced(sister=held.vehicle))
     bench.desk.begin("workshop", None)
     bench.desk.state_vehicle(VehicleAnswers(**{**ANSWERS, "wheelbase_m": held.vehicle.wheelbase_m, **typed}))

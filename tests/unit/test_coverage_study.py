@@ -29,7 +29,6 @@ from benchmarks.accuracy.drives import (
     without_roll_rate,
 )
 from gateway.calibration.known_run import KnownRun
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.core.vehicle import front_share_pct as stated_share_pct
 from gateway.errors import CalibrationImpossibleError
@@ -37,6 +36,7 @@ from gateway.records import Signal
 from gateway.sim.sensors import Sensors
 from gateway.sim.vehicle import Load, front_share_pct, payload_kg
 from gateway.sim.vehicle import Vehicle as Van
+from gateway.weighing.calibrated import CalibratedVehicle
 
 
 def van(number: int = 1) -> Van:

@@ -13,9 +13,6 @@ from gateway.calibration.judgement.evaluation import Comparison, Judged, error_t
 from gateway.calibration.known_run import KnownRun
 from gateway.cli.evaluate import text_of
 from gateway.core.batch import BatchWindow, build_batch
-from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.estimator import estimate
-from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import Unsprung, weighed
@@ -23,6 +20,9 @@ from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
 from gateway.posterior import exactly
 from gateway.records import Batch, Why
+from gateway.weighing.calibrated import CalibratedVehicle
+from gateway.weighing.estimator import estimate
+from gateway.weighing.flow import Flow, Identity
 
 VAN = Vehicle(
     name="van",
@@ -49,9 +49,9 @@ def judged(true_kg: float, found_kg: float | None, true_pct: float = 50.0, found
 
 
 @pytest.mark.parametrize(
-    ("true", "is_covered"), [(89.9, False), (90.0, True), (110.0, True), (110.1, False), (float("nan"), False)]
+    ("true", "is_covered"), [(89.9, False), (90.0, True), (110.0, True), (110.1, False), (float("nan"), None)]
 )
-def test_an_interval_holds_the_truth_between_its_ends(true: float, is_covered: bool) -> None:
+def test_an_interval_holds_the_truth_between_its_ends(true: float, is_covered: bool | None) -> None:
     assert Comparison(true, 100.0, 90.0, 110.0).is_covered is is_covered
     assert Comparison(true, 100.0, float("nan"), float("nan")).is_covered is None
 
@@ -229,9 +229,29 @@ def test_out_of_range_is_an_interval_wholly_beyond_what_was_seen(
     assert (estimate_to_json(found)["front_share_interval95_pct"] is None) == is_outside
 
 
-def test_a_calibration_from_one_load_sets_no_limit() -> None:
-    one = CalibratedVehicle("id", VAN, (100.0, 100.0), (48.0, 48.0))
-    assert not one.is_out_of_range((5000.0, 5001.0), (1.0, 2.0))
+@pytest.mark.parametrize(
+    ("payload95_kg", "is_refused"),
+    [
+        ((-1348.0, 218.0), True),  # -565 +- 783 kg says nothing
+        ((100.0, 700.0), False),  # wide, but some of it can be
+        ((700.0, 750.0), True),
+        ((-300.0, -200.0), True),
+    ],
+)
+def test_a_calibration_of_one_load_believes_what_the_vehicle_may_carry(
+    payload95_kg: tuple[float, float], is_refused: bool
+) -> None:
+    """Up to a third of its own mass, and a quarter of that more at either end; a single share sets no limit."""
+    one = CalibratedVehicle("id", VAN, (0.0, 0.4), (50.0, 50.1))
+    assert one.payload_believed_kg == pytest.approx((-102.3, 511.5))
+    assert one.is_out_of_range(payload95_kg, (1.0, 2.0)) is is_refused
+
+
+def test_an_interval_wider_than_the_believed_range_says_nothing() -> None:
+    calibrated = calibration_file().for_core()
+    low, high = calibrated.payload_believed_kg
+    assert not calibrated.is_out_of_range((low + 1.0, high), (47.0, 49.0))
+    assert calibrated.is_out_of_range((low - 1.0, high), (47.0, 49.0))
 
 
 def test_an_unknown_interval_is_not_outside() -> None:

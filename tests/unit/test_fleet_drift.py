@@ -35,7 +35,7 @@ SEASON = 0.05 * np.sin(2.0 * np.pi * YEARS)
 def series_of(damper: F64) -> Series:
     nothing = (np.empty(0, dtype=np.int64), np.empty(0))
     names = ("damper_rear_ratio", "delay_scale", "roll_share_front", "misfit", "tension")
-    rest = (*names, "sensor_position_score", "sensor_noise_score")
+    rest = (*names, "sensor_position_deviation", "sensor_noise_deviation")
     return {"damper_front_ratio": (WEEKS, damper), **dict.fromkeys(rest, nothing)}
 
 

@@ -9,13 +9,13 @@ import pytest
 from support.calibrated import calibration_file
 from support.drives import drive, joined, later
 
-from gateway.core.flow import Flow, Identity
 from gateway.core.known_weights import Knowledge, Observation
 from gateway.core.settings import BatchSettings
 from gateway.estimate import Estimate, Lack
 from gateway.estimate_json import estimate_to_json
 from gateway.posterior import PAYLOAD, Posterior, Source
 from gateway.records import F64, Motion
+from gateway.weighing.flow import Flow, Identity
 
 SETTINGS = BatchSettings(window_s=20.0, provisional_every_s=10.0)
 LONG = BatchSettings(window_s=100.0, provisional_every_s=60.0)  # an early look long enough to count

@@ -23,15 +23,15 @@ from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of, packed
 from gateway.calibration.kept.drive import inspect_kept, split_run_of
 from gateway.calibration.kept.shelf import Shelf, ShelfLimits
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.flow import Flow, Identity
 from gateway.core.settings import BatchSettings
 from gateway.errors import KeptBatchError
 from gateway.estimate import Estimate
 from gateway.log import Event
+from gateway.model.vehicle import VehicleModel
 from gateway.offline.campaigns import calibrate, read_whole_log
 from gateway.records import Batch, Motion, Why
 from gateway.service.keeper import MOST_WAITING, BatchKeeper
+from gateway.weighing.flow import Flow, Identity
 
 MAP = load_signal_map("springscale:reference")
 SETTINGS = BatchSettings(window_s=20.0)
@@ -135,8 +135,8 @@ def test_a_fit_from_kept_batches_is_the_fit_from_the_logs_bit_for_bit(tmp_path: 
     assert from_kept.warnings == from_log.warnings
 
 
-def exact(calibration: CrossSpectrumCalibration | None) -> bytes:
-    return TypeAdapter(CrossSpectrumCalibration | None).dump_json(calibration)
+def exact(calibration: VehicleModel | None) -> bytes:
+    return TypeAdapter(VehicleModel | None).dump_json(calibration)
 
 
 def test_the_shelf_is_bounded_in_count_and_the_oldest_gives_way(tmp_path: Path, three: list[KeptBatch]) -> None:

@@ -9,8 +9,6 @@ import pytest
 from support.calibrated import calibration_file
 from support.drives import drive, joined, later, without_rows
 
-from gateway.core import flow as flow_module
-from gateway.core.flow import Flow, Identity
 from gateway.core.pool import Part, spanned
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
@@ -18,6 +16,8 @@ from gateway.estimate import Estimate, Way
 from gateway.posterior import Posterior, Source
 from gateway.records import F64, Batch, Motion, Why
 from gateway.units import NS_PER_S
+from gateway.weighing import flow as flow_module
+from gateway.weighing.flow import Flow, Identity
 
 SETTINGS = BatchSettings(window_s=150.0)  # a batch has 90 s that are usable
 CALIBRATED = calibration_file(payload_kg=12.0, front_share_pct=51.0).for_core()

@@ -9,10 +9,10 @@ import springscale
 from support.drives import T0_NS, drive, steady
 
 import gateway
-from gateway.core.flow import Flow, Identity
 from gateway.errors import ArraysError
 from gateway.estimate_json import COLUMNS
 from gateway.records import Motion, Signal
+from gateway.weighing.flow import Flow, Identity
 
 PAPER_VAN = str(files("gateway") / "demo" / "paper_van.json")
 SENSED = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)

@@ -12,8 +12,6 @@ from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import candidate_pairs, rank_correlations
 from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
 from gateway.calibration.ratio_index.table import SpectrumTable
-from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.estimator import estimate
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration, indexes_of
 from gateway.core.ratio_index.regression import (
     MODEL_9_PAYLOAD,
@@ -25,6 +23,8 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimate import UNKNOWN
 from gateway.records import F64, Batch, Why
+from gateway.weighing.calibrated import CalibratedVehicle
+from gateway.weighing.estimator import estimate
 
 VAN = Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0)
 N = 12_000

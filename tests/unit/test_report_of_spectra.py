@@ -6,24 +6,23 @@ import numpy as np
 import pytest
 from support.calibrated import ratio_index_calibration
 from support.estimates import make_estimate
-from support.half_car_road import CAR, RATE_HZ, VAN, as_if_fitted, batch_of, batch_over_road, parameters_of
+from support.half_car_road import CAR, RATE_HZ, VAN, as_if_fitted, batch_of, batch_over_road
 
-from gateway.calibration.half_car.fit import calibrate_cross_spectrum
-from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.calibrate import drive_name
 from gateway.calibration.judgement.assessment import BatchSet, Judgement
 from gateway.calibration.judgement.evaluation import CgLeftErrors, Errors, ErrorTable, Judged, TargetErrors, WheelErrors
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
-from gateway.core.cross_spectrum.measured import cross_spectra_of
-from gateway.core.cross_spectrum.model.parameters import PARAMETERS, ROLL_PARAMETERS, names_of
-from gateway.core.cross_spectrum.model.reading import Reading
+from gateway.calibration.vehicle import TaughtDrive, teach
 from gateway.core.ratio_index.index import Band
 from gateway.core.spectrum import spectra_of
 from gateway.estimate import Quantity
+from gateway.model.displayed import Fitted, modelled_spectra
+from gateway.model.spectra import Reading, cross_spectra_of
+from gateway.model.table import INDEX, NAMES, ROWS, UPRIGHT, prior_of
+from gateway.model.vehicle import VehicleModel
 from gateway.records import Batch, Spectra, Why
 from gateway.reports.calibration.accuracy import accuracy_section
-from gateway.reports.calibration.half_car import fits_of, knowledge_chart, knowledge_of, knowledge_table, told
+from gateway.reports.calibration.fitted_vehicle import fits_of, knowledge_chart, knowledge_of, knowledge_table, told
 from gateway.reports.calibration.spectra import ACCELERATION, N_SEGMENT, PITCH_RATE, density_of, spectra_section
 from gateway.reports.charts import LineMark, Ribbon, Span
 
@@ -85,7 +84,8 @@ def test_the_fitted_half_car_shows_what_was_measured() -> None:
         KnownRun(i, f"{i}.log", kg, pct, (batch_over_road(kg, pct, i, 200.0),))
         for i, (kg, pct) in enumerate([(0.0, 52.0), (300.0, 47.0)], 1)
     ]
-    fits = fits_of(runs, calibrate_cross_spectrum(runs, VAN))
+    drives = [TaughtDrive(drive_name(one.number), one.batches, one.statement) for one in runs]
+    fits = fits_of(runs, teach(drives, VAN))
     assert [fit.run.number for fit in fits] == [1, 2]
     for fit in fits:
         at = np.searchsorted(fit.measured.freq_hz, fit.modelled.freq_hz)
@@ -101,8 +101,8 @@ LOADED = Fitted(payload_kg=270.0, front_share_pct=47.0, delay_s=DELAY_S)
 
 
 @pytest.fixture(scope="module")
-def calibration() -> CrossSpectrumCalibration:
-    return as_if_fitted(parameters_of(CAR), np.zeros(len(PARAMETERS)))
+def calibration() -> VehicleModel:
+    return as_if_fitted(CAR, np.zeros(len(CAR)))
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +127,7 @@ def amplitude_misfit(seen: Spectra, modelled: Spectra) -> float:
     return float(np.sqrt(np.mean(np.square(logs))))
 
 
-def test_it_lies_over_the_spectra_of_the_same_vehicle(seen: Spectra, calibration: CrossSpectrumCalibration) -> None:
+def test_it_lies_over_the_spectra_of_the_same_vehicle(seen: Spectra, calibration: VehicleModel) -> None:
     modelled = modelled_spectra(seen, calibration, LOADED)
     beside = measured(seen, modelled)
     assert amplitude_misfit(seen, modelled) < 0.08  # 233 half-overlapping segments scatter by about 5 %
@@ -138,8 +138,9 @@ def test_it_lies_over_the_spectra_of_the_same_vehicle(seen: Spectra, calibration
     assert np.abs(modelled.coherence - beside.coherence).mean() < 0.08
 
 
-def test_a_payload_on_pallets_is_drawn_as_it_was_found(calibration: CrossSpectrumCalibration) -> None:
-    car = replace(CAR, payload_mode_hz=14.0)
+def test_a_payload_on_pallets_is_drawn_as_it_was_found(calibration: VehicleModel) -> None:
+    car = CAR.copy()
+    car[INDEX["payload_mode_hz"]] = np.log(14.0)
     ringing = spectra_of(batch_over_road(270.0, 47.0, seed=3, speed_mps=SPEED_MPS, noise=0.0, car=car))
     assert ringing is not None
     as_found = modelled_spectra(ringing, calibration, replace(LOADED, payload_mode_hz=14.0))
@@ -150,14 +151,14 @@ def test_a_payload_on_pallets_is_drawn_as_it_was_found(calibration: CrossSpectru
 
 @pytest.mark.parametrize(("payload_kg", "front_share_pct"), [(0.0, 52.0), (270.0, 52.0), (420.0, 47.0)])
 def test_another_load_lies_beside_them(
-    seen: Spectra, calibration: CrossSpectrumCalibration, payload_kg: float, front_share_pct: float
+    seen: Spectra, calibration: VehicleModel, payload_kg: float, front_share_pct: float
 ) -> None:
     other = replace(LOADED, payload_kg=payload_kg, front_share_pct=front_share_pct)
     right = amplitude_misfit(seen, modelled_spectra(seen, calibration, LOADED))
     assert amplitude_misfit(seen, modelled_spectra(seen, calibration, other)) > 1.1 * right
 
 
-def test_what_it_says_it_says_again_of_itself(seen: Spectra, calibration: CrossSpectrumCalibration) -> None:
+def test_what_it_says_it_says_again_of_itself(seen: Spectra, calibration: VehicleModel) -> None:
     """The level is a line through the model's own spectra: nothing is left to move."""
     once = modelled_spectra(seen, calibration, LOADED)
     twice = modelled_spectra(once, calibration, LOADED)
@@ -166,14 +167,14 @@ def test_what_it_says_it_says_again_of_itself(seen: Spectra, calibration: CrossS
 
 
 @pytest.mark.parametrize("gain", [0.1, 7.0])
-def test_a_rougher_road_lifts_both_alike(seen: Spectra, calibration: CrossSpectrumCalibration, gain: float) -> None:
+def test_a_rougher_road_lifts_both_alike(seen: Spectra, calibration: VehicleModel, gain: float) -> None:
     louder = replace(seen, vertical_acceleration=gain * seen.vertical_acceleration, pitch_rate=gain * seen.pitch_rate)
     one, other = (modelled_spectra(each, calibration, LOADED) for each in (seen, louder))
     np.testing.assert_allclose(other.pitch_rate, gain * one.pitch_rate, rtol=1e-9)
     np.testing.assert_allclose(other.coherence, one.coherence, rtol=1e-12)
 
 
-def test_varied_speeds_blur_the_wheelbase(seen: Spectra, calibration: CrossSpectrumCalibration) -> None:
+def test_varied_speeds_blur_the_wheelbase(seen: Spectra, calibration: VehicleModel) -> None:
     """Speeds that differ fill the notches that one delay cuts, most at high frequencies."""
     steady = modelled_spectra(seen, calibration, LOADED)
     varied = modelled_spectra(seen, calibration, replace(LOADED, delay_std_s=0.2 * DELAY_S))
@@ -189,14 +190,14 @@ def test_the_delays_of_a_batch_are_those_of_its_speed() -> None:
 
 
 WIDE = replace(VAN, track_width_m=1.5, sensor_offset_left_m=0.3)
-ROLL_PRIOR = prior_of(WIDE, with_roll=True)
+ROLL_MEAN, ROLL_STD = prior_of(ROWS, WIDE)
 
 
 def test_what_the_drives_told_of_roll_is_in_the_report() -> None:
-    std = ROLL_PRIOR.std.copy()
+    std = ROLL_STD.copy()
     std[-1] *= 0.25
-    known = knowledge_of(as_if_fitted(ROLL_PRIOR.mean, std, WIDE), WIDE)
-    assert [one.name for one in known] == [*PARAMETERS, *ROLL_PARAMETERS]
+    known = knowledge_of(as_if_fitted(ROLL_MEAN, std, WIDE), WIDE)
+    assert [one.name for one in known] == list(NAMES)
     assert known[-1].name == "empty_left_m"
     assert known[-1].left_over == pytest.approx(0.25)
     assert all(one.left_over == pytest.approx(1.0) for one in known[:-1])
@@ -204,15 +205,14 @@ def test_what_the_drives_told_of_roll_is_in_the_report() -> None:
     assert "empty_left_m" not in told(known)
     assert "roll" in [panel.title for panel in knowledge_chart(known).panels]
     rows = {row[0]: row for row in knowledge_table(known).rows}
-    assert set(rows) == {name for name in names_of(ROLL_PRIOR.mean) if not name.startswith("slack_")}
+    assert set(rows) == {name for name in NAMES if not name.startswith("slack_")}
     before = float(rows["roll_inertia_kgm2"][1])
     assert before == pytest.approx(1240.0 * (0.42 * 1.5) ** 2, rel=1e-3)  # in its unit, not its logarithm
 
 
 def test_a_calibration_without_a_roll_rate_says_nothing_of_roll() -> None:
-    prior = prior_of(WIDE)
-    known = knowledge_of(as_if_fitted(prior.mean, prior.std, WIDE), WIDE)
-    assert [one.name for one in known] == list(PARAMETERS)
+    known = knowledge_of(as_if_fitted(*prior_of(UPRIGHT, WIDE), WIDE), WIDE)
+    assert [one.name for one in known] == [row.name for row in UPRIGHT]
     assert "roll" not in [panel.title for panel in knowledge_chart(known).panels]
 
 

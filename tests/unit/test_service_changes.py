@@ -7,7 +7,6 @@ from support.calibrated import calibration_file
 from support.estimates import make_estimate, posterior_of
 from support.log import fields_of, logged, names
 
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.estimate import Estimate
 from gateway.log import Event
 from gateway.records import Why
@@ -15,6 +14,7 @@ from gateway.service.batch_log import BatchLog, StateLog
 from gateway.status import State, Status
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import Scales, weigh_latest
+from gateway.weighing.calibrated import CalibratedVehicle
 
 
 class Told:

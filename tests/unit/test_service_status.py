@@ -16,7 +16,6 @@ from support.ports import free_port
 
 from gateway.bus.live.source import SourceState
 from gateway.config import load_settings
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate, Quantity, Weights
 from gateway.records import Signal
@@ -26,6 +25,7 @@ from gateway.setup import setup_of
 from gateway.status import State, Status
 from gateway.web.live.board import Board
 from gateway.web.routes.weights import Scales, weigh_latest
+from gateway.weighing.calibrated import CalibratedVehicle
 
 SIGNALS = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
 ALL_HEARD: Mapping[Signal, float | None] = dict.fromkeys(SIGNALS, 0.0)

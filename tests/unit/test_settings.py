@@ -13,12 +13,12 @@ from support.patience import PATIENCE_S
 
 from gateway.config import ESTIMATOR_NAMES, Settings, load_settings
 from gateway.config.sections import SettingsSection
-from gateway.core.estimator import ESTIMATORS
 from gateway.core.scheduler import Scheduler
 from gateway.errors import ConfigurationError, SignalMapError
 from gateway.service.parts import store_of
 from gateway.toml_file import checked
 from gateway.units import si_factor
+from gateway.weighing.estimator import ESTIMATORS
 
 LEAST = 'signals = "signals.toml"\n'
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from support.half_car_road import CAR, VAN
+from support.half_car_road import CAR, VAN, times
 from support.known_runs import LOADS, SIBLING, known_run
 
 from gateway.calibration.commissioning.answers import doubts_of
@@ -138,11 +138,7 @@ def test_every_kind_has_words() -> None:
     assert all(kind.text and kind.advice for kind in DoubtKind)
 
 
-OTHER_MODEL = replace(
-    CAR,
-    front=replace(CAR.front, spring_npm=0.7 * CAR.front.spring_npm, damper_nspm=0.8 * CAR.front.damper_nspm),
-    rear=replace(CAR.rear, spring_npm=1.4 * CAR.rear.spring_npm, tyre_npm=0.8 * CAR.rear.tyre_npm),
-)
+OTHER_MODEL = times(CAR, spring_front_npm=0.7, damper_front_nspm=0.8, spring_rear_npm=1.4, tyre_rear_npm=0.8)
 
 
 def taught_by(runs: Sequence[KnownRun], vehicle: Vehicle, sister: VehicleModel | None = None) -> VehicleModel:

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.linalg import solve_banded
 
-from gateway.core.memoized import memoized
 from gateway.core.spline import between, monotone_slopes, smooth_slopes
 from gateway.core.timeline import onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
 from gateway.core.tridiagonal import solve_tridiagonal
@@ -172,28 +171,3 @@ def test_a_monotone_curve_is_the_pchip(n: int, seed: int) -> None:
 def test_what_is_no_number_is_an_error_and_no_curve() -> None:
     with pytest.raises(ValueError, match="infs or NaNs"):
         smooth_slopes(np.arange(5.0), np.array([0.0, np.nan, 1.0, 2.0, 3.0]))
-
-
-def test_it_is_worked_out_once_for_the_same_content_and_anew_for_another() -> None:
-    asked: list[tuple[int, ...]] = []
-
-    @memoized
-    def doubled(x: F64) -> F64:
-        asked.append(x.shape)
-        return 2.0 * x
-
-    x = np.arange(6.0)
-    assert doubled(x).tolist() == doubled(x.copy()).tolist() == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]
-    assert doubled(x.reshape(2, 3)).shape == (2, 3)
-    x[0] = 7.0
-    assert doubled(x)[0] == 14.0
-    assert asked == [(6,), (2, 3), (6,)]
-
-
-def test_nobody_can_change_what_is_kept() -> None:
-    @memoized
-    def doubled(x: F64) -> F64:
-        return 2.0 * x
-
-    with pytest.raises(ValueError, match="read-only"):
-        doubled(np.ones(2))[0] = 0.0

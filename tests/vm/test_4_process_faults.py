@@ -136,11 +136,10 @@ def unknown_key(vehicle: Vehicle) -> str:
     return f"{CONFIG}: web.colour: unknown key"
 
 
-def tampered_calibration(vehicle: Vehicle) -> str:
-    vehicle.run("sed 's/1240/1340/g' /etc/springscale/vehicle.json > /etc/springscale/tampered.json")
-    vehicle.run("! cmp -s /etc/springscale/vehicle.json /etc/springscale/tampered.json")
-    vehicle.configure(SETTINGS.replace("vehicle.json", "tampered.json"))
-    return "does not match its id"
+def cut_calibration(vehicle: Vehicle) -> str:
+    vehicle.run("head -c 5000 /etc/springscale/vehicle.json > /etc/springscale/cut.json")
+    vehicle.configure(SETTINGS.replace("vehicle.json", "cut.json"))
+    return "was cut short"
 
 
 def newer_database(vehicle: Vehicle) -> str:
@@ -157,7 +156,7 @@ def set_schema(vehicle: Vehicle, version: int) -> int:
     return int(vehicle.run(f'python3 -c "{script}"'))
 
 
-@pytest.mark.parametrize("fault", [unknown_key, tampered_calibration, newer_database])
+@pytest.mark.parametrize("fault", [unknown_key, cut_calibration, newer_database])
 def test_a_fault_for_a_person_ends_the_start_once_and_says_which(
     fault: Callable[[Vehicle], str], vehicle: Vehicle
 ) -> None:

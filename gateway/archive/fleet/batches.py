@@ -30,8 +30,8 @@ OF_SENSOR: Final[Mapping[str, str]] = MappingProxyType(
     {
         "misfit": "misfit of the calibrated vehicle",
         "tension": "distance from the calibrated vehicle",
-        "sensor_position_score": "pull to another place or gain of the sensor",
-        "sensor_noise_score": "pull towards more noise in the acceleration",
+        "sensor_position_deviation": "another place of the sensor",
+        "sensor_noise_deviation": "more noise in the acceleration",
     }
 )
 DRIFTING: Final = (*OF_VEHICLE, *OF_SENSOR)

@@ -94,6 +94,8 @@ BOUNDS: Final = (
     Bound("cross_spectrum.band_hz", "two frequencies up to 100 Hz, rising", _rising(1e-3, 100.0, is_strict=True)),
     Bound("cross_spectrum.parameters", "within +-50", _between(-50.0, 50.0)),
     Bound("cross_spectrum.covariance", _COVARIANCE, _covariance),
+    Bound("cross_spectrum.spread", "between 0.1 and 10", _between(0.1, 10.0)),
+    Bound("cross_spectrum.usual_log_amplitude", "within +-50", _between(-50.0, 50.0)),
     Bound("cross_spectrum.payload_seen_kg", _LOADS, _rising(-1e5, 1e5)),
     Bound("cross_spectrum.front_share_seen_pct", _SHARES, _rising(0.0, 100.0)),
     Bound("cross_spectrum.speed_seen_mps", _SPEEDS, _rising(1e-3, 100.0)),

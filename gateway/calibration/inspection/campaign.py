@@ -14,10 +14,10 @@ from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
-from gateway.core.calibrated import is_other_rate
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.quantity import Z95
+from gateway.weighing.calibrated import is_other_rate
 
 SPEED_DIFFERS_BY: Final = 0.2  # chosen: of the median run's speed
 BEYOND_RANGE_BY: Final = 0.25  # chosen: of the range

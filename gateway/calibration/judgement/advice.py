@@ -1,4 +1,4 @@
-"""Fit for use or not: a table of rules over the errors, and what the inspection and the facts say.
+"""Fit for use or not, and what to do next: a table of rules over the errors, and what inspection and facts say.
 
     verdicts_of(assessment) -> a verdict an estimator, first that of the one which the service runs
 
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+from gateway.calibration.ahead import next_steps
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement
@@ -50,11 +51,12 @@ class Reason:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """One estimator's accuracy in a sentence, and a reason for each rule that applies."""
+    """One estimator's accuracy in a sentence, a reason for each rule that applies, and what to state or drive next."""
 
     estimator: str
     accuracy: str
     reasons: tuple[Reason, ...]
+    advice: str = ""
 
     @property
     def grade(self) -> Grade:
@@ -63,10 +65,10 @@ class Verdict:
 
     @property
     def text(self) -> str:
-        """The grade, the accuracy, and the reasons for a grade below fit."""
+        """The grade, the accuracy, the reasons for a grade below fit, and the advice."""
         below = [f"    {one.text}" for one in self.reasons if one.grade is not Grade.FIT]
         head = f"{GRADE_TEXT[self.grade]}, by the {estimator_name(self.estimator)}. {self.accuracy}"
-        return "\n".join([head, *below])
+        return "\n".join([head, *below, *([f"    {self.advice}"] if self.advice else [])])
 
 
 def _share_rejected(table: ErrorTable) -> float:
@@ -121,6 +123,8 @@ class Rule:
         return Reason(self.name, grade, f"{self.what} over the {part}: {figure:.1f} % ({limits}).")
 
 
+WORTH_SAYING: Final = 0.1  # chosen: relative gain of a step that is advised
+
 # All limits are chosen. A guess at mid-range errs by 25 % over evenly spread loads; an interval is half as wide as the
 # range for a mean normal error of 20 %; 95 % intervals with certainly less than 70 % coverage mislead.
 RULES: Final = (
@@ -164,7 +168,18 @@ def _verdict(assessment: Assessment, judgement: Judgement) -> Verdict:
     reasons = [*_of_errors(judgement), *_of_one_load(assessment, judgement.estimator)]
     if assessment.outcome:
         reasons += _of_runs(assessment.outcome)
-    return Verdict(judgement.estimator, _accuracy(judgement), tuple(reasons))
+    return Verdict(judgement.estimator, _accuracy(judgement), tuple(reasons), _advice(assessment, judgement.estimator))
+
+
+def _advice(assessment: Assessment, estimator: str) -> str:
+    """What to state or drive next; empty if nothing would narrow the answer by a tenth."""
+    model = assessment.file.cross_spectrum
+    if estimator != "cross_spectrum" or model is None or assessment.outcome is None:
+        return ""
+    best = next_steps(model, assessment.vehicle)[0]
+    if best.then_kg > (1.0 - WORTH_SAYING) * best.now_kg:
+        return "No single further drive or statement would narrow the intervals by a tenth."
+    return f"Next: {best.text}."
 
 
 def _accuracy(judgement: Judgement) -> str:
@@ -192,7 +207,8 @@ def _of_errors(judgement: Judgement) -> Iterator[Reason]:
 _WARNINGS: Final[Mapping[str, str]] = {
     "springs_from_priors": "Only one load was driven: it sets the zero; the springs are those of a typical vehicle. "
     "Weights away from that load are as uncertain as their intervals say.",
-    "intervals_untested": "Fewer than three runs: intervals were widened by a rule of thumb, not tested.",
+    "intervals_untested": "Fewer than three runs of known load: intervals rest on the errors of other vehicles, not on "
+    "this one's.",
 }
 
 
@@ -201,7 +217,7 @@ def _of_one_load(assessment: Assessment, estimator: str) -> Iterator[Reason]:
     file = assessment.file
     if estimator == "cross_spectrum":
         yield from (Reason(name, Grade.RESERVED, text) for name, text in _WARNINGS.items() if name in file.warnings)
-        if file.sister_id is not None and len({run.payload_kg for run in file.provenance.runs}) == 1:
+        if file.sister_id is not None and len({one.statement.payload_kg for one in file.provenance.drives}) == 1:
             text = (
                 "Only one load was driven: the effect of others was inherited from a sister. One known load, weighed, "
                 "confirms it for this vehicle."
@@ -220,12 +236,14 @@ def _of_runs(outcome: Outcome) -> Iterator[Reason]:
         for one in verdicts
         if one.is_usable and any(finding.kind is Kind.LOAD_DISAGREES for finding in one.findings)
     ]
+    held = [drive.number for drive in outcome.file.provenance.drives if drive.found is not None and drive.found.is_held]
     if mislabelled:
         text = (
             f"The other runs find another weight for {_listed(mislabelled)} than the campaign file says: correct the "
             "load, or calibrate without these runs (--runs)."
         )
-        yield Reason("labels", Grade.UNFIT, text)
+        grade = Grade.RESERVED if set(mislabelled) <= set(held) else Grade.UNFIT  # what is held taught nothing
+        yield Reason("labels", grade, text)
     for doubt in outcome.doubts:
         yield Reason("facts", Grade.UNFIT, f"{doubt.sentence[:1].upper()}{doubt.sentence[1:]}.")
 

@@ -32,9 +32,9 @@ class Answers:
 
 
 def answers_of(judged: Sequence[Judged], target: Target) -> Answers:
-    """Payload in kg or front share in percent; batches without an answer are left out."""
+    """Payload in kg or front share in percent; batches without an answer or a known truth are left out."""
     compared = [(one, one.compared(target)) for one in judged]
-    answered = [(one, row) for one, row in compared if math.isfinite(row.estimated)]
+    answered = [(one, row) for one, row in compared if math.isfinite(row.estimated) and math.isfinite(row.true)]
     rows = np.array([row for _, row in answered], dtype=float).reshape(-1, 4)
     return Answers(
         run=np.array([one.run for one, _ in answered], dtype=np.int64),

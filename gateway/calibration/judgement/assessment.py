@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from gateway.budget import BudgetLine, typical_budget
-from gateway.calibration.calibrate import Outcome
+from gateway.calibration.calibrate import Outcome, drive_name
 from gateway.calibration.campaign import Campaign
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.judgement.evaluation import ErrorTable, Judged, Target, error_table, judge
@@ -111,12 +111,14 @@ def judged_left_out(outcome: Outcome, estimator: str) -> list[Judged]:
     whole = outcome.file.for_core()
     if estimator == "ratio_index":
         ratio = outcome.ratio_index
-        without = {n: replace(whole, ratio_index=taught) for n, taught in (ratio.without if ratio else {}).items()}
+        without = {n: replace(whole, ratio_index=fitted) for n, fitted in (ratio.without if ratio else {}).items()}
     else:
-        cross = outcome.cross_spectrum
+        taught = outcome.cross_spectrum.without if outcome.cross_spectrum else {}
+        identified = [one.identification for one in outcome.split]
         without = {
-            n: replace(whole, cross_spectrum=taught, is_shape_known=True)
-            for n, taught in (cross.without if cross else {}).items()
+            run.number: replace(whole, cross_spectrum=taught[name], is_shape_known=run.statement.is_compact)
+            for run in identified
+            if (name := drive_name(run.number)) in taught
         }
     runs = [one.identification for one in outcome.split if one.identification.number in without]
     return [one for run in runs for one in judge([run], without[run.number], estimator)]

@@ -1,4 +1,4 @@
-"""The error table of equation (12): estimates compared with weighed loads."""
+"""The error table of equation (12): estimates compared with weighed loads; what is unknown is left out."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -10,15 +10,15 @@ import numpy as np
 from gateway.budget import budget_of
 from gateway.calibration.judgement.coverage import interval_scores
 from gateway.calibration.known_run import KnownRun
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cargo import is_said
-from gateway.core.estimator import estimate
 from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung, weighed, weights_of
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
 from gateway.posterior import Source, exactly
 from gateway.records import F64, Batch, Why
+from gateway.weighing.calibrated import CalibratedVehicle
+from gateway.weighing.estimator import estimate
 
 Target = Literal["payload", "front_share"]
 TARGETS: Final[tuple[Target, ...]] = get_args(Target)
@@ -35,16 +35,16 @@ class Comparison(NamedTuple):
 
     @property
     def is_covered(self) -> bool | None:
-        """Whether the interval contains the truth; None if there is no interval."""
-        return self.low <= self.true <= self.high if self.low <= self.high else None
+        """Whether the interval contains the truth; None if either is unknown."""
+        return self.low <= self.true <= self.high if self.low <= self.high and isfinite(self.true) else None
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """One batch of a known run: what was estimated, and what was true.
+    """One batch of a run: what was estimated, and what was true.
 
-    cg_left_m is the sprung mass's centre of gravity left of the centre line, NaN if not stated; unsprung is what
-    calibration found.
+    Payload and front share are NaN if nobody knows them. cg_left_m is the sprung mass's centre of gravity left of the
+    centre line, NaN if not stated; unsprung is what calibration found.
     """
 
     run: int
@@ -224,8 +224,9 @@ def _unloaded_kg(vehicle: Vehicle) -> float:
 def _target_errors(
     compared: F64, full_range: tuple[float, float], unit: Literal["kg", "pp"], unloaded_kg: float | None = None
 ) -> TargetErrors:
-    """Of the rows (n, 4) of Comparison."""
+    """Of the rows (n, 4) of Comparison whose truth is known."""
     low, high = full_range
+    compared = compared[np.isfinite(compared[:, 0])]
     answered = np.isfinite(compared[:, 1])
     true, estimated, lower, upper = compared[answered].T
     error = estimated - true
@@ -284,10 +285,14 @@ def _truth(one: Judged) -> dict[str, int | float | str | None]:
     return {
         "run": one.run,
         "log": one.name,
-        "true_payload_kg": one.payload_kg,
-        "true_front_share_pct": one.front_share_pct,
-        "true_cg_left_m": one.cg_left_m if isfinite(one.cg_left_m) else None,
+        "true_payload_kg": _known(one.payload_kg),
+        "true_front_share_pct": _known(one.front_share_pct),
+        "true_cg_left_m": _known(one.cg_left_m),
     }
+
+
+def _known(number: float) -> float | None:
+    return number if isfinite(number) else None
 
 
 def _batch_record(one: Judged) -> dict[str, Any]:
@@ -297,7 +302,7 @@ def _batch_record(one: Judged) -> dict[str, Any]:
 
 
 def judge(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: str) -> list[Judged]:
-    """Every batch of every known run with its estimate."""
+    """Every batch of every run with its estimate."""
     return [
         Judged(
             run.number,

@@ -24,7 +24,7 @@ from gateway.estimate import Z95
 from gateway.reasons import REMEDIES, SOURCES
 from gateway.records import F64, iso_utc
 from gateway.reports.charts import GREY, Axis, Chart, LineMark, Marker, Panel, Points, Rule, Section, Table
-from gateway.words import NONE, counted, decimal, estimator_name, percent
+from gateway.words import NONE, counted, decimal, estimator_name, known, percent
 
 _MARKERS: Final[Mapping[BatchSet, Marker]] = {BatchSet.LEFT_OUT: "circle", BatchSet.VALIDATION: "diamond"}
 _COLOURS: Final[Mapping[BatchSet, int]] = {
@@ -289,8 +289,8 @@ def runs_table(judgement: Judgement, part: BatchSet) -> Table:
     rows = tuple(
         (
             str(first.run),
-            f"{first.payload_kg:g} kg",
-            f"{first.front_share_pct:.1f} %",
+            known(first.payload_kg, " kg"),
+            known(first.front_share_pct, " %", ".1f"),
             errors.answered,
             *_run_cells(errors.payload),
             *_run_cells(errors.front_share),

@@ -18,7 +18,7 @@ from gateway.calibration.judgement.advice import GRADE_TEXT, Grade, Verdict, ver
 from gateway.calibration.judgement.assessment import Assessment, assess_calibration, stated_budget
 from gateway.estimate_json.kinds import budget_to_json
 from gateway.reports.calibration.accuracy import accuracy_section
-from gateway.reports.calibration.half_car import half_car_section
+from gateway.reports.calibration.fitted_vehicle import fitted_vehicle_section
 from gateway.reports.calibration.ratio_index import ratio_index_section
 from gateway.reports.calibration.runs import provenance_section, runs_section
 from gateway.reports.calibration.spectra import spectra_section
@@ -58,7 +58,7 @@ def _calibration_sections(outcome: Outcome, campaign: Campaign) -> Iterator[Sect
     if outcome.ratio_index is not None:
         yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in outcome.split])
     if outcome.cross_spectrum is not None:
-        yield half_car_section(identification, outcome.cross_spectrum.calibration, campaign.vehicle)
+        yield fitted_vehicle_section(identification, outcome.cross_spectrum, campaign.vehicle)
 
 
 def _evaluation_sections(assessment: Assessment) -> list[Section]:
@@ -84,7 +84,7 @@ def _subtitle(assessment: Assessment) -> str:
     speeds = span(3.6 * seen.speed_mps[0], 3.6 * seen.speed_mps[1], "km/h")
     inherited = " and a sister's calibration" if assessment.file.sister_id else ""
     return (
-        f"Calibrated on {counted(len(assessment.file.provenance.runs), 'run')}{inherited}: payloads of "
+        f"Calibrated on {counted(len(assessment.file.provenance.drives), 'run')}{inherited}: payloads of "
         f"{span(*seen.payload_kg, 'kg')}, front shares of {span(*seen.front_share_pct, '%', 1)}, {speeds}. "
         f"{assessment.file.id}"
     )
@@ -100,6 +100,7 @@ def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...]) -> dict[s
             {
                 "estimator": verdict.estimator,
                 "grade": str(verdict.grade),
+                "advice": verdict.advice,
                 "reasons": [
                     {"rule": reason.rule, "grade": str(reason.grade), "text": reason.text} for reason in verdict.reasons
                 ],
@@ -134,6 +135,7 @@ def _verdict_html(verdicts: Sequence[Verdict]) -> str:
     return (
         f'<section id="verdict" class="{running.grade}"><h2>{_mark(running.grade)} {GRADE_TEXT[running.grade]}</h2>'
         f"<p>By the {escape(estimator_name(running.estimator))}{several}. {prose(running.accuracy)}</p>"
+        f"{f'<p>{prose(running.advice)}</p>' if running.advice else ''}"
         f"{''.join(_reasons(verdict) for verdict in verdicts)}</section>"
     )
 

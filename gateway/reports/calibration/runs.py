@@ -1,12 +1,14 @@
 """The runs and their findings, and the provenance of every number."""
 
 from gateway.calibration.calibrate import Outcome
+from gateway.calibration.file.parts import DrivePart
 from gateway.calibration.inspection.finding import Finding, RunVerdict
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.judgement.assessment import Assessment
+from gateway.quantity import Z95
 from gateway.records import Why
 from gateway.reports.charts import Section, Table
-from gateway.words import NONE, decimal, span
+from gateway.words import NONE, known, span
 
 
 def runs_section(outcome: Outcome) -> Section:
@@ -28,8 +30,8 @@ def _run_row(verdict: RunVerdict, driven: SplitRun | None) -> tuple[str, ...]:
         str(run.number),
         run.name,
         _verdict(verdict),
-        f"{run.payload_kg:g} kg",
-        f"{run.front_share_pct:.1f} %",
+        known(run.payload_kg, " kg"),
+        known(run.front_share_pct, " %", ".1f"),
         *(str(sum(not batch.rejected for batch in part.batches)) for part in (run, driven.validation)),
         str(len(refused)),
     )
@@ -55,6 +57,17 @@ def _findings_table(outcome: Outcome) -> Table | None:
     return Table("What was found of the runs", columns, rows) if rows else None
 
 
+def _stated_and_found(drive: DrivePart) -> tuple[str, str, str]:
+    """Payload and front share as stated, and the payload that the fit found with and without the statement."""
+    said, found = drive.statement, drive.found
+    told = NONE
+    if found is not None:
+        told = f"{found.payload_kg:.0f} ± {Z95 * found.payload_std_kg:.0f} kg"
+        if found.is_held:
+            told += ", the statement is not believed"
+    return known(said.payload_kg, " kg"), known(said.front_share_pct, " %", ".1f"), told
+
+
 def provenance_section(assessment: Assessment) -> Section:
     """The facts for reproducing the calibration, and its valid ranges."""
     file, provenance = assessment.file, assessment.file.provenance
@@ -73,9 +86,7 @@ def provenance_section(assessment: Assessment) -> Section:
         ("command", provenance.command),
         ("campaign file", f"sha256:{provenance.campaign_sha256}"),
     )
-    runs = tuple(
-        (str(run.number), run.log, f"{run.payload_kg:g} kg", decimal(run.front_share_pct, " %", 1), run.sha256)
-        for run in provenance.runs
-    )
-    logs = Table("Logs it was made from", ("Run", "log", "payload", "front share", "sha256"), runs)
+    drives = tuple((str(one.number), one.log, *_stated_and_found(one), one.sha256) for one in provenance.drives)
+    columns = ("Run", "log", "payload", "front share", "found", "sha256")
+    logs = Table("Logs it was made from", columns, drives)
     return Section("provenance", "Provenance", (), (), (Table("Calibration", ("What", "is"), facts), logs))

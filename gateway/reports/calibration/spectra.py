@@ -60,8 +60,9 @@ def density_of(batches: Iterable[Batch], sensor: str) -> Density | None:
 def spectra_section(runs: Sequence[KnownRun], ratio_index: RatioIndexCalibration | None) -> Section | None:
     """Acceleration by payload and pitch rate by front share, a chart each, for a colour is one load or one share.
 
-    None where there is no spectrum at all.
+    Runs of which the load is not known are left out. None where there is no spectrum at all.
     """
+    runs = [run for run in runs if run.has_payload and run.has_place]
     bands_a = ratio_index.acceleration_bands if ratio_index else None
     bands_g = ratio_index.pitch_rate_bands if ratio_index else None
     payloads = [(f"{kg:g} kg", kg) for kg in sorted({run.payload_kg for run in runs})]

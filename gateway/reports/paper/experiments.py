@@ -13,11 +13,11 @@ from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.regression import fit_regression
 from gateway.calibration.ratio_index.table import N_SEGMENT, index_rows
 from gateway.config import ESTIMATOR_NAMES
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.ratio_index.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
 from gateway.core.settings import BatchSettings
 from gateway.offline.campaigns import calibrate, split_runs
+from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.workbench.simulate import bench_of, write_campaign
 
 OnStep = Callable[[str, int, int], None]  # (what is being done, steps done, steps in all)

@@ -14,7 +14,6 @@ from typing import Any, Final, NamedTuple
 
 from gateway.calibration.known_weight import WeightRefusal, load_of
 from gateway.calibration.known_weights_file import FILE_NAME, KnownWeight, KnownWeights
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.known_weights import KnownWeightKind
 from gateway.errors import RefusedError
 from gateway.estimate_json import posterior_to_json
@@ -27,6 +26,7 @@ from gateway.service.record_file import RecordFile
 from gateway.service.verification.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
 from gateway.setup import Subject
 from gateway.stated.facts import Confirmation, Ending, StatedWeight
+from gateway.weighing.calibrated import CalibratedVehicle
 
 ALL_KINDS: Final = tuple(KnownWeightKind)
 

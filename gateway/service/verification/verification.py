@@ -16,7 +16,6 @@ from gateway.calibration.verification_file import (
     verdict_of,
     with_its_id,
 )
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.errors import RefusedError
 from gateway.log import Event, OnEvent, tell_event
 from gateway.quantity import Quantity
@@ -27,6 +26,7 @@ from gateway.setup import Subject
 from gateway.stated.facts import LoadTold, Rule, StatedWeight, VerificationRecord
 from gateway.status import VerificationStatus
 from gateway.units import NS_PER_DAY
+from gateway.weighing.calibrated import CalibratedVehicle
 
 
 class VerificationService:

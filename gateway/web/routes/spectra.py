@@ -9,15 +9,15 @@ from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
 from gateway.core.ratio_index.index import Band
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json, spectra_to_json
+from gateway.model.displayed import Fitted, modelled_spectra
 from gateway.records import Spectra as SpectraSeen
 from gateway.records import Why, json_line
 from gateway.web.live.board import Board
 from gateway.web.schemas import Spectra
+from gateway.weighing.calibrated import CalibratedVehicle
 
 HEAD = ("id", "t_start", "t_end", "estimator", "rejected", "payload_kg", "front_share_pct")
 
@@ -113,6 +113,7 @@ def _fitted(heard: Estimate, wheelbase_m: float) -> Fitted | None:
         damper_front_ratio=told.get("damper_front_ratio") or 1.0,
         damper_rear_ratio=told.get("damper_rear_ratio") or 1.0,
         delay_scale=told.get("delay_scale"),
+        payload_gyration_m2=told.get("payload_gyration_m2"),
         payload_mode_hz=told.get("payload_mode_hz"),
         payload_damping_ratio=told.get("payload_damping_ratio"),
         amplitude_ratio=told.get("amplitude_ratio") or 1.0,

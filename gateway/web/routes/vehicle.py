@@ -5,9 +5,9 @@ from collections.abc import Callable
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from gateway.core.calibrated import CalibratedVehicle, believed
 from gateway.core.vehicle import Vehicle
 from gateway.status import SignalHealth, Status
+from gateway.weighing.calibrated import CalibratedVehicle
 
 
 class CalibrationFigures(BaseModel):
@@ -17,10 +17,12 @@ class CalibrationFigures(BaseModel):
     estimators: tuple[str, ...] = Field(description="those it can serve", examples=[["cross_spectrum", "ratio_index"]])
     payload_seen_kg: tuple[float, float] = Field(examples=[[0.0, 420.0]])
     front_share_seen_pct: tuple[float, float] = Field(examples=[[41.0, 58.0]])
-    payload_believed_kg: tuple[float, float] | None = Field(
-        description="an interval wholly outside is rejected as out_of_range; null: one load seen, no limit"
+    payload_believed_kg: tuple[float, float] = Field(
+        description="an interval that lies outside, or is wider, is rejected as out_of_range"
     )
-    front_share_believed_pct: tuple[float, float] | None
+    front_share_believed_pct: tuple[float, float] | None = Field(
+        description="an interval that lies outside is rejected as out_of_range; null: one load seen, no limit"
+    )
     speed_seen_mps: tuple[float, float] | None = Field(description="batch means", examples=[[13.5, 14.1]])
 
 
@@ -64,8 +66,8 @@ def _calibration(calibrated: CalibratedVehicle) -> CalibrationFigures:
         estimators=tuple(name for name, part in by_estimator.items() if part is not None),
         payload_seen_kg=calibrated.payload_seen_kg,
         front_share_seen_pct=calibrated.front_share_seen_pct,
-        payload_believed_kg=believed(calibrated.payload_seen_kg),
-        front_share_believed_pct=believed(calibrated.front_share_seen_pct),
+        payload_believed_kg=calibrated.payload_believed_kg,
+        front_share_believed_pct=calibrated.front_share_believed_pct,
         speed_seen_mps=_speed_seen_mps(calibrated),
     )
 

@@ -10,7 +10,6 @@ from typing import Any, Final
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.limits import is_over_limit
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, PayloadPlace, place_of, unsprung_kg, weighed
@@ -20,6 +19,7 @@ from gateway.records import iso_utc, rounded
 from gateway.stated.facts import Instant
 from gateway.web.live.board import Board, Shown
 from gateway.web.schemas import WeightFigure, WeightFigures
+from gateway.weighing.calibrated import CalibratedVehicle
 
 _NONE: Final = Estimate(0, 0, "")
 

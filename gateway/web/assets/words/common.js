@@ -39,7 +39,6 @@ export const COMMON = {
   "reason.too_fast": ["too fast", "zu schnell"],
   "reason.speed_spread": ["speed spread", "Geschwindigkeit zu ungleichmäßig"],
   "reason.load_changed": ["load changed", "Ladung geändert"],
-  "reason.soft_load": ["soft load", "Ladung schwingt"],
   "reason.speed_uncalibrated": ["speed uncalibrated", "Geschwindigkeit nicht kalibriert"],
   "reason.not_enough_excitation": ["not enough excitation", "Straße zu glatt"],
   "reason.speed_missing": ["speed missing", "keine Geschwindigkeit"],

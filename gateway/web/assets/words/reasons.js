@@ -11,7 +11,6 @@ export const REASONS_DE = {
   too_slow: ["zu viel des Abschnitts war langsamer als `speed_min_mps`: Stadt, Stau, Hof", "nichts; die nächste freie Straße genügt"],
   too_fast: ["zu viel des Abschnitts war schneller als `speed_max_mps`", "die Einheit der Geschwindigkeit im Signalplan prüfen"],
   speed_spread: ["die Geschwindigkeit schwankte stärker, als der Verhältnisindex verträgt", "gleichmäßig fahren; `cross_spectrum` verträgt mehr als `ratio_index`"],
-  soft_load: ["ein schwerer Teil der Ladung schwingt hinter der Hinterachse auf einem weichen Träger, wie Fahrräder auf der Anhängerkupplung; das Fahrzeug spürt nicht sein ganzes Gewicht", "den Träger so befestigen, dass er nicht schwingt, oder abnehmen"],
   load_changed: ["die Ladung änderte sich bei einem Halt, und mit der davor wurde zu wenig gefahren, um sie zu wiegen (eine Minute)", "nichts; die Ladung nach dem Halt wird gewogen"],
   speed_uncalibrated: ["die mittlere Geschwindigkeit liegt außerhalb der kalibrierten", "auch mit dieser Geschwindigkeit kalibrieren"],
   not_enough_excitation: ["die Straße war zu glatt, um Ladungen zu unterscheiden", "nichts; eine gewöhnliche Straße genügt"],

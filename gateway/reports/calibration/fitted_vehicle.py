@@ -1,4 +1,4 @@
-"""The fitted half-car against what was measured, run by run, and what the data told of each of its parameters."""
+"""The fitted vehicle against what was measured, run by run, and what the data told of each of its parameters."""
 
 import math
 from collections.abc import Sequence
@@ -7,54 +7,58 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.half_car.prior import prior_of
+from gateway.calibration.calibrate import drive_name
 from gateway.calibration.known_run import KnownRun
-from gateway.core.cross_spectrum.calibration import CrossSpectrumCalibration
-from gateway.core.cross_spectrum.displayed import Fitted, modelled_spectra
-from gateway.core.cross_spectrum.likelihood import Point, Whittle
-from gateway.core.cross_spectrum.measured import cross_spectra_of
-from gateway.core.cross_spectrum.model.parameters import ROLL_PARAMETERS, has_roll, is_positive, names_of, upright
-from gateway.core.cross_spectrum.model.strokes import with_strokes
+from gateway.calibration.vehicle import Taught
 from gateway.core.spectrum import spectra_of
-from gateway.core.vehicle import Vehicle
+from gateway.core.vehicle import Load, Vehicle
+from gateway.model.displayed import Fitted, modelled_spectra
+from gateway.model.expected import with_strokes
+from gateway.model.spectra import cross_spectra_of
+from gateway.model.table import LOG, ROWS, UPRIGHT, prior_of
+from gateway.model.vehicle import VehicleModel
+from gateway.model.whittle import Point, Whittle
 from gateway.records import F64, Spectra
 from gateway.reports.charts import Axis, Chart, LineMark, Panel, Points, Rule, Section, Table
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunFit:
-    """One run: its measurement, the model's prediction at its true load, and their agreement."""
+    """One run: its measurement, the model's prediction at its load, known or found, and their agreement."""
 
     run: KnownRun
+    load: Load
     measured: Spectra
     modelled: Spectra
     misfit: float
 
     @property
     def title(self) -> str:
-        return f"Run {self.run.number}: {self.run.payload_kg:g} kg at {self.run.front_share_pct:.1f} % front"
+        return f"Run {self.run.number}: {self.run.described}"
 
 
-def fits_of(runs: Sequence[KnownRun], calibration: CrossSpectrumCalibration) -> list[RunFit]:
-    """Every run with enough steady driving, at its true load, with the parameters of all runs together."""
-    fits = []
+def fits_of(runs: Sequence[KnownRun], taught: Taught) -> list[RunFit]:
+    """Every run with enough steady driving, at its load, with the parameters of all runs together."""
+    fits, model = [], taught.model
+    found = {one.name: one.load for one in taught.loads}
     for run in runs:
+        load = found.get(drive_name(run.number), run.load)
         batches = [batch for batch in run.batches if not batch.rejected]
-        cross = cross_spectra_of(batches, calibration.reading)
+        cross = cross_spectra_of(batches, model.reading)
         measured = _joined([spectra for batch in batches if (spectra := spectra_of(batch)) is not None])
         if cross is None or measured is None:
             continue
-        at_truth = Fitted(
-            run.payload_kg,
-            run.front_share_pct,
+        fitted = Fitted(
+            load.payload_kg,
+            load.front_share_pct,
             cross.delay_mean_s,
             cross.delay_std_s,
             amplitude_ratio=math.exp(cross.log_amplitude_mean),
         )
-        point = Point.of(upright(calibration.parameters), run.load)
-        moving = with_strokes(cross.without_roll, point.theta, run.load, calibration.ground)
-        misfit = Whittle(moving, calibration.ground).misfit(point)
-        fits.append(RunFit(run, measured, modelled_spectra(measured, calibration, at_truth), misfit))
+        point = Point.of(model.parameters[: len(UPRIGHT)], load)
+        moving = with_strokes(cross.without_roll, point.theta, load, model.ground)
+        misfit = Whittle(moving, model.ground).misfit(point)
+        fits.append(RunFit(run, load, measured, modelled_spectra(measured, model, fitted), misfit))
     return fits
 
 
@@ -77,26 +81,26 @@ def _joined(parts: Sequence[Spectra]) -> Spectra | None:
     )
 
 
-def half_car_section(
+def fitted_vehicle_section(
     runs: Sequence[KnownRun],
-    calibration: CrossSpectrumCalibration,
+    taught: Taught,
     vehicle: Vehicle,
 ) -> Section:
     """Identifiability, and every run's spectra beside the model's; the worst run first."""
-    fits = sorted(fits_of(runs, calibration), key=lambda fit: -fit.misfit)
-    known = knowledge_of(calibration, vehicle)
+    fits = sorted(fits_of(runs, taught), key=lambda fit: -fit.misfit)
+    known = knowledge_of(taught.model, vehicle)
     charts = [_fit_chart(fit) for fit in fits]
     return Section(
         "half-car",
         "Half-car fitted to both sensors",
         (
-            "Measured spectra of every run beside those of the one half-car fitted to all of them, each at its true "
+            "Measured spectra of every run beside those of the one vehicle fitted to all of them, each with its own "
             "load. The road's level is a straight line drawn through the spectra; everything else is the model's. "
-            "Misfit is the likelihood ratio per degree of freedom: about 1 if the model explains everything.",
+            "Misfit is the likelihood ratio over what chance gives: about 1 if the model explains everything.",
             told(known),
         ),
         (*charts[:1], knowledge_chart(known)),
-        (_misfit_table(fits, calibration), knowledge_table(known)),
+        (_misfit_table(fits, taught.model), knowledge_table(known)),
         tuple((fit.title, (chart,)) for fit, chart in zip(fits[1:], charts[1:], strict=True)),
     )
 
@@ -108,14 +112,14 @@ def _fit_chart(fit: RunFit) -> Chart:
     def panel(title: str, measured: F64, modelled: F64, *, is_log: bool = False) -> Panel:
         marks = (
             LineMark(m.freq_hz[band], measured[band], "measured", 0),
-            LineMark(s.freq_hz, modelled, "half-car", 2, "dash"),
+            LineMark(s.freq_hz, modelled, "model", 2, "dash"),
         )
         return Panel(Axis("frequency [Hz]"), Axis(title, is_log=is_log), marks)
 
     return Chart(
-        f"half_car_run_{fit.run.number:02d}",
+        f"fit_run_{fit.run.number:02d}",
         f"{fit.title}, misfit {fit.misfit:.2f}.",
-        f"{fit.title}: spectra, phase and coherence measured and by the fitted half-car; misfit {fit.misfit:.2f}.",
+        f"{fit.title}: spectra, phase and coherence measured and by the fitted vehicle; misfit {fit.misfit:.2f}.",
         (
             panel("acceleration [m/s²/√Hz]", m.vertical_acceleration, s.vertical_acceleration, is_log=True),
             panel("pitch rate [rad/s/√Hz]", m.pitch_rate, s.pitch_rate, is_log=True),
@@ -133,15 +137,16 @@ def _unbroken_deg(phase_rad: F64) -> F64:
     return np.where(leaps, np.nan, degrees)
 
 
-def _misfit_table(fits: Sequence[RunFit], calibration: CrossSpectrumCalibration) -> Table:
+def _misfit_table(fits: Sequence[RunFit], model: VehicleModel) -> Table:
     rows = tuple(
-        (str(fit.run.number), f"{fit.run.payload_kg:g} kg", f"{fit.run.front_share_pct:.1f} %", f"{fit.misfit:.2f}")
+        (str(fit.run.number), f"{fit.load.payload_kg:.0f} kg", f"{fit.load.front_share_pct:.1f} %", f"{fit.misfit:.2f}")
         for fit in sorted(fits, key=lambda fit: fit.run.number)
     )
-    caption = f"Misfit of every run; a batch beyond {calibration.misfit_limit:.2f} is not believed"
+    caption = f"Misfit of every run; a batch beyond {model.misfit_limit:.2f} is not believed"
     return Table(caption, ("Run", "payload", "front share", "misfit"), rows)
 
 
+OF_ROLL: Final = frozenset(row.name for row in ROWS if row.needs_roll)
 UNTOLD_SHARE: Final = (
     0.9  # chosen: of the prior's standard deviation; with more remaining the data had little information
 )
@@ -159,18 +164,18 @@ class Known:
     is_slack: bool
 
 
-def knowledge_of(calibration: CrossSpectrumCalibration, vehicle: Vehicle) -> list[Known]:
+def knowledge_of(model: VehicleModel, vehicle: Vehicle) -> list[Known]:
     """The posterior of each parameter against the prior of any vehicle, in the order of the parameters."""
-    theta = calibration.parameters
-    prior = prior_of(vehicle, with_roll=has_roll(theta))
-    stds, before_stds = np.sqrt(np.diag(calibration.covariance)), prior.std
+    rows = ROWS if model.has_roll else UPRIGHT
+    row_of = {row.name: row for row in rows}
+    means, before_stds = prior_of([row_of[name] for name in model.names], vehicle)
+    stds = np.sqrt(np.diag(model.covariance)).tolist()
     known = []
-    for i, name in enumerate(names_of(theta)):
-        before, after, std = float(prior.mean[i]), float(theta[i]), float(stds[i])
-        if is_positive(name):
-            before, after, spread = float(np.exp(before)), float(np.exp(after)), f"{100.0 * std:.1f} %"
-        else:
-            spread = f"{std:.3g}"
+    for i, name in enumerate(model.names):
+        before, after, std = float(means[i]), float(model.parameters[i]), stds[i]
+        spread = f"{std:.3g}"
+        if row_of[name].scale == LOG:
+            before, after, spread = math.exp(before), math.exp(after), f"{100.0 * std:.1f} %"
         known.append(Known(name, before, after, spread, std / float(before_stds[i]), name.startswith("slack_")))
     return known
 
@@ -191,8 +196,8 @@ def knowledge_chart(known: Sequence[Known]) -> Chart:
     """Remaining standard deviations, parameter by parameter."""
     plain = [one for one in known if not one.is_slack and "_bend_" not in one.name]
     groups = (
-        ("vehicle", [one for one in plain if one.name not in ROLL_PARAMETERS]),
-        ("roll", [one for one in plain if one.name in ROLL_PARAMETERS]),
+        ("vehicle", [one for one in plain if one.name not in OF_ROLL]),
+        ("roll", [one for one in plain if one.name in OF_ROLL]),
         ("bends of spring rates", [one for one in known if "_bend_" in one.name]),
         ("slack", [one for one in known if one.is_slack]),
     )

@@ -8,10 +8,8 @@ from typing import Final
 
 from gateway.budget import budget_of
 from gateway.core.batch import Traits
-from gateway.core.calibrated import CalibratedVehicle
 from gateway.core.cargo import is_said
 from gateway.core.change import Rules
-from gateway.core.estimator import estimate
 from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, WeighedLoad, epoch_of, fused_epoch, remembered
 from gateway.core.journey import way_of
 from gateway.core.known_weights import Knowledge
@@ -36,6 +34,8 @@ from gateway.core.weights.on_the_road import weighed
 from gateway.estimate import UNWATCHED, Estimate, Way
 from gateway.posterior import Posterior
 from gateway.records import Batch, Motion, Why
+from gateway.weighing.calibrated import CalibratedVehicle
+from gateway.weighing.estimator import estimate
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,15 +8,16 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from gateway.core.calibrated import CalibratedVehicle
-from gateway.core.cross_spectrum.estimator import MOST_PAYLOAD_STD_SHARE, by_cross_spectrum
 from gateway.core.ratio_index.estimator import by_ratio_index
 from gateway.core.ratio_index.index import indexes_of
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
+from gateway.model.checks import MOST_PAYLOAD_STD_SHARE
+from gateway.model.weigh import by_cross_spectrum
 from gateway.posterior import FRONT_SHARE, Posterior, Source
 from gateway.records import Batch, Why
+from gateway.weighing.calibrated import CalibratedVehicle
 
 
 class Estimator(Protocol):
@@ -108,13 +109,13 @@ def _roll_usable_share(batch: Batch) -> float:
 
 
 def _by_cross_spectrum(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate) -> Estimate:
-    """Fit the half-car to both sensors' cross-spectra; add the ratio indexes for display if they are calibrated."""
+    """Find the load that explains the cross-spectra; add the ratio indexes for display if they are calibrated."""
     if calibrated.cross_spectrum is None:
         return replace(blank, rejected=(Why.NO_CALIBRATION,))
     if calibrated.ratio_index is not None:
         ra, rg = indexes_of(batch, calibrated.ratio_index)
         blank = replace(blank, ratio_index_acceleration=ra, ratio_index_pitch_rate=rg)
-    return by_cross_spectrum(batch, calibrated.cross_spectrum, calibrated.shape_prior, blank)
+    return by_cross_spectrum(batch, calibrated.cross_spectrum, calibrated.shapes, blank)
 
 
 def _by_ratio_index(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate) -> Estimate:

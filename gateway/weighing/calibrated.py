@@ -1,0 +1,108 @@
+"""A vehicle together with its calibration: all prior knowledge of an estimator."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+from gateway.core.cargo import ShapeHypothesis, known_shape, shape_hypotheses
+from gateway.core.ratio_index.index import RatioIndexCalibration
+from gateway.core.vehicle import Vehicle
+from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung
+from gateway.model.vehicle import VehicleModel
+
+RANGE_MARGIN: Final = 0.25  # chosen: share of the calibrated span, added at either end
+RATE_MARGIN: Final = 0.25
+"""Of a sampling rate: devices of one setting differ by 1 %, settings by a factor of 2; chosen."""
+ONE_LOAD_SHARE: Final = 0.05  # chosen: of the empty mass; loads that differ by less are one load
+
+
+def is_other_rate(rate_hz: float, slowest_hz: float, fastest_hz: float) -> bool:
+    """Whether a device samples at a rate outside the range from slowest to fastest; False for NaN."""
+    margin = 1.0 + RATE_MARGIN
+    return rate_hz * margin < slowest_hz or rate_hz > fastest_hz * margin
+
+
+@dataclass(frozen=True, slots=True)
+class CalibratedVehicle:
+    """One calibration file, ready for use. ``id`` is the hash of its bytes. ``is_shape_known``: the weighed load has
+    the shape of the known loads, as in the runs left out of a calibration.
+    """
+
+    id: str
+    vehicle: Vehicle
+    payload_seen_kg: tuple[float, float]
+    front_share_seen_pct: tuple[float, float]
+    ratio_index: RatioIndexCalibration | None = None
+    cross_spectrum: VehicleModel | None = None
+    is_shape_known: bool = False
+    sensor_rate_seen_hz: tuple[float, float] | None = None
+
+    @property
+    def unsprung(self) -> Unsprung:
+        """The unsprung masses as calibrated; the ratio index gives none."""
+        return NOT_CALIBRATED if self.cross_spectrum is None else self.cross_spectrum.unsprung
+
+    @property
+    def shapes(self) -> tuple[ShapeHypothesis, ...]:
+        """The kinds of shape that a weighed load may have; none without the model of the vehicle."""
+        if self.cross_spectrum is None:
+            return ()
+        like = self.cross_spectrum.known_shape
+        return known_shape(*like) if self.is_shape_known else _shapes(self.vehicle, *like)
+
+    def is_sampled_otherwise(self, sensor_rate_hz: float) -> bool:
+        """Whether the sensors send so much faster or slower than in calibration that other vibration aliases into the
+        bands. False for NaN, and for a calibration that does not state its sampling rate.
+        """
+        if self.sensor_rate_seen_hz is None:
+            return False
+        return is_other_rate(sensor_rate_hz, *self.sensor_rate_seen_hz)
+
+    @property
+    def is_of_one_load(self) -> bool:
+        """Whether calibration saw a single load, and so no range."""
+        low, high = self.payload_seen_kg
+        return high - low <= ONE_LOAD_SHARE * self.vehicle.empty_mass_kg
+
+    @property
+    def payload_believed_kg(self) -> tuple[float, float]:
+        """The payloads in which answers are trusted: the calibrated range plus a quarter of its span at either end.
+
+        A calibration of one load has no range: then it is what the vehicle may carry, likewise widened.
+        """
+        low, high = self.payload_seen_kg
+        if self.is_of_one_load:
+            low, high = min(low, self.vehicle.payload_range_kg[0]), max(high, self.vehicle.largest_payload_kg)
+        return _widened(low, high)
+
+    @property
+    def front_share_believed_pct(self) -> tuple[float, float] | None:
+        """Likewise of the front share; None if calibration saw a single load or place, which sets no limit."""
+        low, high = self.front_share_seen_pct
+        return None if self.is_of_one_load or low == high else _widened(low, high)
+
+    def is_out_of_range(self, payload95_kg: tuple[float, float], front_share95_pct: tuple[float, float]) -> bool:
+        """Whether a 95 % interval lies entirely outside the believed range, or that of the payload is wider than it.
+
+        An interval of NaN is not outside.
+        """
+        low, high = self.payload_believed_kg
+        is_too_wide = payload95_kg[1] - payload95_kg[0] > high - low
+        of_share = self.front_share_believed_pct
+        return (
+            is_too_wide
+            or _is_outside(payload95_kg, (low, high))
+            or (of_share is not None and _is_outside(front_share95_pct, of_share))
+        )
+
+
+def _is_outside(interval: tuple[float, float], limits: tuple[float, float]) -> bool:
+    return interval[1] < limits[0] or interval[0] > limits[1]
+
+
+def _widened(low: float, high: float) -> tuple[float, float]:
+    margin = RANGE_MARGIN * (high - low)
+    return low - margin, high + margin
+
+
+_shapes = lru_cache(maxsize=8)(shape_hypotheses)

@@ -1,0 +1,87 @@
+"""What driving on, or saying more, would gain: the prediction narrows, and teaching then really gives about that."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from support.half_car_road import VAN, batch_over_road
+
+from gateway.calibration.ahead import CANDIDATES, Ahead, next_steps, steady_drive
+from gateway.calibration.known_run import KnownRun
+from gateway.calibration.statements import NOTHING_KNOWN, Statement, StatementSource
+from gateway.calibration.vehicle import TaughtDrive, teach
+from gateway.core.vehicle import Load
+from gateway.model.vehicle import VehicleModel
+from gateway.model.whittle import Point, Whittle
+
+EMPTY = Load(0.0, 52.0)
+LOADED = Load(330.0, 54.0)
+DRIVE_S = 300.0
+
+
+def driven(load: Load, number: int) -> TaughtDrive:
+    run = KnownRun(number, "", *load, (batch_over_road(*load, seed=number, duration_s=DRIVE_S),))
+    return TaughtDrive(f"run {number}", run.batches, run.statement)
+
+
+@cache
+def after_one_empty_drive() -> VehicleModel:
+    return teach([driven(EMPTY, 1)], VAN).model
+
+
+def known(load: Load) -> Statement:
+    return Statement(
+        source=StatementSource.KNOWN, payload_kg=load.payload_kg, front_share_pct=load.front_share_pct, is_compact=True
+    )
+
+
+def test_an_ideal_drive_is_the_model_s_own() -> None:
+    """Its likelihood is steepest nowhere: the vehicle and the load that made it fit it best."""
+    model = after_one_empty_drive()
+    drive = steady_drive(model, LOADED, DRIVE_S, 14.0)
+    whittle = Whittle(drive, model.ground)
+    there = Point.of(model.parameters, LOADED)
+    n = len(model.parameters)
+    assert np.abs(whittle.curvature(there, [n, n + 1]).gradient).max() < 1e-6
+    assert whittle.cost(there) < whittle.cost(Point.of(model.parameters, Load(300.0, 54.0)))
+
+
+def test_every_candidate_narrows_or_leaves_the_answer() -> None:
+    steps = next_steps(after_one_empty_drive(), VAN)
+    assert {step.candidate.name for step in steps} == {one.name for one in CANDIDATES}
+    assert all(step.then_kg < step.now_kg for step in steps)
+    assert [step.then_kg for step in steps] == sorted(step.then_kg for step in steps)
+
+
+def test_who_drove_empty_alone_is_told_to_drive_a_known_load() -> None:
+    best, *_, worst = next_steps(after_one_empty_drive(), VAN)
+    assert best.candidate.name.startswith("known_load")
+    assert best.then_kg < 0.95 * worst.then_kg
+    assert best.text.startswith(best.candidate.words)
+
+
+def test_a_drive_of_which_more_is_known_teaches_no_less() -> None:
+    model = after_one_empty_drive()
+    ahead = Ahead(model, VAN)
+    note = Statement(payload_kg=LOADED.payload_kg, payload_plus_minus_kg=25.0)
+    after = [ahead.stds(ahead.after(said, LOADED))[0] for said in (known(LOADED), note, NOTHING_KNOWN)]
+    assert after == sorted(after)
+    assert after[-1] <= ahead.stds(model.covariance)[0]
+
+
+def test_a_longer_drive_teaches_more() -> None:
+    ahead = Ahead(after_one_empty_drive(), VAN)
+    short, long = (ahead.after(known(LOADED), LOADED, duration_s) for duration_s in (300.0, 1800.0))
+    assert np.all(np.linalg.eigvalsh(short - long) > -1e-9 * np.trace(short))
+
+
+@pytest.mark.parametrize("load", [LOADED, EMPTY])
+def test_teaching_then_gives_about_what_was_predicted(load: Load) -> None:
+    before = after_one_empty_drive()
+    ahead = Ahead(before, VAN)
+    predicted_kg, _ = ahead.stds(ahead.after(known(load), load, DRIVE_S))
+    taught = teach([driven(EMPTY, 1), driven(load, 2)], VAN).model
+    there = replace(taught, model_std=before.model_std, spread=before.spread)
+    found_kg, _ = Ahead(there, VAN).stds(there.covariance)
+    assert predicted_kg == pytest.approx(found_kg, rel=0.15)

@@ -1,0 +1,114 @@
+"""Campaigns of which not everything is known: what teaches, what is held, and what the file and the verdict say."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import nan
+from pathlib import Path
+
+import pytest
+from support.half_car_road import VAN
+from support.known_runs import campaign as known_campaign
+
+from gateway.calibration.calibrate import Outcome, calibrate_inspected
+from gateway.calibration.campaign import Campaign, DraftTable
+from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.finding import Kind, RunVerdict
+from gateway.calibration.inspection.log import SplitRun
+from gateway.calibration.judgement.advice import Grade, verdicts_of
+from gateway.calibration.judgement.assessment import BatchSet, assess_calibration
+
+
+def split(**said: dict[str, float]) -> tuple[SplitRun, ...]:
+    """The known-load drives, in which other things are said of some: run_2={"payload_kg": nan}."""
+
+    def told(one: SplitRun) -> SplitRun:
+        change = said.get(f"run_{one.identification.number}", {})
+        return replace(
+            one,
+            identification=replace(one.identification, **change),
+            validation=replace(one.validation, **change),
+        )
+
+    return tuple(told(one) for one in known_campaign())
+
+
+def calibrated(folder: Path, runs: Sequence[SplitRun], *others: str) -> tuple[Campaign, Outcome]:
+    path = folder / "campaign.toml"
+    path.write_text("as inspected")
+    campaign = Campaign(path, DraftTable(vehicle=VAN))
+    verdicts = tuple(RunVerdict(one.identification.number, one.identification.name) for one in runs)
+    inspection = Inspection(tuple(runs), verdicts, ())
+    return campaign, calibrate_inspected(campaign, inspection, estimators=["cross_spectrum", *others])
+
+
+UNKNOWN = {"payload_kg": nan, "front_share_pct": nan}
+NOTE = {"front_share_pct": nan, "payload_plus_minus_kg": 25.0}
+
+
+def test_an_unknown_load_teaches_and_is_found_and_is_not_judged(tmp_path: Path) -> None:
+    campaign, outcome = calibrated(tmp_path, split(run_3=UNKNOWN))
+    told = outcome.file.provenance.drives[2]
+    assert (told.statement.payload_kg, told.statement.front_share_pct) == (None, None)
+    assert told.found is not None
+    assert (told.found.without_statement_kg, told.found.is_held) == (None, False)
+    assert told.found.payload_kg == pytest.approx(300.0, abs=60.0)
+    (judgement,) = assess_calibration(campaign, outcome).judgements
+    assert {one.run for one in judgement.tables[BatchSet.LEFT_OUT].judged} == {1, 2, 4}
+    validation = judgement.tables[BatchSet.VALIDATION]
+    assert validation.errors.n_batches == 4
+    answered = [one for one in validation.judged if one.compared("payload").is_covered is not None]
+    assert {one.run for one in answered} == {1, 2, 4}
+    assert validation.to_json()["runs"][2]["true_payload_kg"] is None
+
+
+def test_a_note_is_judged_by_its_kilograms_alone(tmp_path: Path) -> None:
+    campaign, outcome = calibrated(tmp_path, split(run_2=NOTE))
+    told = outcome.file.provenance.drives[1].statement
+    assert (told.payload_kg, told.payload_plus_minus_kg, told.front_share_pct, told.is_compact) == (
+        200,
+        25,
+        None,
+        False,
+    )
+    (judgement,) = assess_calibration(campaign, outcome).judgements
+    noted = [one for one in judgement.tables[BatchSet.VALIDATION].judged if one.run == 2]
+    assert all(one.compared("payload").is_covered is not None for one in noted)
+    assert all(one.compared("front_share").is_covered is None for one in noted)
+
+
+def test_a_wrong_statement_is_held_and_named_and_condemns_no_other(tmp_path: Path) -> None:
+    campaign, outcome = calibrated(tmp_path, split(run_3={"payload_kg": 0.0, "front_share_pct": 52.0}))
+    assert [one.found.is_held for one in outcome.file.provenance.drives if one.found] == [False, False, True, False]
+    assert outcome.file.provenance.drives[2].found is not None
+    assert outcome.file.provenance.drives[2].found.payload_kg == pytest.approx(300.0, abs=60.0)
+    (warning,) = [one for one in outcome.file.warnings if str(Kind.LOAD_DISAGREES) in one]
+    assert warning.startswith("run 3: load_disagrees: the campaign says 0 kg at 52.0 % front, the drive shows ")
+    assert outcome.file.seen.payload_kg == (0.0, 400.0)
+    (verdict,) = verdicts_of(assess_calibration(campaign, outcome))
+    (labels,) = [reason for reason in verdict.reasons if reason.rule == "labels"]
+    assert "run 3" in labels.text
+    assert labels.grade is Grade.RESERVED
+
+
+def test_the_ratio_index_is_left_out_where_no_load_is_known(tmp_path: Path) -> None:
+    _, outcome = calibrated(tmp_path, split(run_1=NOTE, run_2=UNKNOWN, run_3=UNKNOWN, run_4=UNKNOWN), "ratio_index")
+    assert outcome.file.estimators == ("cross_spectrum",)
+    assert "ratio_index: no run has a known payload and place" in outcome.file.warnings
+
+
+def test_the_file_is_read_back_as_it_was_written(tmp_path: Path) -> None:
+    _, outcome = calibrated(tmp_path, split(run_3=UNKNOWN))
+    path = tmp_path / "van.json"
+    path.write_text(outcome.file.to_json())
+    held = load_calibration(path)
+    assert held.id == outcome.file.id
+    assert held.provenance == outcome.file.provenance
+    assert held.for_core().payload_seen_kg == outcome.file.seen.payload_kg
+
+
+def test_the_verdict_says_what_to_drive_next(tmp_path: Path) -> None:
+    campaign, outcome = calibrated(tmp_path, split()[:1])
+    (verdict,) = verdicts_of(assess_calibration(campaign, outcome))
+    assert verdict.advice.startswith("Next: a known load ")
+    assert verdict.advice in verdict.text
