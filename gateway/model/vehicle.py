@@ -29,7 +29,7 @@ class VehicleModel:
     parameters (n,) and covariance (n, n) follow ``names`` (table.NAMES, those of roll only if a roll rate was used).
     directions (n, k) is the part of a root of the covariance that moves loads most: independent causes of unit
     variance. model_std is the model's own error in payload (kg), front share (%) and lateral place (m), and spread the
-    factor by which intervals are wider, or narrower, than the model says; both are shown by drives left out.
+    factor by which intervals are wider than the model says; both are shown by drives left out.
     misfit_limit is the largest accepted misfit. The two amplitudes are root mean squares within the band;
     usual_log_amplitude and usual_stroke_mps are what friction refers to (spectra.Reading). gravity_mps2 is the mean
     reading of the accelerometer, floor each sensor's noise (spectra.usual_floor), gyro_gain the gyro's gain relative to

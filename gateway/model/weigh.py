@@ -353,7 +353,8 @@ def posterior_of(mixture: Mixture, model: VehicleModel, unseen: float, gain_std:
 
     A parameter that is off its prior's mean by e moves the answer by K e, K = C P^-1, with C the covariance of the
     answer with the parameters and P that of the prior: the columns of a source are K times the columns of its part of
-    P. What is left of the answer's covariance is the batch's own.
+    P. What is left of the answer's covariance is the batch's own: by the weight of its evidence a part of it is chance,
+    and the rest the model's error that a batch repeats, which grows away from what taught the vehicle.
     """
     best, place = mixture.best, mixture.place
     outward = _outward(mixture)
@@ -375,7 +376,8 @@ def posterior_of(mixture: Mixture, model: VehicleModel, unseen: float, gain_std:
     )
     if place is not None:
         own[2, 2] += place.own_variance
-    own = _definite(own)
+    of_statistics = EVIDENCE if place is not None else EVIDENCE_WITHOUT_ROLL
+    own = _definite(own) * (of_statistics + (1.0 - of_statistics) * unseen**2)
     shape, mean, tails = _shape_of(mixture, outward, of_load)
     spread = np.array(model.spread[:size])
     of_model = np.diag(np.array(model.model_std[:size]) * unseen)
