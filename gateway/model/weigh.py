@@ -31,7 +31,7 @@ from gateway.model.whittle import Point, Whittle
 from gateway.posterior import NORMAL_TAILS, PAYLOAD, Posterior, Source
 from gateway.records import F64, Batch, Why
 
-EVIDENCE: Final = 0.5
+EVIDENCE: Final = 0.3
 """Weight of a batch's evidence against the vehicle's prior, 1 being its statistical weight: a batch repeats one error
 of the model. Chosen on simulated vans that serve no other purpose.
 """
@@ -218,14 +218,16 @@ def mixture_of(
     """The posterior of the load behind ``spectra``, as its distinct peaks.
 
     Each axle's movement depends on the load, and so does its place sideways: both are computed at the best of the
-    coarse peaks, from which the search continues.
+    coarse peaks, from which the search continues. A sensor whose roll rate is lost still reads roll: it is where
+    calibration found it, and the load on the centre line.
     """
     with_roll = spectra.has_roll and model.has_roll
     weight = EVIDENCE if with_roll else EVIDENCE_WITHOUT_ROLL
     first, *others = hypotheses_of(model, shapes, gain, with_roll=with_roll)
     flat = spectra.without_roll
     most_kg = MOST_LOAD_SHARE * model.empty_mass_kg
-    own = _Own(Whittle(flat, model.ground, weight), np.empty(0), 0.0, most_kg)
+    roll = np.empty(0) if with_roll else model.parameters[N:]
+    own = _Own(Whittle(flat, model.ground, weight), roll, 0.0, most_kg)
     coarse = _coarse(own, first, model)
     best = max(coarse, key=lambda one: one.log_evidence)
     rolling = None
@@ -443,7 +445,7 @@ def _of_sides(mixture: Mixture, model: VehicleModel, outward: F64) -> F64:
     sides = spectra_of_sides(mixture.whittle, mixture.point, model)
     if not sides:
         return np.zeros((1, len(outward)))
-    own = _Own(mixture.whittle, np.empty(0), 0.0, np.inf)
+    own = _Own(mixture.whittle, mixture.point.theta[N:], 0.0, np.inf)
 
     def answer(parts: F64) -> F64:
         shown = own.whittle.showing(own.whittle.spectra.showing(parts))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
-from gateway.core.cargo import ShapeHypothesis, known_shape, shape_hypotheses
+from gateway.core.cargo import ShapeHypothesis, is_said, known_shape, shape_hypotheses
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung
@@ -44,11 +44,16 @@ class CalibratedVehicle:
 
     @property
     def shapes(self) -> tuple[ShapeHypothesis, ...]:
-        """The kinds of shape that a weighed load may have; none without the model of the vehicle."""
+        """The kinds of shape that a weighed load may have; none without the model of the vehicle.
+
+        A calibration of one load leaves the shape open as widely as any load's differs: unless the fitter stated what is
+        carried there is nothing that a second kind would refer to.
+        """
         if self.cross_spectrum is None:
             return ()
         like = self.cross_spectrum.known_shape
-        return known_shape(*like) if self.is_shape_known else _shapes(self.vehicle, *like)
+        has_one_kind = self.is_shape_known or (self.is_of_one_load and not is_said(self.vehicle))
+        return known_shape(*like) if has_one_kind else _shapes(self.vehicle, *like)
 
     def is_sampled_otherwise(self, sensor_rate_hz: float) -> bool:
         """Whether the sensors send so much faster or slower than in calibration that other vibration aliases into the
