@@ -46,7 +46,7 @@ class CalibratedVehicle:
     def shapes(self) -> tuple[ShapeHypothesis, ...]:
         """The kinds of shape that a weighed load may have; none without the model of the vehicle.
 
-        A calibration of one load leaves its shape as open as that of any load: unless the fitter stated what is carried,
+        A calibration of one load leaves its shape as open as any load's: unless the fitter stated what is carried,
         there is nothing that a second kind would refer to.
         """
         if self.cross_spectrum is None:
