@@ -82,12 +82,14 @@ class Signs:
     """What an answer shows of itself, for the checks.
 
     off (N,) are the deviations of the parameters from the calibration, deviations (N,) the same in standard deviations,
-    tension their chi-squared. is_settled: the lag at which roll was removed equals the lag found, and the searches
+    tension their chi-squared. If the misfit exceeds its limit, off and deviations are of a fit that follows the batch as
+    far as the parameters may, and followed is the misfit of that fit; else followed is the misfit. is_settled: the lag at which roll was removed equals the lag found, and the searches
     converged. rivalry is the variance between peaks over all other.
     """
 
     model: VehicleModel
     misfit: float
+    followed: float
     unseen: float
     reach: float
     is_reversed: bool
@@ -114,6 +116,27 @@ def most_misfit_at(misfit_limit: float, unseen: float) -> float:
     return misfit_limit * math.exp(MISFIT_QUANTILE * MISFIT_ON_OTHER_ROADS * (min(unseen, 4.0) - 1.0))
 
 
+def _is_misfit(signs: Signs) -> bool:
+    return not signs.misfit <= most_misfit_at(signs.model.misfit_limit, signs.unseen)
+
+
+def _is_explained(signs: Signs) -> bool:
+    """Whether a changed sensor may explain the batch: with parameters that follow it, the model fits."""
+    return signs.followed <= most_misfit_at(signs.model.misfit_limit, signs.unseen)
+
+
+def _is_gyro_late(signs: Signs) -> bool:
+    return _is_explained(signs) and abs(signs.changed("gyro_lag_s")) > MOST_LAG_CHANGE_S
+
+
+def _is_moved(signs: Signs) -> bool:
+    return _is_explained(signs) and abs(signs.deviation("sensor_position_m")) > MOST_POSITION
+
+
+def _is_louder(signs: Signs) -> bool:
+    return _is_explained(signs) and signs.deviation("noise_acceleration_m2ps3") > MOST_NOISE
+
+
 def _is_gyro_turned(signs: Signs) -> bool:
     return signs.changed("noise_pitch_rate_rad2ps") > MOST_GYRO_NOISE and not np.any(signs.loudness[1:2] > QUIET)
 
@@ -137,22 +160,12 @@ class Check:
 
 CHECKS: Final = (
     Check("the pitch rate's sign", lambda s: s.is_reversed, Why.WRONG_SIGN),
-    Check("misfit", lambda s: not s.misfit <= most_misfit_at(s.model.misfit_limit, s.unseen), Why.MODEL_MISFIT),
+    Check("the gyro's lag", _is_gyro_late, Why.SENSOR_CHANGED),
+    Check("the sensor's place", _is_moved, Why.SENSOR_CHANGED, of_sensor=True),
+    Check("the accelerometer's noise", _is_louder, Why.SENSOR_CHANGED, of_sensor=True),
+    Check("misfit", _is_misfit, Why.MODEL_MISFIT),
     Check("the sensor's mount", lambda s: s.is_mount_changed, Why.SENSOR_CHANGED),
     Check("the gyro's yaw", _is_gyro_turned, Why.SENSOR_CHANGED),
-    Check("the gyro's lag", lambda s: abs(s.changed("gyro_lag_s")) > MOST_LAG_CHANGE_S, Why.SENSOR_CHANGED),
-    Check(
-        "the sensor's place",
-        lambda s: abs(s.deviation("sensor_position_m")) > MOST_POSITION,
-        Why.SENSOR_CHANGED,
-        of_sensor=True,
-    ),
-    Check(
-        "the accelerometer's noise",
-        lambda s: s.deviation("noise_acceleration_m2ps3") > MOST_NOISE,
-        Why.SENSOR_CHANGED,
-        of_sensor=True,
-    ),
     Check("tension", lambda s: s.tension > MOST_TENSION, Why.MODEL_MISFIT),
     Check("convergence", lambda s: not s.is_settled, Why.NO_SOLUTION),
     Check("rival peaks", lambda s: _is_too_wide(s) and s.rivalry > MOST_RIVALRY, Why.AMBIGUOUS),

@@ -20,7 +20,7 @@ from gateway.core.cargo import HABIT_PART, ShapeHypothesis
 from gateway.core.vehicle import Load
 from gateway.estimate import Estimate
 from gateway.model import fit
-from gateway.model.checks import VEHICLE_ROWS, Signs, disbelieved, reach_of, unseen_of, why_not
+from gateway.model.checks import VEHICLE_ROWS, Signs, disbelieved, most_misfit_at, reach_of, unseen_of, why_not
 from gateway.model.expected import with_strokes
 from gateway.model.place import ROLL_BAND_HZ, Place, most_probable_place, roll_share_of, spectra_of_sides
 from gateway.model.sensors import GAIN_STD, NOISE_RATIOS, Noise, gain_of, is_changed, noise_of, watched
@@ -45,7 +45,7 @@ SOFT_HZ: Final = 10.5  # chosen: middle of the resonances of loads on soft mount
 SOFT_COST: Final = 3.0  # chosen: minus the logarithm of the share of loads on soft mounts
 WORN_STD: Final = 0.3  # chosen: of the logarithm of each axle's dampers, if they may have worn or been replaced
 WORN_COST: Final = 4.0  # chosen: minus the logarithm of the share of batches with worn dampers
-LEAST_WEAR: Final = 2.5  # chosen: standard deviations of a damper from which worn ones are tried
+LEAST_WEAR: Final = 2.0  # chosen: standard deviations of a damper from which worn ones are tried
 START_PAYLOADS_N: Final = 6  # chosen: from 0 to the largest load seen, or a third of the empty mass
 LEAST_START_SHARE: Final = 0.33  # chosen: of the empty mass
 START_PLACES: Final = (0.25, 0.5, 0.9)  # chosen: of the wheelbase
@@ -429,7 +429,7 @@ def _shape_of(mixture: Mixture, outward: F64, of_load: F64) -> tuple[F64, F64, t
 
 def _quantiles(middles: F64, weights: F64, std: float) -> tuple[float, float, float]:
     """The 2.5, 50 and 97.5 % points of a mixture of normal distributions of one standard deviation."""
-    at = np.linspace(middles.min() - 5.0 * std, middles.max() + 5.0 * std, 801)
+    at = np.sort((middles[:, None] + std * np.linspace(-5.0, 5.0, 201)).ravel())
     z = np.clip((at - middles[:, None]) / std, -8.0, 8.0)
     cumulated = weights @ (1.0 / (1.0 + np.exp(-z * (1.5976 + 0.070566 * z**2))))  # within 2e-4 (E. Page, 1977)
     low, middle, high = np.interp((0.025, 0.5, 0.975), cumulated, at)
@@ -536,18 +536,23 @@ def _signs_of(
     is_settled: bool,
 ) -> Signs:
     best, whittle, point = mixture.best, mixture.whittle, mixture.point
+    misfit = followed = whittle.misfit(point)
+    followed_by = best
+    if not misfit <= most_misfit_at(model.misfit_limit, unseen):
+        followed_by, followed = _following(mixture, model)
     off = best.x[:N] - best.hypothesis.mean
     of_vehicle = off[VEHICLE_ROWS]
     prior = best.hypothesis.covariance[np.ix_(VEHICLE_ROWS, VEHICLE_ROWS)]
     between = float(mixture.weights @ np.array([one.x[N] - best.x[N] for one in mixture.peaks]) ** 2)
     return Signs(
         model=model,
-        misfit=whittle.misfit(point),
+        misfit=misfit,
+        followed=followed,
         unseen=unseen,
         reach=reach,
         is_reversed=_is_reversed(mixture, model),
-        off=best.x[:N] - model.parameters[:N],
-        deviations=best.deviations,
+        off=followed_by.x[:N] - model.parameters[:N],
+        deviations=followed_by.deviations,
         tension=float(of_vehicle @ np.linalg.solve(prior, of_vehicle)),
         loudness=noise.loudness,
         is_mount_changed=mixture.place is not None and mixture.place.is_mount_changed,
@@ -557,8 +562,20 @@ def _signs_of(
     )
 
 
+def _following(mixture: Mixture, model: VehicleModel) -> tuple[Peak, float]:
+    """The likeliest peak if all of the batch's evidence counts, and its misfit: what may explain that it does not
+    fit.
+    """
+    most_kg = MOST_LOAD_SHARE * model.empty_mass_kg
+    whittle = Whittle(mixture.whittle.spectra, mixture.whittle.ground)
+    own = _Own(whittle, mixture.point.theta[N:], mixture.point.cg_left_m, most_kg)
+    peak = _climb(own, mixture.best.hypothesis, mixture.best.x, COARSE)
+    return peak, whittle.misfit(own.point(peak.x))
+
+
 def _is_reversed(mixture: Mixture, model: VehicleModel) -> bool:
-    """True if the pitch rate fits better with the other sign: at this load or, if this fits badly, at any start.
+    """True if the pitch rate fits better with the other sign: at this load or, if this fits badly, at any start; or if
+    the search from there ends where the model fits.
 
     Spectra with the wrong sign may lead the search to a load where neither sign fits.
     """
@@ -566,9 +583,13 @@ def _is_reversed(mixture: Mixture, model: VehicleModel) -> bool:
     reverse = whittle.showing(whittle.spectra.with_pitch_reversed())
     least = reverse.cost(point)
     if not whittle.misfit(point) <= model.misfit_limit:
-        theta = np.r_[mixture.best.hypothesis.mean, point.theta[N:]]
-        starts = [Point(theta, *load, point.cg_left_m) for load in _starting_loads(model)]
-        least = min(least, float(reverse.costs(starts).min()))
+        own = _Own(reverse, point.theta[N:], point.cg_left_m, MOST_LOAD_SHARE * model.empty_mass_kg)
+        starts = [np.r_[mixture.best.hypothesis.mean, load] for load in _starting_loads(model)]
+        costs = reverse.costs([own.point(one) for one in starts])
+        peak = _climb(own, mixture.best.hypothesis, starts[int(np.argmin(costs))], COARSE)
+        least = min(least, float(costs.min()))
+        if reverse.misfit(own.point(peak.x)) <= model.misfit_limit:
+            return True
     return least < whittle.cost(point)
 
 

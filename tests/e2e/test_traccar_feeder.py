@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+import httpx
 import pytest
 from support.estimates import make_estimate
 from support.patience import wait_until
@@ -149,6 +150,8 @@ def test_what_was_weighed_while_traccar_was_away_arrives_once_and_in_order(tmp_p
                 fake.is_failing = False
                 assert wait_until(lambda: len(fake.positions) == 8)
                 payloads = [position.attributes["payload"] for position in fake.positions]
+                newest = httpx.get(f"{service.url}/api/v1/estimates").json()["last_cursor"]
+                assert wait_until(lambda: (tmp_path / "place").read_text() == newest)
         with traccar(port) as again, feeding(service.url, port, tmp_path):  # restarted: the place is kept
             gateway.publish(make_estimate(8))
             assert wait_until(lambda: len(again.positions) >= 1)

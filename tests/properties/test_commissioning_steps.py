@@ -94,7 +94,8 @@ class Commissioned(RuleBasedStateMachine):
 
     @rule(is_good=st.booleans(), is_open=st.booleans())
     def drive(self, is_good: bool, is_open: bool) -> None:
-        counts = self.step in ("drive", "fit")
+        underway = self.told["underway"]
+        counts = underway is not None and underway["empty"] is not None
         self.n_windows += 1
         if is_open:
             self.bench.drive(self.n_windows, 60, is_provisional=True)
