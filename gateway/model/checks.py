@@ -82,9 +82,10 @@ class Signs:
     """What an answer shows of itself, for the checks.
 
     off (N,) are the deviations of the parameters from the calibration, deviations (N,) the same in standard deviations,
-    tension their chi-squared. If the misfit exceeds its limit, off and deviations are of a fit that follows the batch as
-    far as the parameters may, and followed is the misfit of that fit; else followed is the misfit. is_settled: the lag at which roll was removed equals the lag found, and the searches
-    converged. rivalry is the variance between peaks over all other.
+    tension their chi-squared. If the misfit exceeds its limit, off and deviations are of a fit that follows the batch
+    as far as the parameters may, and followed is the misfit of that fit; else followed is the misfit. is_settled: the
+    lag at which roll was removed equals the lag found, and the searches converged. rivalry is the variance between
+    peaks over all other.
     """
 
     model: VehicleModel

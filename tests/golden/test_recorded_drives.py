@@ -123,8 +123,8 @@ def real_campaign(folder: Path, trip: str, payload_kg: float) -> Path:
 
 @pytest.mark.xfail(
     strict=True,
-    reason="one drive without a roll rate leaves springs and dampers so open that batches of one load scatter by 45 to 53 "
-    "kg and their mean is 33 kg off; the intervals hold it",
+    reason="one drive without a roll rate leaves springs and dampers so open that batches of one load scatter by 45 to "
+    "53 kg, and their mean is 33 kg off; the intervals hold it",
 )
 @pytest.mark.parametrize(("known", "weighed"), [("a", "b"), ("b", "a")])
 def test_two_trips_of_a_real_car_weigh_alike_and_a_declared_load_moves_them(
