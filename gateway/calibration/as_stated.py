@@ -16,37 +16,28 @@ from gateway.core.vehicle import Load, Vehicle
 from gateway.model import fit
 from gateway.model.car import Ground
 from gateway.model.spectra import CrossSpectra, Reading, grouped, segments_of
-from gateway.model.table import OWN, UPRIGHT, N, covariance_of
+from gateway.model.table import N_OWN, OWN, UPRIGHT, N, covariance_of, of_drive
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64
 
 TOLERANCE: Final = 0.1  # chosen: in log posterior
-K: Final = len(OWN)
-_OWN: Final = list(OWN)
 _DEVIATES: Final = np.linalg.inv(covariance_of([UPRIGHT[i] for i in OWN], "day", "load", "batch"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StatedRun:
-    """The likelihood of one drive, by the vehicle (N,) and by what is the drive's own: the deviations (K,) from that
-    vehicle, then payload (kg) and front share (0..1); each may be left out.
+    """The likelihood of one drive, by the vehicle (N,) and by what is the drive's own: the deviations (N_OWN,) from
+    that vehicle, then payload (kg) and front share (0..1); each may be left out.
     """
 
     run: KnownRun
     load: Load
     whittle: Whittle
 
-    def theta(self, common: F64, own: F64) -> F64:
-        """(N,) the vehicle of this drive."""
-        theta = common.copy()
-        if len(own) >= K:
-            theta[_OWN] += own[:K]
-        return theta
-
     def point(self, common: F64, own: F64) -> Point:
         """The vehicle of this drive with its own load, or with the stated one."""
-        load = own[K:] if len(own) >= K else own
-        theta = self.theta(common, own)
+        deviations, load = _split(own)
+        theta = of_drive(common, deviations)
         return Point(theta, float(load[0]), float(load[1])) if len(load) else Point.of(theta, self.load)
 
     def cost(self, common: F64, own: F64) -> float:
@@ -59,9 +50,10 @@ class StatedRun:
 
     def curvature(self, common: F64, own: F64) -> tuple[F64, F64]:
         """See gateway.model.fit."""
-        n_load = len(own) - K if len(own) >= K else len(own)
-        chosen = [*range(N), *(OWN if len(own) >= K else ()), *range(N, N + n_load)]
-        found = self.whittle.curvature(self.point(common, own), range(N + n_load))
+        deviations, load = _split(own)
+        n = N + len(load)
+        chosen = [*range(N), *(OWN if len(deviations) else ()), *range(N, n)]
+        found = self.whittle.curvature(self.point(common, own), range(n))
         return found.gradient[chosen], found.information[np.ix_(chosen, chosen)]
 
     def saying(self, load: Load) -> "StatedRun":
@@ -70,13 +62,19 @@ class StatedRun:
 
     def own(self, *, deviates: bool, is_free: bool) -> fit.Drive:
         """The drive in a fit, with what is its own."""
-        n = K * deviates + 2 * is_free
+        n = N_OWN * deviates + 2 * is_free
         precision, start = np.zeros((n, n)), np.zeros(n)
         if deviates:
-            precision[:K, :K] = _DEVIATES
+            precision[:N_OWN, :N_OWN] = _DEVIATES
         if is_free:
             start[-2:] = self.load.payload_kg, self.load.front_share
         return fit.Drive(self, fit.Gaussian(np.zeros(n), precision), start)
+
+
+def _split(own: F64) -> tuple[F64, F64]:
+    """A drive's own vector: its deviations (N_OWN,) or (0,), and its load (2,) or (0,)."""
+    n = N_OWN if len(own) >= N_OWN else 0
+    return own[:n], own[n:]
 
 
 def stated_load(run: KnownRun, vehicle: Vehicle) -> Load:

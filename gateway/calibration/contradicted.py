@@ -87,9 +87,7 @@ def contradictions(
     fit = _fit(known, Gaussian.of(whole.mean, whole.covariance), model.parameters[:N])
     found = list(_sensor(fit, vehicle))
     if abs(fit.alone(_DELAY)[2]) > LOOKED_STDS:
-        precision = (
-            fit.prior.precision.copy()
-        )  # with the time between the axles free: a wrong wheelbase bends much else
+        precision = fit.prior.precision.copy()  # the time between the axles is free: a wrong wheelbase bends much else
         precision[_DELAY, _DELAY] = FREE_SCALE_STD**-2.0
         fit = _fit(known, Gaussian(fit.prior.mean, precision), fit.x)
         found += _wheelbase(fit, vehicle)

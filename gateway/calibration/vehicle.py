@@ -29,7 +29,7 @@ from gateway.model.checks import MOST_TENSION, reach_of
 from gateway.model.expected import log_stroke_speeds, with_strokes
 from gateway.model.place import ROLL_BAND_HZ
 from gateway.model.spectra import CrossSpectra, Reading, Segments, grouped, level, mount_of, segments_of, usual_floor
-from gateway.model.table import INDEX, NAMES, OWN, ROWS, UPRIGHT, N, covariance_of, prior_of
+from gateway.model.table import INDEX, N_OWN, NAMES, OWN, ROWS, UPRIGHT, N, covariance_of, of_drive, prior_of
 from gateway.model.vehicle import VehicleModel
 from gateway.model.weigh import answers_by_vehicle, mixture_of, weigh
 from gateway.model.whittle import Point, Whittle
@@ -57,9 +57,6 @@ SCALES: Final = np.array([10.0, 0.2, 0.005])  # chosen: kg, %, m of equal weight
 SPRINGS_FROM_PRIORS: Final = "springs_from_priors"
 UNTESTED: Final = "intervals_untested"
 
-K: Final = len(OWN)
-"""Length of a drive's own vector before its payload (kg) and its front share (0..1)."""
-_OWN: Final = list(OWN)
 _GYRATION, _MODE = OWN.index(INDEX["payload_gyration_m2"]), OWN.index(INDEX["payload_mode_hz"])
 _COMPACT_LOG_S: Final = log(0.1)
 
@@ -88,7 +85,7 @@ def can_roll(vehicle: Vehicle) -> bool:
 class _Drive:
     """One drive's likelihood, as a function of the vehicle's vector (N,) and of its own.
 
-    The own vector (K + 2,) has the drive's deviations from the vehicle, its payload and its front share.
+    The own vector (N_OWN + 2,) has the drive's deviations from the vehicle, its payload and its front share.
     """
 
     def __init__(self, drive: TaughtDrive, vehicle: Vehicle, segments: Segments, reading: Reading) -> None:
@@ -118,7 +115,7 @@ class _Drive:
         return Whittle(spectra, self.ground, EVIDENCE)
 
     def cost(self, common: F64, own: F64) -> float:
-        if abs(own[K]) > MOST_LOAD_SHARE * self.vehicle.empty_mass_kg or not 0.05 < own[K + 1] < 0.95:
+        if abs(own[N_OWN]) > MOST_LOAD_SHARE * self.vehicle.empty_mass_kg or not 0.05 < own[N_OWN + 1] < 0.95:
             return np.inf
         return self.whittle.cost(self.point(common, own))
 
@@ -138,15 +135,13 @@ class _Drive:
 
     def theta(self, common: F64, own: F64) -> F64:
         """(N,) the vehicle of this drive."""
-        theta = common.copy()
-        theta[_OWN] += own[:K]
-        return theta
+        return of_drive(common, own[:N_OWN])
 
     def point(self, common: F64, own: F64) -> Point:
         theta = np.r_[self.theta(common, own), self.roll]
-        payload_kg = float(own[K])
+        payload_kg = float(own[N_OWN])
         left_m = self.cg_left_m(theta, payload_kg, self.moment_kgm) if len(self.roll) else 0.0
-        return Point(theta, payload_kg, float(own[K + 1]), left_m)
+        return Point(theta, payload_kg, float(own[N_OWN + 1]), left_m)
 
     def cg_left_m(self, theta: F64, payload_kg: float, moment_kgm: float) -> float:
         """Centre of gravity left of the centre line with this moment of the payload about it."""
@@ -366,11 +361,11 @@ def _drives(drives: Sequence[TaughtDrive], vehicle: Vehicle, sister: VehicleMode
 
 def _own_prior(stated: LoadPrior, vehicle: Vehicle) -> fit.Gaussian:
     """The prior of a drive's own vector: how drives deviate from their vehicle, and what is stated of the load."""
-    covariance = np.zeros((K + 2, K + 2))
-    covariance[:K, :K] = covariance_of([UPRIGHT[i] for i in OWN], "day", "load", "batch")
-    mean = np.zeros(K + 2)
+    covariance = np.zeros((N_OWN + 2, N_OWN + 2))
+    covariance[:N_OWN, :N_OWN] = covariance_of([UPRIGHT[i] for i in OWN], "day", "load", "batch")
+    mean = np.zeros(N_OWN + 2)
     if stated.is_compact:
-        covariance[:K, :K] *= SHARED**2
+        covariance[:N_OWN, :N_OWN] *= SHARED**2
     else:
         shapes = shape_hypotheses(vehicle, exp(_COMPACT_LOG_S), 0.7)
         at = np.array([one.log_s - _COMPACT_LOG_S for one in shapes])
@@ -379,8 +374,8 @@ def _own_prior(stated: LoadPrior, vehicle: Vehicle) -> fit.Gaussian:
         covariance[_GYRATION, _GYRATION] = weight @ (
             np.array([one.std for one in shapes]) ** 2 + (at - mean[_GYRATION]) ** 2
         )
-    covariance[K, K], covariance[K + 1, K + 1] = stated.payload_std_kg**2, stated.front_share_std**2
-    mean[K:] = stated.payload_kg, stated.front_share
+    covariance[N_OWN, N_OWN], covariance[N_OWN + 1, N_OWN + 1] = stated.payload_std_kg**2, stated.front_share_std**2
+    mean[N_OWN:] = stated.payload_kg, stated.front_share
     return fit.Gaussian.of(mean, covariance)
 
 
@@ -418,11 +413,11 @@ class _Fitted:
         """Of drive i. Without its statement its payload is a ratio of two Gaussians: posterior over statement."""
         own, covariance = self.half_car.own[i], self.half_car.own_covariances[i]
         drive = self.seen[i].drive
-        variance, of_statement = float(covariance[K, K]), self.seen[i].stated.payload_std_kg ** 2
+        variance, of_statement = float(covariance[N_OWN, N_OWN]), self.seen[i].stated.payload_std_kg ** 2
         without_kg = without_std_kg = np.nan
         if drive.statement.is_of_payload:
             left = max(1.0 / variance - 1.0 / of_statement, 1e-3 / of_statement)
-            pulled = own[K] / variance - self.seen[i].stated.payload_kg / of_statement
+            pulled = own[N_OWN] / variance - self.seen[i].stated.payload_kg / of_statement
             without_kg, without_std_kg = float(pulled / left), left**-0.5
         return FoundLoad(drive.name, self.load(i), variance**0.5, without_kg, without_std_kg, drive.name in held)
 
@@ -514,7 +509,7 @@ def _in_ranges_of(sister: VehicleModel, model: VehicleModel) -> VehicleModel:
 
 
 def _load(own: F64) -> Load:
-    return Load(float(own[K]), 100.0 * float(own[K + 1]))
+    return Load(float(own[N_OWN]), 100.0 * float(own[N_OWN + 1]))
 
 
 def _disagreement(found: FoundLoad) -> float:
@@ -614,7 +609,7 @@ def _seed(one: _Drive, prior: fit.Gaussian, theta: F64, mode: float) -> F64:
         for place in places if payload_kg else (0.5,):
             own = start.copy()
             front_kg = vehicle.empty_front_share * vehicle.empty_mass_kg + (1.0 - place) * payload_kg
-            own[K:] = payload_kg, front_kg / (vehicle.empty_mass_kg + payload_kg)
+            own[N_OWN:] = payload_kg, front_kg / (vehicle.empty_mass_kg + payload_kg)
             starts.append(own)
     costs = one.whittle.costs([one.point(theta, own) for own in starts]) + [prior.cost(own) for own in starts]
     return starts[int(np.argmin(costs))]
@@ -624,8 +619,8 @@ def _roll(seen: Sequence[_Drive], found: fit.Found, prior: fit.Gaussian, start: 
     """The most probable roll parameters, the half-car as found, with each drive's moment about the centre line."""
     drives = []
     for one, own in zip(seen, found.own, strict=True):
-        std_kgm = abs(own[K]) * one.stated.left_std_m + LEAST_MOMENT_STD_KGM
-        moment_kgm = np.array([own[K] * one.stated.left_m])
+        std_kgm = abs(own[N_OWN]) * one.stated.left_std_m + LEAST_MOMENT_STD_KGM
+        moment_kgm = np.array([own[N_OWN] * one.stated.left_m])
         drives.append(
             fit.Drive(
                 _Rolling(one, one.theta(found.common, own), _load(own)),

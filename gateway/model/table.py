@@ -221,3 +221,12 @@ def prior_of_size(rows: Iterable[Row], empty_mass_kg: float, track_width_m: floa
 
 OWN: Final = tuple(i for i, row in enumerate(UPRIGHT) if row.day or row.load or row.batch)
 """The parameters in which every drive deviates from its vehicle."""
+N_OWN: Final = len(OWN)
+
+
+def of_drive(common: F64, deviations: F64) -> F64:
+    """(N,) the vehicle of one drive: the vehicle common (N,) to all with the drive's deviations (N_OWN,), or (0,)."""
+    theta = common.copy()
+    if len(deviations):
+        theta[list(OWN)] += deviations
+    return theta
