@@ -167,8 +167,7 @@ class _CandumpReader:
             if line.strip():
                 content = read_line(line)
                 reason = content if isinstance(content, LogReject) else LogReject.GARBLED
-                self._report.reject(reason, self._report.lines + int(i) + 1, shown(line))
-                self._report.frames += 1
+                self._report.reject_frame(reason, shown(line), self._report.lines + int(i) + 1)
 
 
 class _Finder:

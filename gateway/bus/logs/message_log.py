@@ -69,7 +69,7 @@ def _ours(messages: Iterator[tuple[can.Message, int]], selection: Selection) -> 
 
 
 class _RestartError(Exception):
-    """A reader begins anew with another header."""
+    """The header has changed: python-can's reader has to be replaced by a new one, which reads the changed header."""
 
 
 class _TextLog:
@@ -117,20 +117,16 @@ class _TextLog:
         except (EOFError, OSError, LogUnreadableError):
             raise
         except _RestartError:
-            """The header has changed."""
+            pass  # the next reader begins with the changed header
         except Exception:  # noqa: BLE001 # python-can's parsers raise whatever a garbled line makes int() or split() raise
             self._is_awaited = False
-            self.reject(LogReject.GARBLED, self._line)
+            self.report.reject_frame(LogReject.GARBLED, self._line)
         self._inserted.extend(self.header)
 
     def _count_awaited(self) -> None:
         if self._is_awaited:
             self._is_awaited = False
-            self.reject(LogReject.NO_FRAME, self._line)
-
-    def reject(self, reason: LogReject, line: str) -> None:
-        self.report.reject(reason, self.report.lines, line.strip())
-        self.report.frames += 1
+            self.report.reject_frame(LogReject.NO_FRAME, self._line)
 
     def __iter__(self) -> "_TextLog":
         return self
@@ -187,7 +183,7 @@ class _AscLog(_TextLog):
         stamp = self._STAMP.match(line)
         if stamp is None or stamp[1].startswith("-"):
             if self.holds_frame(line):
-                self.reject(LogReject.BAD_TIME, line)
+                self.report.reject_frame(LogReject.BAD_TIME, line)
             return None
         if self._is_relative:
             self._sum_ns += int(stamp[1]) * NS_PER_S + int((stamp[2] or "0").ljust(9, "0"))
@@ -224,7 +220,7 @@ class _TrcLog(_TextLog):
         return None
 
     def holds_frame(self, line: str) -> bool:
-        return not line.startswith(";") and bool(line.strip())
+        return not line.startswith(";") and super().holds_frame(line)
 
 
 class _CsvLog(_TextLog):
@@ -251,7 +247,7 @@ class _CsvLog(_TextLog):
         return line
 
     def holds_frame(self, line: str) -> bool:
-        return self.report.lines > 1 and bool(line.strip())
+        return self.report.lines > 1 and super().holds_frame(line)
 
 
 _TEXTS: Final[dict[str, type[_TextLog]]] = {".asc": _AscLog, ".csv": _CsvLog, ".trc": _TrcLog}

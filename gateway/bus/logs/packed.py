@@ -218,8 +218,7 @@ def line_blocks(report: LogReport, block_bytes: int = BLOCK_BYTES) -> Iterator[L
             if is_last:
                 return
             if not end and not is_overlong:
-                report.reject(LogReject.OVERLONG_LINE, report.lines + 1)
-                report.frames += 1
+                report.reject_frame(LogReject.OVERLONG_LINE, line=report.lines + 1)
                 is_overlong = True
             carried = 0 if is_overlong else end_of_text - end
             buffer[MARGIN : MARGIN + carried] = buffer[end : end + carried]

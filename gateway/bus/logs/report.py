@@ -45,10 +45,9 @@ class LogReject(StrEnum):
 
 _KNOWN_LINES: Final = (
     (r"\(\d{4}-\d\d-\d\d", "stamps are dates (candump -tA): record with candump -L alone"),
-    (r"\(-?\d+,\d+\)|-?\d+,\d+\s+\d+\s", "stamps have a decimal comma: write a point"),
+    (r"\(-?\d+,\d+\)|(\d+\)\s+)?-?\d+,\d+\s", "stamps have a decimal comma: write a point"),
     (r"\(\d{11,}[.)]|\d{11,}\.?\d*,", "stamps are not seconds since 1970, but a fraction of it such as milliseconds"),
     (r"\(-|\s*-\d", "the stamp is negative"),
-    (r"\d+\)\s+-?\d+,\d+\s", "stamps have a decimal comma: write a point"),
     (r"\(?\d+(\.\d+)?\)?\s+\S+\s+[0-9A-F]{3,8}\s+\[\d+\]|\w+\s+[0-9A-F]{3,8}\s+\[\d+\]",
      "this is candump's output for the screen: record with candump -L"),
     (r"\S.*\(\d+\.\d+\) \S+ [0-9A-F]{3,8}#", "something is written before the stamp, as in a system's log: cut it off"),
@@ -116,13 +115,18 @@ class LogReport:
         return reason not in self.rejects or len(self.rejects[reason].first_lines) < KEPT_LINE_NUMBERS
 
     def reject(self, reason: LogReject, line: int | None = None, text: str = "", *, n: int = 1) -> None:
-        """Count a refused line, or ``n`` of them without line numbers. They are among ``frames``."""
+        """Count a refused line, or ``n`` of them without line numbers, which ``frames`` counts already."""
         if n == 0:
             return
         told = self.rejects.setdefault(reason, RejectedLines(text=text))
         if line is not None and self.keeps_lines_of(reason):
             told.first_lines.append(line)
         told.count += n
+
+    def reject_frame(self, reason: LogReject, text: str = "", line: int | None = None) -> None:
+        """Count a line (default: the last one read) as a frame, and refuse it."""
+        self.frames += 1
+        self.reject(reason, self.lines if line is None else line, text.strip())
 
     def begin_at(self, date: datetime | None, zone: tzinfo | None, told: str) -> int:
         """Take the date of the header, which says ``told``; nanoseconds since 1970, 0 without one."""
