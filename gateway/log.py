@@ -45,6 +45,7 @@ class Event(StrEnum):
     BUS_SILENT = "bus silent"
     BUS_FAULT = "bus fault"
     BUS_REOPENED = "bus reopened"
+    ADAPTER_CLOCK = "adapter clock dated"
     ESTIMATE = "estimate"
     PROVISIONAL = "provisional estimate"
     ENTRY = "load event or trip reported"

@@ -19,6 +19,7 @@ from gateway.schema import AsLists
 from gateway.units import NS_PER_S
 
 _START: Final = datetime(1970, 1, 1, tzinfo=UTC)
+FIRST_DATED_NS: Final = 504_921_600 * NS_PER_S  # 1986, the year of CAN: earlier stamps count from something else
 
 F64 = Annotated[NDArray[np.float64], AsLists]
 I64 = NDArray[np.int64]

@@ -140,6 +140,8 @@ class StatusReport:
             n_reconnects=counts.reconnects,
             n_inbox_dropped=counts.dropped_inbox,
             n_kernel_dropped=counts.dropped_kernel,
+            n_clock_sets=counts.clock_sets,
+            n_clock_wraps=counts.clock_wraps,
             last_frame_age_s=min(ages, default=None),
             last_fault=self.source.reason,
         )

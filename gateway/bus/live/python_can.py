@@ -17,6 +17,7 @@ from typing import Any, Final
 import can
 
 from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of
+from gateway.bus.live.adapter_clock import AdapterClock
 from gateway.bus.live.receiver import Burst
 from gateway.bus.signals import IdFilter
 from gateway.errors import BusError
@@ -60,11 +61,14 @@ _WINDOWS_ONLY: Final = frozenset({"etas", "ixxat", "nican", "nixnet", "systec", 
 class PythonCanReceiver:
     """Messages of an open python-can bus as bursts of frames."""
 
-    def __init__(self, bus: can.BusABC, width: int, kernel_socket: socket.socket | None = None) -> None:
+    def __init__(
+        self, bus: can.BusABC, width: int, kernel_socket: socket.socket | None = None, interface: str = ""
+    ) -> None:
         """``kernel_socket`` is the bus's own, if the kernel receives into it (SocketCAN)."""
         self._bus = bus
         self._width = width
         self._socket = kernel_socket
+        self._clock = AdapterClock(interface)
         self._n_dropped = 0
         self._fault: Exception | None = None
 
@@ -83,13 +87,16 @@ class PythonCanReceiver:
         Messages from before a fault are given first.
         """
         messages: list[can.Message] = []
+        now_s = 0.0
         try:
             while self._fault is None and len(messages) < BURST_FRAMES:
                 message = self._bus.recv(0.0 if messages else timeout_s)
                 if message is None:
                     break
-                if not messages and self._socket is not None:
-                    time.sleep(GATHER_S)
+                if not messages:
+                    now_s = time.time()
+                    if self._socket is not None:
+                        time.sleep(GATHER_S)
                 messages.append(message)
         except (OSError, can.CanError) as fault:
             self._fault = fault
@@ -100,9 +107,11 @@ class PythonCanReceiver:
             )
         if self._fault is not None and not messages:
             raise self._fault
-        return self._burst(messages)
+        return self._burst(messages, now_s)
 
-    def _burst(self, messages: Sequence[can.Message]) -> Burst:
+    def _burst(self, messages: Sequence[can.Message], now_s: float) -> Burst:
+        """``now_s`` is the system's clock at the first of them."""
+        n_set, n_wraps = self._clock.n_set, self._clock.n_wraps
         data: list[can.Message] = []
         n_errors, is_bus_off = 0, False
         for message in messages:
@@ -113,8 +122,11 @@ class PythonCanReceiver:
                 is_bus_off = False
                 if not 0.0 < message.timestamp <= LAST_SECOND:
                     message.timestamp = ExactStamp(time.time_ns())
+                elif self._socket is None and not isinstance(message.timestamp, ExactStamp):
+                    message.timestamp = self._clock.dated_s(message.timestamp, now_s)
                 data.append(message)
-        return Burst(frames_of(data, self._width), n_errors, is_bus_off)
+        n_set, n_wraps = self._clock.n_set - n_set, self._clock.n_wraps - n_wraps
+        return Burst(frames_of(data, self._width), n_errors, is_bus_off, n_set, n_wraps)
 
     def close(self) -> None:
         self._bus.shutdown()
@@ -138,7 +150,7 @@ def open_python_can(
     except (TypeError, ValueError) as fault:
         raise BusError(f"interface {interface!r} does not take these options: {fault}") from fault
     if interface != "socketcan":
-        return PythonCanReceiver(bus, width)
+        return PythonCanReceiver(bus, width, interface=interface)
     kernel_socket: socket.socket = bus.socket  # type: ignore[attr-defined] # of SocketcanBus
     with_enough_room(kernel_socket)
     return PythonCanReceiver(bus, width, kernel_socket)

@@ -11,11 +11,16 @@ from gateway.records import Frames
 
 @dataclass(frozen=True, slots=True)
 class Burst:
-    """Frames that came together in order, the number of error frames, and whether bus-off came behind all frames."""
+    """Frames that came together in order, the number of error frames, and whether bus-off came behind all frames.
+
+    ``n_clock_sets`` and ``n_clock_wraps`` tell how often the adapter's own clock was dated, and began again at 0.
+    """
 
     frames: Frames
     error_frames: int = 0
     is_bus_off: bool = False
+    n_clock_sets: int = 0
+    n_clock_wraps: int = 0
 
 
 class Receiver(Protocol):

@@ -1,7 +1,8 @@
 """The live source: a thread that listens to a CAN channel, survives its faults, and fills an inbox.
 
 Time is each frame's own: the kernel's stamp on SocketCAN, the driver's elsewhere, the recorded one on an
-in-process bus. A frame without any is stamped on receipt.
+in-process bus. An adapter that counts from its own start is dated by the system's clock (``adapter_clock``); a frame
+without any stamp is stamped on receipt.
 """
 
 import errno
@@ -18,10 +19,11 @@ from typing import Any, Final
 import can
 
 from gateway.bus.live.python_can import open_python_can, packets_received, require_usable_interface
-from gateway.bus.live.receiver import Inbox, Receiver
+from gateway.bus.live.receiver import Burst, Inbox, Receiver
 from gateway.bus.signals import IdFilter, SignalMap
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ThreadPart
+from gateway.records import iso_utc
 
 POLL_S: Final = 0.3  # chosen: longest wait inside a receiver: how soon a stop takes effect
 ASLEEP_POLL_S: Final = 1.0  # chosen: likewise while the bus is silent; a frame ends the wait at once
@@ -68,6 +70,8 @@ class SourceCounts:
     dropped_kernel: int
     error_frames: int
     reconnects: int
+    clock_sets: int = 0
+    clock_wraps: int = 0
 
 
 class LiveSource(ThreadPart):
@@ -135,6 +139,8 @@ class LiveSource(ThreadPart):
             dropped_kernel=self._dropped_before + (receiver.dropped_kernel if receiver else 0),
             error_frames=self._tally["error_frames"],
             reconnects=self._tally["reconnects"],
+            clock_sets=self._tally["clock_sets"],
+            clock_wraps=self._tally["clock_wraps"],
         )
 
     def _run(self) -> None:
@@ -175,6 +181,7 @@ class LiveSource(ThreadPart):
                 burst = receiver.receive(ASLEEP_POLL_S if self._state is SourceState.BUS_SILENT else POLL_S)
                 self._tally["frames"] += len(burst.frames)
                 self._tally["error_frames"] += burst.error_frames
+                self._note_clock(burst)
                 is_bus_off = burst.is_bus_off or (is_bus_off and not len(burst.frames))
                 if len(burst.frames):
                     heard_s = time.monotonic()
@@ -193,6 +200,19 @@ class LiveSource(ThreadPart):
         finally:
             self._dropped_before += receiver.dropped_kernel
             self._receiver = None
+
+    def _note_clock(self, burst: Burst) -> None:
+        self._tally["clock_sets"] += burst.n_clock_sets
+        self._tally["clock_wraps"] += burst.n_clock_wraps
+        if burst.n_clock_sets or burst.n_clock_wraps:
+            log_event(
+                Event.ADAPTER_CLOCK,
+                interface=self._interface,
+                channel=self._channel,
+                n_sets=burst.n_clock_sets,
+                n_wraps=burst.n_clock_wraps,
+                first_frame=iso_utc(int(burst.frames.t_ns[0])),
+            )
 
     def _enter(self, state: SourceState, reason: str | None) -> None:
         is_new_fault = state is SourceState.READER_FAULT and reason != self._reason

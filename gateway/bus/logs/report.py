@@ -12,10 +12,10 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.bus.frames import gathered
-from gateway.bus.logs.wall_clock import FIRST_DATED_NS, LATE_START_S, ns_since_1970
+from gateway.bus.logs.wall_clock import LATE_START_S, ns_since_1970
 from gateway.bus.signals import IdFilter
 from gateway.errors import LogUnreadableError
-from gateway.records import I64, U32, Bool, Frames, iso_utc
+from gateway.records import FIRST_DATED_NS, I64, U32, Bool, Frames, iso_utc
 from gateway.units import NS_PER_S
 
 KEPT_LINE_NUMBERS: Final = 5  # chosen: what a person looks at

@@ -4,9 +4,6 @@ import re
 from datetime import UTC, datetime, timedelta, tzinfo
 from typing import Final
 
-from gateway.units import NS_PER_S
-
-FIRST_DATED_NS: Final = 504_921_600 * NS_PER_S  # 1986, the year of CAN: earlier stamps count from something else
 LATE_START_S: Final = 3600.0  # chosen: a first frame so long after the date of its header gets a remark
 
 # Short names as CANoe writes them with Windows in English, German, French, Italian, Spanish, Polish, Portuguese, Dutch,
