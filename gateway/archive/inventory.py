@@ -50,15 +50,32 @@ class Inventory:
         self.facts[vehicle] |= facts
         keep_facts(self.dataset, vehicle, self.facts[vehicle])
 
+    def copies(self) -> dict[str, str]:
+        """Names of logs with the content of another log of the same vehicle, each with that log, which counts."""
+        first: dict[tuple[str, str], str] = {}
+        found: dict[str, str] = {}
+        for assignment, group in zip(self.manifest.assignments, self.logs, strict=True):
+            for log in group:
+                told = self.facts[assignment.vehicle].get(log.key)
+                if told is not None and told.first_ns is not None:
+                    original = first.setdefault((assignment.vehicle, told.content_sha256), log.name)
+                    found |= {log.name: original} if original != log.name else {}
+        return found
+
     def jobs(self) -> list[ArchiveJob]:
-        """The jobs of every fully surveyed vehicle, the largest first: a missing log would change its job."""
+        """The jobs of every fully surveyed vehicle, the largest first: a missing log would change its job.
+
+        Copies of logs are left out.
+        """
+        copies = self.copies()
         pairs = list(zip(self.manifest.assignments, self.logs, strict=True))
         in_part = {assignment.vehicle for assignment, group in pairs if not self._is_known(assignment, group)}
         found: list[ArchiveJob] = []
         for assignment, group in pairs:
             if assignment.vehicle not in in_part:
                 facts = self.facts[assignment.vehicle]
-                found += plan(self.dataset, assignment, group, facts, self.manifest.settings)
+                own = [log for log in group if log.name not in copies]
+                found += plan(self.dataset, assignment, own, facts, self.manifest.settings)
         return sorted(found, key=lambda job: (-job.size, job.slot))
 
     def _is_known(self, assignment: Assignment, group: list[LogFile]) -> bool:

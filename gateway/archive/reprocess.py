@@ -81,6 +81,7 @@ class Summary:
     n_failed_before: int
     outcomes: list[JobOutcome] = field(default_factory=list)
     lost: dict[str, str] = field(default_factory=dict)  # logs and jobs to retry, with reasons
+    copies: dict[str, str] = field(default_factory=dict)  # logs left out, each with the log whose content it has
     took_s: float = 0.0
 
     def count(self, status: JobStatus) -> int:
@@ -117,6 +118,7 @@ class Summary:
             "n_failed_logs": self.n_failed_logs,
             "failures": [reason for outcome in self.outcomes for reason in outcome.failures],
             "lost": self.lost,
+            "copies": self.copies,
             "took_s": round(self.took_s, 3),
         }
 
@@ -146,6 +148,7 @@ def reprocess(
         n_already=sum(job.slot in done for job in jobs),
         n_failed_before=sum(job.slot in failed - done for job in jobs),
         lost=dict(inventory.lost),
+        copies=inventory.copies(),
     )
     _weigh(to_do, workers, summary, on_progress)
     _retire(dataset, jobs)

@@ -1,18 +1,22 @@
-"""Surveys logs before processing: every log's hash and the time of its first frame.
+"""Surveys logs before processing: every log's hash, that of its unpacked content, and the time of its first frame.
 
 Each log is read completely once, on any worker; the facts are stored in the data set (``logs/vehicle=X.json``), and are
 valid as long as the log's size and stamp are unchanged.
 """
 
+import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, Final
 from zoneinfo import ZoneInfo
 
 from gateway.archive.manifest import Assignment
-from gateway.archive.places import Location
+from gateway.archive.places import Fetched, Location
 from gateway.bus.logs import is_named_as_log, open_whole_log
+from gateway.bus.logs.packed import is_packed, open_log_file
 from gateway.errors import ConfigurationError, LogUnreadableError, ReaderMissingError
 
 KNOWN: Final = "logs"  # folder of the data set
@@ -37,9 +41,13 @@ class LogFile:
 
 @dataclass(frozen=True, slots=True)
 class SurveyedLog:
-    """Facts about a log's content. ``first_ns`` is None without a readable frame; ``fault`` then has the reason."""
+    """Facts about a log's content. ``first_ns`` is None without a readable frame; ``fault`` then has the reason.
+
+    Logs of one ``content_sha256`` are copies of each other, packed or not.
+    """
 
     sha256: str
+    content_sha256: str
     first_ns: int | None
     fault: str | None = None
 
@@ -72,7 +80,7 @@ def known_facts(dataset: Location, vehicle: str) -> Facts:
 
 def keep_facts(dataset: Location, vehicle: str, facts: Facts) -> None:
     """Store the facts for the next run."""
-    told = {key: {"sha256": one.sha256, "first_ns": one.first_ns, "fault": one.fault} for key, one in facts.items()}
+    told = {key: asdict(one) for key, one in facts.items()}
     dataset.replace(_path(vehicle), (json.dumps(told, indent=0, sort_keys=True) + "\n").encode())
 
 
@@ -83,21 +91,38 @@ def _path(vehicle: str) -> str:
 def survey(log: LogFile) -> SurveyedLog:
     """Read a log once. Raises FileNotFoundError, PlaceError, or ConfigurationError without a library."""
     with log.place.fetched(log.path) as fetched:
+        content_sha256 = _content_sha256(fetched)
         try:
-            chunks, report = open_whole_log(fetched.path, zone=log.zone)
-            first_ns = next((int(chunk.t_ns[0]) for chunk in chunks if len(chunk)), None)
-            if first_ns is None:
-                report.require_frames()
-            elif not report.is_dated:
-                noted = "".join(f"; {note}" for note in report.notes)
-                raise LogUnreadableError(
-                    f"{log.name}: has no date{noted}: nothing tells which month and calibration it belongs to; "
-                    "weigh it with springscale estimate"
-                )
+            first_ns = _first_ns(log, fetched.path)
         except ReaderMissingError as fault:  # no fault of the log
             raise ConfigurationError(str(fault).replace(str(fetched.path), log.name)) from None
         except LogUnreadableError as fault:
-            return SurveyedLog(fetched.sha256, None, str(fault).replace(str(fetched.path), log.name))
+            why = str(fault).replace(str(fetched.path), log.name)
         except Exception as fault:  # noqa: BLE001 - a reader's surprise is this log's fault, not that of the others
-            return SurveyedLog(fetched.sha256, None, f"{log.name}: cannot be read: {fault!r}")
-    return SurveyedLog(fetched.sha256, first_ns)
+            why = f"{log.name}: cannot be read: {fault!r}"
+        else:
+            return SurveyedLog(fetched.sha256, content_sha256, first_ns)
+    return SurveyedLog(fetched.sha256, content_sha256, None, why)
+
+
+def _first_ns(log: LogFile, path: Path) -> int:
+    """The time of the first frame. Raises LogUnreadableError without one that has a date."""
+    chunks, report = open_whole_log(path, zone=log.zone)
+    first_ns = next((int(chunk.t_ns[0]) for chunk in chunks if len(chunk)), None)
+    if first_ns is None:
+        report.require_frames()
+    if first_ns is None or not report.is_dated:
+        noted = "".join(f"; {note}" for note in report.notes)
+        raise LogUnreadableError(
+            f"{log.name}: has no date{noted}: nothing tells which month and calibration it belongs to; "
+            "weigh it with springscale estimate"
+        )
+    return first_ns
+
+
+def _content_sha256(fetched: Fetched) -> str:
+    """Hash of a log's unpacked content; that of the file itself if its packing is damaged."""
+    with suppress(EOFError, OSError), open_log_file(fetched.path) as stream:
+        if is_packed(stream):
+            return hashlib.file_digest(stream, "sha256").hexdigest()  # type: ignore[arg-type] # it has readinto
+    return fetched.sha256

@@ -65,6 +65,9 @@ def summary_in_words(summary: Summary, output: str) -> str:
         f"done now: {counts['done']}, {batches} batches, {weighed} of them weighed; done before: {counts['already']}",
         f"took {duration(summary.took_s)}; the data set is in {output}",
     ]
+    if summary.copies:
+        lines.append(f"left out, copies of other logs: {counted(len(summary.copies), 'log')}:")
+        lines += _some([f"{copy}: has the content of {log}" for copy, log in summary.copies.items()])
     if counts["failed_before"]:
         lines.append(f"failed in an earlier run: {counts['failed_before']}; to try them again, remove {output}/failed")
     failures = [

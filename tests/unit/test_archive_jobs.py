@@ -41,7 +41,10 @@ def _van(manifest: Manifest) -> Assignment:
 def jobs_of(van: Assignment, starts: Sequence[int | None], settings: BatchSettings | None = None) -> list[ArchiveJob]:
     """Of logs 0.log, 1.log, ... that begin then; None: without a readable frame."""
     logs = [LogFile(van.logs, f"{n}.log", f"van/{n}.log", 100, "x") for n in range(len(starts))]
-    facts = {log.key: SurveyedLog(f"sha{n}", starts[n], None if starts[n] else "bad") for n, log in enumerate(logs)}
+    facts = {
+        log.key: SurveyedLog(f"sha{n}", f"sha{n}", starts[n], None if starts[n] else "bad")
+        for n, log in enumerate(logs)
+    }
     return list(plan(DATASET, van, logs, facts, settings or BatchSettings()))
 
 

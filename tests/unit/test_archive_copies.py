@@ -1,0 +1,65 @@
+"""A log that was copied counts once, whatever its name, folder and packing; the copies are named."""
+
+import gzip
+import lzma
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from support.archive import MIDNIGHT_NS, Here, tables_of, write_drive, write_manifest
+
+from gateway.archive import place_of
+from gateway.archive.manifest import load_manifest
+from gateway.archive.reprocess import Summary, reprocess
+from gateway.bus.logs.packed import zstd
+from gateway.cli.reprocess import summary_in_words
+
+Write = Callable[[Path, bytes], object]
+
+
+def weighed(folder: Path, output: str) -> Summary:
+    return reprocess(load_manifest(str(folder / "archive.toml")), place_of(folder / output), Here())
+
+
+COPIES: dict[str, tuple[str, Write]] = {
+    "another name": ("van-1/2.log", Path.write_bytes),
+    "another folder of the vehicle": ("van-1/backup/1.log", Path.write_bytes),
+    "gzip": ("van-1/1.log.gz", lambda path, content: path.write_bytes(gzip.compress(content))),
+    "zstd": ("van-1/1.log.zst", lambda path, content: path.write_bytes(zstd.compress(content))),
+    "xz": ("van-1/1.log.xz", lambda path, content: path.write_bytes(lzma.compress(content))),
+}
+
+
+@pytest.mark.parametrize("kind", COPIES)
+def test_a_copy_is_left_out_and_named(kind: str, tmp_path: Path) -> None:
+    name, write = COPIES[kind]
+    write_drive(tmp_path / "van-1" / "1.log", MIDNIGHT_NS, 21.0)
+    write_manifest(tmp_path, "van-1")
+    alone = weighed(tmp_path, "alone")
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    write(tmp_path / name, (tmp_path / "van-1" / "1.log").read_bytes())
+    both = weighed(tmp_path, "both")
+    assert both.is_good
+    assert both.copies == {name: "van-1/1.log"}
+    assert alone.copies == {}
+    assert (both.n_logs, both.to_json()["n_batches"]) == (2, alone.to_json()["n_batches"])
+    assert tables_of(place_of(tmp_path / "both")) == tables_of(place_of(tmp_path / "alone"))
+    assert f"left out, copies of other logs: 1 log:\n  {name}: has the content of van-1/1.log" in summary_in_words(
+        both, "both"
+    )
+    assert weighed(tmp_path, "both").copies == both.copies  # from the facts of the first run
+
+
+def test_what_only_looks_alike_is_no_copy(tmp_path: Path) -> None:
+    """A cut copy, empty files, and one log in the folders of two vehicles."""
+    write_drive(tmp_path / "van-1" / "1.log", MIDNIGHT_NS, 21.0)
+    content = (tmp_path / "van-1" / "1.log").read_bytes()
+    (tmp_path / "van-1" / "cut.log.gz").write_bytes(gzip.compress(content)[:-9])
+    (tmp_path / "van-1" / "empty.log").write_bytes(b"")
+    (tmp_path / "van-1" / "empty too.log").write_bytes(b"")
+    (tmp_path / "van-2").mkdir()
+    (tmp_path / "van-2" / "1.log").write_bytes(content)
+    write_manifest(tmp_path, "van-1", "van-2")
+    summary = weighed(tmp_path, "out")
+    assert summary.copies == {}
+    assert summary.n_failed_logs == 2
