@@ -6,7 +6,8 @@ sensor, another sends, with a bounded queue between them.
 Kernel, Documentation/ABI/testing/sysfs-bus-iio and driver-api/iio/buffers.rst: scan_elements say which channels a scan
 contains, in which order (_index) and how ([be|le]:[s|u]bits/storagebits[>>shift], _type); each is aligned to its own
 size, and so is a whole scan. (raw + _offset) * _scale is in m/s2 and rad/s. A mount matrix turns the chip's axes to the
-board's. gpsd_json(5): TPV has ``mode`` (2 and 3: a fix), ``speed`` in m/s, ``lat`` and ``lon``; SKY has ``uSat``.
+board's. gpsd_json(5): TPV has ``mode`` (2 and 3: a fix), ``speed`` in m/s, ``lat`` and ``lon``; SKY has ``uSat``; both
+have ``device``, the receiver's path.
 """
 
 import contextlib
@@ -18,6 +19,7 @@ import select
 import socket
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -40,6 +42,9 @@ HEAP_S: Final = 0.04  # chosen: length of a burst: a fifth of the work; the coun
 QUEUE: Final = 500  # chosen: bursts: ten seconds of two sensors
 RETRY_S: Final = 2.0  # chosen: pause after a fault of the bus or of gpsd
 CONNECT_S: Final = 3.0  # chosen: gpsd is on this computer or near
+RECEIVER_LOST_S: Final = (
+    60.0  # chosen: without a speed: longer than a tunnel; a receiver that is plugged in anew has another path
+)
 LONGEST_LINE: Final = 1 << 16  # chosen: far longer than a report of gpsd
 HOLE: Final = 2.5  # chosen: periods without a sample after which samples count as lost, not late
 USUAL_OF: Final = 101  # chosen: pauses whose median is the usual one: a second at 100 Hz
@@ -210,10 +215,17 @@ def find_devices(turn: F64, rate_hz: float, sysfs: Path = SYSFS, nodes: Path = N
 
 
 class Gpsd:
-    """One connection to gpsd; opened again by the next read after it broke."""
+    """One connection to gpsd; opened again by the next read after it broke.
 
-    def __init__(self, host: str, port: int) -> None:
+    One receiver counts: ``device``, or the first that gives a speed, and another one only after that has given none for
+    RECEIVER_LOST_S. The reports of fixes from others are left out: ``n_left_out``, by device.
+    """
+
+    def __init__(self, host: str, port: int, device: str | None = None) -> None:
         self.name = f"gpsd {host}:{port}"
+        self.device = device  # the receiver that counts; None: none yet
+        self.n_left_out: Counter[str] = Counter()
+        self._is_chosen, self._last_speed_s = device is not None, 0.0
         self._address = (host, port)
         self._socket: socket.socket | None = None
         self._rest = b""
@@ -252,17 +264,32 @@ class Gpsd:
             report = json.loads(line)
         if not isinstance(report, dict):
             return None
-        if report.get("class") == "SKY" and isinstance(report.get("uSat"), int):
+        device = str(report.get("device", ""))
+        if report.get("class") == "SKY" and isinstance(report.get("uSat"), int) and self.device in (None, device):
             self._n_satellites = min(max(report["uSat"], 0), 64)
         if report.get("class") != "TPV":
             return None
         known = report if report.get("mode") in (2, 3) else {}
         speed_mps = _within(known.get("speed"), 0.0, 200.0)
+        if not self._counts(device, has_speed=speed_mps is not None):
+            return None
         place = _within(known.get("lat"), -90.0, 90.0), _within(known.get("lon"), -180.0, 180.0)
         latitude, longitude = (NO_PLACE_DEG if None in place else float(x or 0.0) for x in place)
         mode = 0.0 if speed_mps is None else float(known["mode"])
         speed = {"Speed": speed_mps or 0.0, "Fix": mode, "Satellites": float(self._n_satellites)}
         return {"GPS_SPEED": speed, "GPS_POSITION": {"Latitude": latitude, "Longitude": longitude}}
+
+    def _counts(self, device: str, *, has_speed: bool) -> bool:
+        """Whether the reports of this receiver count; if not, this one is counted as left out."""
+        now_s = time.monotonic()
+        is_lost = not self._is_chosen and now_s - self._last_speed_s > RECEIVER_LOST_S
+        if has_speed and (self.device is None or is_lost):
+            self.device = device
+        if device == self.device and has_speed:
+            self._last_speed_s = now_s
+        if self.device not in (None, device):
+            self.n_left_out[device] += 1
+        return self.device in (None, device)
 
 
 def _within(told: Any, least: float, most: float) -> float | None:
@@ -276,6 +303,7 @@ class FeedState:
     n_samples: dict[str, int] = field(default_factory=dict)
     n_lost: dict[str, int] = field(default_factory=dict)
     n_fixes: int = 0
+    n_left_out: dict[str, int] = field(default_factory=dict)  # reports of other receivers, by device
     n_sent: int = 0
     n_dropped: int = 0
     last_sample_s: float = 0.0
@@ -393,6 +421,9 @@ class Feeder:
                     columns = {name: {k: np.array([x]) for k, x in row.items()} for name, row in rows.items()}
                     self._hand_on(self._encoded(np.array([time.time_ns()], np.int64), columns))
                     self.state.n_fixes += rows["GPS_SPEED"]["Fix"] > 0.0
+                for other in gps.n_left_out.keys() - self.state.n_left_out.keys():
+                    self._say(f"{gps.name}: {other} is left out: {gps.device} counts; choose one by --gps-device")
+                self.state.n_left_out = dict(gps.n_left_out)
                 self._note(gps.name, None)
             except BusError as fault:
                 self._note(gps.name, str(fault))

@@ -36,6 +36,9 @@ SILENT_S: Final = 10.0  # chosen: without a sample for so long systemd's watchdo
 @click.option("--up", type=click.Choice(list(AXES)), default="z", show_default=True, help="the IMU's axis up")
 @click.option("--rate-hz", type=NumberRange(40.0, 1000.0), default=100.0, show_default=True, help="of the IMU")
 @click.option("--gpsd", "gps", default=GPSD, show_default=True, help="HOST:PORT; empty: no receiver")
+@click.option(
+    "--gps-device", default=None, help="receiver of several at gpsd, such as /dev/ttyUSB0 [default: the first]"
+)
 @click.option("--for-s", type=NumberRange(0.1), default=None, help="so many seconds [default: until Ctrl-C]")
 @click.option("--sysfs", type=options.FILE, default=Path("/sys/bus/iio/devices"), hidden=True)
 @click.option("--nodes", type=options.FILE, default=Path("/dev"), hidden=True)
@@ -48,6 +51,7 @@ def feed(
     up: str,
     rate_hz: float,
     gps: str,
+    gps_device: str | None,
     for_s: float | None,
     sysfs: Path,
     nodes: Path,
@@ -62,7 +66,9 @@ def feed(
     devices = chosen or list(find_devices(turn, rate_hz, sysfs, nodes))
     if not devices and not gps:
         raise ConfigurationError(f"{sysfs}: has no inertial unit with a buffer, and --gpsd is empty: nothing to send")
-    feeder = Feeder(interface, channel, devices, _gpsd(gps), lambda text: click.echo(f"feed: {text}", err=True))
+    feeder = Feeder(
+        interface, channel, devices, _gpsd(gps, gps_device), lambda text: click.echo(f"feed: {text}", err=True)
+    )
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: feeder.stop())
     if for_s is not None:
@@ -75,13 +81,13 @@ def feed(
     return _json(feeder.state), _sentence(feeder.state)
 
 
-def _gpsd(told: str) -> Gpsd | None:
+def _gpsd(told: str, device: str | None) -> Gpsd | None:
     if not told:
         return None
     host, _, port = told.rpartition(":")
     if not host or not port.isdecimal():
         raise ConfigurationError(f"--gpsd {told}: not HOST:PORT, such as {GPSD}")
-    return Gpsd(host.strip("[]"), int(port))
+    return Gpsd(host.strip("[]"), int(port), device)
 
 
 class _Ticker:
@@ -121,8 +127,10 @@ class _Ticker:
 def _sentence(state: FeedState) -> str:
     samples = ", ".join(f"{n} samples of {name}" for name, n in state.n_samples.items()) or "no sample"
     lost = sum(state.n_lost.values())
+    others = "".join(f", {n} reports of {device} left out" for device, n in state.n_left_out.items())
     return (
-        f"{samples}, {state.n_fixes} fixes, {state.n_sent} frames sent, {lost} samples lost, {state.n_dropped} dropped"
+        f"{samples}, {state.n_fixes} fixes{others}, {state.n_sent} frames sent, {lost} samples lost, "
+        f"{state.n_dropped} dropped"
     )
 
 
@@ -132,6 +140,7 @@ def _json(state: FeedState) -> dict[str, object]:
         "samples": state.n_samples,
         "lost": state.n_lost,
         "fixes": state.n_fixes,
+        "left_out": state.n_left_out,
         "sent": state.n_sent,
         "dropped": state.n_dropped,
         "gravity_mps2": gravity,

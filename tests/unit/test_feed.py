@@ -159,6 +159,62 @@ def test_a_real_receivers_reports_become_speed_and_place() -> None:
     assert "works again" in said[1]
 
 
+def report(device: str, speed_mps: float | None, uSat: int = 9) -> bytes:
+    """A second of a receiver behind gpsd; None: no fix."""
+    fix = {"mode": 1} if speed_mps is None else {"mode": 3, "speed": speed_mps}
+    reports = ({"class": "SKY", "device": device, "uSat": uSat}, {"class": "TPV", "device": device, **fix})
+    return b"".join(json.dumps(one).encode() + b"\n" for one in reports)
+
+
+ONE, OTHER = "/dev/ttyUSB0", "/dev/ttyACM0"
+RECEIVERS = {  # --gps-device, seconds as (device, speed), speeds that count, reports left out
+    "the first with a speed": (None, [(OTHER, None), (ONE, 14.0), (OTHER, 0.0)] * 3, [14.0] * 3, {OTHER: 5}),
+    "the chosen one": (OTHER, [(ONE, 14.0), (OTHER, 3.0)] * 3, [3.0] * 3, {ONE: 3}),
+    "one alone": (None, [(ONE, 14.0)] * 3, [14.0] * 3, {}),
+    "one without a name": (None, [("", 14.0)] * 3, [14.0] * 3, {}),
+    "a chosen one that is not there": ("/dev/ttyS9", [(ONE, 14.0)] * 3, [], {ONE: 3}),
+}
+
+
+@pytest.mark.parametrize("case", RECEIVERS)
+def test_one_receiver_of_several_counts(case: str) -> None:
+    device, seconds, speeds_mps, left_out = RECEIVERS[case]
+    gps = Gpsd("127.0.0.1", 1, device)
+    found = [gps.fix_of(line) for second in seconds for line in report(*second).splitlines()]
+    fixes = [one["GPS_SPEED"] for one in found if one is not None and one["GPS_SPEED"]["Fix"]]
+    assert [one["Speed"] for one in fixes] == speeds_mps
+    assert gps.n_left_out == left_out
+
+
+def test_a_receiver_that_is_plugged_in_anew_takes_the_place_of_the_lost_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [100.0]
+    monkeypatch.setattr("gateway.bus.feed.time.monotonic", lambda: clock[0])
+    gps = Gpsd("127.0.0.1", 1)
+    speeds = []
+    for device, speed_mps, pause_s in ((ONE, 14.0, 1.0), (OTHER, 13.0, 58.0), (OTHER, 12.0, 3.0), (ONE, 11.0, 1.0)):
+        clock[0] += pause_s
+        found = [gps.fix_of(line) for line in report(device, speed_mps).splitlines()]
+        speeds += [one["GPS_SPEED"]["Speed"] for one in found if one is not None]
+    assert speeds == [14.0, 12.0]
+    assert gps.n_left_out == {OTHER: 1, ONE: 1}
+
+
+def test_another_receiver_is_named_once_and_counted() -> None:
+    fake = FakeGpsd()
+    with listening("feed-two") as heard, feeding("feed-two", [], Gpsd("127.0.0.1", fake.port)) as (feeder, said):
+        connection = fake.accept()
+        connection.sendall((report(ONE, 14.0, 11) + report(OTHER, 0.0, 3)) * 4)
+        assert wait_until(lambda: feeder.state.n_left_out == {OTHER: 4})
+        assert wait_until(lambda: len(heard) >= 8)
+        connection.close()
+    fake.close()
+    assert decoded(heard).of(Signal.SPEED)[1] == pytest.approx([14.0] * 4, abs=0.001)
+    assert {message.data[2] for message in heard if message.arbitration_id == 0x130} == {11}  # satellites, of the same
+    naming = [text for text in said if OTHER in text]
+    assert len(naming) == 1
+    assert f"{OTHER} is left out: {ONE} counts; choose one by --gps-device" in naming[0]
+
+
 def test_no_gpsd_is_told_once_and_tried_again(tmp_path: Path) -> None:
     fake = FakeIio(tmp_path)
     device = IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
