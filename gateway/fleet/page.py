@@ -32,7 +32,7 @@ def fleet_app(book: Book) -> FastAPI:
 
     @app.get("/", include_in_schema=False)
     async def root() -> Response:
-        return RedirectResponse("/fleet")
+        return RedirectResponse("fleet")  # relative, as the page's own links: a proxy may serve it below a path
 
     app.mount("/assets", StaticFiles(directory=ASSETS), name="assets")
     return app

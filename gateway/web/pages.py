@@ -58,9 +58,11 @@ SWAGGER_FILES: Final = Path(str(files("fastapi_offline"))) / "static"
 def install(app: FastAPI, known_loads_path: str = "") -> None:
     """/, /cab, /docs and the files they load. ``known_loads_path`` is the address of the true loads, if there are
     any.
+
+    Pages name files and routes relative to themselves, so that a proxy may serve them below a path of its own.
     """
     page = Template((ASSETS / "dashboard.html").read_text(encoding="utf-8")).substitute(
-        chart_library=LIBRARY_URL, chart_styles=" ".join(style_ids()), known_loads=known_loads_path
+        chart_library=LIBRARY_URL[1:], chart_styles=" ".join(style_ids()), known_loads=known_loads_path[1:]
     )
     asked_about = {"cache-control": "no-cache"}
 

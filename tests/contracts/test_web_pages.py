@@ -4,16 +4,18 @@ import gzip
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import urljoin
 
 import pytest
-from support.web import Client, Gateway
+from support.web import Client, Gateway, below
 
 from gateway.reasons import EXPLANATIONS, REMEDIES, SOURCES
 from gateway.records import iso_utc
 from gateway.web.pages import LIBRARY, LIBRARY_URL
 from gateway.web.routes.weights import KnownLoadTold
 
-NAMED = re.compile(r"(?:<link[^>]* href=|src=|from )\"(/[^\"]*)\"")
+NAMED = re.compile(r"(?:<link[^>]* href=|src=|chart-library=|from )\"([^\"]*)\"")
+PREFIX = "/fleet/van-17"  # a path of a proxy
 ROW = re.compile(r"^  (\S+): \[\s*\"(.*?)\",\s*\"(.*?)\",?\s*\],$", re.MULTILINE)
 TRUTH = tuple(
     KnownLoadTold(t_start=iso_utc(t_ns), payload_kg=kg, front_share_pct=pct)
@@ -48,7 +50,7 @@ def test_the_page_holds_no_script_and_no_style_of_its_own(client: Client, path: 
     page = client.get(path).text
     assert re.findall(r"<script(?![^>]*\bsrc=)", page) == []
     assert re.findall(r"<style|\sstyle=|\son[a-z]+=", page) == []
-    assert re.findall(r"(?:src|href)=\"(?!/|#)", page) == []
+    assert re.findall(r"(?:src|href)=\"(?:/|[a-z]+:)[^\"]*", page) == []  # relative ones work below the path of a proxy
 
 
 @pytest.mark.parametrize(
@@ -86,22 +88,44 @@ def test_an_id_stands_once_in_a_page(client: Client, path: str) -> None:
     assert sorted(ids) == sorted(set(ids))
 
 
-@pytest.mark.parametrize(("path", "one"), [("/", LIBRARY_URL), ("/docs", "/swagger/swagger-ui.css")])
-def test_every_file_the_page_names_is_there(client: Client, path: str, one: str) -> None:
-    named = re.findall(r"(?:src|href|chart-library)=\"(/[^\"]*)\"", client.get(path).text)
-    assert one in named
-    assert [path for path in named if client.get(path).status_code != 200] == []
+def loaded(client: Client, page: str) -> dict[str, bytes]:
+    """What a browser loads for a page, by path; module by module."""
+    found, waiting = {}, [page]
+    while waiting:
+        path = waiting.pop()
+        answer = client.get(path)
+        assert answer.status_code == 200, path
+        found[path] = answer.content
+        is_ours = path == page or (path.endswith(".js") and "/assets/" in path and "plotly" not in path)
+        names = NAMED.findall(answer.text) if is_ours else []
+        waiting += {urljoin(path, name) for name in names} - found.keys() - set(waiting)
+    return found
+
+
+@pytest.mark.parametrize("prefix", ["", PREFIX])
+@pytest.mark.parametrize(
+    ("path", "one"), [("/", LIBRARY_URL), ("/cab", "/assets/cab/cab.js"), ("/docs", "/swagger/swagger-ui.css")]
+)
+def test_every_file_the_page_names_is_there(client: Client, path: str, one: str, prefix: str) -> None:
+    """Also below a path of a proxy, which cuts it off."""
+    behind = Client(below(prefix, client.app)) if prefix else client
+    assert prefix + one in loaded(behind, prefix + path)
+
+
+def test_scripts_ask_for_routes_relative_to_the_page(client: Client) -> None:
+    """An absolute one would leave the path of a proxy."""
+    paths = {path for page in ("/", "/cab") for path in loaded(client, page) if path.endswith(".js")}
+    paths = {path for path in paths if "plotly" not in path and "/words/" not in path}
+    asked = [text for path in paths for text in re.findall(r"[\"`]/(?:api|assets)/", client.get(path).text)]
+    assert asked == []
+    assert "api/v1/status" in client.get("/assets/dashboard/feed.js").text
 
 
 def test_the_cab_page_is_small_with_all_that_it_loads(client: Client) -> None:
     """A cheap phone on a slow link: 40 kB before compression, less than a tenth of one photograph."""
-    files = {"/cab"}
-    while more := {name for path in files for name in NAMED.findall(client.get(path).text)} - files:
-        files |= more
+    files = loaded(client, "/cab")
     assert {path.rpartition(".")[2] for path in files} == {"/cab", "css", "js", "svg"}
-    answers = [client.get(path) for path in files]
-    assert {answer.status_code for answer in answers} == {200}
-    assert sum(len(answer.content) for answer in answers) < 40_000
+    assert sum(map(len, files.values())) < 40_000
 
 
 def test_the_library_is_that_of_the_installed_package_packed_or_not(client: Client) -> None:
@@ -124,7 +148,7 @@ def test_a_browser_keeps_the_library_and_asks_about_the_page(client: Client) -> 
 def test_true_loads_are_told_where_they_are_known(tmp_path: Path) -> None:
     with Gateway(tmp_path, known_loads=lambda: TRUTH) as gateway:
         client = Client(gateway.app)
-        assert 'data-known-loads="/api/v1/known-loads"' in client.get("/").text
+        assert 'data-known-loads="api/v1/known-loads"' in client.get("/").text
         assert client.get("/api/v1/known-loads").json()["items"] == [
             {"t_start": "1970-01-01T00:00:00.000000Z", "payload_kg": 0.0, "front_share_pct": 50.0},
             {"t_start": "1970-01-01T00:15:00.000000Z", "payload_kg": 270.0, "front_share_pct": 50.6},

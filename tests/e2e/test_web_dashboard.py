@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 from support.browser import expect
-from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Look, Watched
+from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Look, Watched, furnished
 from support.estimates import make_estimate
-from support.web import Gateway, serving
+from support.web import Gateway, below, serving
 
 from gateway.estimate import Z95
 from gateway.records import Why
@@ -398,6 +398,27 @@ NAMELESS = """[...document.querySelectorAll("[role=img], [role=region], section,
     return !named && !e.labels?.length && !e.textContent.trim();
   })
   .map((e) => e.outerHTML.slice(0, 80))"""
+
+
+def test_pages_work_below_a_path_of_a_proxy(tmp_path: Path, watched: Watched) -> None:
+    """One host for several vehicles: the proxy serves each below a path of its own, and cuts that off."""
+    page = watched.page
+    with furnished(tmp_path) as gateway, serving(below("/vans/17", gateway.app)) as server:
+        page.goto(f"{server.url}/vans/17/")
+        expect(page.locator("#payload")).to_have_text("270 kg")
+        page.locator("footer a", has_text="In the cab").click()
+        expect(page).to_have_url(f"{server.url}/vans/17/cab")
+        expect(page.locator("body")).to_contain_text("270 kg")
+        page.goto(f"{server.url}/vans/17/docs")
+        page.get_by_text("/health/live").first.click()
+        page.get_by_role("button", name="Try it out").click()
+        page.get_by_role("button", name="Execute").click()
+        expect(page.locator(".request-url")).to_contain_text(f"{server.url}/vans/17/health/live")
+        expect(page.locator(".live-responses-table tbody .response-col_status").first).to_contain_text("200")
+        gateway.board.close()
+    ours = [address for address in watched.addresses if not address.startswith("data:")]
+    assert all(address.startswith(f"{server.url}/vans/17/") for address in ours), ours
+    assert [text for text in watched.complaints if "plotly" not in text and "ERR_FAILED" not in text] == []
 
 
 def test_the_api_documentation_renders_without_a_network(gateway: Gateway, watched: Watched) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import httpx
 import uvicorn
 from fastapi import FastAPI
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
@@ -80,10 +81,22 @@ class Gateway:
         self.store.close()
 
 
+def below(prefix: str, app: ASGIApp) -> ASGIApp:
+    """The application behind a proxy that serves it below a path, which it cuts off."""
+
+    async def proxy(scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http":
+            assert scope["path"].startswith(f"{prefix}/"), f"{scope['path']} leaves {prefix}/"
+            scope = {key: scope[key] for key in scope.keys() - {"raw_path"}} | {"path": scope["path"][len(prefix) :]}
+        await app(scope, receive, send)
+
+    return proxy
+
+
 class Client:
     """Asks the application itself, without a server in between; an error in it is an answer, not an exception."""
 
-    def __init__(self, app: FastAPI, address: str = "127.0.0.1") -> None:
+    def __init__(self, app: ASGIApp, address: str = "127.0.0.1") -> None:
         self.app = app
         self._client = (address, 12345)
 
@@ -130,7 +143,7 @@ class Server:
 
 
 @contextmanager
-def serving(app: FastAPI, config: uvicorn.Config | None = None, port: int = 0) -> Iterator[Server]:
+def serving(app: ASGIApp, config: uvicorn.Config | None = None, port: int = 0) -> Iterator[Server]:
     """A running server; stopped at the end if the test has not done so."""
     server = Server(config or server_config(app, "127.0.0.1", port), port)
     server.thread.start()

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import uvicorn
-from fastapi import FastAPI
+from starlette.types import ASGIApp
 
 from gateway.errors import ConfigurationError
 from gateway.web.access.guard import is_loopback
@@ -45,7 +45,7 @@ def refuse_open_address(host: str, *, has_tokens: bool, has_tls: bool) -> None:
         )
 
 
-def server_config(app: FastAPI, host: str, port: int, tls: Tls | None = None) -> uvicorn.Config:
+def server_config(app: ASGIApp, host: str, port: int, tls: Tls | None = None) -> uvicorn.Config:
     """uvicorn's settings for a gateway. Raises ConfigurationError for TLS files that cannot be used."""
     return uvicorn.Config(
         app,

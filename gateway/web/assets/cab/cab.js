@@ -1,11 +1,11 @@
 // The cab page: asks one small question every few seconds and shows the answer, its age, and what is unknown.
 
-import { stayAwake } from "/assets/cab/wake-lock.js";
-import { aboard, about, alarm, alarmText, eventText, lightText, notSeen, ownReading, phrase, question, roomText, stood } from "/assets/cab/sentences.js";
-import { Refused, ask, setToken } from "/assets/dashboard/gateway.js";
-import { element, made, pair, say, write } from "/assets/dashboard/page.js";
-import { number } from "/assets/dashboard/words.js";
-import { fill } from "/assets/language.js";
+import { stayAwake } from "./wake-lock.js";
+import { aboard, about, alarm, alarmText, eventText, lightText, notSeen, ownReading, phrase, question, roomText, stood } from "./sentences.js";
+import { Refused, ask, setToken } from "../dashboard/gateway.js";
+import { element, made, pair, say, write } from "../dashboard/page.js";
+import { number } from "../dashboard/words.js";
+import { fill } from "../language.js";
 
 const ASK_EVERY_MS = 5000; // chosen: as long as a glance may wait
 const ANSWER_WITHIN_MS = 4000; // chosen: less than until the next question
@@ -28,7 +28,7 @@ async function askNow() {
   const patience = new AbortController();
   const timer = setTimeout(() => patience.abort(), ANSWER_WITHIN_MS);
   try {
-    cab = await (await ask("/api/v1/cab", {}, patience.signal)).json();
+    cab = await (await ask("api/v1/cab", {}, patience.signal)).json();
     heard = now();
     isRefused = false;
   } catch (error) {

@@ -1,9 +1,9 @@
 // The cab page's sentences, from the answer of /api/v1/cab.
 
-import { SURE, ago, alarmName, between, capital, clock, duration, figure, number, placeName, reasons } from "/assets/dashboard/words.js";
-import { speaker } from "/assets/language.js";
-import { CAB } from "/assets/words/cab.js";
-import { COMMON } from "/assets/words/common.js";
+import { SURE, ago, alarmName, between, capital, clock, duration, figure, number, placeName, reasons } from "../dashboard/words.js";
+import { speaker } from "../language.js";
+import { CAB } from "../words/cab.js";
+import { COMMON } from "../words/common.js";
 
 const STEP_KG = 5; // chosen: finer than that nothing is loaded
 const SILENT_S = 30; // chosen: after that the age of a reading is shown

@@ -1,9 +1,9 @@
 // Alarms: active ones come first on the page, ended ones are below.
 
-import { show } from "/assets/dashboard/known.js";
-import { element, made } from "/assets/dashboard/page.js";
-import { phrase } from "/assets/dashboard/phrases.js";
-import { capital, clock, reasons, span, withStd } from "/assets/dashboard/words.js";
+import { show } from "./known.js";
+import { element, made } from "./page.js";
+import { phrase } from "./phrases.js";
+import { capital, clock, reasons, span, withStd } from "./words.js";
 
 /** Alarms of an answer, newest first, each once. */
 export const alarmsOf = ({ active, items }) => [...new Map([...items, ...active].map((alarm) => [alarm.id, alarm])).values()];

@@ -1,7 +1,7 @@
 // The gateway's doubts about stated facts, in the reader's language, and the answers that were probably meant.
 
-import { phrase } from "/assets/dashboard/phrases.js";
-import { capital, figure, number } from "/assets/dashboard/words.js";
+import { phrase } from "./phrases.js";
+import { capital, figure, number } from "./words.js";
 
 const ADVICE = {
   wheelbase: "measure", mass: "scales", front_share: "scales", sister_mass: "sister", sister_axles: "sister", sister_track: "place",

@@ -1,9 +1,9 @@
 // The answers so far, each with a link back to it.
 
-import { asked } from "/assets/dashboard/commissioning-doubts.js";
-import { button, made, pair } from "/assets/dashboard/page.js";
-import { phrase } from "/assets/dashboard/phrases.js";
-import { UNKNOWN, clock, figure } from "/assets/dashboard/words.js";
+import { asked } from "./commissioning-doubts.js";
+import { button, made, pair } from "./page.js";
+import { phrase } from "./phrases.js";
+import { UNKNOWN, clock, figure } from "./words.js";
 
 function place({ sensor_position_m, sensor_offset_left_m }) {
   const m = figure(sensor_position_m, 2, "m");

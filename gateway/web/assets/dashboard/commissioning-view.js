@@ -1,14 +1,14 @@
 // Calibrating on the vehicle itself: one step at a time, each answered by the gateway before the next is shown. What the
 // gateway has is shown again whenever somebody goes back or returns; what is typed and not yet sent stays in this browser.
 
-import { asked, changed, meantText } from "/assets/dashboard/commissioning-doubts.js";
-import { summary } from "/assets/dashboard/commissioning-summary.js";
-import { unfold } from "/assets/dashboard/fold.js";
-import { COMMISSIONING, change, hasToken } from "/assets/dashboard/gateway.js";
-import { known, learn, show } from "/assets/dashboard/known.js";
-import { button, element, made, numberText, say, typedNumber, write } from "/assets/dashboard/page.js";
-import { phrase } from "/assets/dashboard/phrases.js";
-import { Z95, clock, duration, figure } from "/assets/dashboard/words.js";
+import { asked, changed, meantText } from "./commissioning-doubts.js";
+import { summary } from "./commissioning-summary.js";
+import { unfold } from "./fold.js";
+import { COMMISSIONING, change, hasToken } from "./gateway.js";
+import { known, learn, show } from "./known.js";
+import { button, element, made, numberText, say, typedNumber, write } from "./page.js";
+import { phrase } from "./phrases.js";
+import { Z95, clock, duration, figure } from "./words.js";
 
 const STEPS = ["vehicle", "empty", "drive", "fit"];
 const TONES = { fault: "alarm", warning: "warning", note: "soft" };

@@ -1,9 +1,9 @@
 // The last day: what was loaded and unloaded where, and the trips between; as bars over time, and as a list in words.
 
-import { known, show } from "/assets/dashboard/known.js";
-import { element, made, shape, write } from "/assets/dashboard/page.js";
-import { phrase } from "/assets/dashboard/phrases.js";
-import { SURE, clock, figure, number, span, withStd } from "/assets/dashboard/words.js";
+import { known, show } from "./known.js";
+import { element, made, shape, write } from "./page.js";
+import { phrase } from "./phrases.js";
+import { SURE, clock, figure, number, span, withStd } from "./words.js";
 
 const DAY_MS = 24 * 3600 * 1000;
 const N_SHOWN = 10; // chosen: entries before the fold

@@ -1,7 +1,7 @@
 // A question before something is changed: a form with a note, a token where one is in use, and the gateway's refusal.
 
-import { hasToken } from "/assets/dashboard/gateway.js";
-import { element, say } from "/assets/dashboard/page.js";
+import { hasToken } from "./gateway.js";
+import { element, say } from "./page.js";
 
 /**
  * Sets the dialog `name` up; returns what opens it, and fills it by `fill()`.

@@ -1,6 +1,6 @@
 // Server-sent events over fetch: unlike EventSource it can send a token, and it says why a connection failed.
 
-import { ask } from "/assets/dashboard/gateway.js";
+import { ask } from "./gateway.js";
 
 const FIRST_PAUSE_MS = 1000; // chosen: doubles up to the last
 const LAST_PAUSE_MS = 30000; // chosen: how late a gateway that came back is noticed

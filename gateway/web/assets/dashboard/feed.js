@@ -1,11 +1,11 @@
 // Keeps the page's state in step with the gateway: fetches it at the start and now and then, follows the stream in
 // between.
 
-import { follow } from "/assets/dashboard/event-stream.js";
-import { alarmsOf } from "/assets/dashboard/alarm-view.js";
-import { ALARMS, COMMISSIONING, KNOWN_WEIGHTS, Refused, VERIFICATIONS, load } from "/assets/dashboard/gateway.js";
-import { known, learn } from "/assets/dashboard/known.js";
-import { explained } from "/assets/dashboard/phrases.js";
+import { follow } from "./event-stream.js";
+import { alarmsOf } from "./alarm-view.js";
+import { ALARMS, COMMISSIONING, KNOWN_WEIGHTS, Refused, VERIFICATIONS, load } from "./gateway.js";
+import { known, learn } from "./known.js";
+import { explained } from "./phrases.js";
 
 const ASK_EVERY_MS = 5000; // chosen: as the cab page
 const GATHER_MS = 50; // chosen: shorter than a person notices
@@ -14,9 +14,9 @@ const BATCHES_BY_HOURS = { 3: 300, 24: 300, 168: MOST_BATCHES };
 
 async function askNow() {
   try {
-    const [status, latest] = await Promise.all([load("/api/v1/status"), load("/api/v1/estimates/latest")]);
+    const [status, latest] = await Promise.all([load("api/v1/status"), load("api/v1/estimates/latest")]);
     learn({ status, latest, latestAtMs: performance.now(), isReachable: true, isRefused: false });
-    if (known.weights?.id !== latest.id || latest.id === null) learn({ weights: await load("/api/v1/weights/latest") });
+    if (known.weights?.id !== latest.id || latest.id === null) learn({ weights: await load("api/v1/weights/latest") });
     if (known.verifications && known.verifications.due.n_records !== status.verification.n_records) await askVerifications();
     if (known.commissioning?.underway || known.commissioning?.is_pending) await askCommissioning();
     if (known.knownWeights && known.knownWeights.known_weights_id !== status.known_weights_id) await askKnownWeights(); // somebody else changed them
@@ -26,7 +26,7 @@ async function askNow() {
 }
 
 async function askBatches() {
-  const page = await load(`/api/v1/estimates?order=newest_first&spectra=false&limit=${BATCHES_BY_HOURS[known.hours]}`);
+  const page = await load(`api/v1/estimates?order=newest_first&spectra=false&limit=${BATCHES_BY_HOURS[known.hours]}`);
   learn({ batches: page.items });
   return page.last_cursor;
 }
@@ -34,7 +34,7 @@ async function askBatches() {
 const ENTRIES = "order=newest_first&limit=200";
 
 async function askDay() {
-  const [events, trips] = await Promise.all([load(`/api/v1/events?${ENTRIES}`), load(`/api/v1/trips?${ENTRIES}`)]);
+  const [events, trips] = await Promise.all([load(`api/v1/events?${ENTRIES}`), load(`api/v1/trips?${ENTRIES}`)]);
   learn({ events: events.items, trips: trips.items });
 }
 
@@ -47,7 +47,7 @@ function revised(entries, entry) {
   return [entry, ...(entries ?? []).filter((one) => one.id !== entry.id)];
 }
 
-const askSpectra = async () => learn({ spectra: await load("/api/v1/spectra/latest") });
+const askSpectra = async () => learn({ spectra: await load("api/v1/spectra/latest") });
 
 const askKnownWeights = async () => learn({ knownWeights: await load(KNOWN_WEIGHTS) });
 
@@ -56,7 +56,7 @@ export const askCommissioning = async () => learn({ commissioning: await load(CO
 const askVerifications = async () => learn({ verifications: await load(VERIFICATIONS) });
 
 async function askOnce() {
-  const [vehicle, reasons] = await Promise.all([load("/api/v1/vehicle"), load("/api/v1/reasons")]);
+  const [vehicle, reasons] = await Promise.all([load("api/v1/vehicle"), load("api/v1/reasons")]);
   learn({ vehicle, ...explained(reasons) });
 }
 
@@ -113,7 +113,7 @@ export async function feed() {
   }
   setInterval(askNow, ASK_EVERY_MS);
   let hasBeenLive = false;
-  await follow("/api/v1/stream", cursor, onEvent, (isLive) => {
+  await follow("api/v1/stream", cursor, onEvent, (isLive) => {
     learn({ isLive });
     if (isLive && hasBeenLive) catchUp().catch(giveUpUntilNext);
     hasBeenLive ||= isLive;

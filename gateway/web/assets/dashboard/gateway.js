@@ -1,10 +1,10 @@
 // Requests to the gateway: with the token of this session, if one was entered.
 
-const TOKEN = "springscale-token";
-export const KNOWN_WEIGHTS = "/api/v1/known-weights";
-export const COMMISSIONING = "/api/v1/calibration/commissioning";
-export const VERIFICATIONS = "/api/v1/calibration/verifications";
-export const ALARMS = "/api/v1/alarms?order=newest_first&limit=50";
+const TOKEN = `springscale-token ${new URL(".", document.baseURI).pathname}`; // one proxy may serve several vehicles
+export const KNOWN_WEIGHTS = "api/v1/known-weights";
+export const COMMISSIONING = "api/v1/calibration/commissioning";
+export const VERIFICATIONS = "api/v1/calibration/verifications";
+export const ALARMS = "api/v1/alarms?order=newest_first&limit=50";
 
 export class Refused extends Error {}
 

@@ -1,10 +1,10 @@
 // Bus and sensors, the vehicle and its calibration.
 
-import { show } from "/assets/dashboard/known.js";
-import { element, made, pair, row } from "/assets/dashboard/page.js";
-import { calibratedHere, phrase } from "/assets/dashboard/phrases.js";
-import { isAsleep, isSilent } from "/assets/dashboard/sleep.js";
-import { UNKNOWN, between, capital, clock, duration, figure, number } from "/assets/dashboard/words.js";
+import { show } from "./known.js";
+import { element, made, pair, row } from "./page.js";
+import { calibratedHere, phrase } from "./phrases.js";
+import { isAsleep, isSilent } from "./sleep.js";
+import { UNKNOWN, between, capital, clock, duration, figure, number } from "./words.js";
 
 const NEEDED = new Set(["vertical_acceleration", "pitch_rate", "speed"]);
 

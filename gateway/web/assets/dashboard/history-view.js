@@ -1,10 +1,10 @@
 // History: every batch with its 95 % band over time, as charts and as a table.
 
-import { known, show } from "/assets/dashboard/known.js";
-import { element, made, row, write } from "/assets/dashboard/page.js";
-import { colour, plot } from "/assets/dashboard/plot.js";
-import { phrase } from "/assets/dashboard/phrases.js";
-import { axisDay, between, clock, figure, kmh, reasons, withStd } from "/assets/dashboard/words.js";
+import { known, show } from "./known.js";
+import { element, made, row, write } from "./page.js";
+import { colour, plot } from "./plot.js";
+import { phrase } from "./phrases.js";
+import { axisDay, between, clock, figure, kmh, reasons, withStd } from "./words.js";
 
 const HOUR_MS = 3600e3;
 const QUANTITIES = {

@@ -1,11 +1,11 @@
 // Known weights: those in use, those that wait for a confirmation, and the forms to state one or take it back.
 
-import { dialog } from "/assets/dashboard/dialog.js";
-import { KNOWN_WEIGHTS, change } from "/assets/dashboard/gateway.js";
-import { known, learn, show } from "/assets/dashboard/known.js";
-import { button, element, made, write } from "/assets/dashboard/page.js";
-import { phrase } from "/assets/dashboard/phrases.js";
-import { clock, signed, span as spanOf, withStd } from "/assets/dashboard/words.js";
+import { dialog } from "./dialog.js";
+import { KNOWN_WEIGHTS, change } from "./gateway.js";
+import { known, learn, show } from "./known.js";
+import { button, element, made, write } from "./page.js";
+import { phrase } from "./phrases.js";
+import { clock, signed, span as spanOf, withStd } from "./words.js";
 
 const payload = (one) => withStd(one.payload_kg, one.payload_std_kg, 0, "kg");
 

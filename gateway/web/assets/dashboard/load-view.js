@@ -1,9 +1,9 @@
 // The load now: numbers, intervals, gauges, age.
 
-import { ageNow, known, show } from "/assets/dashboard/known.js";
-import { element, made, say, write } from "/assets/dashboard/page.js";
-import { calibratedHere, phrase } from "/assets/dashboard/phrases.js";
-import { UNKNOWN, Z95, ago, between, capital, clock, figure, kmh, reasons as named, withStd, words } from "/assets/dashboard/words.js";
+import { ageNow, known, show } from "./known.js";
+import { element, made, say, write } from "./page.js";
+import { calibratedHere, phrase } from "./phrases.js";
+import { UNKNOWN, Z95, ago, between, capital, clock, figure, kmh, reasons as named, withStd, words } from "./words.js";
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interval", { between: between(bounds, digits, unit) }));
 

@@ -1,23 +1,23 @@
 // The dashboard: creates the views, then the feed that fills them.
 
-import "/assets/dashboard/phrases.js"; // first: the others find its words in the page
-import "/assets/dashboard/theme-button.js";
-import "/assets/dashboard/fold.js";
-import "/assets/dashboard/state-view.js";
-import "/assets/dashboard/alarm-view.js";
-import "/assets/dashboard/load-view.js";
-import "/assets/dashboard/van-view.js";
-import "/assets/dashboard/health-view.js";
-import "/assets/dashboard/history-view.js";
-import "/assets/dashboard/day-view.js";
-import "/assets/dashboard/spectra-view.js";
-import "/assets/dashboard/known-weights-view.js";
-import "/assets/dashboard/commissioning-view.js";
-import "/assets/dashboard/verification-view.js";
+import "./phrases.js"; // first: the others find its words in the page
+import "./theme-button.js";
+import "./fold.js";
+import "./state-view.js";
+import "./alarm-view.js";
+import "./load-view.js";
+import "./van-view.js";
+import "./health-view.js";
+import "./history-view.js";
+import "./day-view.js";
+import "./spectra-view.js";
+import "./known-weights-view.js";
+import "./commissioning-view.js";
+import "./verification-view.js";
 
-import { feed, lookBack } from "/assets/dashboard/feed.js";
-import { download, setToken } from "/assets/dashboard/gateway.js";
-import { element } from "/assets/dashboard/page.js";
+import { feed, lookBack } from "./feed.js";
+import { download, setToken } from "./gateway.js";
+import { element } from "./page.js";
 
 element("token").addEventListener("submit", (event) => {
   event.preventDefault();

@@ -1,6 +1,6 @@
 // Small pieces of the page.
 
-import { locale } from "/assets/language.js";
+import { locale } from "../language.js";
 
 export const element = (id) => document.getElementById(id);
 

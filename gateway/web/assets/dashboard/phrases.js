@@ -1,11 +1,11 @@
 // The dashboard's words in the reader's language; loading this module translates those in the page itself.
 
-import { acceptNumbers, numberText } from "/assets/dashboard/page.js";
-import { fill, language, speaker } from "/assets/language.js";
-import { COMMISSIONING_WORDS } from "/assets/words/commissioning.js";
-import { COMMON } from "/assets/words/common.js";
-import { DASHBOARD } from "/assets/words/dashboard.js";
-import { REASONS_DE, REMEDIES_DE, SOURCES_DE } from "/assets/words/reasons.js";
+import { acceptNumbers, numberText } from "./page.js";
+import { fill, language, speaker } from "../language.js";
+import { COMMISSIONING_WORDS } from "../words/commissioning.js";
+import { COMMON } from "../words/common.js";
+import { DASHBOARD } from "../words/dashboard.js";
+import { REASONS_DE, REMEDIES_DE, SOURCES_DE } from "../words/reasons.js";
 
 export const phrase = speaker(COMMON, DASHBOARD, COMMISSIONING_WORDS);
 

@@ -1,7 +1,7 @@
 // plotly.js, fetched after the numbers are on the page, and what all charts have in common.
 
-import { learn } from "/assets/dashboard/known.js";
-import { locale } from "/assets/language.js";
+import { learn } from "./known.js";
+import { locale } from "../language.js";
 
 const CONFIG = { displayModeBar: false, responsive: true, showTips: false };
 const isTouch = matchMedia("(pointer: coarse)");

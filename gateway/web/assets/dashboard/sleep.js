@@ -1,6 +1,6 @@
 // Whether silence is normal: a parked vehicle's bus is silent, which is no cause for alarm.
 
-import { phrase } from "/assets/dashboard/phrases.js";
+import { phrase } from "./phrases.js";
 
 const SILENT_AFTER_S = 5; // as gateway/status.py
 

@@ -1,10 +1,10 @@
 // Spectra of the last batch, the fitted model over them, and the bands of the ratio indexes.
 
-import { show } from "/assets/dashboard/known.js";
-import { element, made, row, write } from "/assets/dashboard/page.js";
-import { colour, plot } from "/assets/dashboard/plot.js";
-import { phrase } from "/assets/dashboard/phrases.js";
-import { clock, figure, number, reasons } from "/assets/dashboard/words.js";
+import { show } from "./known.js";
+import { element, made, row, write } from "./page.js";
+import { colour, plot } from "./plot.js";
+import { phrase } from "./phrases.js";
+import { clock, figure, number, reasons } from "./words.js";
 
 const PANELS = [
   { name: "vertical_acceleration_mps2_rthz", title: phrase("spectra_acceleration"), bands: "acceleration_bands" },

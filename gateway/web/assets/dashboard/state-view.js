@@ -1,10 +1,10 @@
 // The state of the service in words, and whether this page hears it.
 
-import { show } from "/assets/dashboard/known.js";
-import { element, write } from "/assets/dashboard/page.js";
-import { phrase } from "/assets/dashboard/phrases.js";
-import { isAsleep, silentSignals } from "/assets/dashboard/sleep.js";
-import { language } from "/assets/language.js";
+import { show } from "./known.js";
+import { element, write } from "./page.js";
+import { phrase } from "./phrases.js";
+import { isAsleep, silentSignals } from "./sleep.js";
+import { language } from "../language.js";
 
 const TONES = {
   starting: "busy", waiting_for_bus: "warn", sensor_fault: "bad", waiting_for_speed: "busy", collecting: "busy",

@@ -1,7 +1,7 @@
 // The button that chooses the theme; theme.js applies it.
 
-import { phrase } from "/assets/dashboard/phrases.js";
-import { element } from "/assets/dashboard/page.js";
+import { phrase } from "./phrases.js";
+import { element } from "./page.js";
 
 const { CHOICES, chosen, choose } = globalThis.springscaleTheme;
 

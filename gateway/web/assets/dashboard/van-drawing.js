@@ -1,9 +1,9 @@
 // The van from above, front to the left: the load on each axle and wheel, and the load's centre of gravity.
 // To scale along by the wheelbase and across by the track width.
 
-import { shape } from "/assets/dashboard/page.js";
-import { phrase } from "/assets/dashboard/phrases.js";
-import { Z95, capital, figure, number, withStd } from "/assets/dashboard/words.js";
+import { shape } from "./page.js";
+import { phrase } from "./phrases.js";
+import { Z95, capital, figure, number, withStd } from "./words.js";
 
 const FRONT_X = 96, REAR_X = 290, MIDDLE_Y = 96, HALF_TRACK = 58; // chosen: units of the drawing
 const LARGEST_RADIUS = 30, LARGEST_REACH = 200; // chosen likewise

@@ -1,10 +1,10 @@
 // The load's position: the van from above, and its weights in words.
 
-import { show } from "/assets/dashboard/known.js";
-import { element, pair, say } from "/assets/dashboard/page.js";
-import { aside, drawVan } from "/assets/dashboard/van-drawing.js";
-import { phrase } from "/assets/dashboard/phrases.js";
-import { UNKNOWN, capital, figure, withStd } from "/assets/dashboard/words.js";
+import { show } from "./known.js";
+import { element, pair, say } from "./page.js";
+import { aside, drawVan } from "./van-drawing.js";
+import { phrase } from "./phrases.js";
+import { UNKNOWN, capital, figure, withStd } from "./words.js";
 
 const WHEELS = ["front_left", "front_right", "rear_left", "rear_right"];
 const LIMITED = ["gross", "front_axle", "rear_axle", ...WHEELS];

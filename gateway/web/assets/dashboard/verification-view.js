@@ -1,11 +1,11 @@
 // Known loads: their last comparison with the estimates, and the form that states one.
 
-import { dialog } from "/assets/dashboard/dialog.js";
-import { KNOWN_WEIGHTS, VERIFICATIONS, change, download } from "/assets/dashboard/gateway.js";
-import { learn, show } from "/assets/dashboard/known.js";
-import { button, element, made, typedNumber, write } from "/assets/dashboard/page.js";
-import { phrase } from "/assets/dashboard/phrases.js";
-import { clock, figure, signed } from "/assets/dashboard/words.js";
+import { dialog } from "./dialog.js";
+import { KNOWN_WEIGHTS, VERIFICATIONS, change, download } from "./gateway.js";
+import { learn, show } from "./known.js";
+import { button, element, made, typedNumber, write } from "./page.js";
+import { phrase } from "./phrases.js";
+import { clock, figure, signed } from "./words.js";
 
 const FIELDS = { gross: ["gross_kg"], axles: ["front_axle_kg", "rear_axle_kg"], payload: ["payload_kg", "position_m"] };
 const OPTIONAL = new Set(["position_m"]);

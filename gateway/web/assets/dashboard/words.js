@@ -1,7 +1,7 @@
 // Numbers, times and names for people, as their language writes them.
 
-import { language, locale, speaker } from "/assets/language.js";
-import { COMMON } from "/assets/words/common.js";
+import { language, locale, speaker } from "../language.js";
+import { COMMON } from "../words/common.js";
 
 const common = speaker(COMMON);
 

@@ -1,10 +1,10 @@
 // The fleet: fetches every few seconds, shows a line per vehicle, alarms first; the search keeps matching lines.
 
-import { element, made, write } from "/assets/dashboard/page.js";
-import { UNKNOWN, ago, alarmName, capital, clock, figure, placeName, withStd } from "/assets/dashboard/words.js";
-import { fill, speaker } from "/assets/language.js";
-import { COMMON } from "/assets/words/common.js";
-import { FLEET } from "/assets/words/fleet.js";
+import { element, made, write } from "../dashboard/page.js";
+import { UNKNOWN, ago, alarmName, capital, clock, figure, placeName, withStd } from "../dashboard/words.js";
+import { fill, speaker } from "../language.js";
+import { COMMON } from "../words/common.js";
+import { FLEET } from "../words/fleet.js";
 
 const ASK_EVERY_MS = 5000; // chosen: as the other pages
 const OLD_AFTER_S = 24 * 3600; // chosen: not weighed today
@@ -87,7 +87,7 @@ function draw() {
 
 async function askNow() {
   try {
-    const response = await fetch("/api/v1/fleet", { cache: "no-store" });
+    const response = await fetch("api/v1/fleet", { cache: "no-store" });
     if (!response.ok) throw new Error(`status ${response.status}`);
     ({ items: vehicles, n_unreadable: nUnreadable } = await response.json());
     draw();
