@@ -4,6 +4,7 @@ import csv
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from datetime import timedelta
 from functools import partial
 from io import StringIO
 from pathlib import Path
@@ -21,12 +22,12 @@ from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import ConfigurationError, NothingWeighedError
 from gateway.estimate import Estimate
-from gateway.estimate_json import COLUMNS, estimate_to_json, table_row
+from gateway.estimate_json import COLUMNS, estimate_to_json, table_row, without_dates
 from gateway.offline.estimates import with_remainders
 from gateway.reasons import EXPLANATIONS
 from gateway.records import Why, json_line
 from gateway.setup import Setup, load_setup, setup_of
-from gateway.units import si_factor
+from gateway.units import NS_PER_S, si_factor
 
 
 @click.command("estimate")
@@ -121,13 +122,13 @@ def _other_vehicle(vehicle: Vehicle) -> str:
 
 def _sentences(found: Found) -> Iterator[str]:
     for log, weighed in found:
-        text = sentence(estimate_to_json(weighed))
+        text = sentence(without_dates(estimate_to_json(weighed)))
         yield text if log is None else f"{log}: {text}"
 
 
 def _json_lines(found: Found) -> Iterator[str]:
     for log, weighed in found:
-        record = estimate_to_json(weighed)
+        record = without_dates(estimate_to_json(weighed))
         yield json_line(record if log is None else {"log": str(log), **record})
 
 
@@ -186,13 +187,20 @@ def with_known_weights(setup: Setup, named: Path | None, state: Path | None) -> 
 
 def sentence(record: Mapping[str, Any]) -> str:
     """One line of the object of ``estimate_to_json``: when, how much, with its interval; or why not."""
-    when = f"{record['t_start'][:19]}Z"
+    when = when_told(record, "t_start")
     if record["rejected"]:
         return f"{when}  no estimate: {', '.join(record['rejected'])}"
     payload = _told(record, "payload", "kg", "7.1f", "5.1f")
     front_share = _told(record, "front_share", "pct", "5.2f", "4.2f")
     speed_kmh = record["mean_speed_mps"] / si_factor("speed", "km/h")
     return f"{when}  {payload}   {front_share}   {_aside(record)}{speed_kmh:5.1f} km/h{_too_much(record)}"
+
+
+def when_told(record: Mapping[str, Any], name: str) -> str:
+    """An instant of ``without_dates``, to the second: 2026-11-21T03:50:00Z, or the time in a log without a date."""
+    if record[name] is not None:
+        return f"{record[name][:19]}Z"
+    return f"no date, {timedelta(seconds=record[f'{name}_ns'] // NS_PER_S)}"
 
 
 def _told(record: Mapping[str, Any], name: str, unit: str, form: str, half_form: str) -> str:

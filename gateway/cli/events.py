@@ -7,9 +7,10 @@ from typing import Any
 import click
 
 from gateway.cli import options
-from gateway.cli.estimate import half_width, prepared, with_known_weights
+from gateway.cli.estimate import half_width, prepared, when_told, with_known_weights
 from gateway.cli.options import FILE, as_json, one_estimator, window
 from gateway.core.events.entry import Entry, EntryKind
+from gateway.estimate_json import without_dates
 from gateway.offline.estimates import entries_of_logs, require_order
 from gateway.records import json_line
 
@@ -39,7 +40,7 @@ def events(
     setup, settings, state = prepared(config_path, signals, calibration, estimator, window_s)
     require_order(logs, setup.signal_map)
     for entry in entries_of_logs(logs, with_known_weights(setup, None, state), settings):
-        click.echo(json_line(entry.record) if as_json else entry_sentence(entry))
+        click.echo(json_line(without_dates(entry.record)) if as_json else entry_sentence(entry))
 
 
 SURE = 0.99  # chosen: below it the probability is printed
@@ -47,7 +48,8 @@ SURE = 0.99  # chosen: below it the probability is printed
 
 def entry_sentence(entry: Entry) -> str:
     """One line a person can read; times are UTC."""
-    return _event(entry.record) if entry.kind is EntryKind.EVENT else _trip(entry.record)
+    told = without_dates(entry.record)
+    return _event(told) if entry.kind is EntryKind.EVENT else _trip(told)
 
 
 def _event(told: Mapping[str, Any]) -> str:
@@ -75,6 +77,8 @@ def _trip(told: Mapping[str, Any]) -> str:
 
 
 def _span(told: Mapping[str, Any]) -> str:
-    """Begin and end in UTC, with the date of the end only if it differs."""
+    """Begin and end in UTC, with the date of the end only if it differs; of a log without a date the times in it."""
+    if told["t_start"] is None:
+        return f"{when_told(told, 't_start')} to {when_told(told, 't_end').removeprefix('no date, ')}"
     (day, begun), (last_day, ended) = ((told[name][:10], told[name][11:16]) for name in ("t_start", "t_end"))
     return f"{day} {begun} to {ended if last_day == day else f'{last_day} {ended}'}"

@@ -24,6 +24,7 @@ from gateway.estimate_json.kinds import (
     posterior_to_json,
     spectra_from_json,
     spectra_to_json,
+    without_dates,
     without_places,
 )
 
@@ -46,5 +47,6 @@ __all__ = [
     "spectra_from_json",
     "spectra_to_json",
     "table_row",
+    "without_dates",
     "without_places",
 ]

@@ -30,6 +30,7 @@ from gateway.estimate_json.kinds import (
     WHOLE,
     FieldKind,
     weights_to_json,
+    without_dates,
 )
 from gateway.quantities import BY_NAME
 
@@ -281,8 +282,11 @@ def csv_cells(told: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def table_row(estimate: Estimate) -> dict[str, Any]:
-    """The columns of a CSV file, all of them, for a table of estimates such as pandas makes; None if unknown."""
-    return {**dict.fromkeys(COLUMNS), **csv_cells(estimate_to_json(estimate))}
+    """The columns of a CSV file, all of them, for a table of estimates such as pandas makes; None if unknown.
+
+    Of a log without a date ``t_start`` and ``t_end`` are unknown; ``t_end_ns`` counts from the zero of its stamps.
+    """
+    return {**dict.fromkeys(COLUMNS), **csv_cells(without_dates(estimate_to_json(estimate)))}
 
 
 def _at(estimate: Estimate, path: str) -> Any:

@@ -27,7 +27,7 @@ from gateway.estimate import (
     Weights,
 )
 from gateway.posterior import NORMAL_TAILS, Posterior, Source
-from gateway.records import F64, Spectra, Why, iso_utc, ns_of
+from gateway.records import F64, FIRST_DATED_NS, Spectra, Why, iso_utc, ns_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +118,23 @@ def _weight_cells(shown: Mapping[str, Mapping[str, Any]]) -> list[Any]:
 def places_over_limit(shown: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """The places over their limit in the JSON object of weights."""
     return [place for place in PLACES if shown[place]["is_over_limit"]]
+
+
+_INSTANTS: Final = ("t_start", "t_end", "since")
+
+
+def without_dates(told: Any) -> Any:
+    """JSON of our own with null for instants before 1986, of a log without a date.
+
+    Beside each stands the time from the zero of the log's stamps: ``t_start_ns``, ``t_end_ns``, ``since_ns``.
+    """
+    if isinstance(told, Sequence) and not isinstance(told, str):
+        return [without_dates(one) for one in told]
+    if not isinstance(told, Mapping):
+        return told
+    undated = [name for name in _INSTANTS if told.get(name) and ns_of(told[name]) < FIRST_DATED_NS]
+    times = {f"{name}_ns": ns_of(told[name]) for name in undated}
+    return times | {name: None if name in undated else without_dates(one) for name, one in told.items()}
 
 
 TEXT: Final = FieldKind(str | None, _as_is, _as_is)

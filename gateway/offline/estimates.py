@@ -17,7 +17,7 @@ from gateway.core.events.ledger import Ledger
 from gateway.core.settings import BatchSettings
 from gateway.errors import ArraysError, LogUnreadableError
 from gateway.estimate import Estimate
-from gateway.records import F64, Motion, Signal
+from gateway.records import F64, FIRST_DATED_NS, Motion, Signal
 from gateway.setup import Setup
 from gateway.units import NS_PER_S
 from gateway.weighing.flow import Flow, Identity
@@ -58,11 +58,14 @@ def with_remainders(
 
 
 def require_order(logs: Sequence[Path], signal_map: SignalMap) -> None:
-    """Raises LogUnreadableError if a log begins before the preceding one.
+    """Raises LogUnreadableError if a log begins before the preceding one, or one of several has no date.
 
     Loads and trips depend on the order of drives; logs out of order would give false changes of load.
     """
     begun = [(log, start_ns) for log in logs if (start_ns := _start_ns(log, signal_map)) is not None]
+    undated = next((log for log, start_ns in begun if start_ns < FIRST_DATED_NS), None)
+    if undated is not None and len(begun) > 1:
+        raise LogUnreadableError(f"{undated}: has no date: nothing tells which log came first; name it alone")
     for (before, before_ns), (log, start_ns) in pairwise(begun):
         if start_ns < before_ns:
             raise LogUnreadableError(f"{log}: begins before {before}: name the logs in order of time")

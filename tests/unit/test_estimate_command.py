@@ -1,5 +1,7 @@
 """What springscale estimate says of each batch, of logs that are not quite sound, and of broken sensors."""
 
+import csv
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib.resources import files
@@ -20,7 +22,7 @@ from gateway.bus.signals import load_signal_map
 from gateway.cli.estimate import sentence
 from gateway.errors import SpringscaleError
 from gateway.estimate import UNKNOWN, Estimate, Quantity, Weight, Weights
-from gateway.estimate_json import estimate_to_json
+from gateway.estimate_json import estimate_to_json, without_dates
 from gateway.records import F64, Signal, Why
 
 DEMO = str(files("gateway") / "demo" / "paper_van.json")
@@ -96,19 +98,24 @@ ANSWER = replace(make_estimate(0), front_share=Quantity(50.5, 0.2, (50.1, 50.9))
 
 
 def line(estimate: Estimate) -> str:
-    return sentence(estimate_to_json(estimate))
+    return sentence(without_dates(estimate_to_json(estimate)))
 
 
 def test_a_line_says_when_how_much_and_how_sure() -> None:
     assert line(ANSWER) == (
-        "1970-01-01T00:00:00Z  payload   100.0 kg ±  12.0 (95 %)   front share 50.50 % ± 0.40 (95 %)    50.4 km/h"
+        "no date, 0:00:00  payload   100.0 kg ±  12.0 (95 %)   front share 50.50 % ± 0.40 (95 %)    50.4 km/h"
     )
+
+
+def test_a_line_says_the_date_where_the_log_has_one() -> None:
+    assert line(make_estimate(5_000_000, Why.GAP)) == "2017-07-14T02:40:00Z  no estimate: gap"
+    assert line(make_estimate(300, Why.GAP)) == "no date, 1 day, 1:00:00  no estimate: gap"
 
 
 def test_what_the_calibration_does_not_hold_is_said_to_be_unknown() -> None:
     """Loads all at one place calibrate the ratio index for payload alone."""
     assert line(replace(ANSWER, front_share=UNKNOWN)) == (
-        "1970-01-01T00:00:00Z  payload   100.0 kg ±  12.0 (95 %)   front share unknown    50.4 km/h"
+        "no date, 0:00:00  payload   100.0 kg ±  12.0 (95 %)   front share unknown    50.4 km/h"
     )
     assert "payload unknown   front share 50.50 % ± 0.40 (95 %)" in line(replace(ANSWER, payload=UNKNOWN))
 
@@ -120,7 +127,7 @@ def test_where_the_load_lies_sideways_is_said_where_something_tells() -> None:
 
 
 def test_a_refusal_says_why() -> None:
-    assert line(make_estimate(0, Why.AMBIGUOUS)) == "1970-01-01T00:00:00Z  no estimate: ambiguous"
+    assert line(make_estimate(0, Why.AMBIGUOUS)) == "no date, 0:00:00  no estimate: ambiguous"
 
 
 def test_too_much_is_said_last() -> None:
@@ -172,6 +179,31 @@ def test_estimate_tells_them_on_standard_error(tmp_path):
     (tmp_path / "a.log.zst").write_bytes(packed[: len(packed) // 2])
     ran = run("estimate", tmp_path / "a.log.zst", "--signals", "springscale:reference")
     assert ran.stderr.startswith(f"{tmp_path / 'a.log.zst'}: the zstd stream is cut off; everything before was read\n")
+
+
+@pytest.mark.parametrize("start_s", [0.0, 1.7e9])
+def test_a_log_without_a_date_gives_relative_times_in_every_form(tmp_path: Path, start_s: float) -> None:
+    """Two batches of 20 s each, and a stop of a minute in a third; none of 1970."""
+    log, t_s = tmp_path / "a.log", np.arange(12_000) / 100.0
+    speed = np.where(t_s < 50.0, 14.0, 0.0)
+    noise = np.random.default_rng(1).standard_normal((3, len(t_s)))
+    write(log, (9.81 + noise[0], 0.05 * noise[1], 0.05 * noise[2], speed), start_s + t_s - 1.7e9)
+    asked = ("estimate", log, *MAP, "--window-s", "20")
+    text, as_json, as_csv = (run(*asked, *form).stdout for form in ((), ("--json",), ("--csv",)))
+    records = [json.loads(one) for one in as_json.splitlines()]
+    rows = list(csv.DictReader(as_csv.splitlines()))
+    assert len(records) == len(rows) == text.count("\n") >= 2
+    assert ("no date, 0:00:20  " in text, "has no date" in run(*asked).stderr) == (not start_s, not start_s)
+    assert "1970" not in text + as_json + as_csv
+    for n, record in enumerate(records):
+        assert (record["t_start"] is None, record["t_end"] is None) == (not start_s, not start_s)
+        assert record["t_start_ns"] == pytest.approx((start_s + 20 * n) * 1e9, abs=2e8)
+        assert int(rows[n]["t_end_ns"]) == record["t_end_ns"]
+        assert (rows[n]["t_start"] == "") == (not start_s)
+    stops = [stop for record in records for stop in record["way"]["stops"]]
+    assert stops
+    for stop in stops:
+        assert (stop["t_start"] is None) == (stop.get("t_start_ns", 0) > 0) == (not start_s)
 
 
 MAP = ("--signals", "springscale:reference")

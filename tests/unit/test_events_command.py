@@ -108,6 +108,17 @@ def test_logs_out_of_order_are_refused(tmp_path: Path, drives: tuple[str, str]) 
     assert f"{first}: begins before {second}: name the logs in order of time" in str(found.exception)
 
 
+def test_logs_without_a_date_have_no_order(tmp_path: Path, drives: tuple[str, str]) -> None:
+    undated = tmp_path / "undated.log"
+    write_candump(white_noise(21.0, 5 * NS_PER_S, seed=1), "can0", undated)
+    (trip,) = told(tmp_path, str(undated))
+    assert (trip["t_start"], trip["t_start_ns"]) == (None, 5 * NS_PER_S)
+    assert said(tmp_path, str(undated)).startswith("no date, 0:00:05 to 0:00:25  drove 0.3 km")
+    for logs in ((undated, drives[0]), (drives[0], undated)):
+        found = called("events", *logs, "--config", tmp_path / "springscale.toml")
+        assert str(found.exception) == f"{undated}: has no date: nothing tells which log came first; name it alone"
+
+
 EVENT: dict[str, Any] = {
     "revision": 1,
     "t_start": "2026-01-01T00:14:59.000000Z",

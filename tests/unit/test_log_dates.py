@@ -77,7 +77,7 @@ def test_a_log_without_a_date_says_so(kind, tmp_path):
     assert len(frames) == 1
     assert not report.is_dated
     assert any(said in remark for remark in report.remarks())
-    assert any("times count from 1970" in remark for remark in report.remarks())
+    assert any("times count from the zero of its stamps" in remark for remark in report.remarks())
 
 
 def test_a_trc_of_version_1_0_has_the_date_of_its_remark(tmp_path):

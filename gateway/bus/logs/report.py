@@ -195,7 +195,7 @@ class LogReport:
         if self.first_ns is None:
             return
         if not self.is_dated:
-            yield f"{self.path}: has no date: times count from 1970-01-01T00:00:00Z in place of the true start"
+            yield f"{self.path}: has no date: times count from the zero of its stamps"
         elif self.has_wall_clock and self.zone is None:
             yield (
                 f"{self.path}: its date states no zone, it is read as UTC; if that is wrong, state time_zone in the "
