@@ -126,7 +126,7 @@ def _row(job: ArchiveJob, one: JobLog, found: Estimate) -> dict[str, Any]:
 def _told(one: JobLog, report: LogReport) -> dict[str, Any]:
     """A receipt's entry for a log."""
     told = {"log": one.log.name, "sha256": one.facts.sha256, "bytes": one.log.size, "frames": report.wanted}
-    return told | {"rejected_lines": report.n_rejected, "ended_early": report.ended_early}
+    return told | {"left_out": report.left_out, "ended_early": report.ended_early}
 
 
 def _keep_failure(job: ArchiveJob, one: JobLog | None, reason: str) -> None:

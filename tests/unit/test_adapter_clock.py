@@ -125,9 +125,9 @@ def test_every_known_counter_is_of_32_bits() -> None:
 
 def test_recorded_stamps_of_an_undated_log_stay_exact(clock: Clock) -> None:
     """A replay on the in-process bus gives the batches of the log itself."""
-    bus = FakeBus(clock, [(NOW_S, ExactStamp(123_456_789))])
+    bus = FakeBus(clock, [(NOW_S, ExactStamp(t_ns)) for t_ns in (0, 0, 123_456_789)])
     burst = PythonCanReceiver(bus, 8).receive(1.0)  # type: ignore[arg-type] # as above
-    assert (burst.frames.t_ns.tolist(), burst.n_clock_sets) == ([123_456_789], 0)
+    assert (burst.frames.t_ns.tolist(), burst.n_clock_sets) == ([0, 0, 123_456_789], 0)
 
 
 def test_the_counts_and_the_log_say_so(clock: Clock, caplog: pytest.LogCaptureFixture) -> None:

@@ -120,13 +120,19 @@ class PythonCanReceiver:
                 is_bus_off |= self._socket is not None and bool(message.arbitration_id & _BUS_OFF)
             elif not message.is_remote_frame:
                 is_bus_off = False
-                if not 0.0 < message.timestamp <= LAST_SECOND:
-                    message.timestamp = ExactStamp(time.time_ns())
-                elif self._socket is None and not isinstance(message.timestamp, ExactStamp):
-                    message.timestamp = self._clock.dated_s(message.timestamp, now_s)
+                self._date(message, now_s)
                 data.append(message)
         n_set, n_wraps = self._clock.n_set - n_set, self._clock.n_wraps - n_wraps
         return Burst(frames_of(data, self._width), n_errors, is_bus_off, n_set, n_wraps)
+
+    def _date(self, message: can.Message, now_s: float) -> None:
+        """Make the stamp a time since 1970, unless it is the kernel's or the recorded one of a replay."""
+        if isinstance(message.timestamp, ExactStamp):
+            return
+        if not 0.0 < message.timestamp <= LAST_SECOND:
+            message.timestamp = ExactStamp(time.time_ns())
+        elif self._socket is None:
+            message.timestamp = self._clock.dated_s(message.timestamp, now_s)
 
     def close(self) -> None:
         self._bus.shutdown()

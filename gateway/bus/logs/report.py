@@ -168,6 +168,18 @@ class LogReport:
     def n_rejected(self) -> int:
         return sum(lines.count for lines in self.rejects.values())
 
+    @property
+    def left_out(self) -> dict[str, int]:
+        """Frames that were not given out, by reason; with ``wanted`` they are all that the log holds."""
+        counts = {
+            "other_identifiers": self.other_identifiers,
+            "other_channel": self.other_channel,
+            "remote_frames": self.remote_frames,
+            "error_frames": self.error_frames,
+            **{str(reason): lines.count for reason, lines in self.rejects.items()},
+        }
+        return {reason: n for reason, n in counts.items() if n}
+
     def to_json(self) -> dict[str, Any]:
         counts = ("lines", "frames", "wanted", "other_channel", "remote_frames", "error_frames", "out_of_order")
         rejects = {str(r): {"count": n.count, "first_lines": n.first_lines} for r, n in self.rejects.items()}

@@ -1,0 +1,378 @@
+"""One short drive as many recorders and copies leave it, through look, estimate, record, reprocess and check-config.
+
+Every frame is used or counted with a reason, and no command names a cause that is not there.
+"""
+
+import gzip
+import os
+import re
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import Result
+from support.archive import MIDNIGHT_NS, Here, S, write_manifest
+from support.bus_drive import white_noise
+from support.calibrated import calibration_file
+from support.commands import called
+from support.configured import service_config
+from support.patience import PATIENCE_S, wait_until
+
+from gateway.archive import place_of, receipts
+from gateway.bus.frames import take
+from gateway.bus.live.source import LiveSource
+from gateway.bus.logs.candump_write import append_candump
+from gateway.bus.logs.open import open_log
+from gateway.bus.signals import load_signal_map
+from gateway.cli import record
+from gateway.records import Frames
+from gateway.units import NS_PER_S
+
+DRIVE = white_noise(21.0, MIDNIGHT_NS, seed=1)
+N = len(DRIVE)
+WINDOW_S = 20.0
+RELATIVE_S = (DRIVE.t_ns - MIDNIGHT_NS) / NS_PER_S
+MAP = "springscale:reference"
+
+CAUSES = {  # what a message may name, and how it does
+    "undated": "has no date",
+    "no zone": "states no zone",
+    "late start": "after the date of its header",
+    "fraction of a second": "stamps are not seconds since 1970",
+    "comma": "decimal comma",
+    "pauses": "pauses between frames",
+    "whole seconds": "whole seconds",
+    "rate": "no bus carries",
+    "negative": "stamp is negative",
+    "UTF-16": "UTF-16",
+    "prefix": "written before the stamp",
+    "table": "table is not python-can's",
+    "names": "names instead of identifiers",
+    "version": "is a .trc of version",
+    "half byte": "half byte",
+    "cut": "is cut off",
+    "channels": "if these are one bus twice",
+    "other channel": "correct channel in the signal map",
+    "map": "map of this vehicle",
+    "copy": "copies of other logs",
+    "database": "has several signals",
+    "vehicle": "not the log of the vehicle",
+    "nothing weighed": "nothing was weighed",
+    "sensor": "antenna",
+    "silence": "silent",
+    "road": "road too smooth",
+    "reader": "cannot be read as",
+}
+
+
+def candump(stamps_s: Sequence[float] | None = None, form: str = "({:.6f})", channel: str = "can0") -> bytes:
+    """The drive as candump's text; with other stamps if they are given."""
+    lines = _text(DRIVE, channel).decode().splitlines()
+    if stamps_s is None:
+        return ("\n".join(lines) + "\n").encode()
+    rests = (line.partition(") ")[2] for line in lines)
+    return "".join(f"{form.format(t)} {rest}\n" for t, rest in zip(stamps_s, rests, strict=True)).encode()
+
+
+def _text(frames: Frames, channel: str) -> bytes:
+    class Kept:
+        content = b""
+
+        def write(self, more: bytes) -> None:
+            self.content += more
+
+    kept = Kept()
+    append_candump(frames, channel, kept)  # type: ignore[arg-type] # as much of a file as is asked
+    return kept.content
+
+
+def asc(date: str, base: str = "absolute", stamps_s: Sequence[float] = RELATIVE_S, name: str = "{:X}") -> bytes:
+    """The drive as Vector's text."""
+    rows = zip(stamps_s, DRIVE.can_id, DRIVE.length, DRIVE.payload, strict=True)
+    lines = (
+        f"{t:11.6f} 1  {name.format(can_id):<15} Rx   d {n} {payload[:n].tobytes().hex(' ')}\n"
+        for t, can_id, n, payload in rows
+    )
+    return (f"{date}base hex  timestamps {base}\ninternal events logged\n" + "".join(lines)).encode()
+
+
+def trc(version: str, header: str = "") -> bytes:
+    """The drive as PEAK's text."""
+    rows = zip(RELATIVE_S, DRIVE.can_id, DRIVE.length, DRIVE.payload, strict=True)
+    lines = (
+        f"{i:6d}) {1000.0 * t:12.1f}  Rx     {can_id:04X}  {n}  {payload[:n].tobytes().hex(' ')}\n"
+        for i, (t, can_id, n, payload) in enumerate(rows, 1)
+    )
+    return (f";$FILEVERSION={version}\n{header}" + "".join(lines)).encode()
+
+
+def damaged() -> bytes:
+    """Every hundredth frame has lost a digit."""
+    lines = candump().decode().splitlines()
+    return "".join((line[:-1] if i % 100 == 50 else line) + "\n" for i, line in enumerate(lines)).encode()
+
+
+def two_channels() -> bytes:
+    lines = candump().decode().splitlines(keepends=True)
+    return "".join(line.replace("can0", f"can{i % 2}") for i, line in enumerate(lines)).encode()
+
+
+PAUSES_S = np.diff(RELATIVE_S, prepend=0.0)
+DATE = "date Sun Nov 01 00:00:00.000 2026\n"
+ZONED = "date 2026-11-01T00:00:00Z\n"
+ABSOLUTE_S = DRIVE.t_ns / NS_PER_S
+DAYS = f";$STARTTIME={(MIDNIGHT_NS / S / 86_400.0) + 25_569.0:.9f}\n"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A log, its file's name, and what is said of it: ``told`` of one that is read, ``refused`` of one that is not.
+
+    ``n_left_out`` frames of all cannot be read. ``not_archived`` is why the archive alone refuses it.
+    """
+
+    name: str
+    content: Callable[[], bytes]
+    told: frozenset[str] = frozenset()
+    refused: frozenset[str] = frozenset()
+    n_left_out: int = 0
+    not_archived: frozenset[str] = frozenset()
+    n_frames: int = N
+
+    @property
+    def archived(self) -> frozenset[str]:
+        return self.refused | self.not_archived
+
+
+def said(*causes: str) -> frozenset[str]:
+    return frozenset(causes)
+
+
+UNDATED = {"told": said("undated"), "not_archived": said("undated")}
+CASES = {
+    "sound": Case("a.log", candump),
+    "sound and packed": Case("a.log.gz", lambda: gzip.compress(candump())),
+    "a byte order mark": Case("a.log", lambda: b"\xef\xbb\xbf" + candump()),
+    "undated: candump -tz": Case("a.log", lambda: candump(RELATIVE_S, "({:010.6f})"), **UNDATED),
+    "undated: .asc": Case("a.asc", lambda: asc(""), **UNDATED),
+    "undated: .trc": Case("a.trc", lambda: trc("1.1"), **UNDATED),
+    "a date of no known language": Case("a.asc", lambda: asc("date xxx foo 1 00:00:00 2026\n"), **UNDATED),
+    "a date with its zone": Case("a.asc", lambda: asc(ZONED)),
+    "a date without a zone": Case("a.asc", lambda: asc(DATE), told=said("no zone")),
+    ".trc with a date": Case("a.trc", lambda: trc("1.1", DAYS), told=said("no zone")),
+    "relative stamps": Case("a.asc", lambda: asc(ZONED, "relative", PAUSES_S)),
+    "seconds of the day": Case("a.asc", lambda: asc(ZONED, stamps_s=54_000.0 + RELATIVE_S), told=said("late start")),
+    "negative stamps": Case(
+        "a.asc", lambda: asc(ZONED, stamps_s=RELATIVE_S - 0.1), told=said("negative"),
+        n_left_out=int(np.count_nonzero(RELATIVE_S < 0.0999)),
+    ),
+    "damaged lines": Case("a.log", damaged, told=said("half byte"), n_left_out=(N + 49) // 100),
+    "cut while packed": Case(
+        "a.log.gz", lambda: gzip.compress(candump())[:-20], told=said("cut"), n_left_out=1, n_frames=0
+    ),
+    "two channels": Case("a.log", two_channels, told=said("channels")),
+    "candump -td": Case("a.log", lambda: candump(PAUSES_S, "({:010.6f})"), refused=said("pauses")),
+    "milliseconds": Case("a.log", lambda: candump(1e3 * ABSOLUTE_S, "({:.3f})"), refused=said("fraction of a second")),
+    "a decimal comma": Case("a.log", lambda: candump().replace(b".", b","), refused=said("comma")),
+    "whole seconds": Case("a.log", lambda: candump(np.floor(ABSOLUTE_S), "({:.1f})"), refused=said("whole seconds")),
+    "a thousand times too fast": Case(
+        "a.log", lambda: candump(MIDNIGHT_NS / S + RELATIVE_S / 1000.0), refused=said("rate")
+    ),
+    "UTF-16": Case("a.log", lambda: candump().decode().encode("utf-16"), refused=said("UTF-16")),
+    "a system's log": Case(
+        "a.log", lambda: candump().replace(b"(", b"Nov 01 00:00:00 box candump: ("), refused=said("prefix")
+    ),
+    "symbolic .asc": Case("a.asc", lambda: asc(ZONED, name="IMU_{:X}"), refused=said("names")),
+    ".trc 3.0": Case("a.trc", lambda: trc("3.0"), refused=said("version")),
+}  # fmt: skip
+
+
+def causes_in(text: str) -> frozenset[str]:
+    return frozenset(cause for cause, form in CAUSES.items() if form in text)
+
+
+def n_left_out_in(text: str) -> int:
+    return sum(map(int, re.findall(r"left out, [a-z ]+: (\d+)", text)))
+
+
+def all_said(result: Result) -> str:
+    """Everything that a person reads of a command."""
+    return f"{result.output}\n{result.exception if result.exit_code else ''}"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An archive of one vehicle, the configuration of its service, and workers in this process."""
+
+    @contextmanager
+    def here(_: int | None) -> Iterator[Here]:
+        yield Here()
+
+    monkeypatch.setattr("gateway.cli.reprocess.local_workers", here)
+    write_manifest(tmp_path, "van-1")
+    service_config(
+        tmp_path, calibration_file().to_json(), signals=MAP, estimator="ratio_index", batch__window_s=WINDOW_S
+    )
+    (tmp_path / "van-1").mkdir()
+    return tmp_path
+
+
+def written(folder: Path, case: Case) -> Path:
+    log = folder / "van-1" / case.name
+    log.write_bytes(case.content())
+    return log
+
+
+@pytest.fixture(params=CASES)
+def case(request: pytest.FixtureRequest) -> Case:
+    return CASES[request.param]
+
+
+def n_in(case: Case, log: Path) -> int:
+    """Frames that the file holds for a reader: those written, or of a cut one those before the cut."""
+    if case.n_frames:
+        return case.n_frames
+    chunks, report = open_log(log, load_signal_map(MAP))
+    return sum(map(len, chunks)) + report.n_rejected
+
+
+def test_look(case: Case, folder: Path) -> None:
+    log = written(folder, case)
+    seen = called("look", log)
+    assert causes_in(all_said(seen)) == case.told | case.refused
+    assert bool(seen.exit_code) == bool(case.refused)
+    if not case.refused:
+        found = re.search(r": (\d+) frames in", seen.output)
+        assert found
+        assert int(found[1]) + n_left_out_in(seen.output) == n_in(case, log)
+        assert n_left_out_in(seen.output) == case.n_left_out
+        assert "This can work." in seen.output
+
+
+def test_estimate(case: Case, folder: Path) -> None:
+    log = written(folder, case)
+    done = called("estimate", log, "--config", folder / "springscale.toml")
+    assert causes_in(all_said(done)) == case.told | case.refused
+    assert bool(done.exit_code) == bool(case.refused)
+    if not case.refused:
+        assert done.stdout.count("payload   200.0 kg") == 1
+        assert done.stdout.startswith("no date, 0:00:0" if "undated" in case.told else "2026-11-01T")
+        assert n_left_out_in(done.output) == case.n_left_out
+        chunks, report = open_log(log, load_signal_map(MAP))
+        assert sum(map(len, chunks)) + sum(report.left_out.values()) == n_in(case, log)
+
+
+def test_reprocess(case: Case, folder: Path) -> None:
+    log = written(folder, case)
+    done = called("reprocess", folder, "--output", folder / "out")
+    assert causes_in(all_said(done)) == case.archived
+    assert bool(done.exit_code) == bool(case.archived)
+    for receipt in receipts(place_of(folder / "out")):
+        (told,) = receipt["logs"]
+        assert told["frames"] + sum(told["left_out"].values()) == n_in(case, log)
+        assert sum(told["left_out"].values()) == case.n_left_out
+        assert (told["ended_early"] is None) == ("cut" not in case.told)
+        assert receipt["n_weighed"] == 1
+
+
+def test_record(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a replay of the log: the recording has every frame that could be read, at its time."""
+    log, recorded = written(folder, case), folder / "recorded.log"
+    monkeypatch.setattr(record, "FLUSH_S", 0.0)
+    monkeypatch.setattr("gateway.bus.live.source.POLL_S", 0.05)
+    monkeypatch.setattr("gateway.bus.live.source.ASLEEP_POLL_S", 0.05)
+    bus = ("--interface", "virtual", "--channel", folder.name)
+    signal_map = load_signal_map(MAP)
+    source = LiveSource("virtual", folder.name, signal_map, silence_s=0.05)
+    monkeypatch.setattr(record, "LiveSource", lambda *_: source)
+    n_used = 0 if case.refused else n_in(case, log) - case.n_left_out
+    sent: list[Result] = []
+
+    def play() -> None:
+        assert wait_until(lambda: source.state == "bus_silent")  # it is open, then
+        sent.append(called("replay", log, *bus, "--speed", "max"))
+        wait_until(lambda: source.counts().frames >= n_used)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    player = threading.Thread(target=play)
+    player.start()
+    done = called("record", recorded, "--signals", MAP, *bus, "--for-s", PATIENCE_S)
+    player.join()
+    if sent[0].exit_code:
+        assert case.refused
+        assert causes_in(all_said(sent[0])) == case.refused
+        assert "no mapped frame came" in all_said(done)
+        return
+    if case.refused:
+        return  # replay judges no stamps: the recording has what was sent until then
+    assert f"{n_used} frames, 0 lost" in done.output
+    chunks, report = open_log(recorded, signal_map)
+    kept_ns = np.concatenate([chunk.t_ns for chunk in chunks])
+    of_log_ns = np.concatenate([chunk.t_ns for chunk in open_log(log, signal_map)[0]])
+    assert np.array_equal(kept_ns, of_log_ns)
+    assert causes_in(" ".join(report.remarks())) <= {"undated"}
+
+
+def test_check_config(case: Case, folder: Path) -> None:
+    """Which log lies beside it is none of its business."""
+    written(folder, case)
+    found = called("check-config", folder / "springscale.toml")
+    assert found.exit_code == 0, found.output
+    assert causes_in(found.output) == said()
+
+
+def test_a_copy(folder: Path) -> None:
+    for name, content in (("1.log", candump()), ("2.log.gz", gzip.compress(candump()))):
+        (folder / "van-1" / name).write_bytes(content)
+    done = called("reprocess", folder, "--output", folder / "out")
+    assert (done.exit_code, causes_in(done.output)) == (0, said("copy"))
+    assert "van-1/2.log.gz: has the content of van-1/1.log" in done.output
+    assert "1 batches, 1 of them weighed" in done.output
+
+
+DBC = """VERSION ""
+NS_ :
+BS_:
+BU_: A
+BO_ 288 IMU_ACCEL: 7 A
+ SG_ AccelZ : 32|16@1- (0.001,0) [-32|32] "m/s^2" A
+ SG_ AccelZ : 0|16@1- (0.001,0) [-32|32] "m/s^2" A
+"""
+
+
+@pytest.mark.parametrize("command", ["check-config", "estimate", "reprocess", "record"])
+def test_twin_names(command: str, folder: Path) -> None:
+    """The map is at fault and named, whatever the log."""
+    log = written(folder, CASES["sound"])
+    (folder / "twin.dbc").write_text(DBC)
+    (folder / "twin.toml").write_text(
+        'dbc = ["twin.dbc"]\n[signals.vertical_acceleration]\nmessage = "IMU_ACCEL"\nsignal = "AccelZ"\n'
+    )
+    for name in ("springscale.toml", "archive.toml"):
+        (folder / name).write_text((folder / name).read_text().replace(MAP, "twin.toml"))
+    options: dict[str, tuple[object, ...]] = {
+        "check-config": (folder / "springscale.toml",),
+        "estimate": (log, "--config", folder / "springscale.toml"),
+        "reprocess": (folder, "--output", folder / "out"),
+        "record": (folder / "r.log", "--signals", folder / "twin.toml", "--interface", "virtual", "--channel", "x"),
+    }
+    done = called(command, *options[command])
+    assert done.exit_code == 1
+    assert causes_in(all_said(done)) == said("database")
+
+
+def test_another_vehicles_map(folder: Path) -> None:
+    """Frames that no map knows are counted as such, and then alone the map is asked about."""
+    log = folder / "van-1" / "a.log"
+    foreign = take(DRIVE, slice(0, 3000))
+    foreign = Frames(foreign.t_ns, foreign.can_id + np.uint32(0x400), foreign.length, foreign.payload)
+    log.write_bytes(_text(foreign, "can0"))
+    done = called("estimate", log, "--config", folder / "springscale.toml")
+    assert causes_in(all_said(done)) == said("map")
+    assert "none of its 3000 frames has an identifier of the signal map" in all_said(done)
+    assert causes_in(all_said(called("look", log))) == said()
