@@ -90,12 +90,12 @@ class _TextLog:
         self._line, self._is_awaited = "", False  # the last one, and whether it should give a message
 
     def accepted(self, line: str) -> str | None:
-        """The line as the reader gets it; None for one that the reader need not see."""
+        """The line, which is not blank, as the reader gets it; None for one that the reader need not see."""
         return line
 
     def holds_frame(self, line: str) -> bool:
         """Whether a line that the reader gets should hold a frame."""
-        return bool(line.strip())
+        return True
 
     def messages(self) -> Iterator[tuple[can.Message, int]]:
         """Each message, and the nanoseconds from 1970 to the zero of its stamp."""
@@ -141,7 +141,7 @@ class _TextLog:
                 self._is_at_end = True
                 raise StopIteration
             self.report.lines += 1
-            accepted = self.accepted(self._line)
+            accepted = self.accepted(self._line) if self._line.strip() else None
             if accepted is not None:
                 self._is_awaited = self.holds_frame(accepted)
                 return accepted
@@ -220,7 +220,7 @@ class _TrcLog(_TextLog):
         return None
 
     def holds_frame(self, line: str) -> bool:
-        return not line.startswith(";") and super().holds_frame(line)
+        return not line.startswith(";")
 
 
 class _CsvLog(_TextLog):
@@ -247,7 +247,7 @@ class _CsvLog(_TextLog):
         return line
 
     def holds_frame(self, line: str) -> bool:
-        return self.report.lines > 1 and super().holds_frame(line)
+        return self.report.lines > 1
 
 
 _TEXTS: Final[dict[str, type[_TextLog]]] = {".asc": _AscLog, ".csv": _CsvLog, ".trc": _TrcLog}

@@ -1,0 +1,182 @@
+"""Any JSON body and any table of frames is answered or refused in words: no exception, no hang, nothing uncounted."""
+
+import base64
+import json
+import logging
+import math
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from support.commissioning import ANSWERS, Bench
+from support.epochs import START_NS, drive_of, stored
+from support.known_weights import SUBJECT, KnownWeightBench
+from support.verification import CALIBRATED, verification_desk
+from support.web import Client, Gateway
+
+from gateway.bus.logs.message_log import _CsvLog
+from gateway.bus.logs.open import open_whole_log
+from gateway.errors import LogUnreadableError
+from gateway.records import iso_utc
+
+MANY = settings(max_examples=500, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
+SLOWEST_S: Final = 5.0  # chosen: a thousand times what an answer takes
+
+NUMBERS = st.one_of(
+    st.integers(), st.floats(), st.sampled_from([0, -1, 10**400, -(10**400), 1e308, 5e-324, math.nan, math.inf, True])
+)
+TEXTS = st.one_of(st.text(max_size=20), st.sampled_from(["", "\0", "\ud800", "x" * 300, "axles", "payload", "empty"]))
+ANY = st.recursive(
+    st.one_of(st.none(), st.booleans(), NUMBERS, TEXTS),
+    lambda inner: st.one_of(st.lists(inner, max_size=4), st.dictionaries(TEXTS, inner, max_size=4)),
+    max_leaves=12,
+)
+
+AXLES = {"by": "axles", "front_axle_kg": 850.0, "rear_axle_kg": 1040.0}
+PAYLOAD = {"by": "payload", "payload_kg": 100.0, "position_m": 1.4, "at": iso_utc(START_NS + 60_000_000_000)}
+SOUND: dict[str, dict[str, Any]] = {  # by route, a body that it takes
+    "/api/v1/known-weights": {"kind": "axle_pads", "weight": AXLES, "note": "scales"},
+    "/api/v1/calibration/tare": {"is_empty": True, "note": ""},
+    "/api/v1/calibration/tickets": {"weight": PAYLOAD, "note": "ticket"},
+    "/api/v1/calibration/verifications": {"loads": [PAYLOAD], "note": "scales"},
+    "/api/v1/calibration/commissioning": {"note": "begin"},
+    "/api/v1/calibration/commissioning/vehicle": ANSWERS,
+    "/api/v1/calibration/commissioning/empty": {"is_empty": True, "again": False},
+}
+
+
+@st.composite
+def changed(draw: st.DrawFn, sound: Any) -> Any:
+    """A sound body with parts replaced, left out or added at any depth."""
+    if isinstance(sound, dict):
+        kept = {key: draw(changed(one)) for key, one in sound.items() if draw(st.integers(0, 9))}
+        return kept | draw(st.one_of(st.just({}), st.dictionaries(TEXTS, ANY, max_size=1)))
+    if isinstance(sound, list):
+        return [draw(changed(one)) for one in sound] * draw(st.sampled_from([1, 1, 0, 12]))
+    return draw(ANY) if draw(st.integers(0, 3)) == 0 else sound
+
+
+def bodies(sound: dict[str, Any]) -> st.SearchStrategy[bytes]:
+    """JSON of the right and of any other form, deep nesting, other encodings, and bytes that are no JSON."""
+    asked = st.one_of(changed(sound), ANY).map(lambda body: json.dumps(body).encode())
+    nested = st.builds(lambda n, end: b'{"note":' * n + b"1" + b"}" * end, st.integers(1, 1200), st.integers(0, 1200))
+    other = st.builds(
+        lambda body, code: json.dumps(body).encode(code), changed(sound), st.sampled_from(["utf-16", "utf-32"])
+    )
+    return st.one_of(asked, asked, asked, nested, other, st.binary(max_size=100), st.just(b'{"note": "\xff"}'))
+
+
+TYPES = st.sampled_from(["application/json"] * 8 + ["text/plain", "", "application/json; charset=utf-16", "a/b; c=\\"])
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
+    """A gateway with every part that takes a body."""
+    folder = tmp_path_factory.mktemp("fuzz")
+    bench = KnownWeightBench(folder, 276.0, subject=SUBJECT)
+    weighed = stored(folder / "weighed", drive_of(3, 112.0, calibration_id=CALIBRATED.id))
+    with Gateway(
+        folder / "web",
+        known_weights=bench.service,
+        commissioning=Bench(folder).desk,
+        verification=verification_desk(folder, weighed),
+    ) as gateway:
+        yield Client(gateway.app)
+    weighed.close()
+    bench.store.close()
+
+
+def routes_with_bodies(client: Client) -> set[str]:
+    paths = client.app.openapi()["paths"]
+    return {path for path, known in paths.items() for one in known.values() if "requestBody" in one}
+
+
+def test_every_route_with_a_body_is_tried(client: Client) -> None:
+    assert routes_with_bodies(client) == set(SOUND)
+
+
+@pytest.mark.parametrize("route", SOUND)
+def test_any_body_is_answered_or_refused_in_words(client: Client, route: str, caplog: pytest.LogCaptureFixture) -> None:
+    codes: set[int] = set()
+
+    @MANY
+    @given(body=bodies(SOUND[route]), kind=TYPES)
+    def ask(body: bytes, kind: str) -> None:
+        begun_s = time.monotonic()
+        answer = client.request("POST", route, content=body, headers={"content-type": kind} if kind else {})
+        assert time.monotonic() - begun_s < SLOWEST_S
+        assert answer.status_code < 500, answer.text
+        told = answer.json()
+        if answer.status_code >= 400:
+            assert told["status"] == answer.status_code
+            assert told["detail"]
+        codes.add(answer.status_code)
+
+    with caplog.at_level(logging.ERROR):
+        ask()
+    assert caplog.records == []
+    assert codes & {200, 201, 409}, "no sound body came through"
+    assert 422 in codes
+
+
+COLUMNS: Final = _CsvLog.COLUMNS
+CELLS = st.one_of(
+    st.sampled_from(
+        ["", "0", "1", "-1", "1700000000.5", "nan", "inf", "1e400", "0x123", "0x1fffffff", "FFFFFFFFFF", "AQID", "AQI",
+         "=", '"', "'", "1,5", "\0", "é", "Rx", "8", "64", "99999999999999999999", " "]
+    ),
+    st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\r\n"), max_size=8),
+)  # fmt: skip
+SOUND_ROW = st.builds(
+    lambda t, i, data: f"{1.7e9 + t},{i:#x},0,0,0,{len(data)},{base64.b64encode(data).decode()}",
+    st.floats(0.0, 1e6),
+    st.integers(0, 0x7FF),
+    st.binary(max_size=8),
+)
+ROWS = st.one_of(
+    SOUND_ROW, SOUND_ROW, st.lists(CELLS, min_size=7, max_size=7).map(",".join), st.lists(CELLS).map(",".join)
+)
+ENDS = st.sampled_from(["\n", "\n", "\r\n"])
+
+
+@MANY
+@given(rows=st.lists(ROWS, max_size=20), end=ENDS, has_end=st.booleans(), mark=st.sampled_from([b"", b"\xef\xbb\xbf"]))
+def test_each_line_of_any_table_is_a_frame_or_counted(
+    tmp_path_factory: pytest.TempPathFactory, rows: list[str], end: str, has_end: bool, mark: bytes
+) -> None:
+    log = tmp_path_factory.getbasetemp() / "fuzzed.csv"
+    log.write_bytes(mark + (end.join([COLUMNS, *rows]) + end * has_end).encode())
+    begun_s = time.monotonic()
+    chunks, report = open_whole_log(log)
+    n_used = sum(map(len, chunks))
+    assert time.monotonic() - begun_s < SLOWEST_S
+    n_lines = sum(bool(row.strip()) for row in rows)
+    assert report.ended_early is None
+    assert n_used + sum(report.left_out.values()) == n_lines
+    assert report.lines <= 1 + len(rows)
+    assert all(isinstance(remark, str) for remark in report.remarks())
+    sound = re.compile(r"[0-9.]+,0x[0-9a-f]{1,3},0,0,0,[0-8],[A-Za-z0-9+/=]*")
+    assert n_used >= sum(sound.fullmatch(row) is not None for row in rows) - report.n_rejected
+
+
+@MANY
+@given(content=st.one_of(st.binary(max_size=400), st.text(max_size=200).map(str.encode), st.just(b"\0" * 70_000)))
+def test_a_file_that_is_no_table_is_refused_in_words(tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
+    log = Path(tmp_path_factory.getbasetemp()) / "other.csv"
+    log.write_bytes(content)
+    begun_s = time.monotonic()
+    with pytest.raises(LogUnreadableError) as refusal:
+        read_whole(log)
+    assert str(refusal.value).startswith(f"{log}: ")
+    assert time.monotonic() - begun_s < SLOWEST_S
+
+
+def read_whole(log: Path) -> None:
+    chunks, report = open_whole_log(log)
+    assert sum(map(len, chunks)) == 0
+    report.require_frames()
