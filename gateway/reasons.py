@@ -36,8 +36,9 @@ class Explanation:
 def _missing(sensor: str) -> Explanation:
     return Explanation(
         Cause.SENSORS,
-        f"the {sensor} sensor was silent, or marked its samples as not available",
-        "check the signal map and the device",
+        f"the {sensor} sensor was silent, marked its samples as not available, or its frames were refused for their "
+        "length or range",
+        "see what the log's remarks or the status say of refused frames; check the signal map and the device",
     )
 
 
@@ -110,7 +111,8 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         Why.SPEED_MISSING: Explanation(
             Cause.SENSORS,
             "there was no valid speed for too much of the window (`speed_hold_s`)",
-            "check the antenna and `valid_when` in the signal map; map `wheel_speed` too",
+            "see what the log's remarks or the status say of refused frames; check the antenna and `valid_when` in the "
+            "signal map; map `wheel_speed` too",
         ),
         Why.SPEED_FROZEN: Explanation(
             Cause.SENSORS,

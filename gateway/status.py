@@ -23,7 +23,7 @@ class State(StrEnum):
 SENTENCES: Final[dict[State, str]] = {
     State.STARTING: "Starting.",
     State.WAITING_FOR_BUS: "The bus is silent: the vehicle is asleep or the channel is not connected.",
-    State.SENSOR_FAULT: "The bus is alive, but a sensor is silent.",
+    State.SENSOR_FAULT: "The bus is alive, but a sensor gives no valid sample.",
     State.WAITING_FOR_SPEED: "Sensors are heard; waiting for the vehicle to drive fast enough.",
     State.COLLECTING: "Driving; collecting the first batch.",
     State.ESTIMATING: "Driving; the estimate is kept up to date.",
@@ -243,7 +243,7 @@ class Status(_Told):
         said = [SENTENCES[self.state]]
         silent = [f"{s.signal.replace('_', ' ')}{self._why_silent(s)}" for s in self.signals if s.is_silent]
         if silent and self.state is State.SENSOR_FAULT:
-            said.append(f"Silent: {', '.join(silent)}.")
+            said.append(f"Missing: {', '.join(silent)}.")
         if self.state is State.SENSOR_FAULT or (self.state is State.WAITING_FOR_BUS and not self.bus.n_frames):
             said.append(LOOK)
         if self.state is State.READER_FAULT and self.bus.last_fault:

@@ -23,7 +23,7 @@ def run_springscale(log: str) -> dict[str, Any]:
     signal_map = load_signal_map("springscale:reference")
 
     def run() -> dict[str, Any]:
-        chunks, report, _ = motion_of_log(Path(log), signal_map)
+        chunks, report = motion_of_log(Path(log), signal_map)
         n_rows = sum(len(motion) for motion in chunks)
         assert n_rows == report.wanted
         return {"frames": report.frames, "samples": n_rows}

@@ -54,7 +54,7 @@ class JobDrives:
             if fetched.sha256 != one.facts.sha256:
                 raise PlaceError(f"{one.log.name}: was changed while the archive was read; run again")
             try:
-                motions, report, _ = motion_of_log(fetched.path, self._job.setup.signal_map)
+                motions, report = motion_of_log(fetched.path, self._job.setup.signal_map)
                 estimates, newest_ns = [], None
                 for motion in motions:
                     if len(motion):
@@ -103,7 +103,7 @@ class JobDrives:
         """Whether the last log before the job is still under way when it begins, by decoding alone."""
         with one.log.place.fetched(one.log.path) as fetched:
             try:
-                motions, _, _ = motion_of_log(fetched.path, self._job.setup.signal_map)
+                motions, _ = motion_of_log(fetched.path, self._job.setup.signal_map)
                 newest_ns = max((int(motion.t_ns.max()) for motion in motions if len(motion)), default=None)
             except Exception:  # noqa: BLE001 - a log that cannot be read leads nowhere; its own job reports it
                 return False

@@ -50,6 +50,7 @@ class JobOutcome:
     n_weighed: int = 0
     n_failed_logs: int = 0
     failures: tuple[str, ...] = ()  # the first few
+    refused: tuple[str, ...] = ()  # likewise: frames of another length than the database says, values out of range
 
 
 def run(job: ArchiveJob) -> JobOutcome:
@@ -61,6 +62,7 @@ def run(job: ArchiveJob) -> JobOutcome:
     begun_s = time.monotonic()
     rows: list[dict[str, Any]] = []
     told: list[dict[str, Any]] = []
+    refused: list[str] = []
     failures = {one: one.facts.fault or "" for one in job.logs if one.facts.first_ns is None}
     drives = JobDrives(job)
     for one, next_ns in followed(readable(job.logs), job.next_ns):
@@ -72,6 +74,7 @@ def run(job: ArchiveJob) -> JobOutcome:
             continue
         rows += [_row(job, one, found) for found in read.estimates]
         told.append(_told(one, read.report))
+        refused += (f"{one.log.name}: {cause.text}" for cause in read.report.causes())
     for one, reason in failures.items():
         _keep_failure(job, one, reason)
     outcome = JobOutcome(
@@ -83,6 +86,7 @@ def run(job: ArchiveJob) -> JobOutcome:
         n_weighed=sum(not row["rejected"] for row in rows),
         n_failed_logs=len(failures),
         failures=tuple(failures.values())[:TOLD_FAILURES],
+        refused=tuple(refused)[:TOLD_FAILURES],
     )
     if told or rows:
         return _written(job, outcome, rows, told, failures)
@@ -126,7 +130,8 @@ def _row(job: ArchiveJob, one: JobLog, found: Estimate) -> dict[str, Any]:
 def _told(one: JobLog, report: LogReport) -> dict[str, Any]:
     """A receipt's entry for a log."""
     told = {"log": one.log.name, "sha256": one.facts.sha256, "bytes": one.log.size, "frames": report.wanted}
-    return told | {"left_out": report.left_out, "ended_early": report.ended_early}
+    remarks = [remark.replace(str(report.path), one.log.name) for remark in report.remarks()]
+    return told | {"left_out": report.left_out, "ended_early": report.ended_early, "remarks": remarks}
 
 
 def _keep_failure(job: ArchiveJob, one: JobLog | None, reason: str) -> None:

@@ -68,11 +68,15 @@ def estimate(
     if not no_known_weights:
         setup = with_known_weights(setup, known_weights, state)
     lines = partial(_csv, has_logs=len(logs) > 1) if as_csv else _json_lines if as_json else _sentences
-    reasons, unlike = Counter[Why | None](), Counter[Why]()
+    reasons, unlike, refused = Counter[Why | None](), Counter[Why](), list[str]()
+
+    def on_read(report: LogReport) -> None:
+        tell(report)
+        refused.extend(f"{report.path}: {cause.text}" for cause in report.causes())
 
     def found() -> Found:
         for log in logs:
-            for weighed in with_remainders([log], setup, settings, on_read=_tell):
+            for weighed in with_remainders([log], setup, settings, on_read=on_read):
                 reasons.update(weighed.rejected or [None])
                 if setup.calibration is not None and _is_at_seen_speed(weighed, setup.calibration):
                     unlike.update(UNLIKE.intersection(weighed.rejected))
@@ -84,19 +88,24 @@ def estimate(
     if setup.calibration is not None and not reasons.pop(None, 0):
         is_unlike = 2 * unlike.total() > reasons.total()
         other = [_other_vehicle(setup.calibration.vehicle)] if is_unlike else []
-        raise NothingWeighedError("\n".join([_in_words(reasons), *other]))
+        raise NothingWeighedError("\n".join([_in_words(reasons, refused), *other]))
 
 
 Found = Iterable[tuple[Path | None, Estimate]]  # the log, if there are several
 
 
-def _in_words(reasons: Counter[Why | None]) -> str:
-    """Why no batch was weighed, the most frequent reason first, and what to do about each."""
+def _in_words(reasons: Counter[Why | None], refused: Sequence[str]) -> str:
+    """Why no batch was weighed, the most frequent reason first, and what to do about each.
+
+    Frames that the decoder refused come first, and are the only advice: the rest may follow from them.
+    """
     lines = ["nothing was weighed" + ("" if reasons else ": there is no batch in these logs")]
+    lines += [f"  mend this first: {text}" for text in refused]
     for why, n in reasons.most_common():
         if why is not None:
             told = EXPLANATIONS[why]
-            lines.append(f"  {why} ({n} batch{'es' * (n > 1)}): {told.happened}. What to do: {told.advice}.")
+            advice = "" if refused else f": {told.happened}. What to do: {told.advice}."
+            lines.append(f"  {why} ({n} batch{'es' * (n > 1)}){advice}")
     return "\n".join(lines)
 
 
@@ -145,8 +154,8 @@ def _csv(found: Found, *, has_logs: bool) -> Iterator[str]:
         yield text.getvalue()
 
 
-def _tell(report: LogReport) -> None:
-    """Unreadable parts of the log, beside the estimates."""
+def tell(report: LogReport) -> None:
+    """Unreadable parts of the log and refused frames, beside the estimates."""
     for remark in report.remarks():
         click.echo(remark, err=True)
 

@@ -46,6 +46,7 @@ def _heard(seen: Look) -> Iterator[str]:
     on = f" on {', '.join(channels)}" if channels else ""
     yield f"{seen.log}: {seen.report.wanted} frames in {max(one.duration_s for one in seen.heard):.0f} s{on}"
     yield from (f"  {remark.removeprefix(f'{seen.log}: ')}" for remark in seen.report.remarks())
+    yield from (f"  {one.text}" for one in seen.refused)
     yield ""
     yield f"{'channel':<8} {'identifier':<10} {'per s':>7}  {'bytes':<7} message"
     known = {id(one.heard): one for one in seen.described}
@@ -94,7 +95,7 @@ def _fit(fit: MapFit) -> str:
         return f"fits{without}; its vertical axis reads {fit.gravity_mps2:+.2f} m/s2"
     told = f"has {', '.join(fit.found)}" + (f", lacks {', '.join(fit.missing)}" if fit.missing else "")
     if math.isfinite(fit.gravity_mps2):
-        told += f"; its vertical axis reads {fit.gravity_mps2:+.2f} m/s2 and not 9.8"
+        told += f"; its vertical axis reads {fit.gravity_mps2:+.2f} m/s2" + ("" if fit.has_gravity else " and not 9.8")
     return told
 
 
@@ -136,6 +137,7 @@ def look_json(seen: Look) -> dict[str, Any]:
             }
             for fit in seen.fits
         ],
+        "refused": [one.text for one in seen.refused],
         "can_work": not seen.lacking,
         "unsure_databases": list(seen.unsure_databases),
         "lacking": list(seen.lacking),

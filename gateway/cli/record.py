@@ -14,7 +14,7 @@ import click
 from gateway.bus.frames import widened
 from gateway.bus.live.source import LiveSource
 from gateway.bus.logs.candump_write import append_candump
-from gateway.bus.signals import load_signal_map
+from gateway.bus.signals import Decoder, load_signal_map
 from gateway.cli import options
 from gateway.cli.options import FILE, NumberRange, Told, prints
 from gateway.cli.progress import StatusLine
@@ -36,12 +36,13 @@ DRAIN_S: Final = 0.2  # chosen: how soon a stop takes effect
 def record(log: Path, signals: str, interface: str, channel: str, for_s: float | None) -> Told:
     """Record the mapped frames of a bus into LOG (candump text, compressed if it ends in .gz)."""
     signal_map = load_signal_map(signals)
-    source = LiveSource(interface, channel, signal_map)
+    source, decoder = LiveSource(interface, channel, signal_map), Decoder(signal_map)
     n_frames, due_s = 0, time.monotonic() + FLUSH_S
     with StatusLine() as status, refusal_told(log, SpringscaleError), _new(log) as file:
         for frames in _received(source, for_s):
             if frames is not None:
                 append_candump(widened(frames, int(frames.length.max())), signal_map.channel or channel, file)
+                decoder.decode(frames)
                 n_frames += len(frames)
                 status.show(f"{n_frames} frames")
             if time.monotonic() >= due_s:
@@ -51,8 +52,9 @@ def record(log: Path, signals: str, interface: str, channel: str, for_s: float |
     n_dropped = counts.dropped_inbox + counts.dropped_kernel
     if not n_frames:
         raise SpringscaleError(f"{log}: no mapped frame came ({source.reason or 'the bus was silent'})")
-    told = {"output": str(log), "n_frames": n_frames, "n_dropped": n_dropped}
-    return told, f"{log}: {n_frames} frames, {n_dropped} lost"
+    remarks = [remark.text for remark in decoder.remarks()]
+    told = {"output": str(log), "n_frames": n_frames, "n_dropped": n_dropped, "remarks": remarks}
+    return told, "\n".join([f"{log}: {n_frames} frames, {n_dropped} lost", *remarks])
 
 
 def _new(log: Path) -> BinaryIO:

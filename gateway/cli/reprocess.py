@@ -76,6 +76,9 @@ def summary_in_words(summary: Summary, output: str) -> str:
     if failures:
         lines.append(f"failed: {counted(counts['failed'], 'job')}, {counted(summary.n_failed_logs, 'log')}:")
         lines += _some(failures)
+    if refused := [text for outcome in summary.outcomes for text in outcome.refused]:
+        lines.append("frames refused, which explains batches that were not weighed:")
+        lines += _some(refused)
     if summary.lost:
         lines.append(f"not done: {len(summary.lost)}; run again to try them:")
         lines += _some([f"{what}: {why}" for what, why in summary.lost.items()])

@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from gateway.bus.logs import LogReport, motion_of_log
-from gateway.bus.signals import MappedMessage, SignalMap, id_name, load_signal_map
+from gateway.bus.signals import Decoder, MappedMessage, SignalMap, id_name, load_signal_map
 from gateway.bus.signals.decode import SignalCounts
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, OnRun, RunTable, chosen_runs, file_sha256
@@ -31,7 +31,7 @@ def read_whole_log(log: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]
 
     Raises LogUnreadableError if nothing can be read.
     """
-    motions, report, _ = motion_of_log(log, signal_map)
+    motions, report = motion_of_log(log, signal_map)
     parts = list(motions)
     report.require_frames()
     return joined(parts).weighing, report
@@ -111,21 +111,17 @@ def _split_run(
         start_s=run.start_s,
         span_ns=(int(motion.t_ns.min()), int(motion.t_ns.max())) if len(motion) else None,
         damage=_damage(report),
-        silent=_silent(log, motion, signal_map),
+        silent=_silent(report.decoder, motion, signal_map) if report.decoder else {},
+        refused={signal: (one.text, one.share) for one in report.causes() for signal in one.signals},
     )
     facts = row_facts(both[0] if stretches[0] else both[1], signal_map.traits)
     return SplitRun(parts[0], parts[1], facts, stretches[0] is not None, log_facts)
 
 
-def _silent(log: Path, motion: Motion, signal_map: SignalMap) -> dict[Signal, str]:
-    """Why mapped inertial signals have hardly a sample. Reads the log once more if there are any."""
+def _silent(decoder: Decoder, motion: Motion, signal_map: SignalMap) -> dict[Signal, str]:
+    """Why mapped inertial signals have hardly a sample."""
     wanted = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE)
     silent = [signal for signal in wanted if signal in motion.signals and len(motion.of(signal)[1]) < 2]
-    if not silent:
-        return {}
-    motions, _, decoder = motion_of_log(log, signal_map)
-    for _ in motions:
-        """The decoder counts what it refuses."""
     return {signal: _why_silent(decoder.counts[signal], signal_map.message_of(signal)) for signal in silent}
 
 

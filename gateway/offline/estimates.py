@@ -49,7 +49,7 @@ def with_remainders(
     """The same with the stretches too short for a batch (``is_remainder``), which have a way."""
     for log in logs:
         flow = setup.flow(settings)
-        motions, report, _ = motion_of_log(log, setup.signal_map)
+        motions, report = motion_of_log(log, setup.signal_map)
         for motion in motions:
             yield from flow.feed(motion)
         report.require_frames()
@@ -81,9 +81,13 @@ def _start_ns(log: Path, signal_map: SignalMap) -> int | None:
 
 
 def entries_of_logs(
-    logs: Sequence[Path | str], setup: Setup, settings: BatchSettings = AS_THE_SERVICE
+    logs: Sequence[Path | str],
+    setup: Setup,
+    settings: BatchSettings = AS_THE_SERVICE,
+    *,
+    on_read: Callable[[LogReport], None] = lambda report: None,
 ) -> Iterator[Entry]:
-    """Every event and trip of the logs, in its last revision.
+    """Every event and trip of the logs, in its last revision; ``on_read`` gets the reader's report of each log.
 
     Raises LogUnreadableError at the first unreadable log, after yielding those of the logs before.
     """
@@ -91,7 +95,7 @@ def entries_of_logs(
     told: dict[str, Entry] = {}
     unreadable: LogUnreadableError | None = None
     try:
-        for estimate in with_remainders(logs, setup, settings):
+        for estimate in with_remainders(logs, setup, settings, on_read=on_read):
             told |= {entry.id: entry for entry in ledger.add(estimate)}
     except LogUnreadableError as fault:
         unreadable = fault

@@ -143,8 +143,9 @@ class Pipeline(ThreadPart):
 
     @property
     def fault(self) -> str | None:
-        """Faults of sensors that do not stop the weighing, for people."""
-        return "; ".join(filter(None, (self.roll_rate_fault, self.noise_fault))) or None
+        """Frames that the decoder refuses, and faults of sensors that do not stop the weighing, for people."""
+        refused = (remark.text for remark in self.decoder.causes())
+        return "; ".join(filter(None, (*refused, self.roll_rate_fault, self.noise_fault))) or None
 
     def _count(self, found: Estimate) -> None:
         if math.isfinite(found.roll_usable_share) and not found.is_remainder:

@@ -191,7 +191,7 @@ def test_a_silent_sensor_is_named() -> None:
     heard = {"speed": 0.2, "vertical_acceleration": 75.0, "pitch_rate": None}
     signals = tuple(SignalHealth(signal=name, last_age_s=age_s) for name, age_s in heard.items())
     told = Status(version="1", state=State.SENSOR_FAULT, uptime_s=90.0, calibration_id="sha256:ab", signals=signals)
-    said = "The bus is alive, but a sensor is silent. Silent: vertical acceleration, pitch rate."
+    said = "The bus is alive, but a sensor gives no valid sample. Missing: vertical acceleration, pitch rate."
     assert told.state_in_words == f"{said} {LOOK}"
 
 

@@ -49,7 +49,7 @@ def test_the_options_of_a_campaign_reach_the_simulator(tmp_path: Path) -> None:
     assert load_campaign(tmp_path / "campaign.toml").vehicle.name == "large_van"
     signal_map = load_signal_map(tmp_path / "signals.toml")
     assert signal_map.j1939
-    motion, report, _ = motion_of_log(next(tmp_path.rglob("can.log.gz")), signal_map)
+    motion, report = motion_of_log(next(tmp_path.rglob("can.log.gz")), signal_map)
     assert sum(len(rows) for rows in motion) == report.wanted < report.frames
 
 

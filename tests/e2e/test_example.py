@@ -70,7 +70,7 @@ def test_a_phones_recording_becomes_a_log_in_the_vehicles_axes(tmp_path: Path) -
     exported(driven, tmp_path / "drive.zip")
     script = [sys.executable, EXAMPLES / "phone.py", tmp_path / "drive.zip", tmp_path / "drive.log"]
     subprocess.run(script, check=True)
-    motions, report, _ = motion_of_log(tmp_path / "drive.log", load_signal_map("springscale:reference"))
+    motions, report = motion_of_log(tmp_path / "drive.log", load_signal_map("springscale:reference"))
     motion = joined(list(motions))
     assert report.frames == 2 * len(driven.imu_t_ns) + len(driven.gps_t_ns)
     for signal, truth in (

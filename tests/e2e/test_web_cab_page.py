@@ -121,7 +121,7 @@ def test_too_heavy_says_what_must_come_out_by_the_same_logic(gateway: Gateway, c
     expect(page.locator("#rooms")).to_contain_text("Front axle10 kg too much")
     active = ("overload.gross", "sensor_fault.silent")
     gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(active=active)})
-    expect(page.locator("#alarms")).to_have_text("Alarm: a sensor is silent.")  # the light says the other
+    expect(page.locator("#alarms")).to_have_text("Alarm: a sensor gives no valid sample.")  # the light says the other
 
 
 def test_alarms_that_stand_are_said_in_words(gateway: Gateway, cab: Look) -> None:

@@ -32,8 +32,8 @@ def reader_that_trips_in(name: str) -> Any:
     """Over one log, a window after its beginning."""
 
     def read(path: Path, signal_map: SignalMap) -> Any:
-        motions, report, decoder = motion_of_log(path, signal_map)
-        return (cut(joined(list(motions))) if path.name == name else motions), report, decoder
+        motions, report = motion_of_log(path, signal_map)
+        return (cut(joined(list(motions))) if path.name == name else motions), report
 
     def cut(motion: Motion) -> Iterator[Motion]:
         yield motion.rows(motion.t_ns < motion.t_ns[0] + 20 * S)

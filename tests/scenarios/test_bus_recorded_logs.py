@@ -76,7 +76,7 @@ def truth_of(path, database, mapped, channel):
 
 def test_every_sample_is_python_cans_and_cantools(drive):
     path, database, mapped, channel, signal_map = drive
-    chunks, report, _ = motion_of_log(path, signal_map)
+    chunks, report = motion_of_log(path, signal_map)
     motions = list(chunks)
     truth = truth_of(path, database, mapped, channel)
     for signal in mapped:

@@ -308,8 +308,8 @@ def test_a_silent_sensor_says_why(alter: Alter, words: str, tmp_path: Path) -> N
     log = tmp_path / "drive.log"
     write_candump(alter(bus_drive(20.0, seed=3)), "can0", log)
     silent = (Signal.PITCH_RATE, Signal.ROLL_RATE)  # both come in one message
-    motion, _ = read_whole_log(log, REFERENCE)
-    why = _silent(log, motion, REFERENCE)
+    motion, report = read_whole_log(log, REFERENCE)
+    why = _silent(report.decoder, motion, REFERENCE)
     assert why == dict.fromkeys(silent, words)
     nothing = KnownRun(1, "drive.log", 0.0, 50.0, ())
     split = SplitRun(nothing, nothing, row_facts(motion, REFERENCE.traits), log=LogFacts(silent=why))
@@ -322,9 +322,9 @@ def test_a_silent_sensor_says_why(alter: Alter, words: str, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("counts", "words"),
     [
-        ({"ok": 0}, "Silent: pitch rate (no frame of its message)."),
-        ({"ok": 0, "invalid": 900}, "Silent: pitch rate (900 frames came, all invalid)."),
-        ({"ok": 900}, "Silent: pitch rate."),
+        ({"ok": 0}, "Missing: pitch rate (no frame of its message)."),
+        ({"ok": 0, "invalid": 900}, "Missing: pitch rate (900 frames came, all invalid)."),
+        ({"ok": 900}, "Missing: pitch rate."),
     ],
 )
 def test_the_service_says_it_too(counts: dict[str, int], words: str) -> None:

@@ -80,11 +80,11 @@ def _open(
     return READERS[suffix](selection), selection.report
 
 
-def motion_of_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Motion], LogReport, Decoder]:
-    """A log decoded: motion in chunks, the reader's report and the decoder with its counts."""
+def motion_of_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Motion], LogReport]:
+    """A log decoded: motion in chunks, and the reader's report with the decoder."""
     chunks, report = open_log(path, signal_map)
-    decoder = Decoder(signal_map)
-    return map(decoder.decode, chunks), report, decoder
+    report.decoder = Decoder(signal_map)
+    return map(report.decoder.decode, chunks), report
 
 
 def _require_no_other_kind(path: Path) -> None:

@@ -13,7 +13,8 @@ import numpy as np
 
 from gateway.bus.frames import gathered
 from gateway.bus.logs.wall_clock import LATE_START_S, ns_since_1970
-from gateway.bus.signals import IdFilter
+from gateway.bus.signals import Decoder, IdFilter
+from gateway.bus.signals.decode import Remark
 from gateway.errors import LogUnreadableError
 from gateway.records import FIRST_DATED_NS, I64, U32, Bool, Frames, iso_utc
 from gateway.units import NS_PER_S
@@ -26,6 +27,8 @@ SHOWN_CHARS: Final = 60  # chosen: of a line that cannot be read
 TELLING_SHARE: Final = 0.01  # chosen: of a log's frames; so many unreadable ones are the cause if none can be used
 AS_CANDUMP: Final = "candump logs are recorded with candump -L"
 JUDGED_FRAMES: Final = 1000  # chosen: least number whose stamps are judged
+JUDGED_SECONDS: Final = 3.0  # chosen: least time in which stamps of whole seconds are
+WHOLE_PER_S: Final = 10.0  # chosen: more frames a second all on whole seconds are no coincidence
 MOST_PER_S: Final = 100_000.0  # chosen: several times what a bus of 1 Mbit/s can carry (ISO 11898-1: 21,000 frames)
 
 
@@ -87,6 +90,8 @@ class LogReport:
     stays 0 for binary formats, whose rejects carry no line numbers. ``ended_early`` says why a damaged file could not
     be read to its end.
 
+    ``decoder`` is that of the frames given out, if they are decoded.
+
     ``start_ns`` is the date of the log's header, if it has one; ``has_wall_clock`` tells that this date states no zone.
     """
 
@@ -106,6 +111,7 @@ class LogReport:
     zone: tzinfo | None = None
     notes: list[str] = field(default_factory=list)
     first_ns: int | None = None
+    decoder: Decoder | None = None
     _last_t_ns: int = 0
     _span_ns: tuple[int, int] = (0, 0)
     _n_whole_seconds: int = 0
@@ -199,9 +205,14 @@ class LogReport:
         if len(self.channels) > 1 and not self.other_channel:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
             yield f"{self.path}: mapped frames are on {seen}; if these are one bus twice, name one in the map"
-        for note in self.notes:
+        refused = () if self.decoder is None else self.decoder.remarks()
+        for note in (*self.notes, *(remark.text for remark in refused)):
             yield f"{self.path}: {note}"
         yield from self._remarks_on_time()
+
+    def causes(self) -> tuple[Remark, ...]:
+        """What the decoder refused so often that it explains why nothing is weighed."""
+        return () if self.decoder is None else self.decoder.causes()
 
     def _remarks_on_time(self) -> Iterator[str]:
         if self.first_ns is None:
@@ -222,16 +233,22 @@ class LogReport:
 
     def _why_no_times(self) -> str | None:
         """Why the stamps of the wanted frames cannot be their times; None if they can."""
-        span_s = (self._span_ns[1] - self._span_ns[0]) / NS_PER_S
         if self.wanted < JUDGED_FRAMES:
             return None
+        if (why := self.why_whole_seconds(0.0)) is not None:
+            return why
+        span_s = (self._span_ns[1] - self._span_ns[0]) / NS_PER_S
         if not self.is_dated and 8 * self.out_of_order > self.wanted:
             return "its stamps are the pauses between frames (candump -td): record with candump -L alone"
-        if self.wanted > 10.0 * span_s and self._n_whole_seconds == self.wanted:
-            return f"its {self.wanted} stamps are whole seconds: a spreadsheet has cut them off?"
         if self.wanted > MOST_PER_S * span_s:
             return f"it has {self.wanted} frames in {span_s:.3g} s by its stamps, which no bus carries"
         return None
+
+    def why_whole_seconds(self, least_s: float = JUDGED_SECONDS) -> str | None:
+        """The same of stamps whose fractions are gone; None too before so many seconds are read."""
+        span_s = (self._span_ns[1] - self._span_ns[0]) / NS_PER_S
+        is_cut = self._n_whole_seconds == self.wanted > WHOLE_PER_S * span_s and span_s >= least_s
+        return f"its {self.wanted} stamps are whole seconds: a spreadsheet has cut them off?" if is_cut else None
 
     @contextmanager
     def until_damage(self, kind: str) -> Iterator[None]:
@@ -321,9 +338,14 @@ class Selection:
         return False
 
     def given_out(self, parts: Iterable[Frames], n: int = CHUNK_FRAMES) -> Iterator[Frames]:
-        """The frames in chunks of at least ``n``, each counted as it is given out."""
+        """The frames in chunks of at least ``n``, each counted as it is given out.
+
+        Raises LogUnreadableError once their stamps turn out to be whole seconds, before they mislead anyone.
+        """
         for frames in gathered(parts, n, self.width):
             self.report.count_wanted(frames.t_ns)
+            if (why := self.report.why_whole_seconds()) is not None:
+                raise LogUnreadableError(f"{self.path}: {why}")
             yield frames
 
     def rows(self, can_id: U32, channel: I64 | None, is_remote: Bool | None = None) -> I64:

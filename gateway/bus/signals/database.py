@@ -38,6 +38,13 @@ class DatabaseSignal:
     multiplexer: str | None
     multiplexer_ids: tuple[int, ...]
 
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Least and greatest physical value: of the database, or of the bits if it gives no range."""
+        if self.minimum is not None and self.maximum is not None and self.minimum < self.maximum:
+            return float(self.minimum), float(self.maximum)
+        return self.field.physical_range
+
 
 @dataclass(frozen=True, slots=True)
 class DatabaseMessage:

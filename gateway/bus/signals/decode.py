@@ -12,10 +12,12 @@ from typing import Final
 import numpy as np
 
 from gateway.bus.signals.bit_field import U64, BitField, Coding
-from gateway.bus.signals.mapping import Condition, IdFilter, MappedMessage, MappedSignal, SignalMap
+from gateway.bus.signals.mapping import Condition, IdFilter, MappedMessage, MappedSignal, SignalMap, id_name
 from gateway.records import ASIDE, F64, I64, U8, Bool, Frames, Motion, Signal
 
 J1939_LAST_VALID_BYTE: Final = 0xFA  # SAE J1939-71: a most significant byte above this is no measurement
+TELLING_SHARE: Final = 0.01  # chosen: of a message's frames; with so many refused, this is why a sensor is missing
+NEEDED: Final = frozenset({Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED, Signal.WHEEL_SPEED})
 RANGE_TOLERANCE_STEPS: Final = 0.01  # chosen: the limits of a DBC are decimals; a raw number on a limit must pass
 
 
@@ -42,6 +44,11 @@ class SampleReader:
         self._high = mapped.maximum + slack if np.isfinite(mapped.maximum) else np.inf
         reach = sorted(end * mapped.to_si for end in mapped.field.physical_range)
         self._can_leave_range = reach[0] < self._low or reach[1] > self._high
+        self._beyond = np.inf, -np.inf  # least and greatest sample out of range
+
+    def told_range(self) -> str:
+        """The samples out of range, and the range."""
+        return told_range(self._beyond, (self._mapped.minimum, self._mapped.maximum), self._mapped.unit)
 
     def read(self, payload: U8) -> tuple[F64, dict[Rejected, int]]:
         """Samples (n,) of payloads (n, width), NaN if rejected, and how many for each reason.
@@ -56,8 +63,12 @@ class SampleReader:
         is_rejected = np.zeros(len(bits), np.bool_)
         for reason, applies in self._verdicts(payload, bits, samples):
             if applies.any():
-                counts[reason] = counts.get(reason, 0) + int(np.count_nonzero(applies & ~is_rejected))
+                is_first = applies & ~is_rejected
+                counts[reason] = counts.get(reason, 0) + int(np.count_nonzero(is_first))
                 is_rejected |= applies
+                if reason is Rejected.OUT_OF_RANGE and is_first.any():
+                    beyond = samples[is_first]
+                    self._beyond = min(self._beyond[0], beyond.min()), max(self._beyond[1], beyond.max())
         if counts:
             samples[is_rejected] = np.nan
         return samples, {reason: n for reason, n in counts.items() if n}
@@ -107,6 +118,42 @@ class SignalCounts:
     rejected: Mapping[Rejected, int]
 
 
+def told_lengths(counts: Mapping[int, int], n_frames: int, length: int) -> str:
+    """ "1,708 of 1,720 frames have 8 bytes, the database says 4; ...", of the counts of every other length."""
+    have = f"{min(counts)}" + (f" to {max(counts)}" if len(counts) > 1 else "")
+    return (
+        f"{told_share(sum(counts.values()), n_frames)} frames have {have} bytes, the database says {length}; if the "
+        "device sends so, correct the length there"
+    )
+
+
+def told_range(read: tuple[float, float], limits: tuple[float, float], unit: str) -> str:
+    """ "31 to 80 m/s, beyond the range 0 to 30 m/s; ..."; an end that is NaN is no limit."""
+    least, most = (f"{end:.4g}" for end in read)
+    low, high = ("any" if np.isnan(end) else f"{end:.4g}" for end in limits)
+    return (
+        f"{least if least == most else f'{least} to {most}'} {unit}".rstrip()
+        + f", beyond the range {low} to {high} {unit}".rstrip()
+        + "; if they are true, correct the range in the database, or set minimum and maximum in the signal map"
+    )
+
+
+def told_share(n: int, n_all: int) -> str:
+    """ "1,708", or "1,708 of 1,720"."""
+    return f"{n:,}" if n == n_all else f"{n:,} of {n_all:,}"
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """Why many frames of a message give no sample although the device sends: a sentence for people, the share of its
+    frames, and the signals that lack them.
+    """
+
+    text: str
+    share: float
+    signals: frozenset[Signal]
+
+
 class Decoder:
     """Turns frames into motion by one signal map. The counts are its only memory: chunking leaves no trace."""
 
@@ -119,6 +166,14 @@ class Decoder:
     @property
     def counts(self) -> dict[Signal, SignalCounts]:
         return {signal: counts for message in self._messages for signal, counts in message.counts()}
+
+    def remarks(self) -> tuple[Remark, ...]:
+        """Frames of another length than the database says, and values out of range."""
+        return tuple(remark for message in self._messages for remark in message.remarks())
+
+    def causes(self) -> tuple[Remark, ...]:
+        """Those that explain why nothing is weighed: a good part of a signal that weighing needs is refused."""
+        return tuple(one for one in self.remarks() if one.share >= TELLING_SHARE and one.signals & NEEDED)
 
     def decode(self, frames: Frames) -> Motion:
         """One row for every frame of a mapped message, in order of arrival; other frames are passed over.
@@ -148,7 +203,10 @@ class _MessageReader:
     def __init__(self, message: MappedMessage, signals: tuple[Signal, ...]) -> None:
         self.id_filter: IdFilter = message.id_filter
         self.is_aside = all(m.signal in ASIDE for m in message.signals)
+        self._name = message.name
+        self._frame_id = message.frame_id
         self._length = message.length
+        self._wrong_lengths: Counter[int] = Counter()
         self._readers = [(m.signal, signals.index(m.signal), SampleReader(m)) for m in message.signals]
         counters = [(m.counter, m.signal) for m in message.signals if m.counter is not None]
         self._counters = {field: [signal for of, signal in counters if of == field] for field, _ in counters}
@@ -159,6 +217,16 @@ class _MessageReader:
         rejected = self._rejected.items()
         return [(signal, SignalCounts(self._n_frames - n.total(), dict(n))) for signal, n in rejected]
 
+    def remarks(self) -> Iterator[Remark]:
+        """Those of this message."""
+        if lengths := dict(self._wrong_lengths):
+            text = f"{self._name} ({id_name(self._frame_id)}): {told_lengths(lengths, self._n_frames, self._length)}"
+            yield Remark(text, sum(lengths.values()) / self._n_frames, frozenset(self._rejected))
+        for signal, _, reader in self._readers:
+            if n := self._rejected[signal][Rejected.OUT_OF_RANGE]:
+                text = f"{signal} ({self._name}): {told_share(n, self._n_frames)} values read {reader.told_range()}"
+                yield Remark(text, n / self._n_frames, frozenset({signal}))
+
     def fill(self, columns: F64, ours: I64, payload: U8, length: U8) -> None:
         """Decode payloads (m, width) and their lengths (m,), all of this message, into the rows ``ours`` (m,) of
         ``columns``.
@@ -167,6 +235,8 @@ class _MessageReader:
         has_length = length == self._length
         n_wrong = len(ours) - int(np.count_nonzero(has_length))
         if n_wrong:
+            of_length = np.bincount(length[~has_length])
+            self._wrong_lengths.update({int(n_bytes): int(of_length[n_bytes]) for n_bytes in of_length.nonzero()[0]})
             payload, ours = payload[has_length], ours[has_length]
             for rejected in self._rejected.values():
                 rejected[Rejected.WRONG_LENGTH] += n_wrong

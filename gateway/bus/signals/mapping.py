@@ -8,12 +8,35 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
+from typing import Final
 from zoneinfo import ZoneInfo
 
 import numpy as np
 
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.records import EXTENDED_ID, U32, Bool, SensorTraits, Signal
+from gateway.units import TO_SI
+
+QUANTITIES: Final[Mapping[Signal, str]] = {
+    Signal.VERTICAL_ACCELERATION: "acceleration",
+    Signal.PITCH_RATE: "angular_rate",
+    Signal.SPEED: "speed",
+    Signal.ROLL_RATE: "angular_rate",
+    Signal.LONGITUDINAL_ACCELERATION: "acceleration",
+    Signal.LATERAL_ACCELERATION: "acceleration",
+    Signal.YAW_RATE: "angular_rate",
+    Signal.WHEEL_SPEED: "speed",
+    Signal.IGNITION: "state",
+    Signal.AMBIENT_TEMPERATURE: "temperature",
+    Signal.AXLE_WEIGHT: "mass",
+    Signal.LATITUDE: "angle",
+    Signal.LONGITUDE: "angle",
+    Signal.ODOMETER: "distance",
+    Signal.DOOR: "state",
+    Signal.AIR_SPRING_PRESSURE: "pressure",
+    Signal.RIDE_HEIGHT: "distance",
+    Signal.TRAILER: "state",
+}
 
 CLASSIC_BYTES = 8  # ISO 11898-1, the longest payload
 CAN_FD_BYTES = 64  # likewise of CAN FD
@@ -75,6 +98,11 @@ class MappedSignal:
     def resolution(self) -> float:
         """The least step, in SI; NaN for a float."""
         return math.nan if self.field.coding is Coding.FLOAT else abs(self.field.scale * self.to_si)
+
+    @property
+    def unit(self) -> str:
+        """The SI unit of its samples; empty for a state."""
+        return next(iter(TO_SI[QUANTITIES[self.signal]]))
 
     @property
     def traits(self) -> SensorTraits:

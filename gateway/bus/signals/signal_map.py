@@ -1,7 +1,6 @@
 """Signal maps: the TOML file that names our signals in a DBC, each entry checked and resolved against its databases."""
 
 import math
-from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Final, Literal
@@ -11,32 +10,20 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.signals.database import DatabaseMessage, DatabaseSignal, closest, load_messages
-from gateway.bus.signals.mapping import Condition, MappedMessage, MappedSignal, SignalMap, exact_filter, j1939_filter
+from gateway.bus.signals.mapping import (
+    QUANTITIES,
+    Condition,
+    MappedMessage,
+    MappedSignal,
+    SignalMap,
+    exact_filter,
+    j1939_filter,
+)
 from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID, Signal
 from gateway.toml_file import Read, load_toml
 from gateway.units import si_factor
 
-QUANTITIES: Final[Mapping[Signal, str]] = {
-    Signal.VERTICAL_ACCELERATION: "acceleration",
-    Signal.PITCH_RATE: "angular_rate",
-    Signal.SPEED: "speed",
-    Signal.ROLL_RATE: "angular_rate",
-    Signal.LONGITUDINAL_ACCELERATION: "acceleration",
-    Signal.LATERAL_ACCELERATION: "acceleration",
-    Signal.YAW_RATE: "angular_rate",
-    Signal.WHEEL_SPEED: "speed",
-    Signal.IGNITION: "state",
-    Signal.AMBIENT_TEMPERATURE: "temperature",
-    Signal.AXLE_WEIGHT: "mass",
-    Signal.LATITUDE: "angle",
-    Signal.LONGITUDE: "angle",
-    Signal.ODOMETER: "distance",
-    Signal.DOOR: "state",
-    Signal.AIR_SPRING_PRESSURE: "pressure",
-    Signal.RIDE_HEIGHT: "distance",
-    Signal.TRAILER: "state",
-}
 LONGEST_BYTES = 64  # of a CAN FD frame
 FEWEST_COUNTER_BITS: Final = 2  # chosen: one bit cannot tell a lost frame from two
 MOST_COUNTER_BITS: Final = 32  # chosen: no frames are lost round a longer one
@@ -160,10 +147,7 @@ def _unit_factor(where: str, signal: Signal, entry: SignalEntry, named: Database
 
 def _valid_range(where: str, entry: SignalEntry, named: DatabaseSignal, to_si: float) -> tuple[float, float]:
     """Least and greatest valid SI: of the entry, else of the database, else of the bits."""
-    low, high = named.field.physical_range
-    if named.minimum is not None and named.maximum is not None and named.minimum < named.maximum:
-        low, high = float(named.minimum), float(named.maximum)
-    ends = sorted((low * to_si, high * to_si))
+    ends = sorted(end * to_si for end in named.limits)
     minimum = ends[0] if entry.minimum is None else entry.minimum
     maximum = ends[1] if entry.maximum is None else entry.maximum
     if minimum >= maximum:

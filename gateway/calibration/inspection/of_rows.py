@@ -17,6 +17,12 @@ INERTIAL: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
 JITTER_SHARE_MAX: Final = 0.25  # chosen: of a sample's interval; half the width of the central 80 %
 BIAS_MAX_RADPS: Final = 3.0 * pi / 180.0  # chosen: largest bias of an uncalibrated automotive gyroscope
 MASKED_SHARE_NOTED: Final = 0.02  # chosen: of the time
+LOST_SHARE: Final = 0.5  # chosen: of a signal's frames; with more refused nothing can be weighed
+MISSING: Final = {
+    Why.SPEED_MISSING: Signal.SPEED,
+    Why.ACCELERATION_MISSING: Signal.VERTICAL_ACCELERATION,
+    Why.PITCH_RATE_MISSING: Signal.PITCH_RATE,
+}
 
 
 def cut_away(seen: Seen) -> Said:
@@ -42,6 +48,14 @@ def unmapped(seen: Seen) -> Said:
         yield f"{text}; axes and loads cannot be checked", Severity.FAULT if len(absent) > 1 else Severity.WARNING
 
 
+def refused(seen: Seen) -> Said:
+    """Frames of another length than the database says, or values out of range: a fault if a needed signal is lost."""
+    texts = dict.fromkeys(text for text, _ in seen.drive.log.refused.values())
+    for text in texts:
+        lost = {s for s, (of, share) in seen.drive.log.refused.items() if of == text and share > LOST_SHARE}
+        yield text, Severity.FAULT if lost & {*INERTIAL, Signal.SPEED} else Severity.WARNING
+
+
 def _sensors(seen: Seen, *, are_heard: bool = True) -> Iterator[tuple[Signal, Stream, Severity]]:
     """Without a roll rate a vehicle is weighed all the same."""
     for signal in (*INERTIAL, Signal.ROLL_RATE):
@@ -53,6 +67,8 @@ def _sensors(seen: Seen, *, are_heard: bool = True) -> Iterator[tuple[Signal, St
 def silent(seen: Seen) -> Said:
     """Sensors without a sample, and why."""
     for signal, stream, severity in _sensors(seen, are_heard=False):
+        if seen.is_refused(signal, 1.0):
+            continue
         why = seen.drive.log.silent.get(signal)
         yield f"{signal} has {stream.n} samples in the whole run" + (f": {why}" if why else ""), severity
 
@@ -84,12 +100,16 @@ def standing(seen: Seen) -> Said:
         yield "the speed is always 0, but the vehicle shakes as it does when driven"
 
 
+def _is_refused(seen: Seen, why: Why, share: float) -> bool:
+    return why in MISSING and seen.is_refused(MISSING[why], share)
+
+
 def speed_lost(why: Why) -> Callable[[Seen], Said]:
     """A fault if that alone leaves no batch, else a warning."""
 
     def look(seen: Seen) -> Said:
         share, is_mapped = seen.share(why), not seen.streams or {Signal.SPEED, Signal.WHEEL_SPEED} & set(seen.streams)
-        if share >= REASON_SHARE_MIN and is_mapped and not seen.is_too_short:
+        if share >= REASON_SHARE_MIN and is_mapped and not seen.is_too_short and not _is_refused(seen, why, share):
             is_ruinous = seen.is_lost and share > 1.0 - seen.settings.usable_share_min
             yield f"{share:.0%} of the drive", Severity.FAULT if is_ruinous else Severity.WARNING
 
@@ -115,7 +135,7 @@ def masked(*whys: Why) -> Callable[[Seen], Said]:
     """Time lost to gaps, or to sensors that stuck or sat at the end of their range."""
 
     def look(seen: Seen) -> Said:
-        shares = {why: seen.share(why) for why in whys}
+        shares = {why: share for why in whys if not _is_refused(seen, why, share := seen.share(why))}
         if sum(shares.values()) > MASKED_SHARE_NOTED and all(stream.n >= 2 for stream in seen.streams.values()):
             yield ", ".join(f"{why} {share:.1%} of the drive" for why, share in shares.items() if share > 0.0)
 

@@ -101,6 +101,10 @@ class Seen:
         masked_s = sum(batch.shares.get(why, 0.0) * batch.duration_s for batch in self.batches for why in whys)
         return masked_s / total_s if total_s else 0.0
 
+    def is_refused(self, signal: Signal, missing_share: float) -> bool:
+        """Whether frames refused for their length or range explain that so much of the signal is missing."""
+        return 2.0 * self.drive.log.refused.get(signal, ("", 0.0))[1] > missing_share
+
     @property
     def needed_s(self) -> float:
         """The shortest batch."""

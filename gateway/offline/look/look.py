@@ -1,6 +1,6 @@
 """Inspects a log: its identifiers, their signals by the databases, the shipped maps that fit, and what is lacking."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -24,6 +24,7 @@ from gateway.bus.signals import (
     shipped_databases,
     shipped_maps,
 )
+from gateway.bus.signals.decode import RANGE_TOLERANCE_STEPS, TELLING_SHARE, told_lengths, told_range, told_share
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE
 from gateway.core.settings import BatchSettings
 from gateway.errors import SignalMapError
@@ -38,7 +39,7 @@ KINDS: Final = (".dbc", ".kcd", ".arxml", ".sym")  # databases by their suffix
 QUANTITIES: Final = ("acceleration", "angular_rate", "speed")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Heard:
     """One identifier of one channel: the number of its frames, their time span, and the first of them."""
 
@@ -53,11 +54,12 @@ class Heard:
         """Frames a second, from the first to the last."""
         return (self.n_frames - 1) / self.duration_s if self.duration_s > 0.0 else 0.0
 
-    @property
-    def lengths(self) -> tuple[int, ...]:
-        """The payload lengths that occur, the most frequent first."""
+    @cached_property
+    def lengths(self) -> dict[int, int]:
+        """How many of the kept frames have which length, the most frequent first."""
         lengths, n_times = np.unique(self.frames.length, return_counts=True)
-        return tuple(int(length) for length in lengths[np.argsort(-n_times, kind="stable")])
+        order = np.argsort(-n_times, kind="stable")
+        return dict(zip(lengths[order].tolist(), n_times[order].tolist(), strict=True))
 
     @property
     def name(self) -> str:
@@ -110,13 +112,16 @@ class Described:
 
 @dataclass(frozen=True)
 class SignalReading:
-    """One signal of one identifier: times (n,) from the log's origin and valid samples (n,) in SI."""
+    """One signal of one identifier: times (n,) from the log's origin, valid samples (n,) and those out of range, in
+    SI.
+    """
 
     described: Described
     signal: DatabaseSignal
     quantity: str
     t_s: F64
     x: F64
+    beyond: F64
 
     @property
     def name(self) -> str:
@@ -149,16 +154,60 @@ def readings_of(found: Described, origin_ns: int) -> Iterator[SignalReading]:
     """The signals with a known unit, from frames of the right length."""
     frames = take(found.heard.frames, found.heard.frames.length == found.message.length)
     for signal in found.message.signals.values():
-        unit = (signal.unit or "").strip().lower()
-        quantity = next((quantity for quantity in QUANTITIES if unit in TO_SI[quantity]), None)
+        quantity = _quantity_of(signal)
         if quantity is None or signal.multiplexer is not None or signal.field.n_bytes > found.message.length:
             continue
         bits = signal.field.bits(frames.payload)
-        x = signal.field.physical(bits) * TO_SI[quantity][unit]
+        x = signal.field.physical(bits)
         is_valid = np.isfinite(x)
         if found.by_group and signal.field.coding is Coding.UNSIGNED:
             is_valid &= ~is_j1939_code(signal.field, bits)
-        yield SignalReading(found, signal, quantity, (frames.t_ns[is_valid] - origin_ns) / NS_PER_S, x[is_valid])
+        (low, high), slack = signal.limits, RANGE_TOLERANCE_STEPS * abs(signal.field.scale)
+        is_beyond = is_valid & ((x < low - slack) | (x > high + slack))
+        is_valid &= ~is_beyond
+        x = x * TO_SI[quantity][_unit_of(signal)]
+        t_s = (frames.t_ns[is_valid] - origin_ns) / NS_PER_S
+        yield SignalReading(found, signal, quantity, t_s, x[is_valid], x[is_beyond])
+
+
+def _unit_of(signal: DatabaseSignal) -> str:
+    return (signal.unit or "").strip().lower()
+
+
+def _quantity_of(signal: DatabaseSignal) -> str | None:
+    return next((quantity for quantity in QUANTITIES if _unit_of(signal) in TO_SI[quantity]), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """Frames of another length than the database says, or values out of its range: a sentence, their share, and the
+    quantities that lack them.
+    """
+
+    text: str
+    share: float
+    quantities: frozenset[str]
+
+
+def refused_in(
+    messages: Sequence[Described], readings: Sequence[SignalReading], sources: Collection[Path]
+) -> Iterator[Refused]:
+    """What a map by these databases would refuse of the messages with a known unit."""
+    for one in messages:
+        quantities = frozenset(filter(None, map(_quantity_of, one.message.signals.values())))
+        counts, n_all = dict(one.heard.lengths), len(one.heard.frames)
+        n_right = counts.pop(one.message.length, 0)
+        if counts and quantities and one.message.source in sources:
+            text = f"{one.message.name} ({one.heard.name}): {told_lengths(counts, n_all, one.message.length)}"
+            yield Refused(text, 1.0 - n_right / n_all, quantities)
+    for each in readings:
+        if (n := len(each.beyond)) and each.described.message.source in sources:
+            n_all, to_si = len(each.described.heard.frames), TO_SI[each.quantity]
+            factor, unit = to_si[_unit_of(each.signal)], next(iter(to_si))
+            low, high = (end * factor for end in each.signal.limits)
+            read = float(each.beyond.min()), float(each.beyond.max())
+            text = f"{each.name}: {told_share(n, n_all)} values read {told_range(read, (low, high), unit)}"
+            yield Refused(text, n / n_all, frozenset({each.quantity}))
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,10 +221,14 @@ class MapFit:
     gravity_mps2: float
 
     @property
+    def has_gravity(self) -> bool:
+        """Whether gravity is on the mapped axis."""
+        return abs(self.gravity_mps2 - STANDARD_GRAVITY_MPS2) < GRAVITY_TOLERANCE_MPS2
+
+    @property
     def is_whole(self) -> bool:
         """Whether both inertial signals come, and gravity is on the mapped axis."""
-        has_gravity = abs(self.gravity_mps2 - STANDARD_GRAVITY_MPS2) < GRAVITY_TOLERANCE_MPS2
-        return has_gravity and {Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE} <= set(self.found)
+        return self.has_gravity and {Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE} <= set(self.found)
 
 
 def fits_of(heard: Sequence[Heard]) -> tuple[MapFit, ...]:
@@ -183,10 +236,9 @@ def fits_of(heard: Sequence[Heard]) -> tuple[MapFit, ...]:
     fits = []
     for name in shipped_maps():
         signal_map = load_signal_map(f"springscale:{name}")
-        wanted = [(message.id_filter, message.length) for message in signal_map.messages]
         for channel in sorted({one.channel for one in heard}, key=str):
             on_it = [one for one in heard if one.channel == channel]
-            ours = [one for one in on_it if any(ids.is_for(one.can_id) and n in one.lengths for ids, n in wanted)]
+            ours = [one for one in on_it if any(ids.is_for(one.can_id) for ids in signal_map.filters)]
             motion = Decoder(signal_map).decode(merge_frames([one.frames for one in ours]))
             found = tuple(signal for signal in motion.signals if len(motion.of(signal)[1]))
             missing = tuple(signal for signal in motion.signals if signal not in found and signal not in ASIDE)
@@ -209,6 +261,7 @@ class Look:
     readings: tuple[SignalReading, ...]
     found: tuple[FoundRole, ...]
     tilt_deg: float
+    refused: tuple[Refused, ...]
     lacking: tuple[str, ...]
     faults: tuple[str, ...]
 
@@ -240,11 +293,14 @@ def look(log: Path, databases: Sequence[Path] = ()) -> Look:
     messages = (*by_own, *described(others, _messages_of(shipped_databases())[0]))
     origin_ns = min(int(one.frames.t_ns.min()) for one in heard)
     readings = tuple(reading for one in messages for reading in readings_of(one, origin_ns))
-    found = roles_of([r for r in readings if r.described in by_own] or readings)
+    heard_of = [reading for reading in readings if len(reading.x)]
+    found = roles_of([r for r in heard_of if r.described in by_own] or heard_of)
     up = next((each for each in found if each.role is Signal.VERTICAL_ACCELERATION), None)
     tilt, fits = tilt_deg(readings, up) if up else float("nan"), fits_of(heard)
-    lacking = tuple(_lacking(found, fits, readings, tilt))
-    return Look(log, report, heard, messages, fits, readings, found, tilt, lacking, faults)
+    sources = {one.message.source for one in by_own} | {each.reading.described.message.source for each in found}
+    refused = tuple(refused_in(messages, readings, sources))
+    lacking = tuple(_lacking(found, fits, readings, tilt, refused))
+    return Look(log, report, heard, messages, fits, readings, found, tilt, refused, lacking, faults)
 
 
 def _messages_of(paths: Iterable[Path]) -> tuple[tuple[DatabaseMessage, ...], tuple[str, ...]]:
@@ -267,23 +323,32 @@ def _near(log: Path) -> list[Path]:
 
 
 def _lacking(
-    found: Sequence[FoundRole], fits: Sequence[MapFit], readings: Sequence[SignalReading], tilt: float
+    found: Sequence[FoundRole],
+    fits: Sequence[MapFit],
+    readings: Sequence[SignalReading],
+    tilt: float,
+    refused: Sequence[Refused],
 ) -> Iterator[str]:
     """The obstacles to weighing with this log, and their remedies."""
     whole = next((fit for fit in fits if fit.is_whole), None)
     roles = {each.role: each for each in found}
     up, pitch = roles.get(Signal.VERTICAL_ACCELERATION), roles.get(Signal.PITCH_RATE)
-    if whole is None and not readings:
+    lost = {quantity for one in refused if one.share >= TELLING_SHARE for quantity in one.quantities}
+    if whole is None and not readings and not lost:
         yield "no database describes an acceleration in it: give the DBC of the sensor with --dbc"
         return
+    as_told = "frames or values that would show it are refused, as told above"
     if whole is None and up is None:
-        yield "no acceleration reads 9.8 m/s2: the sensor is not in this log, or takes gravity off"
+        why = "the sensor is not in this log, or takes gravity off"
+        yield f"no acceleration reads 9.8 m/s2: {as_told if 'acceleration' in lost else why}"
     if whole is None and tilt > MOST_TILT_DEG:
         yield f"the sensor leans by {tilt:.0f} degrees: mount it level, or have it turn its axes"
     if whole is None and up is not None and pitch is None:
-        yield "no pitch rate could be told: drive with some braking, or name it yourself"
+        why = "drive with some braking, or name it yourself"
+        yield f"no pitch rate could be told: {as_told if 'angular_rate' in lost else why}"
     if not {Signal.SPEED, Signal.WHEEL_SPEED} & set(whole.found if whole else roles):
-        yield "no speed: add [signals.speed] from a GNSS receiver or the vehicle"
+        why = "add [signals.speed] from a GNSS receiver or the vehicle"
+        yield f"no speed: {as_told if 'speed' in lost else why}"
     for each in (up, pitch) if whole is None else ():
         if each is not None and each.reading.rate_hz < LEAST_RATE_HZ:
             yield f"{each.reading.name} comes {each.reading.rate_hz:.0f} times a second; {LEAST_RATE_HZ:.0f} are needed"

@@ -25,7 +25,7 @@ export const COMMON = {
   "place.rear_left": ["rear left wheel", "Rad hinten links"],
   "place.rear_right": ["rear right wheel", "Rad hinten rechts"],
 
-  "alarm.sensor_fault.silent": ["a sensor is silent", "ein Sensor schweigt"],
+  "alarm.sensor_fault.silent": ["a sensor gives no valid sample", "ein Sensor liefert keinen gültigen Wert"],
   "alarm.sensor_fault.refused": ["a sensor gives implausible values", "ein Sensor liefert unglaubwürdige Werte"],
   "alarm.overload": ["{place} too heavy", "{place} zu schwer"],
 
