@@ -3,9 +3,11 @@
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import click
 
+from gateway.bus.signals import unsound_messages
 from gateway.calibration.known_weights_file import FILE_NAME
 from gateway.cli.options import FILE, Told, prints
 from gateway.config import Settings, load_settings
@@ -32,7 +34,7 @@ def check_config(config: Path) -> Told:
         raise ConfigurationError("\n".join(f"{config}: {fault}" for fault in faults))
     forwarding = uplink_settings(settings.uplink, settings.vehicle)
     pushing = webhook_settings(settings.webhook, settings.vehicle)
-    summary = {
+    summary: dict[str, Any] = {
         "config": str(config),
         "signals": [str(signal) for signal in setup.signal_map.signals],
         "calibration_id": setup.calibration.id if setup.calibration else None,
@@ -43,8 +45,13 @@ def check_config(config: Path) -> Told:
         "limits": limits_in_force(setup),
         "uplink": forwarding.broker if forwarding else None,
         "webhook": pushing.receiver if pushing else None,
+        "unsound_messages": list(unsound_messages(setup.signal_map.name)),
     }
-    return summary, "\n".join(_sentences(config, settings, setup))
+    return summary, "\n".join([*_sentences(config, settings, setup), *map(_left_out, summary["unsound_messages"])])
+
+
+def _left_out(fault: str) -> str:
+    return f"Left out, as the signal map does not use it: {fault}"
 
 
 def _sentences(config: Path, settings: Settings, setup: Setup) -> Iterator[str]:

@@ -101,7 +101,7 @@ def test_a_database_that_is_cut_off_is_refused_by_name(kind, load):
 
 def test_the_same_message_on_two_buses_of_one_file_is_told(load):
     twice = [*MESSAGES, replace(MESSAGES[0], can_id=0x121)]
-    with pytest.raises(SignalMapError, match=r"message 'IMU' is in car\.dbc"):
+    with pytest.raises(SignalMapError, match=r"message 'IMU' is twice in car\.dbc"):
         load("dbc", dbc(twice))
 
 

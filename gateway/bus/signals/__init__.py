@@ -5,7 +5,7 @@ counts what it refuses, an ``Encoder`` does the inverse for the simulator. Units
 """
 
 from gateway.bus.signals.bit_field import Coding
-from gateway.bus.signals.database import DatabaseMessage, DatabaseSignal, load_messages
+from gateway.bus.signals.database import DatabaseMessage, Databases, DatabaseSignal
 from gateway.bus.signals.decode import Decoder, is_j1939_code
 from gateway.bus.signals.encode import Encoder
 from gateway.bus.signals.mapping import (
@@ -25,6 +25,7 @@ from gateway.bus.signals.signal_map import (
     shipped_databases,
     shipped_map,
     shipped_maps,
+    unsound_messages,
 )
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "Coding",
     "DatabaseMessage",
     "DatabaseSignal",
+    "Databases",
     "Decoder",
     "Encoder",
     "IdFilter",
@@ -44,9 +46,9 @@ __all__ = [
     "id_name",
     "is_j1939_code",
     "j1939_filter",
-    "load_messages",
     "load_signal_map",
     "shipped_databases",
     "shipped_map",
     "shipped_maps",
+    "unsound_messages",
 ]

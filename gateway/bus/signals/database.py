@@ -1,10 +1,13 @@
 """CAN databases through cantools, reduced to what decoding needs. The only module of the room that imports cantools."""
 
 import difflib
+import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
@@ -14,14 +17,15 @@ from cantools.database.can import Signal as CantoolsSignal
 from cantools.database.errors import UnsupportedDatabaseFormatError
 
 from gateway.bus.signals.bit_field import BitField, Coding
+from gateway.bus.signals.dbc import DbcMessage, messages_in
 from gateway.bus.text import text_of
 from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID
 from gateway.toml_file import Read
 
-_LONG_SIGNAL = re.compile(rb"^\s*SG_\s+(\w+)[^:\n]*:\s*\d+\s*\|\s*0*[1-9]\d{3,}\s*@", re.MULTILINE)
-_FRAME_ID = re.compile(rb"^\s*BO_\s+0*(\d+)\s", re.MULTILINE)
+_LINE = re.compile(r" at line \d+, column \d+")  # of a message alone, which no reader sees
 
+TOLD_CHARS: Final = 300  # chosen: of a fault that cantools describes, which may repeat a line of any length
 KINDS: Final = ("dbc", "sym", "kcd", "arxml", "cdd")
 
 
@@ -42,7 +46,7 @@ class DatabaseSignal:
     def limits(self) -> tuple[float, float]:
         """Least and greatest physical value: of the database, or of the bits if it gives no range."""
         if self.minimum is not None and self.maximum is not None and self.minimum < self.maximum:
-            return float(self.minimum), float(self.maximum)
+            return self.minimum, self.maximum
         return self.field.physical_range
 
 
@@ -58,19 +62,41 @@ class DatabaseMessage:
     twins: frozenset[str] = frozenset()
 
 
-def load_messages(map_path: Path, paths: Sequence[Path], read: Read = Path.read_bytes) -> dict[str, DatabaseMessage]:
-    """Every message of the databases by name. Raises SignalMapError naming ``map_path`` and the file at fault."""
-    messages: dict[str, DatabaseMessage] = {}
-    for path in paths:
-        for message in _load(map_path, path, read):
-            name = str(message.name)
-            if name in messages:
-                raise SignalMapError(
-                    f"{map_path}: dbc: message {name!r} is in {messages[name].source.name} and in {path.name}; "
-                    "list only one of them"
-                )
-            messages[name] = _message(message, path)
-    return messages
+ReadMessage = Callable[[], DatabaseMessage]
+
+
+class Databases:
+    """The messages of several databases. One is read when it is asked for, so that an unsound one harms no other."""
+
+    def __init__(self, map_path: Path, paths: Sequence[Path], read: Read = Path.read_bytes) -> None:
+        """Raises SignalMapError naming ``map_path`` and a file that cannot be read."""
+        self._map_path = map_path
+        self._of_name: dict[str, list[tuple[Path, ReadMessage]]] = {}
+        for path in paths:
+            for name, message in _messages(map_path, path, read):
+                self._of_name.setdefault(name, []).append((path, message))
+
+    @property
+    def names(self) -> Collection[str]:
+        return self._of_name.keys()
+
+    def message(self, name: str) -> DatabaseMessage:
+        """One of ``names``. Raises SignalMapError if it is unsound or not the only one of its name."""
+        (path, message), *others = self._of_name[name]
+        if others:
+            places = f"in {path.name} and in {others[0][0].name}" if others[0][0] != path else f"twice in {path.name}"
+            raise SignalMapError(f"{self._map_path}: dbc: message {name!r} is {places}; keep only one of them")
+        return message()
+
+    def sound(self) -> tuple[list[DatabaseMessage], list[str]]:
+        """All messages that can be read, and why others cannot."""
+        found, unsound = [], []
+        for _, message in chain.from_iterable(self._of_name.values()):
+            try:
+                found.append(message())
+            except SignalMapError as fault:
+                unsound.append(str(fault))
+        return found, unsound
 
 
 def closest(name: str, known: Iterable[str]) -> str:
@@ -81,37 +107,48 @@ def closest(name: str, known: Iterable[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else f"there are {listed or 'none'}"
 
 
-def _load(map_path: Path, path: Path, read: Read) -> list[CantoolsMessage]:
+def _messages(map_path: Path, path: Path, read: Read) -> Iterator[tuple[str, ReadMessage]]:
+    """Names of the messages of a database, and how each is read."""
+    where = f"{map_path}: dbc: {path}"
     if not path.is_file():
         raise SignalMapError(f"{map_path}: dbc: no such file: {path}; paths are relative to the map")
     kind = path.suffix.removeprefix(".").lower()
     if kind not in KINDS:
-        raise SignalMapError(f"{map_path}: dbc: {path}: its name must end in .{', .'.join(KINDS)}")
+        raise SignalMapError(f"{where}: its name must end in .{', .'.join(KINDS)}")
     try:
-        content = read(path)
+        text = text_of(read(path))
     except OSError as fault:
         raise SignalMapError(f"{map_path}: dbc: {fault}") from None
-    _refuse_absurd(map_path, path, content)
+    if kind != "dbc":
+        for message in _loaded(f"{where} cannot be read as a CAN database", text, kind):
+            yield str(message.name), partial(_message, message, path)
+        return
+    found = messages_in(text)
+    if not found:
+        raise SignalMapError(f"{where} cannot be read as a CAN database: it has no message (BO_)")
+    for one in found:
+        yield one.name, partial(_dbc_message, where, one, path)
+
+
+def _loaded(where: str, text: str, kind: str) -> list[CantoolsMessage]:
     try:
         # not strict: vendors' databases with overlapping signals are common, and a field is checked when it is mapped
-        database = cantools.database.load_string(text_of(content), kind, strict=False)
+        database = cantools.database.load_string(text, kind, strict=False)
     except (UnsupportedDatabaseFormatError, cantools.Error, UnicodeDecodeError) as fault:
-        raise SignalMapError(f"{map_path}: dbc: {path} cannot be read as a CAN database: {fault}") from None
+        said = _LINE.sub("", str(fault)) if kind == "dbc" else str(fault)
+        raise SignalMapError(f"{where}: {said[:TOLD_CHARS]}{'...' if len(said) > TOLD_CHARS else ''}") from None
     if not isinstance(database, cantools.database.can.Database):
-        raise SignalMapError(f"{map_path}: dbc: {path} describes diagnostics; a DBC, KCD, ARXML or SYM is wanted")
+        raise SignalMapError(f"{where}: it describes diagnostics; a DBC, KCD, ARXML or SYM is wanted")
     return list(database.messages)
 
 
-def _refuse_absurd(map_path: Path, path: Path, text: bytes) -> None:
-    """cantools takes a minute for a signal of a billion bits, and cuts an identifier of 33 bits down to another."""
-    long = _LONG_SIGNAL.search(text)
-    if long is not None:
-        raise SignalMapError(f"{map_path}: dbc: {path}: signal {long[1].decode()!r} is longer than any message")
-    for found in _FRAME_ID.finditer(text):
-        if len(found[1]) > 10 or int(found[1]) >= 1 << 32:
-            raise SignalMapError(
-                f"{map_path}: dbc: {path}: {found[1][:20].decode()} is no identifier: 32 bits hold one"
-            )
+def _dbc_message(where: str, one: DbcMessage, path: Path) -> DatabaseMessage:
+    told = f"{where}: message {one.name!r} in line {one.line} cannot be read"
+    try:
+        (message,) = _loaded(told, one.text(), "dbc")
+    except ValueError as fault:
+        raise SignalMapError(f"{told}: {fault}") from None
+    return replace(_message(message, path), name=one.name)
 
 
 def _message(message: CantoolsMessage, path: Path) -> DatabaseMessage:
@@ -132,16 +169,24 @@ def _signal(signal: CantoolsSignal) -> DatabaseSignal:
         length=signal.length,
         is_big_endian=signal.byte_order == "big_endian",
         coding=coding,
-        scale=float(conversion.scale),
-        offset=float(conversion.offset),
+        scale=_float(conversion.scale),
+        offset=_float(conversion.offset),
     )
     return DatabaseSignal(
         name=signal.name,
         field=field,
         unit=signal.unit,
-        minimum=signal.minimum,
-        maximum=signal.maximum,
+        minimum=None if signal.minimum is None else _float(signal.minimum),
+        maximum=None if signal.maximum is None else _float(signal.maximum),
         choices=choices,
         multiplexer=signal.multiplexer_signal,
         multiplexer_ids=tuple(signal.multiplexer_ids or ()),
     )
+
+
+def _float(number: int | float) -> float:
+    """The number; an integer beyond a double is infinite."""
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf

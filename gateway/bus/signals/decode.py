@@ -18,6 +18,7 @@ from gateway.records import ASIDE, F64, I64, U8, Bool, Frames, Motion, Signal
 J1939_LAST_VALID_BYTE: Final = 0xFA  # SAE J1939-71: a most significant byte above this is no measurement
 TELLING_SHARE: Final = 0.01  # chosen: of a message's frames; with so many refused, this is why a sensor is missing
 NEEDED: Final = frozenset({Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED, Signal.WHEEL_SPEED})
+MOST_COMPARED: Final = 16  # chosen: allowed numbers that are compared one by one, which is faster for few
 RANGE_TOLERANCE_STEPS: Final = 0.01  # chosen: the limits of a DBC are decimals; a raw number on a limit must pass
 
 
@@ -91,6 +92,8 @@ class SampleReader:
 
 def _fails(condition: Condition, payload: U8) -> Bool:
     bits = condition.field.bits(payload)
+    if len(condition.allowed_bits) > MOST_COMPARED:
+        return ~np.isin(bits, np.array(condition.allowed_bits, np.uint64))
     fails: Bool = bits != np.uint64(condition.allowed_bits[0])
     for allowed in condition.allowed_bits[1:]:
         fails &= bits != np.uint64(allowed)

@@ -9,7 +9,7 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 from pydantic import BaseModel, ConfigDict, Field
 
 from gateway.bus.signals.bit_field import BitField, Coding
-from gateway.bus.signals.database import DatabaseMessage, DatabaseSignal, closest, load_messages
+from gateway.bus.signals.database import DatabaseMessage, Databases, DatabaseSignal, closest
 from gateway.bus.signals.mapping import (
     QUANTITIES,
     Condition,
@@ -217,23 +217,35 @@ def load_signal_map(path: Path | str, read: Read = Path.read_bytes) -> SignalMap
 
     Raises SignalMapError naming the file, the key, what is wrong with it and how to mend it.
     """
+    file_path, wanted, databases = _opened(path, read)
+    found: dict[str, DatabaseMessage] = {}
+    mapped: dict[str, list[MappedSignal]] = {}
+    for signal, entry in wanted.signals.items():
+        where = f"{file_path}: signals.{signal}"
+        if entry.message not in databases.names:
+            hint = closest(entry.message, databases.names)
+            raise SignalMapError(f"{where}.message: the databases have no message {entry.message!r}; {hint}")
+        if entry.message not in found:
+            found[entry.message] = databases.message(entry.message)
+        resolved = resolve_signal(where, signal, entry, found[entry.message], wanted.j1939)
+        mapped.setdefault(entry.message, []).append(resolved)
+    messages = tuple(_mapped_message(found[m], tuple(signals), wanted.j1939) for m, signals in mapped.items())
+    _require_distinct(messages, file_path)
+    return SignalMap(str(path), wanted.channel, wanted.j1939, messages, _zone(file_path, wanted.time_zone))
+
+
+def unsound_messages(path: Path | str, read: Read = Path.read_bytes) -> tuple[str, ...]:
+    """Messages of a map's databases that cannot be read, each with the reason: those it maps are none of them."""
+    return tuple(_opened(path, read)[2].sound()[1])
+
+
+def _opened(path: Path | str, read: Read) -> tuple[Path, SignalMapFile, Databases]:
     name = str(path)
     is_shipped = name.startswith(SHIPPED_PREFIX)
     file_path = shipped_map(name.removeprefix(SHIPPED_PREFIX)) if is_shipped else Path(path)
     reading = Path.read_bytes if is_shipped else read
     wanted = load_toml(file_path, SignalMapFile, SignalMapError, reading)
-    databases = load_messages(file_path, [file_path.parent / dbc for dbc in wanted.dbc], reading)
-    mapped: dict[str, list[MappedSignal]] = {}
-    for signal, entry in wanted.signals.items():
-        where = f"{file_path}: signals.{signal}"
-        if entry.message not in databases:
-            hint = closest(entry.message, databases)
-            raise SignalMapError(f"{where}.message: the databases have no message {entry.message!r}; {hint}")
-        resolved = resolve_signal(where, signal, entry, databases[entry.message], wanted.j1939)
-        mapped.setdefault(entry.message, []).append(resolved)
-    messages = tuple(_mapped_message(databases[m], tuple(signals), wanted.j1939) for m, signals in mapped.items())
-    _require_distinct(messages, file_path)
-    return SignalMap(str(path), wanted.channel, wanted.j1939, messages, _zone(file_path, wanted.time_zone))
+    return file_path, wanted, Databases(file_path, [file_path.parent / dbc for dbc in wanted.dbc], reading)
 
 
 def _zone(path: Path, name: str | None) -> ZoneInfo | None:

@@ -14,12 +14,12 @@ from gateway.bus.signals import (
     CAN_FD_BYTES,
     Coding,
     DatabaseMessage,
+    Databases,
     DatabaseSignal,
     Decoder,
     id_name,
     is_j1939_code,
     j1939_filter,
-    load_messages,
     load_signal_map,
     shipped_databases,
     shipped_maps,
@@ -285,9 +285,7 @@ def look(log: Path, databases: Sequence[Path] = ()) -> Look:
     Raises LogUnreadableError if there is no frame in it, SignalMapError for a given database that cannot be read.
     """
     heard, report = heard_in(log)
-    own, faults = _messages_of(databases or _near(log))
-    if databases and faults:
-        raise SignalMapError(faults[0])
+    own, faults = _messages_of(databases or _near(log), are_given=bool(databases))
     by_own = described(heard, own)
     others = [one for one in heard if not any(one is each.heard for each in by_own)]
     messages = (*by_own, *described(others, _messages_of(shipped_databases())[0]))
@@ -303,15 +301,25 @@ def look(log: Path, databases: Sequence[Path] = ()) -> Look:
     return Look(log, report, heard, messages, fits, readings, found, tilt, refused, lacking, faults)
 
 
-def _messages_of(paths: Iterable[Path]) -> tuple[tuple[DatabaseMessage, ...], tuple[str, ...]]:
-    """Every message of the databases, and the faults of unreadable ones."""
+def _messages_of(
+    paths: Iterable[Path], *, are_given: bool = False
+) -> tuple[tuple[DatabaseMessage, ...], tuple[str, ...]]:
+    """Every message of the databases, and the faults of those that cannot be read.
+
+    Raises SignalMapError for a whole database among them if they are given.
+    """
     messages: list[DatabaseMessage] = []
     faults: list[str] = []
     for path in paths:
         try:
-            messages += load_messages(path, [path]).values()
+            found, unsound = Databases(path, [path]).sound()
         except SignalMapError as fault:
+            if are_given:
+                raise
             faults.append(str(fault))
+            continue
+        messages += found
+        faults += unsound
     return tuple(messages), tuple(faults)
 
 
