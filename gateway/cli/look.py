@@ -70,9 +70,9 @@ def _message(found: Described | None) -> str:
 def _readings(seen: Look) -> Iterator[str]:
     readings = [reading for reading in seen.readings if reading.quantity == "acceleration" and len(reading.x)]
     yield "Accelerations, usual reading:" if readings else "No acceleration: no database describes one."
-    why = {found.reading.name: found.why for found in seen.found}
+    why = {id(found.reading): found.why for found in seen.found}
     for reading in readings:
-        yield f"  {reading.name}: {reading.usual:+.2f} m/s2  {why.get(reading.name, '')}".rstrip()
+        yield f"  {reading.name}: {reading.usual:+.2f} m/s2  {why.get(id(reading), '')}".rstrip()
     if math.isfinite(seen.tilt_deg):
         yield f"  the sensor leans by {seen.tilt_deg:.0f} degrees"
     for found in seen.found:
@@ -102,7 +102,11 @@ def _fit(fit: MapFit) -> str:
 def _verdict(seen: Look) -> Iterator[str]:
     if seen.lacking:
         yield "This cannot work yet:"
-        yield from (f"  {what}" for what in seen.lacking)
+        yield from (f"  {what}" for what in (*seen.to_mend, *seen.lacking))
+        return
+    if seen.to_mend:
+        yield "This can work, once the signal map says so or its database is right:"
+        yield from (f"  {what}" for what in seen.to_mend)
         return
     if unsure := " and ".join(seen.unsure_databases):
         yield f"This can work, if {unsure} describes your device: only identifiers and lengths say so."
@@ -138,6 +142,7 @@ def look_json(seen: Look) -> dict[str, Any]:
             for fit in seen.fits
         ],
         "refused": [one.text for one in seen.refused],
+        "to_mend": list(seen.to_mend),
         "can_work": not seen.lacking,
         "unsure_databases": list(seen.unsure_databases),
         "lacking": list(seen.lacking),

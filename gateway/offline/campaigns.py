@@ -112,7 +112,7 @@ def _split_run(
         span_ns=(int(motion.t_ns.min()), int(motion.t_ns.max())) if len(motion) else None,
         damage=_damage(report),
         silent=_silent(report.decoder, motion, signal_map) if report.decoder else {},
-        refused={signal: (one.text, one.share) for one in report.causes() for signal in one.signals},
+        mismatches=tuple((one.text, one.share, one.signals) for one in report.causes()),
     )
     facts = row_facts(both[0] if stretches[0] else both[1], signal_map.traits)
     return SplitRun(parts[0], parts[1], facts, stretches[0] is not None, log_facts)

@@ -89,7 +89,7 @@ def test_an_example_of_a_campaign_can_be_loaded(example: str, tmp_path: Path) ->
 
 
 def test_the_pages_have_examples() -> None:
-    assert (len(examples_of(SIGNAL_MAP)), len(examples_of(CAMPAIGN))) == (4, 1)
+    assert (len(examples_of(SIGNAL_MAP)), len(examples_of(CAMPAIGN))) == (5, 1)
 
 
 def test_every_field_of_an_estimate_is_described_and_says_when_it_is_unknown() -> None:

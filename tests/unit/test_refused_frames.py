@@ -155,12 +155,12 @@ def test_an_inspection_finds_the_refused_frames_and_no_silent_sensor(spoiled: tu
     case, log, signals = spoiled
     signal_map = load_signal_map(signals)
     motion, report = read_whole_log(log, signal_map)
-    refused = {signal: (one.text, one.share) for one in report.causes() for signal in one.signals}
+    mismatches = tuple((one.text, one.share, one.signals) for one in report.causes())
     nothing = KnownRun(1, "drive.log", 0.0, 50.0, ())
-    split = SplitRun(nothing, nothing, row_facts(motion, signal_map.traits), log=LogFacts(refused=refused))
-    kinds = (Kind.FRAMES_REFUSED, Kind.SENSOR_SILENT, Kind.SPEED_MISSING)
+    split = SplitRun(nothing, nothing, row_facts(motion, signal_map.traits), log=LogFacts(mismatches=mismatches))
+    kinds = (Kind.MAP_MISMATCH, Kind.SENSOR_SILENT, Kind.SPEED_MISSING)
     first, *others = inspect_run(split, VAN, BatchSettings(), kinds).findings
-    assert (first.kind, first.severity) == (Kind.FRAMES_REFUSED, Severity.FAULT)
+    assert (first.kind, first.severity) == (Kind.MAP_MISMATCH, Severity.FAULT)
     assert first.text.startswith(case.told)
     assert "roll_rate" in case.signals or all("roll_rate" in other.text for other in others)
 

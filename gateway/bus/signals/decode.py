@@ -12,13 +12,24 @@ from typing import Final
 import numpy as np
 
 from gateway.bus.signals.bit_field import U64, BitField, Coding
-from gateway.bus.signals.mapping import Condition, IdFilter, MappedMessage, MappedSignal, SignalMap, id_name
-from gateway.records import ASIDE, F64, I64, U8, Bool, Frames, Motion, Signal
+from gateway.bus.signals.mapping import (
+    QUANTITIES,
+    SOURCE_ADDRESS,
+    Condition,
+    IdFilter,
+    MappedMessage,
+    MappedSignal,
+    SignalMap,
+    id_name,
+)
+from gateway.records import ASIDE, F64, I64, U8, U32, Bool, Frames, Motion, Signal
 
 J1939_LAST_VALID_BYTE: Final = 0xFA  # SAE J1939-71: a most significant byte above this is no measurement
 TELLING_SHARE: Final = 0.01  # chosen: of a message's frames; with so many refused, this is why a sensor is missing
 NEEDED: Final = frozenset({Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED, Signal.WHEEL_SPEED})
 MOST_COMPARED: Final = 16  # chosen: allowed numbers that are compared one by one, which is faster for few
+NAMED_SOURCES: Final = 4  # chosen: of a J1939 group
+SAME_SPEED_SHARE: Final = 0.02  # chosen: mean speeds of two devices of one vehicle differ by less
 RANGE_TOLERANCE_STEPS: Final = 0.01  # chosen: the limits of a DBC are decimals; a raw number on a limit must pass
 
 
@@ -121,6 +132,13 @@ class SignalCounts:
     rejected: Mapping[Rejected, int]
 
 
+def _is_mixed(signal: Signal, n: F64, sums: F64) -> bool:
+    """Whether several devices send a signal, by the number and sum of samples of each; speeds that agree are one."""
+    means = sums[n > 0] / n[n > 0]
+    is_one = QUANTITIES[signal] == "speed" and len(means) and np.ptp(means) <= SAME_SPEED_SHARE * np.abs(means).max()
+    return len(means) > 1 and not is_one
+
+
 def told_lengths(counts: Mapping[int, int], n_frames: int, length: int) -> str:
     """ "1,708 of 1,720 frames have 8 bytes, the database says 4; ...", of the counts of every other length."""
     have = f"{min(counts)}" + (f" to {max(counts)}" if len(counts) > 1 else "")
@@ -148,8 +166,8 @@ def told_share(n: int, n_all: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """Why many frames of a message give no sample although the device sends: a sentence for people, the share of its
-    frames, and the signals that lack them.
+    """Why frames of a message give no sample or the wrong one: a sentence for people, the share of its frames, and the
+    signals that suffer.
     """
 
     text: str
@@ -171,11 +189,11 @@ class Decoder:
         return {signal: counts for message in self._messages for signal, counts in message.counts()}
 
     def remarks(self) -> tuple[Remark, ...]:
-        """Frames of another length than the database says, and values out of range."""
+        """Frames of another length than the database says, values out of range, and signals of several devices."""
         return tuple(remark for message in self._messages for remark in message.remarks())
 
     def causes(self) -> tuple[Remark, ...]:
-        """Those that explain why nothing is weighed: a good part of a signal that weighing needs is refused."""
+        """Those that explain why nothing is weighed: they concern a good part of a signal that weighing needs."""
         return tuple(one for one in self.remarks() if one.share >= TELLING_SHARE and one.signals & NEEDED)
 
     def decode(self, frames: Frames) -> Motion:
@@ -195,7 +213,7 @@ class Decoder:
             if len(ours):
                 payload = frames.payload.take(rows[ours], axis=0)
                 message.count(counters, ours, payload)
-                message.fill(columns, ours, payload, frames.length[rows[ours]])
+                message.fill(columns, ours, payload, frames.length[rows[ours]], frames.can_id[rows[ours]])
         aside = self._is_aside[message_of] if self._is_aside.any() else None
         return Motion(self.signals, frames.t_ns[rows], columns, counters, aside)
 
@@ -214,6 +232,8 @@ class _MessageReader:
         counters = [(m.counter, m.signal) for m in message.signals if m.counter is not None]
         self._counters = {field: [signal for of, signal in counters if of == field] for field, _ in counters}
         self._n_frames = 0
+        sent = [m.signal for m in message.signals] if message.id_filter.is_of_any_source else []
+        self._of_source = {signal: np.zeros((2, SOURCE_ADDRESS + 1)) for signal in sent}  # number and sum of samples
         self._rejected: dict[Signal, Counter[Rejected]] = {m.signal: Counter() for m in message.signals}
 
     def counts(self) -> list[tuple[Signal, SignalCounts]]:
@@ -225,14 +245,24 @@ class _MessageReader:
         if lengths := dict(self._wrong_lengths):
             text = f"{self._name} ({id_name(self._frame_id)}): {told_lengths(lengths, self._n_frames, self._length)}"
             yield Remark(text, sum(lengths.values()) / self._n_frames, frozenset(self._rejected))
+        mixed = {signal: n_and_sum[0] for signal, n_and_sum in self._of_source.items() if _is_mixed(signal, *n_and_sum)}
+        if mixed:
+            n_of_source = next(iter(mixed.values()))
+            addresses = np.argsort(-n_of_source, kind="stable")[: np.count_nonzero(n_of_source)]
+            each = [f"{address:#04x} ({n_of_source[address]:,.0f})" for address in addresses[:NAMED_SOURCES]]
+            text = (
+                f"{self._name}: {len(addresses)} devices send {', '.join(mixed)}, with the source addresses "
+                f"{', '.join(each)}: state the source_address of one in the signal map"
+            )
+            yield Remark(text, float(1.0 - n_of_source.max() / n_of_source.sum()), frozenset(mixed))
         for signal, _, reader in self._readers:
             if n := self._rejected[signal][Rejected.OUT_OF_RANGE]:
                 text = f"{signal} ({self._name}): {told_share(n, self._n_frames)} values read {reader.told_range()}"
                 yield Remark(text, n / self._n_frames, frozenset({signal}))
 
-    def fill(self, columns: F64, ours: I64, payload: U8, length: U8) -> None:
-        """Decode payloads (m, width) and their lengths (m,), all of this message, into the rows ``ours`` (m,) of
-        ``columns``.
+    def fill(self, columns: F64, ours: I64, payload: U8, length: U8, can_id: U32) -> None:
+        """Decode payloads (m, width), their lengths and identifiers (m,), all of this message, into the rows ``ours``
+        (m,) of ``columns``.
         """
         self._n_frames += len(ours)
         has_length = length == self._length
@@ -240,7 +270,7 @@ class _MessageReader:
         if n_wrong:
             of_length = np.bincount(length[~has_length])
             self._wrong_lengths.update({int(n_bytes): int(of_length[n_bytes]) for n_bytes in of_length.nonzero()[0]})
-            payload, ours = payload[has_length], ours[has_length]
+            payload, ours, can_id = payload[has_length], ours[has_length], can_id[has_length]
             for rejected in self._rejected.values():
                 rejected[Rejected.WRONG_LENGTH] += n_wrong
         if not len(ours):
@@ -248,6 +278,12 @@ class _MessageReader:
         for signal, column, reader in self._readers:
             columns[ours, column], refused = reader.read(payload)
             self._rejected[signal].update(refused)
+            if self._of_source:
+                samples = columns[ours, column]
+                known = np.isfinite(samples)
+                sources, samples = can_id[known] & np.uint32(SOURCE_ADDRESS), samples[known]
+                for row, weights in enumerate((None, samples)):
+                    self._of_source[signal][row] += np.bincount(sources, weights, SOURCE_ADDRESS + 1)
 
     def count(self, counters: Mapping[Signal, F64], ours: I64, payload: U8) -> None:
         """Message counters of the same frames into the same rows; a frame too short for its counter gives no sample

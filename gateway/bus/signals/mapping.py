@@ -56,11 +56,17 @@ class IdFilter:
         passes: Bool = (can_id & np.uint32(self.mask)) == np.uint32(self.can_id)
         return passes
 
+    @property
+    def is_of_any_source(self) -> bool:
+        """Whether it is a J1939 group of whatever device."""
+        return not self.mask & SOURCE_ADDRESS and bool(self.can_id & EXTENDED_ID)
+
     def is_for(self, can_id: int) -> bool:
         """The same of one identifier."""
         return can_id & self.mask == self.can_id
 
 
+SOURCE_ADDRESS: Final = 0xFF  # SAE J1939-21: the last byte of a 29-bit identifier
 EVERY_IDENTIFIER = (IdFilter(0, EXTENDED_ID), IdFilter(EXTENDED_ID, EXTENDED_ID))
 
 
@@ -183,12 +189,14 @@ def exact_filter(frame_id: int) -> IdFilter:
     return IdFilter(frame_id, EXTENDED_ID | (0x1FFF_FFFF if frame_id & EXTENDED_ID else 0x7FF))
 
 
-def j1939_filter(frame_id: int) -> IdFilter:
-    """The parameter group of a 29-bit identifier, whatever its priority and source address.
+def j1939_filter(frame_id: int, source_address: int | None = None) -> IdFilter:
+    """The parameter group of a 29-bit identifier, whatever its priority, from one source address or from any.
 
     SAE J1939-21: bits 8 to 25 are the group; with a PDU format (bits 16 to 23) below 240, bits 8 to 15
     are a destination address and belong to no group.
     """
     is_addressed = (frame_id >> 16 & 0xFF) < 240
     group_mask = 0x03FF_0000 if is_addressed else 0x03FF_FF00
-    return IdFilter(frame_id & group_mask | EXTENDED_ID, group_mask | EXTENDED_ID)
+    if source_address is None:
+        return IdFilter(frame_id & group_mask | EXTENDED_ID, group_mask | EXTENDED_ID)
+    return IdFilter(frame_id & group_mask | source_address | EXTENDED_ID, group_mask | SOURCE_ADDRESS | EXTENDED_ID)

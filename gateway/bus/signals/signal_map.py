@@ -12,6 +12,7 @@ from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.signals.database import DatabaseMessage, Databases, DatabaseSignal, closest
 from gateway.bus.signals.mapping import (
     QUANTITIES,
+    SOURCE_ADDRESS,
     Condition,
     MappedMessage,
     MappedSignal,
@@ -49,6 +50,9 @@ class SignalEntry(BaseModel):
     counter: str | None = Field(
         None,
         description="signal of the same message that counts its frames: it distinguishes late frames from lost ones",
+    )
+    source_address: int | None = Field(
+        None, ge=0, le=253, description="with j1939: count only frames of this device; without it those of every device"
     )
     minimum: Finite | None = Field(None, description="least valid value in SI; overrides the DBC's range")
     maximum: Finite | None = Field(None, description="greatest valid value in SI; overrides the DBC's range")
@@ -219,7 +223,7 @@ def load_signal_map(path: Path | str, read: Read = Path.read_bytes) -> SignalMap
     """
     file_path, wanted, databases = _opened(path, read)
     found: dict[str, DatabaseMessage] = {}
-    mapped: dict[str, list[MappedSignal]] = {}
+    mapped: dict[tuple[str, int | None], list[MappedSignal]] = {}
     for signal, entry in wanted.signals.items():
         where = f"{file_path}: signals.{signal}"
         if entry.message not in databases.names:
@@ -228,8 +232,14 @@ def load_signal_map(path: Path | str, read: Read = Path.read_bytes) -> SignalMap
         if entry.message not in found:
             found[entry.message] = databases.message(entry.message)
         resolved = resolve_signal(where, signal, entry, found[entry.message], wanted.j1939)
-        mapped.setdefault(entry.message, []).append(resolved)
-    messages = tuple(_mapped_message(found[m], tuple(signals), wanted.j1939) for m, signals in mapped.items())
+        if entry.source_address is not None and not (wanted.j1939 and found[entry.message].frame_id & EXTENDED_ID):
+            raise SignalMapError(
+                f"{where}.source_address: only messages with 29-bit identifiers have one, and with j1939 = true"
+            )
+        mapped.setdefault((entry.message, entry.source_address), []).append(resolved)
+    messages = tuple(
+        _mapped_message(found[name], source, tuple(signals), wanted.j1939) for (name, source), signals in mapped.items()
+    )
     _require_distinct(messages, file_path)
     return SignalMap(str(path), wanted.channel, wanted.j1939, messages, _zone(file_path, wanted.time_zone))
 
@@ -276,11 +286,16 @@ def shipped_map(name: str) -> Path:
     return Path(str(files("gateway.dbc") / f"{name}.toml"))
 
 
-def _mapped_message(message: DatabaseMessage, signals: tuple[MappedSignal, ...], j1939: bool) -> MappedMessage:
+def _mapped_message(
+    message: DatabaseMessage, source_address: int | None, signals: tuple[MappedSignal, ...], j1939: bool
+) -> MappedMessage:
     by_group = j1939 and bool(message.frame_id & EXTENDED_ID)
-    id_filter = j1939_filter(message.frame_id) if by_group else exact_filter(message.frame_id)
+    name, frame_id = message.name, message.frame_id
+    id_filter = j1939_filter(frame_id, source_address) if by_group else exact_filter(frame_id)
+    if source_address is not None:
+        name, frame_id = f"{name} of {source_address:#04x}", frame_id & ~SOURCE_ADDRESS | source_address
     fields = {name: signal.field for name, signal in message.signals.items()}
-    return MappedMessage(message.name, message.frame_id, id_filter, message.length, signals, fields)
+    return MappedMessage(name, frame_id, id_filter, message.length, signals, fields)
 
 
 def _require_distinct(messages: tuple[MappedMessage, ...], path: Path) -> None:
@@ -290,5 +305,5 @@ def _require_distinct(messages: tuple[MappedMessage, ...], path: Path) -> None:
             if (one.id_filter.can_id ^ other.id_filter.can_id) & common == 0:
                 raise SignalMapError(
                     f"{path}: messages {one.name!r} and {other.name!r} are the same frames on the bus; "
-                    "map all their signals from one of them"
+                    "map all their signals from one of them, each or none with a source_address"
                 )

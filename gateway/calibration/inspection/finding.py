@@ -51,8 +51,8 @@ class Kind(StrEnum):
     # The sensors
     SIGNAL_UNMAPPED = ("signal_unmapped", _FAULT_OR_WARNING,
         "add it to the signal map: every estimator needs the speed, and cross_spectrum needs both sensors")
-    FRAMES_REFUSED = ("frames_refused", _FAULT_OR_WARNING,
-        "correct length or range in the database to those of the device, or set minimum and maximum in the signal map")
+    MAP_MISMATCH = ("map_mismatch", _FAULT_OR_WARNING,
+        "correct length or range in the database, or set minimum, maximum or source_address in the signal map")
     SENSOR_SILENT = ("sensor_silent", _FAULT_OR_WARNING,
         "check message, signal and valid_when in the signal map, and that the log was recorded on this bus")
     RATE_LOW = "rate_low", _FAULT_OR_WARNING, "increase its rate in the device; 100 Hz is good"

@@ -14,8 +14,8 @@ class LogFacts:
 
     ``duration_s`` is of the whole log, ``span_ns`` the first and last stamp of the run's piece of it, None if that
     piece is empty. ``unreadable`` says why nothing could be read, ``damage`` what was lost of it, ``silent`` why a
-    mapped signal has no valid sample, ``refused`` what the decoder refused for its length or range, and the share of
-    the signal's frames.
+    mapped signal has no valid sample. ``mismatches`` say which frames do not fit the signal map: a sentence, their
+    share of the message, and the signals that suffer.
     """
 
     sha256: str = ""
@@ -25,7 +25,7 @@ class LogFacts:
     unreadable: str | None = None
     damage: str | None = None
     silent: Mapping[Signal, str] = field(default_factory=dict)
-    refused: Mapping[Signal, tuple[str, float]] = field(default_factory=dict)
+    mismatches: tuple[tuple[str, float, frozenset[Signal]], ...] = ()
 
     def is_of_same_drive(self, other: "LogFacts") -> bool:
         """Whether both are of one log and their pieces of it overlap."""

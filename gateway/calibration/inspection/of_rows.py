@@ -17,7 +17,7 @@ INERTIAL: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
 JITTER_SHARE_MAX: Final = 0.25  # chosen: of a sample's interval; half the width of the central 80 %
 BIAS_MAX_RADPS: Final = 3.0 * pi / 180.0  # chosen: largest bias of an uncalibrated automotive gyroscope
 MASKED_SHARE_NOTED: Final = 0.02  # chosen: of the time
-LOST_SHARE: Final = 0.5  # chosen: of a signal's frames; with more refused nothing can be weighed
+RUINOUS_SHARE: Final = 0.2  # chosen: of a message's frames; if more do not fit the map, the run teaches nothing true
 MISSING: Final = {
     Why.SPEED_MISSING: Signal.SPEED,
     Why.ACCELERATION_MISSING: Signal.VERTICAL_ACCELERATION,
@@ -48,12 +48,11 @@ def unmapped(seen: Seen) -> Said:
         yield f"{text}; axes and loads cannot be checked", Severity.FAULT if len(absent) > 1 else Severity.WARNING
 
 
-def refused(seen: Seen) -> Said:
-    """Frames of another length than the database says, or values out of range: a fault if a needed signal is lost."""
-    texts = dict.fromkeys(text for text, _ in seen.drive.log.refused.values())
-    for text in texts:
-        lost = {s for s, (of, share) in seen.drive.log.refused.items() if of == text and share > LOST_SHARE}
-        yield text, Severity.FAULT if lost & {*INERTIAL, Signal.SPEED} else Severity.WARNING
+def mismatched(seen: Seen) -> Said:
+    """Frames that do not fit the signal map: a fault if a needed signal suffers."""
+    for text, share, signals in seen.drive.log.mismatches:
+        is_ruinous = share > RUINOUS_SHARE and signals & {*INERTIAL, Signal.SPEED}
+        yield text, Severity.FAULT if is_ruinous else Severity.WARNING
 
 
 def _sensors(seen: Seen, *, are_heard: bool = True) -> Iterator[tuple[Signal, Stream, Severity]]:

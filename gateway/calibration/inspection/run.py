@@ -38,7 +38,7 @@ CHECKS: Final = (
     Check(Part.ROWS, Kind.ACCELERATION_AXIS, of_rows.gravity(Kind.ACCELERATION_AXIS)),
     Check(Part.LOG, Kind.LOG_DAMAGED, lambda seen: filter(None, [seen.drive.log.damage])),
     Check(Part.ROWS, Kind.SIGNAL_UNMAPPED, of_rows.unmapped),
-    Check(Part.LOG, Kind.FRAMES_REFUSED, of_rows.refused),
+    Check(Part.LOG, Kind.MAP_MISMATCH, of_rows.mismatched),
     Check(Part.ROWS, Kind.SENSOR_SILENT, of_rows.silent),
     Check(Part.ROWS, Kind.RATE_LOW, of_rows.slow),
     Check(Part.ROWS, Kind.JITTER, of_rows.jitter),

@@ -102,8 +102,9 @@ class Seen:
         return masked_s / total_s if total_s else 0.0
 
     def is_refused(self, signal: Signal, missing_share: float) -> bool:
-        """Whether frames refused for their length or range explain that so much of the signal is missing."""
-        return 2.0 * self.drive.log.refused.get(signal, ("", 0.0))[1] > missing_share
+        """Whether frames that do not fit the signal map explain that so much of the signal is missing."""
+        shares = (share for _, share, signals in self.drive.log.mismatches if signal in signals)
+        return 2.0 * max(shares, default=0.0) > missing_share
 
     @property
     def needed_s(self) -> float:

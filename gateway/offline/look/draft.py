@@ -3,7 +3,7 @@
 import json
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -32,7 +32,11 @@ def write_draft(seen: Look, output: Path) -> tuple[Path, ...]:
         whole = [f"springscale:{fit.name}" for fit in seen.fits if fit.is_whole]
         choice = f"{' and '.join(whole)} fit alike: take the one of your device" if whole else "; ".join(seen.lacking)
         raise SpringscaleError(f"{output} is not written: {choice}")
-    text = _own_text(seen, output) if shipped is None else shipped_map(shipped.name).read_text(encoding="utf-8")
+    if shipped is None:
+        text = _own_text(seen, output)
+    else:
+        checks = "".join(f"# CHECK: {what}\n" for what in seen.to_mend)
+        text = checks + shipped_map(shipped.name).read_text(encoding="utf-8")
     databases = [path for path in shipped_databases() if f'"{path.name}"' in text]
     new = [output, *(output.parent / path.name for path in databases)]
     taken = [path for path in new if path.exists()]
@@ -64,7 +68,8 @@ def _own_text(seen: Look, output: Path) -> str:
     if any(found.reading.described.by_group for found in seen.found):
         lines.append("j1939 = true")
     for found in seen.found:
-        lines += ["", *_entry(found)]
+        rivals = [one for one in seen.described if one.is_rival(found.reading.described)]
+        lines += ["", *_entry(found, rivals)]
     return "\n".join(lines) + "\n"
 
 
@@ -74,11 +79,14 @@ def _as_named(path: Path, output: Path) -> str:
     return path.name if beside else Path(os.path.relpath(path.resolve(), output.resolve().parent)).as_posix()
 
 
-def _entry(found: FoundRole) -> Iterator[str]:
+def _entry(found: FoundRole, rivals: Sequence[Described]) -> Iterator[str]:
     signal = found.reading.signal
     yield f"[signals.{found.role}] # {'' if found.is_sure else 'CHECK: '}{found.why}"
     yield f"message = {_toml(found.reading.described.message.name)}"
     yield f"signal = {_toml(signal.name)}"
+    if rivals:
+        others = ", ".join(f"{one.source_address:#04x}" for one in rivals)
+        yield f"source_address = {found.reading.described.source_address:#04x} # CHECK: {others} send it too"
     if found.role in (Signal.SPEED, Signal.WHEEL_SPEED):
         yield "latency_s = 0.0 # CHECK: how late the receiver tells it; 0.2 is usual where it sends five times a second"
     else:

@@ -24,7 +24,15 @@ from gateway.bus.signals import (
     shipped_databases,
     shipped_maps,
 )
-from gateway.bus.signals.decode import RANGE_TOLERANCE_STEPS, TELLING_SHARE, told_lengths, told_range, told_share
+from gateway.bus.signals.decode import (
+    RANGE_TOLERANCE_STEPS,
+    SAME_SPEED_SHARE,
+    TELLING_SHARE,
+    told_lengths,
+    told_range,
+    told_share,
+)
+from gateway.bus.signals.mapping import SOURCE_ADDRESS
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE
 from gateway.core.settings import BatchSettings
 from gateway.errors import SignalMapError
@@ -103,6 +111,15 @@ class Described:
     heard: Heard
     message: DatabaseMessage
     by_group: bool
+
+    @property
+    def source_address(self) -> int:
+        return self.heard.can_id & SOURCE_ADDRESS
+
+    def is_rival(self, other: "Described") -> bool:
+        """Whether another device sends the same J1939 group on the same channel."""
+        is_same = self.message is other.message and self.heard.channel == other.heard.channel
+        return is_same and self.source_address != other.source_address
 
     @property
     def has_length(self) -> bool:
@@ -212,13 +229,16 @@ def refused_in(
 
 @dataclass(frozen=True, slots=True)
 class MapFit:
-    """A shipped map on one channel: the signals found, the missing ones, and the mean of its vertical axis."""
+    """A shipped map on one channel: the signals found, the missing ones, the mean of its vertical axis, and which
+    frames do not fit it.
+    """
 
     name: str
     channel: str | None
     found: tuple[Signal, ...]
     missing: tuple[Signal, ...]
     gravity_mps2: float
+    causes: tuple[str, ...]
 
     @property
     def has_gravity(self) -> bool:
@@ -239,11 +259,14 @@ def fits_of(heard: Sequence[Heard]) -> tuple[MapFit, ...]:
         for channel in sorted({one.channel for one in heard}, key=str):
             on_it = [one for one in heard if one.channel == channel]
             ours = [one for one in on_it if any(ids.is_for(one.can_id) for ids in signal_map.filters)]
-            motion = Decoder(signal_map).decode(merge_frames([one.frames for one in ours]))
+            decoder = Decoder(signal_map)
+            motion = decoder.decode(merge_frames([one.frames for one in ours]))
             found = tuple(signal for signal in motion.signals if len(motion.of(signal)[1]))
             missing = tuple(signal for signal in motion.signals if signal not in found and signal not in ASIDE)
             vertical = motion.of(Signal.VERTICAL_ACCELERATION)[1]
-            fits.append(MapFit(name, channel, found, missing, float(np.median(vertical)) if len(vertical) else np.nan))
+            gravity_mps2 = float(np.median(vertical)) if len(vertical) else np.nan
+            causes = tuple(cause.text for cause in decoder.causes())
+            fits.append(MapFit(name, channel, found, missing, gravity_mps2, causes))
     return tuple(
         sorted((fit for fit in fits if fit.found), key=lambda fit: (not fit.is_whole, len(fit.missing), fit.name))
     )
@@ -251,7 +274,9 @@ def fits_of(heard: Sequence[Heard]) -> tuple[MapFit, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """The findings about a log. ``lacking`` lists the obstacles; empty if it suffices."""
+    """The findings about a log. ``lacking`` lists the obstacles; empty if it suffices. ``to_mend`` is what the signal
+    map must say or have corrected before, such as which of several devices counts.
+    """
 
     log: Path
     report: LogReport
@@ -262,6 +287,7 @@ class Look:
     found: tuple[FoundRole, ...]
     tilt_deg: float
     refused: tuple[Refused, ...]
+    to_mend: tuple[str, ...]
     lacking: tuple[str, ...]
     faults: tuple[str, ...]
 
@@ -298,7 +324,25 @@ def look(log: Path, databases: Sequence[Path] = ()) -> Look:
     sources = {one.message.source for one in by_own} | {each.reading.described.message.source for each in found}
     refused = tuple(refused_in(messages, readings, sources))
     lacking = tuple(_lacking(found, fits, readings, tilt, refused))
-    return Look(log, report, heard, messages, fits, readings, found, tilt, refused, lacking, faults)
+    causes = (cause for fit in fits if fit.is_whole for cause in fit.causes)
+    to_mend = tuple(dict.fromkeys([*causes, *_rivals(found, readings)]))
+    return Look(log, report, heard, messages, fits, readings, found, tilt, refused, to_mend, lacking, faults)
+
+
+def _rivals(found: Sequence[FoundRole], readings: Sequence[SignalReading]) -> Iterator[str]:
+    """Signals with a role that several J1939 devices send; speeds that agree are no matter."""
+    for each in found:
+        ours = each.reading
+        same = [r for r in readings if r.signal is ours.signal and r.described.is_rival(ours.described) and len(r.x)]
+        if ours.quantity == "speed":
+            same = [r for r in same if abs(np.mean(r.x) - np.mean(ours.x)) > SAME_SPEED_SHARE * abs(np.mean(ours.x))]
+        if same:
+            unit = next(iter(TO_SI[ours.quantity]))
+            devices = [
+                f"{one.described.source_address:#04x} ({len(one.x):,} samples, usually {one.usual:.3g} {unit})"
+                for one in (ours, *same)
+            ]
+            yield f"{ours.name} comes from {' and '.join(devices)}: state the source_address of one"
 
 
 def _messages_of(
