@@ -159,7 +159,15 @@ def open_python_can(
         return PythonCanReceiver(bus, width, interface=interface)
     kernel_socket: socket.socket = bus.socket  # type: ignore[attr-defined] # of SocketcanBus
     with_enough_room(kernel_socket)
+    _discard_unfiltered(bus)
     return PythonCanReceiver(bus, width, kernel_socket)
+
+
+def _discard_unfiltered(bus: can.BusABC) -> None:
+    """Discard what came before python-can had set the filters of the socket that it had opened."""
+    for _ in range(BURST_FRAMES):
+        if bus.recv(0.0) is None:
+            return
 
 
 def with_enough_room(kernel_socket: socket.socket) -> None:
