@@ -14,7 +14,6 @@ from typing import Final
 import cantools
 from cantools.database.can import Message as CantoolsMessage
 from cantools.database.can import Signal as CantoolsSignal
-from cantools.database.errors import UnsupportedDatabaseFormatError
 
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.signals.dbc import DbcMessage, messages_in
@@ -45,7 +44,7 @@ class DatabaseSignal:
     @property
     def limits(self) -> tuple[float, float]:
         """Least and greatest physical value: of the database, or of the bits if it gives no range."""
-        if self.minimum is not None and self.maximum is not None and self.minimum < self.maximum:
+        if self.minimum is not None and self.maximum is not None and -math.inf < self.minimum < self.maximum < math.inf:
             return self.minimum, self.maximum
         return self.field.physical_range
 
@@ -134,8 +133,9 @@ def _loaded(where: str, text: str, kind: str) -> list[CantoolsMessage]:
     try:
         # not strict: vendors' databases with overlapping signals are common, and a field is checked when it is mapped
         database = cantools.database.load_string(text, kind, strict=False)
-    except (UnsupportedDatabaseFormatError, cantools.Error, UnicodeDecodeError) as fault:
-        said = _LINE.sub("", str(fault)) if kind == "dbc" else str(fault)
+    except Exception as fault:  # noqa: BLE001 - numbers beyond a double, texts that are none, a thousand brackets
+        said = str(fault) or type(fault).__name__
+        said = _LINE.sub("", said) if kind == "dbc" else said
         raise SignalMapError(f"{where}: {said[:TOLD_CHARS]}{'...' if len(said) > TOLD_CHARS else ''}") from None
     if not isinstance(database, cantools.database.can.Database):
         raise SignalMapError(f"{where}: it describes diagnostics; a DBC, KCD, ARXML or SYM is wanted")
