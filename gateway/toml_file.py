@@ -42,6 +42,7 @@ def read_toml(
     """The tables of ``path``. Raises ``error`` naming the file, and the line where its syntax breaks."""
     try:
         tables = tomllib.loads(read(path).decode("utf-8-sig"))
+        parts = list(_parts(tables, ""))
     except FileNotFoundError:
         raise error(f"{path}: no such file") from None
     except IsADirectoryError:
@@ -54,7 +55,7 @@ def read_toml(
         raise error(f"{path}: not UTF-8 text (byte {fault.start})") from None
     except (ValueError, RecursionError) as fault:  # a number of 5,000 digits, a thousand brackets
         raise error(f"{path}: not valid TOML: {fault}") from None
-    for where, part in _parts(tables, ""):
+    for where, part in parts:
         if isinstance(part, str) and "\0" in part:
             raise error(f"{path}: {where}: contains a NUL character, which no name or path may")
         if isinstance(part, int) and not -(2**63) <= part < 2**64:

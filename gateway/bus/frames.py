@@ -9,6 +9,8 @@ import numpy as np
 from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 from gateway.units import NS_PER_S
 
+LAST_STANDARD: Final = 0x7FF  # ISO 11898-1: 11 bits
+LAST_EXTENDED: Final = 0x1FFF_FFFF  # likewise 29 bits
 LAST_SECOND: Final = 9_223_372_035  # int64 nanoseconds reach no further
 
 Speed = float | Literal["max"]  # of a replay: 2.0 is twice as fast as recorded

@@ -160,8 +160,8 @@ REFUSED = {
     "asc as log": ("a.log", asc("2023-03-10 15:06:12"), "name it so"),
     "GVRET": ("a.csv", "Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n1,123,0,Rx,0,1,01\n", "SavvyCAN's"),
     "CANedge": ("a.csv", "TimestampEpoch;BusChannel;ID;IDE;DLC;DataLength;Dir;EDL;BRS;DataBytes\n", "CANedge's"),
-    "trc 1.2": ("a.trc", ";$FILEVERSION=1.2\n     1)      0.0 1  Rx  0123  2  01 02\n", "version 1.2"),
-    "trc 3.0": ("a.trc", ";$FILEVERSION=3.0\n", "version 3.0"),
+    "trc 1.2": ("a.trc", ";$FILEVERSION=1.2\n     1)      0.0 1  Rx  0123  2  01 02\n", "version '1.2'"),
+    "trc 3.0": ("a.trc", ";$FILEVERSION=3.0\n", "version '3.0'"),
 }
 
 
@@ -177,3 +177,11 @@ def test_a_byte_order_mark_costs_no_frame(tmp_path):
     for name, text in (("a.log", "(1627274455.012500) can0 123#01\n"), ("a.asc", asc("2023-03-10 15:06:12"))):
         frames, report = read(tmp_path / name, b"\xef\xbb\xbf" + text.encode())
         assert (len(frames), report.n_rejected, report.is_dated) == (1, 0, True)
+
+
+@pytest.mark.parametrize("line", [";$STARTTIMEX=abc\n", ";$COLUMNS=\n", ";$COLUMNS=X\n", ";$\n" * 50])
+def test_a_header_of_a_trc_log_that_cannot_be_read_ends_no_reading(line, tmp_path):
+    text = f";$FILEVERSION=2.1\n{line}     1 0.0 DT 1 0123 Rx - 2 01 02\n     2 1.0 DT 1 0123 Rx - 2 01 02\n"
+    frames, report = read(tmp_path / "a.trc", text)
+    assert len(frames) + report.n_rejected >= 2
+    assert report.frames == report.wanted + report.n_rejected

@@ -152,6 +152,9 @@ class _CandumpReader:
             self._report.reject(content, line_number, shown(line))
         elif content is NotData.REMOTE_FRAME:
             self._report.remote_frames += 1
+        elif content is NotData.ERROR_FRAME:  # of classes that do not exist; the others are never read
+            self._report.error_frames += 1
+            self._report.frames -= 1
         elif isinstance(content, LineFrame) and self._selection.has(content.channel.decode(), 1):
             places.append(np.array([hit]))
             parts.append(_one_frame(content, self._selection.width))

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.bus.frames import LAST_SECOND
+from gateway.bus.frames import LAST_EXTENDED, LAST_SECOND, LAST_STANDARD
 from gateway.bus.logs.report import LogReject
 from gateway.records import EXTENDED_ID, F64, I64, U8, U32, Bool, Frames
 from gateway.units import NS_PER_S
@@ -21,8 +21,6 @@ _LINE = re.compile(
 )
 _REMOTE = re.compile(rb"[Rr][0-9A-Fa-f]?")
 _ERROR_FLAG: Final = 0x2000_0000  # CAN_ERR_FLAG of linux/can.h
-_LAST_EXTENDED: Final = 0x1FFF_FFFF  # ISO 11898-1: 29 bits
-_LAST_STANDARD: Final = 0x7FF  # likewise 11 bits
 
 
 class NotData(Enum):
@@ -71,8 +69,8 @@ def _identifier(digits: bytes) -> int | NotData | LogReject:
     if len(digits) == 8:
         if can_id & _ERROR_FLAG and can_id < 2 * _ERROR_FLAG:
             return NotData.ERROR_FRAME
-        return can_id | EXTENDED_ID if can_id <= _LAST_EXTENDED else LogReject.BAD_ID
-    return can_id if len(digits) == 3 and can_id <= _LAST_STANDARD else LogReject.BAD_ID
+        return can_id | EXTENDED_ID if can_id <= LAST_EXTENDED else LogReject.BAD_ID
+    return can_id if len(digits) == 3 and can_id <= LAST_STANDARD else LogReject.BAD_ID
 
 
 def _payload(digits: bytes, *, is_fd: bool) -> bytes | LogReject:

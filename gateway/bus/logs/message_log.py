@@ -6,25 +6,31 @@ python-can takes the computer's own zone, knows two languages, and passes over w
 
 import io
 import re
+import zlib
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from datetime import UTC, datetime, tzinfo
 from itertools import islice
 from typing import Final, TextIO, cast
 
 import can
+from can.io import blf
 from can.io.generic import MessageReader
 
-from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of, message_id, stamp_to_ns
+from gateway.bus.frames import LAST_EXTENDED, LAST_SECOND, LAST_STANDARD, ExactStamp, frames_of, message_id, stamp_to_ns
 from gateway.bus.logs.packed import is_packed, open_log_file, unpacked_path, unpacked_suffix
-from gateway.bus.logs.report import LogReject, LogReport, Selection
+from gateway.bus.logs.report import SHOWN_CHARS, LogReject, LogReport, Selection
 from gateway.bus.logs.wall_clock import date_in, days_since_1899
+from gateway.bus.signals import CAN_FD_BYTES
 from gateway.bus.text import OR_CP1252
 from gateway.errors import LogUnreadableError
 from gateway.records import Frames
 from gateway.units import NS_PER_S
 
 CHUNK_MESSAGES: Final = 4096  # chosen: of python-can in memory
+KEPT_HEADER: Final = 16  # chosen: lines of a header for a reader that is restarted; PEAK writes three
+MOST_OF_CONTAINER: Final = 16_000_000  # chosen: bytes inflated at once of a .blf; Vector writes 128 KiB
+_OF_NO_LENGTH: Final = re.compile(rb"LOBJ.{4}\0{4}", re.DOTALL)
 LONGEST_LINE: Final = 1 << 16  # chosen: characters of a line that are read at once
 
 
@@ -52,6 +58,10 @@ def _ours(messages: Iterator[tuple[can.Message, int]], selection: Selection) -> 
             report.error_frames += 1
             continue
         report.frames += 1
+        last = LAST_EXTENDED if message.is_extended_id else LAST_STANDARD
+        if not isinstance(message.arbitration_id, int) or not 0 <= message.arbitration_id <= last:
+            report.reject(LogReject.BAD_ID, report.lines or None)
+            continue
         can_id = message_id(message)
         if can_id not in is_mapped:
             is_mapped[can_id] = any(ids.is_for(can_id) for ids in selection.filters)
@@ -61,11 +71,19 @@ def _ours(messages: Iterator[tuple[can.Message, int]], selection: Selection) -> 
             report.remote_frames += 1
         elif not selection.has(message.channel, 1):
             continue
-        elif not abs(message.timestamp + start_ns / NS_PER_S) <= LAST_SECOND:
-            report.reject(LogReject.BAD_TIME, report.lines or None)
+        elif (fault := _fault_of(message, start_ns)) is not None:
+            report.reject(fault, report.lines or None)
         else:
             message.timestamp = ExactStamp(stamp_to_ns(message.timestamp) + start_ns)
             yield message
+
+
+def _fault_of(message: can.Message, start_ns: int) -> LogReject | None:
+    """Why a message is none: python-can passes on whatever a file says."""
+    stamp = message.timestamp
+    if not isinstance(stamp, int | float) or not abs(stamp + start_ns / NS_PER_S) <= LAST_SECOND:
+        return LogReject.BAD_TIME
+    return LogReject.TOO_LONG if len(message.data) > CAN_FD_BYTES else None
 
 
 class _RestartError(Exception):
@@ -88,6 +106,7 @@ class _TextLog:
         self._text: TextIO = io.StringIO()
         self._is_at_end = False
         self._line, self._is_awaited = "", False  # the last one, and whether it should give a message
+        self._given = ""  # to the reader, from the file or from the header
 
     def accepted(self, line: str) -> str | None:
         """The line, which is not blank, as the reader gets it; None for one that the reader need not see."""
@@ -121,6 +140,9 @@ class _TextLog:
         except Exception:  # noqa: BLE001 # python-can's parsers raise whatever a garbled line makes int() or split() raise
             self._is_awaited = False
             self.report.reject_frame(LogReject.GARBLED, self._line)
+            if self._given in self.header:  # else it fails again and again
+                self.header.remove(self._given)
+                self._inserted.clear()
         self._inserted.extend(self.header)
 
     def _count_awaited(self) -> None:
@@ -135,7 +157,8 @@ class _TextLog:
         self._count_awaited()
         while True:
             if self._inserted:
-                return self._inserted.popleft()
+                self._given = self._inserted.popleft()
+                return self._given
             self._line = self._text.readline(LONGEST_LINE)
             if not self._line:
                 self._is_at_end = True
@@ -143,7 +166,7 @@ class _TextLog:
             self.report.lines += 1
             accepted = self.accepted(self._line) if self._line.strip() else None
             if accepted is not None:
-                self._is_awaited = self.holds_frame(accepted)
+                self._given, self._is_awaited = accepted, self.holds_frame(accepted)
                 return accepted
 
     def close(self) -> None:
@@ -209,11 +232,11 @@ class _TrcLog(_TextLog):
             self.start_ns = self.report.begin_at(days_since_1899(days) if days > 0 else None, self.zone, told)
         elif name == "$FILEVERSION" and told not in self.VERSIONS:
             raise LogUnreadableError(
-                f"{self.report.path}: line {self.report.lines}: is a .trc of version {told}; read are "
+                f"{self.report.path}: line {self.report.lines}: is a .trc of version {told[:SHOWN_CHARS]!r}; read are "
                 f"{', '.join(self.VERSIONS)}: convert it with PEAK's converter"
             )
         elif line.startswith(";$"):
-            self.header.append(line)
+            self.header = [*self.header, line][-KEPT_HEADER:]
             return line
         elif "start time:" in line.lower() and self.report.start_ns is None and (date := date_in(line)) is not None:
             self.start_ns = self.report.begin_at(date, self.zone, line)
@@ -254,10 +277,39 @@ _TEXTS: Final[dict[str, type[_TextLog]]] = {".asc": _AscLog, ".csv": _CsvLog, ".
 MESSAGE_SUFFIXES: Final = (*_TEXTS, ".blf", ".db")
 
 
+class _BlfReader(can.BLFReader):
+    """Ends at the first container that is damaged or absurd; python-can passes over some, takes all memory for others,
+    and reads an object of no length for ever.
+    """
+
+    def __iter__(self) -> Generator[can.Message, None, None]:
+        head = blf.OBJ_HEADER_BASE_STRUCT
+        while begin := self.file.read(head.size):
+            signature, _, _, n_bytes, kind = head.unpack(begin)
+            if signature != b"LOBJ" or n_bytes < head.size:
+                raise blf.BLFParseError("an object has no beginning")
+            content = self.file.read(n_bytes - head.size)
+            self.file.read(n_bytes % 4)  # padding
+            if kind == blf.LOG_CONTAINER:
+                yield from self._parse_container(self._unpacked(content))
+        self.stop()
+
+    def _unpacked(self, content: bytes) -> bytes:
+        method, _ = blf.LOG_CONTAINER_STRUCT.unpack_from(content)
+        packed = content[blf.LOG_CONTAINER_STRUCT.size :]
+        if method == blf.ZLIB_DEFLATE:
+            packed = zlib.decompressobj().decompress(packed, MOST_OF_CONTAINER)
+        elif method != blf.NO_COMPRESSION:
+            raise blf.BLFParseError(f"a container is packed by the unknown method {method}")
+        if len(packed) + len(self._tail) >= MOST_OF_CONTAINER or _OF_NO_LENGTH.search(self._tail[-16:] + packed):
+            raise blf.BLFParseError("an object has an absurd length")
+        return packed
+
+
 def _blf_messages(report: LogReport, zone: tzinfo | None) -> Iterator[tuple[can.Message, int]]:
     with report.until_damage(".blf"), open_log_file(report.path) as stream:
         n_bytes = None if is_packed(stream) else report.path.stat().st_size  # a packed one says itself where it is cut
-        reader = can.BLFReader(stream)
+        reader = _BlfReader(stream)
         as_utc_ns, shift_ns = round(reader.start_timestamp * 1000) * 1_000_000, 0
         if reader.start_timestamp:
             date = datetime.fromtimestamp(as_utc_ns // NS_PER_S, UTC).replace(tzinfo=None)

@@ -1,5 +1,6 @@
 """Reader of ASAM's measurement files (.mf4) with bus frames, by asammdf: the extra springscale[mdf]."""
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, suppress
 from functools import cache, partial
@@ -45,6 +46,7 @@ def _asammdf() -> "Callable[[Path], MDF]":
     from asammdf import MDF  # noqa: PLC0415 # an extra
     from asammdf.blocks.mdf_v4 import MDF4  # noqa: PLC0415
 
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # its faults come as exceptions too, which we tell once
     destroy = MDF4.__del__
 
     def destroy_quietly(mdf: MDF4) -> None:

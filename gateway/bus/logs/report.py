@@ -124,7 +124,7 @@ class LogReport:
         """Count a refused line, or ``n`` of them without line numbers, which ``frames`` counts already."""
         if n == 0:
             return
-        told = self.rejects.setdefault(reason, RejectedLines(text=text))
+        told = self.rejects.setdefault(reason, RejectedLines(text=text[: 2 * SHOWN_CHARS]))
         if line is not None and self.keeps_lines_of(reason):
             told.first_lines.append(line)
         told.count += n

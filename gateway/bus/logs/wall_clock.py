@@ -4,6 +4,7 @@ import re
 from datetime import UTC, datetime, timedelta, tzinfo
 from typing import Final
 
+LONGEST_DATE: Final = 200  # chosen: characters of a line that states one
 LATE_START_S: Final = 3600.0  # chosen: a first frame so long after the date of its header gets a remark
 
 # Short names as CANoe writes them with Windows in English, German, French, Italian, Spanish, Polish, Portuguese, Dutch,
@@ -32,6 +33,7 @@ _NUMBERS: Final = re.compile(rf"(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<ye
 
 def date_in(text: str) -> datetime | None:
     """The date of a header's line; None if it has none that can be read. Aware only if the text states a zone."""
+    text = text[:LONGEST_DATE]
     try:
         if iso := _ISO.search(text):
             return datetime.fromisoformat(iso[0].replace(",", "."))

@@ -1,0 +1,119 @@
+"""Logs that no recorder writes: each is counted or refused in words, at once; none is read for ever."""
+
+import sqlite3
+import struct
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import can
+import pytest
+
+from gateway.bus.frames import join
+from gateway.bus.logs import open_whole_log
+from gateway.bus.logs.report import LogReport
+from gateway.errors import LogUnreadableError
+from gateway.records import Frames
+
+ASC = "date 2023-03-10 15:06:12\nbase hex  timestamps absolute\ninternal events logged\n"
+CSV = "timestamp,arbitration_id,extended,remote,error,dlc,data\n"
+SOUND = {
+    ".log": "(1790000000.5) can0 123#0102\n",
+    ".asc": "   0.500000 1  123             Rx   d 2 01 02\n",
+    ".csv": "1790000000.5,0x123,0,0,0,2,AQI=\n",
+    ".trc": "     1)      500.0  Rx  0123  2  01 02\n",
+}
+HEADS = {".asc": ASC, ".csv": CSV, ".trc": ";$FILEVERSION=1.1\n", ".log": ""}
+
+
+def read(path: Path) -> tuple[Frames, LogReport]:
+    chunks, report = open_whole_log(path)
+    return join(list(chunks), 64), report
+
+
+LINES = {
+    "an identifier of 33 bits": (".asc", "   0.6 1  1FFFFFFFF             Rx   d 2 01 02\n", "bad id"),
+    "an identifier of 12 bits": (".csv", "1790000000.6,0x1234,0,0,0,2,AQI=\n", "bad id"),
+    "an identifier of a hundred digits": (".csv", f"1790000000.6,0x{'1' * 100},1,0,0,2,AQI=\n", "bad id"),
+    "a stamp without end": (".csv", "inf,0x123,0,0,0,2,AQI=\n", "bad time"),
+    "a stamp beyond 64 bits": (".csv", "1e15,0x123,0,0,0,2,AQI=\n", "bad time"),
+    "a frame of 65 bytes": (".csv", f"1790000000.6,0x123,0,0,0,65,{'AAAA' * 22}\n", "too long"),
+    "a line of letters": (".trc", "a" * 60_000 + "\n", "no frame"),
+    "a line of digits": (".trc", "1" * 60_000 + "\n", "no frame"),
+}
+
+
+@pytest.mark.parametrize("kind", LINES)
+def test_a_line_that_holds_no_frame_is_counted_with_its_reason(kind: str, tmp_path: Path) -> None:
+    suffix, line, said = LINES[kind]
+    path = tmp_path / f"a{suffix}"
+    path.write_text(HEADS[suffix] + SOUND[suffix] + line + SOUND[suffix])
+    begun_s = time.process_time()
+    frames, report = read(path)
+    assert time.process_time() - begun_s < 2.0
+    assert (len(frames), report.n_rejected, report.frames, report.other_identifiers) == (2, 1, 3, 0)
+    (remark,) = (remark for remark in report.remarks() if f"left out, {said}" in remark)
+    assert len(remark) < 400
+
+
+def test_error_frames_of_classes_that_do_not_exist_are_error_frames(tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text(SOUND[".log"] + "(1790000000.6) can0 2FFFFFFF#0000000000000000\n")
+    _, report = read(tmp_path / "a.log")
+    assert (report.frames, report.wanted, report.error_frames, report.other_identifiers) == (1, 1, 1, 0)
+
+
+@pytest.mark.parametrize("date", ["A" * 60_000, "1" * 60_000, "1:" * 30_000, "jan " * 15_000])
+def test_a_date_of_any_length_is_looked_at_once(date: str, tmp_path: Path) -> None:
+    (tmp_path / "a.asc").write_text(f"date {date}\n{ASC.partition(chr(10))[2]}{SOUND['.asc']}")
+    begun_s = time.process_time()
+    frames, report = read(tmp_path / "a.asc")
+    assert time.process_time() - begun_s < 2.0
+    assert len(frames) == 1
+    assert not report.is_dated
+
+
+def blf(path: Path) -> bytearray:
+    """Two frames in one container that is not compressed."""
+    with can.BLFWriter(path, compression_level=0) as writer:
+        for n in range(2):
+            writer.on_message_received(can.Message(timestamp=1_790_000_000.0 + n, arbitration_id=0x123, data=b"12"))
+    return bytearray(path.read_bytes())
+
+
+def of_no_length(content: bytearray) -> None:
+    at = content.rindex(b"LOBJ")
+    content[at + 8 : at + 12] = bytes(4)
+
+
+def of_all_lengths(content: bytearray) -> None:
+    at = content.index(b"LOBJ")
+    content[at + 8 : at + 12] = struct.pack("<L", 3)
+
+
+def packed_otherwise(content: bytearray) -> None:
+    content[content.index(b"LOBJ") + 16] = 7
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [(of_no_length, "absurd length"), (of_all_lengths, "no beginning"), (packed_otherwise, "unknown method 7")],
+)
+def test_an_absurd_object_ends_a_blf(spoil: Callable[[bytearray], None], said: str, tmp_path: Path) -> None:
+    content = blf(tmp_path / "a.blf")
+    assert len(read(tmp_path / "a.blf")[0]) == 2
+    spoil(content)
+    (tmp_path / "a.blf").write_bytes(content)
+    with pytest.raises(LogUnreadableError, match=said):
+        read(tmp_path / "a.blf")
+
+
+def test_a_row_of_a_database_without_an_identifier_is_counted(tmp_path: Path) -> None:
+    path = tmp_path / "a.db"
+    with can.SqliteWriter(path) as writer:
+        for n in range(2):
+            writer.on_message_received(can.Message(timestamp=1_790_000_000.0 + n, arbitration_id=0x123, data=b"12"))
+    with sqlite3.connect(path) as database:
+        database.execute("UPDATE messages SET arbitration_id = NULL WHERE ts > 1790000000.5")
+    database.close()
+    frames, report = read(path)
+    assert (len(frames), report.n_rejected, report.frames) == (1, 1, 2)
