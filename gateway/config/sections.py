@@ -6,10 +6,15 @@ from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from gateway.permission import Holder, Kind, encryption_to, may_leave
+
 Seconds = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]  # 32 years: fits 64 bits in nanoseconds
 LimitKg = Annotated[float | None, Field(gt=0.0, le=100_000.0, allow_inf_nan=False)]  # road vehicles weigh less
 OF_CALIBRATION = "[default: as the calibration has it]"
-_LOCAL: Final = frozenset({"127.0.0.1", "::1", "localhost"})
+
+
+def _may_be_sent_to(host: str, *, has_tls: bool) -> bool:
+    return may_leave(Kind.RECORD, encryption_to(host, has_tls=has_tls), Holder.NAMED)
 
 
 class SettingsSection(BaseModel):
@@ -119,7 +124,7 @@ class UplinkSection(SettingsSection):
             raise ValueError("certificate and key belong together: give both or neither")
         if self.password_file is not None and self.username is None:
             raise ValueError("password_file needs username")
-        if self.host is not None and not self.tls and self.host not in _LOCAL:
+        if self.host is not None and not _may_be_sent_to(self.host, has_tls=self.tls):
             raise ValueError("estimates would cross the network in the clear: set tls = true")
         return self
 
@@ -193,7 +198,7 @@ class WebhookSection(SettingsSection):
             raise ValueError("is no https:// address")
         if parts.username is not None or parts.fragment or not url.isascii() or not url.isprintable() or " " in url:
             raise ValueError("may contain neither a user nor a fragment, and no character that must be escaped")
-        if parts.scheme == "http" and parts.hostname not in _LOCAL:
+        if not _may_be_sent_to(parts.hostname, has_tls=parts.scheme == "https"):
             raise ValueError("would cross the network in the clear: use https://")
         return url
 

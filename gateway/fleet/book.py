@@ -4,18 +4,20 @@ A record that cannot be read or stored is set aside with the reason, and does no
 """
 
 import json
-import re
 import threading
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar
 
 import sqlalchemy as sql
+from pydantic import BaseModel
 from sqlalchemy.dialects import postgresql, sqlite
 
-from gateway.fleet.records import KINDS, Alarm, Estimate, Fleet, Line, Status
+from gateway.fleet.records import Alarm, Arrival, Estimate, Fleet, Line, Status, read
+
+Read = TypeVar("Read", bound=BaseModel)
 
 _TABLES: Final = sql.MetaData()
 
@@ -54,11 +56,10 @@ UNREADABLE: Final = sql.Table(
     sql.Column("fault", sql.Text, nullable=False),
     sql.Column("payload", sql.LargeBinary, nullable=False),
 )
-AWAY: Final = (sql.exc.OperationalError, sql.exc.InterfaceError, sql.exc.ProgrammingError, sql.exc.TimeoutError)
-"""What :meth:`Book.write` raises while the database is away, full, or lacks a table or a right: try again later."""
+AWAY: Final = sql.exc.SQLAlchemyError
+"""What :meth:`Book.write` raises while the database is away or full: it takes not even a record that is set aside."""
 
 BRANCH: Final = "springscale/+"  # of all vehicles, + where each has its name, as deploy/fleet/mosquitto/acl has it
-_NAME: Final = re.compile(r"[A-Za-z0-9._-]{1,64}")  # of a vehicle, as deploy/fleet/provision.py has them
 _LATEST: Final = (
     sql.select(ESTIMATE.c.record)
     .where(ESTIMATE.c.vehicle_id == VEHICLE.c.vehicle_id, ESTIMATE.c.is_weighed)
@@ -92,47 +93,75 @@ class Book:
         if url.drivername == "sqlite":
             self._insert = sqlite.insert
             sql.event.listen(self._engine, "connect", _make_durable)
+            sql.event.listen(self._engine, "begin", lambda connection: connection.exec_driver_sql("BEGIN"))
         self._has_tables, self._lock = False, threading.Lock()
         self.counts: Counter[str] = Counter()
 
     def write(self, arrivals: Sequence[Message]) -> list[tuple[str, str]]:
         """Store all messages; on disk when this returns -> topic and fault of those that were set aside.
 
-        Raises one of ``AWAY``: then it is not known which are stored, and all can be written again.
+        Raises ``AWAY``: then it is not known which are stored, and all can be written again.
         """
         try:
-            with self._begun() as database:
-                counts = Counter([self._store(database, arrival) for arrival in arrivals])
-        except AWAY:
-            raise
-        except Exception as fault:  # noqa: BLE001 - one of them is at fault, so that each is tried alone
-            if len(arrivals) > 1:
-                return [told for arrival in arrivals for told in self.write([arrival])]
-            return [self._set_aside(arrivals[0], fault)]
-        self.counts += counts
-        return []
+            return self._written(arrivals, sets_aside=False)
+        except Exception:  # noqa: BLE001 - a connection from before the database was restarted, a table that is missing
+            self._has_tables = False
+            return self._written(arrivals, sets_aside=True)
+
+    def _written(self, arrivals: Sequence[Message], *, sets_aside: bool) -> list[tuple[str, str]]:
+        """One transaction, a savepoint for each message. What cannot be read is set aside, and with ``sets_aside`` also
+        what the database refuses; if it refuses that too, the database is at fault and not the record.
+        """
+        counts, told = Counter[str](), []
+        with self._begun() as database:
+            for arrival in arrivals:
+                try:
+                    found = read(arrival.topic, arrival.payload)
+                except Exception as fault:  # noqa: BLE001 - whatever a vehicle sends
+                    told.append(self._set_aside(database, arrival, fault))
+                    continue
+                try:
+                    with database.begin_nested():
+                        counts[self._store(database, found)] += 1
+                except Exception as fault:
+                    if not sets_aside:
+                        raise
+                    told.append(self._set_aside(database, arrival, fault))
+        self.counts += counts + Counter(unreadable=len(told))
+        return told
 
     def fleet(self) -> Fleet:
-        """The fleet now, a line per vehicle."""
-        now_s, alarms, lines = self._clock_s(), defaultdict[str, list[Alarm]](list), []
+        """The fleet now, a line per vehicle. A stored record that this version cannot read is left out and counted."""
+        now_s, alarms, n_unread = self._clock_s(), defaultdict[str, list[Alarm]](list), 0
+
+        def read_again(model: type[Read], text: str | None) -> Read | None:
+            nonlocal n_unread
+            try:
+                return model.model_validate_json(text) if text else None
+            except ValueError:
+                n_unread += 1
+                return None
+
         with self._begun() as database:
             for vehicle, record in database.execute(_ACTIVE):
-                alarms[vehicle].append(Alarm.model_validate_json(record))
+                if (alarm := read_again(Alarm, record)) is not None:
+                    alarms[vehicle].append(alarm)
             rows = database.execute(_LINES).all()
             n_unreadable = database.execute(sql.select(sql.func.count()).select_from(UNREADABLE)).scalar_one()
+        lines = []
         for vehicle, status, record in rows:
-            estimate = record and Estimate.model_validate_json(record)
+            estimate = read_again(Estimate, record)
             lines.append(
                 Line(
                     vehicle_id=vehicle,
-                    status=status and Status.model_validate_json(status),
+                    status=read_again(Status, status),
                     estimate=estimate,
                     age_s=estimate and max(0.0, now_s - estimate.t_end.timestamp()),
                     used_share=estimate and estimate.used_share(),
                     alarms=alarms[vehicle],
                 )
             )
-        return Fleet(items=lines, n_unreadable=n_unreadable)
+        return Fleet(items=lines, n_unreadable=n_unreadable + n_unread)
 
     def close(self) -> None:
         self._engine.dispose()
@@ -145,21 +174,13 @@ class Book:
                 self._has_tables = True
         return self._engine.begin()
 
-    def _store(self, database: sql.Connection, arrival: Message) -> str:
-        """Store a record -> its kind, or "known already". Raises ValueError or LookupError if it cannot be read.
-
-        The vehicle's name is from the topic alone: the broker lets each vehicle write below its own.
-        """
-        _, vehicle, kind, *_ = arrival.topic.split("/")
-        if not _NAME.fullmatch(vehicle):
-            raise ValueError("no name of a vehicle")
-        told = json.loads(arrival.payload)
-        text = json.dumps(told, allow_nan=False)  # ASCII, which no database refuses
-        record = KINDS[kind].model_validate_json(text)
+    def _store(self, database: sql.Connection, found: Arrival) -> str:
+        """Store a record -> its kind, or "known already"."""
+        vehicle, kind, record, text = found
         database.execute(self._insert(VEHICLE).values(vehicle_id=vehicle).on_conflict_do_nothing())
         if isinstance(record, Status):
             before = database.execute(sql.select(VEHICLE.c.status).where(VEHICLE.c.vehicle_id == vehicle)).scalar_one()
-            known = {key: field for key, field in told.items() if field is not None}
+            known = record.model_dump(exclude_none=True)
             text = json.dumps(json.loads(before or "{}") | known)  # the will has fewer fields than the birth message
             statement = sql.update(VEHICLE).where(VEHICLE.c.vehicle_id == vehicle).values(status=text)
         elif isinstance(record, Estimate):
@@ -176,15 +197,15 @@ class Book:
             statement = new.on_conflict_do_update(index_elements=["vehicle_id", "id"], set_=row, where=is_later)
         return kind if database.execute(statement).rowcount else "known already"
 
-    def _set_aside(self, arrival: Message, fault: Exception) -> tuple[str, str]:
-        told = f"{type(fault).__name__}: {fault}".replace("\0", "")[:1000]
+    def _set_aside(self, database: sql.Connection, arrival: Message, fault: Exception) -> tuple[str, str]:
+        """Keep the message as it came, with the reason. Raises ``AWAY``."""
+        told = f"{type(fault).__name__}: {fault}".encode("ascii", "backslashreplace").decode().replace("\0", "")[:1000]
         row = {"received_s": self._clock_s(), "topic": arrival.topic, "fault": told, "payload": arrival.payload}
-        with self._begun() as database:
-            database.execute(sql.insert(UNREADABLE).values(row))
-        self.counts["unreadable"] += 1
+        database.execute(sql.insert(UNREADABLE).values(row))
         return arrival.topic, told
 
 
 def _make_durable(connection: Any, _record: Any) -> None:
+    connection.isolation_level = None  # else the driver begins no transaction before a savepoint
     for pragma in ("journal_mode = WAL", "synchronous = FULL"):
         connection.execute(f"PRAGMA {pragma}")

@@ -1,27 +1,40 @@
-"""The fleet's page, /fleet, and its API, /api/v1/fleet."""
+"""The fleet's page, /fleet, and its API, /api/v1/fleet.
+
+They ask nobody for a token, and so answer only under the names that the settings give the subscriber: a page from
+elsewhere cannot read them by a name of its own that leads here.
+"""
 
 import threading
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 
 import uvicorn
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI, HTTPException, Request
 from starlette.responses import FileResponse, RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from gateway.fleet.book import Book
 from gateway.fleet.records import Fleet
+from gateway.permission import LOCAL_NAMES, Encryption, Holder, Kind, may_leave, name_in
 from gateway.web.access.middleware import SecurityHeaders
 from gateway.web.pages import ASSETS
 
 
-def fleet_app(book: Book) -> FastAPI:
-    """The application over a book, which it asks in a worker thread."""
+def fleet_app(book: Book, names: Collection[str] = ()) -> FastAPI:
+    """The application over a book, which it asks in a worker thread. It answers under ``names`` and local names."""
+
+    async def is_asked_for(request: Request) -> None:
+        """Raise HTTPException for a request under another name."""
+        known = {*LOCAL_NAMES, *map(str.lower, names)}
+        holder = Holder.MACHINE if name_in(request.headers.get("host", "")) in known else Holder.NOBODY
+        if not may_leave(Kind.RECORD, Encryption.LOCAL, holder):  # a proxy on this machine encrypts and asks who it is
+            raise HTTPException(421, f"answered for are {', '.join(sorted(known))}: name others in FLEET_NAMES")
+
     app = FastAPI(title="Springscale fleet", docs_url=None, redoc_url=None)
     app.add_middleware(SecurityHeaders, counts=Counter())
 
-    @app.get("/api/v1/fleet")
+    @app.get("/api/v1/fleet", dependencies=[Depends(is_asked_for)])
     def fleet() -> Fleet:
         """The fleet now, a line per vehicle."""
         return book.fleet()

@@ -1,21 +1,31 @@
-"""What is read of the vehicles' records, and one vehicle as a line of the fleet's table. Other fields are ignored."""
+"""The border of the fleet: what is read of the vehicles' records, and one vehicle as a line of the fleet's table.
 
-from typing import Annotated, Any, Final
+Other fields are ignored. Every type is closed: integers of 64 bits, finite numbers, texts and lists of limited length.
+"""
 
-from pydantic import AwareDatetime, BaseModel, Field
+import json
+import re
+from typing import Annotated, Any, Final, NamedTuple
+
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 RecordId = Annotated[str, Field(pattern=r"^[ -~]{1,200}$")]
 Number = Annotated[int, Field(ge=0, lt=2**63)]
+Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]{0,200}$")]
 
 
-class Status(BaseModel):
+class _Told(BaseModel):
+    model_config = ConfigDict(allow_inf_nan=False, frozen=True)
+
+
+class Status(_Told):
     """A vehicle's birth message, or its will."""
 
-    state: str = Field(examples=["online"])
-    vin: str | None = None
+    state: Text = Field(examples=["online"])
+    vin: Text | None = None
 
 
-class Weight(BaseModel):
+class Weight(_Told):
     """A weight of an estimate."""
 
     kg: float | None = None
@@ -23,7 +33,7 @@ class Weight(BaseModel):
     is_over_limit: bool | None = None
 
 
-class Place(BaseModel):
+class Place(_Told):
     """The place of a record in the vehicle's stream: docs/uplink.md."""
 
     stream: RecordId
@@ -31,16 +41,16 @@ class Place(BaseModel):
     previous: Number
 
 
-class Estimate(BaseModel):
+class Estimate(_Told):
     """A batch, weighed or not."""
 
     id: RecordId
     t_end: AwareDatetime
-    rejected: list[str]
-    vin: str | None = None
+    rejected: list[Text] = Field(max_length=100)
+    vin: Text | None = None
     payload_kg: float | None = None
     payload_std_kg: float | None = None
-    weights: dict[str, Weight | None] | None = None
+    weights: dict[Text, Weight | None] | None = Field(None, max_length=100)
     sequence: Place | None = None
 
     def columns(self) -> dict[str, Any]:
@@ -57,7 +67,7 @@ class Estimate(BaseModel):
         return max(0.0, self.payload_kg / capacity_kg) if capacity_kg > 0.0 else None
 
 
-class Entry(BaseModel):
+class Entry(_Told):
     """A load event or a trip in one of its revisions."""
 
     id: RecordId
@@ -67,9 +77,9 @@ class Entry(BaseModel):
 class Alarm(Entry):
     """An alarm in one of its revisions."""
 
-    kind: str = Field(examples=["overload"])
-    where: str = Field(examples=["rear_axle"])
-    t_start: str
+    kind: Text = Field(examples=["overload"])
+    where: Text = Field(examples=["rear_axle"])
+    t_start: Text
     is_active: bool
 
 
@@ -77,6 +87,28 @@ KINDS: Final[dict[str, type[Status | Estimate | Entry]]] = {
     "status": Status, "estimates": Estimate, "alarms": Alarm, "events": Entry, "trips": Entry
 }  # fmt: skip
 """By the level of the topic below the vehicle's name."""
+VEHICLE_ID: Final = re.compile(r"[A-Za-z0-9._-]{1,64}")  # as [vehicle] id and deploy/fleet/provision.py have it
+
+
+class Arrival(NamedTuple):
+    """A record that was read: its vehicle, its kind, and its JSON in ASCII, which no database refuses."""
+
+    vehicle_id: str
+    kind: str
+    record: Status | Estimate | Entry
+    text: str
+
+
+def read(topic: str, payload: bytes) -> Arrival:
+    """What a message says. Raises whatever its content provokes; ``Exception`` covers it.
+
+    The vehicle's name is from the topic alone: the broker lets each vehicle write below its own.
+    """
+    _, vehicle_id, kind, *_ = topic.split("/")
+    if not VEHICLE_ID.fullmatch(vehicle_id):
+        raise ValueError("no name of a vehicle")
+    text = json.dumps(json.loads(payload), allow_nan=False)
+    return Arrival(vehicle_id, kind, KINDS[kind].model_validate_json(text), text)
 
 
 class Line(BaseModel):

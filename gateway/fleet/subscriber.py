@@ -45,6 +45,7 @@ class Settings(BaseSettings):
     fleet_database: str = "fleet.sqlite"  # or postgresql://...
     fleet_host: str = "127.0.0.1"  # of the page, which asks nobody for a token: keep a proxy that does before it
     fleet_port: int = 8080
+    fleet_names: tuple[str, ...] = ()  # beside local names: those under which the proxy hands requests on
 
 
 class Link:
@@ -111,7 +112,7 @@ def serve(link: Link, book: Book, stopping: threading.Event) -> None:
         try:
             for topic, fault in book.write(waiting) if waiting else ():
                 tell("unreadable", topic=topic, fault=fault)
-        except AWAY as away:
+        except AWAY as away:  # not even a record that is set aside is taken
             tell("database away", fault=str(away).partition("\n")[0], waiting=len(waiting))
             stopping.wait(PAUSE_S)
             continue
@@ -129,7 +130,10 @@ def main() -> None:
         signal.signal(number, lambda *_: stopping.set())
     settings = Settings()
     book = Book(settings.fleet_database)
-    with contextlib.closing(book), served(fleet_app(book), settings.fleet_host, settings.fleet_port):
+    with (
+        contextlib.closing(book),
+        served(fleet_app(book, settings.fleet_names), settings.fleet_host, settings.fleet_port),
+    ):
         link = Link(settings)
         try:
             serve(link, book, stopping)

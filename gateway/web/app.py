@@ -134,6 +134,6 @@ def _latest(board: Board, access: Access) -> Callable[[Request], Awaitable[Respo
 
     async def latest(request: Request) -> Response:
         await access(request, await bearer(request))
-        return LatestResponse(board, request.scope)
+        return LatestResponse(board, request.scope, request.state.client.shown)
 
     return latest

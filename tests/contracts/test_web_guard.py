@@ -12,7 +12,7 @@ from support.patience import PATIENCE_S
 from support.web import Client, Gateway, serving
 
 from gateway.errors import ConfigurationError
-from gateway.web.access.guard import is_loopback
+from gateway.permission import is_loopback
 from gateway.web.access.serving import Tls, refuse_open_address, server_config
 from gateway.web.access.tokens import Scope, TokenFile
 
@@ -224,4 +224,5 @@ def test_a_stranger_is_refused_before_and_after_the_first_token(tmp_path: Path) 
         assert stranger.get("/api/v1/status").status_code == 403
         text = tokens.create("reader", Scope.READ)
         assert stranger.get("/api/v1/status").status_code == 401
-        assert stranger.get("/api/v1/status", headers=bearer(text)).status_code == 200
+        assert stranger.get("https://localhost:8000/api/v1/status", headers=bearer(text)).status_code == 200
+        assert stranger.get("/api/v1/status", headers=bearer(text)).status_code == 403  # it would cross in the clear

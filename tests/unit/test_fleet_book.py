@@ -126,14 +126,23 @@ def test_a_record_that_the_database_alone_refuses_is_set_aside(book: Book, monke
     assert book.counts == {"unreadable": 1, "trips": 4, "known already": 1}
 
 
-def test_a_database_that_is_away_is_told_to_the_caller(book: Book, tmp_path: Path) -> None:
+def test_a_table_that_is_missing_is_made_again(book: Book, tmp_path: Path) -> None:
+    """Every record that came was taken for an absent database, for ever."""
     book.write([estimate("van-1", 1, 5.0)])
     with sqlite3.connect(tmp_path / "fleet.sqlite") as breaking:
         breaking.execute("DROP TABLE estimate")
+    assert book.write([estimate("van-1", 2, 6.0)]) == []
+    assert book.fleet().items[0].estimate.payload_kg == 6.0
+
+
+def test_a_database_that_is_away_is_told_to_the_caller_and_used_when_it_is_back(tmp_path: Path) -> None:
+    book = Book(str(tmp_path / "absent" / "fleet.sqlite"), lambda: NOW_S)
     with pytest.raises(AWAY):
-        book.write([estimate("van-1", 2, 5.0)])
-    with sqlite3.connect(tmp_path / "fleet.sqlite") as looked:
-        assert looked.execute("SELECT count(*) FROM unreadable").fetchone() == (0,)
+        book.write([estimate("van-1", 2, 5.0), Message("springscale/van-1/trips", b"no JSON")])
+    assert book.counts == {}
+    (tmp_path / "absent").mkdir()
+    assert book.write([estimate("van-1", 2, 5.0)]) == []
+    book.close()
 
 
 def test_it_is_there_after_a_restart(book: Book, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from gateway.errors import ConfigurationError
-from gateway.web.access.guard import is_loopback
+from gateway.permission import Holder, Kind, encryption_to, may_leave
 
 CONNECTIONS: Final = 100  # chosen: of all clients together, streams among them; beyond them the answer is 503
 HEAD_BYTES: Final = 32_768  # chosen: request line and headers
@@ -38,7 +38,8 @@ def refuse_open_address(host: str, *, has_tokens: bool, has_tls: bool) -> None:
     """Raise ConfigurationError if machines other than this one could ask without a token, or read along."""
     wanted = [] if has_tokens else ["a token (make one: `springscale token create NAME --config springscale.toml`)"]
     wanted += [] if has_tls else ["TLS (tls_certificate and tls_key)"]
-    if wanted and not is_loopback(host):
+    holder = Holder.READ if has_tokens else Holder.MACHINE
+    if not may_leave(Kind.RECORD, encryption_to(host, has_tls=has_tls), holder):
         raise ConfigurationError(
             f"[web] host = {host!r} can be reached from elsewhere, and needs {' and '.join(wanted)}; or set "
             'host = "127.0.0.1" and put a reverse proxy in front (deploy/Caddyfile)'

@@ -13,7 +13,7 @@ from starlette.responses import Response
 from starlette.types import Scope
 
 from gateway.estimate import Estimate, Weights
-from gateway.estimate_json import estimate_from_json, estimate_to_json, without_places
+from gateway.estimate_json import estimate_from_json, estimate_to_json
 from gateway.history import ESTIMATE, REJECTION
 from gateway.records import Why, json_line
 from gateway.web.live.stream import Fanout
@@ -195,10 +195,10 @@ class LatestResponse(Response):
 
     media_type = "application/json"
 
-    def __init__(self, board: Board, scope: Scope) -> None:
+    def __init__(self, board: Board, scope: Scope, shown: Callable[[str], str]) -> None:
+        """``shown`` turns the JSON into what the client may see of it."""
         tag, body = board.latest()
-        if scope.get("state", {}).get("hides_places"):
-            body = without_places(body.decode()).encode()
+        body = shown(body.decode()).encode()
         etag = f'"{tag}"'
         is_known = _has(scope, etag)
         headers = {"etag": f"W/{etag}", "cache-control": "no-cache"}

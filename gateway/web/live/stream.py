@@ -17,6 +17,7 @@ from gateway.history import KINDS, JournalRecord
 from gateway.store import StoreReader
 
 RETRY_MS: Final = 3000  # chosen: pause of a browser before it connects again
+ASK_AGAIN_S: Final = 5.0  # chosen: how soon a token that was revoked ends a stream on which nothing comes
 _PAGE: Final = 5  # chosen: records in memory for each client
 
 EVENT_SCHEMA: Final[dict[str, Any]] = {
@@ -41,7 +42,7 @@ class Subscription:
 
     def __init__(self, reader: StoreReader, behind: str | None, shown: Callable[[str], str] = str) -> None:
         """``behind`` is the cursor to resume behind, None for live only; ``shown`` turns a record's JSON into what the
-        client may see of it.
+        client may see of it, and raises PermissionError once it may see none.
         """
         self._shown = shown
         self._loop = asyncio.get_running_loop()
@@ -63,7 +64,16 @@ class Subscription:
         self._follower.close()
 
     async def events(self) -> AsyncIterator[ServerSentEvent]:
-        """Records by their numbers, and between them, in order, events that are not stored."""
+        """Records by their numbers, and between them, in order, events that are not stored, while the client may see
+        them.
+        """
+        try:
+            async for event in self._events():
+                yield event
+        except PermissionError as refusal:
+            yield ServerSentEvent(event="closing", data={"detail": str(refusal)})
+
+    async def _events(self) -> AsyncIterator[ServerSentEvent]:
         yield ServerSentEvent(retry=RETRY_MS)
         while True:
             is_last = self._is_ended  # before the last look: what came before the end still goes out
@@ -80,7 +90,9 @@ class Subscription:
             if is_last:
                 yield _CLOSING
                 return
-            await self._news.wait()
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._news.wait(), ASK_AGAIN_S)
+            self._shown("")
 
     def _seen(self, event: ServerSentEvent) -> ServerSentEvent:
         return event.model_copy(update={"raw_data": self._shown(event.raw_data or "")})

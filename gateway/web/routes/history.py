@@ -205,9 +205,9 @@ def api_router(board: Board, reader: StoreReader, status: Callable[[], Status]) 
     @router.get(
         "/estimates/latest", response_model=Latest, responses={304: {"description": "nothing but the age has changed"}}
     )
-    async def latest(request: Request) -> Response:
+    async def latest(request: Request, shown: AsShown) -> Response:
         """The last good estimate and its age. Its ETag changes with all but the age."""
-        return LatestResponse(board, request.scope)
+        return LatestResponse(board, request.scope, shown)
 
     @router.get("/estimates", response_model=EstimatesPage, responses=problem_responses(422, 503))
     async def estimates(query: Annotated[EstimatesQuery, Query()], shown: AsShown) -> Response:

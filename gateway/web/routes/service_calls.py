@@ -12,7 +12,6 @@ from fastapi import Depends, Request
 from starlette.responses import Response
 
 from gateway.core.known_weights import KnownWeightKind
-from gateway.estimate_json import without_places
 from gateway.stated.facts import StatedWeight, VehicleAnswers
 from gateway.web.schemas import problem_responses
 
@@ -79,8 +78,9 @@ Shown = Callable[[str], str]
 
 
 async def _shown_to(request: Request) -> Shown:
-    return without_places if getattr(request.state, "hides_places", False) else str
+    shown: Shown = request.state.client.shown
+    return shown
 
 
 AsShown = Annotated[Shown, Depends(_shown_to)]
-"""Turns the JSON of a record into what this client may see of it."""
+"""Turns the JSON of a record into what this client may see of it; raises PermissionError once it may see none."""
