@@ -54,18 +54,22 @@ def read_toml(
         raise error(f"{path}: not UTF-8 text (byte {fault.start})") from None
     except (ValueError, RecursionError) as fault:  # a number of 5,000 digits, a thousand brackets
         raise error(f"{path}: not valid TOML: {fault}") from None
-    if (where := _with_nul(tables)) is not None:
-        raise error(f"{path}: {where}: contains a NUL character, which no name or path may")
+    for where, part in _parts(tables, ""):
+        if isinstance(part, str) and "\0" in part:
+            raise error(f"{path}: {where}: contains a NUL character, which no name or path may")
+        if isinstance(part, int) and not -(2**63) <= part < 2**64:
+            raise error(f"{path}: {where}: an integer beyond 64 bits")
     return tables
 
 
-def _with_nul(part: Any) -> str | None:
-    """The keys of the first text with a NUL character; None if there is none."""
-    if isinstance(part, str):
-        return "" if "\0" in part else None
-    pairs = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ()
-    found = ((key, _with_nul(one)) for key, one in pairs)
-    return next((f"{key}.{below}".rstrip(".") for key, below in found if below is not None), None)
+def _parts(part: Any, where: str) -> Iterator[tuple[str, Any]]:
+    """Every value with the keys that lead to it."""
+    pairs = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else None
+    if pairs is None:
+        yield where, part
+        return
+    for key, one in pairs:
+        yield from _parts(one, f"{where}.{key}" if where else str(key))
 
 
 def load_toml(

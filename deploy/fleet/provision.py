@@ -26,7 +26,7 @@ SUBSCRIBER: Final = "fleet-subscriber"
 FILES: Final = ("calibration", "signals")
 REPEAT_S: Final = 120  # four times what mosquitto.conf takes to save
 _ROUNDS: Final = 101  # mosquitto's own, for passwords that people choose; these have 256 bits of chance
-_NAME: Final = re.compile(r"[A-Za-z0-9._-]{1,64}")  # safe in a topic, in the broker's list and as a folder
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")  # safe in a topic, in the broker's list and as a folder
 
 
 class FleetError(Exception):

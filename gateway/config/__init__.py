@@ -40,7 +40,11 @@ ESTIMATOR_NAMES: tuple[EstimatorName, ...] = get_args(EstimatorName)
 class VehicleSection(SettingsSection):
     """The vehicle's identity, and its limits."""
 
-    id: str = Field("vehicle", min_length=1, max_length=64, description="name under which the fleet knows the vehicle")
+    id: str = Field(
+        "vehicle",
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$",
+        description="name under which the fleet knows the vehicle: letters, digits, `.`, `_` and `-`",
+    )
     calibrated_as: str | None = Field(
         None, description="the vehicle's name in its calibration file; if set, another vehicle's file is refused"
     )

@@ -11,6 +11,7 @@ from gateway.estimate_json.fields import (
     csv_cells,
     estimate_from_json,
     estimate_to_json,
+    read_estimate,
     table_row,
 )
 from gateway.estimate_json.kinds import (
@@ -43,6 +44,7 @@ __all__ = [
     "estimate_to_json",
     "posterior_from_json",
     "posterior_to_json",
+    "read_estimate",
     "spectra_from_json",
     "spectra_to_json",
     "table_row",

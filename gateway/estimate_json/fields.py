@@ -3,6 +3,7 @@
 The table has names, order, kinds, descriptions and columns of CSV files.
 """
 
+import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -252,6 +253,11 @@ def estimate_from_json(told: Mapping[str, Any]) -> Estimate:
         left_share=_quantity(known, "left_share"),
         epoch=_epoch(known),
     )
+
+
+def read_estimate(text: str) -> Estimate:
+    """The estimate of a JSON text. Raises whatever another text provokes; ``Exception`` covers it."""
+    return estimate_from_json(json.loads(text))
 
 
 def _quantity(known: Mapping[str, Any], path: str) -> Quantity:

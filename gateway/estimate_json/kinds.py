@@ -32,7 +32,8 @@ from gateway.records import F64, Spectra, Why, iso_utc, ns_of
 
 @dataclass(frozen=True, slots=True)
 class FieldKind:
-    """How fields of one kind are written, read back and typed. ``read`` never sees null: unknown stays unknown.
+    """How fields of one kind are written, read back and typed. ``read`` never sees null: unknown stays unknown; it
+    raises for anything of another type.
 
     ``cells`` makes what was written the cells of a line of CSV.
     """
@@ -57,7 +58,7 @@ def spectra_to_json(spectra: Spectra) -> dict[str, list[float | None]]:
 def spectra_from_json(told: Mapping[str, Sequence[float | None]]) -> Spectra:
     """The inverse of :func:`spectra_to_json`, within its rounding."""
     names = spectra_to_json(Spectra(*[np.empty(0)] * 5))
-    return Spectra(*(np.array([math.nan if x is None else x for x in told[name]]) for name in names))
+    return Spectra(*(np.array([math.nan if x is None else x for x in told[name]], float) for name in names))
 
 
 def rounded(x: float, digits: int) -> float | None:
@@ -76,6 +77,29 @@ def _interval(bounds: tuple[float, float]) -> list[float] | None:
 
 def _as_is(x: Any) -> Any:
     return x
+
+
+def _text(x: object) -> str:
+    if not isinstance(x, str):
+        raise TypeError(f"{x!r:.40} is no text")
+    return x
+
+
+def _flag(x: object) -> bool:
+    if not isinstance(x, bool):
+        raise TypeError(f"{x!r:.40} is neither true nor false")
+    return x
+
+
+def _whole(x: object) -> int:
+    if not isinstance(x, int) or isinstance(x, bool) or not -(2**63) <= x < 2**63:
+        raise TypeError(f"{x!r:.40} is no integer of 64 bits")
+    return x
+
+
+def _pair(told: Sequence[Any]) -> tuple[float, float]:
+    low, high = map(float, told)
+    return low, high
 
 
 def weights_to_json(weights: Weights) -> dict[str, dict[str, Any]]:
@@ -102,10 +126,11 @@ def _weights_of(told: Mapping[str, Mapping[str, Any]]) -> Weights:
 
 
 def _weight_of(told: Mapping[str, Any]) -> Weight:
-    kg, std_kg = (math.nan if told[name] is None else told[name] for name in ("kg", "std_kg"))
+    kg, std_kg = (_known(told[name]) for name in ("kg", "std_kg"))
     lacks = None if told["lacks"] is None else Lack(told["lacks"])
-    low_kg, high_kg = told["interval95_kg"] or UNKNOWN_INTERVAL
-    return Weight(kg, std_kg, told["limit_kg"], lacks, told["is_unsprung_estimated"], (low_kg, high_kg))
+    limit_kg = None if told["limit_kg"] is None else float(told["limit_kg"])
+    interval95_kg = _pair(told["interval95_kg"] or UNKNOWN_INTERVAL)
+    return Weight(kg, std_kg, limit_kg, lacks, _flag(told["is_unsprung_estimated"]), interval95_kg)
 
 
 def _weight_cells(shown: Mapping[str, Mapping[str, Any]]) -> list[Any]:
@@ -120,18 +145,18 @@ def places_over_limit(shown: Mapping[str, Mapping[str, Any]]) -> list[str]:
     return [place for place in PLACES if shown[place]["is_over_limit"]]
 
 
-TEXT: Final = FieldKind(str | None, _as_is, _as_is)
-FLAG: Final = FieldKind(bool | None, _as_is, _as_is)
-WHOLE: Final = FieldKind(int | None, _as_is, _as_is)
+TEXT: Final = FieldKind(str | None, _as_is, _text)
+FLAG: Final = FieldKind(bool | None, _as_is, _flag)
+WHOLE: Final = FieldKind(int | None, _as_is, _whole)
 COUNT: Final = FieldKind(float | None, float, int)
 INSTANT: Final = FieldKind(str | None, iso_utc, ns_of)
 NUMBER: Final = FieldKind(float | None, lambda x: rounded(x, 9), float)
 ROUGH_NUMBER: Final = FieldKind(float | None, lambda x: rounded(x, 6), float)
-INTERVAL: Final = FieldKind(list[float] | None, _interval, tuple, cells=list)
+INTERVAL: Final = FieldKind(list[float] | None, _interval, _pair, cells=list)
 NUMBERS_BY_NAME: Final = FieldKind(
     dict[str, float | None],
     lambda numbers: {name: rounded(x, 6) for name, x in numbers.items()},
-    lambda told: {name: math.nan if x is None else x for name, x in told.items()},
+    lambda told: {name: _known(x) for name, x in told.items()},
 )
 REASONS: Final = FieldKind(
     list[str],
@@ -164,9 +189,11 @@ def posterior_to_json(posterior: Posterior) -> dict[str, Any]:
 
 def posterior_from_json(record: Mapping[str, Any]) -> Posterior:
     """The inverse of :func:`posterior_to_json`, within its rounding."""
-    low, high = record.get("tails", NORMAL_TAILS)
+    mean, own = np.array(record["mean"], float), np.array(record["own"], float)
     sources = {Source(name): np.array(rows, float) for name, rows in record["sources"].items()}
-    return Posterior(np.array(record["mean"], float), np.array(record["own"], float), sources, (low, high))
+    if own.shape != mean.shape * 2 or any(rows.shape[1:] != mean.shape for rows in sources.values()):
+        raise ValueError("mean, own covariance and sources are of different sizes")
+    return Posterior(mean, own, sources, _pair(record.get("tails", NORMAL_TAILS)))
 
 
 def _rows(matrix: F64) -> list[list[float | None]]:
@@ -193,9 +220,9 @@ def budget_from_json(records: Sequence[Mapping[str, Any]]) -> tuple[BudgetLine, 
     numbers = ("payload_kg", "front_share_pct", "cg_left_m", "payload_with_remedy_kg")
     return tuple(
         BudgetLine(
-            source=record["source"],
+            source=_text(record["source"]),
             remedy=None if record["remedy"] is None else Remedy(record["remedy"]),
-            **{name: float("nan") if record[name] is None else record[name] for name in numbers},
+            **{name: _known(record[name]) for name in numbers},
         )
         for record in records
     )
@@ -227,8 +254,8 @@ def way_from_json(told: Mapping[str, Any]) -> Way:
     """The inverse of :func:`way_to_json`, within its rounding."""
     return Way(
         distance_m=_known(told["distance_m"]),
-        known_s=told["known_s"],
-        moving_s=told["moving_s"],
+        known_s=float(told["known_s"]),
+        moving_s=float(told["moving_s"]),
         odometer_start_m=_known(told["odometer_start_m"]),
         odometer_end_m=_known(told["odometer_end_m"]),
         start=_place_of(told["start"]),
@@ -255,7 +282,7 @@ def without_places(text: str) -> str:
 
 
 def _place_of(told: Mapping[str, float] | None) -> Place:
-    return NOWHERE if told is None else Place(told["latitude_deg"], told["longitude_deg"])
+    return NOWHERE if told is None else Place(float(told["latitude_deg"]), float(told["longitude_deg"]))
 
 
 def _stop(stop: Stop) -> dict[str, Any]:
@@ -276,12 +303,13 @@ def _watched(seen: Watched) -> dict[str, bool | None]:
 
 
 def _watched_of(told: Mapping[str, Any]) -> Watched:
-    seen = Watched(told["door_opened"], told["ignition_off"])
+    opened, off = (None if told[name] is None else _flag(told[name]) for name in ("door_opened", "ignition_off"))
+    seen = Watched(opened, off)
     return UNWATCHED if seen == UNWATCHED else seen
 
 
 def _known(told: float | None) -> float:
-    return math.nan if told is None else told
+    return math.nan if told is None else float(told)
 
 
 WAY = FieldKind(dict[str, Any] | None, lambda way: None if way is None else way_to_json(way), way_from_json)

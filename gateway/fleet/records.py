@@ -87,7 +87,9 @@ KINDS: Final[dict[str, type[Status | Estimate | Entry]]] = {
     "status": Status, "estimates": Estimate, "alarms": Alarm, "events": Entry, "trips": Entry
 }  # fmt: skip
 """By the level of the topic below the vehicle's name."""
-VEHICLE_ID: Final = re.compile(r"[A-Za-z0-9._-]{1,64}")  # as [vehicle] id and deploy/fleet/provision.py have it
+VEHICLE_ID: Final = re.compile(
+    r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
+)  # as [vehicle] id and deploy/fleet/provision.py have it
 
 
 class Arrival(NamedTuple):

@@ -21,7 +21,7 @@ from gateway.core.alarms.alarm import (
 from gateway.core.alarms.rules import AlarmRules, AlarmVerdict, Says
 from gateway.core.alarms.watch import AlarmWatch
 from gateway.estimate import Estimate
-from gateway.estimate_json import estimate_from_json
+from gateway.estimate_json import read_estimate
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.service.status import NEEDED_SENSORS
@@ -139,17 +139,12 @@ class AlarmService:
 def remembered(reader: StoreReader) -> tuple[list[Alarm], list[Estimate]]:
     """The last stored alarms and batches, oldest first. Raises what the store's reader raises.
 
-    An unreadable alarm is skipped: if its fault persists, it is raised again.
+    An alarm that cannot be read is left out: if its cause persists, it is raised again.
     """
     told = reader.entries(kind=ENTRY_KIND, limit=REMEMBERED, newest_first=True)
     page = reader.estimates(limit=RECENT, newest_first=True, with_spectra=False)
-    alarms = []
-    for text in reversed(told.items):
-        try:
-            alarms.append(alarm_from_json(json.loads(text)))
-        except (ValueError, KeyError, TypeError) as fault:
-            log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=f"an alarm: {fault!r}")
-    return alarms, [estimate_from_json(json.loads(text)) for text in reversed(page.items)]
+    alarms = reader.understood(reversed(told.items), lambda text: alarm_from_json(json.loads(text)))
+    return alarms, reader.understood(reversed(page.items), read_estimate)
 
 
 def _text(alarm: Alarm) -> str:

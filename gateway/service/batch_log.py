@@ -3,13 +3,15 @@
 import json
 import logging
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Final
+
+from pydantic import BaseModel
 
 from gateway.core.change import Rules
 from gateway.core.events.entry import Entry, EntryKind
 from gateway.core.events.ledger import HORIZON, Ledger
 from gateway.estimate import PLACES, Estimate
-from gateway.estimate_json import INSTANT, estimate_from_json
+from gateway.estimate_json import INSTANT, read_estimate
 from gateway.history import BATCHES, REMAINDER
 from gateway.log import Event, log_event
 from gateway.records import Why, json_line, rounded
@@ -17,6 +19,7 @@ from gateway.setup import Setup
 from gateway.status import State, Status
 from gateway.store import Store, StoreReader, restored
 from gateway.web.live.board import Board
+from gateway.web.routes.history import LoadEvent, Trip
 from gateway.web.routes.weights import LatestWeights
 
 
@@ -109,6 +112,7 @@ class StateLog:
             self._is_stale = is_stale
 
 
+_SHAPES: Final[Mapping[EntryKind, type[BaseModel]]] = {EntryKind.EVENT: LoadEvent, EntryKind.TRIP: Trip}
 MOST: Final = 2 * HORIZON  # chosen: entries that so many batches can produce
 
 
@@ -131,15 +135,17 @@ class LoadEventLog:
 def ledger_of(reader: StoreReader, rules: Rules) -> Ledger:
     """The ledger at the last stop of the service, restored from the journal. Raises what the store's reader raises."""
     page = reader.page((*BATCHES, REMAINDER), limit=HORIZON, newest_first=True, with_spectra=False)
-    estimates = [estimate_from_json(json.loads(text)) for text in reversed(page.items)]
+    estimates = reader.understood(reversed(page.items), read_estimate)
     known: list[Entry] = []
     first_ns = min((one.t_start_ns for one in estimates), default=0)  # not the oldest's: clocks are put back
     for kind in EntryKind if estimates else ():
         told = reader.entries(kind=kind, since_ns=first_ns, limit=MOST, newest_first=True)
-        known += (_entry(json.loads(text)) for text in told.items)
+        known += reader.understood(told.items, _entry)
     return Ledger(rules, estimates, known)
 
 
-def _entry(record: Mapping[str, Any]) -> Entry:
+def _entry(text: str) -> Entry:
+    record = json.loads(text)
     kind = EntryKind(record["id"].partition("-")[0])
-    return Entry(kind, record["id"], INSTANT.read(record["t_end"]), dict(record))
+    _SHAPES[kind].model_validate(record)
+    return Entry(kind, record["id"], INSTANT.read(record["t_end"]), record)

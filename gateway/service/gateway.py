@@ -109,14 +109,14 @@ class Gateway:
         )
         self.uplink = uplink_of(broker, setup, self.store, with_places=with_places)
         self.webhook = webhook_of(receiver, self.store, with_places=with_places)
-        directory, ask, on_event = settings.store.directory, self.store.reader().estimates, self.store.write_event
+        directory, reader, on_event = settings.store.directory, self.store.reader(), self.store.write_event
         self.known_weights = KnownWeightService(
-            directory, subject, self.pipeline, ask, stale_after_s=settings.web.stale_after_s, on_event=on_event
+            directory, subject, self.pipeline, reader, stale_after_s=settings.web.stale_after_s, on_event=on_event
         )
         self.verification = VerificationService(
             directory,
             subject,
-            ask,
+            reader,
             Rule(**settings.verification.model_dump(exclude={"every_days"})),
             payload_without=self.known_weights.payload_without,
             every_days=settings.verification.every_days,
@@ -138,7 +138,7 @@ class Gateway:
         )
         app = create_app(
             self.board,
-            self.store.reader(),
+            reader,
             self.status,
             calibrated=setup.calibrated,
             tokens=token_file,

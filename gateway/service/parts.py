@@ -1,6 +1,5 @@
 """The parts of a service, each built from its section of the settings."""
 
-from dataclasses import asdict
 from importlib.metadata import version
 
 from gateway.bus.live.source import LiveSource, OpenReceiver
@@ -9,13 +8,14 @@ from gateway.calibration.file.calibration_file import load_calibration
 from gateway.calibration.kept.shelf import FOLDER, Shelf, ShelfLimits
 from gateway.config import BusSection, Settings, StoreSection
 from gateway.config.sections import KeepSection
+from gateway.estimate_json import read_estimate
 from gateway.log import Event, log_event
 from gateway.service.calibration_in_use import why_not_allowed
 from gateway.service.commissioning.empty_drive import ServiceVehicle
 from gateway.service.commissioning.session import Commissioning
 from gateway.service.keeper import BatchKeeper
 from gateway.setup import Setup
-from gateway.store import Retention, Store, restored
+from gateway.store import Latest, Retention, Store, restored
 from gateway.units import BYTES_PER_MB, S_PER_DAY
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings, WebhookSettings
@@ -69,7 +69,13 @@ def store_of(wanted: StoreSection, *receivers: UplinkSettings | WebhookSettings 
 def board_of(stale_after_s: float, store: Store, setup: Setup) -> Board:
     """The board with the last stored estimates; an unreadable disk does not prevent the start."""
     board = Board(stale_after_s=stale_after_s, unweighed=Scales(setup.calibrated).weigh(None))
-    restored(lambda: board.restore(**asdict(store.reader().latest())), None)
+    reader = store.reader()
+    latest = restored(reader.latest, Latest(None, None, None))
+    answer, refusal = (
+        text if text and reader.understood([text], read_estimate) else None
+        for text in (latest.estimate, latest.rejection)
+    )
+    board.restore(answer, refusal, latest.age_s)
     heard = board.heard()
     if heard is not None and heard.calibration_id != setup.calibration_id:
         log_event(Event.CALIBRATION_CHANGED, calibration_id=setup.calibration_id, before=heard.calibration_id)

@@ -5,6 +5,7 @@ import itertools
 import logging
 import os
 import sqlite3
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,7 +18,17 @@ from gateway.history import BATCHES, ESTIMATE, KINDS
 from gateway.log import Event, log_event
 from gateway.store.queries import INSERT, Stored, is_good, stored_row
 from gateway.store.retention import AgeClock, Retention, remove_old, remove_share
-from gateway.store.schema import Chain, DeliveryRow, DocumentRow, JournalRow, Row, checksum, connect_writer, pragma
+from gateway.store.schema import (
+    TABLES,
+    Chain,
+    DeliveryRow,
+    DocumentRow,
+    JournalRow,
+    Row,
+    checksum,
+    connect_writer,
+    pragma,
+)
 
 T = TypeVar("T")
 
@@ -42,8 +53,8 @@ class DamagedError(sqlite3.DatabaseError):
     """SQLite's own check found the file inconsistent."""
 
 
-def is_damaged(error: sqlite3.Error) -> bool:
-    """Whether the file itself is damaged, as opposed to a failing disk."""
+def is_damaged(error: Exception) -> bool:
+    """Whether the file itself is damaged, as opposed to a failing disk or a record."""
     if isinstance(error, DamagedError):
         return True
     code = getattr(error, "sqlite_errorcode", None)  # absent on errors raised by the Python module itself
@@ -57,10 +68,25 @@ def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
     try:
         yield
         connection.execute("COMMIT")
-    except sqlite3.Error:
+    except BaseException:
         if connection.in_transaction:  # some failures have rolled back already
             connection.execute("ROLLBACK")
         raise
+
+
+@contextmanager
+def _savepoint(connection: sqlite3.Connection) -> Iterator[None]:
+    """A part of a transaction that leaves nothing behind if it fails."""
+    connection.execute("SAVEPOINT part")
+    try:
+        yield
+    except BaseException:
+        if connection.in_transaction:
+            connection.execute("ROLLBACK TO part")
+        raise
+    finally:
+        if connection.in_transaction:
+            connection.execute("RELEASE part")
 
 
 def _identity(path: Path) -> tuple[int, int] | None:
@@ -104,6 +130,7 @@ class Database:
         self._lock()
         self._connection = connect_writer(self.path)
         try:
+            self.require_tables()
             opened = self._identify(self._connection, new_epoch)
             self._age = AgeClock(self._connection)
             self.n_bad_records = _last_number(self._connection, "damaged")
@@ -115,26 +142,34 @@ class Database:
             raise
 
     def add(self, rows: Sequence[Row], boot_id: str) -> tuple[list[JournalRow], int]:
-        """Commit rows in one transaction -> (new records, number of batches that were already stored)."""
+        """Commit rows in one transaction -> (new records, number of batches that were already stored).
+
+        A row that SQLite refuses is set aside as it came; if SQLite refuses that too, the database is at fault.
+        """
         connection = self._connected()
         stored: list[JournalRow] = []
         n_known = 0
         chain = Chain(self.chain)
         with _transaction(connection):
             for row in rows:
-                if isinstance(row, DeliveryRow):
-                    _keep_delivery(connection, row)
-                elif isinstance(row, DocumentRow):
-                    _keep_document(connection, row)
-                else:
-                    linked = chain.linked(row)
-                    if _add_record(connection, linked):
+                linked = chain.linked(row) if isinstance(row, JournalRow) else row
+                try:
+                    with _savepoint(connection):
+                        is_new = _add_row(connection, linked)
+                except Exception as fault:
+                    if not connection.in_transaction or is_damaged(fault) or missing_tables(connection):
+                        raise
+                    _set_refused_aside(connection, linked, fault)
+                    is_new = False
+                if isinstance(linked, JournalRow):
+                    if is_new:
                         stored.append(linked)
                     else:
                         chain.skip(linked)
                         n_known += 1
             _keep_receipt(connection, stored, boot_id)
-        self.chain = chain
+            n_bad_records = _last_number(connection, "damaged")
+        self.chain, self.n_bad_records = chain, n_bad_records
         return stored, n_known
 
     def prune(self, now_ns: int) -> int:
@@ -158,6 +193,11 @@ class Database:
         n_pages = pragma(connection, "page_count") - pragma(connection, "freelist_count")
         return n_pages * pragma(connection, "page_size")
 
+    def require_tables(self) -> None:
+        """Raise DamagedError for a file that lacks one of its tables."""
+        if missing := missing_tables(self._connected()):
+            raise DamagedError(f"it has no table {' and no '.join(missing)}")
+
     def check(self) -> None:
         """Check the whole file after a reader reported damage, and rebuild its indexes. Raises DamagedError."""
         verdict = self._connected().execute("PRAGMA quick_check(1)").fetchone()[0]
@@ -177,7 +217,7 @@ class Database:
     @staticmethod
     def _move_aside(connection: sqlite3.Connection, rows: Sequence[Stored], now_ns: int) -> None:
         with _transaction(connection):
-            for seq, _kind, record_id, *_, text, _crc in rows:
+            for seq, _kind, record_id, *_, text, _crc, _is_object in rows:
                 connection.execute(
                     "INSERT INTO damaged (seq, found_ns, id, text) VALUES (?, ?, ?, ?)", (seq, now_ns, record_id, text)
                 )
@@ -272,6 +312,32 @@ class Database:
         sql = "SELECT max(seq) FROM journal WHERE kind = ?"
         newest = {kind: connection.execute(sql, (kind,)).fetchone()[0] or 0 for kind in KINDS}
         return Opened(epoch, _last_number(connection, "journal"), last_batch, newest)
+
+
+def missing_tables(connection: sqlite3.Connection) -> list[str]:
+    """Tables that the file should have and has not."""
+    found = {name for (name,) in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
+    return sorted(TABLES - found)
+
+
+def _set_refused_aside(connection: sqlite3.Connection, row: Row, fault: Exception) -> None:
+    """Keep what SQLite did not take."""
+    name = row.id if isinstance(row, JournalRow) else row.name
+    text = repr(row).encode("ascii", "backslashreplace")
+    sql = "INSERT INTO damaged (seq, found_ns, id, text) VALUES (?, ?, ?, ?)"
+    connection.execute(sql, (0, time.time_ns(), repr(name), text))
+    log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, record=repr(row)[:200], fault=repr(fault)[:200])
+
+
+def _add_row(connection: sqlite3.Connection, row: Row) -> bool:
+    """Store a row -> False if it is a batch that was already stored."""
+    if isinstance(row, JournalRow):
+        return _add_record(connection, row)
+    if isinstance(row, DeliveryRow):
+        _keep_delivery(connection, row)
+    else:
+        _keep_document(connection, row)
+    return True
 
 
 def _add_record(connection: sqlite3.Connection, row: JournalRow) -> bool:

@@ -6,14 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from gateway.history import BATCHES, ENTRIES, Delivery
+from gateway.history import BATCHES, ENTRIES, SERVICE, Delivery
 from gateway.records import json_line
 from gateway.store.schema import JOURNAL_COLUMNS, JournalRow, checksum
 
 LAST: Final = (1 << 63) - 1  # SQLite's largest integer
 # Read texts as bytes: a flipped bit may break UTF-8, and the checksum covers the bytes on disk.
 _STORED: Final = (
-    "seq, CAST(kind AS BLOB), CAST(id AS BLOB), revision, t_end_ns, previous, received_ns, CAST(text AS BLOB), crc"
+    "seq, CAST(kind AS BLOB), CAST(id AS BLOB), revision, t_end_ns, previous, received_ns, CAST(text AS BLOB), crc, "
+    f"kind = '{SERVICE}' OR (json_valid(text) AND substr(text, 1, 1) = '{{')"
 )
 # SQLite would abort the whole query at a text that is not JSON.
 _WITHOUT_SPECTRA: Final = "CASE WHEN json_valid(text) THEN CAST(json_remove(text, '$.spectra') AS BLOB) END"
@@ -43,8 +44,9 @@ class JournalQuery:
 
 
 def is_good(row: Stored) -> bool:
-    *columns, crc = row
-    return bool(checksum(columns) == crc)
+    """Whether a row has the checksum that was written with it, and is a JSON object."""
+    *columns, crc, is_object = row
+    return bool(is_object) and checksum(columns) == crc
 
 
 def page(
@@ -61,7 +63,7 @@ def page(
         for *stored, bare in found:
             row = tuple(stored)
             if is_good(row):
-                good.append(_decoded(row if bare is None else (*row[:-2], bare, row[-1])))
+                good.append(_decoded(row if bare is None else (*row[:-3], bare, *row[-2:])))
             else:
                 bad.append(row[0])
         if len(found) < wanted:
@@ -144,7 +146,7 @@ def _rows_behind(
 
 
 def _decoded(row: Stored) -> JournalRow:
-    seq, kind, record_id, revision, t_end_ns, previous, received_ns, text, _ = row
+    seq, kind, record_id, revision, t_end_ns, previous, received_ns, text, *_ = row
     return JournalRow(seq, kind.decode(), record_id.decode(), revision, t_end_ns, previous, received_ns, text.decode())
 
 

@@ -3,7 +3,7 @@
 import logging
 import sqlite3
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, TypedDict, TypeVar, Unpack
@@ -103,6 +103,16 @@ class StoreReader:
             next_cursor=f"{epoch}-{shown[-1].seq}" if has_more else None,
             last_cursor=f"{epoch}-{max(row.seq for row in shown)}" if shown else cursor,
         )
+
+    def understood(self, texts: Iterable[str], parse: Callable[[str], T]) -> list[T]:
+        """What ``parse`` makes of each record. One that it cannot read is left out, logged and counted."""
+        found = []
+        for text in texts:
+            try:
+                found.append(parse(text))
+            except Exception as fault:  # noqa: BLE001 - whatever a record of another shape provokes
+                self._store.note_unread(text, fault)
+        return found
 
     def estimates(self, **question: Unpack[PageQuery]) -> HistoryPage:
         """Estimates and rejections, as ``page``."""
@@ -206,14 +216,11 @@ class StoreReader:
 
 
 def restored(read: Callable[[], T], otherwise: T) -> T:
-    """What ``read`` takes from the journal at a start.
-
-    If the journal cannot be read, or another version of the program wrote it, ``otherwise``, with a line in the log.
-    """
+    """What ``read`` takes from the journal at a start; ``otherwise``, with a line in the log, if that fails."""
     try:
         return read()
-    except (StoreError, TimeoutError, ValueError, KeyError) as fault:
-        log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault))
+    except Exception as fault:  # noqa: BLE001 - nothing in the journal keeps the service from starting
+        log_event(Event.NOT_RESTORED, level=logging.WARNING, fault=str(fault) or repr(fault))
         return otherwise
 
 

@@ -1,5 +1,6 @@
 """The tables of the database, the rows written to them, and how the file is opened."""
 
+import re
 import sqlite3
 import zlib
 from collections.abc import Sequence
@@ -48,6 +49,9 @@ PRAGMA application_id = {APPLICATION_ID};
 PRAGMA user_version = {VERSION};
 COMMIT;
 """
+
+
+TABLES: Final = frozenset(re.findall(r"CREATE TABLE (\w+)", _TABLES))
 
 
 def connect_writer(path: Path) -> sqlite3.Connection:

@@ -5,6 +5,7 @@ import secrets
 import sqlite3
 import threading
 import time
+import zlib
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -48,6 +49,7 @@ class Store(ServicePart):
         self._suspect = threading.Event()
         self._lost = threading.Event()
         self._bad_seqs: deque[int] = deque(maxlen=PAGE_OF_BAD)
+        self._unread: set[int] = set()  # checksums of records that this program cannot read
         self._reason: str | None = None
         self._set_aside: str | None = None
         self._n_written = self._n_duplicates = self._n_pruned = self._size_bytes = 0
@@ -135,7 +137,7 @@ class Store(ServicePart):
             n_pruned=self._n_pruned,
             size_bytes=self._size_bytes,
             set_aside=self._set_aside,
-            n_bad_records=self._database.n_bad_records,
+            n_bad_records=self._database.n_bad_records + len(self._unread),
         )
 
     def is_alive(self) -> bool:
@@ -170,7 +172,7 @@ class Store(ServicePart):
         self._buffer.wake()
 
     def suspect_loss(self) -> None:
-        """A reader could not open the file: the next attempt checks whether it is still the same file."""
+        """A reader could not use the file: the next attempt checks whether it is still the same file, and whole."""
         self._lost.set()
         self._buffer.wake()
 
@@ -178,6 +180,13 @@ class Store(ServicePart):
         """A reader found that these records fail their checksum."""
         self._bad_seqs.extend(seqs)
         self._buffer.wake()
+
+    def note_unread(self, text: str, fault: Exception) -> None:
+        """A record that is whole, but that this program cannot read: it stays where it is, is logged and counted."""
+        mark = zlib.crc32(text.encode("utf-8", "surrogateescape"))
+        if mark not in self._unread and len(self._unread) < PAGE_OF_BAD:
+            self._unread.add(mark)
+            log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, record=text[:80], fault=repr(fault)[:200])
 
     def _append(self, kind: str, record_id: str, t_end_ns: int, text: str, revision: int = 1) -> str:
         row = JournalRow(0, kind, record_id, revision, t_end_ns, 0, self._clock_ns(), text, boot_ns())
@@ -216,19 +225,23 @@ class Store(ServicePart):
     def _attempt(self) -> bool:
         """Write the rows in memory; returns False and keeps them if the disk fails."""
         try:
-            self._lost.clear()
             self._open_if_closed()
+            if self._lost.is_set():
+                self._lost.clear()
+                self._database.require_tables()
             if self._suspect.is_set():
                 self._suspect.clear()
                 self._database.check()
             self._set_bad_records_aside()
             self._commit()
-        except sqlite3.Error as error:
+        except StoreError:
+            raise
+        except Exception as error:  # noqa: BLE001 - a record was set aside already: the disk or the file is at fault
             self._buffer.give_back()
-            return self._set_damaged_aside(error) if is_damaged(error) else self._degrade(f"{self.path}: {error}")
-        except OSError as error:
-            self._buffer.give_back()
-            return self._degrade(str(error))
+            self._lost.set()  # what failed may be a table that is missing: the next attempt looks
+            if is_damaged(error):
+                return self._set_damaged_aside(error)
+            return self._degrade(f"{self.path}: {error}" if isinstance(error, sqlite3.Error) else str(error))
         return True
 
     def _open_if_closed(self) -> None:
@@ -267,7 +280,7 @@ class Store(ServicePart):
         self._reason = reason
         return False
 
-    def _set_damaged_aside(self, error: sqlite3.Error) -> bool:
+    def _set_damaged_aside(self, error: Exception) -> bool:
         """Rename a damaged file; the next attempt starts a new one with the same numbering."""
         try:
             self._set_aside = self._database.set_aside()

@@ -8,7 +8,6 @@ https://www.home-assistant.io/integrations/mqtt (Home Assistant 2024.11 and late
 
 import hashlib
 import json
-import re
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -88,6 +87,6 @@ def _below(topic: str, more: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _object_id(name: str) -> str:
-    """The name with the characters that a topic allows; a changed name gets a hash, so that it stays unique."""
-    safe = re.sub(r"[^A-Za-z0-9_-]", "_", name)
+    """A vehicle's id without dots, which are not allowed there; a changed id gets a hash, so that it stays unique."""
+    safe = name.replace(".", "_")
     return safe if safe == name else f"{safe}_{hashlib.sha256(name.encode()).hexdigest()[:8]}"

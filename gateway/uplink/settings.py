@@ -71,10 +71,7 @@ def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSe
         return None
     topic = section.topic.replace("{vehicle_id}", vehicle.id)
     if any(character in topic for character in "+#\0") or topic.startswith("$"):
-        raise ConfigurationError(
-            f"[uplink] topic {topic!r}: MQTT allows no +, # or NUL in a topic, nor a $ before it: "
-            "set [uplink] topic without {vehicle_id}, or another [vehicle] id"
-        )
+        raise ConfigurationError(f"[uplink] topic {topic!r}: MQTT allows no +, # or NUL in a topic, nor a $ before it")
     settings = UplinkSettings(
         **section.model_dump(exclude={"port", "topic", "client_id"}),
         port=section.port if section.port is not None else (8883 if section.tls else 1883),

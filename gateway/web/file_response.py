@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
@@ -14,14 +13,14 @@ from gateway.web.schemas import problem_responses
 FORMATS: Final[Mapping[str, str]] = {"csv": "text/csv; charset=utf-8", "jsonl": "application/jsonl"}
 """The media type of each ending."""
 
-Cells = Callable[[Any], Mapping[str, Any]]
+Rows = Callable[[Sequence[str]], Iterable[Mapping[str, Any]]]
 PageBehind = Callable[[str | None], Awaitable[HistoryPage]]
 
 
-def _encoder(ending: str, columns: Iterable[str], cells_of: Cells) -> Callable[[Sequence[str]], str]:
+def _encoder(ending: str, columns: Iterable[str], rows_of: Rows) -> Callable[[Sequence[str]], str]:
     """Turns records (their JSON) into the next part of the file; the first part of CSV (RFC 4180) begins with its head.
 
-    A line of JSON Lines is a record as it is; ``cells_of`` gives the cells of a record in a table of ``columns``.
+    A line of JSON Lines is a record as it is; ``rows_of`` gives the cells of records in a table of ``columns``.
     """
     if ending == "jsonl":
         return lambda items: "".join(f"{item}\n" for item in items)
@@ -30,7 +29,7 @@ def _encoder(ending: str, columns: Iterable[str], cells_of: Cells) -> Callable[[
     writer.writeheader()
 
     def lines(items: Sequence[str]) -> str:
-        writer.writerows(cells_of(json.loads(item)) for item in items)
+        writer.writerows(rows_of(items))
         text = sink.getvalue()
         sink.seek(0)
         sink.truncate()
@@ -40,10 +39,10 @@ def _encoder(ending: str, columns: Iterable[str], cells_of: Cells) -> Callable[[
 
 
 async def sent_as_file(
-    page_behind: PageBehind, name: str, ending: str, columns: Iterable[str], cells_of: Cells
+    page_behind: PageBehind, name: str, ending: str, columns: Iterable[str], rows_of: Rows
 ) -> Response:
     """All records from the first page on, each encoded as it is read."""
-    encoded = _encoder(ending, columns, cells_of)
+    encoded = _encoder(ending, columns, rows_of)
     first = await page_behind(None)  # before the answer begins: what goes wrong here is still a problem
 
     async def pieces() -> AsyncIterator[str]:

@@ -37,15 +37,15 @@ class NoCommissioning:
 
 def of_no_vehicle(directory: Path, store: Store) -> dict[str, Any]:
     """The arguments of ``create_app``: services with nothing to weigh; no alarm, and no commissioning is allowed."""
-    ask = store.reader().estimates
+    reader = store.reader()
     return {
         "known_weights": KnownWeightService(
-            directory, NOBODY, NO_PIPELINE, ask, stale_after_s=900.0, on_event=lambda kind, detail: None
+            directory, NOBODY, NO_PIPELINE, reader, stale_after_s=900.0, on_event=lambda kind, detail: None
         ),
         "verification": VerificationService(
             directory,
             NOBODY,
-            ask,
+            reader,
             Rule(permitted_error_pct=5.0, permitted_axle_error_pct=None, loads=1),
             every_days=0.0,
             on_event=lambda kind, detail: None,

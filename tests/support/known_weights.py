@@ -107,7 +107,7 @@ class KnownWeightBench:
             self.directory,
             replace(self.subject, **subject),
             self.pipeline,
-            self.store.reader().estimates,
+            self.store.reader(),
             stale_after_s=900.0,
             on_event=lambda kind, detail: self.events.append(kind),
             clock_ns=self._tick,

@@ -26,7 +26,7 @@ def verification_desk(
     return VerificationService(
         directory,
         Subject(CALIBRATED, "ratio_index", "van-17"),
-        store.reader().estimates,
+        store.reader(),
         rule,
         every_days=every_days,
         on_event=lambda kind, detail: None,

@@ -362,7 +362,7 @@ def test_the_list_as_it_stood_at_any_time_is_known(bench: KnownWeightBench) -> N
 def test_a_load_is_judged_without_what_is_known_of_it(bench: KnownWeightBench) -> None:
     """A verification under a ticket of the same load must not praise the ticket."""
     at_ns = bench.pipeline.flow.weighed.t_end_ns
-    epochs = epochs_around(bench.store.reader().estimates, at_ns)
+    epochs = epochs_around(bench.store.reader(), at_ns)
     of_ticket, other = epochs[0], epoch_at(epochs, epochs[1].t_end_ns, None)
     bench.ticket(0, 330.0)
     assert bench.service.payload_without(of_ticket).number == pytest.approx(276.0, abs=1e-6)

@@ -11,7 +11,6 @@ from typing import Final
 import cantools
 from cantools.database.can import Message as CantoolsMessage
 from cantools.database.can import Signal as CantoolsSignal
-from cantools.database.errors import UnsupportedDatabaseFormatError
 
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.text import text_of
@@ -19,8 +18,12 @@ from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID
 from gateway.toml_file import Read
 
-_LONG_SIGNAL = re.compile(rb"^\s*SG_\s+(\w+)[^:\n]*:\s*\d+\s*\|\s*0*[1-9]\d{3,}\s*@", re.MULTILINE)
-_FRAME_ID = re.compile(rb"^\s*BO_\s+0*(\d+)\s", re.MULTILINE)
+# possessive, and never over the end of a line: each takes time in proportion to the file
+_LONG_SIGNAL = re.compile(
+    rb"^[ \t]*+SG_[ \t]++(\w++)[^:\r\n]*+:[ \t]*+\d++[ \t]*+\|[ \t]*+0*+\d{4,}+[ \t]*+@", re.MULTILINE
+)
+_FRAME_ID = re.compile(rb"^[ \t]*+BO_[ \t]++0*+(\d++)\s", re.MULTILINE)
+MOST_TOLD: Final = 300  # chosen: characters of a parser's message, which may quote the whole file
 
 KINDS: Final = ("dbc", "sym", "kcd", "arxml", "cdd")
 
@@ -56,13 +59,12 @@ def load_messages(map_path: Path, paths: Sequence[Path], read: Read = Path.read_
     messages: dict[str, DatabaseMessage] = {}
     for path in paths:
         for message in _load(map_path, path, read):
-            name = str(message.name)
-            if name in messages:
+            if message.name in messages:
                 raise SignalMapError(
-                    f"{map_path}: dbc: message {name!r} is in {messages[name].source.name} and in {path.name}; "
-                    "list only one of them"
+                    f"{map_path}: dbc: message {message.name!r} is in {messages[message.name].source.name} and in "
+                    f"{path.name}; list only one of them"
                 )
-            messages[name] = _message(message, path)
+            messages[message.name] = message
     return messages
 
 
@@ -74,7 +76,8 @@ def closest(name: str, known: Iterable[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else f"there are {listed or 'none'}"
 
 
-def _load(map_path: Path, path: Path, read: Read) -> list[CantoolsMessage]:
+def _load(map_path: Path, path: Path, read: Read) -> list[DatabaseMessage]:
+    """The messages of one file. Whatever its content makes cantools or the conversion raise is its own fault."""
     if not path.is_file():
         raise SignalMapError(f"{map_path}: dbc: no such file: {path}; paths are relative to the map")
     kind = path.suffix.removeprefix(".").lower()
@@ -88,11 +91,12 @@ def _load(map_path: Path, path: Path, read: Read) -> list[CantoolsMessage]:
     try:
         # not strict: vendors' databases with overlapping signals are common, and a field is checked when it is mapped
         database = cantools.database.load_string(text_of(content), kind, strict=False)
-    except (UnsupportedDatabaseFormatError, cantools.Error, UnicodeDecodeError) as fault:
-        raise SignalMapError(f"{map_path}: dbc: {path} cannot be read as a CAN database: {fault}") from None
-    if not isinstance(database, cantools.database.can.Database):
-        raise SignalMapError(f"{map_path}: dbc: {path} describes diagnostics; a DBC, KCD, ARXML or SYM is wanted")
-    return list(database.messages)
+        if isinstance(database, cantools.database.can.Database):
+            return [_message(message, path) for message in database.messages]
+    except Exception as fault:  # noqa: BLE001 - numbers beyond a double, texts that are none, a thousand brackets
+        told = f"{str(fault) or type(fault).__name__:.{MOST_TOLD}}"
+        raise SignalMapError(f"{map_path}: dbc: {path} cannot be read as a CAN database: {told}") from None
+    raise SignalMapError(f"{map_path}: dbc: {path} describes diagnostics; a DBC, KCD, ARXML or SYM is wanted")
 
 
 def _refuse_absurd(map_path: Path, path: Path, text: bytes) -> None:
@@ -132,8 +136,8 @@ def _signal(signal: CantoolsSignal) -> DatabaseSignal:
         name=signal.name,
         field=field,
         unit=signal.unit,
-        minimum=signal.minimum,
-        maximum=signal.maximum,
+        minimum=None if signal.minimum is None else float(signal.minimum),
+        maximum=None if signal.maximum is None else float(signal.maximum),
         choices=choices,
         multiplexer=signal.multiplexer_signal,
         multiplexer_ids=tuple(signal.multiplexer_ids or ()),

@@ -162,7 +162,7 @@ def _valid_range(where: str, entry: SignalEntry, named: DatabaseSignal, to_si: f
     """Least and greatest valid SI: of the entry, else of the database, else of the bits."""
     low, high = named.field.physical_range
     if named.minimum is not None and named.maximum is not None and named.minimum < named.maximum:
-        low, high = float(named.minimum), float(named.maximum)
+        low, high = named.minimum, named.maximum
     ends = sorted((low * to_si, high * to_si))
     minimum = ends[0] if entry.minimum is None else entry.minimum
     maximum = ends[1] if entry.maximum is None else entry.maximum

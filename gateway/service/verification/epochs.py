@@ -1,25 +1,22 @@
 """Finds the load epoch that a stated weight belongs to, from the stored estimates."""
 
-import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from gateway.calibration.known_weight import WeightRefusal
 from gateway.errors import RefusedError, StoreError
 from gateway.estimate import Estimate, Quantity
-from gateway.estimate_json import estimate_from_json
-from gateway.history import HistoryPage
+from gateway.estimate_json import read_estimate
 from gateway.posterior import Posterior, fused
 from gateway.records import iso_utc
 from gateway.stated.facts import Drive
+from gateway.store import StoreReader
 from gateway.units import NS_PER_S
 
 NEAR_NS: Final = 12 * 3600 * NS_PER_S  # chosen: a drive further away in time may have carried another load
 BATCH_IDS: Final = 20  # chosen: ids kept of one load, the newest
 _PAGE: Final = 500  # chosen: batches read at a time
-
-Ask = Callable[..., HistoryPage]
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,19 +105,19 @@ def epoch_at(epochs: Sequence[WeighedEpoch], at_ns: int, drive: Drive | None) ->
     return candidates[0]
 
 
-def epochs_around(ask: Ask, at_ns: int) -> list[WeighedEpoch]:
+def epochs_around(reader: StoreReader, at_ns: int) -> list[WeighedEpoch]:
     """The stored epochs around a time. Raises RefusedError if the store cannot be read."""
     try:
-        return epochs_of(_estimates(ask, at_ns - NEAR_NS, at_ns + NEAR_NS))
+        return epochs_of(_estimates(reader, at_ns - NEAR_NS, at_ns + NEAR_NS))
     except (StoreError, TimeoutError) as fault:
         raise RefusedError(WeightRefusal.NOT_STORED, f"the store cannot be read now: {fault}") from None
 
 
-def _estimates(ask: Ask, since_ns: int, until_ns: int) -> Iterator[Estimate]:
+def _estimates(reader: StoreReader, since_ns: int, until_ns: int) -> Iterator[Estimate]:
     cursor: str | None = None
     while True:
-        page = ask(since_ns=since_ns, until_ns=until_ns, limit=_PAGE, cursor=cursor, with_spectra=False)
-        yield from (estimate_from_json(json.loads(item)) for item in page.items)
+        page = reader.estimates(since_ns=since_ns, until_ns=until_ns, limit=_PAGE, cursor=cursor, with_spectra=False)
+        yield from reader.understood(page.items, read_estimate)
         if page.next_cursor is None:
             return
         cursor = page.next_cursor

@@ -23,9 +23,10 @@ from gateway.quantity import Quantity
 from gateway.records import iso_utc, json_line, ns_of
 from gateway.service.pipeline import Pipeline
 from gateway.service.record_file import RecordFile
-from gateway.service.verification.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
+from gateway.service.verification.epochs import WeighedEpoch, epoch_at, epochs_around
 from gateway.setup import Subject
 from gateway.stated.facts import Confirmation, Ending, StatedWeight
+from gateway.store import StoreReader
 from gateway.weighing.calibrated import CalibratedVehicle
 
 ALL_KINDS: Final = tuple(KnownWeightKind)
@@ -49,17 +50,17 @@ class KnownWeightService:
         directory: Path,
         subject: Subject,
         pipeline: Pipeline,
-        ask: Ask,
+        reader: StoreReader,
         *,
         stale_after_s: float,
         on_event: OnEvent,
         clock_ns: Callable[[], int] = time.time_ns,
     ) -> None:
-        """Reads the file and applies its known weights. ``ask`` queries the store for estimates.
+        """Reads the file and applies its known weights. ``reader`` gives the stored estimates.
 
         A damaged file is set aside: weighing goes on without known weights, and ``fault`` says so.
         """
-        self._subject, self._pipeline, self._ask = subject, pipeline, ask
+        self._subject, self._pipeline, self._reader = subject, pipeline, reader
         self._stale_after_s = stale_after_s
         self._on_event = on_event
         self._clock_ns = clock_ns
@@ -246,7 +247,7 @@ class KnownWeightService:
     def _at(self, stated: StatedWeight, calibrated: CalibratedVehicle) -> _Load:
         """The stored load at the stated time. Raises RefusedError."""
         at_ns = ns_of(stated.at)
-        epoch = epoch_at(epochs_around(self._ask, at_ns), at_ns, stated.drive)
+        epoch = epoch_at(epochs_around(self._reader, at_ns), at_ns, stated.drive)
         epoch.require(calibrated.id, self._subject.estimator)
         return _Load(epoch.posterior, epoch.t_start_ns, epoch.t_end_ns, epoch.n_batches, epoch.batch_ids)
 

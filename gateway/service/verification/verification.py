@@ -21,10 +21,11 @@ from gateway.log import Event, OnEvent, tell_event
 from gateway.quantity import Quantity
 from gateway.records import iso_utc, json_line, ns_of
 from gateway.service.record_file import RecordFile
-from gateway.service.verification.epochs import Ask, WeighedEpoch, epoch_at, epochs_around
+from gateway.service.verification.epochs import WeighedEpoch, epoch_at, epochs_around
 from gateway.setup import Subject
 from gateway.stated.facts import LoadTold, Rule, StatedWeight, VerificationRecord
 from gateway.status import VerificationStatus
+from gateway.store import StoreReader
 from gateway.units import NS_PER_DAY
 from gateway.weighing.calibrated import CalibratedVehicle
 
@@ -36,7 +37,7 @@ class VerificationService:
         self,
         directory: Path,
         subject: Subject,
-        ask: Ask,
+        reader: StoreReader,
         rule: Rule,
         *,
         payload_without: Callable[[WeighedEpoch], Quantity] = lambda epoch: epoch.payload,
@@ -44,12 +45,12 @@ class VerificationService:
         on_event: OnEvent,
         clock_ns: Callable[[], int] = time.time_ns,
     ) -> None:
-        """``ask`` queries the store for estimates; ``every_days`` 0: a verification is never due.
+        """``reader`` gives the stored estimates; ``every_days`` 0: a verification is never due.
 
         ``payload_without`` estimates a load without its own known weight.
         """
         self._subject = subject
-        self._ask = ask
+        self._reader = reader
         self._rule = rule
         self._payload_without = payload_without
         self._every_days = every_days
@@ -104,7 +105,7 @@ class VerificationService:
         calibrated = self._subject.calibrated
         if calibrated is None:
             raise RefusedError(WeightRefusal.NO_CALIBRATION, "there is no calibration, and so nothing to verify")
-        epochs = [epoch_at(epochs_around(self._ask, ns_of(one.at)), ns_of(one.at), one.drive) for one in stated]
+        epochs = [epoch_at(epochs_around(self._reader, ns_of(one.at)), ns_of(one.at), one.drive) for one in stated]
         loads = tuple(self._judged(one, epoch, calibrated) for one, epoch in zip(stated, epochs, strict=True))
         unnamed = VerificationRecord(
             id="",

@@ -167,11 +167,14 @@ def _rejected(heard: Estimate | None, shown: Estimate | None) -> tuple[Why, ...]
 def _last_event(reader: StoreReader) -> CabEvent | None:
     """The latest load event that is not withdrawn."""
     page = reader.page((EntryKind.EVENT,), limit=_EVENTS, newest_first=True)
-    standing = [one for one in map(json.loads, page.items) if not one["is_withdrawn"]]
-    if not standing:
-        return None
-    last = max(standing, key=lambda one: str(one["t_end"]))
-    return CabEvent(**last | {"payload_kg": last["after"]["payload_kg"]})
+    told = (one for one in reader.understood(page.items, _cab_event) if one is not None)
+    return max(told, key=lambda one: one.t_end, default=None)
+
+
+def _cab_event(text: str) -> CabEvent | None:
+    """None for one that was withdrawn."""
+    told = json.loads(text)
+    return None if told["is_withdrawn"] else CabEvent(**told | {"payload_kg": told["after"]["payload_kg"]})
 
 
 def _interval(quantity: Quantity) -> list[float] | None:

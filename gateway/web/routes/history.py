@@ -1,10 +1,10 @@
 """/api/v1: the latest estimate, the status, the stream, and the history as pages and as files."""
 
 import asyncio
+import json
 import re
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, Depends, Header, Query, Request
@@ -251,11 +251,14 @@ def export_router(reader: StoreReader) -> APIRouter:
     """All estimates as a file."""
     router = APIRouter(prefix="/api/v1", tags=["export"])
 
+    def rows_of(items: Sequence[str]) -> list[dict[str, Any]]:
+        return reader.understood(items, lambda item: csv_cells(json.loads(item)))
+
     def sent(span: TimeSpan, ending: str, shown: Shown, *, with_spectra: bool) -> Awaitable[Response]:
         def page(cursor: str | None) -> Awaitable[HistoryPage]:
             return history_page(reader, BATCHES, span, BATCHES_AT_A_TIME, cursor, shown, with_spectra=with_spectra)
 
-        return sent_as_file(page, "springscale", ending, COLUMNS, csv_cells)
+        return sent_as_file(page, "springscale", ending, COLUMNS, rows_of)
 
     @router.get("/export.csv", response_class=Response, responses=file_responses("csv", "the file"))
     async def export_csv(span: Annotated[TimeSpan, Query()], shown: AsShown) -> Response:
@@ -303,11 +306,14 @@ def _entries(reader: StoreReader, kind: EntryKind) -> Callable[..., Any]:
 
 
 def _whole(reader: StoreReader, kind: EntryKind, name: str, ending: str) -> Callable[..., Any]:
+    def rows_of(items: Sequence[str]) -> list[dict[str, Any]]:
+        return reader.understood(items, lambda item: table.cells_of(kind, json.loads(item)))
+
     async def whole(span: Annotated[TimeSpan, Query()], shown: AsShown) -> Response:
         def page(cursor: str | None) -> Awaitable[HistoryPage]:
             return history_page(reader, (kind,), span, ENTRIES_AT_A_TIME, cursor, shown)
 
-        return await sent_as_file(page, name, ending, table.COLUMNS[kind], partial(table.cells_of, kind))
+        return await sent_as_file(page, name, ending, table.COLUMNS[kind], rows_of)
 
     return whole
 
