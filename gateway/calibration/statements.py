@@ -6,13 +6,15 @@ other doubts. Plus-minus is half a 95 % interval.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Final
 
 import numpy as np
 
 from gateway.core.vehicle import Carries, Load, Vehicle, front_share_pct
 from gateway.quantity import Z95
+from gateway.stated.statement import StatementSource
+
+__all__ = ["Claim", "LoadPrior", "Statement", "StatementSource", "empty", "load_prior_of"]
 
 UNKNOWN_PART: Final = (0.45, 0.7)
 """Chosen: mean and standard deviation of a payload that nobody stated, in parts of the largest payload. Wide enough
@@ -25,16 +27,6 @@ KNOWN_PLUS_MINUS_KG: Final = 4.0  # chosen: of a weighed known load
 KNOWN_PLACE_PLUS_MINUS_M: Final = 0.05  # chosen: of a measured place
 KNOWN_SHARE_PLUS_MINUS_PCT: Final = 0.4  # the same as a front share, of a load of a quarter of the vehicle
 LEAST_SHARE_STD: Final = 0.002  # chosen: 0..1, of any stated place
-
-
-class StatementSource(StrEnum):
-    """Where a statement comes from."""
-
-    EMPTY = "empty"
-    DELIVERY_NOTE = "delivery_note"
-    SCALE = "scale"
-    AXLE_SCALES = "axle_scales"
-    KNOWN = "known"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from math import exp, isfinite, log, nan
+from math import exp, isfinite, log, nan, pi, sqrt
 from statistics import fmean
 from typing import Final
 
@@ -61,6 +61,7 @@ UNKNOWN_SHARE: Final = 0.1  # chosen: of the empty mass; a payload stated no bet
 SHARED: Final = 1e-2  # chosen: what is left of the deviations among known loads: one day, one box, one road
 MOST_LOAD_SHARE: Final = 4.0  # chosen: of the empty mass; bound of the search
 MOST_DISAGREEMENT: Final = 3.7  # chosen: standard deviations; chance exceeds it for one statement in five thousand
+GROSS_ERRORS: Final = 0.05  # chosen: probability that a statement is of another load
 MOST_SUSPECTS: Final = 4  # chosen: statements compared before one is held
 WEAK_DISAGREEMENT: Final = 2.5  # chosen: from here on a statement counts less, as in Huber's estimate of a mean
 LEAST_WITNESSES: Final = 3  # chosen: two drives must remain for a scale
@@ -125,8 +126,17 @@ class _Drive:
         """The name of the statement that says its place."""
         return self.drive.statement.placed_by or self.drive.name
 
-    def believing(self, held: Collection[str], softened: Mapping[str, float], causes: Sequence[str]) -> "_Drive":
-        """The same drive without the statements that are held; those softened have so many times their error."""
+    def believing(
+        self,
+        held: Collection[str],
+        softened: Mapping[str, float],
+        causes: Sequence[str],
+        *,
+        is_one_day: bool = True,
+    ) -> "_Drive":
+        """The same drive without the statements that are held; those softened have so many times their error. If
+        it is not of one day with the others, it deviates from the vehicle like any drive.
+        """
         one, statement = copy(self), self.drive.statement
         if statement.is_of_payload:
             statement = replace(
@@ -137,6 +147,7 @@ class _Drive:
         for name in held:
             if name == statement.placed_by or any(claim.name == name for claim in statement.claims):
                 statement = statement.without(name)
+        statement = replace(statement, is_compact=statement.is_compact and is_one_day)
         one.drive = replace(self.drive, statement=statement)
         one.stated = load_prior_of(statement, self.vehicle)
         one.terms = Terms.of(statement.claims, causes)
@@ -397,7 +408,7 @@ def teach(
         if progress is not None:
             progress(next(done, n_steps), n_steps)
 
-    fitted, claims = _tried(known, prior, step)
+    fitted, claims = _tested(known, prior, step)
     loads = [fitted.found_load(i, claims) for i in range(len(known))]
     step()
     model = fitted.model(vehicle)
@@ -430,8 +441,24 @@ def teach(
     )
 
 
-def _tried(known: Sequence[_Drive], prior: Prior, step: Callable[[], None]) -> tuple["_Fitted", list[FoundClaim]]:
-    """The fit of all drives, and its statements tested: each is believed, counts less, or is held.
+def _tested(known: Sequence[_Drive], prior: Prior, step: Callable[[], None]) -> tuple["_Fitted", list[FoundClaim]]:
+    """The fit of all drives, and its statements tested.
+
+    Known loads count as driven in one box on one day. If that makes them contradict each other, the drives may rather
+    have been of several days: what is more probable counts.
+    """
+    fitted, found = _judged(known, prior, step, is_one_day=True)
+    if any(one.state is ClaimState.HELD for one in found) and any(one.stated.is_compact for one in known):
+        other, found_otherwise = _judged(known, prior, step, is_one_day=False)
+        if other.log_evidence(found_otherwise) > fitted.log_evidence(found):
+            return other, found_otherwise
+    return fitted, found
+
+
+def _judged(
+    known: Sequence[_Drive], prior: Prior, step: Callable[[], None], *, is_one_day: bool
+) -> tuple["_Fitted", list[FoundClaim]]:
+    """The fit of all drives, of whose statements each is believed, counts less, or is held.
 
     A wrong statement makes others look wrong, sometimes more than itself: of those that look wrong the one is held
     first without which all drives are explained best. One that agrees once others are held is believed again.
@@ -442,24 +469,21 @@ def _tried(known: Sequence[_Drive], prior: Prior, step: Callable[[], None]) -> t
     softened: dict[str, float] = {}
     fitted: _Fitted | None = None
     while True:
-        drives = [one.believing(held, softened, causes) for one in known]
+        drives = [one.believing(held, softened, causes, is_one_day=is_one_day) for one in known]
         fitted = _fitted(drives, causes, prior, step, fitted)
         found = [claim for i, one in enumerate(known) for claim in fitted.found_claims(i, one, held, softened)]
-        doubted = {one.name: one.disagreement for one in found if one.disagreement > MOST_DISAGREEMENT}
-        if suspects := sorted(doubted.keys() - held, key=lambda name: -doubted[name])[:MOST_SUSPECTS]:
-            held.add(fitted.least_likely(suspects) if len(suspects) > 1 else suspects[0])
+        off = {one.name: one.disagreement for one in found if one.name not in held}
+        if suspects := sorted((name for name in off if off[name] > MOST_DISAGREEMENT), key=lambda name: -off[name]):
+            held.add(fitted.least_likely(suspects[:MOST_SUSPECTS]))
             continue
-        weak = {one.name: one.disagreement / WEAK_DISAGREEMENT for one in found if one.name not in {*held, *softened}}
-        agreeing = {
-            name
-            for name in held - pardoned
-            if all(one.disagreement < WEAK_DISAGREEMENT for one in found if one.name == name)
-        }
-        if not agreeing and not any(factor > 1.0 for factor in weak.values()):
+        agreeing = {one.name for one in found if one.disagreement < WEAK_DISAGREEMENT} & held - pardoned
+        weak = {name: z / WEAK_DISAGREEMENT for name, z in off.items() if z > WEAK_DISAGREEMENT}
+        weak = {name: factor for name, factor in weak.items() if name not in softened}
+        if not (agreeing or weak):
             return fitted, found
         pardoned |= agreeing
         held -= agreeing
-        softened |= {name: factor for name, factor in weak.items() if factor > 1.0}
+        softened |= weak
 
 
 def _drives(drives: Sequence[TaughtDrive], vehicle: Vehicle, sister: VehicleModel | None) -> list[_Drive]:
@@ -612,11 +636,26 @@ class _Fitted:
                 is_of_place=by_place > max(off, WEAK_DISAGREEMENT),
             )
 
+    def log_evidence(self, claims: Sequence[FoundClaim]) -> float:
+        """Logarithm of the probability of drives and statements, up to a constant, by Laplace's approximation.
+
+        A statement that is held is a gross error: any payload that the vehicle may carry, with a small probability.
+        """
+        own = [prior.precision[np.ix_(free, free)] for prior in self.own_priors
+               if (free := np.flatnonzero(np.diag(prior.precision)).tolist())]  # fmt: skip
+        volume = 0.5 * sum(float(np.linalg.slogdet(precision)[1]) for precision in own) - self.half_car.log_volume
+        words = -sum(float(np.sum(np.log(one.terms.own_kg * sqrt(2.0 * pi)))) for one in self.seen)
+        most_kg = self.seen[0].vehicle.largest_payload_kg
+        n_held = sum(claim.state is ClaimState.HELD for claim in claims)
+        return volume + words - self.half_car.cost + n_held * log(GROSS_ERRORS / most_kg)
+
     def least_likely(self, names: Sequence[str]) -> str:
         """Of these statements the one without which all drives are explained best."""
         upright = self.prior.upright(len(self.causes))
 
         def cost(name: str) -> float:
+            if len(names) == 1:
+                return 0.0
             drives = [one.believing({name}, {}, self.causes) for one in self.seen]
             priors = [_own_prior(one.stated, one.vehicle, is_said=bool(one.terms.names)) for one in drives]
             found = fit.most_probable(self.half_car.common, upright, _at(drives, priors, self.half_car.own), ROUGH)
