@@ -13,13 +13,15 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
+from itertools import combinations
 from math import exp, isfinite, log, nan, pi, sqrt
 from statistics import fmean
 from typing import Final
 
 import numpy as np
 
-from gateway.calibration.claims import Terms, common_causes, shared_disagreement
+from gateway.calibration.claims import LEAST_PRECISION, Terms, common_causes, shared_disagreement
 from gateway.calibration.left_out import (
     USUAL_FRONT_SHARE_PCT,
     USUAL_PAYLOAD_SHARE,
@@ -37,7 +39,7 @@ from gateway.model import fit
 from gateway.model.car import Ground
 from gateway.model.checks import MOST_TENSION, reach_of
 from gateway.model.expected import log_stroke_speeds, with_strokes
-from gateway.model.place import ROLL_BAND_HZ
+from gateway.model.place import ROLL_BAND_HZ, spectra_of_sides
 from gateway.model.spectra import CrossSpectra, Reading, Segments, grouped, level, mount_of, segments_of, usual_floor
 from gateway.model.table import INDEX, NAMES, OWN, ROWS, UPRIGHT, N, covariance_of, prior_of
 from gateway.model.vehicle import VehicleModel
@@ -63,6 +65,7 @@ MOST_LOAD_SHARE: Final = 4.0  # chosen: of the empty mass; bound of the search
 MOST_DISAGREEMENT: Final = 3.7  # chosen: standard deviations; chance exceeds it for one statement in five thousand
 GROSS_ERRORS: Final = 0.05  # chosen: probability that a statement is of another load
 MOST_SUSPECTS: Final = 4  # chosen: statements compared before one is held
+MOST_PAIRS: Final = 2  # chosen: statements that may have been exchanged; each pair costs a rough fit
 WEAK_DISAGREEMENT: Final = 2.5  # chosen: from here on a statement counts less, as in Huber's estimate of a mean
 LEAST_WITNESSES: Final = 3  # chosen: two drives must remain for a scale
 MOST_DIRECTIONS: Final = 8  # chosen: they carry 98 % and more of the payload's variance
@@ -318,17 +321,30 @@ class ClaimState(StrEnum):
 class FoundClaim:
     """What the fit made of a statement about one drive.
 
-    disagreement is that of the statement with the drive as the others see it, in standard deviations of their
-    difference; without (kg) is what the drive says without it. ``is_of_place``: its payload agrees, its place does not.
+    said (kg) is its payload with the whole error that was stated. disagreement is that of the statement with the drive
+    as the others see it, in standard deviations of their difference; without (kg) is what the drive says without it.
+    ``is_of_place``: its payload agrees, its place does not. ``exchanged_with`` is the drive whose statement explains
+    this one, and which this statement explains.
     """
 
     name: str
     drive: str
     state: ClaimState
     disagreement: float
+    said_kg: float
+    said_std_kg: float
     without_kg: float
     without_std_kg: float
     is_of_place: bool = False
+    exchanged_with: str | None = None
+
+    def distance(self, other: "FoundClaim") -> float:
+        """Of two statements, each from what the other's drive says, in standard deviations."""
+        off = [
+            (one.said_kg - drive.without_kg) / np.hypot(one.said_std_kg, drive.without_std_kg)
+            for one, drive in ((self, other), (other, self))
+        ]
+        return float(np.hypot(*off))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -394,12 +410,7 @@ def teach(
     Raises CalibrationImpossibleError if no drive has enough steady driving.
     """
     known = _drives(drives, vehicle, sister)
-    with_roll = known[0].spectra.has_roll
-    prior = (
-        Prior.of_any(vehicle, with_roll=with_roll)
-        if sister is None
-        else Prior.of_sister(sister, vehicle, with_roll=with_roll)
-    )
+    prior = _prior(known, vehicle, sister)
     witnesses = [one for one in known if one.drive.statement.is_of_payload]
     n_steps = (1 if sister else len(STARTS)) + 1 + (len(witnesses) if len(witnesses) >= LEAST_WITNESSES else 0)
     done = iter(range(1, n_steps + 1))
@@ -441,6 +452,22 @@ def teach(
     )
 
 
+def examined(drives: Sequence[TaughtDrive], vehicle: Vehicle, sister: VehicleModel | None) -> tuple[FoundClaim, ...]:
+    """The statements about these drives, tested as :func:`teach` does; none if no drive has enough steady driving."""
+    try:
+        known = _drives(drives, vehicle, sister)
+    except CalibrationImpossibleError:
+        return ()
+    return tuple(_tested(known, _prior(known, vehicle, sister), lambda: None)[1])
+
+
+def _prior(known: Sequence[_Drive], vehicle: Vehicle, sister: VehicleModel | None) -> Prior:
+    with_roll = known[0].spectra.has_roll
+    if sister is None:
+        return Prior.of_any(vehicle, with_roll=with_roll)
+    return Prior.of_sister(sister, vehicle, with_roll=with_roll)
+
+
 def _tested(known: Sequence[_Drive], prior: Prior, step: Callable[[], None]) -> tuple["_Fitted", list[FoundClaim]]:
     """The fit of all drives, and its statements tested.
 
@@ -461,11 +488,14 @@ def _judged(
     """The fit of all drives, of whose statements each is believed, counts less, or is held.
 
     A wrong statement makes others look wrong, sometimes more than itself: of those that look wrong the one is held
-    first without which all drives are explained best. One that agrees once others are held is believed again.
+    first without which all drives are explained best. One that agrees once others are held is believed again. If the
+    loads of two drives were exchanged, both are held, although one of the drives alone may not be sure enough.
     """
     causes = common_causes(claim for one in known for claim in one.claims)
     held: set[str] = set()
     pardoned: set[str] = set()
+    exchanged: dict[str, str] = {}
+    tried: set[frozenset[str]] = set()
     softened: dict[str, float] = {}
     fitted: _Fitted | None = None
     while True:
@@ -476,14 +506,56 @@ def _judged(
         if suspects := sorted((name for name in off if off[name] > MOST_DISAGREEMENT), key=lambda name: -off[name]):
             held.add(fitted.least_likely(suspects[:MOST_SUSPECTS]))
             continue
-        agreeing = {one.name for one in found if one.disagreement < WEAK_DISAGREEMENT} & held - pardoned
+        as_stated = [one.believing((), {}, causes, is_one_day=is_one_day) for one in known] if held else []
+        others = [one for one in found if one.name not in exchanged]
+        if (pair := _exchanged(as_stated, fitted, found, others, tried)) is not None:
+            exchanged |= {pair[0].name: pair[1].drive, pair[1].name: pair[0].drive}
+            held |= {one.name for one in pair}
+            continue
+        agreeing = {one.name for one in found if one.disagreement < WEAK_DISAGREEMENT} & held - pardoned - {*exchanged}
         weak = {name: z / WEAK_DISAGREEMENT for name, z in off.items() if z > WEAK_DISAGREEMENT}
         weak = {name: factor for name, factor in weak.items() if name not in softened}
         if not (agreeing or weak):
-            return fitted, found
+            return fitted, [replace(one, exchanged_with=exchanged.get(one.name)) for one in found]
         pardoned |= agreeing
         held -= agreeing
         softened |= weak
+
+
+def _exchanged(
+    known: Sequence[_Drive],
+    fitted: "_Fitted",
+    found: Sequence[FoundClaim],
+    others: Sequence[FoundClaim],
+    tried: set[frozenset[str]],
+) -> tuple[FoundClaim, FoundClaim] | None:
+    """Two of the ``others``, at least one of them held, that explain all drives better once they exchange their drives.
+
+    Those that promise most are tried, by what either drive says and by its likelihood with the other's load; ``tried``
+    keeps which.
+    """
+    places = {one.drive.name: i for i, one in enumerate(known)}
+    alone = [one for one in others if sum(other.drive == one.drive or other.name == one.name for other in found) == 1]
+    pairs = [
+        pair
+        for pair in combinations(alone, 2)
+        if any(one.state is ClaimState.HELD for one in pair) and frozenset(one.name for one in pair) not in tried
+    ]
+    gains = {pair: fitted.gain_of_exchange(known, *(places[one.drive] for one in pair)) for pair in pairs}
+    likely = [pair for pair in sorted(pairs, key=lambda pair: -gains[pair])[:MOST_PAIRS] if gains[pair] > 0.0]
+    near = [pair for pair in pairs if pair[0].distance(pair[1]) < MOST_DISAGREEMENT and pair not in likely]
+    best = fitted.log_evidence(found)
+    for pair in (*likely, *sorted(near, key=lambda pair: pair[0].distance(pair[1]))[:MOST_PAIRS]):
+        tried.add(frozenset(one.name for one in pair))
+        drives = list(fitted.seen)
+        for one, other in (pair, reversed(pair)):
+            i, said = places[one.drive], known[places[other.drive]].drive.statement
+            exchanged = copy(fitted.seen[i])
+            exchanged.drive = replace(known[i].drive, statement=said)
+            drives[i] = exchanged.believing((), {}, fitted.causes)
+        if fitted.again(drives).log_evidence([one for one in found if one not in pair]) > best:
+            return pair
+    return None
 
 
 def _drives(drives: Sequence[TaughtDrive], vehicle: Vehicle, sister: VehicleModel | None) -> list[_Drive]:
@@ -539,7 +611,7 @@ def _own_prior(stated: LoadPrior, vehicle: Vehicle, *, is_said: bool = False) ->
     return prior
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _Fitted:
     """The result of one fit: the half-car with its drives, and roll."""
 
@@ -608,7 +680,7 @@ class _Fitted:
     ) -> Iterator[FoundClaim]:
         """Every statement about drive i as it was ``stated``, tested: also what is held."""
         terms, (mean, covariance) = self.seen[i].terms, self._joint(i)
-        model_kg = USUAL_PAYLOAD_SHARE * stated.vehicle.empty_mass_kg
+        model_kg, model_share = self._model_error(i)
         for claim in stated.claims:
             whole = Terms.of([claim], self.causes)
             error_kg = float(np.hypot(whole.own_kg[0], model_kg))
@@ -624,13 +696,15 @@ class _Fitted:
             for cause, _ in claim.shared:
                 if cause == claim.name and cause in causes:
                     off = max(off, shared_disagreement(causes[cause][0], causes[cause][1] ** 2))
-            by_place = self._place_disagreement(i, stated) if claim.name == stated.placed_by else 0.0
+            by_place = self._place_disagreement(i, stated, model_share) if claim.name == stated.placed_by else 0.0
             state = ClaimState.WEAK if claim.name in softened else ClaimState.USED
             yield FoundClaim(
                 name=claim.name,
                 drive=stated.drive.name,
                 state=ClaimState.HELD if claim.name in held else state,
                 disagreement=max(off, by_place),
+                said_kg=claim.payload_kg,
+                said_std_kg=claim.std_kg,
                 without_kg=float(by_others[0]),
                 without_std_kg=float(left[0, 0]) ** 0.5,
                 is_of_place=by_place > max(off, WEAK_DISAGREEMENT),
@@ -651,24 +725,69 @@ class _Fitted:
 
     def least_likely(self, names: Sequence[str]) -> str:
         """Of these statements the one without which all drives are explained best."""
+        if len(names) == 1:
+            return names[0]
+        costs = {
+            name: self.again([one.believing({name}, {}, self.causes) for one in self.seen]).half_car.cost
+            for name in names
+        }
+        return min(names, key=lambda name: costs[name])
+
+    def gain_of_exchange(self, stated: Sequence[_Drive], i: int, j: int) -> float:
+        """In log likelihood, if each of two drives carried what is stated of the other, all else as it is."""
+        gain = 0.0
+        for one, other in ((i, j), (j, i)):
+            own, said = self.half_car.own[one].copy(), stated[other].stated
+            here = self.seen[one].point(self.half_car.common, own)
+            own[K:] = said.payload_kg, said.front_share
+            there = self.seen[one].point(self.half_car.common, own)
+            own[K:] = stated[one].stated.payload_kg, stated[one].stated.front_share
+            as_stated = self.seen[one].point(self.half_car.common, own)
+            costs = self.seen[one].whittle.costs([there, as_stated, here])
+            gain += float(costs[1] - costs[0])
+        return gain
+
+    def again(self, drives: list[_Drive]) -> "_Fitted":
+        """A rough fit of the same drives with other statements, from here and from a usual vehicle; roll stays."""
         upright = self.prior.upright(len(self.causes))
+        priors = [_own_prior(one.stated, one.vehicle, is_said=bool(one.terms.names)) for one in drives]
+        starts = ((self.half_car.common, self.half_car.own), (upright.mean, [prior.mean for prior in priors]))
+        tried = [_from_start(drives, priors, upright, *start) for start in starts]
+        return replace(self, seen=drives, own_priors=priors, half_car=min(tried, key=lambda found: found.cost))
 
-        def cost(name: str) -> float:
-            if len(names) == 1:
-                return 0.0
-            drives = [one.believing({name}, {}, self.causes) for one in self.seen]
-            priors = [_own_prior(one.stated, one.vehicle, is_said=bool(one.terms.names)) for one in drives]
-            found = fit.most_probable(self.half_car.common, upright, _at(drives, priors, self.half_car.own), ROUGH)
-            own, n_moved = _reseeded(drives, priors, found)
-            return (
-                fit.most_probable(found.common, upright, _at(drives, priors, own), ROUGH).cost
-                if n_moved
-                else found.cost
-            )
+    def _model_error(self, i: int) -> tuple[float, float]:
+        """Standard deviations of what drive i says of payload (kg) and front share (0..1) by the model's own error, and
+        without a roll rate by the load's unknown place across (gateway.model.weigh says how).
+        """
+        one, own = self.seen[i], self.half_car.own[i]
+        usual = USUAL_PAYLOAD_SHARE * one.vehicle.empty_mass_kg, USUAL_FRONT_SHARE_PCT / 100.0
+        point = one.point(self.half_car.common, own)
+        sides = spectra_of_sides(one.whittle, point, self._plain) if self.rolling is None else ()
+        if not sides:
+            return usual
+        across = self.half_car.across[i]
+        by_vehicle = across.T @ np.linalg.solve(self.half_car.covariance, across)
+        information = np.linalg.inv(self.half_car.own_covariances[i] - by_vehicle)
+        information[K, K] -= np.sum(one.terms.own_kg**-2.0)
+        if one.drive.statement.has_place:
+            information[K + 1, K + 1] -= self.own_priors[i].precision[K + 1, K + 1]
+        values, vectors = np.linalg.eigh(information)
+        free = (vectors / np.maximum(values, LEAST_PRECISION)) @ vectors.T
+        n = len(point.theta)
 
-        return min(names, key=cost)
+        def moved(parts: F64) -> F64:
+            shown = one.whittle.showing(one.whittle.spectra.showing(parts))
+            return np.asarray(-free @ shown.curvature(point, [*OWN, n, n + 1]).gradient)[K:]
 
-    def _place_disagreement(self, i: int, stated: _Drive) -> float:
+        left, right, middle = (moved(parts) for parts in sides)
+        found = np.hypot(0.5 * (left - right), 0.5 * (left + right) - middle)
+        return float(np.hypot(usual[0], found[0])), float(np.hypot(usual[1], found[1]))
+
+    @cached_property
+    def _plain(self) -> VehicleModel:
+        return self.model(self.seen[0].vehicle)
+
+    def _place_disagreement(self, i: int, stated: _Drive, model_std: float) -> float:
         """Of the stated front share with that of drive i without it, in standard deviations of the difference."""
         if not stated.drive.statement.has_place or stated.stated.payload_kg == 0.0:
             return 0.0
@@ -677,7 +796,7 @@ class _Fitted:
         if self.seen[i].drive.statement.has_place:
             left = 1.0 / max(1.0 / variance - std**-2.0, 1e-3 / std**2)
             mean, variance = (mean / variance - share / std**2) * left, left
-        return abs(mean - share) / float(np.sqrt(variance + std**2 + (USUAL_FRONT_SHARE_PCT / 100.0) ** 2))
+        return abs(mean - share) / float(np.sqrt(variance + std**2 + model_std**2))
 
     def covariance(self) -> F64:
         """(n, n) of all parameters: roll moves with the half-car by -C I_rp."""

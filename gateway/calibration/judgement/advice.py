@@ -12,7 +12,6 @@ from typing import Final
 
 from gateway.calibration.ahead import next_steps
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import ErrorTable, Target
@@ -90,7 +89,7 @@ def _uncovered(target: Target) -> Callable[[ErrorTable], float | None]:
     """The least share of intervals that may miss the truth, as few runs determine it; None with fewer than two runs."""
 
     def figure(table: ErrorTable) -> float | None:
-        covered = [(hit, one.run) for one in table.judged if (hit := one.compared(target).is_covered) is not None]
+        covered = [(hit, one.run) for one in table.judged if (hit := one.is_covered(target)) is not None]
         if len({run for _, run in covered}) < 2:
             return None
         return 100.0 * (1.0 - coverage_of([hit for hit, _ in covered], [run for _, run in covered]).high)
@@ -231,19 +230,14 @@ def _of_runs(outcome: Outcome) -> Iterator[Reason]:
     if unusable:
         grade = Grade.UNFIT if 2 * len(unusable) > len(verdicts) else Grade.RESERVED
         yield Reason("runs", grade, f"{len(unusable)} of {len(verdicts)} runs cannot be used: {_listed(unusable)}.")
-    mislabelled = [
-        one.number
-        for one in verdicts
-        if one.is_usable and any(finding.kind is Kind.LOAD_DISAGREES for finding in one.findings)
-    ]
-    held = [drive.number for drive in outcome.file.provenance.drives if drive.found is not None and drive.found.is_held]
-    if mislabelled:
+    drives = [one for one in outcome.file.provenance.drives if one.statement.is_of_payload]
+    held = [one.number for one in drives if one.found is not None and one.found.is_held]
+    if held:
         text = (
-            f"The other runs find another weight for {_listed(mislabelled)} than the campaign file says: correct the "
-            "load, or calibrate without these runs (--runs)."
+            f"The drives contradict what is stated of {_listed(held)}: nothing was learnt from it. Correct the load, "
+            "or leave it out."
         )
-        grade = Grade.RESERVED if set(mislabelled) <= set(held) else Grade.UNFIT  # what is held taught nothing
-        yield Reason("labels", grade, text)
+        yield Reason("labels", Grade.UNFIT if 2 * len(held) > len(drives) else Grade.RESERVED, text)
     for doubt in outcome.doubts:
         yield Reason("facts", Grade.UNFIT, f"{doubt.sentence[:1].upper()}{doubt.sentence[1:]}.")
 
