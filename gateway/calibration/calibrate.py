@@ -25,7 +25,7 @@ from gateway.core.vehicle import Load, Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.model.vehicle import VehicleModel
 from gateway.quantity import Z95
-from gateway.records import F64, Batch
+from gateway.records import F64, Batch, iso_utc
 from gateway.stated.doubt import Doubt
 
 OnFit = Callable[[str, int, int], None]  # (estimator, steps done, steps in all)
@@ -157,7 +157,7 @@ def _refused(campaign: Campaign, inspection: Inspection, why: str) -> str:
 
 def drive_name(number: int) -> str:
     """The name by which a fit knows a run."""
-    return f"run {number}"
+    return f"drive {number}"
 
 
 def _found(runs: Sequence[KnownRun], taught: Taught | None) -> dict[int, FoundLoad]:
@@ -273,6 +273,8 @@ def _provenance(campaign: Campaign, split: Sequence[SplitRun], taught: Taught | 
                 number=run.number,
                 log=run.name,
                 sha256=one.log.sha256,
+                t_start=iso_utc(one.log.span_ns[0]) if one.log.span_ns else None,
+                t_end=iso_utc(one.log.span_ns[1]) if one.log.span_ns else None,
                 n_batches=len([batch for batch in run.batches if not batch.rejected]),
                 statement=run.statement,
                 found=FoundPart.of(found[run.number]) if run.number in found else None,

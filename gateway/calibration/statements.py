@@ -35,12 +35,14 @@ class Claim:
 
     plus_minus_kg is of the error that no other claim has. ``shared`` are errors that it has in common with others, each
     a cause and its standard deviation (kg): a delivery note leaves out the packaging like every other note.
+    ``is_confirmed``: somebody insists on it, so that it is believed whatever the drive shows.
     """
 
     name: str
     payload_kg: float
     plus_minus_kg: float
     shared: tuple[tuple[str, float], ...] = ()
+    is_confirmed: bool = False
 
     @property
     def own_std_kg(self) -> float:
@@ -54,7 +56,8 @@ class Claim:
 
     def softened(self, factor: float) -> "Claim":
         """The same with its own error so many times as large."""
-        return replace(self, plus_minus_kg=factor * self.plus_minus_kg)
+        shared = tuple((cause, std_kg * (factor if cause == self.name else 1.0)) for cause, std_kg in self.shared)
+        return replace(self, plus_minus_kg=factor * self.plus_minus_kg, shared=shared)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -492,6 +492,7 @@ def _judged(
     loads of two drives were exchanged, both are held, although one of the drives alone may not be sure enough.
     """
     causes = common_causes(claim for one in known for claim in one.claims)
+    confirmed = {claim.name for one in known for claim in one.claims if claim.is_confirmed}
     held: set[str] = set()
     pardoned: set[str] = set()
     exchanged: dict[str, str] = {}
@@ -502,12 +503,12 @@ def _judged(
         drives = [one.believing(held, softened, causes, is_one_day=is_one_day) for one in known]
         fitted = _fitted(drives, causes, prior, step, fitted)
         found = [claim for i, one in enumerate(known) for claim in fitted.found_claims(i, one, held, softened)]
-        off = {one.name: one.disagreement for one in found if one.name not in held}
+        off = {one.name: one.disagreement for one in found if one.name not in held | confirmed}
         if suspects := sorted((name for name in off if off[name] > MOST_DISAGREEMENT), key=lambda name: -off[name]):
             held.add(fitted.least_likely(suspects[:MOST_SUSPECTS]))
             continue
         as_stated = [one.believing((), {}, causes, is_one_day=is_one_day) for one in known] if held else []
-        others = [one for one in found if one.name not in exchanged]
+        others = [one for one in found if one.name not in exchanged and one.name not in confirmed]
         if (pair := _exchanged(as_stated, fitted, found, others, tried)) is not None:
             exchanged |= {pair[0].name: pair[1].drive, pair[1].name: pair[0].drive}
             held |= {one.name for one in pair}

@@ -90,6 +90,7 @@ class StatementRecord(Part):
     place: StatedPlace | None = None
     shape: StatedShape | None = None
     learn: bool = Field(True, description="false: compared with what was found, and never learnt from")
+    confirmed: bool = Field(False, description="true: learnt from, although the drive may contradict it")
     by: Text = ""
     note: Text = ""
 

@@ -22,13 +22,13 @@ class BatchSet(StrEnum):
 
 
 PART_NAMES: Mapping[BatchSet, str] = {
-    BatchSet.LEFT_OUT: "runs left out",
+    BatchSet.LEFT_OUT: "drives left out",
     BatchSet.IDENTIFICATION: "identification part (in-sample)",
     BatchSet.VALIDATION: "validation part",
     BatchSet.ALL: "all batches",
 }
 PART_TEXT: Mapping[BatchSet, str] = {
-    BatchSet.LEFT_OUT: "Runs left out: every run's identification part, weighed by a calibration from the other runs.",
+    BatchSet.LEFT_OUT: "Drives left out: the identification part of each, weighed by a calibration from the others.",
     BatchSet.IDENTIFICATION: "Identification part: the batches of the fit, where errors look small.",
     BatchSet.VALIDATION: "Validation part: later batches of the same runs, new to the fit; their loads are not new.",
     BatchSet.ALL: "All batches of the campaign, whether the calibration was fitted to them or not.",
