@@ -132,6 +132,14 @@ class SignalCounts:
     rejected: Mapping[Rejected, int]
 
 
+def _rows_of_sources(can_id: U32) -> list[tuple[int, Bool | slice]]:
+    """Each J1939 source address among the identifiers (n,), at least one, with its rows."""
+    sources = can_id & np.uint32(SOURCE_ADDRESS)
+    if (sources == sources[0]).all():
+        return [(int(sources[0]), slice(None))]
+    return [(int(source), sources == source) for source in np.unique(sources)]
+
+
 def _is_mixed(signal: Signal, n: F64, sums: F64) -> bool:
     """Whether several devices send a signal, by the number and sum of samples of each; speeds that agree are one."""
     means = sums[n > 0] / n[n > 0]
@@ -275,15 +283,14 @@ class _MessageReader:
                 rejected[Rejected.WRONG_LENGTH] += n_wrong
         if not len(ours):
             return
+        by_source = _rows_of_sources(can_id) if self._of_source else []
         for signal, column, reader in self._readers:
-            columns[ours, column], refused = reader.read(payload)
+            samples, refused = reader.read(payload)
+            columns[ours, column] = samples
             self._rejected[signal].update(refused)
-            if self._of_source:
-                samples = columns[ours, column]
-                known = np.isfinite(samples)
-                sources, samples = can_id[known] & np.uint32(SOURCE_ADDRESS), samples[known]
-                for row, weights in enumerate((None, samples)):
-                    self._of_source[signal][row] += np.bincount(sources, weights, SOURCE_ADDRESS + 1)
+            for source, rows in by_source:
+                known = samples[rows][np.isfinite(samples[rows])] if refused else samples[rows]
+                self._of_source[signal][:, source] += len(known), known.sum()
 
     def count(self, counters: Mapping[Signal, F64], ours: I64, payload: U8) -> None:
         """Message counters of the same frames into the same rows; a frame too short for its counter gives no sample
