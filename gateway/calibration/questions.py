@@ -24,11 +24,10 @@ SLIPS: Final = (
 
 def question(claim: FoundClaim, record: StatementRecord, vehicle: Vehicle) -> str:
     """One sentence about a statement that is held or counts less, with what would explain it, and what to do."""
-    said = f"{claim.said_kg:.0f} ± {Z95 * claim.said_std_kg:.0f} kg"
     shown = f"{claim.without_kg:.0f} ± {Z95 * claim.without_std_kg:.0f} kg"
     place = " at another place" if claim.is_of_place else ""
     meant = next(_slips(claim, record, vehicle), "is it of another drive, or of another vehicle?")
-    return f"says {said}, the drive shows {shown}{place}: {meant}"
+    return f"says {claim.said_kg:.0f} kg, the drive shows {shown}{place}: {meant}"
 
 
 def _slips(claim: FoundClaim, record: StatementRecord, vehicle: Vehicle) -> Iterator[str]:
@@ -60,8 +59,11 @@ def common_errors(causes: Mapping[str, tuple[float, float]]) -> Iterator[str]:
     for source, (part, _) in BIAS.items():
         mean, std = causes.get(str(source), (0.0, 1.0))
         if part and abs(mean) > SURE * std and abs(part * mean) > BIAS_SHOWN:
-            less = "less" if mean > 0.0 else "more"
+            off, less = (
+                f"{100.0 * part * abs(mean):.0f} ± {100.0 * Z95 * part * std:.0f} %",
+                "less" if mean > 0.0 else "more",
+            )
             yield (
-                f"all {source.replace('_', ' ')}s say {100.0 * part * abs(mean):.0f} ± {100.0 * Z95 * part * std:.0f} % "
-                f"{less} than is aboard: is it packaging, or what is always in the vehicle? A scale ticket tells"
+                f"all {source.replace('_', ' ')}s say {off} {less} than is aboard: is it packaging, or what is always "
+                "in the vehicle? A scale ticket tells"
             )

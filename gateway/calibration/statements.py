@@ -54,6 +54,11 @@ class Claim:
         """Standard deviation of its whole error."""
         return float(np.hypot.reduce([self.own_std_kg, *(std_kg for _, std_kg in self.shared)]))
 
+    @property
+    def stated_plus_minus_kg(self) -> float:
+        """Half the 95 % interval that its statement gives."""
+        return Z95 * dict(self.shared).get(self.name, self.own_std_kg)
+
     def softened(self, factor: float) -> "Claim":
         """The same with its own error so many times as large."""
         shared = tuple((cause, std_kg * (factor if cause == self.name else 1.0)) for cause, std_kg in self.shared)

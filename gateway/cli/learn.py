@@ -15,6 +15,7 @@ from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.calibration.judgement.advice import FIT_HALF_WIDTH_PCT, WORTH_SAYING, Verdict
 from gateway.calibration.questions import common_errors, question
+from gateway.calibration.statements import Statement
 from gateway.calibration.statements_csv import ToldRow, ToldRows, read_statements
 from gateway.calibration.vehicle import ClaimState
 from gateway.cli import options
@@ -210,13 +211,20 @@ def _drives_record(found: Learnt) -> list[Record]:
                 "t_start": iso_utc(one.piece.begin_ns),
                 "t_end": iso_utc(one.piece.end_ns),
                 "driven_s": rounded(one.usable_s, 1),
-                "stated": None if said.payload_kg is None else _kg(said.payload_kg, said.payload_plus_minus_kg / Z95),
+                "stated": _stated(said),
                 "found": load and _kg(load.load.payload_kg, load.payload_std_kg),
                 "found_without_statement": load and _kg(load.without_kg, load.without_std_kg),
                 "state": str(max((claim.state for claim in claims), key=_gravity)) if claims else None,
             }
         )
     return drives
+
+
+def _stated(said: Statement) -> Record | None:
+    if said.payload_kg is None:
+        return None
+    plus_minus_kg = min(claim.stated_plus_minus_kg for claim in said.claims)
+    return {"payload_kg": rounded(said.payload_kg, 1), "plus_minus_kg": rounded(plus_minus_kg, 1)}
 
 
 def _gravity(state: ClaimState) -> int:
@@ -329,7 +337,7 @@ def _drives_told(record: Record) -> Iterator[str]:
         found = one["found_without_statement"] or one["found"]
         shown = _kg_told(found) if found else "too little driving"
         stated = _kg_told(one["stated"]) if one["stated"] else "nothing"
-        line = f"{one['number']:>5}  {name:28}  {one['t_start'][:16]}  {stated:>17}  {shown:>17}  {one['state'] or ''}"
+        line = f"{one['number']:>5}  {name:28}  {one['t_start'][:16].replace('T', ' ')}  {stated:>17}  {shown:>17}  {one['state'] or ''}"
         yield line.rstrip()
     if n := record["n_drives_unneeded"]:
         yield f"{n_of(n, 'drive')} of unknown load were not used: those above teach as much"
@@ -357,7 +365,8 @@ def _asked(record: Record) -> Iterator[str]:
     if numbers := record["looks_empty"]:
         drives = [record["drives"][number - 1] for number in numbers]
         named = f"drive{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"
-        yield f"{named} of unknown load look{'s' * (len(numbers) == 1)} empty. Is that right? Then add to the statements:"
+        looks = "looks" if len(numbers) == 1 else "look"
+        yield f"{named} of unknown load {looks} empty. Is that right? Then add to the statements:"
         yield "    from;until;source"
         yield from (f"    {one['t_start'][:19]}Z;{one['t_end'][:19]}Z;empty" for one in drives)
     yield f"{record['output'] or 'no file written'}: id {record['calibration_id']}"
