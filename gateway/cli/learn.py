@@ -337,7 +337,8 @@ def _drives_told(record: Record) -> Iterator[str]:
         found = one["found_without_statement"] or one["found"]
         shown = _kg_told(found) if found else "too little driving"
         stated = _kg_told(one["stated"]) if one["stated"] else "nothing"
-        line = f"{one['number']:>5}  {name:28}  {one['t_start'][:16].replace('T', ' ')}  {stated:>17}  {shown:>17}  {one['state'] or ''}"
+        begun = one["t_start"][:16].replace("T", " ")
+        line = f"{one['number']:>5}  {name:28}  {begun}  {stated:>17}  {shown:>17}  {one['state'] or ''}"
         yield line.rstrip()
     if n := record["n_drives_unneeded"]:
         yield f"{n_of(n, 'drive')} of unknown load were not used: those above teach as much"
