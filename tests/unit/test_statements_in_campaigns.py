@@ -87,7 +87,7 @@ def test_a_wrong_statement_is_held_and_named_and_condemns_no_other(tmp_path: Pat
     assert outcome.file.seen.payload_kg == (0.0, 400.0)
     (verdict,) = verdicts_of(assess_calibration(outcome))
     (labels,) = [reason for reason in verdict.reasons if reason.rule == "labels"]
-    assert "run 3" in labels.text
+    assert "drive 3" in labels.text
     assert labels.grade is Grade.RESERVED
 
 
