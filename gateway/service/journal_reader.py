@@ -3,6 +3,7 @@
 import logging
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from gateway.estimate import Estimate
@@ -50,7 +51,7 @@ class JournalReader(ThreadPart):
             while records := self._follower.read(PAGE):
                 for record in records:
                     for found in self._store.reader().understood([record.text], read_estimate):
-                        self._hear(found)
+                        self._hear(replace(found, is_remainder=record.kind == REMAINDER))
                     self._store.write_delivery(self.NAME, record.cursor)
             if is_last:
                 return
