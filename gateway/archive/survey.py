@@ -1,7 +1,7 @@
 """Surveys logs before processing: every log's hash, that of its unpacked content, and the time of its first frame.
 
-Each log is read completely once, on any worker; the facts are stored in the data set (``logs/vehicle=X.json``), and are
-valid as long as the log's size and stamp are unchanged.
+Each log is read completely once, and a packed one unpacked once more, on any worker. The facts are stored in the data
+set (``logs/vehicle=X.json``), and are valid as long as the log's size and stamp are unchanged.
 """
 
 import hashlib
@@ -89,7 +89,7 @@ def _path(vehicle: str) -> str:
 
 
 def survey(log: LogFile) -> SurveyedLog:
-    """Read a log once. Raises FileNotFoundError, PlaceError, or ConfigurationError without a library."""
+    """The facts of a log. Raises FileNotFoundError, PlaceError, or ConfigurationError without a library."""
     with log.place.fetched(log.path) as fetched:
         content_sha256 = _content_sha256(fetched)
         try:

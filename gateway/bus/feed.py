@@ -42,9 +42,8 @@ HEAP_S: Final = 0.04  # chosen: length of a burst: a fifth of the work; the coun
 QUEUE: Final = 500  # chosen: bursts: ten seconds of two sensors
 RETRY_S: Final = 2.0  # chosen: pause after a fault of the bus or of gpsd
 CONNECT_S: Final = 3.0  # chosen: gpsd is on this computer or near
-RECEIVER_LOST_S: Final = (
-    60.0  # chosen: without a speed: longer than a tunnel; a receiver that is plugged in anew has another path
-)
+RECEIVER_LOST_S: Final = 60.0
+"""Chosen: without a speed, longer than in a tunnel. A receiver that is unplugged and plugged in has another path."""
 LONGEST_LINE: Final = 1 << 16  # chosen: far longer than a report of gpsd
 HOLE: Final = 2.5  # chosen: periods without a sample after which samples count as lost, not late
 USUAL_OF: Final = 101  # chosen: pauses whose median is the usual one: a second at 100 Hz

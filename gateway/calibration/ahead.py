@@ -84,7 +84,7 @@ class Ahead:
     def after(
         self, statement: Statement, load: Load, duration_s: float = DRIVE_S, speed_mps: float | None = None
     ) -> F64:
-        """Covariance (n, n) of the parameters after one more drive with this load, of which ``statement`` is known.
+        """Covariance (n, n) of the parameters after one more drive with this load and ``statement``.
 
         The roll parameters keep theirs.
         """

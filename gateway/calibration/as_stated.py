@@ -11,12 +11,13 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.vehicle import BAND_HZ, EVIDENCE, MOST_LOAD_SHARE, N_SEGMENT
+from gateway.calibration.vehicle import BAND_HZ, EVIDENCE, N_SEGMENT
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model import fit
 from gateway.model.car import Ground
 from gateway.model.spectra import CrossSpectra, Reading, grouped, segments_of
 from gateway.model.table import N_OWN, OWN, UPRIGHT, N, covariance_of, of_drive
+from gateway.model.weigh import MOST_LOAD_SHARE
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64
 

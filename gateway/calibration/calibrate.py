@@ -13,7 +13,7 @@ from gateway.calibration.contradicted import contradictions
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.file.parts import DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
 from gateway.calibration.inspection.campaign import Inspection
-from gateway.calibration.inspection.finding import Finding, Kind, Severity
+from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.ratio_index.bands import BandChoice
@@ -150,22 +150,20 @@ def _found(runs: Sequence[KnownRun], taught: Taught | None) -> dict[int, FoundLo
 
 def _with_disagreements(inspection: Inspection, runs: Sequence[KnownRun], taught: Taught | None) -> Inspection:
     """With a warning for each run whose statement the fit held, because its drive contradicts it beyond chance."""
-    found = _found(runs, taught)
-    verdicts = []
-    for verdict in inspection.verdicts:
+    found, said = _found(runs, taught), {run.number: run for run in runs}
+
+    def told(verdict: RunVerdict) -> RunVerdict:
         one = found.get(verdict.number)
         is_told = any(finding.kind is Kind.LOAD_DISAGREES for finding in verdict.findings)
-        if one is not None and one.is_held and not is_told:
-            said = next(run for run in runs if run.number == verdict.number)
-            text = (
-                f"the campaign says {said.described}, the drive shows {one.load.payload_kg:.0f} ± "
-                f"{Z95 * one.payload_std_kg:.0f} kg; the statement taught nothing"
-            )
-            told = replace(verdict, findings=(*verdict.findings, Finding.of(Kind.LOAD_DISAGREES, text)))
-            verdicts.append(told)
-        else:
-            verdicts.append(verdict)
-    return replace(inspection, verdicts=tuple(verdicts))
+        if one is None or not one.is_held or is_told:
+            return verdict
+        text = (
+            f"the campaign says {said[verdict.number].described}, the drive shows {one.load.payload_kg:.0f} ± "
+            f"{Z95 * one.payload_std_kg:.0f} kg; the statement taught nothing"
+        )
+        return replace(verdict, findings=(*verdict.findings, Finding.of(Kind.LOAD_DISAGREES, text)))
+
+    return replace(inspection, verdicts=tuple(map(told, inspection.verdicts)))
 
 
 def _seen(runs: Sequence[KnownRun], counted: Sequence[Batch], taught: Taught | None) -> SeenPart:

@@ -55,8 +55,8 @@ class KnownRun:
 
     @property
     def statement(self) -> Statement:
-        """What is known of the load. One of which payload and place are known is as compact as the vehicle's other
-        known loads.
+        """What is known of the load. If its payload and place are known, it is as compact as the vehicle's other known
+        loads.
         """
         return Statement(
             source=StatementSource.KNOWN if self.has_payload else None,

@@ -31,7 +31,7 @@ from gateway.model.place import ROLL_BAND_HZ
 from gateway.model.spectra import CrossSpectra, Reading, Segments, grouped, level, mount_of, segments_of, usual_floor
 from gateway.model.table import INDEX, N_OWN, NAMES, OWN, ROWS, UPRIGHT, N, covariance_of, of_drive, prior_of
 from gateway.model.vehicle import VehicleModel
-from gateway.model.weigh import answers_by_vehicle, mixture_of, weigh
+from gateway.model.weigh import MOST_LOAD_SHARE, SOFT_HZ, answers_by_vehicle, mixture_of, weigh
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64, Batch, Why
 
@@ -45,11 +45,9 @@ STARTS: Final = ((0.0, 0.0), (0.4, 0.3), (-0.4, -0.3))  # log springs, log dampe
 ROUGH, FINE = 1.0, 0.05  # chosen: tolerances in log posterior, of a start and of the result
 RESEEDS: Final = 3  # chosen: attempts to lift drives out of false peaks
 RESEED_GAIN: Final = 2.0  # chosen: in log posterior, of a peak that is worth moving to
-SOFT_HZ: Final = 10.5  # chosen: of loads on soft mounts
 SEEDS: Final = (8, (0.25, 0.5, 0.75, 1.0))  # chosen: payloads, and places in wheelbases, of a drive's starting loads
 UNKNOWN_SHARE: Final = 0.1  # chosen: of the empty mass; a payload stated no better than that has several starts
 SHARED: Final = 1e-2  # chosen: what is left of the deviations among known loads: one day, one box, one road
-MOST_LOAD_SHARE: Final = 4.0  # chosen: of the empty mass; bound of the search
 MOST_DISAGREEMENT: Final = 3.7  # chosen: standard deviations; chance exceeds it for one statement in five thousand
 LEAST_WITNESSES: Final = 3  # chosen: two drives must remain for a scale
 MOST_DIRECTIONS: Final = 8  # chosen: they carry 98 % and more of the payload's variance

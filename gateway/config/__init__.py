@@ -32,6 +32,7 @@ from gateway.toml_file import SIMILAR, describe_faults, read_toml
 
 Section = TypeVar("Section", bound=BaseModel)
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
+VEHICLE_ID: Final = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"  # as deploy/fleet/provision.py has it
 
 EstimatorName = Literal["cross_spectrum", "ratio_index"]  # those of weighing.estimator, which loads too much for this
 ESTIMATOR_NAMES: tuple[EstimatorName, ...] = get_args(EstimatorName)
@@ -42,7 +43,7 @@ class VehicleSection(SettingsSection):
 
     id: str = Field(
         "vehicle",
-        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$",
+        pattern=f"^{VEHICLE_ID}$",
         description="name under which the fleet knows the vehicle: letters, digits, `.`, `_` and `-`",
     )
     calibrated_as: str | None = Field(

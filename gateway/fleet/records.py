@@ -9,6 +9,8 @@ from typing import Annotated, Any, Final, NamedTuple
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
+from gateway.config import VEHICLE_ID
+
 RecordId = Annotated[str, Field(pattern=r"^[ -~]{1,200}$")]
 Number = Annotated[int, Field(ge=0, lt=2**63)]
 Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]{0,200}$")]
@@ -87,9 +89,6 @@ KINDS: Final[dict[str, type[Status | Estimate | Entry]]] = {
     "status": Status, "estimates": Estimate, "alarms": Alarm, "events": Entry, "trips": Entry
 }  # fmt: skip
 """By the level of the topic below the vehicle's name."""
-VEHICLE_ID: Final = re.compile(
-    r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
-)  # as [vehicle] id and deploy/fleet/provision.py have it
 
 
 class Arrival(NamedTuple):
@@ -107,7 +106,7 @@ def read(topic: str, payload: bytes) -> Arrival:
     The vehicle's name is from the topic alone: the broker lets each vehicle write below its own.
     """
     _, vehicle_id, kind, *_ = topic.split("/")
-    if not VEHICLE_ID.fullmatch(vehicle_id):
+    if not re.fullmatch(VEHICLE_ID, vehicle_id):
         raise ValueError("no name of a vehicle")
     text = json.dumps(json.loads(payload), allow_nan=False)
     return Arrival(vehicle_id, kind, KINDS[kind].model_validate_json(text), text)

@@ -117,13 +117,14 @@ def most_misfit_at(misfit_limit: float, unseen: float) -> float:
     return misfit_limit * math.exp(MISFIT_QUANTILE * MISFIT_ON_OTHER_ROADS * (min(unseen, 4.0) - 1.0))
 
 
-def _is_misfit(signs: Signs) -> bool:
-    return not signs.misfit <= most_misfit_at(signs.model.misfit_limit, signs.unseen)
+def fits(misfit: float, model: VehicleModel, unseen: float) -> bool:
+    """Whether a misfit is small enough for an answer to be believed; False for NaN."""
+    return misfit <= most_misfit_at(model.misfit_limit, unseen)
 
 
 def _is_explained(signs: Signs) -> bool:
     """Whether a changed sensor may explain the batch: with parameters that follow it, the model fits."""
-    return signs.followed <= most_misfit_at(signs.model.misfit_limit, signs.unseen)
+    return fits(signs.followed, signs.model, signs.unseen)
 
 
 def _is_gyro_late(signs: Signs) -> bool:
@@ -164,7 +165,7 @@ CHECKS: Final = (
     Check("the gyro's lag", _is_gyro_late, Why.SENSOR_CHANGED),
     Check("the sensor's place", _is_moved, Why.SENSOR_CHANGED, of_sensor=True),
     Check("the accelerometer's noise", _is_louder, Why.SENSOR_CHANGED, of_sensor=True),
-    Check("misfit", _is_misfit, Why.MODEL_MISFIT),
+    Check("misfit", lambda s: not fits(s.misfit, s.model, s.unseen), Why.MODEL_MISFIT),
     Check("the sensor's mount", lambda s: s.is_mount_changed, Why.SENSOR_CHANGED),
     Check("the gyro's yaw", _is_gyro_turned, Why.SENSOR_CHANGED),
     Check("tension", lambda s: s.tension > MOST_TENSION, Why.MODEL_MISFIT),

@@ -20,7 +20,7 @@ from gateway.core.cargo import HABIT_PART, ShapeHypothesis
 from gateway.core.vehicle import Load
 from gateway.estimate import Estimate
 from gateway.model import fit
-from gateway.model.checks import VEHICLE_ROWS, Signs, disbelieved, most_misfit_at, reach_of, unseen_of, why_not
+from gateway.model.checks import VEHICLE_ROWS, Signs, disbelieved, fits, reach_of, unseen_of, why_not
 from gateway.model.expected import with_strokes
 from gateway.model.place import ROLL_BAND_HZ, Place, most_probable_place, roll_share_of, spectra_of_sides
 from gateway.model.sensors import GAIN_STD, NOISE_RATIOS, Noise, gain_of, is_changed, noise_of, watched
@@ -382,7 +382,7 @@ def posterior_of(mixture: Mixture, model: VehicleModel, unseen: float, gain_std:
     )
     if place is not None:
         own[2, 2] += place.own_variance
-    of_statistics = EVIDENCE if place is not None else EVIDENCE_WITHOUT_ROLL
+    of_statistics = mixture.whittle.weight
     own = _definite(own) * (of_statistics + (1.0 - of_statistics) * unseen**2)
     shape, mean, tails = _shape_of(mixture, outward, of_load)
     spread = np.array(model.spread[:size])
@@ -542,7 +542,7 @@ def _signs_of(
     best, whittle, point = mixture.best, mixture.whittle, mixture.point
     misfit = followed = whittle.misfit(point)
     followed_by = best
-    if not misfit <= most_misfit_at(model.misfit_limit, unseen):
+    if not fits(misfit, model, unseen):
         followed_by, followed = _following(mixture, model)
     off = best.x[:N] - best.hypothesis.mean
     of_vehicle = off[VEHICLE_ROWS]
@@ -554,7 +554,7 @@ def _signs_of(
         followed=followed,
         unseen=unseen,
         reach=reach,
-        is_reversed=_is_reversed(mixture, model),
+        is_reversed=_is_reversed(mixture, model, misfit),
         off=followed_by.x[:N] - model.parameters[:N],
         deviations=followed_by.deviations,
         tension=float(of_vehicle @ np.linalg.solve(prior, of_vehicle)),
@@ -570,14 +570,18 @@ def _following(mixture: Mixture, model: VehicleModel) -> tuple[Peak, float]:
     """The likeliest peak if all of the batch's evidence counts, and its misfit: what may explain that it does not
     fit.
     """
-    most_kg = MOST_LOAD_SHARE * model.empty_mass_kg
     whittle = Whittle(mixture.whittle.spectra, mixture.whittle.ground)
-    own = _Own(whittle, mixture.point.theta[N:], mixture.point.cg_left_m, most_kg)
+    own = _own_by(whittle, mixture, model)
     peak = _climb(own, mixture.best.hypothesis, mixture.best.x, COARSE)
     return peak, whittle.misfit(own.point(peak.x))
 
 
-def _is_reversed(mixture: Mixture, model: VehicleModel) -> bool:
+def _own_by(whittle: Whittle, mixture: Mixture, model: VehicleModel) -> _Own:
+    """Another likelihood of the batch, with roll and the lateral place as the mixture has them."""
+    return _Own(whittle, mixture.point.theta[N:], mixture.point.cg_left_m, MOST_LOAD_SHARE * model.empty_mass_kg)
+
+
+def _is_reversed(mixture: Mixture, model: VehicleModel, misfit: float) -> bool:
     """True if the pitch rate fits better with the other sign: at this load or, if this fits badly, at any start; or if
     the search from there ends where the model fits.
 
@@ -586,8 +590,8 @@ def _is_reversed(mixture: Mixture, model: VehicleModel) -> bool:
     whittle, point = mixture.whittle, mixture.point
     reverse = whittle.showing(whittle.spectra.with_pitch_reversed())
     least = reverse.cost(point)
-    if not whittle.misfit(point) <= model.misfit_limit:
-        own = _Own(reverse, point.theta[N:], point.cg_left_m, MOST_LOAD_SHARE * model.empty_mass_kg)
+    if not misfit <= model.misfit_limit:
+        own = _own_by(reverse, mixture, model)
         starts = [np.r_[mixture.best.hypothesis.mean, load] for load in _starting_loads(model)]
         costs = reverse.costs([own.point(one) for one in starts])
         peak = _climb(own, mixture.best.hypothesis, starts[int(np.argmin(costs))], COARSE)

@@ -68,7 +68,7 @@ class Whittle:
     """The likelihood of one set of spectra. ``weight`` scales all evidence (1: full weight)."""
 
     def __init__(self, spectra: CrossSpectra, ground: Ground, weight: float = 1.0) -> None:
-        self.spectra, self.ground, self._weight = spectra, ground, weight
+        self.spectra, self.ground, self.weight = spectra, ground, weight
         self._groups = Groups(spectra, ground)
         self._p = p = spectra.n_sensors
         self._n = spectra.n_segments * (EFFECTIVE_SHARE * weight)

@@ -31,6 +31,7 @@ from gateway.store.schema import (
 )
 
 T = TypeVar("T")
+_KEEP_DAMAGED: Final = "INSERT INTO damaged (seq, found_ns, id, text) VALUES (?, ?, ?, ?)"
 
 FILE_NAME: Final = "springscale.db"
 LOCK_NAME: Final = "springscale.lock"
@@ -218,9 +219,7 @@ class Database:
     def _move_aside(connection: sqlite3.Connection, rows: Sequence[Stored], now_ns: int) -> None:
         with _transaction(connection):
             for seq, _kind, record_id, *_, text, _crc, _is_object in rows:
-                connection.execute(
-                    "INSERT INTO damaged (seq, found_ns, id, text) VALUES (?, ?, ?, ?)", (seq, now_ns, record_id, text)
-                )
+                connection.execute(_KEEP_DAMAGED, (seq, now_ns, record_id, text))
                 connection.execute("DELETE FROM journal WHERE seq = ?", (seq,))
             newest = _last_number(connection, "damaged")
             connection.execute("DELETE FROM damaged WHERE n <= ?", (newest - MOST_BAD_RECORDS,))
@@ -324,8 +323,7 @@ def _set_refused_aside(connection: sqlite3.Connection, row: Row, fault: Exceptio
     """Keep what SQLite did not take."""
     name = row.id if isinstance(row, JournalRow) else row.name
     text = repr(row).encode("ascii", "backslashreplace")
-    sql = "INSERT INTO damaged (seq, found_ns, id, text) VALUES (?, ?, ?, ?)"
-    connection.execute(sql, (0, time.time_ns(), repr(name), text))
+    connection.execute(_KEEP_DAMAGED, (0, time.time_ns(), repr(name), text))
     log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, record=repr(row)[:200], fault=repr(fault)[:200])
 
 

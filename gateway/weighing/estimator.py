@@ -50,9 +50,7 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
             if not found.counted:
                 return found
             if calibrated.is_out_of_range(found.payload.interval95, found.front_share.interval95):
-                return found.refused(
-                    Why.OUT_OF_RANGE
-                )  # checked without the error of the stated share, which known loads share
+                return found.refused(Why.OUT_OF_RANGE)  # without the stated share's error, which known loads share
             answer = _as_stated(found, calibrated.vehicle)
             return answer if _is_sound(answer.posterior) else answer.refused(Why.NO_SOLUTION)
         except BROKEN_DOWN:

@@ -14,7 +14,7 @@ import numpy as np
 from gateway.bus.frames import gathered
 from gateway.bus.logs.wall_clock import LATE_START_S, ns_since_1970
 from gateway.bus.signals import Decoder, IdFilter
-from gateway.bus.signals.decode import Remark
+from gateway.bus.signals.decode import TELLING_SHARE, Remark
 from gateway.errors import LogUnreadableError
 from gateway.records import FIRST_DATED_NS, I64, U32, Bool, Frames, iso_utc
 from gateway.units import NS_PER_S
@@ -24,7 +24,6 @@ NAMED_CHANNELS: Final = 8  # chosen: likewise
 KEPT_CHANNELS: Final = 32  # chosen: in memory; damaged lines name any number
 CHUNK_FRAMES: Final = 32_768  # chosen: given out at once: large enough that the decoder's own steps cost little
 SHOWN_CHARS: Final = 60  # chosen: of a line that cannot be read
-TELLING_SHARE: Final = 0.01  # chosen: of a log's frames; so many unreadable ones are the cause if none can be used
 AS_CANDUMP: Final = "candump logs are recorded with candump -L"
 JUDGED_FRAMES: Final = 1000  # chosen: least number whose stamps are judged
 JUDGED_SECONDS: Final = 3.0  # chosen: least time in which stamps of whole seconds are

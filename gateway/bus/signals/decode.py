@@ -25,7 +25,7 @@ from gateway.bus.signals.mapping import (
 from gateway.records import ASIDE, F64, I64, U8, U32, Bool, Frames, Motion, Signal
 
 J1939_LAST_VALID_BYTE: Final = 0xFA  # SAE J1939-71: a most significant byte above this is no measurement
-TELLING_SHARE: Final = 0.01  # chosen: of a message's frames; with so many refused, this is why a sensor is missing
+TELLING_SHARE: Final = 0.01  # chosen: of frames, of a log or message; so many refused are why a sensor is missing
 NEEDED: Final = frozenset({Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED, Signal.WHEEL_SPEED})
 MOST_COMPARED: Final = 16  # chosen: allowed numbers that are compared one by one, which is faster for few
 NAMED_SOURCES: Final = 4  # chosen: of a J1939 group

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.signals.database import DatabaseMessage, Databases, DatabaseSignal, closest
 from gateway.bus.signals.mapping import (
+    CAN_FD_BYTES,
     QUANTITIES,
     SOURCE_ADDRESS,
     Condition,
@@ -25,7 +26,6 @@ from gateway.records import EXTENDED_ID, Signal
 from gateway.toml_file import Read, load_toml
 from gateway.units import si_factor
 
-LONGEST_BYTES = 64  # of a CAN FD frame
 FEWEST_COUNTER_BITS: Final = 2  # chosen: one bit cannot tell a lost frame from two
 MOST_COUNTER_BITS: Final = 32  # chosen: no frames are lost round a longer one
 _EXACT_INTEGERS: Final = 1 << 53  # a double holds every integer up to here
@@ -120,7 +120,7 @@ def _require_decodable(where: str, signal: DatabaseSignal, message: DatabaseMess
         raise SignalMapError(f"{where}: {signal.name!r} is a float of {field.length} bits; 16, 32 or 64 are possible")
     if not 1 <= field.length <= 64:
         raise SignalMapError(f"{where}: {signal.name!r} has {field.length} bits; 1 to 64 are possible")
-    if not 0 <= message.length <= LONGEST_BYTES:
+    if not 0 <= message.length <= CAN_FD_BYTES:
         raise SignalMapError(f"{where}: {message.name!r} has {message.length} bytes; a CAN frame carries at most 64")
     if field.start < 0:
         raise SignalMapError(f"{where}: {signal.name!r} begins at bit {field.start}; correct {message.source.name}")

@@ -27,19 +27,16 @@ class Client:
     encryption: Encryption
     forward: bool = False
 
-    def token(self) -> Token | None:
-        """The valid token that it shows."""
-        return None if self.tokens is None else self.tokens.verify(self.text)
-
-    def holder(self) -> Holder:
+    def known_as(self) -> tuple[Holder, Token | None]:
+        """Who it is now, and the valid token that it shows."""
         if self.tokens is None or not self.tokens.are_required():  # the first token counts from its first moment
-            return Holder.MACHINE
-        token = self.token()
-        return Holder.NOBODY if token is None else Holder(token.scope)
+            return Holder.MACHINE, None
+        token = self.tokens.verify(self.text)
+        return (Holder.NOBODY if token is None else Holder(token.scope)), token
 
     def shown(self, record: str) -> str:
         """The JSON of a record as this client may see it. Raises PermissionError if it may see no record any more."""
-        holder = self.holder()
+        holder, _ = self.known_as()
         if not may_leave(Kind.RECORD, self.encryption, holder):
             raise PermissionError("the token was revoked or has expired, or one is needed now")
         is_whole = may_leave(Kind.POSITION, self.encryption, holder, forward=self.forward)
@@ -61,11 +58,10 @@ class Access:
         text = "" if shown is None else shown.credentials.strip()
         client = Client(self._tokens, text, _encryption(request), forward=self._are_places_read)
         request.state.client = client
-        holder = client.holder()
+        holder, token = client.known_as()
         if holder is Holder.MACHINE:
             _refuse_strangers(request, client.encryption)
             return
-        token = client.token()
         if token is None:
             is_shown = "authorization" in request.headers
             detail = (
