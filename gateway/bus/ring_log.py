@@ -86,14 +86,6 @@ class RingLog(ThreadPart):
         n_held, n_dropped = self._n_put - n_written - n_lost, n_lost + self._n_refused
         return RecordStatus(n_written, n_held, n_dropped, self._size_bytes, self._fault)
 
-    @property
-    def fault(self) -> str | None:
-        """Why frames are not being recorded, for people; None while they are."""
-        if (fault := self._fault) is None:
-            return None
-        n_dropped = self.status().n_frames_dropped
-        return f"frames are not being recorded ({fault}); {n_dropped} are lost so far, weighing goes on"
-
     def _run(self) -> None:
         try:
             is_stopping = False

@@ -134,7 +134,7 @@ class Gateway:
             self.ring_log,
             self.verification.status,
             alarms=self.alarms.summary,
-            warnings=self._warnings,
+            faults=self._faults,
         )
         app = create_app(
             self.board,
@@ -161,8 +161,8 @@ class Gateway:
         self._beside = (self.commissioning, self.keeper, *present)
         self.needs_restart = False  # with the calibration that was made meanwhile; see life.py
 
-    def _warnings(self) -> tuple[str, ...]:
-        """Faults that do not stop the weighing, as sentences for people."""
+    def _faults(self) -> tuple[str, ...]:
+        """Faults of parts that the status does not tell of, as sentences for people."""
         faults = [self._tokens.fault, self._setup_fault, self._web_fault, self.known_weights.fault]
         faults += [self.verification.fault, self.listeners.fault]
         faults += [*(part.fault for part in self._vital), *(part.shown_fault() for part in self._beside)]

@@ -11,7 +11,7 @@ from support.patience import PATIENCE_S
 from support.web import Client, Gateway
 
 from gateway.records import Why
-from gateway.status import LOOK, BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, StoreStatus
+from gateway.status import LOOK, BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, StoreStatus, judged
 
 JSON = "application/json"
 
@@ -174,7 +174,7 @@ def test_a_store_that_cannot_be_read_is_503(gateway: Gateway, client: Client, tm
 
 
 def test_status_is_told_in_words_and_numbers(gateway: Gateway, client: Client) -> None:
-    gateway.status = Status(
+    now = Status(
         version="1.2.3",
         state=State.READER_FAULT,
         uptime_s=1.0,
@@ -182,6 +182,7 @@ def test_status_is_told_in_words_and_numbers(gateway: Gateway, client: Client) -
         bus=BusStatus(interface="socketcan", channel="can0", state="reader_fault", last_fault="can0: no such device"),
         store=StoreStatus(state="degraded", reason="disk full", n_held=3),
     )
+    gateway.status = judged(now, ())
     told = client.get("/api/v1/status").json()
     assert told["state"] == "reader_fault"
     assert "can0: no such device" in told["state_in_words"]

@@ -62,7 +62,7 @@ def test_what_was_put_is_what_is_read(tmp_path: Path) -> None:
     told = log.status()
     assert (told.n_frames_written, told.n_frames_dropped, told.n_frames_held) == (len(DRIVE), 0, 0)
     assert told.size_bytes == path.stat().st_size
-    assert (log.fault, path.parent.stat().st_mode & 0o027) == (None, 0)
+    assert (log.status().last_fault, path.parent.stat().st_mode & 0o027) == (None, 0)
 
 
 def test_runs_are_kept_one_behind_the_other(tmp_path: Path) -> None:
@@ -110,11 +110,11 @@ def test_a_disk_that_refuses_is_waited_for(tmp_path: Path) -> None:
     log = RingLog(directory, "can0", 10**9, 0, write_s=0.01)
     log.start()
     log.put(DRIVE)
-    assert wait_until(lambda: log.fault is not None)
+    assert wait_until(lambda: log.status().last_fault is not None)
     assert log.status().n_frames_held == len(DRIVE)
     directory.unlink()
     assert wait_until(lambda: log.status().n_frames_written == len(DRIVE))
-    assert wait_until(lambda: log.fault is None)
+    assert wait_until(lambda: log.status().last_fault is None)
     assert log.status().n_frames_dropped == 0
     log.stop(PATIENCE_S)
 
@@ -137,7 +137,7 @@ def test_a_disk_with_little_room_is_left_alone(tmp_path: Path) -> None:
     log.start()
     log.put(DRIVE)
     log.stop(PATIENCE_S)
-    assert "free_mb" in str(log.fault)
+    assert "free_mb" in str(log.status().last_fault)
     assert (files(tmp_path / "record"), log.status().n_frames_dropped) == ([], len(DRIVE))
 
 

@@ -62,13 +62,24 @@ class PythonCanReceiver:
     """Messages of an open python-can bus as bursts of frames."""
 
     def __init__(
-        self, bus: can.BusABC, width: int, kernel_socket: socket.socket | None = None, interface: str = ""
+        self,
+        bus: can.BusABC,
+        width: int,
+        kernel_socket: socket.socket | None = None,
+        interface: str = "",
+        *,
+        has_error_classes: bool | None = None,
     ) -> None:
-        """``kernel_socket`` is the bus's own, if the kernel receives into it (SocketCAN)."""
+        """``kernel_socket`` is the bus's own, if the kernel receives into it (SocketCAN). ``has_error_classes`` is
+        whether identifiers of error frames are the kernel's error classes; None: if there is a kernel socket.
+        """
         self._bus = bus
         self._width = width
         self._socket = kernel_socket
         self._clock = AdapterClock(interface)
+        self._has_error_classes = kernel_socket is not None if has_error_classes is None else has_error_classes
+        streams = (one for one in vars(bus).values() if isinstance(one, socket.socket))
+        self._stream = next((one for one in streams if one.type == socket.SOCK_STREAM), None)
         self._n_dropped = 0
         self._fault: Exception | None = None
 
@@ -92,6 +103,7 @@ class PythonCanReceiver:
             while self._fault is None and len(messages) < BURST_FRAMES:
                 message = self._bus.recv(0.0 if messages else timeout_s)
                 if message is None:
+                    self._require_open_stream()
                     break
                 if not messages:
                     now_s = time.time()
@@ -109,6 +121,13 @@ class PythonCanReceiver:
             raise self._fault
         return self._burst(messages, now_s)
 
+    def _require_open_stream(self) -> None:
+        """Raise OSError if the bus is a TCP connection that the other end has closed: python-can calls it silent."""
+        if self._stream is not None:
+            with suppress(BlockingIOError):
+                if not self._stream.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT):
+                    raise ConnectionResetError("the server of the bus has closed the connection")
+
     def _burst(self, messages: Sequence[can.Message], now_s: float) -> Burst:
         """``now_s`` is the system's clock at the first of them."""
         n_set, n_wraps = self._clock.n_set, self._clock.n_wraps
@@ -117,7 +136,7 @@ class PythonCanReceiver:
         for message in messages:
             if message.is_error_frame:
                 n_errors += 1
-                is_bus_off |= self._socket is not None and bool(message.arbitration_id & _BUS_OFF)
+                is_bus_off |= self._has_error_classes and bool(message.arbitration_id & _BUS_OFF)
             elif not message.is_remote_frame:
                 is_bus_off = False
                 self._date(message, now_s)
@@ -156,7 +175,7 @@ def open_python_can(
     except (TypeError, ValueError) as fault:
         raise BusError(f"interface {interface!r} does not take these options: {fault}") from fault
     if interface != "socketcan":
-        return PythonCanReceiver(bus, width, interface=interface)
+        return PythonCanReceiver(bus, width, interface=interface, has_error_classes=interface == "socketcand")
     kernel_socket: socket.socket = bus.socket  # type: ignore[attr-defined] # of SocketcanBus
     with_enough_room(kernel_socket)
     _discard_unfiltered(bus)

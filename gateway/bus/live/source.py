@@ -243,5 +243,6 @@ def opener_of(
 def system_reason(fault: Exception, channel: str) -> str:
     """Why ``channel`` cannot be used, with what to do if the system's own words do not say it."""
     number = fault.errno if isinstance(fault, OSError) else getattr(fault, "error_code", None)
-    reason = _SYSTEM_REASONS.get(number or 0, str(fault) or type(fault).__name__)
+    told = str(fault).partition("\n")[0].partition("Traceback")[0].strip()  # python-can's may end in a traceback
+    reason = _SYSTEM_REASONS.get(number or 0, told or type(fault).__name__)
     return reason.format(channel=channel)

@@ -54,8 +54,6 @@ export const DASHBOARD = {
   silent_signals: ["Missing: {signals}.", "Ohne Daten: {signals}."],
   last_fault: ["Last fault: {fault}.", "Letzter Fehler: {fault}."],
   spectra_only: ["No calibration: spectra only, no payload.", "Keine Kalibrierung: nur Spektren, keine Nutzlast."],
-  memory_only: ["Estimates are kept in memory only ({reason}).", "Schätzungen stehen nur im Arbeitsspeicher ({reason})."],
-  broker_away: ["Not connected to the fleet's broker ({fault}); estimates wait.", "Nicht mit dem Broker der Flotte verbunden ({fault}); Schätzungen warten."],
 
   alarms: ["Alarms", "Alarme"],
   alarms_past: ["Ended alarms", "Beendete Alarme"],
