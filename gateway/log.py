@@ -64,6 +64,7 @@ class Event(StrEnum):
     STORE_FORGETS = "old damaged database removed"
     CLOCK_DOUBTED = "clock far ahead, age removes nothing"
     CLOCK_BELIEVED = "clock believed again"
+    STORE_RESERVE = "the disk is full, store gives up its reserve"
     STORE_LOST_ROWS = "store closed with rows unwritten"
     UPLINK_CONNECTED = "uplink connected"
     UPLINK_LOST = "uplink lost"

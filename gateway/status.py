@@ -138,6 +138,9 @@ class StoreStatus:
     size_bytes: int = 0
     n_bad_records: Annotated[int, Field(description="records that failed their checksum and were set aside")] = 0
     set_aside: Annotated[str | None, Field(description="damaged database that the service renamed")] = None
+    is_reserve_in_use: Annotated[
+        bool, Field(description="true: the disk is full, and records go to the room that was kept for them")
+    ] = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -294,6 +297,8 @@ def faults_of(status: Status) -> Iterator[str]:
     store, uplink, webhook, record = status.store, status.uplink, status.webhook, status.record
     if store.state != StoreState.OK:
         yield f"estimates are kept in memory only ({store.reason}): {store.n_held} are not stored"
+    if store.is_reserve_in_use:
+        yield "the disk is full: records go to the last megabytes that were kept for them; make room"
     if store.n_dropped:
         yield f"{store.n_dropped} records are lost: the disk refused them for longer than memory holds them"
     if store.set_aside:

@@ -272,7 +272,9 @@ class Gateway:
         late = stop_in_turn(self._beside, deadline)
         self.board.close()
         self.store.write_event("stopped", {"failure": self._failure})
-        n_lost = self.store.close(max(CLOSE_WITHIN_S, deadline.left_s()))
+        n_lost = self.store.close(max(CLOSE_WITHIN_S, deadline.left_s())) + self.store.health().n_dropped
+        if n_lost and self._failure is None:
+            self._failure = f"{n_lost} records could not be stored: {self.store.health().reason or 'there was no time'}"
         level = logging.ERROR if n_lost or late or self._failure else logging.INFO
         log_event(Event.STOPPED, level=level, failure=self._failure, rows_lost=n_lost)
 

@@ -68,7 +68,9 @@ def store_of(wanted: StoreSection, *receivers: UplinkSettings | WebhookSettings 
 
 def board_of(stale_after_s: float, store: Store, setup: Setup) -> Board:
     """The board with the last stored estimates; an unreadable disk does not prevent the start."""
-    board = Board(stale_after_s=stale_after_s, unweighed=Scales(setup.calibrated).weigh(None))
+    board = Board(
+        stale_after_s=stale_after_s, unweighed=Scales(setup.calibrated).weigh(None), is_stored=store.is_stored
+    )
     reader = store.reader()
     latest = restored(reader.latest, Latest(None, None, None))
     answer, refusal = (

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.errors import StoreError
+from gateway.files.reserve import Reserve
 from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, REMAINDER, SERVICE, Delivery
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ServicePart
@@ -42,6 +43,7 @@ class Store(ServicePart):
     def __init__(self, directory: Path, retention: Retention, clock_ns: Callable[[], int]) -> None:
         self.path = directory / FILE_NAME
         self._database = Database(directory, retention)
+        self._reserve = Reserve(directory)
         self._clock_ns = clock_ns
         self._boot_id = _boot_id()
         self._buffer = WriteBuffer(retention.max_held, epoch=secrets.token_hex(4))
@@ -112,6 +114,10 @@ class Store(ServicePart):
         """
         return Follower(self._buffer, self.reader(), self._linked, kinds, after, on_news)
 
+    def is_stored(self, record_id: str) -> bool:
+        """Whether an accepted record is on disk."""
+        return not len(self._buffer) or all(row.id != record_id for row in self._buffer.held()[1])
+
     def head(self) -> str:
         return self._buffer.head()
 
@@ -137,6 +143,7 @@ class Store(ServicePart):
             n_pruned=self._n_pruned,
             size_bytes=self._size_bytes,
             set_aside=self._set_aside,
+            is_reserve_in_use=self._reserve.is_in_use,
             n_bad_records=self._database.n_bad_records + len(self._unread),
         )
 
@@ -241,6 +248,9 @@ class Store(ServicePart):
             self._lost.set()  # what failed may be a table that is missing: the next attempt looks
             if is_damaged(error):
                 return self._set_damaged_aside(error)
+            if self._reserve.give_up():
+                log_event(Event.STORE_RESERVE, level=logging.WARNING, reason=str(error))
+                return self._attempt()
             return self._degrade(f"{self.path}: {error}" if isinstance(error, sqlite3.Error) else str(error))
         return True
 
@@ -272,6 +282,7 @@ class Store(ServicePart):
         self._buffer.settle(stored)
         self._n_pruned += self._database.prune(self._clock_ns())
         self._size_bytes = self._database.size_bytes()
+        self._reserve.keep()
 
     def _degrade(self, reason: str) -> bool:
         """Report that the disk fails. The connection stays open, so readers need no new file."""

@@ -106,6 +106,14 @@ Latest: Final = create_model(
     __doc__="The last good estimate, ``age_s`` old; before any, nulls and ``no_estimate_yet``.",
     age_s=(float | None, Field(description="since its receipt, on a clock that never steps", examples=[42.0])),
     is_stale=(bool, Field(description="older than the service's stale_after_s", examples=[False])),
+    is_stored=(
+        bool | None,
+        Field(
+            description="false: in memory only, because the disk takes nothing; null: an early look or none, which is "
+            "not stored",
+            examples=[True],
+        ),
+    ),
     last_rejection=(Estimate | None, Field(description="the last batch without an answer (spectra left out)")),
 )
 

@@ -38,7 +38,12 @@ def test_latest_before_any_estimate(client: Client) -> None:
 def test_latest_is_the_estimate_with_its_age(gateway: Gateway, client: Client) -> None:
     gateway.publish(make_estimate(5, with_spectra=True))
     gateway.clock_s += 7.0
-    expected = make_record(5, with_spectra=True) | {"age_s": 7.0, "is_stale": False, "last_rejection": None}
+    expected = make_record(5, with_spectra=True) | {
+        "age_s": 7.0,
+        "is_stale": False,
+        "is_stored": True,
+        "last_rejection": None,
+    }
     assert client.get("/api/v1/estimates/latest").json() == expected
 
 

@@ -26,6 +26,7 @@ function isDoubted({ last_rejection: refusal, ...latest }, reasons) {
 function notes(latest, reasons, commissioning) {
   const said = [];
   if (isDoubted(latest, reasons)) said.push(phrase("note_doubted", { reasons: named(latest.last_rejection.rejected) }));
+  if (latest.is_stored === false) said.push(phrase("note_unstored"));
   if (latest.is_stale) said.push(phrase("note_old"));
   if (latest.provisional) said.push(phrase("note_early"));
   if (latest.rejected.includes("no_estimate_yet")) said.push(noneYet(latest.last_rejection, reasons, commissioning));

@@ -88,6 +88,7 @@ export const DASHBOARD = {
   budget_better: ["What would narrow it", "Was die Schätzung genauer macht"],
   budget_remedy: ["{advice}: ±\u00a0{now} becomes ±\u00a0{then}.", "{advice}: Aus ±\u00a0{now} wird ±\u00a0{then}."],
   note_old: ["This estimate is old: the load may have changed since.", "Diese Schätzung ist alt: Die Ladung kann sich geändert haben."],
+  note_unstored: ["Not stored: the disk takes nothing.", "Nicht gespeichert: Die Platte nimmt nichts an."],
   note_early: ["Early value: the batch under way is not complete yet.", "Früher Wert: Der laufende Abschnitt ist noch nicht vollständig."],
   note_doubted: ["The last batch could not be weighed: {reasons}. This number may be wrong.", "Der letzte Abschnitt konnte nicht gewogen werden: {reasons}. Diese Zahl muss nicht mehr stimmen."],
   note_none: ["No estimate: {reasons}.", "Keine Schätzung: {reasons}."],
