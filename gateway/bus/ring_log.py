@@ -86,17 +86,17 @@ class RingLog(ThreadPart):
         n_held, n_dropped = self._n_put - n_written - n_lost, n_lost + self._n_refused
         return RecordStatus(n_written, n_held, n_dropped, self._size_bytes, self._fault)
 
-    def _run(self) -> None:
+    def _work(self) -> None:
         try:
             is_stopping = False
             while not is_stopping:
                 is_stopping = self._stopping.wait(self._write_s)
                 if self._held:
                     self._write_held()
+                    self._succeeded()
             self._n_lost = self._n_put - self._n_written  # at a stop, what the disk does not take is lost
-        except Exception as failure:  # noqa: BLE001 - a failure of the recording must not end the weighing
-            self.failure = failure
-        self._close()
+        finally:
+            self._close()
 
     def _write_held(self) -> None:
         """Write what is held. If the disk refuses before the first frame all stay held, else they count as lost."""

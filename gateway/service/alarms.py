@@ -22,8 +22,10 @@ from gateway.core.alarms.rules import AlarmRules, AlarmVerdict, Says
 from gateway.core.alarms.watch import AlarmWatch
 from gateway.estimate import Estimate
 from gateway.estimate_json import read_estimate
+from gateway.history import up_to
 from gateway.log import Event, log_event
 from gateway.records import json_line
+from gateway.service.journal_reader import place_of
 from gateway.service.status import NEEDED_SENSORS
 from gateway.setup import Subject
 from gateway.status import AlarmsStatus, State, Status
@@ -77,6 +79,8 @@ def rules_of(section: AlarmsSection) -> AlarmRules:
 class AlarmService:
     """Every method may be called from any thread."""
 
+    NAME: Final = "alarms"
+
     def __init__(
         self,
         rules: AlarmRules,
@@ -94,12 +98,12 @@ class AlarmService:
         self._lock = threading.Lock()
         self._n_raised = 0
         nothing: tuple[list[Alarm], list[Estimate]] = ([], [])
-        known, recent = restored(lambda: remembered(store.reader()), nothing)
+        known, recent = restored(lambda: remembered(store.reader(), place_of(store, self.NAME)), nothing)
         self._watch = AlarmWatch(rules, subject.vehicle_id, known, recent)
         self._tell(self._watch.end_switched_off(clock_ns()))
 
     def __call__(self, found: Estimate) -> None:
-        """Process a batch; called by the pipeline after it is stored."""
+        """Process a stored batch."""
         if found.is_remainder:
             return
         calibrated = self._subject.calibrated
@@ -136,13 +140,14 @@ class AlarmService:
             self._store.write_entry(ENTRY_KIND, alarm.id, alarm.t_last_ns, _text(alarm), alarm.revision)
 
 
-def remembered(reader: StoreReader) -> tuple[list[Alarm], list[Estimate]]:
-    """The last stored alarms and batches, oldest first. Raises what the store's reader raises.
+def remembered(reader: StoreReader, place: str | None) -> tuple[list[Alarm], list[Estimate]]:
+    """The last stored alarms, and the last batches up to a place in the journal, oldest first. Raises what the store's
+    reader raises.
 
     An alarm that cannot be read is left out: if its cause persists, it is raised again.
     """
     told = reader.entries(kind=ENTRY_KIND, limit=REMEMBERED, newest_first=True)
-    page = reader.estimates(limit=RECENT, newest_first=True, with_spectra=False)
+    page = reader.estimates(limit=RECENT, newest_first=True, with_spectra=False, cursor=up_to(place))
     alarms = reader.understood(reversed(told.items), lambda text: alarm_from_json(json.loads(text)))
     return alarms, reader.understood(reversed(page.items), read_estimate)
 

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.errors import StoreError
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json
 from gateway.files.reserve import Reserve
 from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, REMAINDER, SERVICE, Delivery
 from gateway.log import Event, log_event
@@ -39,6 +41,7 @@ class Store(ServicePart):
     """
 
     NAME = "database writer"
+    IS_VITAL = True
 
     def __init__(self, directory: Path, retention: Retention, clock_ns: Callable[[], int]) -> None:
         self.path = directory / FILE_NAME
@@ -86,9 +89,13 @@ class Store(ServicePart):
         kind = REJECTION if record["rejected"] else ESTIMATE
         return self._append(kind, record["id"], record["t_end_ns"], json_line(record))
 
-    def write_remainder(self, record: Mapping[str, Any]) -> None:
-        """Accept a remainder that is too short to be a batch; it is neither shown in the history nor sent."""
-        self._append(REMAINDER, record["id"], record["t_end_ns"], json_line(record))
+    def write_window(self, found: Estimate) -> None:
+        """Accept a window's estimate, rejection or remainder; the last is neither shown in the history nor sent."""
+        record = estimate_to_json(found)
+        if found.is_remainder:
+            self._append(REMAINDER, record["id"], record["t_end_ns"], json_line(record))
+        else:
+            self.write_estimate(record)
 
     def write_entry(self, kind: str, entry_id: str, t_end_ns: int, text: str, revision: int = 1) -> str:
         """Accept a new revision of a load event, trip or alarm -> its cursor; it replaces the earlier revision."""

@@ -6,8 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 from gateway.log import Event, log_event
+from gateway.part import BackOff
 from gateway.status import UplinkStatus
-from gateway.uplink.forwarder import IDLE_S, PAGE, BackOff, Forwarder
+from gateway.uplink.forwarder import IDLE_S, PAGE, Forwarder
 from gateway.uplink.link import LinkError, MqttLink
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import UplinkSettings
@@ -38,7 +39,7 @@ class Uplink(Forwarder[UplinkStatus]):
         self._connect = connect
         self._refusal: str | None = None  # of the last record, until one is accepted
 
-    def _deliver(self) -> None:
+    def _work(self) -> None:
         """Deliver until stopped. Raises LinkError if the connection breaks."""
         link = self._connect(self._settings, self._birth, self._outbox.tell_news, self._stopping.is_set)
         self._report = replace(

@@ -1,8 +1,7 @@
 """The web application: one function that puts the parts together."""
 
 from collections import Counter
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Awaitable, Callable
 from typing import Any, Final
 
 from fastapi import Depends, FastAPI
@@ -71,17 +70,11 @@ def create_app(
     """
     responses: Counter[int] = Counter()
 
-    @asynccontextmanager
-    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
-        yield
-        board.close()
-
     app = _Application(
         wrap=lambda inner: SecurityHeaders(HeadAsGet(inner), responses),
         title="Springscale",
         version=API_VERSION,
         description=_DESCRIPTION,
-        lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,

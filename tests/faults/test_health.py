@@ -19,6 +19,7 @@ from gateway.bus.live import source as live_source
 from gateway.bus.live.python_can import PythonCanReceiver
 from gateway.bus.live.source import LiveSource, SourceState
 from gateway.bus.signals import load_signal_map
+from gateway.part import BackOff
 from gateway.status import (
     BusStatus,
     RecordStatus,
@@ -31,7 +32,6 @@ from gateway.status import (
 )
 from gateway.store import Store
 from gateway.uplink import link
-from gateway.uplink.forwarder import BackOff
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings
 from gateway.uplink.uplink import Uplink

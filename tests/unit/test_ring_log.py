@@ -178,7 +178,7 @@ def test_what_kills_the_recorder_is_told(tmp_path: Path, monkeypatch: pytest.Mon
         raise ZeroDivisionError
 
     monkeypatch.setattr(ring_log, "message_of", broken)
-    assert "ZeroDivisionError" in str(recorded(tmp_path, DRIVE).shown_fault())
+    assert "ZeroDivisionError" in str(recorded(tmp_path, DRIVE).fault)
 
 
 @pytest.fixture

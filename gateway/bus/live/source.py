@@ -82,6 +82,7 @@ class LiveSource(ThreadPart):
     """
 
     NAME = "bus reader"
+    IS_VITAL = True
 
     def __init__(
         self,
@@ -143,12 +144,13 @@ class LiveSource(ThreadPart):
             clock_wraps=self._tally["clock_wraps"],
         )
 
-    def _run(self) -> None:
+    def _work(self) -> None:
         try:
             self._listen_until_stopped()
-        except BaseException as failure:  # noqa: BLE001 # every failure of the thread must be reported
+        except BaseException as failure:
             self.failure = failure
             self._enter(SourceState.READER_FAULT, f"the receive thread died: {failure!r}")
+            raise
         else:
             self._enter(SourceState.STOPPED, self._reason)
         finally:
