@@ -30,6 +30,7 @@ _COMMANDS = {
     "events": "What was loaded and unloaded where and when, and the trips between, from log files.",
     "feed": "Send an IMU of Linux IIO and a receiver behind gpsd onto a CAN interface.",
     "fleet-report": "A fleet's data set as pages: each vehicle and what needs attention.",
+    "learn": "Learn a vehicle from the logs of ordinary drives and from delivery notes.",
     "look": "The content of an unknown log, and a first signal map from it.",
     "record": "Record the mapped frames of a bus into a log.",
     "replay": "Send a log to a bus, paced by its time stamps.",

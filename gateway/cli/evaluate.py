@@ -58,9 +58,9 @@ def evaluate(
 def _report(directory: Path, campaign: Campaign, held: CalibrationFile, split: Split, table: ErrorTable) -> None:
     from gateway.reports.calibration import report as calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
 
-    assessment = assess_evaluation(campaign, held, BatchSet(split), table)
+    assessment = assess_evaluation(campaign.vehicle, held, BatchSet(split), table)
     with counted("drawing") as on_chart:
-        written = calibration_report.write_evaluation_report(directory, assessment, on_chart)
+        written = calibration_report.write_report_of(directory, assessment, on_chart)
     click.echo(str(written), err=True)
 
 

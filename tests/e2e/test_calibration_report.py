@@ -127,7 +127,7 @@ def test_without_a_report_the_command_prints_the_verdict(made: Path, numbers: Ma
     done = run("calibrate", str(made / "campaign.toml"), "--output", str(made / "again.json"), *WINDOW)
     grade = next(text for grade, text in GRADE_TEXT.items() if grade == numbers["grade"])
     said = done.stdout[
-        done.stdout.index(f"{grade}, by the cross-spectral estimator. Over the runs left out it weighs") :
+        done.stdout.index(f"{grade}, by the cross-spectral estimator. Over the drives left out it weighs") :
     ]
     reasons = numbers["verdicts"][0]["reasons"]
     assert [one["text"] in said for one in reasons] == [one["grade"] != "fit" for one in reasons]
