@@ -302,8 +302,13 @@ def _logs_told(record: Record) -> Iterator[str]:
     yield f"{n_of(record['n_logs'], 'log')}: {n_of(record['n_drives'], 'drive')} with {hours:.1f} h of driving{lost}"
     for log, reasons in left_out.items():
         yield from (f"  {log}: left out: {why}" for why in reasons)
+    of_finding: dict[str, list[str]] = {}
     for log, findings in record["findings"].items():
-        yield from (f"  {log}: {one}" for one in findings)
+        for one in findings:
+            of_finding.setdefault(one, []).append(log)
+    for finding, logs in of_finding.items():
+        others = f" and {n_of(len(logs) - 1, 'other log')}" if len(logs) > 1 else ""
+        yield f"  {logs[0]}{others}: {finding}"
     if n := record["n_short_drives"]:
         what = one_or_more(n, "drive", "drives")
         yield f"  {what} without a minute of steady driving ({record['short_s']:.0f} s in all) can teach nothing"
