@@ -1,6 +1,7 @@
 """springscale learn, as a person calls it: logs of five ordinary drives and a table of notes, one of them wrong."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from gateway.calibration.judgement.advice import Grade
 from gateway.calibration.statements_csv import StatementsFileError
 from gateway.quantity import Z95
 
+README = Path(__file__).parents[2] / "README.md"
 ABOARD_KG = {1: 0.0, 2: 200.0, 3: 380.0, 4: 120.0, 5: 300.0}
 PLACES_M = (None, 1.8, 2.2, 1.5, 1.6)
 NOTES = """vehicle;from;until;source;payload_kg;plus_minus_kg;ref;learn
@@ -92,22 +94,26 @@ def test_the_calibration_is_written_with_a_verdict_and_what_would_help(drives: P
     assert learnt["learning"]["plus_minus_kg"] < learnt["learning"]["useful_at_kg"]
 
 
-def test_the_file_weighs_a_drive_of_which_nothing_was_said(drives: Path, learnt: dict[str, Any]) -> None:
-    assert learnt["calibration_id"]
-    said = printed(
-        "estimate",
-        drives / "05.log",
-        "--signals",
-        drives / "signals.toml",
-        "--calibration",
-        drives / "vehicle.json",
-        "--json",
-        *WINDOW,
-    )
-    weighed = [one for one in map(json.loads, said.splitlines()) if one.get("payload_kg") is not None]
+@pytest.fixture(scope="module")
+def weighed(drives: Path, learnt: dict[str, Any]) -> list[str]:
+    """The weights of a drive of which nothing was said, a line of JSON each."""
+    files = ["--signals", drives / "signals.toml", "--calibration", learnt["output"]]
+    return printed("estimate", drives / "05.log", *files, "--json", *WINDOW).splitlines()
+
+
+def test_the_file_weighs_a_drive_of_which_nothing_was_said(weighed: list[str]) -> None:
     assert weighed
-    for one in weighed:
+    for one in map(json.loads, weighed):
         assert abs(one["payload_kg"] - ABOARD_KG[5]) < Z95 * one["payload_std_kg"]
+
+
+def test_readme_tells_how_much_leaves_the_van(weighed: list[str]) -> None:
+    told = re.search(r"a value of (\d+) kB .*?about (\d+) MB a month", README.read_text(encoding="utf-8"), re.DOTALL)
+    assert told
+    n_bytes = len(json.dumps(json.loads(weighed[0]) | {"spectra": None}, separators=(",", ":")))
+    month = 2 * n_bytes * 12 * 8 * 22  # with the retained copy; values an hour, hours a day, days
+    assert float(told[1]) == pytest.approx(n_bytes / 1e3, rel=0.15)
+    assert float(told[2]) == pytest.approx(month / 1e6, rel=0.15)
 
 
 def test_a_table_that_cannot_be_read_is_refused_before_any_log_is(drives: Path, tmp_path: Path) -> None:

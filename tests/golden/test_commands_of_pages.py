@@ -52,6 +52,7 @@ OWN_RUN_BY = {  # of every page: how a command of ours begins, and what runs it
     "springscale events": "tests/unit/test_events_command.py",
     "springscale feed": FEED,
     "springscale fleet-report": "tests/e2e/test_archive_to_report.py",
+    "springscale learn": "tests/e2e/test_learn.py",
     "springscale look": "tests/unit/test_look.py",
     "springscale record": "tests/unit/test_record_command.py",
     "springscale replay": "tests/e2e/test_cli_simulate.py",
@@ -77,7 +78,8 @@ NOT_RUN = {  # how a command begins: what the page says of it
 
 
 def text_of(page: str) -> str:
-    return (ROOT / f"docs/{page}.md").read_text(encoding="utf-8").replace("\\\n", " ")
+    path = ROOT / "README.md" if page == "README" else ROOT / f"docs/{page}.md"
+    return path.read_text(encoding="utf-8").replace("\\\n", " ")
 
 
 def commands_of(page: str) -> list[str]:
@@ -104,7 +106,7 @@ def test_a_test_runs_it_or_the_page_says_that_none_does(page: str, command: str)
 
 OUR_OWN = [
     (page.stem, command)
-    for page in sorted((ROOT / "docs").glob("*.md"))
+    for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
     for command in commands_of(page.stem)
     if re.match("(springscale|python -m benchmarks.accuracy) [a-z]", command)
 ]
