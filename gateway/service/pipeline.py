@@ -172,9 +172,7 @@ class Pipeline(ThreadPart):
         people.
         """
         refused = (remark.text for remark in self.decoder.causes())
-        return (
-            "; ".join(filter(None, (*refused, self.roll_rate_fault, self.noise_fault, self._beside.fault))) or None
-        )
+        return "; ".join(filter(None, (*refused, self.roll_rate_fault, self.noise_fault, self._beside.fault))) or None
 
     def _count(self, found: Estimate) -> None:
         if math.isfinite(found.roll_usable_share) and not found.is_remainder:
