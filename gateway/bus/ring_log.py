@@ -118,10 +118,10 @@ class RingLog(ThreadPart):
             if self._fault is not None:
                 log_event(Event.RECORD_RECOVERED, n_frames_dropped=self.status().n_frames_dropped)
             self._fault = None
-        except OSError as refusal:
+        except Exception as refusal:  # noqa: BLE001 - frames that cannot be written must not come back for ever
             self._close()
             self._n_lost += sum(map(len, begun))
-            if self._fault != (fault := f"{directory}: {refusal.strerror or refusal}"):
+            if self._fault != (fault := f"{directory}: {getattr(refusal, 'strerror', None) or repr(refusal)}"):
                 log_event(Event.RECORD_REFUSED, level=logging.WARNING, fault=fault)
             self._fault = fault
         for _ in begun:

@@ -34,13 +34,19 @@ class Reserve:
     def keep(self) -> None:
         """Make the file if it is missing and the disk has room; a disk that refuses is tried again the next time."""
         with suppress(OSError):
-            if not self._path.exists() and free_bytes(self._path.parent) >= LEAST_FREE_BYTES:
-                file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+            if not self._is_whole() and free_bytes(self._path.parent) >= LEAST_FREE_BYTES:
+                file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
                 try:
                     os.posix_fallocate(file, 0, RESERVE_BYTES)
                 finally:
                     os.close(file)
-            self.is_in_use &= not self._path.exists()
+            self.is_in_use &= not self._is_whole()
+
+    def _is_whole(self) -> bool:
+        """Whether the file holds all its room; a kill or a refusal while it was made leaves less."""
+        with suppress(FileNotFoundError):
+            return self._path.stat(follow_symlinks=False).st_size >= RESERVE_BYTES
+        return False
 
     def give_up(self) -> bool:
         """Remove the file if the disk is short of room -> whether there is more room now."""

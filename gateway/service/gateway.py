@@ -224,7 +224,8 @@ class Gateway:
                 self._notifier.send(READY="1")
                 log_event(Event.READY, url=self.url)
                 self._on_started(self)
-            if is_ready and self._notifier.is_heard and ask.go_on(ASK_S) and self.pipeline.progress != seen:
+            is_asked = is_ready and (self._notifier.is_heard or self._server.fault is not None)
+            if is_asked and ask.go_on(ASK_S) and self.pipeline.progress != seen:
                 seen = self.pipeline.progress
                 self._notifier.send(WATCHDOG="1")
             is_asleep = is_ready and self.source.state is SourceState.BUS_SILENT

@@ -66,7 +66,7 @@ class JournalReader(ThreadPart):
                 log_event(Event.PART_FAILED, level=logging.ERROR, part=self.NAME, failure=repr(failure))
             self.failure = failure
         else:
-            self.failure = None
+            self._succeeded()
 
 
 def place_of(store: Store, name: str) -> str | None:

@@ -38,6 +38,14 @@ def test_the_reserve_is_given_up_for_a_full_disk_alone_and_made_again(
     assert (held.is_in_use, file.stat().st_size) == (False, RESERVE_BYTES)
 
 
+def test_a_reserve_that_a_kill_left_half_made_is_made_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reserve, "free_bytes", lambda directory: 1 << 30)
+    file = tmp_path / reserve.FILE_NAME
+    file.touch()
+    Reserve(tmp_path).keep()
+    assert file.stat().st_blocks * 512 >= RESERVE_BYTES
+
+
 def test_what_can_be_done_without_leaves_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reserve, "free_bytes", lambda directory: 20 << 20)
     require_room(tmp_path / "not made yet", 1 << 20)

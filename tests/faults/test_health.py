@@ -186,6 +186,48 @@ def test_a_burst_is_judged_by_the_order_of_its_frames_and_errors(what: str, inte
             assert source.counts().error_frames == sum(message.is_error_frame for message in messages)
 
 
+IMPOSSIBLE: dict[str, dict[str, Any]] = {
+    "30 bits": {"arbitration_id": 0x2000_0000, "is_extended_id": True},
+    "33 bits": {"arbitration_id": 1 << 33, "is_extended_id": True},
+    "12 bits of a standard identifier": {"arbitration_id": 0x800, "is_extended_id": False},
+    "a negative identifier": {"arbitration_id": -1, "is_extended_id": True},
+    "65 bytes": {"arbitration_id": FRAME_ID, "is_extended_id": False, "is_fd": True, "data": bytes(65)},
+}
+
+
+@pytest.mark.parametrize("what", IMPOSSIBLE)
+def test_a_message_that_no_bus_can_carry_is_counted_as_an_error(what: str) -> None:
+    """python-can passes on what an adapter has read in noise; an identifier of 33 bits ended the service."""
+    bus: Any = ScriptedBus(frame(), can.Message(timestamp=time.time(), **IMPOSSIBLE[what]), frame())
+    with listening(PythonCanReceiver(bus, 8)) as source:
+        assert wait_until(lambda: source.counts().frames == 2)
+        assert source.counts().error_frames == 1
+
+
+class NoisyBus(ScriptedBus):
+    """Gives its messages; then its parser fails, once."""
+
+    def __init__(self, failure: Exception) -> None:
+        super().__init__(frame())
+        self._failures = [failure]
+
+    def recv(self, timeout_s: float) -> can.Message | None:
+        if not self._messages and self._failures:
+            raise self._failures.pop()
+        return super().recv(timeout_s)
+
+
+@pytest.mark.parametrize("failure", [ValueError("x"), IndexError("x"), AttributeError("x"), TypeError("x")], ids=repr)
+def test_whatever_the_reader_of_an_adapter_raises_is_a_fault_and_the_bus_is_opened_again(failure: Exception) -> None:
+    """Any but two kinds of exception ended the service."""
+    bus: Any = NoisyBus(failure)
+    with listening(PythonCanReceiver(bus, 8), silence_s=30.0) as source:
+        assert wait_until(lambda: source.state is SourceState.READER_FAULT)
+        assert "what the adapter sends cannot be read" in source.reason
+        assert source.counts().frames == 1
+        assert source.death() is None
+
+
 @contextmanager
 def socketcand(*, closes: bool) -> Iterator[int]:
     """The port of a server that greets, gives one frame and closes, or falls silent."""

@@ -3,6 +3,7 @@
 import asyncio
 import socket
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -247,6 +248,7 @@ def test_the_watchdog_is_fed_only_while_the_web_answers(
 
 def test_a_web_server_that_dies_begins_anew(config: Path, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gateway.web.access.serving.FIRST_PAUSE_S", 0.01)
+    monkeypatch.setattr(service, "ASK_S", 0.05)
     loops: list[asyncio.AbstractEventLoop] = []
     serve_web = service.WebServer.serve
 
@@ -263,8 +265,34 @@ def test_a_web_server_that_dies_begins_anew(config: Path, log: Path, monkeypatch
         assert wait_until(lambda: server.is_started)
         running.play(log)
         assert running.http("/health/live") == {"is_alive": True}
-        assert asyncio.run_coroutine_threadsafe(server.is_answering(), loops[0]).result(PATIENCE_S)
-        assert server.fault is None
+        assert wait_until(lambda: server.fault is None)
 
     serve(config, drive)
     assert stored(config)[:3] == estimated(config, log)[:3]
+
+
+def test_a_stop_while_the_web_server_pauses_ends_the_process(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It waited for the end of the pause, and then for ever."""
+    pause = threading.Event()
+
+    def long_pause(self: BackOff) -> float:
+        pause.set()
+        return 10.0 * PATIENCE_S
+
+    monkeypatch.setattr(BackOff, "next_s", long_pause)
+    loops: list[asyncio.AbstractEventLoop] = []
+    serve_web = service.WebServer.serve
+
+    async def noted(self: service.WebServer) -> None:
+        loops.append(asyncio.get_running_loop())
+        await serve_web(self)
+
+    monkeypatch.setattr(service.WebServer, "serve", noted)
+
+    def drive(running: Running) -> None:
+        loops[0].call_soon_threadsafe(running.gateway._server._server.ending.set)
+        assert pause.wait(PATIENCE_S)
+
+    begun_s = time.monotonic()
+    serve(config, drive)
+    assert time.monotonic() - begun_s < PATIENCE_S

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import can
 
-from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of
+from gateway.bus.frames import LAST_EXTENDED, LAST_SECOND, LAST_STANDARD, ExactStamp, frames_of
 from gateway.bus.live.adapter_clock import AdapterClock
 from gateway.bus.live.receiver import Burst
 from gateway.bus.signals import IdFilter
@@ -26,6 +26,7 @@ from gateway.records import EXTENDED_ID
 BURST_FRAMES: Final = 4096  # chosen: taken before they are handed on
 GATHER_S: Final = 0.05  # chosen: frames are left to gather in the kernel this long: few wake-ups
 RECEIVE_BUFFER_BYTES: Final = 4 << 20  # chosen: for what comes while this process does not get the processor
+LONGEST: Final = 64  # bytes of a CAN FD frame, ISO 11898-1
 VIRTUAL_QUEUE_FRAMES: Final = 4096  # chosen: an in-process sender waits when it is full
 
 _BUS_OFF: Final = 0x40  # CAN_ERR_BUSOFF of linux/can/error.h, in the identifier of an error frame
@@ -112,10 +113,9 @@ class PythonCanReceiver:
                 messages.append(message)
         except (OSError, can.CanError) as fault:
             self._fault = fault
-        except (ValueError, LookupError) as fault:
-            # python-can's parsers raise whatever int() or an index raises on noise
+        except Exception as fault:  # noqa: BLE001 - python-can's parsers raise whatever they meet in noise
             self._fault = can.CanOperationError(
-                f"what the adapter sends cannot be read ({fault}): check its cable and its speed"
+                f"what the adapter sends cannot be read ({fault!r}): check its cable and its speed"
             )
         if self._fault is not None and not messages:
             raise self._fault
@@ -137,6 +137,8 @@ class PythonCanReceiver:
             if message.is_error_frame:
                 n_errors += 1
                 is_bus_off |= self._has_error_classes and bool(message.arbitration_id & _BUS_OFF)
+            elif not _is_possible(message):
+                n_errors += 1
             elif not message.is_remote_frame:
                 is_bus_off = False
                 self._date(message, now_s)
@@ -155,6 +157,12 @@ class PythonCanReceiver:
 
     def close(self) -> None:
         self._bus.shutdown()
+
+
+def _is_possible(message: can.Message) -> bool:
+    """Whether a CAN bus can carry it. python-can's code for most adapters passes on what it has read in noise."""
+    last = LAST_EXTENDED if message.is_extended_id else LAST_STANDARD
+    return 0 <= message.arbitration_id <= last and len(message.data) <= LONGEST
 
 
 def open_python_can(

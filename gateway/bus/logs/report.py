@@ -43,6 +43,7 @@ class LogReject(StrEnum):
     TOO_LONG = "too_long"  # more bytes than a frame can hold
     GARBLED = "garbled"
     OVERLONG_LINE = "overlong_line"
+    UNKNOWN_VERSION = "unknown_version"  # a frame in a form that python-can does not know
 
 
 _KNOWN_LINES: Final = (

@@ -117,7 +117,7 @@ class WebServer:
     def __init__(self, config: uvicorn.Config) -> None:
         self._config = config
         self._server = _Server(config)
-        self._is_ending = False
+        self._ending = asyncio.Event()
         self._own: tuple[str, int] = ("", 0)  # where this machine can ask, whatever the address of the settings
         self.port = 0
         self.fault: str | None = None
@@ -145,18 +145,21 @@ class WebServer:
                 died = "its address cannot be used"
             except Exception as failure:  # noqa: BLE001 - weighing does not depend on it
                 died = repr(failure)
-            if self._is_ending or not self.port:
+            if self._ending.is_set() or not self.port:
                 return
             if self.fault is None:
                 log_event(Event.PART_FAILED, level=logging.ERROR, part="web server", failure=died)
             self.fault = f"the web server failed: {died}; weighing goes on"
-            await asyncio.sleep(back_off.next_s())
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._ending.wait(), back_off.next_s())
+                return
             self._server = _Server(self._config)
 
     def end(self) -> None:
         """Begin to shut down; from the event loop's thread."""
-        self._is_ending = self._server.should_exit = True
+        self._server.should_exit = True
         self._server.ending.set()
+        self._ending.set()
 
     async def is_answering(self) -> bool:
         """Whether a request to this very server is answered in time."""
