@@ -44,7 +44,7 @@ def look_text(seen: Look) -> str:
 def _heard(seen: Look) -> Iterator[str]:
     channels = sorted({one.channel for one in seen.heard if one.channel})
     on = f" on {', '.join(channels)}" if channels else ""
-    yield f"{seen.log}: {seen.report.wanted} frames in {max(one.duration_s for one in seen.heard):.0f} s{on}"
+    yield f"{seen.log}: {seen.report.wanted} frames in {seen.report.span_s:.0f} s{on}"
     yield from (f"  {remark.removeprefix(f'{seen.log}: ')}" for remark in seen.report.remarks())
     yield from (f"  {one.text}" for one in seen.refused)
     yield ""
