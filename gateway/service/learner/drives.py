@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.calibration.kept.batch_file import KeptBatch, packed
-from gateway.calibration.learning.drives import MOST_OF_DRIVE_S, worth
+from gateway.calibration.learning.drives import ENOUGH_S, MOST_OF_DRIVE_S, worth
 from gateway.files.kept import KeptFiles
 from gateway.files.reserve import require_room
 
@@ -76,7 +76,8 @@ class DriveFiles:
             of_drive_s = sum(one.usable_s for one in self._windows if one.drive_start_ns == batch.drive_start_ns)
             if of_drive_s >= MOST_OF_DRIVE_S:
                 return False
-            self._make_room(len(content), is_stated)
+            if not self._make_room(kept, len(content), is_stated):
+                return False
             require_room(self.directory, len(content))
             self._files.write(name, content)
             window = Window(
@@ -90,24 +91,33 @@ class DriveFiles:
         with self._lock:
             self._remove({file_name})
 
-    def _make_room(self, n_bytes: int, is_stated: Callable[[int, int], bool]) -> None:
-        """Forget the drives that teach least until ``n_bytes`` more fit; the lock is held."""
-        drives: dict[int, list[Window]] = {}
+    def _make_room(self, kept: KeptBatch, n_bytes: int, is_stated: Callable[[int, int], bool]) -> bool:
+        """Forget the drives that teach least until ``n_bytes`` more fit; the lock is held.
+
+        False, and nothing is forgotten, if all others teach more than the drive under way can.
+        """
+        own, drives = kept.batch, dict[int, list[Window]]()
         for one in self._windows:
-            drives.setdefault(one.drive_start_ns, []).append(one)
-        newest_ns = max((one.t_end_ns for one in self._windows), default=0)
-        total = sum(one.n_bytes for one in self._windows) + n_bytes
+            if one.drive_start_ns != own.drive_start_ns:
+                drives.setdefault(one.drive_start_ns, []).append(one)
 
         def value(windows: list[Window]) -> tuple[bool, float]:
             begin_ns, end_ns = windows[0].t_start_ns, windows[-1].t_end_ns
             usable_s = sum(one.usable_s for one in windows)
-            return worth(usable_s, end_ns, newest_ns, is_stated=is_stated(begin_ns, end_ns))
+            return worth(usable_s, end_ns, own.t_end_ns, is_stated=is_stated(begin_ns, end_ns))
 
+        most = worth(ENOUGH_S, own.t_end_ns, own.t_end_ns, is_stated=is_stated(own.t_start_ns, own.t_end_ns))
+        excess = sum(one.n_bytes for one in self._windows) + n_bytes - self._most_bytes
+        forgotten: set[str] = set()
         for windows in sorted(drives.values(), key=value):
-            if total <= self._most_bytes:
-                return
-            self._remove({one.file_name for one in windows})
-            total -= sum(one.n_bytes for one in windows)
+            if excess <= 0 or value(windows) >= most:
+                break
+            forgotten |= {one.file_name for one in windows}
+            excess -= sum(one.n_bytes for one in windows)
+        if excess > 0:
+            return False
+        self._remove(forgotten)
+        return True
 
     def _remove(self, names: set[str]) -> None:
         for name in names:
