@@ -12,9 +12,10 @@ from gateway.calibration.assigned import Assigned, Fate, moments
 from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.file.calibration_file import load_calibration
 from gateway.calibration.judgement.advice import Verdict
-from gateway.calibration.learning.learn import Learnt, matched, standing
+from gateway.calibration.learning.learn import Learnt, matched
 from gateway.calibration.learning.learn import learn as learnt_from
-from gateway.calibration.learning.told import PROBLEMS, drives_record, learning_record, rows_told, statements_record
+from gateway.calibration.learning.spans import PROBLEMS, rows_told, standing
+from gateway.calibration.learning.told import drives_record, learning_record, statements_record
 from gateway.calibration.statements_csv import ToldRow, ToldRows, read_statements
 from gateway.cli import options
 from gateway.cli.calibrate import judged

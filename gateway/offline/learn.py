@@ -18,8 +18,9 @@ from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.learning.drives import Driven, Pieces, can_teach, pieces
+from gateway.calibration.learning.drives import Driven, Pieces, pieces
 from gateway.calibration.learning.learn import LOOKED_FOR
+from gateway.calibration.learning.spans import can_teach
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.learner import ANSWERS, LearnerBench, at
 
-from gateway.calibration.learning.learn import standing
+from gateway.calibration.learning.spans import standing
 from gateway.stated.facts import VehicleAnswers
 from gateway.stated.statement import StatementRecord
 

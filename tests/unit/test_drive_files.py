@@ -55,11 +55,11 @@ def test_a_drive_with_a_statement_outlives_all_others(tmp_path: Path) -> None:
     assert begun(files) == [0, 4 * 3600]
 
 
-def test_of_a_long_drive_the_first_hour_is_kept(tmp_path: Path) -> None:
+def test_of_a_long_drive_the_first_half_hour_is_kept(tmp_path: Path) -> None:
     files = DriveFiles(tmp_path, 100 * BYTES)
     for n in range(20):
         files.add(kept_window(0, n * 300), nothing)
-    assert begun(files) == [n * 300 for n in range(12)]
+    assert begun(files) == [n * 300 for n in range(6)]
 
 
 def test_a_failing_disk_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

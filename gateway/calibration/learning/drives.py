@@ -4,22 +4,16 @@ import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Final
 
-from gateway.calibration.assigned import Piece, cut
+from gateway.calibration.assigned import Piece
 from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.kept.batch_file import KeptBatch
 from gateway.calibration.kept.drive import joined_facts
-from gateway.core.pool import LEAST_LOAD_S, Part, can_be_pooled, spanned
+from gateway.calibration.learning.spans import ENOUGH_S, MOST_DRIVES, can_teach, spans_of, worth
+from gateway.core.pool import LEAST_LOAD_S, Part, spanned
 from gateway.core.settings import BatchSettings
 from gateway.estimate import Way
 from gateway.records import Batch, Why, iso_utc
-from gateway.units import NS_PER_S, S_PER_DAY
-
-MOST_DRIVES: Final = 40  # chosen: a fit of so many takes minutes; more of the same teach little
-ENOUGH_S: Final = 1800.0  # chosen: driving after which one drive teaches little more of the vehicle
-MOST_OF_DRIVE_S: Final = 3600.0  # chosen: what a drive goes on for after that is not learnt from
-HALVED_AFTER_DAYS: Final = 180.0  # chosen: springs, tyres and goods change with the seasons
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,24 +60,6 @@ class Pieces:
     short_s: float = 0.0
 
 
-def can_teach(window: Batch, settings: BatchSettings) -> bool:
-    """Whether a window has enough sound driving: also one that only lacks the length of a batch."""
-    if window.is_provisional:
-        return False
-    is_enough = window.usable_s >= LEAST_LOAD_S and can_be_pooled(window, settings)
-    return not window.rejected or is_enough
-
-
-def spans_of(windows: Iterable[tuple[int, int, int]], at_ns: Sequence[int]) -> list[Piece]:
-    """The pieces of drives by their windows: begin of the drive, begin and end of the window (ns)."""
-    pieces: list[Piece] = []
-    for number, (_, group) in enumerate(groupby(sorted(windows), lambda one: one[0]), 1):
-        of_drive = list(group)
-        bounds = cut(of_drive[0][1], max(end_ns for *_, end_ns in of_drive), at_ns)
-        pieces += [Piece(begin_ns, end_ns, number) for begin_ns, end_ns in bounds]
-    return pieces
-
-
 def pieces(
     windows: Iterable[KeptBatch],
     at_ns: Sequence[int],
@@ -116,7 +92,7 @@ def _begins(windows: Sequence[KeptBatch]) -> Iterator[KeptBatch]:
     for _, group in groupby(windows, lambda one: one.batch.drive_start_ns):
         driven_s = 0.0
         for one in group:
-            if driven_s < MOST_OF_DRIVE_S:
+            if driven_s < ENOUGH_S:
                 yield one
             driven_s += one.batch.usable_s
 
@@ -138,15 +114,6 @@ def _within(window: Batch, piece: Piece) -> Batch | None:
     except IndexError:  # less than one sample
         return None
     return part if part.usable_s >= LEAST_LOAD_S else replace(part, rejected=(Why.TOO_SHORT,))
-
-
-def worth(usable_s: float, end_ns: int, newest_ns: int, *, is_stated: bool) -> tuple[bool, float]:
-    """How much a drive teaches, for the choice of those that are fitted and of those that are kept: greater is more.
-
-    A drive with a statement is worth more than any without; then driving counts, and half as much after half a year.
-    """
-    age_days = (newest_ns - end_ns) / NS_PER_S / S_PER_DAY
-    return is_stated, min(usable_s, ENOUGH_S) * 0.5 ** (age_days / HALVED_AFTER_DAYS)
 
 
 def chosen(driven: Sequence[Driven], is_stated: Sequence[bool]) -> list[int]:

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import isfinite, nan
 from pathlib import Path
@@ -68,18 +68,6 @@ class Learnt:
         unknown = {number: one for number, one in self.loads.items() if not self.statements[number - 1].is_of_payload}
         members = looking_empty(list(unknown.values()), self.outcome.file.vehicle)
         return tuple(number for number, one in unknown.items() if any(one is member for member in members))
-
-
-def standing(records: Iterable[StatementRecord]) -> list[StatementRecord]:
-    """Those that stand, of records in the order in which they were made, in an order of their own.
-
-    A later record with the ref of an earlier one replaces it; the same record twice counts once. So what is learnt does
-    not depend on the order in which statements arrive.
-    """
-    by_id = {one.id: one for one in records}
-    by_ref = {one.ref: one.id for one in by_id.values() if one.ref}
-    kept = [one for one in by_id.values() if not one.ref or by_ref[one.ref] == one.id]
-    return sorted(kept, key=lambda one: (one.from_ns, one.id))
 
 
 def matched(records: Sequence[StatementRecord], driven: Sequence[Driven], vehicle: Vehicle) -> Assigned:

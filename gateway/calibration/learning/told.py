@@ -1,53 +1,22 @@
 """What was learnt, as an object: for the command's JSON, and from the process that learns to its service."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from gateway.calibration.ahead import Step
-from gateway.calibration.assigned import Assigned, Fate
-from gateway.calibration.judgement.advice import FIT_HALF_WIDTH_PCT, WORTH_SAYING, Verdict
+from gateway.calibration.assigned import Assigned
+from gateway.calibration.judgement.advice import WORTH_SAYING, Verdict
 from gateway.calibration.learning.learn import Learnt
+from gateway.calibration.learning.spans import STATES
 from gateway.calibration.questions import common_errors, question
 from gateway.calibration.statements import Statement
 from gateway.calibration.vehicle import ClaimState
-from gateway.core.vehicle import Vehicle
 from gateway.quantity import Z95
 from gateway.records import iso_utc, rounded
 from gateway.stated.statement import StatementRecord
-from gateway.words import counted as n_of
 
 Record = dict[str, Any]
-
-STATES: Final[Mapping[Fate, str]] = {
-    Fate.WAITING: "waiting",
-    Fate.MATCHED: "waiting",  # for a drive that can teach
-    Fate.OVERLAPPING: "held",
-    Fate.REPLACED: "withdrawn",
-    Fate.IMPOSSIBLE: "held",
-}
-PROBLEMS: Final[Mapping[Fate, str]] = {
-    Fate.WAITING: "waits",
-    Fate.OVERLAPPING: "overlap",
-    Fate.REPLACED: "replaced",
-    Fate.IMPOSSIBLE: "bad",
-}
-
-
-def rows_told(n_rows: int, n_match: int, problems: Sequence[Record]) -> str:
-    """ "38 rows: 31 match a drive, 4 wait, 2 overlap (rows 9, 10), 1 unknown vehicle (row 12)"."""
-    of_kind = {
-        kind: sorted({one["row"] for one in problems if one["kind"] == kind})
-        for kind in ("waits", "overlap", "replaced", "unknown_vehicle", "bad")
-    }
-    n_wait = len(of_kind.pop("waits"))
-    parts = [f"{n_match} {'matches' if n_match == 1 else 'match'} a drive"]
-    parts += [f"{n_wait} {'waits' if n_wait == 1 else 'wait'}"] if n_wait else []
-    for kind, numbers in of_kind.items():
-        if numbers:
-            named = f"row{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"
-            parts.append(f"{len(numbers)} {kind.replace('_', ' ')} ({named})")
-    return f"{n_of(n_rows, 'row')}: {', '.join(parts)}"
 
 
 def drives_record(found: Learnt) -> list[Record]:
@@ -122,7 +91,7 @@ def learning_record(found: Learnt, verdict: Verdict) -> Record:
     helps = [one for one in verdict.steps if one.then_kg <= (1.0 - WORTH_SAYING) * one.now_kg]
     return {
         "plus_minus_kg": rounded(verdict.steps[0].now_kg, 1) if verdict.steps else None,
-        "useful_at_kg": useful_at_kg(found.outcome.file.vehicle),
+        "useful_at_kg": rounded(found.outcome.file.vehicle.useful_half_width_kg, 1),
         "tested_on": len({one.run for one in taught.errors}) if taught else 0,
         "helps": [_help(one) for one in helps],
         "findings": list(_findings(found)),
@@ -135,12 +104,6 @@ def _help(step: Step) -> Record:
         "then_plus_minus_kg": rounded(step.then_kg, 1),
         "text": f"{step.candidate.words}: ± {step.now_kg:.0f} kg would become ± {step.then_kg:.0f} kg",
     }
-
-
-def useful_at_kg(vehicle: Vehicle) -> float | None:
-    """The half-width from which on a weighing of this vehicle is of use."""
-    low_kg, high_kg = vehicle.payload_range_kg
-    return rounded(FIT_HALF_WIDTH_PCT / 100.0 * (high_kg - low_kg), 1)
 
 
 def _findings(found: Learnt) -> Iterator[str]:

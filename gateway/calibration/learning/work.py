@@ -23,7 +23,8 @@ from gateway.calibration.judgement.assessment import assess_calibration
 from gateway.calibration.kept.batch_file import KeptBatch, unpacked
 from gateway.calibration.learning.drives import pieces
 from gateway.calibration.learning.job import JOB, RESULT, LearnJob, LearnResult
-from gateway.calibration.learning.learn import Learnt, learn, matched, standing
+from gateway.calibration.learning.learn import Learnt, learn, matched
+from gateway.calibration.learning.spans import standing
 from gateway.calibration.learning.told import drives_record, learning_record, statements_record
 from gateway.calibration.left_out import LeftOut
 from gateway.core.settings import BatchSettings

@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 from pydantic import Field
 
 from gateway.calibration.file.calibration_file import load_calibration
-from gateway.calibration.learning.learn import standing
+from gateway.calibration.learning.spans import standing
 from gateway.errors import CalibrationFileError, RefusedError
 from gateway.files.kept import KeptFiles
 from gateway.log import Event, OnEvent, tell_event

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.calibration.kept.batch_file import KeptBatch, packed
-from gateway.calibration.learning.drives import ENOUGH_S, MOST_OF_DRIVE_S, worth
+from gateway.calibration.learning.spans import ENOUGH_S, worth
 from gateway.files.kept import KeptFiles
 from gateway.files.reserve import require_room
 
@@ -74,7 +74,7 @@ class DriveFiles:
             if any(one.t_start_ns == batch.t_start_ns for one in self._windows) or len(content) > self._most_bytes:
                 return False
             of_drive_s = sum(one.usable_s for one in self._windows if one.drive_start_ns == batch.drive_start_ns)
-            if of_drive_s >= MOST_OF_DRIVE_S:
+            if of_drive_s >= ENOUGH_S:
                 return False
             if not self._make_room(kept, len(content), is_stated):
                 return False

@@ -19,10 +19,17 @@ from gateway.bus.signals import SignalMap
 from gateway.calibration.assigned import Assigned, Fate, Piece, assign, moments
 from gateway.calibration.commissioning.answers import doubts_of, vehicle_table
 from gateway.calibration.kept.batch_file import kept_batch_of
-from gateway.calibration.learning.drives import MOST_DRIVES, can_teach, spans_of, worth
 from gateway.calibration.learning.job import LearnJob, LearnResult
-from gateway.calibration.learning.learn import standing
-from gateway.calibration.learning.told import PROBLEMS, STATES, rows_told, useful_at_kg
+from gateway.calibration.learning.spans import (
+    MOST_DRIVES,
+    PROBLEMS,
+    STATES,
+    can_teach,
+    rows_told,
+    spans_of,
+    standing,
+    worth,
+)
 from gateway.calibration.sister import require_alike
 from gateway.calibration.statements_csv import StatementsFileError, ToldRow, ToldRows, read_statements
 from gateway.config.sections import LearningSection
@@ -32,7 +39,7 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, CampaignError, NoSisterError, RefusedError
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, BackOff, ThreadPart
-from gateway.records import Batch, Motion
+from gateway.records import Batch, Motion, rounded
 from gateway.service.learner.book import MOST_STATEMENTS, MOST_VERSIONS, Book, LearningRecord, Outcome, Said, Stated
 from gateway.service.learner.book import Version as LearntVersion
 from gateway.service.learner.drives import FOLDER, DriveFiles, Window
@@ -612,7 +619,7 @@ class Learner(ThreadPart):
             is_allowed=self._vehicle.why_not_allowed is None,
             why_not=self._vehicle.why_not_allowed,
             plus_minus_kg=learning.get("plus_minus_kg"),
-            useful_at_kg=None if vehicle is None else useful_at_kg(vehicle),
+            useful_at_kg=None if vehicle is None else rounded(vehicle.useful_half_width_kg, 1),
             tested_on=learning.get("tested_on", 0),
             helps=[Help.model_validate(one) for one in learning.get("helps", ())],
             findings=[*learning.get("findings", ()), *([last.fault] if last and last.fault else [])],
