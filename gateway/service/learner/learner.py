@@ -13,8 +13,6 @@ from datetime import tzinfo
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from pydantic import TypeAdapter
-
 from gateway.bus.signals import SignalMap
 from gateway.calibration.assigned import Assigned, Fate, Piece, assign, moments
 from gateway.calibration.commissioning.answers import doubts_of, vehicle_table
@@ -74,7 +72,7 @@ FIRST_RETRY_S, LAST_RETRY_S = 60.0, 3600.0  # chosen: after a process that was e
 BYTES_PER_MB: Final = 1_000_000  # SI
 NEWEST, BY_FILE = "newest", "file"
 NO_VEHICLE: Final = "the vehicle is not stated yet: its axle weights, wheelbase and the sensor's place are needed"
-_VEHICLE: Final = TypeAdapter(Vehicle)
+NEXT_FIT: Final = "its drive is there: it is learnt from with the next fit"
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +146,7 @@ class Learner(ThreadPart):
         self._retry = BackOff(FIRST_RETRY_S, LAST_RETRY_S)
         self._not_before_s = 0.0
         self._disk_fault: str | None = None
+        self._fates_of: tuple[LearningRecord, tuple[Window, ...], dict[str, tuple[Fate, str]]] | None = None
         self.n_lost = 0  # windows that should have been kept and were not
 
     # -- the pipeline, and the thread --
@@ -579,9 +578,10 @@ class Learner(ThreadPart):
 
     def _told(self, chosen: Sequence[Said]) -> list[StatementTold]:
         """These statements with what became of them."""
-        record = self._book.record
-        records = record.records
-        fates = self._fates(records)
+        record, windows = self._book.record, self._files.windows()
+        if self._fates_of is None or self._fates_of[0] is not record or self._fates_of[1] != windows:
+            self._fates_of = (record, windows, self._fates(record.records))
+        fates = self._fates_of[2]
         return [self._one_told(said, fates.get(said.record.id), record.last) for said in chosen]
 
     def _one_told(self, said: Said, fate: tuple[Fate, str] | None, last: Outcome | None) -> StatementTold:
@@ -597,7 +597,7 @@ class Learner(ThreadPart):
             told["reason"] = found.get("reason")
         else:
             told["state"] = STATES[fate[0]]
-            told["reason"] = fate[1] or "its drive is there: it is learnt from with the next fit"
+            told["reason"] = fate[1] or (NO_VEHICLE if self._learnt_vehicle is None else NEXT_FIT)
         content = said.effective.model_dump(mode="json", by_alias=True)
         return StatementTold.model_validate({**content, "vehicle": self._vehicle.id, "at": said.at, **told})
 
