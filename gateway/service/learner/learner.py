@@ -147,6 +147,7 @@ class Learner(ThreadPart):
         self._not_before_s = 0.0
         self._disk_fault: str | None = None
         self._fates_of: tuple[LearningRecord, tuple[Window, ...], dict[str, tuple[Fate, str]]] | None = None
+        self._looked: tuple[LearningRecord, tuple[Window, ...], int | None] | None = None  # nothing to learn there
         self.n_lost = 0  # windows that should have been kept and were not
 
     # -- the pipeline, and the thread --
@@ -243,8 +244,12 @@ class Learner(ThreadPart):
         with self._book.lock:
             if self._stopping.is_set() or self._worker.is_busy or time.monotonic() < self._not_before_s:
                 return
+            looked = (self._book.record, self._files.windows(), self._scheduler.drive_start_ns)
+            if self._looked is not None and self._looked[0] is looked[0] and self._looked[1:] == looked[1:]:
+                return
             job, last = self._job(), self._book.record.last
             if job is None or (last is not None and last.key == job.key):
+                self._looked = looked
                 return
             try:
                 self._worker.start(job)
