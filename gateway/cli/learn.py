@@ -283,12 +283,7 @@ def _learning_record(found: Learnt, verdict: Verdict, output: Path | None) -> Re
             "helps": [{"do": one.candidate.name, "then_plus_minus_kg": rounded(one.then_kg, 1)} for one in helps],
             "findings": list(common_errors(taught.causes)) if taught else [],
         },
-        "verdict": {
-            "grade": str(verdict.grade),
-            "accuracy": verdict.accuracy,
-            "reasons": [{"rule": one.rule, "grade": str(one.grade), "text": one.text} for one in verdict.reasons],
-            "advice": verdict.advice,
-        },
+        "verdict": verdict.to_json(),
     }
 
 
