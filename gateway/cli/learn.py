@@ -196,12 +196,7 @@ def _verdict_record(found: Learnt, verdict: Verdict, output: Path | None) -> Rec
         "output": str(output) if output else None,
         "warnings": list(file.warnings),
         "learning": learning_record(found, verdict),
-        "verdict": {
-            "grade": str(verdict.grade),
-            "accuracy": verdict.accuracy,
-            "reasons": [{"rule": one.rule, "grade": str(one.grade), "text": one.text} for one in verdict.reasons],
-            "advice": verdict.advice,
-        },
+        "verdict": verdict.to_json(),
     }
 
 

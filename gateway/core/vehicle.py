@@ -134,6 +134,14 @@ class VehicleFields:
         default=None,
         metadata=described("usual height of the load above the floor", ge=0.05, le=5.0, examples=[1.2]),
     )
+    loading_area_m: tuple[Metres, Metres] | None = field(
+        default=None,
+        metadata=described(
+            "where its load may lie, from the front end of the loading area to its rear end, behind the front axle, "
+            "rising; tells how much more may go in; absent: 0.35 to 1.25 wheelbases",
+            examples=[[1.2, 3.1]],
+        ),
+    )
     roof_rack: bool = field(default=False, metadata=described("part of the load may be on the roof"))
     tow_bar: bool = field(
         default=False, metadata=described("part of the load may be on a tow bar: a carrier, a trailer's tongue")
@@ -191,6 +199,8 @@ class Vehicle(VehicleFields):
             low, high = getattr(self, name)
             if low >= high:
                 raise ValueError(f"{name} must rise: [low, high]")
+        if self.loading_area_m is not None and self.loading_area_m[0] >= self.loading_area_m[1]:
+            raise ValueError("loading_area_m must rise: [front end, rear end]")
 
     @property
     def empty_front_share(self) -> float:

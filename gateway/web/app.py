@@ -96,7 +96,7 @@ def create_app(
         export_router(reader),
         events_router(reader),
         *([alarms_router(reader, alarms)] if alarms else ()),
-        weights_router(board, scales),
+        weights_router(board, scales, status),
         cab_router(board, reader, status, scales),
         standards_router(board, scales),
         health_router(status, metrics),

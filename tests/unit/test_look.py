@@ -104,6 +104,7 @@ def test_a_box_on_its_side_is_mapped_by_gravity_and_braking(box: Path, tmp_path:
     assert "BOX.AccZ: +0." in told or "BOX.AccZ: -0." in told
     assert "points rearward: goes with the change of speed" in told
     assert "This can work." in told
+    assert f'Next: `springscale run` with signals = "{output}" in springscale.toml' in told
     mapped = {m.signal: m for message in load_signal_map(output).messages for m in message.signals}
     # up = -y, forward = -z, left = up x forward = y x z = x
     assert (mapped[Signal.VERTICAL_ACCELERATION].dbc_signal, mapped[Signal.VERTICAL_ACCELERATION].to_si) == ("AccY", -1)

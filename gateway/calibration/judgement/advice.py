@@ -8,7 +8,7 @@ A calibration is as good as its worst rule. docs/calibration.md lists them.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
+from typing import Any, Final
 
 from gateway.calibration.ahead import Step, next_steps
 from gateway.calibration.calibrate import Outcome
@@ -79,6 +79,15 @@ class Verdict:
         below = [f"    {one.text}" for one in self.reasons if one.grade is not Grade.FIT]
         head = f"{GRADE_TEXT[self.grade]}, by the {estimator_name(self.estimator)}. {self.accuracy}"
         return "\n".join([head, *below, *([f"    {self.advice}"] if self.advice else [])])
+
+    def to_json(self) -> dict[str, Any]:
+        """The same for programs."""
+        return {
+            "grade": str(self.grade),
+            "accuracy": self.accuracy,
+            "reasons": [{"rule": one.rule, "grade": str(one.grade), "text": one.text} for one in self.reasons],
+            "advice": self.advice,
+        }
 
 
 def _share_rejected(table: ErrorTable) -> float:
