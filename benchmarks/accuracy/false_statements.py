@@ -48,7 +48,7 @@ TEST: Final = (2, 4, 7)
 NOTES: Final = tuple(name for name in TEACH if name != "empty")
 
 Said = dict[str, Any]
-"""A statement record without its times."""
+"""A statement record; without a time it is of the drive's begin."""
 Told = dict[str, tuple[Said, ...]]
 """What is stated of each drive."""
 
@@ -135,6 +135,11 @@ KINDS: Final = (
     Kind("nothing is false", (), lambda of: {}),
     Kind("note of another van: 95 kg for 436", ("436 kg",), lambda of: {"436 kg": [note(95.0)]}),
     Kind("note at the wrong day: 436 kg for an empty one", ("empty",), lambda of: {"empty": [note(436.0)]}),
+    Kind(
+        "note of another year",
+        ("436 kg",),
+        lambda of: {"436 kg": [note(of.kg("436 kg")) | {"from": FIRST_DAY - timedelta(days=362)}]},
+    ),
     Kind("gross for net", ("436 kg",), lambda of: {"436 kg": [note(of.gross_kg("436 kg"))]}),
     Kind("net for gross", ("436 kg",), lambda of: {"436 kg": [said("scale", gross_kg=of.kg("436 kg"))]}),
     Kind("pounds: 458 for 208 kg", ("208 kg",), lambda of: {"208 kg": [note(2.20462 * of.kg("208 kg"))]}),
@@ -163,6 +168,11 @@ KINDS: Final = (
                 )
             ]
         },
+    ),
+    Kind(
+        "place in centimetres",
+        ("436 kg",),
+        lambda of: {"436 kg": [note(of.kg("436 kg"), behind_front_axle_m=100.0 * of.place_m("436 kg"))]},
     ),
     Kind(
         "two notes for one load, half each",
@@ -224,9 +234,9 @@ def stated(told: Mapping[str, Sequence[Said]], names: Iterable[str], vehicle: Ve
         pieces.append(Piece(begin_ns, end_ns, day))
         for number, one in enumerate(told.get(name, ())):
             try:
-                record = StatementRecord.model_validate({**one, "from": begin, "id": f"{name}, {number}"})
+                record = StatementRecord.model_validate({"from": begin, **one, "id": f"{name}, {number}"})
             except ValidationError as fault:
-                faults += [str(each["msg"]) for each in fault.errors()]
+                faults += [f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in fault.errors()]
                 continue
             records.append((name, record))
     return Stated(tuple(records), assign([record for _, record in records], pieces, vehicle), tuple(faults))
