@@ -58,8 +58,11 @@ def taught() -> str:
     found = numbers("taught.json")
     figures = ("error", "held", "half", "score")
 
+    def cell(figure: float | None, name: str) -> str:
+        return "–" if figure is None else f"{figure:.{0 if name == 'held' else 1}f}"
+
     def row(line: dict[str, Any]) -> tuple[str, ...]:
-        parts = [f"{line[of][name]:.{0 if name == 'held' else 1}f}" for of in ("payload", "share") for name in figures]
+        parts = [cell(line[of][name], name) for of in ("payload", "share") for name in figures]
         return line["title"].replace("_", " "), str(line["n"]), str(line["refused"]), *parts
 
     head = "drives | batches | refused | payload error | held | ± | score | share error | held | ± | score"
