@@ -59,11 +59,12 @@ def taught() -> str:
     figures = ("error", "held", "half", "score")
 
     def row(line: dict[str, Any]) -> tuple[str, ...]:
-        parts = [f"{line[of][name]:.{0 if name == 'held' else 1}f}" for of in ("payload", "share") for name in figures]
+        each = [(name, line[of][name]) for of in ("payload", "share") for name in figures]
+        parts = ["none" if one is None else f"{one:.{0 if name == 'held' else 1}f}" for name, one in each]
         return line["title"].replace("_", " "), str(line["n"]), str(line["refused"]), *parts
 
     head = "drives | batches | refused | payload error | held | ± | score | share error | held | ± | score"
-    return table(head, map(row, found["lines"]))
+    return table(head, (row(line) for line in found["lines"] if line["n"] or line["refused"]))
 
 
 ACCURACY: Final = {
