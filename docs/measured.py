@@ -66,7 +66,7 @@ def taught() -> str:
         return line["title"].replace("_", " "), str(line["n"]), str(line["refused"]), *parts
 
     head = "drives | batches | refused | payload error | held | ± | score | share error | held | ± | score"
-    return table(head, map(row, found["lines"]))
+    return table(head, (row(line) for line in found["lines"] if line["n"] or line["refused"]))
 
 
 ACCURACY: Final = {
