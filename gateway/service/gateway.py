@@ -256,7 +256,8 @@ class Gateway:
         """One check of the service's state, in a thread because it may wait for a lock or a disk."""
         now = self.status()
         self._checks.call("log of states", log_state, now)
-        self._checks.call("alarms", self.alarms.watch, now)
+        causes = [cause.text for cause in self.pipeline.decoder.causes()]
+        self._checks.call("alarms", self.alarms.watch, now, causes)
         self._notifier.send_status(now.sentence())
 
     def _dead_part(self, serving: asyncio.Task[None]) -> str | None:
