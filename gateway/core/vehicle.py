@@ -20,6 +20,7 @@ PAYLOAD_LEFT_STD_M: Final = 0.1
 A choice, not a measurement: a pallet 0.8 m wide has 0.2 m to either side between wheel arches 1.2 m apart.
 """
 
+USEFUL_SHARE: Final = 0.25  # chosen: of the range, half the 95 % interval of a weighing that is of use
 LEAST_RANGE_SHARE: Final = 0.33  # chosen: of the empty mass, what any vehicle may carry
 PAYLOAD_LEFT_NOTED_STD_M: Final = 0.02
 """Chosen: a noted place of the payload, measured with a tape."""
@@ -210,6 +211,11 @@ class Vehicle(VehicleFields):
     def largest_payload_kg(self) -> float:
         """What it may carry: the end of its range, but no less than any vehicle can."""
         return max(self.payload_range_kg[1], LEAST_RANGE_SHARE * self.empty_mass_kg)
+
+    @property
+    def useful_half_width_kg(self) -> float:
+        """Half the 95 % interval from which on a weighing is of use."""
+        return USEFUL_SHARE * (self.payload_range_kg[1] - self.payload_range_kg[0])
 
     @property
     def sensor_left_m(self) -> float:

@@ -52,6 +52,7 @@ OWN_RUN_BY = {  # of every page: how a command of ours begins, and what runs it
     "springscale events": "tests/unit/test_events_command.py",
     "springscale feed": FEED,
     "springscale fleet-report": "tests/e2e/test_archive_to_report.py",
+    "springscale learn": "tests/e2e/test_learning_service.py",
     "springscale look": "tests/unit/test_look.py",
     "springscale record": "tests/unit/test_record_command.py",
     "springscale replay": "tests/e2e/test_cli_simulate.py",
@@ -59,6 +60,7 @@ OWN_RUN_BY = {  # of every page: how a command of ours begins, and what runs it
     "springscale reproduce": "tests/e2e/test_reproduce.py",
     "springscale run": "tests/e2e/test_gateway_service.py",
     "springscale simulate": "tests/e2e/test_cli_simulate.py",
+    "springscale state": "tests/unit/test_state_command.py",
     "springscale token": "tests/unit/test_web_tokens.py",
     "springscale verification": "tests/e2e/test_verification_service.py",
 }
