@@ -103,6 +103,9 @@ class LearningState(Part):
 
     is_allowed: bool
     why_not: str | None
+    vehicle_time: Instant = Field(
+        description="now: by this computer, or by the bus where its time is days away from it, as in a replay"
+    )
     plus_minus_kg: float | None = Field(description="of a middling payload now; null: nothing is learnt yet")
     useful_at_kg: float | None = Field(description="from this ± on it is of use; null: the vehicle is not stated yet")
     tested_on: int = Field(description="drives with a statement that were left out and weighed")

@@ -37,7 +37,7 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, CampaignError, NoSisterError, RefusedError
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, BackOff, ThreadPart
-from gateway.records import Batch, Motion, rounded
+from gateway.records import Batch, Motion, iso_utc, rounded
 from gateway.service.learner.book import MOST_STATEMENTS, MOST_VERSIONS, Book, LearningRecord, Outcome, Said, Stated
 from gateway.service.learner.book import Version as LearntVersion
 from gateway.service.learner.drives import FOLDER, DriveFiles, Window
@@ -71,6 +71,7 @@ TURN_S: Final = 1.0  # chosen: interval between looks whether there is something
 FIRST_RETRY_S, LAST_RETRY_S = 60.0, 3600.0  # chosen: after a process that was ended from outside
 BYTES_PER_MB: Final = 1_000_000  # SI
 NEWEST, BY_FILE = "newest", "file"
+OTHER_TIME_NS: Final = 86_400 * NS_PER_S  # chosen: a bus whose time is further off than a day has a time of its own
 NO_VEHICLE: Final = "the vehicle is not stated yet: its axle weights, wheelbase and the sensor's place are needed"
 NEXT_FIT: Final = "its drive is there: it is learnt from with the next fit"
 
@@ -137,6 +138,7 @@ class Learner(ThreadPart):
         super().__init__("learner")
         self._settings, self._batch, self._scheduler = settings, batch, drives
         self._signal_map, self._vehicle = signal_map, vehicle
+        self._clock_ns = clock_ns
         self._book = Book(directory, on_event, clock_ns)
         self._files = DriveFiles(directory / FOLDER, round(settings.size_mb * BYTES_PER_MB))
         self._worker = (make_worker or (lambda on_result: Worker(directory, on_result)))(self._on_result)
@@ -623,6 +625,7 @@ class Learner(ThreadPart):
         return LearningState(
             is_allowed=self._vehicle.why_not_allowed is None,
             why_not=self._vehicle.why_not_allowed,
+            vehicle_time=iso_utc(self._vehicle_time_ns(windows)),
             plus_minus_kg=learning.get("plus_minus_kg"),
             useful_at_kg=None if vehicle is None else rounded(vehicle.useful_half_width_kg, 1),
             tested_on=learning.get("tested_on", 0),
@@ -639,6 +642,13 @@ class Learner(ThreadPart):
             held_version=record.held,
             fault=self.fault,
         )
+
+    def _vehicle_time_ns(self, windows: Sequence[Window]) -> int:
+        """The time that a statement without one is of: in a replay or a demonstration the bus has a time of its own."""
+        now_ns, window_ns = self._clock_ns(), self._scheduler.open_window_ns
+        bus_ns = [one.t_end_ns for one in windows] if window_ns is None else [window_ns[1]]
+        newest_ns = max(bus_ns, default=now_ns)
+        return newest_ns if abs(now_ns - newest_ns) > OTHER_TIME_NS else now_ns
 
     def _lacks(self, windows: Sequence[Window]) -> Iterator[Any]:
         stated = self._book.record.vehicle

@@ -11,6 +11,7 @@ export const DASHBOARD = {
   connecting: ["connecting", "verbindet"],
   loading: ["Loading", "Lädt"],
   cab: ["In the cab", "Im Fahrerhaus"],
+  teach: ["Teach the vehicle", "Fahrzeug anlernen"],
   api: ["API", "API"],
   metrics: ["Metrics", "Messwerte"],
   version: ["version {version}", "Version {version}"],
