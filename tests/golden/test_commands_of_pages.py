@@ -14,7 +14,7 @@ from benchmarks.accuracy.__main__ import studies
 from gateway.cli import springscale
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("hardware", "feed", "contribute", "real-parts")
+PAGES = ("hardware", "feed", "contribute", "faults")
 PROGRAMS = (
     r"(?:springscale|python[\d.]*|sudo|cat|systemctl|echo|make|npm|pip|vspec|databroker|mmdebstrap|podman"
     r"|[\w/-]+/bin/\w+|\w+=\S+ python)"
