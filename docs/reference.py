@@ -147,13 +147,13 @@ def _named(heading: str, words: Mapping[Any, str]) -> str:
 def settings_tables() -> str:
     """Every key, a table a section."""
     top = {name: field for name, field in Settings.model_fields.items() if _section_of(field) is None}
-    parts = [_settings_table("Top of the file", top, prefix="SPRINGSCALE_")]
+    parts = [_settings_table("Top of the file", top)]
     for name, field in Settings.model_fields.items():
         section = _section_of(field)
         if section is not None:
             words = (section.__doc__ or "").strip().splitlines()[0].rstrip(".")
             title = f"[{name}]: {words[0].lower()}{words[1:]}"
-            parts.append(_settings_table(title, section.model_fields, prefix=f"SPRINGSCALE_{name.upper()}__"))
+            parts.append(_settings_table(title, section.model_fields))
     return "\n".join(parts)
 
 
@@ -163,12 +163,9 @@ def _section_of(field: FieldInfo) -> type[BaseModel] | None:
     return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
 
 
-def _settings_table(title: str, fields: Mapping[str, FieldInfo], *, prefix: str) -> str:
-    rows = (
-        (f"`{name}`", _default(field), field.description or "", f"`{prefix}{name.upper()}`")
-        for name, field in fields.items()
-    )
-    return f"## {title}\n\n{table('key | default | meaning | variable', rows)}"
+def _settings_table(title: str, fields: Mapping[str, FieldInfo]) -> str:
+    rows = ((f"`{name}`", _default(field), field.description or "") for name, field in fields.items())
+    return f"## {title}\n\n{table('key | default | meaning', rows)}"
 
 
 def _default(field: FieldInfo) -> str:
