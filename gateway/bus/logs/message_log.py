@@ -339,7 +339,7 @@ class _BlfReader(can.BLFReader):
 def _blf_messages(report: LogReport, zone: tzinfo | None) -> Iterator[tuple[can.Message, int]]:
     with report.until_damage(".blf"), open_log_file(report.path) as stream:
         n_bytes = None if is_packed(stream) else report.path.stat().st_size  # a packed one says itself where it is cut
-        reader = _BlfReader(cast(BinaryIO, stream), report)
+        reader = _BlfReader(stream, report)
         as_utc_ns, shift_ns = round(reader.start_timestamp * 1000) * 1_000_000, 0
         if reader.start_timestamp:
             date = datetime.fromtimestamp(as_utc_ns // NS_PER_S, UTC).replace(tzinfo=None)
