@@ -35,7 +35,6 @@ RUN_BY = {  # how a command begins: what runs it
     "SPRINGSCALE_HASS=ha/bin/hass python -m pytest": "tests/real/test_real_home_assistant.py",
     "make test-vm": FEED,
     "systemctl status springscale-feed": FEED,
-    "python -m benchmarks.": BY_A_STUDY,
 }
 OWN_RUN_BY = {  # of every page: how a command of ours begins, and what runs it
     "springscale calibrate": "tests/golden/test_recorded_roll.py",
@@ -93,6 +92,7 @@ ANY_RUN_BY = {  # the same of what tests run
     "make dist": "tests/e2e/test_dist.py",
     "python docs/make.py": "tests/golden/test_reference_pages.py",
     "python docs/make_tutorial.py": "tests/golden/test_tutorial.py",
+    "python -m benchmarks.": BY_A_STUDY,
     "python -m gateway.fleet.subscriber": "tests/support/fleet_view.py",
     "python3 provision.py": "tests/unit/test_fleet_files.py",
     "springscale --help": "tests/unit/test_command_line.py",
