@@ -1,7 +1,7 @@
-"""Every command that the pages of ways in tell: which test runs it, or that the page says it was not run.
+"""Every command on a page has a test that runs it, or a line here that says why none does.
 
-A command that is added to one of these pages needs its line here. Of all pages our own commands must exist, with the
-options that are told, and a test must run each.
+Pages of ways in also say in their own words what was not run. Commands of ours must exist, with the options that a page
+tells, and a test must run each.
 """
 
 import re
@@ -14,7 +14,7 @@ from benchmarks.accuracy.__main__ import studies
 from gateway.cli import springscale
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("hardware", "feed", "contribute", "real-parts")
+PAGES = ("hardware", "feed", "contribute", "faults")  # they name what was not run in their own words
 PROGRAMS = (
     r"(?:springscale|python[\d.]*|sudo|cat|systemctl|echo|make|npm|pip|vspec|databroker|mmdebstrap|podman"
     r"|[\w/-]+/bin/\w+|\w+=\S+ python)"
@@ -35,7 +35,6 @@ RUN_BY = {  # how a command begins: what runs it
     "SPRINGSCALE_HASS=ha/bin/hass python -m pytest": "tests/real/test_real_home_assistant.py",
     "make test-vm": FEED,
     "systemctl status springscale-feed": FEED,
-    "python -m benchmarks.": BY_A_STUDY,
 }
 OWN_RUN_BY = {  # of every page: how a command of ours begins, and what runs it
     "springscale calibrate": "tests/golden/test_recorded_roll.py",
@@ -63,6 +62,49 @@ OWN_RUN_BY = {  # of every page: how a command of ours begins, and what runs it
     "springscale state": "tests/unit/test_state_command.py",
     "springscale token": "tests/unit/test_web_tokens.py",
     "springscale verification": "tests/e2e/test_verification_service.py",
+}
+NOT_RUN_HERE = {  # how a command of any page begins: why no test runs it
+    "cat /var/lib/springscale/record": "joins files of a vehicle",
+    "make audit": "asks a server of advisories; a test runs the script against a fake one",
+    "make bench": "takes a quarter of an hour; its numbers stand in performance.json",
+    "make check": "is what every change runs before it is committed",
+    "make docs": "writes what tests compare",
+    "make fleet-test": "wants a broker and a database; its counts stand in fleet_test.json",
+    "make screenshots": "takes pictures, for eyes",
+    "make soak": "takes long; its numbers stand in soak.json",
+    "make test": "is the tests",
+    "pip install": "asks an index; the lists of packages are tested",
+    "python -m pytest": "is the tests",
+    "sudo -u postgres": "a server's set-up; tests make the same database without sudo",
+    "sudo /opt/springscale-subscriber": "a server's set-up",
+    "sudo apt install mosquitto": "a server's set-up",
+    "sudo apt install postgresql": "a server's set-up",
+    "sudo chown 1883": "a server's set-up",
+    "sudo cp subscriber/": "a server's set-up; a test reads the unit",
+    "sudo python3 -m venv /opt": "a server's set-up",
+    "sudo sh -c 'modprobe vcan": "wants root and the vcan module; tests/vm plays a log onto a vcan0 of its own",
+    "sudo systemctl edit springscale": "opens an editor",
+    "sudo useradd": "a server's set-up",
+    'echo "whsec_': "wants root; a test makes a secret of the same form",
+}
+ANY_RUN_BY = {  # the same of what tests run
+    "make deb": "tests/e2e/test_vehicle_packages.py",
+    "make demo": "tests/e2e/test_cli_demo.py",
+    "make dist": "tests/e2e/test_dist.py",
+    "python docs/make.py": "tests/golden/test_reference_pages.py",
+    "python docs/make_tutorial.py": "tests/golden/test_tutorial.py",
+    "python -m benchmarks.": BY_A_STUDY,
+    "python -m gateway.fleet.subscriber": "tests/support/fleet_view.py",
+    "python3 provision.py": "tests/unit/test_fleet_files.py",
+    "springscale --help": "tests/unit/test_command_line.py",
+    "springscale -V": "tests/unit/test_command_line.py",
+    "springscale COMMAND": "tests/unit/test_command_line.py",
+    "sudo apt install ./build/springscale": "tests/vm/harness/vehicle.py",
+    "sudo cp /usr/share/springscale/network": "tests/vm/harness/vehicle.py",
+    "sudo springscale token create": "tests/vm/harness/vehicle.py",
+    "sudo systemctl enable --now springscale": "tests/vm/harness/vehicle.py",
+    "systemctl restart springscale": "tests/vm/harness/vehicle.py",
+    "systemctl status springscale": "tests/vm/harness/vehicle.py",
 }
 NOT_RUN = {  # how a command begins: what the page says of it
     "sudo apt install gpsd": "a real Raspberry Pi",
@@ -94,13 +136,27 @@ def commands_of(page: str) -> list[str]:
 COMMANDS = [(page, command) for page in PAGES for command in commands_of(page)]
 
 
+def beginning_of(command: str, *tables: dict[str, str]) -> str | None:
+    """What the first of the tables that knows the command says of it."""
+    return next((said for table in tables for start, said in table.items() if command.startswith(start)), None)
+
+
 @pytest.mark.parametrize(("page", "command"), COMMANDS)
 def test_a_test_runs_it_or_the_page_says_that_none_does(page: str, command: str) -> None:
-    runner = next((where for beginning, where in RUN_BY.items() if command.startswith(beginning)), None)
-    if runner is None:
-        said = next((text for beginning, text in NOT_RUN.items() if command.startswith(beginning)), None)
-        assert said is not None, f"neither a test that runs it nor words that it was not run: {command}"
+    if said := beginning_of(command, NOT_RUN):
         assert said in " ".join(text_of(page).split())
+    else:
+        test_a_test_runs_it_or_the_table_says_why_none_does(command)
+
+
+OF_ALL_PAGES = sorted({each for page in (ROOT / "docs").glob("*.md") for each in commands_of(page.stem)})
+
+
+@pytest.mark.parametrize("command", OF_ALL_PAGES)
+def test_a_test_runs_it_or_the_table_says_why_none_does(command: str) -> None:
+    runner = beginning_of(command, RUN_BY, OWN_RUN_BY, ANY_RUN_BY)
+    if runner is None:
+        assert beginning_of(command, NOT_RUN, NOT_RUN_HERE), f"neither a test that runs it nor why none does: {command}"
     else:
         assert (ROOT / runner).exists()
 
@@ -137,4 +193,5 @@ def test_commands_are_found_in_every_page() -> None:
     assert {page for page, _ in COMMANDS} == set(PAGES)
     told = [command for _, command in COMMANDS]
     unused = [beginning for beginning in (*RUN_BY, *NOT_RUN) if not any(one.startswith(beginning) for one in told)]
+    unused += [one for one in (*ANY_RUN_BY, *NOT_RUN_HERE) if not any(each.startswith(one) for each in OF_ALL_PAGES)]
     assert unused == []
