@@ -32,7 +32,7 @@ def main() -> None:
         sys.exit(f"{output}: no option is known here, and no folder is called so")
     gather()
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", output]  # --quiet counts no warning
-    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}  # docs/decisions.md
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}  # docs/architecture.md
     built = subprocess.run(command, cwd=ROOT, env=environment, check=False, capture_output=True, text=True)
     if built.returncode:
         sys.stderr.write(built.stderr)

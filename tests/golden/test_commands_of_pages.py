@@ -61,7 +61,6 @@ OWN_RUN_BY = {  # how a command of ours begins: what runs it
     "springscale learn": "tests/e2e/test_learn.py",
     "springscale look": "tests/unit/test_look.py",
     "springscale record": "tests/unit/test_record_command.py",
-    "springscale replay": "tests/e2e/test_cli_simulate.py",
     "springscale reprocess": "tests/unit/test_archive_command.py",
     "springscale reproduce": "tests/e2e/test_reproduce.py",
     "springscale run": "tests/e2e/test_gateway_service.py",

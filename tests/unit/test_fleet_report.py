@@ -198,8 +198,8 @@ def test_a_data_set_that_is_none_ends_in_one_line(tmp_path: Path, capsys: pytest
     assert "holds no receipt" in capsys.readouterr().err
 
 
-TEXT = (Path(__file__).parents[2] / "docs/archive.md").read_text(encoding="utf-8")
-TEXT = TEXT.partition("## The report of a fleet")[2]
+PAGE = (Path(__file__).parents[2] / "docs/archive.md").read_text(encoding="utf-8")
+TEXT = PAGE.partition("## The report of a fleet")[2]
 SQL = [one for block in re.findall(r"```sql\n(.*?)```", TEXT, re.DOTALL) for one in block.split(";") if one.strip()]
 PYTHON = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 
