@@ -20,7 +20,7 @@ PROGRAMS = (
     r"|\./\w+\.sh|mmdebstrap|podman|[\w/-]+/bin/\w+|\w+=\S+ python)"
 )
 PACK, FEED = "tests/unit/test_campaign_pack.py", "tests/vm/test_9_feed.py"
-DEMO, PACKAGE, STUDY = "tests/e2e/test_cli_demo.py", "tests/vm/test_8_package.py", "benchmarks"
+DEMO, VM, STUDY = "tests/e2e/test_cli_demo.py", "tests/vm/harness/vehicle.py", "benchmarks"
 RUN_BY = {  # how a command begins: what runs it, or makes its numbers anew
     "python examples/phone.py": "tests/e2e/test_example.py",
     "python -m pytest tests/real": "tests/real/test_real_prometheus.py",
@@ -36,9 +36,12 @@ RUN_BY = {  # how a command begins: what runs it, or makes its numbers anew
     "make demo": DEMO,
     "make dist": "tests/e2e/test_dist.py",
     "make fleet-test": "tests/fleet/test_fifty_vehicles.py",
-    "sudo apt install ./build/": PACKAGE,
-    "sudo springscale token": "tests/unit/test_web_tokens.py",
-    "systemctl status springscale": FEED,
+    "sudo apt install ./build/": VM,
+    "sudo cp /usr/share/springscale/network": VM,
+    "sudo springscale token create": VM,
+    "sudo systemctl enable --now springscale": VM,
+    "systemctl restart springscale": VM,
+    "systemctl status springscale": VM,
 }
 OWN_RUN_BY = {  # how a command of ours begins: what runs it
     "springscale calibrate campaign.toml --check": "tests/unit/test_inspection_campaign.py",
@@ -82,11 +85,20 @@ SAID = {  # how a command begins that no test runs: the words with which its pag
     "podman build": BY_HAND,
 }
 ROOT_RIGHTS = "changes the machine, as root"
+SERVER = "sets up a server; the tests run the same files without root"
 NETWORK = "installs from a package index; `make test` itself runs in such an environment"
 BY_OTHERS = "another project's program; the tests send the same requests, or call the same library"
 NOT_RUN = {  # how a command begins that no test runs, and why
-    "sudo ": ROOT_RIGHTS,
-    "systemctl restart springscale": ROOT_RIGHTS,
+    "sudo sh -c 'modprobe vcan": ROOT_RIGHTS,
+    "sudo systemctl edit springscale": "opens an editor",
+    "sudo -u postgres": SERVER,
+    "sudo /opt/springscale-subscriber": SERVER,
+    "sudo apt install mosquitto": SERVER,
+    "sudo apt install postgresql": SERVER,
+    "sudo chown 1883": SERVER,
+    "sudo cp subscriber/": SERVER,
+    "sudo python3 -m venv /opt": SERVER,
+    "sudo useradd": SERVER,
     "journalctl": ROOT_RIGHTS,
     'echo "whsec_': ROOT_RIGHTS,
     "pip install": NETWORK,
@@ -125,17 +137,19 @@ COMMANDS = [(page, command) for page in PAGES for command in commands_of(page)]
 OF_OTHERS = [each for each in COMMANDS if not each[1].startswith("springscale ")]
 
 
+def of_beginning(command: str, table: dict[str, str]) -> str | None:
+    """What the table says of the first beginning that fits the command."""
+    return next((said for beginning, said in table.items() if command.startswith(beginning)), None)
+
+
 @pytest.mark.parametrize(("page", "command"), OF_OTHERS)
 def test_every_command_has_a_test_or_a_reason_why_none_runs_it(page: str, command: str) -> None:
-    runner = next((where for beginning, where in RUN_BY.items() if command.startswith(beginning)), None)
-    if runner is not None:
-        assert (ROOT / runner).exists()
-        return
-    said = next((words for beginning, words in SAID.items() if command.startswith(beginning)), None)
-    if said is not None:
+    if said := of_beginning(command, SAID):
         assert said in " ".join(text_of(page).split())
-        return
-    assert any(command.startswith(beginning) for beginning in NOT_RUN), f"neither run nor named as not run: {command}"
+    elif runner := of_beginning(command, RUN_BY):
+        assert (ROOT / runner).exists()
+    else:
+        assert of_beginning(command, NOT_RUN), f"neither run nor named as not run: {command}"
 
 
 OUR_OWN = [
