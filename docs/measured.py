@@ -41,7 +41,8 @@ def kilograms() -> str:
 
     def between(told: str, figure: str, unit: str, of: float) -> str:
         found = sorted(of * line["payload"][figure] for line in lines if line["title"].endswith(f": {told}"))
-        return f"{found[0]:.0f} to {found[-1]:.0f} {unit}"
+        low, high = (f"{one:.0f}" for one in (found[0], found[-1]))
+        return f"{low} {unit}" if low == high else f"{low} to {high} {unit}"
 
     kg = PAYLOAD_KG / 100.0
     return table(

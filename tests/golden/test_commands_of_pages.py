@@ -68,6 +68,7 @@ OWN_RUN_BY = {  # how a command of ours begins: what runs it
     "springscale reproduce": "tests/e2e/test_reproduce.py",
     "springscale run": "tests/e2e/test_gateway_service.py",
     "springscale simulate": "tests/e2e/test_cli_simulate.py",
+    "springscale state": "tests/unit/test_state_command.py",
     "springscale verification": "tests/e2e/test_verification_service.py",
 }
 ON_PI = "a real Raspberry Pi"
