@@ -69,6 +69,6 @@ def verdict_of(
     if near.light is Light.UNKNOWN:
         has_limit = any(weight.limit_kg is not None for _, weight in weights.items())
         return Verdict(Light.UNKNOWN, Says.WEIGHT_UNKNOWN if has_limit else Says.NO_LIMIT)
-    if told := tuple(place for place in alarmed if place in near.probabilities):
-        return Verdict(Light.NEAR, Says.WAS_OVER, told, probability)
+    if alarmed:
+        return Verdict(Light.NEAR, Says.WAS_OVER, alarmed, probability)
     return Verdict(near.light, _SAYS[near.light], near.places(), probability)
