@@ -152,6 +152,24 @@ def test_a_lorrys_number_fits_too(tmp_path: Path, phone: Watched) -> None:
         phone.page.close()
 
 
+def test_standing_the_driver_may_say_what_is_aboard(gateway: Gateway, cab: Look) -> None:
+    gateway.publish(loaded(0, 300.0, 48.0))
+    page = cab()
+    expect(page.locator("#number")).to_have_text("210 kg")
+    expect(page.locator("#tell")).to_be_hidden()
+    gateway.status = BEFORE.model_copy(update={"standing": Standing(stood_s=240.0)})
+    expect(page.get_by_text("Not known? Just drive.")).to_be_visible()
+    page.get_by_label("Kilograms").fill("310")
+    page.get_by_role("button", name="That is aboard").click()
+    expect(page.locator("#told")).to_have_text("Noted. The vehicle learns from it after the drive.")
+    (stated,) = page.evaluate("fetch('api/v1/statements').then((answer) => answer.json())")["items"]
+    assert (stated["source"], stated["load"]["payload_kg"]) == ("delivery_note", 310.0)
+    page.get_by_role("button", name="It is empty").click()
+    page.wait_for_function("fetch('api/v1/statements').then(async (answer) => (await answer.json()).items.length === 2)")
+    gateway.status = BEFORE
+    expect(page.locator("#tell")).to_be_hidden()
+
+
 def test_standing_it_says_that_it_cannot_see_what_is_loaded_now(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     readings = (

@@ -2,6 +2,7 @@
 
 import { stayAwake } from "./wake-lock.js";
 import { aboard, about, alarm, alarmText, eventText, lightText, notSeen, ownReading, phrase, question, spareText, stood } from "./sentences.js";
+import { listen, offer } from "./tell.js";
 import { Refused, ask, setToken } from "../dashboard/gateway.js";
 import { element, made, pair, say, write } from "../dashboard/page.js";
 import { number } from "../dashboard/words.js";
@@ -81,6 +82,7 @@ function draw() {
   write("likely", isAnswered ? likely : "");
   element("rooms").replaceChildren(...cab.spare.map((spare) => pair(...spareText(spare))));
   say("alarms", alarmText(cab));
+  offer(cab);
   write("aboard", aboard(cab, cab.age_s === null ? null : cab.age_s + silentS));
   write("last-event", eventText(cab.last_event));
   element("own").hidden = cab.own_readings.length === 0;
@@ -104,6 +106,7 @@ document.addEventListener("visibilitychange", () => {
 });
 
 fill(phrase);
+listen();
 document.title = phrase("title");
 askNow();
 setInterval(askNow, ASK_EVERY_MS);

@@ -56,6 +56,17 @@ export const CAB = {
   gone_for: ["For {duration}.", "Seit {duration}."],
   no_sensor: ["A sensor or the bus is silent: weighing has stopped.", "Ein Sensor oder der Bus schweigt: Es wird nicht gewogen."],
 
+  what_is_aboard: ["What is aboard?", "Was ist geladen?"],
+  kilograms: ["Kilograms", "Kilogramm"],
+  known_from: ["Known from", "Woher bekannt"],
+  of_note: ["load, by the note", "Ladung, laut Lieferschein"],
+  of_scale: ["whole vehicle, by a scale", "ganzes Fahrzeug, laut Waage"],
+  tell: ["That is aboard", "Das ist geladen"],
+  it_is_empty: ["It is empty", "Es ist leer"],
+  just_drive: ["Not known? Just drive.", "Nicht bekannt? Einfach fahren."],
+  told: ["Noted. The vehicle learns from it after the drive.", "Notiert. Nach der Fahrt lernt das Fahrzeug daraus."],
+  not_told: ["Not noted: {why}", "Nicht notiert: {why}"],
+
   alarms: ["Alarm: {names}.", "Alarm: {names}."],
   aboard: ["On board: {kg}{interval}, weighed {ago}.", "Geladen: {kg}{interval}, gewogen {ago}."],
   before_start: ["before the gateway started", "bevor das Gateway startete"],

@@ -21,7 +21,6 @@ export const DASHBOARD = {
   confirm: ["Confirm", "Bestätigen"],
   cancel: ["Cancel", "Abbrechen"],
   close: ["Close", "Schließen"],
-  number_hint: ["A number, such as {example}", "Eine Zahl, zum Beispiel {example}"],
   note: ["Note, kept with it", "Notiz, die dabei bleibt"],
   token_operate: ["Token with scope operate, used once (empty: the page's own)", "Token mit Bedienrecht, nur für dieses Mal (leer: das der Seite)"],
 

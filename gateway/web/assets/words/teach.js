@@ -83,7 +83,6 @@ export const TEACH = {
   "carries.long_goods": ["long goods", "lange Güter"],
   "carries.tools": ["tools", "Werkzeug"],
   "carries.mixed": ["mixed", "Gemischtes"],
-  number_hint: ["A number, such as {example}", "Eine Zahl, zum Beispiel {example}"],
 
   versions: ["Learnt so far", "Bisher gelernt"],
   "version.in_use": ["in use", "in Gebrauch"],
