@@ -20,7 +20,7 @@ from pydantic import ValidationError
 
 from gateway.core.vehicle import Carries
 from gateway.errors import ConfigurationError
-from gateway.stated.statement import StatementRecord, StatementSource
+from gateway.stated.statement import HALF_CHARACTER, StatementRecord, StatementSource, is_text
 from gateway.toml_file import describe_faults
 
 COLUMNS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
@@ -128,6 +128,9 @@ def _of_json(text: str, where: str) -> ToldRows:
     rows: list[ToldRow] = []
     faults: dict[int, tuple[str, ...]] = {}
     for number, item in enumerate(items if isinstance(items, list) else [items], 1):
+        if not is_text(item):
+            faults[number] = (f"row {number}: {HALF_CHARACTER}",)
+            continue
         content = dict(item) if isinstance(item, dict) else item
         vehicle = content.pop("vehicle", None) if isinstance(content, dict) else None
         for name in OF_ANSWERS if isinstance(content, dict) else ():

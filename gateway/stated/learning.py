@@ -2,7 +2,7 @@
 
 from typing import Any, Final, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from gateway.stated.doubt import DoubtKind
 from gateway.stated.facts import Instant, Part, VehicleAnswers
@@ -140,13 +140,3 @@ class StatedVehicle(Part):
     at: Instant
     doubts: list[DoubtOfVehicle]
     is_confirmed: bool = Field(description="somebody confirmed that unlikely figures are right")
-
-
-class UseVersion(BaseModel):
-    """Which of the learnt calibrations to use."""
-
-    use: str = Field(
-        max_length=80,
-        description="id of a version: it is used from the next drive on, and none replaces it; `newest`: back to "
-        "learning; `file`: that of the settings",
-    )

@@ -7,7 +7,7 @@ import hashlib
 import json
 from datetime import datetime
 from enum import StrEnum
-from typing import Annotated, Self
+from typing import Annotated, Final, Self
 
 from pydantic import AwareDatetime, ConfigDict, Field, model_validator
 
@@ -127,6 +127,18 @@ class StatementRecord(Part):
             return self
         content = json.dumps(self.model_dump(mode="json", by_alias=True), sort_keys=True)
         return self.model_copy(update={"id": f"s-{hashlib.sha256(content.encode()).hexdigest()[:12]}"})
+
+
+HALF_CHARACTER: Final = "contains half a character (a lone surrogate), which is not text"
+
+
+def is_text(told: object) -> bool:
+    """Whether all strings of a JSON value are text: JSON can escape half of a character, which UTF-8 cannot encode."""
+    try:
+        json.dumps(told, ensure_ascii=False, default=str).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _ns(at: datetime) -> int:

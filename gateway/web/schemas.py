@@ -1,6 +1,5 @@
 """The shapes of the answers, for the API's description; board and store provide the finished bytes."""
 
-import json
 import re
 from datetime import UTC, datetime, timedelta, timezone
 from http import HTTPStatus
@@ -11,6 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSche
 
 from gateway.estimate import Lack
 from gateway.estimate_json import FIELDS, INSTANT, NUMBERS_BY_NAME, SPECTRA, WEIGHTS, EstimateField, Presence
+from gateway.stated.statement import HALF_CHARACTER, is_text
 from gateway.units import NS_PER_S
 
 _RFC_3339: Final = re.compile(
@@ -151,10 +151,8 @@ class Ready(BaseModel):
 
 def utf8_only(said: Any) -> Any:
     """JSON can escape half of a character (a lone surrogate): that is not text, and UTF-8 cannot encode it."""
-    try:
-        json.dumps(said, ensure_ascii=False, default=str).encode()
-    except UnicodeEncodeError:
-        raise ValueError("contains half a character (a lone surrogate), which is not text") from None
+    if not is_text(said):
+        raise ValueError(HALF_CHARACTER)
     return said
 
 

@@ -139,7 +139,10 @@ def test_an_evaluation_has_a_report_of_its_own(made: Path) -> None:
         "ratio_index", "--report", str(made / "evaluated"), *WINDOW, "--json",
     )  # fmt: skip
     numbers = json.loads((made / "evaluated" / "report.json").read_text(encoding="utf-8"))
-    assert numbers["errors"] == {"ratio_index": {"validation": json.loads(told.stdout)}}
+    answer = json.loads(told.stdout)
+    verdict = answer.pop("verdict")
+    assert numbers["errors"] == {"ratio_index": {"validation": answer}}
+    assert verdict["grade"] in set(GRADE_TEXT)
     page = Page((made / "evaluated" / "report.html").read_text(encoding="utf-8"))
     assert {"verdict", "accuracy-ratio-index", "provenance"} <= set(page.ids)
     assert not {"half-car", "spectra", "runs"} & set(page.ids)

@@ -1,5 +1,7 @@
 """/api/v1/statements and /api/v1/learning: what is said of loads, and what was learnt from it."""
 
+import contextlib
+import json
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
@@ -16,11 +18,10 @@ from gateway.stated.learning import (
     StatementPage,
     StatementState,
     StatementTold,
-    UseVersion,
 )
-from gateway.stated.statement import StatementRecord
+from gateway.stated.statement import HALF_CHARACTER, StatementRecord, is_text
 from gateway.web.routes.service_calls import REFUSALS, By, LearnerBackend, answered, created
-from gateway.web.schemas import Instant, problem_responses
+from gateway.web.schemas import Body, Instant, problem_responses
 
 STATEMENTS_PATH: Final = "/statements"
 LEARNING_PATH: Final = "/learning"
@@ -46,6 +47,16 @@ _BODY: Final[dict[str, Any]] = {
     },
 }  # fmt: skip
 StatementId = Annotated[str, Path(max_length=200, description="as the list has it")]
+
+
+class UseVersion(Body):
+    """Which of the learnt calibrations to use."""
+
+    use: str = Field(
+        max_length=80,
+        description="id of a version: it is used from the next drive on, and none replaces it; `newest`: back to "
+        "learning; `file`: that of the settings",
+    )
 
 
 class ImportQuery(BaseModel):
@@ -136,6 +147,9 @@ def _kind(request: Request) -> str:
 
 def _checked(content: bytes) -> StatementRecord:
     """Raises RequestValidationError, which becomes a problem that names every fault."""
+    with contextlib.suppress(ValueError, RecursionError):
+        if not is_text(json.loads(content)):
+            raise RequestValidationError([{"type": "value_error", "loc": ("body",), "msg": HALF_CHARACTER}])
     try:
         return _ONE.validate_json(content)
     except ValidationError as fault:
