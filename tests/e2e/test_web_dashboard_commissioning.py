@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from gateway.calibration.commissioning.job import Result
+from gateway.stated.commissioning import FindingTold
 from support.browser import expect
 from support.commissioning import ANSWERS, NOW_NS, Bench, fitted, in_steps, replaced
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Look, Watched
 from support.estimates import make_estimate
 from support.web import Gateway, serving
 
-from gateway.calibration.commissioning.job import Result
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.records import Why
-from gateway.stated.commissioning import FindingTold
 from gateway.stated.doubt import Doubt, DoubtKind
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from gateway.service.verification.verification import VerificationService
 from support.browser import expect
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Look, Watched
 from support.epochs import drive_of, stored
 from support.verification import CALIBRATED, verification_desk
 from support.web import Gateway, serving
 
-from gateway.service.verification.verification import VerificationService
 from gateway.store import Store
 
 

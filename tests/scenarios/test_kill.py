@@ -7,12 +7,12 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from gateway.calibration.known_weights_file import FILE_NAME, MOST_KNOWN_WEIGHTS, load_known_weights
 from support.alarms import AlarmBench
 from support.killed import told_before_kill
 
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import load_signal_map
-from gateway.calibration.known_weights_file import FILE_NAME, MOST_KNOWN_WEIGHTS, load_known_weights
 from gateway.store import Store
 
 WRITER = """

@@ -5,9 +5,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from gateway.calibration.commissioning.answers import vehicle_table
+
 from gateway.calibration.axle_weights import UNSPRUNG_SHARE
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.commissioning.answers import vehicle_table
 from gateway.core.vehicle import Vehicle
 from gateway.stated.facts import VehicleAnswers
 from support.configured import service_config

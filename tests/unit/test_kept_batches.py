@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gateway.calibration.kept.shelf import Shelf, ShelfLimits
+from gateway.service.keeper import MOST_WAITING, BatchKeeper
 from pydantic import TypeAdapter
 from support.bus_drive import bus_drive
 from support.known_load_logs import write_known_loads
@@ -21,7 +23,6 @@ from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of, packed, unpacked
 from gateway.calibration.kept.drive import inspect_kept, split_run_of
-from gateway.calibration.kept.shelf import Shelf, ShelfLimits
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.errors import KeptBatchError
@@ -30,7 +31,6 @@ from gateway.log import Event
 from gateway.model.vehicle import VehicleModel
 from gateway.offline.campaigns import calibrate, read_whole_log
 from gateway.records import Batch, Motion, Why
-from gateway.service.keeper import MOST_WAITING, BatchKeeper
 from gateway.weighing.flow import Flow, Identity
 
 MAP = load_signal_map("springscale:reference")
