@@ -1,9 +1,9 @@
 """A simulated week in the real service at high speed: memory, file handles, threads and database do not grow.
 
-`make soak` runs it and prints one line per simulated day; it exits with 1 if something grew. The service weighs by
-a calibration file; each day has hours of driving and a night of silence. A client polls the latest estimate, and every frame is recorded.
-The bus is replaced by a receiver that repeats the frames of one simulated drive with later stamps; everything behind it
-is the service as in a vehicle.
+`make soak` runs it and prints one line per simulated day; it exits with 1 if something grew. The service weighs by a
+calibration file; each day has hours of driving and a night of silence. A client polls the latest estimate, and every
+frame is recorded. The bus is replaced by a receiver that repeats the frames of one simulated drive with later stamps;
+everything behind it is the service as in a vehicle.
 """
 
 import asyncio

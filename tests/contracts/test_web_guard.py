@@ -78,10 +78,10 @@ def test_a_token_opens_what_its_scope_allows(client: Client, tokens: TokenFile) 
         assert client.get("/api/v1/estimates/latest", headers=bearer(text)).status_code == 200
         assert client.get("/api/v1/status", headers={"authorization": f"bearer  {text} "}).status_code == 200
     undo = "/api/v1/learning"
-    refused = client.request("POST", undo, headers=bearer(reader))
+    refused = client.request("PUT", undo, headers=bearer(reader))
     assert refused.status_code == 403
     assert 'scope="operate"' in refused.headers["www-authenticate"]
-    allowed = client.request("POST", undo, headers=bearer(operator))
+    allowed = client.request("PUT", undo, headers=bearer(operator))
     assert "www-authenticate" not in allowed.headers
 
 

@@ -125,7 +125,6 @@ for n in itertools.count():
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_kill_loses_no_statement_that_was_answered(tmp_path: Path, seed: int) -> None:
-    answered = told_before_kill(STATER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.3), ready="ready
-")
+    answered = told_before_kill(STATER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.3), ready="ready\n")
     kept = json.loads(LearnerBench(tmp_path).learner.statements(limit=1000))["items"]
     assert {line.strip() for line in answered[-900:]} <= {one["id"] for one in kept}

@@ -41,7 +41,6 @@ def test_every_field_of_an_estimate_is_a_column_but_its_spectra() -> None:
         "error_budget",
         "posterior",
         "epoch_posterior",
-        "measured_posterior",
     }
     assert names[-len(PROVENANCE) :] == list(PROVENANCE)
 
