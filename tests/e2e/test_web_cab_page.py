@@ -165,7 +165,9 @@ def test_standing_the_driver_may_say_what_is_aboard(gateway: Gateway, cab: Look)
     (stated,) = page.evaluate("fetch('api/v1/statements').then((answer) => answer.json())")["items"]
     assert (stated["source"], stated["load"]["payload_kg"]) == ("delivery_note", 310.0)
     page.get_by_role("button", name="It is empty").click()
-    page.wait_for_function("fetch('api/v1/statements').then(async (answer) => (await answer.json()).items.length === 2)")
+    page.wait_for_function(
+        "fetch('api/v1/statements').then(async (answer) => (await answer.json()).items.length === 2)"
+    )
     gateway.status = BEFORE
     expect(page.locator("#tell")).to_be_hidden()
 
