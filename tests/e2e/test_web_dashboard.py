@@ -5,12 +5,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 from support.browser import expect
 from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Look, Watched, furnished
 from support.estimates import make_estimate
 from support.learner import ANSWERS, LearnerBench, at, found
-from support.web import Client, Gateway, below, serving
+from support.web import Gateway, below, serving
 
 from gateway.estimate import Z95
 from gateway.records import Why
@@ -98,14 +99,14 @@ def test_it_shows_how_bus_sensors_and_calibration_are(site: str, watched: Watche
 def test_it_shows_how_exactly_a_load_is_weighed_and_what_to_teach_next(tmp_path: Path, watched: Watched) -> None:
     bench, page = LearnerBench(tmp_path / "learner"), watched.page
     with Gateway(tmp_path / "store", learner=bench.learner) as gateway, serving(gateway.app) as server:
-        gateway.status, teaching = STATUS, Client(gateway.app)
+        gateway.status = STATUS
         page.goto(server.url)
         expect(page.locator("#teach-accuracy")).to_have_text("nothing is learnt yet")
         expect(page.locator("#teach-help")).to_have_text("state the van")
         expect(page.locator("#teach-questions")).to_have_text("none")
-        teaching.request("PUT", "/api/v1/vehicle", json=ANSWERS)
+        httpx.put(f"{server.url}/api/v1/vehicle", json=ANSWERS).raise_for_status()
         load = {"from": at(60), "source": "delivery_note", "load": {"payload_kg": 310.0}}
-        teaching.request("POST", "/api/v1/statements", json=load)
+        httpx.post(f"{server.url}/api/v1/statements", json=load).raise_for_status()
         bench.drive(60)
         bench.turn()
         helps = [{"do": "scale", "then_plus_minus_kg": 17.0}, {"do": "empty_drive", "then_plus_minus_kg": 30.0}]
