@@ -2,7 +2,7 @@
 
 import { show } from "./known.js";
 import { element, made, pair, row } from "./page.js";
-import { taughtHere, phrase } from "./phrases.js";
+import { phrase, taughtHere } from "./phrases.js";
 import { isAsleep, isSilent } from "./sleep.js";
 import { UNKNOWN, between, capital, clock, duration, figure, number } from "./words.js";
 

@@ -2,7 +2,7 @@
 
 import { ageNow, known, show } from "./known.js";
 import { element, made, say, write } from "./page.js";
-import { taughtHere, phrase } from "./phrases.js";
+import { phrase, taughtHere } from "./phrases.js";
 import { UNKNOWN, Z95, ago, between, capital, clock, figure, kmh, reasons as named, withStd, words } from "./words.js";
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interval", { between: between(bounds, digits, unit) }));
