@@ -41,7 +41,8 @@ def kilograms() -> str:
 
     def between(told: str, figure: str, unit: str, of: float) -> str:
         found = sorted(of * line["payload"][figure] for line in lines if line["title"].endswith(f": {told}"))
-        return f"{found[0]:.0f} to {found[-1]:.0f} {unit}"
+        low, high = (f"{one:.0f}" for one in (found[0], found[-1]))
+        return f"{low} {unit}" if low == high else f"{low} to {high} {unit}"
 
     kg = PAYLOAD_KG / 100.0
     return table(
@@ -58,12 +59,15 @@ def taught() -> str:
     found = numbers("taught.json")
     figures = ("error", "held", "half", "score")
 
+    def cell(figure: float | None, name: str) -> str:
+        return "–" if figure is None else f"{figure:.{0 if name == 'held' else 1}f}"
+
     def row(line: dict[str, Any]) -> tuple[str, ...]:
-        parts = [f"{line[of][name]:.{0 if name == 'held' else 1}f}" for of in ("payload", "share") for name in figures]
+        parts = [cell(line[of][name], name) for of in ("payload", "share") for name in figures]
         return line["title"].replace("_", " "), str(line["n"]), str(line["refused"]), *parts
 
     head = "drives | batches | refused | payload error | held | ± | score | share error | held | ± | score"
-    return table(head, map(row, found["lines"]))
+    return table(head, (row(line) for line in found["lines"] if line["n"] or line["refused"]))
 
 
 ACCURACY: Final = {
@@ -173,7 +177,7 @@ def faults() -> str:
     """A table for each area of the system, with the recoveries of the last recorded runs."""
     rows: list[dict[str, str]] = tomllib.loads((ROOT / "tests/faults.toml").read_text(encoding="utf-8"))["row"]
     tests = numbers("faults.json")["tests"]
-    head = "fault | what is done | what must happen | recovery | test"
+    head = "fault | what must happen | recovery | test"
     return "\n".join(
         f"## {area}\n\n{table(head, (_fault(row, tests) for row in rows if row['area'] == area))}"
         for area in dict.fromkeys(row["area"] for row in rows)
@@ -187,7 +191,7 @@ def _fault(row: dict[str, str], tests: dict[str, Any]) -> tuple[str, ...]:
     recovery = f"{times[-1]:.1f} s" if times else ""
     if file.startswith("tests/vm") and not (runs and all(run["outcome"] == "passed" for run in runs)):
         recovery = "not yet seen to pass"
-    return row["fault"], row["injected"], row["must"], recovery, f"[{name}](../{file})"
+    return row["fault"], row["must"], recovery, f"[{name}](../{file})"
 
 
 def fault_figures() -> str:

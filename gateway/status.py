@@ -245,7 +245,7 @@ class Status(_Told):
     def sentence(self) -> str:
         """The state in words, with any faults."""
         said = [SENTENCES[self.state]]
-        silent = [f"{s.signal.replace('_', ' ')}{self._why_silent(s)}" for s in self.signals if s.is_silent]
+        silent = [f"{s.signal.replace('_', ' ')}{self.why_silent(s)}" for s in self.signals if s.is_silent]
         if silent and self.state is State.SENSOR_FAULT:
             said.append(f"Missing: {', '.join(silent)}.")
         if self.state is State.SENSOR_FAULT or (self.state is State.WAITING_FOR_BUS and not self.bus.n_frames):
@@ -257,8 +257,8 @@ class Status(_Told):
         said += [f"{warning[:1].upper()}{warning[1:]}." for warning in self.warnings]
         return " ".join(said)
 
-    def _why_silent(self, silent: SignalHealth) -> str:
-        """No frame of its message, or frames without a valid sample; empty: it was received."""
+    def why_silent(self, silent: SignalHealth) -> str:
+        """Behind its name: no frame of its message, or frames without a valid sample; empty: it was received."""
         counts = {row.reason: row.n for row in self.decode if row.signal == silent.signal}
         n_refused = sum(n for reason, n in counts.items() if reason != "ok")
         if not counts or counts.get("ok"):

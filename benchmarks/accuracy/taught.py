@@ -111,7 +111,7 @@ def line_of(title: str, rows: Sequence[F64], refused: Counter[str], span_kg: flo
 def said(line: Line) -> str:
     """The figures as text."""
     if not line["n"]:
-        return f"{line['title']:34} all {line['refused']} refused"
+        return f"{line['title']:34} no batch is answered, {line['refused']} refused"
     shown = (" ".join(f"{name} {line[of][name]:6.2f}" for name in FIGURES) for of in ("payload", "share"))
     return f"{line['title']:34} n {line['n']:3d} refused {line['refused']} | {' | '.join(shown)}"
 

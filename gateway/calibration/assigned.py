@@ -7,7 +7,7 @@ statement holds for a piece whose middle lies within it. Without ``until`` it ho
 under way or the next, for after a stop of a minute the load may be another; or to the next statement of its kind.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
@@ -166,19 +166,32 @@ def _spans(records: Sequence[StatementRecord], kept: Sequence[int], pieces: Sequ
     slack_ns, wait_ns = round(SLACK_S * NS_PER_S), round(MOST_WAIT_S * NS_PER_S)
     spans: dict[int, _Span] = {}
     until_ns: int | None = None
-    for i in sorted(kept, key=lambda i: (records[i].from_ns, i)):
+    ordered = sorted(kept, key=lambda i: (records[i].from_ns, i))
+    for place, i in enumerate(ordered):
         one = records[i]
         is_within = one.load.change_kg is not None and one.until_ns is None and (until_ns or 0) > one.from_ns
         until_ns = until_ns if is_within else one.until_ns
-        later = [records[j] for j in kept if records[j].from_ns > one.from_ns]
-        changes_ns = [other.from_ns for other in later if _changes(other, one)]
+        end_ns = _next_change_ns(one, (records[j] for j in ordered[place + 1 :]), until_ns)
         if until_ns is not None:
-            spans[i] = _Span(one.from_ns, min([until_ns, *changes_ns]), None)
+            spans[i] = _Span(one.from_ns, end_ns, None)
             continue
-        changes_ns += [other.from_ns for other in later if other.source is one.source]
-        drives = [piece.drive for piece in pieces if piece.end_ns - slack_ns > one.from_ns >= piece.begin_ns - wait_ns]
-        spans[i] = _Span(one.from_ns, min(changes_ns, default=inf), drives[0] if drives else -1)
+        begun_ns = one.from_ns
+        drives = [piece.drive for piece in pieces if piece.end_ns - slack_ns > begun_ns >= piece.begin_ns - wait_ns]
+        spans[i] = _Span(one.from_ns, end_ns, drives[0] if drives else -1)
     return spans
+
+
+def _next_change_ns(one: StatementRecord, after: Iterable[StatementRecord], until_ns: int | None) -> float:
+    """When the record ends at the latest: at ``until_ns``, or as soon as a later one changes the load; without an end
+    of its own also as soon as a later one has its source. ``after`` are in order of time.
+    """
+    for other in after:
+        if until_ns is not None and other.from_ns >= until_ns:
+            break
+        is_new = _changes(other, one) or (until_ns is None and other.source is one.source)
+        if other.from_ns > one.from_ns and is_new:
+            return other.from_ns
+    return inf if until_ns is None else until_ns
 
 
 def _changes(later: StatementRecord, earlier: StatementRecord) -> bool:
@@ -197,13 +210,19 @@ def _overlapping(records: Sequence[StatementRecord], spans: Mapping[int, _Span])
     """Of each record those of its source that overlap with it by more than people's times are off."""
     slack_ns = round(SLACK_S * NS_PER_S)
     found: dict[int, list[int]] = {}
-    for i, one in spans.items():
-        for j, other in spans.items():
-            common_ns = min(one.end_ns, other.end_ns) - max(one.begin_ns, other.begin_ns)
+    ordered = sorted(spans, key=lambda i: (spans[i].begin_ns, i))
+    for place, i in enumerate(ordered):
+        one = spans[i]
+        for j in ordered[place + 1 :]:
+            other = spans[j]
+            if other.begin_ns > one.begin_ns and other.begin_ns >= one.end_ns:
+                break
+            common_ns = min(one.end_ns, other.end_ns) - other.begin_ns
             is_same = one.begin_ns == other.begin_ns
-            if i != j and records[i].source is records[j].source and (common_ns > slack_ns or is_same):
+            if records[i].source is records[j].source and (common_ns > slack_ns or is_same):
                 found.setdefault(i, []).append(j)
-    return found
+                found.setdefault(j, []).append(i)
+    return {i: sorted(others, key=lambda j: (spans[j].begin_ns, j)) for i, others in found.items()}
 
 
 def _named(which: Sequence[int], records: Sequence[StatementRecord]) -> str:

@@ -58,12 +58,14 @@ def calibrate_inspected(
     bands: BandChoice = "campaign",
     like: CalibrationFile | None = None,
     command: str = "",
+    campaign_sha256: str | None = None,
     on_fit: OnFit = lambda name, done, of: None,
 ) -> Outcome:
     """Fits every named estimator on the identification parts of the runs without a fault.
 
     ``like`` is the calibration of a vehicle of the same model: it replaces the prior of any vehicle.
-    ``bands`` are the ratio index's: found on the campaign, or the paper's Table 2.
+    ``bands`` are the ratio index's: found on the campaign, or the paper's Table 2. ``campaign_sha256`` is of what
+    states the vehicle; None: of the campaign's file.
 
     An estimator that these runs do not determine is left out with a warning; raises CalibrationImpossibleError if none
     is left, or if the faults of the runs leave no valid calibration.
@@ -92,7 +94,7 @@ def calibrate_inspected(
         sister_id=like.id if like and cross_spectrum else None,
         expected_errors=_expected_errors(ratio_index, cross_spectrum),
         warnings=(*inspection.warnings, *warnings),
-        provenance=_provenance(campaign, split, cross_spectrum, command),
+        provenance=_provenance(campaign_sha256 or file_sha256(campaign.path), split, cross_spectrum, command),
     )
     return Outcome(file, inspection, ratio_index, cross_spectrum, doubts)
 
@@ -262,12 +264,12 @@ def _rms(errors: F64 | None) -> float | None:
     return float(np.sqrt(np.mean(known**2))) if known.size else None
 
 
-def _provenance(campaign: Campaign, split: Sequence[SplitRun], taught: Taught | None, command: str) -> ProvenancePart:
+def _provenance(campaign_sha256: str, split: Sequence[SplitRun], taught: Taught | None, command: str) -> ProvenancePart:
     found = _found([one.identification for one in split], taught)
     return ProvenancePart(
         software=f"springscale {version('springscale')}",
         command=command,
-        campaign_sha256=file_sha256(campaign.path),
+        campaign_sha256=campaign_sha256,
         drives=tuple(
             DrivePart(
                 number=run.number,

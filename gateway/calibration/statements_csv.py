@@ -50,6 +50,8 @@ COLUMNS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
 """Columns, and the place of each in a record."""
 TIMES: Final = ("from", "until")
 LOADS: Final = ("payload_kg", "gross_kg", "front_axle_kg", "rear_axle_kg", "change_kg")
+OF_ANSWERS: Final = ("row", "at", "state", "found", "reason", "question", "drives")
+"""What a service or a command says of a statement: it is not read."""
 MOST_BYTES: Final = 50_000_000  # chosen: half a million rows
 SIMILAR: Final = 0.75  # of difflib's ratio
 YES: Final = frozenset({"true", "yes", "1", "ja", "oui"})
@@ -128,8 +130,8 @@ def _of_json(text: str, where: str) -> ToldRows:
     for number, item in enumerate(items if isinstance(items, list) else [items], 1):
         content = dict(item) if isinstance(item, dict) else item
         vehicle = content.pop("vehicle", None) if isinstance(content, dict) else None
-        for name in ("state", "found") if isinstance(content, dict) else ():
-            content.pop(name, None)  # of an answer of the service
+        for name in OF_ANSWERS if isinstance(content, dict) else ():
+            content.pop(name, None)
         try:
             record = StatementRecord.model_validate(content).identified()
             rows.append(ToldRow(number, None if vehicle is None else str(vehicle), record))

@@ -5,7 +5,7 @@
 A drive is driven by a vehicle that nearly is the one that is sought; by how much it deviates is in the table. Its load
 is what somebody stated of it, with that doubt, or unknown; errors that statements have in common are found too
 (gateway.calibration.claims). Heave and pitch are fitted to what the sensors would measure on the centre line, roll to
-all three sensors with the half-car as found; they take turns (docs/adr/roll-takes-turns.md). Drives left out, weighed
+all three sensors with the half-car as found; they take turns (docs/architecture.md). Drives left out, weighed
 as the service weighs, show the model's error.
 """
 

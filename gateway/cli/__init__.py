@@ -38,6 +38,7 @@ _COMMANDS = {
     "reproduce": "Repeat the paper's section 4 in the simulator, as a report.",
     "run": "Run the service.",
     "simulate": "Simulate drives, as log files or onto a bus.",
+    "state": "Say to a running service what its vehicle carries, import delivery notes, and see what became of them.",
     "token": "Make, list and revoke access tokens for other machines.",
     "verification": "Known loads compared with the estimates of a running service, as dated records.",
 }  # each in the module of its name

@@ -157,12 +157,13 @@ def calibrate(
     if output is not None:
         with refusal_told(output, ConfigurationError):
             write_whole(output, outcome.file.to_json())
-    verdict = judged(outcome, report) if report is not None or not as_json else None
+    verdict = judged(outcome, report)
     if as_json:
-        click.echo(json_line(_record(outcome.file, output) | {"inspection": inspection_json(outcome.inspection)}))
+        told = {"verdict": verdict.to_json(), "inspection": inspection_json(outcome.inspection)}
+        click.echo(json_line(_record(outcome.file, output) | told))
     else:
         click.echo(_sentences(outcome.file, output, said=inspection.warnings))
-        click.echo(verdict.text if verdict else "")
+        click.echo(verdict.text)
 
 
 def _command(

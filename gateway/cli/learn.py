@@ -1,7 +1,5 @@
 """springscale learn: ordinary drives, and what is said of their loads, to a calibration file."""
 
-import math
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -12,22 +10,22 @@ import click
 from gateway.bus.signals import load_signal_map
 from gateway.calibration.assigned import Assigned, Fate, moments
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
-from gateway.calibration.judgement.advice import FIT_HALF_WIDTH_PCT, WORTH_SAYING, Verdict
-from gateway.calibration.questions import common_errors, question
-from gateway.calibration.statements import Statement
+from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.judgement.advice import Verdict
+from gateway.calibration.learning.learn import Learnt, matched
+from gateway.calibration.learning.learn import learn as learnt_from
+from gateway.calibration.learning.spans import PROBLEMS, rows_told, standing
+from gateway.calibration.learning.told import drives_record, learning_record, statements_record
 from gateway.calibration.statements_csv import ToldRow, ToldRows, read_statements
-from gateway.calibration.vehicle import ClaimState
 from gateway.cli import options
 from gateway.cli.calibrate import judged
 from gateway.cli.options import FILE, as_json, batch_settings, require_output_place, window
 from gateway.cli.progress import counted, on_share
 from gateway.errors import ConfigurationError
 from gateway.files.whole import refusal_told, write_whole
-from gateway.offline.learn import Drives, Learnt, matched, read_drives
-from gateway.offline.learn import learn as learnt_from
-from gateway.quantity import Z95
-from gateway.records import iso_utc, json_line, rounded
+from gateway.offline.learn import Drives, read_drives
+from gateway.records import json_line, rounded
+from gateway.stated.statement import StatementRecord
 from gateway.words import counted as n_of
 from gateway.words import one_or_more
 
@@ -90,11 +88,13 @@ def learn(
     told = ToldRows((), {}, ()) if statements is None else _read(statements, zone)
     name = campaign.vehicle.name.strip().casefold()
     rows = [row for row in told.rows if row.vehicle is None or row.vehicle.strip().casefold() == name]
-    at_ns = moments([row.record for row in rows])
+    numbers = {row.record.id: row.number for row in rows}
+    records = standing(row.record for row in rows)
+    settings = batch_settings(window_s)
     with counted("reading logs") as on_log:
-        drives = read_drives(logs, signal_map, campaign.vehicle, at_ns, batch_settings(window_s), on_log)
-    assigned = matched(rows, drives, campaign.vehicle)
-    record = _logs_record(drives) | _rows_record(told, rows, assigned, campaign.vehicle.name)
+        drives = read_drives(logs, signal_map, campaign.vehicle, moments(records), settings, on_log)
+    assigned = matched(records, drives.driven, campaign.vehicle)
+    record = _logs_record(drives) | _rows_record(told, rows, records, assigned, campaign.vehicle.name)
     if not as_json:
         click.echo("\n".join([*_logs_told(record), *_rows_told(record)]))
     elif only_matches:
@@ -103,20 +103,21 @@ def learn(
         return
     with counted("learning") as on_step:
         found = learnt_from(
-            campaign,
-            drives,
+            campaign.vehicle,
+            drives.driven,
             assigned,
+            settings,
             like=sister,
-            command=_command(vehicle_path, sister, window_s),
             on_fit=on_share(on_step, ("cross_spectrum",)),
         )
     if output is not None:
         with refusal_told(output, ConfigurationError):
             write_whole(output, found.outcome.file.to_json())
     verdict = judged(found.outcome, report)
-    record |= {"drives": _drives_record(found), "n_drives_unneeded": found.n_unneeded}
-    record |= {"statements": _statements_record(rows, assigned, found), "looks_empty": list(found.empty)}
-    record |= _learning_record(found, verdict, output)
+    record |= {"drives": drives_record(found), "n_drives_unneeded": found.n_unneeded}
+    of_rows = [{"row": numbers[one["id"]], **one} for one in statements_record(records, assigned, found)]
+    record |= {"statements": sorted(of_rows, key=lambda one: one["row"]), "looks_empty": list(found.empty)}
+    record |= _verdict_record(found, verdict, output)
     click.echo(json_line(record) if as_json else "\n".join([*_drives_told(record), *_asked(record), verdict.text]))
 
 
@@ -124,14 +125,6 @@ def _signals(signals: str | None, campaign: Campaign) -> str:
     if signals or campaign.signals:
         return signals or campaign.signals
     raise click.UsageError(f"name the signal map with --signals, or as signals = ... in {campaign.path}")
-
-
-def _command(vehicle: Path, sister: CalibrationFile | None, window_s: float | None) -> str:
-    """What decides the result, beside logs and statements; without the places of files."""
-    words = ["springscale", "learn", "--vehicle", vehicle.name]
-    words += [] if sister is None else ["--like", sister.id]
-    words += [] if window_s is None else ["--window-s", f"{window_s:g}"]
-    return shlex.join(words)
 
 
 def _read(statements: Path, zone: ZoneInfo | None) -> ToldRows:
@@ -156,8 +149,8 @@ def _logs_record(drives: Drives) -> Record:
         "n_logs": drives.n_logs,
         "n_drives": len(drives.driven),
         "driven_s": rounded(sum(one.usable_s for one in drives.driven), 1),
-        "n_short_drives": drives.n_short,
-        "short_s": rounded(drives.short_s, 1),
+        "n_short_drives": drives.pieces.n_short,
+        "short_s": rounded(drives.pieces.short_s, 1),
         "left_out": {str(log): why for log, why in left_out.items()},
         "findings": {
             str(log): [f"{one.severity} {one.kind}: {one.text}: {one.advice}" for one in found]
@@ -166,16 +159,11 @@ def _logs_record(drives: Drives) -> Record:
     }
 
 
-_PROBLEMS: Final[Mapping[Fate, str]] = {
-    Fate.WAITING: "waits",
-    Fate.OVERLAPPING: "overlap",
-    Fate.REPLACED: "replaced",
-    Fate.IMPOSSIBLE: "bad",
-}
-
-
-def _rows_record(told: ToldRows, rows: Sequence[ToldRow], assigned: Assigned, name: str) -> Record:
+def _rows_record(
+    told: ToldRows, rows: Sequence[ToldRow], records: Sequence[StatementRecord], assigned: Assigned, name: str
+) -> Record:
     """What became of the rows before the fit."""
+    fates = {one.id: (fate, why) for one, fate, why in zip(records, assigned.fates, assigned.reasons, strict=True)}
     problems = [
         {"row": number, "kind": "bad", "text": line.partition(": ")[2]}
         for number, lines in told.faults.items()
@@ -186,109 +174,29 @@ def _rows_record(told: ToldRows, rows: Sequence[ToldRow], assigned: Assigned, na
         for row in told.rows
         if row not in rows
     ]
-    problems += [
-        {"row": row.number, "kind": _PROBLEMS[fate], "text": reason}
-        for row, fate, reason in zip(rows, assigned.fates, assigned.reasons, strict=True)
-        if fate in _PROBLEMS
-    ]
+    for row in rows:
+        fate, reason = fates.get(
+            row.record.id, (Fate.REPLACED, f"replaced by a later one with the ref {row.record.ref}")
+        )
+        if fate in PROBLEMS:
+            problems.append({"row": row.number, "kind": PROBLEMS[fate], "text": reason})
     return {
         "n_rows": told.n_rows,
-        "n_match": sum(fate is Fate.MATCHED for fate in assigned.fates),
+        "n_match": sum(fates.get(row.record.id, (None, ""))[0] is Fate.MATCHED for row in rows),
         "problems": sorted(problems, key=lambda one: (one["row"], one["text"])),
         "notes": list(told.notes),
     }
 
 
-def _drives_record(found: Learnt) -> list[Record]:
-    """Each drive, with what is stated and found of its load."""
-    drives = []
-    for number, (one, said) in enumerate(zip(found.drives, found.statements, strict=True), 1):
-        load, claims = found.loads.get(number), found.claims_of(number)
-        drives.append(
-            {
-                "number": number,
-                "log": str(one.log),
-                "t_start": iso_utc(one.piece.begin_ns),
-                "t_end": iso_utc(one.piece.end_ns),
-                "driven_s": rounded(one.usable_s, 1),
-                "stated": _stated(said),
-                "found": load and _kg(load.load.payload_kg, load.payload_std_kg),
-                "found_without_statement": load and _kg(load.without_kg, load.without_std_kg),
-                "state": str(max((claim.state for claim in claims), key=_gravity)) if claims else None,
-            }
-        )
-    return drives
-
-
-def _stated(said: Statement) -> Record | None:
-    if said.payload_kg is None:
-        return None
-    plus_minus_kg = min(claim.stated_plus_minus_kg for claim in said.claims)
-    return {"payload_kg": rounded(said.payload_kg, 1), "plus_minus_kg": rounded(plus_minus_kg, 1)}
-
-
-def _gravity(state: ClaimState) -> int:
-    return list(ClaimState).index(state)
-
-
-def _kg(payload_kg: float, std_kg: float) -> Record | None:
-    if math.isnan(payload_kg):
-        return None
-    return {"payload_kg": rounded(payload_kg, 1), "plus_minus_kg": rounded(Z95 * std_kg, 1)}
-
-
-_STATES: Final[Mapping[Fate, str]] = {
-    Fate.WAITING: "waiting",
-    Fate.MATCHED: "waiting",  # for a drive that can teach
-    Fate.OVERLAPPING: "held",
-    Fate.REPLACED: "withdrawn",
-    Fate.IMPOSSIBLE: "held",
-}
-
-
-def _statements_record(rows: Sequence[ToldRow], assigned: Assigned, found: Learnt) -> list[Record]:
-    """Each statement with its state, and what its drives said without it."""
-    statements = []
-    for i, (row, fate) in enumerate(zip(rows, assigned.fates, strict=True)):
-        numbers = [n for n, holding in enumerate(found.holding, 1) if i in holding]
-        claims = [one for n in numbers for one in found.claims_of(n) if one.name == row.record.id]
-        state, shown, asked = _STATES[fate], None, None
-        if claims:
-            worst = max(claims, key=lambda one: (_gravity(one.state), one.disagreement))
-            state, shown = str(worst.state), _kg(worst.without_kg, worst.without_std_kg)
-            if worst.state is not ClaimState.USED:
-                asked = f"{worst.drive} {question(worst, row.record, found.outcome.file.vehicle)}"
-        elif not row.record.learn and (loads := [found.loads[n] for n in numbers if n in found.loads]):
-            state, shown = "checked", _kg(loads[0].load.payload_kg, loads[0].payload_std_kg)
-        told = row.record.model_dump(mode="json", by_alias=True)
-        statements.append(
-            {"row": row.number, **told, "drives": numbers, "state": state, "found": shown, "question": asked}
-        )
-    return statements
-
-
-def _learning_record(found: Learnt, verdict: Verdict, output: Path | None) -> Record:
-    """The vehicle, and what would narrow its answers."""
-    file, taught = found.outcome.file, found.outcome.cross_spectrum
-    low_kg, high_kg = file.vehicle.payload_range_kg
-    helps = [one for one in verdict.steps if one.then_kg <= (1.0 - WORTH_SAYING) * one.now_kg]
+def _verdict_record(found: Learnt, verdict: Verdict, output: Path | None) -> Record:
+    """The file and how good it is."""
+    file = found.outcome.file
     return {
         "calibration_id": file.id,
         "output": str(output) if output else None,
         "warnings": list(file.warnings),
-        "learning": {
-            "plus_minus_kg": rounded(verdict.steps[0].now_kg, 1) if verdict.steps else None,
-            "useful_at_kg": rounded(FIT_HALF_WIDTH_PCT / 100.0 * (high_kg - low_kg), 1),
-            "tested_on": len({one.run for one in taught.errors}) if taught else 0,
-            "helps": [{"do": one.candidate.name, "then_plus_minus_kg": rounded(one.then_kg, 1)} for one in helps],
-            "findings": list(common_errors(taught.causes)) if taught else [],
-        },
-        "verdict": {
-            "grade": str(verdict.grade),
-            "accuracy": verdict.accuracy,
-            "reasons": [{"rule": one.rule, "grade": str(one.grade), "text": one.text} for one in verdict.reasons],
-            "advice": verdict.advice,
-        },
+        "learning": learning_record(found, verdict),
+        "verdict": verdict.to_json(),
     }
 
 
@@ -318,18 +226,7 @@ def _rows_told(record: Record) -> Iterator[str]:
     """ "38 rows: 31 match a drive, 4 wait, 2 overlap (rows 9, 10), 1 unknown vehicle (row 12)", and each problem."""
     if not record["n_rows"] and not record["notes"]:
         return
-    of_kind = {
-        kind: sorted({one["row"] for one in record["problems"] if one["kind"] == kind})
-        for kind in ("waits", "overlap", "replaced", "unknown_vehicle", "bad")
-    }
-    n_match, n_wait = record["n_match"], len(of_kind.pop("waits"))
-    parts = [f"{n_match} {'matches' if n_match == 1 else 'match'} a drive"]
-    parts += [f"{n_wait} {'waits' if n_wait == 1 else 'wait'}"] if n_wait else []
-    for kind, numbers in of_kind.items():
-        if numbers:
-            named = f"row{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"
-            parts.append(f"{len(numbers)} {kind.replace('_', ' ')} ({named})")
-    yield f"{n_of(record['n_rows'], 'row')}: {', '.join(parts)}"
+    yield rows_told(record["n_rows"], record["n_match"], record["problems"])
     yield from (f"  {note}" for note in record["notes"])
     yield from (f"  row {one['row']}: {one['text']}" for one in record["problems"])
 

@@ -7,6 +7,7 @@ import signal
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 from gateway.bus.live.source import OpenReceiver, SourceState
 from gateway.bus.signals import Decoder
@@ -23,6 +24,7 @@ from gateway.service.parts import (
     board_of,
     commissioning_of,
     keeper_of,
+    learner_of,
     ring_log_of,
     source_of,
     store_of,
@@ -70,8 +72,11 @@ class Gateway:
         known_loads: KnownLoads | None = None,
         open_receiver: OpenReceiver | None = None,
         setup_fault: str | None = None,
+        by_file: Path | None = None,
     ) -> None:
-        """``setup_fault`` says why the calibration that was made on the vehicle is not in use.
+        """``by_file`` is the calibration that the settings name, if another one is in use.
+
+        ``setup_fault`` says why the calibration that was made on the vehicle is not in use.
 
         ``open_receiver`` replaces the bus interface (soak run).
         """
@@ -94,6 +99,7 @@ class Gateway:
         flow = setup.flow(replace(settings.batch.for_core(is_live=True), position_decimals=settings.position.decimals))
         self.keeper = keeper_of(settings.keep, settings.store, setup)
         self.commissioning = commissioning_of(settings, setup, self.keeper, flow, self.store)
+        self.learner = learner_of(settings, by_file or settings.calibration, setup, flow, self.store)
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.ring_log = ring_log_of(settings, setup)
         subject = setup.subject
@@ -148,6 +154,7 @@ class Gateway:
             known_loads=known_loads,
             verification=self.verification,
             alarms=self.alarms.standing,
+            learner=self.learner,
             are_places_read=settings.position.forward,
         )
         self._server = WebServer(server_config(app, settings.web.host, settings.web.port, tls))
@@ -155,7 +162,15 @@ class Gateway:
         self._checks = Beside()
         self._stopping = asyncio.Event()
         self._failure: str | None = None
-        beside = (self.commissioning, self.keeper, *self.readers, self.ring_log, self.uplink, self.webhook)
+        beside = (
+            self.commissioning,
+            self.learner,
+            self.keeper,
+            *self.readers,
+            self.ring_log,
+            self.uplink,
+            self.webhook,
+        )
         self._beside = [part for part in beside if part is not None]
         self.parts: list[ServicePart] = [self.store, *self._beside, self.pipeline, self.source]  # in order of start
         self.needs_restart = False  # with the calibration that was made meanwhile; see life.py
@@ -230,7 +245,8 @@ class Gateway:
                 self._notifier.send(WATCHDOG="1")
             is_asleep = is_ready and self.source.state is SourceState.BUS_SILENT
             look.go_on(ASLEEP_LOOK_S if is_asleep else LOOK_S)
-            if self.commissioning.is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
+            is_due = self.learner.is_due or self.commissioning.is_due
+            if is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
                 self.needs_restart = True
                 self.request_stop()
             with contextlib.suppress(TimeoutError):
@@ -240,7 +256,8 @@ class Gateway:
         """One check of the service's state, in a thread because it may wait for a lock or a disk."""
         now = self.status()
         self._checks.call("log of states", log_state, now)
-        self._checks.call("alarms", self.alarms.watch, now)
+        causes = [cause.text for cause in self.pipeline.decoder.causes()]
+        self._checks.call("alarms", self.alarms.watch, now, causes)
         self._notifier.send_status(now.sentence())
 
     def _dead_part(self, serving: asyncio.Task[None]) -> str | None:

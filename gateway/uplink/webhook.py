@@ -1,6 +1,6 @@
 """The webhook: signed HTTP requests with alarms and events, posted one at a time, with retries.
 
-The format is that of Standard Webhooks (docs/adr/webhook-by-httpx.md).
+The format is that of Standard Webhooks (docs/architecture.md).
 """
 
 import asyncio

@@ -61,7 +61,7 @@ def test_it_shows_where_the_load_lies(site: str, watched: Watched) -> None:
     front, rear = (float(x) for x in page.evaluate(AXLE_PLACES))
     centre = float(drawing.locator("circle.load").get_attribute("cx"))
     assert (centre - front) / (rear - front) == pytest.approx(1.71 / 2.8, abs=0.01)
-    expect(page.locator("#overload")).to_have_text("Rear axle is over its limit.")
+    expect(page.locator("#overload")).to_have_text("Rear axle: too heavy.")
     expect(drawing.locator("text.over")).to_contain_text(["865", "limit 850"])
 
 
@@ -140,7 +140,7 @@ def test_in_german_on_a_phone_and_on_a_wide_desk(site: str, browser: Any, width:
     expect(page.locator("#share")).to_have_text("48,0 %")
     expect(page.locator("#payload-range")).to_have_text("95 %: 258 bis 282 kg")
     expect(page.locator("#state-name")).to_have_text("Wiegt")
-    expect(page.locator("#overload")).to_have_text("Hinterachse über der Grenze.")
+    expect(page.locator("#overload")).to_have_text("Hinterachse: zu schwer.")
     expect(page.locator("#calibrated")).to_contain_text("Kreuzspektren", use_inner_text=False)
     expect(page.locator("#rejected")).to_contain_text(
         "Zu langsam: zu viel des Abschnitts war langsamer", use_inner_text=False

@@ -103,7 +103,11 @@ def test_every_refusal_of_a_known_weight_is_explained_and_the_numbers_are_the_co
 
 
 def test_every_finding_is_explained_once_as_the_code_has_it_and_found_somewhere_in_the_code() -> None:
-    rows = [re.split(r" *\| *", line)[1:5] for line in text_of("findings.md").splitlines() if line.startswith("| `")]
+    rows = [
+        re.split(r" *\| *", line)[1:5]
+        for line in text_of("reasons.md").partition("## Findings of the inspection")[2].splitlines()
+        if line.startswith("| `")
+    ]
     told = {name.strip("`"): (weight, advice.replace("`", "")) for name, weight, _, advice in rows}
     assert all(means for _, _, means, _ in rows)
     assert len(told) == len(rows)

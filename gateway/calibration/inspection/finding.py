@@ -21,7 +21,7 @@ _FAULT_OR_WARNING: Final = (Severity.FAULT, Severity.WARNING)
 
 class Kind(StrEnum):
     """Every kind of finding: its name, the severities it may have (the gravest first), and what a fitter should do, as
-    part of a sentence. docs/findings.md also says what each means.
+    part of a sentence. docs/reasons.md also says what each means.
     """
 
     severities: tuple[Severity, ...]

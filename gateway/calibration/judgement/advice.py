@@ -8,7 +8,7 @@ A calibration is as good as its worst rule. docs/calibration.md lists them.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
+from typing import Any, Final
 
 from gateway.calibration.ahead import Step, next_steps
 from gateway.calibration.calibrate import Outcome
@@ -16,7 +16,7 @@ from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Jud
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import ErrorTable, Target
 from gateway.config import ESTIMATOR_NAMES
-from gateway.core.vehicle import Vehicle
+from gateway.core.vehicle import USEFUL_SHARE, Vehicle
 from gateway.words import decimal, estimator_name
 
 
@@ -80,6 +80,15 @@ class Verdict:
         head = f"{GRADE_TEXT[self.grade]}, by the {estimator_name(self.estimator)}. {self.accuracy}"
         return "\n".join([head, *below, *([f"    {self.advice}"] if self.advice else [])])
 
+    def to_json(self) -> dict[str, Any]:
+        """The same for programs."""
+        return {
+            "grade": str(self.grade),
+            "accuracy": self.accuracy,
+            "reasons": [{"rule": one.rule, "grade": str(one.grade), "text": one.text} for one in self.reasons],
+            "advice": self.advice,
+        }
+
 
 def _share_rejected(table: ErrorTable) -> float:
     errors = table.errors
@@ -134,7 +143,7 @@ class Rule:
 
 
 WORTH_SAYING: Final = 0.1  # chosen: relative gain of a step that is advised
-FIT_HALF_WIDTH_PCT, MOST_HALF_WIDTH_PCT = 25.0, 50.0  # chosen: of the range
+FIT_HALF_WIDTH_PCT, MOST_HALF_WIDTH_PCT = 100.0 * USEFUL_SHARE, 50.0  # chosen: of the range
 
 # All limits are chosen. A guess at mid-range errs by 25 % over evenly spread loads; an interval is half as wide as the
 # range for a mean normal error of 20 %; 95 % intervals with certainly less than 70 % coverage mislead.
