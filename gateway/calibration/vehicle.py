@@ -250,6 +250,32 @@ class _OfVehicle:
         return self.drive.own_curvature(self.theta, own)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Known:
+    """A drive's likelihood of which cost and curvature at one point are known: each fit of the drives without one of
+    them starts there.
+    """
+
+    drive: _Drive
+    common: F64
+    own: F64
+    at_cost: float
+    at_curvature: tuple[F64, F64]
+
+    @classmethod
+    def at(cls, drive: _Drive, common: F64, own: F64) -> "_Known":
+        return cls(drive, common, own, drive.cost(common, own), drive.curvature(common, own))
+
+    def cost(self, common: F64, own: F64) -> float:
+        return self.at_cost if self._is_here(common, own) else self.drive.cost(common, own)
+
+    def curvature(self, common: F64, own: F64) -> tuple[F64, F64]:
+        return self.at_curvature if self._is_here(common, own) else self.drive.curvature(common, own)
+
+    def _is_here(self, common: F64, own: F64) -> bool:
+        return np.array_equal(common, self.common) and np.array_equal(own, self.own)
+
+
 class _Rolling:
     """All three sensors of a drive, by the roll parameters (r,) and its payload's moment about the centre line (kg
     m).
@@ -778,6 +804,11 @@ class _Fitted:
         return float(np.hypot(usual[0], found[0])), float(np.hypot(usual[1], found[1]))
 
     @cached_property
+    def _known(self) -> list[_Known]:
+        common = self.half_car.common
+        return [_Known.at(one, common, own) for one, own in zip(self.seen, self.half_car.own, strict=True)]
+
+    @cached_property
     def _plain(self) -> VehicleModel:
         return self.model(self.seen[0].vehicle)
 
@@ -795,6 +826,7 @@ class _Fitted:
             mean, variance = (mean / variance - share / std**2) * left, left
         return abs(mean - share) / float(np.sqrt(variance + std**2 + model_std**2))
 
+    @cached_property
     def covariance(self) -> F64:
         """(n, n) of all parameters: roll moves with the half-car by -C I_rp."""
         upright = self.half_car.covariance[:N, :N]
@@ -816,16 +848,16 @@ class _Fitted:
 
     def model(self, vehicle: Vehicle) -> VehicleModel:
         """The vehicle, its intervals not yet tested on any drive left out."""
-        return self._model(vehicle, self.theta, self.covariance())
+        return self._model(vehicle, self.theta, self.covariance)
 
     def without(self, one: _Drive, vehicle: Vehicle) -> tuple[VehicleModel, F64, F64]:
         """The vehicle as the other drives teach it, from the result of all; roll as all of them show it. With it the
         mean and the covariance of the common causes.
         """
         others = [i for i, each in enumerate(self.seen) if each is not one]
-        start = [fit.Drive(self.seen[i], self.own_priors[i], self.half_car.own[i]) for i in others]
+        start = [fit.Drive(self._known[i], self.own_priors[i], self.half_car.own[i]) for i in others]
         found = fit.most_probable(self.half_car.common, self.prior.upright(len(self.causes)), start, FINE)
-        theta, covariance = self.theta, self.covariance().copy()
+        theta, covariance = self.theta, self.covariance.copy()
         theta[:N], covariance[:N, :N] = found.common[:N], found.covariance[:N, :N]
         covariance[N:, :N] = covariance[:N, N:] = 0.0
         fitted = replace(self, seen=[self.seen[i] for i in others], half_car=found)
