@@ -17,7 +17,7 @@ from made import ROOT, StaleError, filled, keep_up_to_date
 
 PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
     **{f"docs/{page}": parts for page, parts in reference.PARTS.items()},
-    "README.md": {"errors": measured.errors_in_readme},
+    "README.md": {"kilograms": measured.kilograms},
     "docs/accuracy.md": measured.ACCURACY,
     "docs/faults.md": {
         "faults": measured.faults,

@@ -17,7 +17,7 @@ from latex2mathml.converter import convert
 ROOT: Final = Path(__file__).parents[1]
 DOCS: Final = ROOT / "docs"
 PAGES: Final = ROOT / "build/site-pages"  # docs_dir of mkdocs.yml
-TOP_PAGES: Final = ("CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")
+TOP_PAGES: Final = ("CONTRIBUTING.md",)
 STATIC: Final = ("*.md", "*.svg", "*.png", "calibration.schema.json")
 LINK: Final = re.compile(r"(?P<mark>!?)\[(?P<words>(?:`[^`]*`|[^\[\]`])*)\]\((?P<target>[^)\s]+)\)")
 
@@ -32,7 +32,7 @@ def main() -> None:
         sys.exit(f"{output}: no option is known here, and no folder is called so")
     gather()
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", output]  # --quiet counts no warning
-    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}  # docs/adr/docs-site.md
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}  # docs/architecture.md
     built = subprocess.run(command, cwd=ROOT, env=environment, check=False, capture_output=True, text=True)
     if built.returncode:
         sys.stderr.write(built.stderr)
@@ -45,14 +45,12 @@ def gather() -> None:
     places = {file: file.relative_to(DOCS) for pattern in STATIC for file in DOCS.rglob(pattern)}
     places |= {ROOT / name: Path(name) for name in TOP_PAGES}
     places[ROOT / "benchmarks/accuracy/trials.md"] = Path("trials.md")
-    places |= {ROOT / "README.md": Path("index.md"), DOCS / "adr": Path("adr/index.md")}
+    places[ROOT / "README.md"] = Path("index.md")
     for source, place in places.items():
         target = PAGES / place
         target.parent.mkdir(parents=True, exist_ok=True)
         if source.suffix == ".md":
             target.write_text(fitted(source, places), encoding="utf-8")
-        elif source.is_dir():
-            target.write_text(list_of(source), encoding="utf-8")
         else:
             shutil.copyfile(source, target)
 
@@ -86,12 +84,6 @@ def _as_mathml(formula: re.Match[str]) -> str:
     if formula["block"]:
         return f"<p>{convert(formula['block'], display='block')}</p>"
     return f"<span>{convert(formula['inline'])}</span>"  # within a span, or a line that begins with it would be a block
-
-
-def list_of(decisions: Path) -> str:
-    """A page that lists every decision by its first line."""
-    titles = {page.name: page.read_text(encoding="utf-8").splitlines()[0] for page in sorted(decisions.glob("*.md"))}
-    return "# Decisions\n\n" + "".join(f"- [{title.removeprefix('# ')}]({name})\n" for name, title in titles.items())
 
 
 if __name__ == "__main__":

@@ -39,21 +39,21 @@ NULL: Final = {
     "vehicle_id": "null if no configuration names the vehicle",
     "vin": "absent unless `[vehicle] vin` states it",
     "t_start_ns": "null in a log without a date, where nanoseconds count from the zero of its stamps",
-    "t_end_ns": "as above",
+    "t_end_ns": "null in a log without a date, where nanoseconds count from the zero of its stamps",
     "estimator": "",
     "calibration_id": "null without a calibration",
     "payload": "null if rejected, or if the ratio index has no model of it",
     "front_share": "null if rejected, or if the ratio index has no model of it",
     "payload_front_share_correlation": "null where rejected",
     "cg_left": "null if rejected, by the ratio index, and without a roll rate",
-    "left_share": "as above",
-    "payload_cg_left_correlation": "as above",
-    "front_share_cg_left_correlation": "as above",
-    "roll_share_front": "as above",
-    "roll_share_front_std": "as above",
+    "left_share": "null if rejected, by the ratio index, and without a roll rate",
+    "payload_cg_left_correlation": "null if rejected, by the ratio index, and without a roll rate",
+    "front_share_cg_left_correlation": "null if rejected, by the ratio index, and without a roll rate",
+    "roll_share_front": "null if rejected, by the ratio index, and without a roll rate",
+    "roll_share_front_std": "null if rejected, by the ratio index, and without a roll rate",
     "weights": "unknown weights are null and say what they lack; see below",
     "ratio_index_acceleration": "null if rejected before it was computed, and without a calibrated ratio index",
-    "ratio_index_pitch_rate": "as above",
+    "ratio_index_pitch_rate": "null if rejected before it was computed, and without a calibrated ratio index",
     "mean_speed_mps": "null if no speed is known",
     "gap_share": "",
     "usable_share": "",
@@ -68,7 +68,7 @@ NULL: Final = {
     "way": "null in records of early versions, and in a provisional estimate; unknown parts are null",
     "known_weights_id": "absent if no known weight is in use",
     "raw_payload": "absent if no known weight is in use",
-    "raw_front_share": "as above",
+    "raw_front_share": "absent if no known weight is in use",
     "error_budget": "empty where rejected",
     "posterior": "absent where rejected",
     "measured": "absent if no known weight is in use",
@@ -112,16 +112,13 @@ def fields_table(group: str) -> str:
     """The fields of one of GROUPS."""
     elsewhere = {part for parts in GROUPS.values() for part in parts}
     named = [one for one in FIELDS if (part_of(one) if part_of(one) in elsewhere else "") in GROUPS[group]]
-    rows = (
-        (
-            f"`{one.name}`",
-            unit_of(one),
-            one.description or "",
-            NULL[part_of(one)],
-            ", ".join(f"`{c}`" for c in one.columns),
-        )
-        for one in named
-    )
+    rows, before = [], ""
+    for one in named:
+        unknown = NULL[part_of(one)]
+        told = "as above" if unknown and unknown == before else unknown
+        columns = ", ".join(f"`{c}`" for c in one.columns)
+        rows.append((f"`{one.name}`", unit_of(one), one.description or "", told, columns))
+        before = unknown
     return table("field | unit | meaning | unknown | columns in CSV", rows)
 
 
@@ -150,13 +147,13 @@ def _named(heading: str, words: Mapping[Any, str]) -> str:
 def settings_tables() -> str:
     """Every key, a table a section."""
     top = {name: field for name, field in Settings.model_fields.items() if _section_of(field) is None}
-    parts = [_settings_table("Top of the file", top, prefix="SPRINGSCALE_")]
+    parts = [_settings_table("Top of the file", top)]
     for name, field in Settings.model_fields.items():
         section = _section_of(field)
         if section is not None:
             words = (section.__doc__ or "").strip().splitlines()[0].rstrip(".")
             title = f"[{name}]: {words[0].lower()}{words[1:]}"
-            parts.append(_settings_table(title, section.model_fields, prefix=f"SPRINGSCALE_{name.upper()}__"))
+            parts.append(_settings_table(title, section.model_fields))
     return "\n".join(parts)
 
 
@@ -166,12 +163,9 @@ def _section_of(field: FieldInfo) -> type[BaseModel] | None:
     return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
 
 
-def _settings_table(title: str, fields: Mapping[str, FieldInfo], *, prefix: str) -> str:
-    rows = (
-        (f"`{name}`", _default(field), field.description or "", f"`{prefix}{name.upper()}`")
-        for name, field in fields.items()
-    )
-    return f"## {title}\n\n{table('key | default | meaning | variable', rows)}"
+def _settings_table(title: str, fields: Mapping[str, FieldInfo]) -> str:
+    rows = ((f"`{name}`", _default(field), field.description or "") for name, field in fields.items())
+    return f"## {title}\n\n{table('key | default | meaning', rows)}"
 
 
 def _default(field: FieldInfo) -> str:

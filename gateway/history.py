@@ -76,6 +76,14 @@ class HistoryPage:
     last_cursor: str | None
 
 
+def up_to(cursor: str | None) -> str | None:
+    """The cursor for a page, newest first, of the records up to this one; None: of all."""
+    if cursor is None:
+        return None
+    epoch, _, number = cursor.partition("-")
+    return f"{epoch}-{int(number) + 1}"
+
+
 @dataclass(frozen=True, slots=True)
 class Delivery:
     """How far an uplink has delivered. ``n_pruned`` estimates were removed by retention before it could.

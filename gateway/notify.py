@@ -14,6 +14,11 @@ class Notifier:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) if address else None
         self._status = ""
 
+    @property
+    def is_heard(self) -> bool:
+        """Whether there is a systemd to tell."""
+        return self._socket is not None
+
     def send_status(self, sentence: str) -> None:
         """Set the line that `systemctl status` shows, if it has changed."""
         if sentence != self._status:

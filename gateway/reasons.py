@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 from gateway.budget import OWN, Remedy
 from gateway.posterior import Source
@@ -62,7 +62,9 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         Why.NO_CALIBRATION: Explanation(
             Cause.NOTHING_YET,
             "no calibration file is given, or it does not contain the chosen estimator",
-            "`springscale calibrate`, then name the file under `calibration`",
+            "`springscale learn LOGS --vehicle van.toml --statements notes.csv --output vehicle.json` makes one of "
+            "ordinary drives and notes of their loads, `springscale calibrate` one of drives with known loads; then "
+            "name the file under `calibration`, or with `--calibration`",
         ),
         Why.TOO_SHORT: Explanation(
             Cause.DRIVE,
@@ -228,3 +230,12 @@ REMEDIES: Final[Mapping[Remedy, str]] = MappingProxyType(
     }
 )
 """Remedies that narrow an error, as parts of sentences."""
+
+
+def unexplained(*tables: tuple[type[StrEnum], Mapping[Any, str | Explanation]]) -> list[str]:
+    """The members that their table lacks."""
+    return [f"{names.__name__}.{one.name}" for names, table in tables for one in names if one not in table]
+
+
+if _lacking := unexplained((Why, EXPLANATIONS), (Source, SOURCES), (Remedy, REMEDIES)):
+    raise AssertionError(f"gateway/reasons.py explains no {', '.join(_lacking)}: add a row")  # before any page is asked

@@ -1,5 +1,6 @@
 """The service's status as types and as a sentence: the service fills it in, the web sends it unchanged."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Final
@@ -137,6 +138,9 @@ class StoreStatus:
     size_bytes: int = 0
     n_bad_records: Annotated[int, Field(description="records that failed their checksum and were set aside")] = 0
     set_aside: Annotated[str | None, Field(description="damaged database that the service renamed")] = None
+    is_reserve_in_use: Annotated[
+        bool, Field(description="true: the disk is full, and records go to the room that was kept for them")
+    ] = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +158,7 @@ class UplinkStatus:
     n_pruned: Annotated[int, Field(description="removed by retention before they could be delivered")] = 0
     n_connections: int = 0
     n_cuts: Annotated[int, Field(description="times an established link broke")] = 0
-    last_fault: str | None = None
+    last_fault: Annotated[str | None, Field(description="null while the broker accepts records")] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,7 +245,7 @@ class Status(_Told):
     def sentence(self) -> str:
         """The state in words, with any faults."""
         said = [SENTENCES[self.state]]
-        silent = [f"{s.signal.replace('_', ' ')}{self._why_silent(s)}" for s in self.signals if s.is_silent]
+        silent = [f"{s.signal.replace('_', ' ')}{self.why_silent(s)}" for s in self.signals if s.is_silent]
         if silent and self.state is State.SENSOR_FAULT:
             said.append(f"Missing: {', '.join(silent)}.")
         if self.state is State.SENSOR_FAULT or (self.state is State.WAITING_FOR_BUS and not self.bus.n_frames):
@@ -250,15 +254,11 @@ class Status(_Told):
             said.append(f"Last fault: {self.bus.last_fault}.")
         if self.calibration_id is None:
             said.append("No calibration: spectra only, no payload.")
-        if self.store.state != StoreState.OK:
-            said.append(f"Estimates are kept in memory only ({self.store.reason}).")
-        if self.uplink is not None and not self.uplink.is_connected and self.uplink.last_fault:
-            said.append(f"Not connected to the fleet's broker ({self.uplink.last_fault}); estimates wait.")
         said += [f"{warning[:1].upper()}{warning[1:]}." for warning in self.warnings]
         return " ".join(said)
 
-    def _why_silent(self, silent: SignalHealth) -> str:
-        """No frame of its message, or frames without a valid sample; empty: it was received."""
+    def why_silent(self, silent: SignalHealth) -> str:
+        """Behind its name: no frame of its message, or frames without a valid sample; empty: it was received."""
         counts = {row.reason: row.n for row in self.decode if row.signal == silent.signal}
         n_refused = sum(n for reason, n in counts.items() if reason != "ok")
         if not counts or counts.get("ok"):
@@ -267,3 +267,48 @@ class Status(_Told):
             reasons = " and ".join(reason.replace("_", " ") for reason, n in counts.items() if n and reason != "ok")
             return f" ({n_refused} frames came, all {reasons})"
         return " (no frame of its message)"
+
+
+def judged(status: Status, faults: Sequence[str]) -> Status:
+    """The status with its verdicts: whether it is ready, and the warnings. They depend on the status and on ``faults``,
+    those of parts that it does not tell of, and on nothing else.
+    """
+    not_ready = why_not_ready(status)
+    warnings = (*faults_of(status), *faults)
+    told = status.model_copy(
+        update={"is_ready": not_ready is None, "not_ready_reason": not_ready, "warnings": warnings}
+    )
+    return told.model_copy(update={"state_in_words": told.sentence()})
+
+
+def why_not_ready(status: Status) -> str | None:
+    """Why no estimate is possible, or none is kept; None otherwise. A sleeping bus or a parked vehicle is no reason."""
+    if status.state is State.READER_FAULT:
+        return status.bus.last_fault or "the bus cannot be read"
+    if status.calibration_id is None:
+        return "no calibration: batches carry spectra only; name a calibration file in the configuration"
+    if status.store.state != StoreState.OK:
+        return f"estimates do not reach the disk: {status.store.reason}"
+    return None
+
+
+def faults_of(status: Status) -> Iterator[str]:
+    """What is wrong with the parts that the status tells of, as sentences; none of it stops the weighing."""
+    store, uplink, webhook, record = status.store, status.uplink, status.webhook, status.record
+    if store.state != StoreState.OK:
+        yield f"estimates are kept in memory only ({store.reason}): {store.n_held} are not stored"
+    if store.is_reserve_in_use:
+        yield "the disk is full: records go to the last megabytes that were kept for them; make room"
+    if store.n_dropped:
+        yield f"{store.n_dropped} records are lost: the disk refused them for longer than memory holds them"
+    if store.set_aside:
+        yield f"the database was damaged and is kept as {store.set_aside}; the history begins anew"
+    if uplink is not None and uplink.last_fault:
+        yield f"the fleet's broker takes no records ({uplink.last_fault}); {uplink.n_waiting} wait"
+    if webhook is not None and webhook.last_fault:
+        yield f"the webhook takes no messages ({webhook.last_fault}); {webhook.n_waiting} wait"
+    if record is not None and record.last_fault:
+        yield (
+            f"frames are not being recorded ({record.last_fault}); {record.n_frames_dropped} are lost so far, "
+            "weighing goes on"
+        )

@@ -1,20 +1,21 @@
 """What a vehicle learns from drives and statements, tried on recorded drives.
 
-    python -m benchmarks.accuracy.taught DATA [--splits 3]
+    python -m benchmarks.accuracy.taught DATA [--splits 3] [--output docs]
 
 DATA holds campaigns with a roll rate (campaign_roll.toml). Known loads teach a vehicle that weighs the other sets;
 then, in random splits, one steady empty drive and four mixed drives teach one, of which nothing is said or whose
 kilograms a delivery note states, and the other mixed drives are weighed. Prints payload and front share, each with mean
 error, bias, share held by the 95 % interval, half-width and interval score, in percent of the payload range and of 20
-points.
+points; ``--output`` writes them to taught.json.
 """
 
 import argparse
+import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -87,35 +88,47 @@ def weighed(runs: Sequence[KnownRun], model: VehicleModel, vehicle: Vehicle) -> 
     return rows, refused
 
 
-def row(name: str, rows: Sequence[F64], refused: Counter[str], span_kg: float) -> str:
-    """One line of the table."""
-    if not rows:
-        return f"{name:34} all refused: {dict(refused)}"
-    figures = []
-    for columns, span in ((slice(0, 4), span_kg), (slice(4, 8), SHARE_SPAN_PCT)):
-        true, answer, low, high = np.array(rows)[:, columns].T
+Line = dict[str, Any]
+"""A set of drives: title, n, refused, and under payload and share the figures of FIGURES, each in percent."""
+
+FIGURES: Final = ("error", "bias", "held", "half", "score")
+
+
+def line_of(title: str, rows: Sequence[F64], refused: Counter[str], span_kg: float) -> Line:
+    """The figures of the batches of one set."""
+    line: Line = {"title": title, "n": len(rows), "refused": sum(refused.values())}
+    for name, columns, span in (("payload", slice(0, 4), span_kg), ("share", slice(4, 8), SHARE_SPAN_PCT)):
+        true, answer, low, high = np.array(rows).reshape(-1, 8)[:, columns].T
         missed = np.maximum(0.0, np.maximum(low - true, true - high))
-        held = np.mean((low <= true) & (true <= high))
-        error, bias, half = np.mean(np.abs(answer - true)), np.mean(answer - true), np.mean(high - low) / 2.0
-        score = np.mean(high - low + 40.0 * missed)
-        of_span = [f"{100.0 * x / span:6.2f}" for x in (error, bias, half, score)]
-        figures.append(f"{of_span[0]} {of_span[1]} held {held:.2f} half {of_span[2]} score {of_span[3]}")
-    return f"{name:34} n {len(rows):3d} refused {sum(refused.values())} | {' | '.join(figures)}"
+        held = span * ((low <= true) & (true <= high))
+        each = (abs(answer - true), answer - true, held, 0.5 * (high - low), high - low + 40.0 * missed)
+        of_set = [round(100.0 * float(np.mean(one)) / span, 2) if rows else None for one in each]
+        line[name] = dict(zip(FIGURES, of_set, strict=True))
+    print(said(line), flush=True)
+    return line
 
 
-def on_known_loads(data: Path) -> None:
+def said(line: Line) -> str:
+    """The figures as text."""
+    if not line["n"]:
+        return f"{line['title']:34} no batch is answered, {line['refused']} refused"
+    shown = (" ".join(f"{name} {line[of][name]:6.2f}" for name in FIGURES) for of in ("payload", "share"))
+    return f"{line['title']:34} n {line['n']:3d} refused {line['refused']} | {' | '.join(shown)}"
+
+
+def on_known_loads(data: Path) -> Iterator[Line]:
     """Calibrate on known loads and weigh their last thirds and the other sets."""
     for name, tests in KNOWN_AND_TESTS.items():
         vehicle, first, last = runs_of(data / name)
         span_kg = vehicle.payload_range_kg[1] - vehicle.payload_range_kg[0]
         model = taught(first, [run.statement for run in first], vehicle)
-        print(row(f"{name}, last thirds", *weighed(last, model, vehicle), span_kg), flush=True)
+        yield line_of(f"{name}, last thirds", *weighed(last, model, vehicle), span_kg)
         for test in tests:
             _, *both = runs_of(data / test)
-            print(row(test, *weighed(whole(*both), model, vehicle), span_kg), flush=True)
+            yield line_of(test, *weighed(whole(*both), model, vehicle), span_kg)
 
 
-def on_ordinary_drives(data: Path, n_splits: int) -> None:
+def on_ordinary_drives(data: Path, n_splits: int) -> Iterator[Line]:
     """One steady empty drive and four mixed ones teach; the other mixed drives test, beside ten known loads."""
     for name, (mixed, *_) in KNOWN_AND_TESTS.items():
         vehicle, *both = runs_of(data / name)
@@ -130,29 +143,32 @@ def on_ordinary_drives(data: Path, n_splits: int) -> None:
             order = rng.permutation(len(drives)).tolist()
             teaching = [drives[i] for i in order[:4]]
             tests = [drives[i] for i in order[4:]] or teaching[3:]
-            said = {
+            stated = {
                 "nothing said": [NOTHING_KNOWN] * len(teaching),
                 "delivery notes": [note(run, span_kg, rng) for run in teaching],
             }
             models = {"ten known loads": by_known} | {
-                kind: taught([steady[0], *teaching], [empty(), *each], vehicle) for kind, each in said.items()
+                kind: taught([steady[0], *teaching], [empty(), *each], vehicle) for kind, each in stated.items()
             }
             for kind, model in models.items():
                 found, why = weighed(tests, model, vehicle)
                 rows[kind] += found
                 refused[kind] += why
         for kind, found in rows.items():
-            print(row(f"{mixed}: {kind}", found, refused[kind], span_kg), flush=True)
+            yield line_of(f"{mixed}: {kind}", found, refused[kind], span_kg)
 
 
 def main() -> None:
-    """Print both tables."""
+    """Print every line, and write them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path, help="folder of recorded campaigns")
     parser.add_argument("--splits", type=int, default=3, help="random splits of the mixed drives")
+    parser.add_argument("--output", type=Path, default=None, help="folder for taught.json")
     asked = parser.parse_args()
-    on_known_loads(asked.data)
-    on_ordinary_drives(asked.data, asked.splits)
+    lines = [*on_known_loads(asked.data), *on_ordinary_drives(asked.data, asked.splits)]
+    if asked.output is not None:
+        told = json.dumps({"splits": asked.splits, "lines": lines}, indent=1)
+        (asked.output / "taught.json").write_text(f"{told}\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -177,7 +177,7 @@ def place_of(named: str | Path) -> Location:
 
 
 def _obstore() -> Any:
-    """The library, loaded when something is read; a vehicle does not have it."""
+    """Import obstore at the first use: a vehicle does not have it installed."""
     try:
         import obstore  # noqa: PLC0415 - an extra, see above
     except ModuleNotFoundError:

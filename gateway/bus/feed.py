@@ -1,4 +1,4 @@
-"""Sensors without a CAN bus, fed onto one: an inertial unit of Linux IIO and a receiver behind gpsd become frames.
+"""Sends the readings of an inertial unit of Linux IIO and of a receiver behind gpsd as CAN frames.
 
 The frames are those of dbc/springscale_reference.dbc, so the pipeline behind the bus is the same. A thread reads each
 sensor, another sends, with a bounded queue between them.

@@ -86,25 +86,17 @@ class RingLog(ThreadPart):
         n_held, n_dropped = self._n_put - n_written - n_lost, n_lost + self._n_refused
         return RecordStatus(n_written, n_held, n_dropped, self._size_bytes, self._fault)
 
-    @property
-    def fault(self) -> str | None:
-        """Why frames are not being recorded, for people; None while they are."""
-        if (fault := self._fault) is None:
-            return None
-        n_dropped = self.status().n_frames_dropped
-        return f"frames are not being recorded ({fault}); {n_dropped} are lost so far, weighing goes on"
-
-    def _run(self) -> None:
+    def _work(self) -> None:
         try:
             is_stopping = False
             while not is_stopping:
                 is_stopping = self._stopping.wait(self._write_s)
                 if self._held:
                     self._write_held()
+                    self._succeeded()
             self._n_lost = self._n_put - self._n_written  # at a stop, what the disk does not take is lost
-        except Exception as failure:  # noqa: BLE001 - a failure of the recording must not end the weighing
-            self.failure = failure
-        self._close()
+        finally:
+            self._close()
 
     def _write_held(self) -> None:
         """Write what is held. If the disk refuses before the first frame all stay held, else they count as lost."""
@@ -126,10 +118,10 @@ class RingLog(ThreadPart):
             if self._fault is not None:
                 log_event(Event.RECORD_RECOVERED, n_frames_dropped=self.status().n_frames_dropped)
             self._fault = None
-        except OSError as refusal:
+        except Exception as refusal:  # noqa: BLE001 - frames that cannot be written must not come back for ever
             self._close()
             self._n_lost += sum(map(len, begun))
-            if self._fault != (fault := f"{directory}: {refusal.strerror or refusal}"):
+            if self._fault != (fault := f"{directory}: {getattr(refusal, 'strerror', None) or repr(refusal)}"):
                 log_event(Event.RECORD_REFUSED, level=logging.WARNING, fault=fault)
             self._fault = fault
         for _ in begun:

@@ -13,19 +13,19 @@ from gateway.calibration.contradicted import contradictions
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.file.parts import DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
 from gateway.calibration.inspection.campaign import Inspection
-from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
 from gateway.calibration.sister import require_alike, sister_in
-from gateway.calibration.vehicle import FoundLoad, Taught, TaughtDrive, teach
+from gateway.calibration.vehicle import ClaimState, FoundClaim, FoundLoad, Taught, TaughtDrive, examined, teach
 from gateway.core.spectrum import roughness_mps2, spectra_of
-from gateway.core.vehicle import Load
+from gateway.core.vehicle import Load, Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.model.vehicle import VehicleModel
 from gateway.quantity import Z95
-from gateway.records import F64, Batch
+from gateway.records import F64, Batch, iso_utc
 from gateway.stated.doubt import Doubt
 
 OnFit = Callable[[str, int, int], None]  # (estimator, steps done, steps in all)
@@ -58,12 +58,14 @@ def calibrate_inspected(
     bands: BandChoice = "campaign",
     like: CalibrationFile | None = None,
     command: str = "",
+    campaign_sha256: str | None = None,
     on_fit: OnFit = lambda name, done, of: None,
 ) -> Outcome:
     """Fits every named estimator on the identification parts of the runs without a fault.
 
     ``like`` is the calibration of a vehicle of the same model: it replaces the prior of any vehicle.
-    ``bands`` are the ratio index's: found on the campaign, or the paper's Table 2.
+    ``bands`` are the ratio index's: found on the campaign, or the paper's Table 2. ``campaign_sha256`` is of what
+    states the vehicle; None: of the campaign's file.
 
     An estimator that these runs do not determine is left out with a warning; raises CalibrationImpossibleError if none
     is left, or if the faults of the runs leave no valid calibration.
@@ -78,9 +80,11 @@ def calibrate_inspected(
     split = inspection.usable
     runs = [one.identification for one in split]
     counted = [batch for run in runs for batch in run.batches if not batch.rejected]
-    ratio_index, cross_spectrum, warnings = _fit(estimators, runs, campaign, sister, bands, on_fit)
-    doubts = contradictions(runs, campaign.vehicle, cross_spectrum.model, sister) if cross_spectrum else ()
-    inspection = _with_disagreements(inspection, runs, cross_spectrum)
+    ratio_index, cross_spectrum, claims, warnings = _fit(estimators, runs, campaign, sister, bands, on_fit)
+    inspection = _with_disagreements(inspection, claims)
+    inspection = _as_believed(inspection, claims, cross_spectrum)
+    believed = [one.identification for one in inspection.usable]
+    doubts = contradictions(believed, campaign.vehicle, cross_spectrum.model, sister) if cross_spectrum else ()
     warnings += [f"{one.kind}: {one.sentence}" for one in doubts]
     file = CalibrationFile(
         vehicle=campaign.vehicle,
@@ -90,7 +94,7 @@ def calibrate_inspected(
         sister_id=like.id if like and cross_spectrum else None,
         expected_errors=_expected_errors(ratio_index, cross_spectrum),
         warnings=(*inspection.warnings, *warnings),
-        provenance=_provenance(campaign, split, cross_spectrum, command),
+        provenance=_provenance(campaign_sha256 or file_sha256(campaign.path), split, cross_spectrum, command),
     )
     return Outcome(file, inspection, ratio_index, cross_spectrum, doubts)
 
@@ -102,28 +106,44 @@ def _fit(
     sister: VehicleModel | None,
     bands: BandChoice,
     on_fit: OnFit,
-) -> tuple[RatioIndexFit | None, Taught | None, list[str]]:
-    """The result of each named estimator, and a warning for each that these runs do not determine."""
+) -> tuple[RatioIndexFit | None, Taught | None, tuple[FoundClaim, ...], list[str]]:
+    """The result of each named estimator, the statements tested, and a warning for each estimator that these runs do
+    not determine.
+    """
     ratio_index: RatioIndexFit | None = None
     cross_spectrum: Taught | None = None
     warnings: list[str] = []
-    for name in estimators:
-        progress = partial(on_fit, name)
+    drives = _drives(runs)
+    if "cross_spectrum" in estimators:
         try:
-            if name == "ratio_index":
-                known = [run for run in runs if run.has_payload and run.has_place]
-                if not known:
-                    raise CalibrationImpossibleError("no run has a known payload and place")
-                ratio_index = fit_ratio_index(known, campaign.vehicle, bands=bands, progress=progress)
-            else:
-                drives = [TaughtDrive(drive_name(run.number), run.batches, run.statement) for run in runs]
-                cross_spectrum = teach(drives, campaign.vehicle, sister, progress)
-                warnings.extend(cross_spectrum.model.warnings)
+            cross_spectrum = teach(drives, campaign.vehicle, sister, partial(on_fit, "cross_spectrum"))
+            warnings.extend(cross_spectrum.model.warnings)
         except CalibrationImpossibleError as fault:
-            warnings.append(f"{name}: {fault}")
+            warnings.append(f"cross_spectrum: {fault}")
+    claims = cross_spectrum.claims if cross_spectrum else examined(drives, campaign.vehicle, sister)
+    if "ratio_index" in estimators:
+        held = {one.drive for one in claims if one.state is ClaimState.HELD}
+        known = [run for run in runs if run.has_payload and run.has_place and drive_name(run.number) not in held]
+        try:
+            if not known:
+                raise CalibrationImpossibleError("no run has a known payload and place")
+            ratio_index = fit_ratio_index(known, campaign.vehicle, bands=bands, progress=partial(on_fit, "ratio_index"))
+        except CalibrationImpossibleError as fault:
+            warnings.append(f"ratio_index: {fault}")
     if ratio_index is None and cross_spectrum is None:
         raise CalibrationImpossibleError(f"{campaign.path}: " + "; ".join(warnings))
-    return ratio_index, cross_spectrum, warnings
+    return ratio_index, cross_spectrum, claims, warnings
+
+
+def _drives(runs: Sequence[KnownRun]) -> list[TaughtDrive]:
+    return [TaughtDrive(drive_name(run.number), run.batches, run.statement) for run in runs]
+
+
+def with_statements_tested(inspection: Inspection, vehicle: Vehicle, like: CalibrationFile | None = None) -> Inspection:
+    """With a warning for each run whose statement the drives contradict, as a calibration would test it."""
+    sister = None if like is None else sister_in(like)
+    runs = [one.identification for one in inspection.usable if one.has_identification]
+    return _with_disagreements(inspection, examined(_drives(runs), vehicle, sister))
 
 
 def _refused(campaign: Campaign, inspection: Inspection, why: str) -> str:
@@ -139,7 +159,7 @@ def _refused(campaign: Campaign, inspection: Inspection, why: str) -> str:
 
 def drive_name(number: int) -> str:
     """The name by which a fit knows a run."""
-    return f"run {number}"
+    return f"drive {number}"
 
 
 def _found(runs: Sequence[KnownRun], taught: Taught | None) -> dict[int, FoundLoad]:
@@ -148,22 +168,44 @@ def _found(runs: Sequence[KnownRun], taught: Taught | None) -> dict[int, FoundLo
     return {run.number: by_name[name] for run in runs if (name := drive_name(run.number)) in by_name}
 
 
-def _with_disagreements(inspection: Inspection, runs: Sequence[KnownRun], taught: Taught | None) -> Inspection:
-    """With a warning for each run whose statement the fit held, because its drive contradicts it beyond chance."""
-    found, said = _found(runs, taught), {run.number: run for run in runs}
+def _with_disagreements(inspection: Inspection, claims: Sequence[FoundClaim]) -> Inspection:
+    """With a warning for each run whose statement was held, because the drives contradict it beyond chance."""
+    runs = {drive_name(one.run.number): one.run for one in inspection.split}
+    held = {one.drive: one for one in claims if one.state is ClaimState.HELD}
+    verdicts = []
+    for verdict in inspection.verdicts:
+        claim = held.get(drive_name(verdict.number))
+        if claim is not None:
+            shown = f"the drive shows {claim.without_kg:.0f} ± {Z95 * claim.without_std_kg:.0f} kg"
+            shown += " at another place" if claim.is_of_place else ""
+            text = f"the campaign says {runs[claim.drive].described}, {shown}; the statement taught nothing"
+            kind = Kind.LOAD_DISAGREES
+            if claim.exchanged_with is not None:
+                kind, text = Kind.LOADS_SWAPPED, f"{text}; exchanged with {claim.exchanged_with}, both fit far better"
+            verdict = replace(verdict, findings=(*verdict.findings, Finding.of(kind, text)))  # noqa: PLW2901
+        verdicts.append(verdict)
+    return replace(inspection, verdicts=tuple(verdicts))
 
-    def told(verdict: RunVerdict) -> RunVerdict:
-        one = found.get(verdict.number)
-        is_told = any(finding.kind is Kind.LOAD_DISAGREES for finding in verdict.findings)
-        if one is None or not one.is_held or is_told:
-            return verdict
-        text = (
-            f"the campaign says {said[verdict.number].described}, the drive shows {one.load.payload_kg:.0f} ± "
-            f"{Z95 * one.payload_std_kg:.0f} kg; the statement taught nothing"
-        )
-        return replace(verdict, findings=(*verdict.findings, Finding.of(Kind.LOAD_DISAGREES, text)))
 
-    return replace(inspection, verdicts=tuple(map(told, inspection.verdicts)))
+def _as_believed(inspection: Inspection, claims: Sequence[FoundClaim], taught: Taught | None) -> Inspection:
+    """With the loads as the fit believes them: without statements that were held and errors that all of them share."""
+    held = {one.drive for one in claims if one.state is ClaimState.HELD}
+    stated = {one.name: (one.stated_kg, one.stated_std_kg) for one in taught.loads} if taught else {}
+
+    def believed(run: KnownRun) -> KnownRun:
+        name = drive_name(run.number)
+        if name in held and not math.isfinite(stated.get(name, (math.nan,))[0]):
+            return replace(run, payload_kg=math.nan, front_share_pct=math.nan)
+        if run.said is None or name not in stated:
+            return run
+        payload_kg, std_kg = stated[name]
+        return replace(run, payload_kg=payload_kg, payload_plus_minus_kg=Z95 * std_kg)
+
+    split = [
+        replace(one, identification=believed(one.identification), validation=believed(one.validation))
+        for one in inspection.split
+    ]
+    return replace(inspection, split=tuple(split))
 
 
 def _seen(runs: Sequence[KnownRun], counted: Sequence[Batch], taught: Taught | None) -> SeenPart:
@@ -222,17 +264,19 @@ def _rms(errors: F64 | None) -> float | None:
     return float(np.sqrt(np.mean(known**2))) if known.size else None
 
 
-def _provenance(campaign: Campaign, split: Sequence[SplitRun], taught: Taught | None, command: str) -> ProvenancePart:
+def _provenance(campaign_sha256: str, split: Sequence[SplitRun], taught: Taught | None, command: str) -> ProvenancePart:
     found = _found([one.identification for one in split], taught)
     return ProvenancePart(
         software=f"springscale {version('springscale')}",
         command=command,
-        campaign_sha256=file_sha256(campaign.path),
+        campaign_sha256=campaign_sha256,
         drives=tuple(
             DrivePart(
                 number=run.number,
                 log=run.name,
                 sha256=one.log.sha256,
+                t_start=iso_utc(one.log.span_ns[0]) if one.log.span_ns else None,
+                t_end=iso_utc(one.log.span_ns[1]) if one.log.span_ns else None,
                 n_batches=len([batch for batch in run.batches if not batch.rejected]),
                 statement=run.statement,
                 found=FoundPart.of(found[run.number]) if run.number in found else None,

@@ -122,8 +122,9 @@ class Campaign:
 
     @property
     def signals(self) -> str:
-        """The signal map: a path, or springscale:NAME."""
-        return self._signals if self._signals.startswith("springscale:") else str(self.path.parent / self._signals)
+        """The signal map: a path, or springscale:NAME; empty if a draft names none."""
+        is_path = self._signals and not self._signals.startswith("springscale:")
+        return str(self.path.parent / self._signals) if is_path else self._signals
 
     def log_of(self, run: RunTable) -> Path:
         """Path of the run's log."""
@@ -156,10 +157,13 @@ class Campaign:
         )
 
 
-def load_campaign(path: Path) -> Campaign:
-    """Raises CampaignError naming every fault of the file, logs that are not there and loads that cannot be."""
+def load_campaign(path: Path, *, is_draft: bool = False) -> Campaign:
+    """Raises CampaignError naming every fault of the file, logs that are not there and loads that cannot be.
+
+    A draft may lack signals and runs.
+    """
     tables = read_toml(path, CampaignError)
-    table = checked(_with_sprung(tables, path), path, CampaignTable, CampaignError)
+    table = checked(_with_sprung(tables, path), path, DraftTable if is_draft else CampaignTable, CampaignError)
     campaign = Campaign(path, table, states_payload_range="payload_range_kg" in tables["vehicle"])
     faults = [f"{path}: vehicle.{fault}" for fault in _range_faults(campaign.vehicle)]
     faults += [

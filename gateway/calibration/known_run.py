@@ -19,7 +19,8 @@ class KnownRun:
     """Batches of one drive with what is known of its load. ``number`` counts runs of a campaign from 1.
 
     Payload and front share are NaN if nobody knows them; plus-minus is half a 95 % interval. payload_left_m is the
-    payload's centre of gravity left of the vehicle's centre line; None: not noted.
+    payload's centre of gravity left of the vehicle's centre line; None: not noted. ``said`` is what was stated, if that
+    is more than payload and share.
     """
 
     number: int
@@ -30,6 +31,7 @@ class KnownRun:
     payload_left_m: float | None = None
     payload_plus_minus_kg: float = KNOWN_PLUS_MINUS_KG
     front_share_plus_minus_pct: float = KNOWN_SHARE_PLUS_MINUS_PCT
+    said: Statement | None = None
 
     @property
     def load(self) -> Load:
@@ -58,6 +60,8 @@ class KnownRun:
         """What is known of the load. If its payload and place are known, it is as compact as the vehicle's other known
         loads.
         """
+        if self.said is not None:
+            return self.said
         return Statement(
             source=StatementSource.KNOWN if self.has_payload else None,
             payload_kg=self.payload_kg if self.has_payload else None,

@@ -4,14 +4,17 @@ Known loads of a campaign, an empty vehicle, a delivery note, a weighbridge and 
 other doubts. Plus-minus is half a 95 % interval.
 """
 
-from dataclasses import dataclass
-from enum import StrEnum
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from gateway.core.vehicle import Load, Vehicle, front_share_pct
+from gateway.core.vehicle import Carries, Load, Vehicle, front_share_pct
 from gateway.quantity import Z95
+from gateway.stated.statement import StatementSource
+
+__all__ = ["Claim", "LoadPrior", "Statement", "StatementSource", "empty", "load_prior_of"]
 
 UNKNOWN_PART: Final = (0.45, 0.7)
 """Chosen: mean and standard deviation of a payload that nobody stated, in parts of the largest payload. Wide enough
@@ -26,14 +29,40 @@ KNOWN_SHARE_PLUS_MINUS_PCT: Final = 0.4  # the same as a front share, of a load 
 LEAST_SHARE_STD: Final = 0.002  # chosen: 0..1, of any stated place
 
 
-class StatementSource(StrEnum):
-    """Where a statement comes from."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """One statement's word on a payload.
 
-    EMPTY = "empty"
-    DELIVERY_NOTE = "delivery_note"
-    SCALE = "scale"
-    AXLE_SCALES = "axle_scales"
-    KNOWN = "known"
+    plus_minus_kg is of the error that no other claim has. ``shared`` are errors that it has in common with others, each
+    a cause and its standard deviation (kg): a delivery note leaves out the packaging like every other note.
+    ``is_confirmed``: somebody insists on it, so that it is believed whatever the drive shows.
+    """
+
+    name: str
+    payload_kg: float
+    plus_minus_kg: float
+    shared: tuple[tuple[str, float], ...] = ()
+    is_confirmed: bool = False
+
+    @property
+    def own_std_kg(self) -> float:
+        """Standard deviation of the error that no other claim has."""
+        return self.plus_minus_kg / Z95
+
+    @property
+    def std_kg(self) -> float:
+        """Standard deviation of its whole error."""
+        return float(np.hypot.reduce([self.own_std_kg, *(std_kg for _, std_kg in self.shared)]))
+
+    @property
+    def stated_plus_minus_kg(self) -> float:
+        """Half the 95 % interval that its statement gives."""
+        return Z95 * dict(self.shared).get(self.name, self.own_std_kg)
+
+    def softened(self, factor: float) -> "Claim":
+        """The same with its own error so many times as large."""
+        shared = tuple((cause, std_kg * (factor if cause == self.name else 1.0)) for cause, std_kg in self.shared)
+        return replace(self, plus_minus_kg=factor * self.plus_minus_kg, shared=shared)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +71,8 @@ class Statement:
 
     The place is along the vehicle behind the front axle, or the front share of the sprung mass instead; left_m is the
     payload's place left of the centre line. ``is_compact``: the load has the shape of the vehicle's other known loads.
+    If several statements are about one load, or their errors have a cause in common, ``claims`` are their words on the
+    payload, of which payload_kg is the mean; ``placed_by`` names the one that says the place.
     """
 
     source: StatementSource | None = None
@@ -54,15 +85,44 @@ class Statement:
     left_m: float | None = None
     left_plus_minus_m: float = 0.04
     is_compact: bool = False
+    carries: Carries | None = None
+    claims: tuple[Claim, ...] = ()
+    placed_by: str | None = None
 
     @property
     def is_of_payload(self) -> bool:
         """Whether it says how heavy the load is."""
         return self.payload_kg is not None
 
-    def without_payload(self) -> "Statement":
-        """What is left of it if it is not believed."""
-        return Statement(left_m=None)
+    @property
+    def has_place(self) -> bool:
+        """Whether it says where the load is along the vehicle."""
+        return self.payload_kg == 0.0 or self.position_m is not None or self.front_share_pct is not None
+
+    def claims_as(self, name: str) -> tuple[Claim, ...]:
+        """Its claims; without any the payload itself, by this name."""
+        if self.claims or self.payload_kg is None:
+            return self.claims
+        return (Claim(name=name, payload_kg=self.payload_kg, plus_minus_kg=self.payload_plus_minus_kg),)
+
+    def saying(self, claims: Sequence[Claim]) -> "Statement":
+        """The same place with these words on the payload, if there are any."""
+        if not claims:
+            return replace(self, payload_kg=None, claims=())
+        weights = np.array([claim.std_kg**-2.0 for claim in claims])
+        payload_kg = float(weights @ [claim.payload_kg for claim in claims] / weights.sum())
+        plus_minus_kg = float(Z95 * weights.sum() ** -0.5)
+        return replace(self, payload_kg=payload_kg, payload_plus_minus_kg=plus_minus_kg, claims=tuple(claims))
+
+    def without(self, name: str) -> "Statement":
+        """What is left if the claim of this name, and the place if that says it, is not believed."""
+        left = [claim for claim in self.claims if claim.name != name]
+        if not left:
+            return NOTHING_KNOWN
+        placed = replace(
+            self, position_m=None, front_share_pct=None, left_m=None, placed_by=None, is_compact=False
+        ) if self.placed_by == name else self  # fmt: skip
+        return placed.saying(left)
 
 
 NOTHING_KNOWN: Final = Statement()
@@ -88,6 +148,7 @@ class LoadPrior:
     left_m: float
     left_std_m: float
     is_compact: bool
+    carries: Carries | None = None
 
     @property
     def load(self) -> Load:
@@ -112,6 +173,7 @@ def load_prior_of(statement: Statement, vehicle: Vehicle) -> LoadPrior:
         left_m=statement.left_m or 0.0,
         left_std_m=statement.left_plus_minus_m / Z95 if is_across_known else UNKNOWN_LEFT_STD_M,
         is_compact=statement.is_compact,
+        carries=statement.carries,
     )
 
 

@@ -30,6 +30,7 @@ _COMMANDS = {
     "events": "What was loaded and unloaded where and when, and the trips between, from log files.",
     "feed": "Send an IMU of Linux IIO and a receiver behind gpsd onto a CAN interface.",
     "fleet-report": "A fleet's data set as pages: each vehicle and what needs attention.",
+    "learn": "Learn a vehicle from the logs of ordinary drives and from delivery notes.",
     "look": "The content of an unknown log, and a first signal map from it.",
     "record": "Record the mapped frames of a bus into a log.",
     "replay": "Send a log to a bus, paced by its time stamps.",
@@ -37,6 +38,7 @@ _COMMANDS = {
     "reproduce": "Repeat the paper's section 4 in the simulator, as a report.",
     "run": "Run the service.",
     "simulate": "Simulate drives, as log files or onto a bus.",
+    "state": "Say to a running service what its vehicle carries, import delivery notes, and see what became of them.",
     "token": "Make, list and revoke access tokens for other machines.",
     "verification": "Known loads compared with the estimates of a running service, as dated records.",
 }  # each in the module of its name

@@ -7,13 +7,13 @@ from typing import get_args
 
 import click
 
-from gateway.calibration.calibrate import Outcome, calibrate_inspected
+from gateway.calibration.calibrate import Outcome, calibrate_inspected, with_statements_tested
 from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
 from gateway.calibration.inspection.log import SplitRun
-from gateway.calibration.judgement.advice import verdicts_of
+from gateway.calibration.judgement.advice import Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, require_output_place, window
@@ -137,6 +137,8 @@ def calibrate(
         inspection = inspect(loaded, batch_settings(window_s), numbers=numbers, on_run=on_run)
     if sister:
         inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)  # other loads were driven with the sister
+    if only_checks and inspection.refusal is None:
+        inspection = with_statements_tested(inspection, loaded.vehicle, sister)
     _tell_inspection(inspection, as_json=as_json, is_all=only_checks)
     if inspection.refusal is not None:
         raise CalibrationImpossibleError(f"{campaign}: {inspection.refusal}; the findings say how to mend it")
@@ -155,14 +157,13 @@ def calibrate(
     if output is not None:
         with refusal_told(output, ConfigurationError):
             write_whole(output, outcome.file.to_json())
-    if report is not None:
-        _report(report, loaded, outcome)
+    verdict = judged(outcome, report)
     if as_json:
-        click.echo(json_line(_record(outcome.file, output) | {"inspection": inspection_json(inspection)}))
+        told = {"verdict": verdict.to_json(), "inspection": inspection_json(outcome.inspection)}
+        click.echo(json_line(_record(outcome.file, output) | told))
     else:
         click.echo(_sentences(outcome.file, output, said=inspection.warnings))
-        if report is None:  # its page says the same
-            click.echo(_verdict(loaded, outcome))
+        click.echo(verdict.text)
 
 
 def _command(
@@ -213,18 +214,17 @@ def _require_places(output: Path | None, report: Path | None) -> None:
         raise click.UsageError(f"--report {report}: is a file, not a directory")
 
 
-def _report(directory: Path, campaign: Campaign, outcome: Outcome) -> None:
-    from gateway.reports.calibration.report import write_calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
-
-    with counted("judging and drawing") as on_chart:
-        written = write_calibration_report(directory, campaign, outcome, on_chart)
-    click.echo(str(written), err=True)
-
-
-def _verdict(campaign: Campaign, outcome: Outcome) -> str:
-    """How good the calibration is by the estimator that the service runs."""
+def judged(outcome: Outcome, report: Path | None) -> Verdict:
+    """How good the calibration is by the estimator that the service runs; with a report it is written too."""
     with counted("judging"):
-        return verdicts_of(assess_calibration(campaign, outcome))[0].text
+        assessment = assess_calibration(outcome)
+    if report is not None:
+        from gateway.reports.calibration.report import write_report_of  # noqa: PLC0415 # a vehicle has no matplotlib
+
+        with counted("drawing") as on_chart:
+            written = write_report_of(report, assessment, on_chart)
+        click.echo(str(written), err=True)
+    return verdicts_of(assessment)[0]
 
 
 def _record(file: CalibrationFile, output: Path | None) -> dict[str, object]:

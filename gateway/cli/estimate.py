@@ -58,7 +58,8 @@ def estimate(
     """One line per batch of every LOG, rejected ones included with their reasons.
 
     With several logs each line names its log: in front of the line, as "log" in its JSON, or in a first column.
-    If a calibration is given and no batch could be weighed, it says why and exits with 1.
+    If no batch could be weighed, it says why and what to do, and exits with 1; not so with --json and no
+    calibration, which is how to get the spectra alone.
     """
     if as_json and as_csv:
         raise click.UsageError("give --json or --csv, not both")
@@ -85,9 +86,10 @@ def estimate(
 
     for line in lines(found()):
         click.echo(line)
-    if setup.calibration is not None and not reasons.pop(None, 0):
+    is_for_spectra = as_json and setup.calibration is None
+    if not reasons.pop(None, 0) and not is_for_spectra:
         is_unlike = 2 * unlike.total() > reasons.total()
-        other = [_other_vehicle(setup.calibration.vehicle)] if is_unlike else []
+        other = [_other_vehicle(setup.calibration.vehicle)] if setup.calibration is not None and is_unlike else []
         raise NothingWeighedError("\n".join([_in_words(reasons, refused), *other]))
 
 

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import click
 
-from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
-from gateway.calibration.judgement.assessment import BatchSet, assess_evaluation
+from gateway.calibration.campaign import load_campaign
+from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.judgement.advice import verdicts_of
+from gateway.calibration.judgement.assessment import Assessment, BatchSet, assess_evaluation
 from gateway.calibration.judgement.evaluation import Errors, ErrorTable, Judged, TargetErrors, error_table
 from gateway.cli.options import CAMPAIGN, FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.progress import counted
@@ -50,17 +51,21 @@ def evaluate(
             on_run=on_run,
         )
     table = error_table(judged, loaded.vehicle, chosen)
-    click.echo(json_line(table.to_json()) if as_json else text_of(table))
+    assessment = assess_evaluation(loaded.vehicle, held, BatchSet(split), table)
+    [verdict] = verdicts_of(assessment)
+    if as_json:
+        click.echo(json_line(table.to_json() | {"verdict": verdict.to_json()}))
+    else:
+        click.echo(f"{text_of(table)}\n\n{verdict.text}")
     if report is not None:
-        _report(report, loaded, held, split, table)
+        _report(report, assessment)
 
 
-def _report(directory: Path, campaign: Campaign, held: CalibrationFile, split: Split, table: ErrorTable) -> None:
+def _report(directory: Path, assessment: Assessment) -> None:
     from gateway.reports.calibration import report as calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
 
-    assessment = assess_evaluation(campaign, held, BatchSet(split), table)
     with counted("drawing") as on_chart:
-        written = calibration_report.write_evaluation_report(directory, assessment, on_chart)
+        written = calibration_report.write_report_of(directory, assessment, on_chart)
     click.echo(str(written), err=True)
 
 

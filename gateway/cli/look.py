@@ -30,21 +30,21 @@ def look(log: Path, databases: tuple[Path, ...], output: Path | None) -> Told:
     seen = look_at(log, databases)
     written = write_draft(seen, output) if output else ()
     record = {**look_json(seen), "written": [str(path) for path in written]}
-    return record, "\n".join([look_text(seen), *(f"Written: {path}" for path in written)])
+    return record, "\n".join([look_text(seen, output), *(f"Written: {path}" for path in written)])
 
 
 MOST_UNKNOWN = 12  # chosen: lines of identifiers that nothing describes
 
 
-def look_text(seen: Look) -> str:
-    """Identifiers, maps, axes, and the verdict at the end."""
-    return "\n".join([*_heard(seen), "", *_readings(seen), "", *_fits(seen), "", *_verdict(seen)])
+def look_text(seen: Look, written: Path | None = None) -> str:
+    """Identifiers, maps, axes, the verdict and the next step; ``written`` is the signal map that was written."""
+    return "\n".join([*_heard(seen), "", *_readings(seen), "", *_fits(seen), "", *_verdict(seen, written)])
 
 
 def _heard(seen: Look) -> Iterator[str]:
     channels = sorted({one.channel for one in seen.heard if one.channel})
     on = f" on {', '.join(channels)}" if channels else ""
-    yield f"{seen.log}: {seen.report.wanted} frames in {max(one.duration_s for one in seen.heard):.0f} s{on}"
+    yield f"{seen.log}: {seen.report.wanted} frames in {seen.report.span_s:.0f} s{on}"
     yield from (f"  {remark.removeprefix(f'{seen.log}: ')}" for remark in seen.report.remarks())
     yield from (f"  {one.text}" for one in seen.refused)
     yield ""
@@ -99,7 +99,7 @@ def _fit(fit: MapFit) -> str:
     return told
 
 
-def _verdict(seen: Look) -> Iterator[str]:
+def _verdict(seen: Look, written: Path | None) -> Iterator[str]:
     if seen.lacking:
         yield "This cannot work yet:"
         yield from (f"  {what}" for what in (*seen.to_mend, *seen.lacking))
@@ -112,8 +112,11 @@ def _verdict(seen: Look) -> Iterator[str]:
         yield f"This can work, if {unsure} describes your device: only identifiers and lengths say so."
     else:
         yield "This can work."
-    if seen.shipped:
-        yield f'Say signals = "springscale:{seen.shipped.name}", or write your own copy with --output.'
+    signals = f"springscale:{seen.shipped.name}" if seen.shipped else written or "signals.toml"
+    if not seen.shipped and written is None:
+        yield f"Next: write a signal map with `springscale look {seen.log} --output {signals}`, and check its signs."
+    yield f'Next: `springscale run` with signals = "{signals}" in springscale.toml; its page /teach asks for the rest.'
+    yield f"Or without a service: `springscale learn {seen.log} ... --signals {signals} --vehicle van.toml`."
 
 
 def look_json(seen: Look) -> dict[str, Any]:

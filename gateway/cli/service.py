@@ -46,27 +46,25 @@ class Service:
 
     def ask(self, path: str, method: str = "GET", body: Mapping[str, Any] | None = None) -> Answer:
         """The service's answer as JSON. Raises SpringscaleError with its message if it refuses or cannot be reached."""
-        answer = self._answer(path, method, body)
-        try:
-            record: Answer = answer.json()
-        except ValueError:
-            kind = answer.headers.get("content-type", "something")
-            raise SpringscaleError(
-                f"{answer.url}: answered with {kind} in place of JSON: is a proxy or another program there?"
-            ) from None
-        return record
+        content = None if body is None else json_line(body).encode()
+        return _json_of(self._answer(path, method, content))
+
+    def send(self, path: str, content: bytes, kind: str) -> Answer:
+        """Post a file of this media type -> the answer as JSON. Raises as ``ask`` does."""
+        return _json_of(self._answer(path, "POST", content, kind))
 
     def page(self, path: str) -> bytes:
         """A page as the service sends it. Raises as ``ask`` does."""
         return self._answer(path).content
 
-    def _answer(self, path: str, method: str = "GET", body: Mapping[str, Any] | None = None) -> httpx.Response:
+    def _answer(
+        self, path: str, method: str = "GET", content: bytes | None = None, kind: str = "application/json"
+    ) -> httpx.Response:
         address, context = self.address(path), self._context()
-        headers = {"accept": "application/json, */*;q=0.5", "content-type": "application/json"}
+        headers = {"accept": "application/json, */*;q=0.5", "content-type": kind}
         if self.token:
             headers["authorization"] = f"Bearer {self.token}"
         try:
-            content = None if body is None else json_line(body).encode()
             with httpx.Client(verify=context, timeout=TIMEOUT_S, trust_env=False) as client:
                 answer = client.request(method, address, content=content, headers=headers)
         except (httpx.HTTPError, httpx.InvalidURL, ValueError) as fault:  # not reachable, not trusted, or not HTTP
@@ -89,6 +87,18 @@ class Service:
             except OSError as fault:  # ssl.SSLError is one
                 raise ConfigurationError(f"{self.certificate}: no certificate with its key: {fault}") from None
         return context
+
+
+def _json_of(answer: httpx.Response) -> Answer:
+    """The object of an answer. Raises SpringscaleError if it is none."""
+    try:
+        record: Answer = answer.json()
+    except ValueError:
+        kind = answer.headers.get("content-type", "something")
+        raise SpringscaleError(
+            f"{answer.url}: answered with {kind} in place of JSON: is a proxy or another program there?"
+        ) from None
+    return record
 
 
 def only_one(ids: Iterable[str], begin: str, what: str, command: str) -> str:

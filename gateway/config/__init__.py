@@ -17,6 +17,7 @@ from gateway.config.sections import (
     AlarmsSection,
     CommissioningSection,
     KeepSection,
+    LearningSection,
     LimitKg,
     PositionSection,
     RecordSection,
@@ -188,6 +189,7 @@ class Settings(BaseSettings):
     keep: KeepSection = KeepSection()
     record: RecordSection = RecordSection()
     verification: VerificationSection = VerificationSection()
+    learning: LearningSection = LearningSection()
     commissioning: CommissioningSection = CommissioningSection()
     position: PositionSection = PositionSection()
     alarms: AlarmsSection = AlarmsSection()

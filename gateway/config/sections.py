@@ -54,6 +54,17 @@ class VerificationSection(SettingsSection):
     every_days: float = Field(0.0, ge=0.0, le=36_500.0, description="due so long after the last that passed (0: never)")
 
 
+class LearningSection(SettingsSection):
+    """Learning the vehicle on its own machine, from ordinary drives and from statements of their loads."""
+
+    is_allowed: bool = Field(True, description="whether users with scope operate may have the vehicle learnt here")
+    like: Path | None = Field(None, description="calibration file of a vehicle of the same model: the prior of the fit")
+    size_mb: float = Field(100.0, ge=1.0, le=100_000.0, description="disk space for drives to learn from")
+    memory_mb: float = Field(
+        1024.0, ge=256.0, le=16_384.0, description="address space of the process that learns, which takes less memory"
+    )
+
+
 class CommissioningSection(SettingsSection):
     """Calibrating on the vehicle itself, from an empty drive."""
 

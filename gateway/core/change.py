@@ -42,7 +42,7 @@ class Rules:
 
     @classmethod
     def of(cls, vehicle: Vehicle) -> "Rules":
-        """The rules for a campaign's vehicle."""
+        """The scale of load changes that a vehicle's payload range and mass give."""
         low, high = vehicle.payload_range_kg
         return cls(max(high - low, LEAST_RANGE_KG), vehicle.empty_mass_kg + 0.5 * (low + high))
 

@@ -15,7 +15,7 @@ DISPLAY_BAND_HZ = (0.5, 15.0)  # chosen: around the bands of the estimators
 
 
 def runs_of(mask: Bool) -> I64:
-    """(k, 2) begin and end of every unbroken run of True in ``mask`` (n,); the end is the first index after it."""
+    """Begin and end (k, 2) of every unbroken run of True in ``mask`` (n,); the end is the first index after it."""
     return np.flatnonzero(np.diff(np.r_[False, mask, False].astype(np.int8))).reshape(-1, 2)
 
 

@@ -20,6 +20,7 @@ PAYLOAD_LEFT_STD_M: Final = 0.1
 A choice, not a measurement: a pallet 0.8 m wide has 0.2 m to either side between wheel arches 1.2 m apart.
 """
 
+USEFUL_SHARE: Final = 0.25  # chosen: of the range, half the 95 % interval of a weighing that is of use
 LEAST_RANGE_SHARE: Final = 0.33  # chosen: of the empty mass, what any vehicle may carry
 PAYLOAD_LEFT_NOTED_STD_M: Final = 0.02
 """Chosen: a noted place of the payload, measured with a tape."""
@@ -133,6 +134,14 @@ class VehicleFields:
         default=None,
         metadata=described("usual height of the load above the floor", ge=0.05, le=5.0, examples=[1.2]),
     )
+    loading_area_m: tuple[Metres, Metres] | None = field(
+        default=None,
+        metadata=described(
+            "where its load may lie, from the front end of the loading area to its rear end, behind the front axle, "
+            "rising; tells how much more may go in; absent: 0.35 to 1.25 wheelbases",
+            examples=[[1.2, 3.1]],
+        ),
+    )
     roof_rack: bool = field(default=False, metadata=described("part of the load may be on the roof"))
     tow_bar: bool = field(
         default=False, metadata=described("part of the load may be on a tow bar: a carrier, a trailer's tongue")
@@ -190,6 +199,8 @@ class Vehicle(VehicleFields):
             low, high = getattr(self, name)
             if low >= high:
                 raise ValueError(f"{name} must rise: [low, high]")
+        if self.loading_area_m is not None and self.loading_area_m[0] >= self.loading_area_m[1]:
+            raise ValueError("loading_area_m must rise: [front end, rear end]")
 
     @property
     def empty_front_share(self) -> float:
@@ -200,6 +211,11 @@ class Vehicle(VehicleFields):
     def largest_payload_kg(self) -> float:
         """What it may carry: the end of its range, but no less than any vehicle can."""
         return max(self.payload_range_kg[1], LEAST_RANGE_SHARE * self.empty_mass_kg)
+
+    @property
+    def useful_half_width_kg(self) -> float:
+        """Half the 95 % interval from which on a weighing is of use."""
+        return USEFUL_SHARE * (self.payload_range_kg[1] - self.payload_range_kg[0])
 
     @property
     def sensor_left_m(self) -> float:

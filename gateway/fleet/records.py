@@ -101,7 +101,7 @@ class Arrival(NamedTuple):
 
 
 def read(topic: str, payload: bytes) -> Arrival:
-    """What a message says. Raises whatever its content provokes; ``Exception`` covers it.
+    """Read the record in a message. Malformed content raises exceptions of any kind.
 
     The vehicle's name is from the topic alone: the broker lets each vehicle write below its own.
     """

@@ -95,11 +95,11 @@ class Expected:
         self.parts[:p] += self.noise
 
     def _logs(self, entries: list[list[int]]) -> F64:
-        """(r, k, c) entries (r, c) of theta."""
+        """The parameters at entries (r, c) of each of the k vehicles, shaped (r, k, c)."""
         return np.ascontiguousarray(self.theta[:, entries].swapaxes(0, 1))
 
     def of(self, entry: int) -> F64:
-        """(k, 1, 1) one parameter."""
+        """One parameter of each of the k vehicles, shaped (k, 1, 1)."""
         return np.asarray(self.natural[:, entry, None, None])
 
     def log_turns(self, entry: int) -> F64:

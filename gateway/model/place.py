@@ -3,7 +3,7 @@
 A load off the centre line makes the body roll as it heaves, and heave as it rolls. Once payload and front share are
 known, the likelihood of all three sensors has one maximum over the place. Parameters that also affect roll are free:
 the difference of the tracks, the spread of the payload, the day's roll inertia. The half-car's parameters are fixed:
-errors of the roll model must not change the weight (docs/adr/roll-takes-turns.md).
+errors of the roll model must not change the weight (docs/architecture.md).
 
 A sensor off the centre line reads the roll of such a load as heave. Without a roll rate the interval includes this: the
 load may be anywhere across the floor, and the sensor where it was stated, or anywhere plausible.

@@ -140,7 +140,7 @@ class _Chain:
         return found.reshape(len(weights), 2 * p * s, m, r)
 
     def by_response(self) -> F64:
-        """(b, m + 2, p^2, 2 p s) derivatives of the parts by the responses, in the order of ``of_responses``.
+        """Derivatives of the parts by the responses, in the order of ``of_responses``: (b, m + 2, p^2, 2 p s).
 
         An auto-spectrum is F^* (slack F + phase R) plus terms without F, so a change d of the response F moves it by 2
         Re(conj(slack F + phase R) d), and likewise the others: each is the real part of a product with conj(z), or
@@ -207,8 +207,10 @@ class _Chain:
 
 @cache
 def _of_planes(p: int, s: int) -> F64:
-    """(4 p s, p^2 2 p s) the map of _Chain.by_response: from the real parts of what is beside each response in the
-    cross-spectra and of what multiplies it in its own power, then from their imaginary parts.
+    """The matrix (4 p s, p^2 2 p s) of _Chain.by_response, which turns factors into slopes by each response.
+
+    Its rows are the real parts of the factors that stand beside a response in the cross-spectra, those of the factors
+    in its own power, then their imaginary parts.
     """
     found = np.zeros((2, 2, p, p * p, 2, p))
     (beside_re, own_re), (beside_im, own_im) = found

@@ -157,7 +157,7 @@ class CrossSpectra:
 
     @property
     def without_roll(self) -> "CrossSpectra":
-        """Acceleration and pitch rate alone."""
+        """The same spectra with acceleration and pitch rate alone."""
         if not self.has_roll:
             return self
         return replace(self, parts=self.parts[[0, 1, 3, 4]], noise=None if self.noise is None else self.noise[:2])
@@ -427,7 +427,7 @@ def noise_over(floor: F64, expected: F64) -> F64:
 
 
 def as_read(noise: F64, reading: Reading, freq_hz: F64, *, with_roll: bool) -> F64:
-    """(p, m) ``noise`` (p,) at freq_hz (m,) as the spectra contain it.
+    """The sensors' noise densities (p,) as the spectra at freq_hz (m,) contain them, shaped (p, m).
 
     Moving a sensor to the centre line adds the roll rate's noise to the acceleration, times lever arm and frequency,
     and some of it to the pitch rate.

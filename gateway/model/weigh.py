@@ -314,7 +314,7 @@ def _distinct(peaks: Sequence[Peak]) -> list[Peak]:
 
 
 def _against(excess: F64) -> F64:
-    """Minus the log probability of peaks whose evidence is smaller by ``excess`` (k,) than the best."""
+    """Minus the log probability of each peak, whose evidence lies ``excess`` (k,) below that of the best."""
     found: F64 = 0.5 * (EVIDENCE_DOF + 1.0) * np.log1p(2.0 * excess / EVIDENCE_DOF)
     return found
 
@@ -332,7 +332,7 @@ def _starting_loads(model: VehicleModel) -> list[tuple[float, float]]:
 
 
 def _outward(mixture: Mixture) -> F64:
-    """(d, N + 2) derivative of payload (kg), front share (%) and lateral place (m) by parameters and load at the
+    """Derivatives (d, N + 2) of payload (kg), front share (%) and lateral place (m) by parameters and load at the
     peak.
     """
     place = mixture.place

@@ -46,7 +46,7 @@ class Point:
 
     @classmethod
     def of(cls, theta: F64, load: Load, cg_left_m: float = 0.0) -> "Point":
-        """The parameters with a load."""
+        """Join a vehicle's parameters and a load."""
         return cls(theta, load.payload_kg, load.front_share, cg_left_m)
 
     @property

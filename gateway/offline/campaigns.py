@@ -105,17 +105,24 @@ def _split_run(
     for rows in both:
         batches = batches_of_motion(rows, signal_map, settings)
         parts.append(campaign.known_run(number, run, batches))
-    log_facts = LogFacts(
+    facts = row_facts(both[0] if stretches[0] else both[1], signal_map.traits)
+    log_facts = facts_of_log(log, whole, motion, report, signal_map, run.start_s)
+    return SplitRun(parts[0], parts[1], facts, stretches[0] is not None, log_facts)
+
+
+def facts_of_log(
+    log: Path, whole: Motion, motion: Motion, report: LogReport, signal_map: SignalMap, start_s: float = 0.0
+) -> LogFacts:
+    """What reading a log showed, of which ``motion`` is the piece that is used."""
+    return LogFacts(
         sha256=file_sha256(log),
         duration_s=float(np.ptp(whole.t_ns)) / NS_PER_S,
-        start_s=run.start_s,
+        start_s=start_s,
         span_ns=(int(motion.t_ns.min()), int(motion.t_ns.max())) if len(motion) else None,
         damage=_damage(report),
         silent=_silent(report.decoder, motion, signal_map) if report.decoder else {},
         mismatches=tuple((one.text, one.share, one.signals) for one in report.causes()),
     )
-    facts = row_facts(both[0] if stretches[0] else both[1], signal_map.traits)
-    return SplitRun(parts[0], parts[1], facts, stretches[0] is not None, log_facts)
 
 
 def _silent(decoder: Decoder, motion: Motion, signal_map: SignalMap) -> dict[Signal, str]:

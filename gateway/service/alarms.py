@@ -4,7 +4,7 @@ import json
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
 from gateway.config.sections import AlarmsSection
@@ -22,11 +22,13 @@ from gateway.core.alarms.rules import AlarmRules, AlarmVerdict, Says
 from gateway.core.alarms.watch import AlarmWatch
 from gateway.estimate import Estimate
 from gateway.estimate_json import read_estimate
+from gateway.history import up_to
 from gateway.log import Event, log_event
 from gateway.records import json_line
+from gateway.service.journal_reader import place_of
 from gateway.service.status import NEEDED_SENSORS
 from gateway.setup import Subject
-from gateway.status import AlarmsStatus, State, Status
+from gateway.status import AlarmsStatus, SignalHealth, State, Status
 from gateway.store import Store, StoreReader, restored
 
 _AT_FAULT: Final = frozenset({State.SENSOR_FAULT, State.READER_FAULT})
@@ -44,8 +46,8 @@ class Silence:
         self._clock_s = clock_s
         self._since_s: float | None = None
 
-    def says(self, status: Status) -> Says:
-        """The verdict for the present status."""
+    def says(self, status: Status, causes: Sequence[str] = ()) -> Says:
+        """The verdict for the present status; ``causes`` are what the decoder refuses so often that it explains it."""
         if status.state not in _AT_FAULT:
             self._since_s = None
             return Says(SILENT, AlarmVerdict.CLEAR if status.state in _HEARD else AlarmVerdict.HOLD)
@@ -54,15 +56,22 @@ class Silence:
         silent_s = self._clock_s() - self._since_s
         if silent_s < self._rules.sensor_silent_s:
             return Says(SILENT, AlarmVerdict.HOLD)
-        return Says(SILENT, AlarmVerdict.RAISE, AlarmFigure(detail=what_is_silent(status)))
+        return Says(SILENT, AlarmVerdict.RAISE, AlarmFigure(detail=what_is_silent(status, causes)))
 
 
-def what_is_silent(status: Status) -> str:
-    """The needed sensors that are silent, or the fault of a bus that cannot be read."""
+def what_is_silent(status: Status, causes: Sequence[str] = ()) -> str:
+    """The needed sensors that are silent, each with what came of it, and the causes; or the fault of a bus that cannot
+    be read.
+    """
     if status.state is State.READER_FAULT:
         return status.bus.last_fault or "the bus cannot be read"
-    silent = [signal.signal for signal in status.signals if signal.is_silent and signal.signal in NEEDED_SENSORS]
-    return " and ".join(silent) or "an unknown sensor"
+    silent = [one for one in status.signals if one.is_silent and one.signal in NEEDED_SENSORS]
+    told = " and ".join(f"{one.signal.replace('_', ' ')}{status.why_silent(one) or _age(one)}" for one in silent)
+    return "; ".join([told or "an unknown sensor", *causes])
+
+
+def _age(silent: SignalHealth) -> str:
+    return "" if silent.last_age_s is None else f" (last heard {silent.last_age_s:.0f} s ago)"
 
 
 REMEMBERED: Final = 1000  # chosen: alarms read at the start to find the active ones
@@ -76,6 +85,8 @@ def rules_of(section: AlarmsSection) -> AlarmRules:
 
 class AlarmService:
     """Every method may be called from any thread."""
+
+    NAME: Final = "alarms"
 
     def __init__(
         self,
@@ -94,12 +105,12 @@ class AlarmService:
         self._lock = threading.Lock()
         self._n_raised = 0
         nothing: tuple[list[Alarm], list[Estimate]] = ([], [])
-        known, recent = restored(lambda: remembered(store.reader()), nothing)
+        known, recent = restored(lambda: remembered(store.reader(), place_of(store, self.NAME)), nothing)
         self._watch = AlarmWatch(rules, subject.vehicle_id, known, recent)
         self._tell(self._watch.end_switched_off(clock_ns()))
 
     def __call__(self, found: Estimate) -> None:
-        """Process a batch; called by the pipeline after it is stored."""
+        """Process a stored batch."""
         if found.is_remainder:
             return
         calibrated = self._subject.calibrated
@@ -109,10 +120,10 @@ class AlarmService:
             else:
                 self._tell(self._watch.weigh(found, calibrated.vehicle, calibrated.unsprung))
 
-    def watch(self, status: Status) -> None:
+    def watch(self, status: Status, causes: Sequence[str] = ()) -> None:
         """Process the present status, several times a minute."""
         with self._lock:
-            self._tell(self._watch.note([self._silence.says(status)], self._clock_ns()))
+            self._tell(self._watch.note([self._silence.says(status, causes)], self._clock_ns()))
 
     def standing(self) -> str:
         """JSON: an array of the active alarms, the oldest first."""
@@ -136,13 +147,14 @@ class AlarmService:
             self._store.write_entry(ENTRY_KIND, alarm.id, alarm.t_last_ns, _text(alarm), alarm.revision)
 
 
-def remembered(reader: StoreReader) -> tuple[list[Alarm], list[Estimate]]:
-    """The last stored alarms and batches, oldest first. Raises what the store's reader raises.
+def remembered(reader: StoreReader, place: str | None) -> tuple[list[Alarm], list[Estimate]]:
+    """The last stored alarms, and the last batches up to a place in the journal, oldest first. Raises what the store's
+    reader raises.
 
     An alarm that cannot be read is left out: if its cause persists, it is raised again.
     """
     told = reader.entries(kind=ENTRY_KIND, limit=REMEMBERED, newest_first=True)
-    page = reader.estimates(limit=RECENT, newest_first=True, with_spectra=False)
+    page = reader.estimates(limit=RECENT, newest_first=True, with_spectra=False, cursor=up_to(place))
     alarms = reader.understood(reversed(told.items), lambda text: alarm_from_json(json.loads(text)))
     return alarms, reader.understood(reversed(page.items), read_estimate)
 

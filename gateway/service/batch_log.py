@@ -12,9 +12,10 @@ from gateway.core.events.entry import Entry, EntryKind
 from gateway.core.events.ledger import HORIZON, Ledger
 from gateway.estimate import PLACES, Estimate
 from gateway.estimate_json import INSTANT, read_estimate
-from gateway.history import BATCHES, REMAINDER
+from gateway.history import up_to
 from gateway.log import Event, log_event
 from gateway.records import Why, json_line, rounded
+from gateway.service.journal_reader import WINDOWS, place_of
 from gateway.setup import Setup
 from gateway.status import State, Status
 from gateway.store import Store, StoreReader, restored
@@ -24,7 +25,9 @@ from gateway.web.routes.weights import LatestWeights
 
 
 class BatchLog:
-    """Called by the pipeline with every batch. ``weigh`` returns the weights shown by the web, with warnings."""
+    """Called with every stored batch. ``weigh`` returns the weights shown by the web, with warnings."""
+
+    NAME: Final = "log of batches"
 
     def __init__(self, weigh: Callable[[], LatestWeights]) -> None:
         self._weigh = weigh
@@ -32,25 +35,22 @@ class BatchLog:
         self._overloaded = overloaded(weigh())
 
     def __call__(self, found: Estimate) -> None:
-        """Log a new estimate at level info; rejected and provisional ones at level debug."""
+        """Log a new estimate at level info, a rejected one at level debug."""
         if found.is_remainder:
             return
-        is_answer = found.counted and not found.is_provisional
-        event = Event.PROVISIONAL if found.is_provisional else Event.ESTIMATE if found.counted else Event.REJECTED
         log_event(
-            event,
-            level=logging.INFO if is_answer else logging.DEBUG,
+            Event.ESTIMATE if found.counted else Event.REJECTED,
+            level=logging.INFO if found.counted else logging.DEBUG,
             batch=found.id,
             payload_kg=rounded(found.payload.number, 3),
             payload_std_kg=rounded(found.payload.std, 3),
             front_share_pct=rounded(found.front_share.number, 3),
             rejected=found.rejected,
         )
-        if not found.is_provisional:
-            before, self._rejected = self._rejected, frozenset(found.rejected)
-            if self._rejected != before:
-                log_event(Event.REASONS_CHANGED, rejected=found.rejected, before=sorted(before))
-            self._tell_overload()
+        before, self._rejected = self._rejected, frozenset(found.rejected)
+        if self._rejected != before:
+            log_event(Event.REASONS_CHANGED, rejected=found.rejected, before=sorted(before))
+        self._tell_overload()
 
     def _tell_overload(self) -> None:
         weights = self._weigh()
@@ -67,31 +67,6 @@ class BatchLog:
 def overloaded(weights: LatestWeights) -> frozenset[str]:
     """The places whose weight is over its limit."""
     return frozenset(where for where in PLACES if getattr(weights, where).is_over_limit)
-
-
-class Listeners:
-    """Passes each batch to listeners by name. What one raises is its own fault: the others and the pipeline go on."""
-
-    def __init__(self, hearers: Mapping[str, Callable[[Estimate], None]]) -> None:
-        self._hearers = hearers
-        self._faults: dict[str, str] = {}  # of the last batch
-
-    def __call__(self, found: Estimate) -> None:
-        for name, hear in self._hearers.items():
-            try:
-                hear(found)
-            except Exception as failure:  # noqa: BLE001 - whatever it is, weighing does not depend on it
-                if name not in self._faults:
-                    log_event(Event.LISTENER_FAILED, level=logging.ERROR, listener=name, failure=repr(failure))
-                self._faults[name] = repr(failure)
-            else:
-                self._faults.pop(name, None)
-
-    @property
-    def fault(self) -> str | None:
-        """Which failed with the last batch, for people."""
-        told = (f"{name} failed: {failure}; weighing goes on" for name, failure in self._faults.copy().items())
-        return "; ".join(told) or None
 
 
 class StateLog:
@@ -117,13 +92,15 @@ MOST: Final = 2 * HORIZON  # chosen: entries that so many batches can produce
 
 
 class LoadEventLog:
-    """Called by the pipeline's thread with every estimate, after it is stored and shown."""
+    """Called with every stored window."""
+
+    NAME: Final = "load events"
 
     def __init__(self, setup: Setup, store: Store) -> None:
-        """Resumes from the stored batches."""
+        """Resumes from the windows that it has taken."""
         self._store = store
         rules = Rules.of(setup.calibrated.vehicle) if setup.calibrated else Rules()
-        self._ledger = restored(lambda: ledger_of(store.reader(), rules), Ledger(rules))
+        self._ledger = restored(lambda: ledger_of(store.reader(), rules, place_of(store, self.NAME)), Ledger(rules))
 
     def __call__(self, found: Estimate) -> None:
         for entry in self._ledger.add(found):
@@ -132,9 +109,9 @@ class LoadEventLog:
             log_event(Event.ENTRY, level=logging.DEBUG, id=entry.id, revision=entry.revision)
 
 
-def ledger_of(reader: StoreReader, rules: Rules) -> Ledger:
-    """The ledger at the last stop of the service, restored from the journal. Raises what the store's reader raises."""
-    page = reader.page((*BATCHES, REMAINDER), limit=HORIZON, newest_first=True, with_spectra=False)
+def ledger_of(reader: StoreReader, rules: Rules, place: str | None = None) -> Ledger:
+    """The ledger behind a place in the journal, None: its end. Raises what the store's reader raises."""
+    page = reader.page(WINDOWS, limit=HORIZON, newest_first=True, with_spectra=False, cursor=up_to(place))
     estimates = reader.understood(reversed(page.items), read_estimate)
     known: list[Entry] = []
     first_ns = min((one.t_start_ns for one in estimates), default=0)  # not the oldest's: clocks are put back

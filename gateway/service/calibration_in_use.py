@@ -1,8 +1,10 @@
-"""The calibration that a service uses: the one made on the vehicle, else the configured file."""
+"""The calibration that a service uses: the one learnt or made on the vehicle, else the configured file."""
 
 from gateway.config import Settings
 from gateway.errors import ConfigurationError
 from gateway.service.commissioning.record import FILE_NAME, CommissioningRecord
+from gateway.service.learner.book import FILE_NAME as LEARNING
+from gateway.service.learner.book import LearningRecord
 from gateway.service.record_file import load_record
 from gateway.setup import Setup, setup_of
 
@@ -14,21 +16,43 @@ def why_not_allowed(settings: Settings) -> str | None:
     return None
 
 
+def why_not_learning(settings: Settings) -> str | None:
+    """Why the vehicle may not be learnt here; None if it may."""
+    if not settings.learning.is_allowed:
+        return "[learning] is_allowed = false: calibrations come by file"
+    return None
+
+
 def with_commissioned(settings: Settings) -> Settings:
-    """The settings with the calibration that was made here and is in use; unchanged if there is none.
+    """The settings with the calibration that was learnt or made here and is in use; unchanged if there is none.
 
     An invalid record is ignored here: the service sets it aside and reports it.
     """
-    if why_not_allowed(settings) is not None:
+    name = _learnt(settings) or _made(settings)
+    if name is None:
         return settings
+    path = settings.store.directory / name
+    return settings.model_copy(update={"calibration": path, "estimator": "cross_spectrum"})
+
+
+def _learnt(settings: Settings) -> str | None:
+    if why_not_learning(settings) is not None:
+        return None
+    try:
+        active = load_record(settings.store.directory / LEARNING, LearningRecord()).active
+    except ConfigurationError:
+        return None
+    return None if active is None else active.file_name
+
+
+def _made(settings: Settings) -> str | None:
+    if why_not_allowed(settings) is not None:
+        return None
     try:
         active = load_record(settings.store.directory / FILE_NAME, CommissioningRecord()).active
     except ConfigurationError:
-        return settings
-    if active is None:
-        return settings
-    path = settings.store.directory / active.file_name
-    return settings.model_copy(update={"calibration": path, "estimator": "cross_spectrum"})
+        return None
+    return None if active is None else active.file_name
 
 
 def commissioned(settings: Settings) -> tuple[Settings, Setup, str | None]:

@@ -4,10 +4,10 @@ import asyncio
 import contextlib
 import logging
 import signal
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 from gateway.bus.live.source import OpenReceiver, SourceState
 from gateway.bus.signals import Decoder
@@ -15,13 +15,16 @@ from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event
 from gateway.notify import Notifier
+from gateway.part import ServicePart
 from gateway.service.alarms import AlarmService, rules_of
-from gateway.service.batch_log import BatchLog, Listeners, LoadEventLog, StateLog
-from gateway.service.part import CLOSE_WITHIN_S, Deadline, Questions, in_own_thread, stop_in_turn
+from gateway.service.batch_log import BatchLog, LoadEventLog, StateLog
+from gateway.service.journal_reader import JournalReader
+from gateway.service.part import CLOSE_WITHIN_S, Deadline, Periodic, Questions, in_own_thread, stop_in_turn
 from gateway.service.parts import (
     board_of,
     commissioning_of,
     keeper_of,
+    learner_of,
     ring_log_of,
     source_of,
     store_of,
@@ -29,7 +32,7 @@ from gateway.service.parts import (
     uplink_of,
     webhook_of,
 )
-from gateway.service.pipeline import Pipeline
+from gateway.service.pipeline import Beside, Pipeline
 from gateway.service.status import StatusReport
 from gateway.service.verification.known_weights import KnownWeightService
 from gateway.service.verification.verification import VerificationService
@@ -45,6 +48,7 @@ SUPERVISE_S = 0.25  # chosen: interval between checks for dead parts
 LOOK_S = 1.0  # chosen: interval between checks of the whole status
 ASLEEP_SUPERVISE_S = 2.0  # chosen: the same two while the bus is silent, to save the battery of a parked vehicle
 ASLEEP_LOOK_S = 5.0  # chosen
+ASK_S = 5.0  # chosen: interval between the service's own questions to its web server; systemd waits for 20 s
 BUS_WITHIN_S = 2.0  # chosen: for the bus reader during a stop
 PIPELINE_WITHIN_S = 10.0  # chosen: for the pipeline: a full inbox contains several windows
 FLUSH_WITHIN_S = 8.0  # chosen: for writing to the disk
@@ -68,8 +72,11 @@ class Gateway:
         known_loads: KnownLoads | None = None,
         open_receiver: OpenReceiver | None = None,
         setup_fault: str | None = None,
+        by_file: Path | None = None,
     ) -> None:
-        """``setup_fault`` says why the calibration that was made on the vehicle is not in use.
+        """``by_file`` is the calibration that the settings name, if another one is in use.
+
+        ``setup_fault`` says why the calibration that was made on the vehicle is not in use.
 
         ``open_receiver`` replaces the bus interface (soak run).
         """
@@ -92,19 +99,19 @@ class Gateway:
         flow = setup.flow(replace(settings.batch.for_core(is_live=True), position_decimals=settings.position.decimals))
         self.keeper = keeper_of(settings.keep, settings.store, setup)
         self.commissioning = commissioning_of(settings, setup, self.keeper, flow, self.store)
+        self.learner = learner_of(settings, by_file or settings.calibration, setup, flow, self.store)
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.ring_log = ring_log_of(settings, setup)
         subject = setup.subject
         self.alarms = AlarmService(rules_of(settings.alarms), subject, self.store)
         events = LoadEventLog(setup, self.store)
-        self.listeners = Listeners({"the log of batches": log_batch, "load events": events, "alarms": self.alarms})
+        self.readers = [JournalReader(one.NAME, self.store, one) for one in (log_batch, events, self.alarms)]
         self.pipeline = Pipeline(
             self.source.inbox,
             Decoder(setup.signal_map),
             flow,
             self.store,
             self.board,
-            self.listeners,
             self.ring_log.put if self.ring_log else lambda frames: None,
         )
         self.uplink = uplink_of(broker, setup, self.store, with_places=with_places)
@@ -134,7 +141,7 @@ class Gateway:
             self.ring_log,
             self.verification.status,
             alarms=self.alarms.summary,
-            warnings=self._warnings,
+            faults=self._faults,
         )
         app = create_app(
             self.board,
@@ -147,38 +154,44 @@ class Gateway:
             known_loads=known_loads,
             verification=self.verification,
             alarms=self.alarms.standing,
+            learner=self.learner,
             are_places_read=settings.position.forward,
         )
-        web = server_config(app, settings.web.host, settings.web.port, tls)
-        self._server = WebServer(web)
+        self._server = WebServer(server_config(app, settings.web.host, settings.web.port, tls))
         self._notifier = Notifier()
+        self._checks = Beside()
         self._stopping = asyncio.Event()
         self._failure: str | None = None
-        self._web_fault: str | None = None
-        self._vital = (self.store, self.pipeline, self.source)  # each tuple in the order of the start
-        optional = (self.ring_log, self.uplink, self.webhook)
-        present = (part for part in optional if part is not None)
-        self._beside = (self.commissioning, self.keeper, *present)
+        beside = (
+            self.commissioning,
+            self.learner,
+            self.keeper,
+            *self.readers,
+            self.ring_log,
+            self.uplink,
+            self.webhook,
+        )
+        self._beside = [part for part in beside if part is not None]
+        self.parts: list[ServicePart] = [self.store, *self._beside, self.pipeline, self.source]  # in order of start
         self.needs_restart = False  # with the calibration that was made meanwhile; see life.py
 
-    def _warnings(self) -> tuple[str, ...]:
-        """Faults that do not stop the weighing, as sentences for people."""
-        faults = [self._tokens.fault, self._setup_fault, self._web_fault, self.known_weights.fault]
-        faults += [self.verification.fault, self.listeners.fault]
-        faults += [*(part.fault for part in self._vital), *(part.shown_fault() for part in self._beside)]
+    def _faults(self) -> tuple[str, ...]:
+        """Faults of parts that the status does not tell of, as sentences for people."""
+        faults = [self._tokens.fault, self._setup_fault, self._server.fault, self.known_weights.fault]
+        faults += [self.verification.fault, self._checks.fault, *(part.fault for part in self.parts)]
         return tuple(fault for fault in faults if fault)
 
     @property
     def url(self) -> str:
-        port = self._server.servers[0].sockets[0].getsockname()[1]
-        scheme = "https" if self._server.config.is_ssl else "http"
         host = self._settings.web.host
-        return f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
+        return f"{self._server.scheme}://{f'[{host}]' if ':' in host else host}:{self._server.port}"
 
     @property
     def has_caught_up(self) -> bool:
-        """Whether every received frame has been processed."""
-        return self.pipeline.n_frames == self.source.counts().frames - self.source.inbox.dropped
+        """Whether every received frame has been processed, and every reader has read the journal."""
+        if self.pipeline.n_frames != self.source.counts().frames - self.source.inbox.dropped:
+            return False
+        return all(reader.has_caught_up for reader in self.readers)
 
     def request_stop(self) -> None:
         """Request a stop, from the thread of the event loop (other threads: loop.call_soon_threadsafe)."""
@@ -186,7 +199,7 @@ class Gateway:
 
     def run(self) -> None:
         """Serve until SIGTERM or SIGINT. Raises GatewayFailedError with a clear line when a part dies."""
-        with asyncio.Runner(loop_factory=self._server.config.get_loop_factory()) as runner:
+        with asyncio.Runner(loop_factory=self._server.loop_factory()) as runner:
             runner.run(self._serve())
         if self._failure is not None:
             raise GatewayFailedError(self._failure)
@@ -198,41 +211,42 @@ class Gateway:
             loop.add_signal_handler(number, self.request_stop)
         bus = self._settings.bus
         log_event(Event.STARTED, version=self.status().version, interface=bus.interface, channel=bus.channel)
-        for part in (*self._beside, *self._vital):
+        for part in self.parts:
             part.start()
         self.store.write_event("started", {"interface": self._settings.bus.interface})
-        serving = asyncio.create_task(self._serve_web())
+        serving = asyncio.create_task(self._server.serve())
         try:
             await self._supervise(serving)
         except Exception as failure:  # noqa: BLE001 - accepted records still have to reach the disk
             self._failure = f"the supervisor died: {failure!r}"
-        await in_own_thread(self._stop_parts)
+        try:
+            await in_own_thread(self._stop_parts)
+        except Exception as failure:  # noqa: BLE001 - the process has to end all the same
+            self._failure = self._failure or f"the stop failed: {failure!r}"
         self._server.end()
         await serving
         self._notifier.close()
 
-    async def _serve_web(self) -> None:
-        """Run uvicorn. A failed start raises SystemExit, which must not leave the task."""
-        with contextlib.suppress(SystemExit):
-            await self._server.serve()
-
     async def _supervise(self, serving: asyncio.Task[None]) -> None:
         """Report readiness, watchdog and status to systemd until a stop request or the death of a vital part."""
-        is_ready, seen = False, -1
-        look = PeriodicCheck(self)
+        is_ready, seen, log_state = False, -1, StateLog(self.board)
+        look = Periodic(lambda: in_own_thread(lambda: self._checks.call("check of the status", self.look, log_state)))
+        ask = Periodic(self._server.is_answering)
         while not self._stopping.is_set() and self._failure is None:
             self._failure = self._dead_part(serving)
-            if self._server.started and not is_ready:
+            if self._server.is_started and not is_ready:
                 is_ready = True
                 self._notifier.send(READY="1")
                 log_event(Event.READY, url=self.url)
                 self._on_started(self)
-            if self.pipeline.progress != seen:
+            is_asked = is_ready and (self._notifier.is_heard or self._server.fault is not None)
+            if is_asked and ask.go_on(ASK_S) and self.pipeline.progress != seen:
                 seen = self.pipeline.progress
                 self._notifier.send(WATCHDOG="1")
             is_asleep = is_ready and self.source.state is SourceState.BUS_SILENT
             look.go_on(ASLEEP_LOOK_S if is_asleep else LOOK_S)
-            if self.commissioning.is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
+            is_due = self.learner.is_due or self.commissioning.is_due
+            if is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
                 self.needs_restart = True
                 self.request_stop()
             with contextlib.suppress(TimeoutError):
@@ -241,57 +255,42 @@ class Gateway:
     def look(self, log_state: StateLog) -> None:
         """One check of the service's state, in a thread because it may wait for a lock or a disk."""
         now = self.status()
-        log_state(now)
-        self.alarms.watch(now)
+        self._checks.call("log of states", log_state, now)
+        causes = [cause.text for cause in self.pipeline.decoder.causes()]
+        self._checks.call("alarms", self.alarms.watch, now, causes)
         self._notifier.send_status(now.sentence())
 
     def _dead_part(self, serving: asyncio.Task[None]) -> str | None:
         """Which vital part died, and why; None while all work."""
-        for part in self._vital:
-            if (death := part.death()) is not None:
+        for part in self.parts:
+            if part.IS_VITAL and (death := part.death()) is not None:
                 return f"the {part.NAME} {death}"
-        if serving.done() and not self._server.started:
+        if serving.done():
             return f"the web server could not run on {self._settings.web.host}:{self._settings.web.port}: is it taken?"
-        if serving.done() and self._web_fault is None:
-            self._web_fault = "the web server died; weighing goes on, a restart brings it back"
-            log_event(Event.WEB_DIED, level=logging.ERROR)
         return None
 
     def _stop_parts(self) -> None:
         """Stop the bus, then the pipeline, then flush the store, so that every accepted estimate is on disk before the
-        other parts stop.
+        other parts stop; the store is the last. What fails on the way keeps no other from its turn.
 
         All share one deadline. Parts that hang are abandoned.
         """
         deadline = Deadline()
+        late: list[str] = []
         self._notifier.send(STOPPING="1", STATUS="Stopping.")
-        self.commissioning.ignore_batches()  # a batch cut short by the stop is not the end of a window
-        self.source.stop(deadline.left_s(BUS_WITHIN_S))
-        self.pipeline.stop(deadline.left_s(PIPELINE_WITHIN_S))
-        self.store.flush(deadline.left_s(FLUSH_WITHIN_S))
-        late = stop_in_turn(self._beside, deadline)
-        self.board.close()
+        with contextlib.ExitStack() as steps:  # the last is done first
+            steps.callback(lambda: self._close_store(deadline, late))
+            steps.callback(self.board.close)
+            steps.callback(lambda: late.extend(stop_in_turn(self._beside, deadline)))
+            steps.callback(lambda: self.store.flush(deadline.left_s(FLUSH_WITHIN_S)))
+            steps.callback(lambda: self.pipeline.stop(deadline.left_s(PIPELINE_WITHIN_S)))
+            steps.callback(lambda: self.source.stop(deadline.left_s(BUS_WITHIN_S)))
+            steps.callback(self.commissioning.ignore_batches)  # a batch cut short by the stop ends no window
+
+    def _close_store(self, deadline: Deadline, late: Sequence[str]) -> None:
         self.store.write_event("stopped", {"failure": self._failure})
-        n_lost = self.store.close(max(CLOSE_WITHIN_S, deadline.left_s()))
+        n_lost = self.store.close(max(CLOSE_WITHIN_S, deadline.left_s())) + self.store.health().n_dropped
+        if n_lost and self._failure is None:
+            self._failure = f"{n_lost} records could not be stored: {self.store.health().reason or 'there was no time'}"
         level = logging.ERROR if n_lost or late or self._failure else logging.INFO
         log_event(Event.STOPPED, level=level, failure=self._failure, rows_lost=n_lost)
-
-
-class PeriodicCheck:
-    """Runs :meth:`Gateway.look` periodically in a thread; a check never overlaps the one before."""
-
-    def __init__(self, gateway: Gateway) -> None:
-        self._gateway = gateway
-        self._log_state = StateLog(gateway.board)
-        self._task: asyncio.Task[None] | None = None
-        self._begun_s = -ASLEEP_LOOK_S
-
-    def go_on(self, every_s: float) -> None:
-        """Start the next check if ``every_s`` have passed. Raises what the last one raised."""
-        if self._task is not None and self._task.done():
-            task, self._task = self._task, None
-            task.result()
-        now_s = time.monotonic()
-        if self._task is None and now_s - self._begun_s >= every_s:
-            self._begun_s = now_s
-            self._task = asyncio.create_task(in_own_thread(lambda: self._gateway.look(self._log_state)))

@@ -67,7 +67,7 @@ class BatchKeeper(ThreadPart):
                 if handed is not None and _counts(handed.batch):
                     self._lose("the disk was too slow for the stop")
 
-    def _run(self) -> None:
+    def _work(self) -> None:
         while True:
             handed = self._waiting.get()
             try:

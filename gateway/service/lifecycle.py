@@ -94,6 +94,7 @@ def live(
         setup_fault=fault,
         on_started=on_started,
         open_receiver=open_receiver,
+        by_file=settings.calibration,
     )
     gateway.run()
     return gateway.needs_restart

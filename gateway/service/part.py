@@ -2,16 +2,18 @@
 
 import asyncio
 import logging
+import math
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from typing import Final
+from typing import Any, Final, Generic, TypeVar
 
 from gateway.log import Event, log_event
 from gateway.part import ServicePart
 
+T = TypeVar("T")
 STOP_WITHIN_S: Final = 25.0  # chosen: for all parts together: less than systemd waits before it kills the process
 PART_WITHIN_S: Final = 5.0  # chosen: for one part, after the pipeline and the store
 CLOSE_WITHIN_S: Final = 3.0  # chosen: reserved for the last records of the stop itself
@@ -60,6 +62,25 @@ async def in_own_thread(work: Callable[[], object]) -> None:
 
     threading.Thread(target=run, name="beside", daemon=True).start()
     await done
+
+
+class Periodic(Generic[T]):
+    """Does some work of the event loop every so often; a turn never overlaps the one before."""
+
+    def __init__(self, work: Callable[[], Coroutine[Any, Any, T]]) -> None:
+        self._work = work
+        self._task: asyncio.Task[T] | None = None
+        self._begun_s = -math.inf
+
+    def go_on(self, every_s: float) -> T | None:
+        """Begin the next turn if ``every_s`` have passed -> the result of one that has ended. Raises what it raised."""
+        task, ended = self._task, None
+        if task is not None and task.done():
+            self._task, ended = None, task.result()
+        if self._task is None and time.monotonic() - self._begun_s >= every_s:
+            self._begun_s = time.monotonic()
+            self._task = asyncio.create_task(self._work())
+        return ended
 
 
 def stop_in_turn(parts: Sequence[ServicePart], deadline: Deadline) -> list[str]:

@@ -1,6 +1,8 @@
 """The parts of a service, each built from its section of the settings."""
 
+from contextlib import suppress
 from importlib.metadata import version
+from pathlib import Path
 
 from gateway.bus.live.source import LiveSource, OpenReceiver
 from gateway.bus.ring_log import RingLog
@@ -8,12 +10,14 @@ from gateway.calibration.file.calibration_file import load_calibration
 from gateway.calibration.kept.shelf import FOLDER, Shelf, ShelfLimits
 from gateway.config import BusSection, Settings, StoreSection
 from gateway.config.sections import KeepSection
+from gateway.errors import CalibrationFileError
 from gateway.estimate_json import read_estimate
 from gateway.log import Event, log_event
-from gateway.service.calibration_in_use import why_not_allowed
+from gateway.service.calibration_in_use import why_not_allowed, why_not_learning
 from gateway.service.commissioning.empty_drive import ServiceVehicle
 from gateway.service.commissioning.session import Commissioning
 from gateway.service.keeper import BatchKeeper
+from gateway.service.learner.learner import Learner, LearnerVehicle
 from gateway.setup import Setup
 from gateway.store import Latest, Retention, Store, restored
 from gateway.units import BYTES_PER_MB, S_PER_DAY
@@ -68,7 +72,9 @@ def store_of(wanted: StoreSection, *receivers: UplinkSettings | WebhookSettings 
 
 def board_of(stale_after_s: float, store: Store, setup: Setup) -> Board:
     """The board with the last stored estimates; an unreadable disk does not prevent the start."""
-    board = Board(stale_after_s=stale_after_s, unweighed=Scales(setup.calibrated).weigh(None))
+    board = Board(
+        stale_after_s=stale_after_s, unweighed=Scales(setup.calibrated).weigh(None), is_stored=store.is_stored
+    )
     reader = store.reader()
     latest = restored(reader.latest, Latest(None, None, None))
     answer, refusal = (
@@ -111,6 +117,37 @@ def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow
     )
     flow.on_batch, keeper.listener = keeper.keep, desk
     return desk
+
+
+def learner_of(settings: Settings, by_file: Path | None, setup: Setup, flow: Flow, store: Store) -> Learner:
+    """The learner, handed every window of the flow; ``by_file`` is the calibration that the settings name."""
+    own_name, like = settings.vehicle.calibrated_as, settings.learning.like
+    sister = load_calibration(like).vehicle if like else None
+    in_file = None
+    if by_file is not None:
+        with suppress(CalibrationFileError):  # a service that weighs by what it learnt does not need it
+            in_file = load_calibration(by_file).vehicle
+    learner = Learner(
+        settings.store.directory,
+        settings.learning,
+        settings.batch.for_core(),
+        flow.scheduler,
+        setup.signal_map,
+        LearnerVehicle(
+            id=settings.vehicle.id,
+            name=own_name or settings.vehicle.id,
+            signals_id=setup.signal_map.id,
+            why_not_allowed=why_not_learning(settings),
+            is_name_fixed=own_name is not None,
+            like=like,
+            sister=sister,
+            by_file=by_file,
+            in_file=in_file,
+        ),
+        on_event=store.write_event,
+    )
+    flow.on_window = learner.take
+    return learner
 
 
 def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | None) -> LiveSource:

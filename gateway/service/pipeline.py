@@ -8,13 +8,12 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Final
+from typing import Final, ParamSpec
 
 from gateway.bus.live.receiver import Inbox
 from gateway.bus.signals import Decoder
 from gateway.core.fusion import WeighedLoad
 from gateway.estimate import Estimate
-from gateway.estimate_json import estimate_to_json
 from gateway.log import Event, log_event
 from gateway.model.sensors import NOISE_RATIOS
 from gateway.model.spectra import NOISY_RATIO
@@ -36,13 +35,46 @@ NOISY: Final = (
     "{} {:.1f} times as noisy as expected in the last batch: look for a loose mount, a bad supply or a changed filter "
     "or range in the device; weighing goes on where possible"
 )
+P = ParamSpec("P")
 LATE_S: Final = 1.0  # chosen: longest delay between the stamp of a frame and its arrival here
+
+
+class Beside:
+    """Calls the pipeline's neighbours. What one raises is its own fault until it succeeds again; weighing goes on."""
+
+    def __init__(self) -> None:
+        self._faults: dict[str, str] = {}
+
+    def call(self, name: str, neighbour: Callable[P, object], *args: P.args, **named: P.kwargs) -> None:
+        try:
+            neighbour(*args, **named)
+        except Exception as failure:  # noqa: BLE001 - whatever it is, weighing does not depend on it
+            if name not in self._faults:
+                log_event(Event.PART_FAILED, level=logging.ERROR, part=name, failure=repr(failure))
+            self._faults[name] = repr(failure)
+        else:
+            self._faults.pop(name, None)
+
+    def guarded(self, name: str, neighbour: Callable[P, object]) -> Callable[P, None]:
+        """The same as a function."""
+
+        def call(*args: P.args, **named: P.kwargs) -> None:
+            self.call(name, neighbour, *args, **named)
+
+        return call
+
+    @property
+    def fault(self) -> str | None:
+        """Who failed with the last call, for people."""
+        told = (f"the {name} failed: {failure}; weighing goes on" for name, failure in self._faults.copy().items())
+        return "; ".join(told) or None
 
 
 class Pipeline(ThreadPart):
     """Runs until :meth:`stop`."""
 
     NAME = "pipeline"
+    IS_VITAL = True
 
     def __init__(
         self,
@@ -51,10 +83,9 @@ class Pipeline(ThreadPart):
         flow: Flow,
         store: Store,
         board: Board,
-        on_batch: Callable[[Estimate], None] = lambda found: None,
         on_frames: Callable[[Frames], None] = lambda frames: None,
     ) -> None:
-        """``on_batch`` receives every estimate once it is stored and shown, ``on_frames`` all decoded frames."""
+        """``on_frames`` receives all decoded frames."""
         super().__init__("pipeline")
         self.decoder = decoder
         self.flow = flow
@@ -71,8 +102,10 @@ class Pipeline(ThreadPart):
         self._inbox = inbox
         self._store = store
         self._board = board
-        self._on_batch = on_batch
         self._on_frames = on_frames
+        self._beside = Beside()
+        flow.on_batch = self._beside.guarded("batch keeper", flow.on_batch)
+        flow.on_window = self._beside.guarded("learner", flow.on_window)
 
     def stop(self, within_s: float = STOP_WITHIN_S) -> None:
         """Process the rest of the inbox, close the open window, and end."""
@@ -90,17 +123,13 @@ class Pipeline(ThreadPart):
         newest_s = max(self.watch.last_heard.values(), default=0.0)
         return self.flow.scheduler.drive_start_ns is None or time.monotonic() - newest_s > silence_s
 
-    def _run(self) -> None:
+    def _work(self) -> None:
         _name_this_thread("pipeline")
-        try:
-            while not self._stopping.is_set():
-                self._turn(ASLEEP_DRAIN_S if self.flow.scheduler.drive_start_ns is None else DRAIN_S)
-            while self._turn(0.0):
-                pass
-            self._hand_over(self.flow.flush())
-        except BaseException as failure:  # noqa: BLE001 - kept for the service, which ends the process with it
-            self.failure = failure
-            log_event(Event.PIPELINE_DIED, level=logging.CRITICAL, failure=repr(failure))
+        while not self._stopping.is_set():
+            self._turn(ASLEEP_DRAIN_S if self.flow.scheduler.drive_start_ns is None else DRAIN_S)
+        while self._turn(0.0):
+            pass
+        self._hand_over(self.flow.flush())
 
     def _turn(self, timeout_s: float) -> bool:
         """One drain of the inbox; True if there were frames."""
@@ -111,11 +140,11 @@ class Pipeline(ThreadPart):
             self._hear_nothing(min(time.monotonic() - begun_s, timeout_s))
             return False
         self._silent_s = 0.0
-        self._on_frames(frames)
+        self._beside.call("recorder", self._on_frames, frames)
         motion = self.decoder.decode(frames)
         if len(motion):
-            self.watch.saw(motion)
-            self.standing.saw(motion)
+            self._beside.call("watch of signals", self.watch.saw, motion)
+            self._beside.call("watch of stops", self.standing.saw, motion)
             self._hand_over(self.flow.feed(motion))
         self.n_frames += len(frames)
         return True
@@ -133,19 +162,18 @@ class Pipeline(ThreadPart):
             self._count(found)
             if self.flow.weighed is not self._weighed_at[0]:
                 self._weighed_at = (self.flow.weighed, boot_clock_s())
-            if found.is_remainder:
-                self._store.write_remainder(estimate_to_json(found))
-            else:
-                self._board.publish(found)  # before the store, so that followers of the journal find it on the board
-                if not found.is_provisional:
-                    self._store.write_estimate(estimate_to_json(found))
-            self._on_batch(found)
+            if not found.is_remainder:  # before the journal, so that its readers find it on the board
+                self._beside.call("board", self._board.publish, found)
+            if not found.is_provisional:
+                self._beside.call("journal", self._store.write_window, found)
 
     @property
     def fault(self) -> str | None:
-        """Frames that the decoder refuses, and faults of sensors that do not stop the weighing, for people."""
+        """Frames that the decoder refuses, and faults of sensors and neighbours that do not stop the weighing, for
+        people.
+        """
         refused = (remark.text for remark in self.decoder.causes())
-        return "; ".join(filter(None, (*refused, self.roll_rate_fault, self.noise_fault))) or None
+        return "; ".join(filter(None, (*refused, self.roll_rate_fault, self.noise_fault, self._beside.fault))) or None
 
     def _count(self, found: Estimate) -> None:
         if math.isfinite(found.roll_usable_share) and not found.is_remainder:

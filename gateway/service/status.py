@@ -24,6 +24,7 @@ from gateway.status import (
     State,
     Status,
     VerificationStatus,
+    judged,
 )
 from gateway.store import Store
 from gateway.uplink.uplink import Uplink
@@ -56,16 +57,14 @@ class StatusReport:
     verification: Callable[[], VerificationStatus] = VerificationStatus
     _: KW_ONLY
     alarms: Callable[[], AlarmsStatus] = AlarmsStatus
-    warnings: Callable[[], tuple[str, ...]] = tuple
+    faults: Callable[[], tuple[str, ...]] = tuple
     version: str = field(init=False, default_factory=partial(version, "springscale"))  # read from a file, once
     started_s: float = field(init=False, default_factory=time.monotonic)
 
     def __call__(self) -> Status:
-        state = self.state()
-        not_ready = self._why_not_ready(state)
-        return Status(
+        now = Status(
             version=self.version,
-            state=state,
+            state=self.state(),
             uptime_s=time.monotonic() - self.started_s,
             vehicle_id=self.setup.identity.vehicle_id,
             vin=self.setup.identity.vin,
@@ -88,18 +87,8 @@ class StatusReport:
             record=self.ring_log.status() if self.ring_log else None,
             verification=self.verification(),
             alarms=self.alarms(),
-            is_ready=not_ready is None,
-            not_ready_reason=not_ready,
-            warnings=self.warnings(),
         )
-
-    def _why_not_ready(self, state: State) -> str | None:
-        """Why no estimate is possible; None if one is. A sleeping bus or a parked vehicle is no reason."""
-        if state is State.READER_FAULT:
-            return self.source.reason
-        if self.setup.calibration is None:
-            return "no calibration: batches carry spectra only; name a calibration file in the configuration"
-        return None
+        return judged(now, self.faults())
 
     def state(self) -> State:
         """The worst state that applies."""

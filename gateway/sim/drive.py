@@ -113,7 +113,7 @@ def _random_drive(
     stop_share: float,
     lateral_mps2: float,
 ) -> Drive:
-    """Legs at random until the time is used up, from rest to rest, with wandering speed and curves."""
+    """A drive of random legs with wandering speed and curves, from rest to rest, as long as asked."""
     legs: list[Leg] = [Leg(0.0, 3.0)]
     left_s = duration_s - 40.0
     while left_s > 0.0:

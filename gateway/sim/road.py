@@ -105,7 +105,7 @@ def iso_roughness_m3(road_class: str) -> float:
 
 
 def iso_road(road_class: str) -> SpectralRoad:
-    """The middle of an ISO 8608 class, two tracks."""
+    """A road of two tracks in the middle of an ISO 8608 class."""
     return SpectralRoad(iso_roughness_m3(road_class))
 
 

@@ -75,7 +75,7 @@ def record(felt: Felt, sensors: Sensors, rng: np.random.Generator, start_ns: int
 
 
 def _turn(mount: Mount) -> F64:
-    """Rotation (3, 3); a row vector in vehicle axes times it is in the sensor's axes."""
+    """The matrix (3, 3) that turns row vectors from the vehicle's axes to the sensor's."""
     (sr, cr), (sp, cp), (sy, cy) = (
         (math.sin(math.radians(a)), math.cos(math.radians(a))) for a in (mount.roll_deg, mount.pitch_deg, mount.yaw_deg)
     )

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from gateway.errors import StoreError
-from gateway.history import BATCHES, ESTIMATE, KINDS
+from gateway.history import BATCHES, ESTIMATE, KINDS, REMAINDER
 from gateway.log import Event, log_event
 from gateway.store.queries import INSERT, Stored, is_good, stored_row
 from gateway.store.retention import AgeClock, Retention, remove_old, remove_share
@@ -309,7 +309,7 @@ class Database:
             connection.execute("INSERT INTO epochs (id) VALUES (?)", (new_epoch,))
         epoch, last_batch = known or (new_epoch, 0)
         sql = "SELECT max(seq) FROM journal WHERE kind = ?"
-        newest = {kind: connection.execute(sql, (kind,)).fetchone()[0] or 0 for kind in KINDS}
+        newest = {kind: connection.execute(sql, (kind,)).fetchone()[0] or 0 for kind in (*KINDS, REMAINDER)}
         return Opened(epoch, _last_number(connection, "journal"), last_batch, newest)
 
 

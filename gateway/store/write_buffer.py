@@ -3,6 +3,7 @@
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -84,7 +85,8 @@ class WriteBuffer:
             numbered = self._numbered(row)
             self._add(numbered)
             for on_news in self._listeners.values():
-                on_news()
+                with suppress(Exception):  # whoever follows has faults of its own, and no part in the writing
+                    on_news()
             return f"{self._epoch}-{numbered.seq}"
 
     def add(self, document: DocumentRow) -> None:

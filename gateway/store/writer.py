@@ -12,6 +12,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.errors import StoreError
+from gateway.estimate import Estimate
+from gateway.estimate_json import estimate_to_json
+from gateway.files.reserve import Reserve
 from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, REMAINDER, SERVICE, Delivery
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ServicePart
@@ -38,10 +41,12 @@ class Store(ServicePart):
     """
 
     NAME = "database writer"
+    IS_VITAL = True
 
     def __init__(self, directory: Path, retention: Retention, clock_ns: Callable[[], int]) -> None:
         self.path = directory / FILE_NAME
         self._database = Database(directory, retention)
+        self._reserve = Reserve(directory)
         self._clock_ns = clock_ns
         self._boot_id = _boot_id()
         self._buffer = WriteBuffer(retention.max_held, epoch=secrets.token_hex(4))
@@ -84,9 +89,13 @@ class Store(ServicePart):
         kind = REJECTION if record["rejected"] else ESTIMATE
         return self._append(kind, record["id"], record["t_end_ns"], json_line(record))
 
-    def write_remainder(self, record: Mapping[str, Any]) -> None:
-        """Accept a remainder that is too short to be a batch; it is neither shown in the history nor sent."""
-        self._append(REMAINDER, record["id"], record["t_end_ns"], json_line(record))
+    def write_window(self, found: Estimate) -> None:
+        """Accept a window's estimate, rejection or remainder; the last is neither shown in the history nor sent."""
+        record = estimate_to_json(found)
+        if found.is_remainder:
+            self._append(REMAINDER, record["id"], record["t_end_ns"], json_line(record))
+        else:
+            self.write_estimate(record)
 
     def write_entry(self, kind: str, entry_id: str, t_end_ns: int, text: str, revision: int = 1) -> str:
         """Accept a new revision of a load event, trip or alarm -> its cursor; it replaces the earlier revision."""
@@ -111,6 +120,10 @@ class Store(ServicePart):
         record, in the thread that writes it, and must not block. Raises ValueError for a text that is not a cursor.
         """
         return Follower(self._buffer, self.reader(), self._linked, kinds, after, on_news)
+
+    def is_stored(self, record_id: str) -> bool:
+        """Whether an accepted record is on disk."""
+        return not len(self._buffer) or all(row.id != record_id for row in self._buffer.held()[1])
 
     def head(self) -> str:
         return self._buffer.head()
@@ -137,6 +150,7 @@ class Store(ServicePart):
             n_pruned=self._n_pruned,
             size_bytes=self._size_bytes,
             set_aside=self._set_aside,
+            is_reserve_in_use=self._reserve.is_in_use,
             n_bad_records=self._database.n_bad_records + len(self._unread),
         )
 
@@ -241,6 +255,9 @@ class Store(ServicePart):
             self._lost.set()  # what failed may be a table that is missing: the next attempt looks
             if is_damaged(error):
                 return self._set_damaged_aside(error)
+            if self._reserve.give_up():
+                log_event(Event.STORE_RESERVE, level=logging.WARNING, reason=str(error))
+                return self._attempt()
             return self._degrade(f"{self.path}: {error}" if isinstance(error, sqlite3.Error) else str(error))
         return True
 
@@ -272,6 +289,7 @@ class Store(ServicePart):
         self._buffer.settle(stored)
         self._n_pruned += self._database.prune(self._clock_ns())
         self._size_bytes = self._database.size_bytes()
+        self._reserve.keep()
 
     def _degrade(self, reason: str) -> bool:
         """Report that the disk fails. The connection stays open, so readers need no new file."""

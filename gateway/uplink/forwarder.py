@@ -1,6 +1,5 @@
 """Base class of the senders: one thread that takes messages from an outbox, back-off, and a status report."""
 
-import random
 import time
 from abc import abstractmethod
 from contextlib import suppress
@@ -9,38 +8,14 @@ from typing import Final, Generic, TypeVar
 
 from gateway.errors import StoreError
 from gateway.history import Delivery
-from gateway.part import STOP_WITHIN_S, ThreadPart
+from gateway.part import FIRST_PAUSE_S, STOP_WITHIN_S, BackOff, ThreadPart
 from gateway.status import UplinkStatus, WebhookStatus
 from gateway.units import NS_PER_S
 from gateway.uplink.outbox import Outbox
 
-
-class BackOff:
-    """Exponential with full jitter: uniform between nothing and a ceiling that doubles up to ``last_s``.
-
-    Source: M. Brooker, "Exponential Backoff And Jitter", AWS Architecture Blog, 2015.
-    """
-
-    def __init__(self, first_s: float, last_s: float, draw: random.Random | None = None) -> None:
-        self._first_s = first_s
-        self._last_s = last_s
-        self._ceiling_s = first_s
-        self._draw = draw or random.Random()  # of the system's entropy: vehicles must not agree
-
-    def next_s(self) -> float:
-        pause_s = self._draw.uniform(0.0, self._ceiling_s)
-        self._ceiling_s = min(2.0 * self._ceiling_s, self._last_s)
-        return pause_s
-
-    def reset(self) -> None:
-        """Start again at ``first_s``, after a success."""
-        self._ceiling_s = self._first_s
-
-
 LOOK_S: Final = 5.0  # chosen: how often the backlog is counted
 IDLE_S: Final = 5.0  # chosen: how often what waits is counted; a new message is seen at once
 PAGE: Final = 100  # chosen: messages asked for at once
-FIRST_PAUSE_S: Final = 1.0  # chosen: ceiling of the first pause
 
 Report = TypeVar("Report", UplinkStatus, WebhookStatus)
 
@@ -53,10 +28,9 @@ class Forwarder(ThreadPart, Generic[Report]):
 
     def __init__(self, outbox: Outbox, report: Report, back_off: BackOff | None, back_off_max_s: float) -> None:
         """``back_off`` gives the pauses; without it they grow to ``back_off_max_s``."""
-        super().__init__(self.NAME)
+        super().__init__(self.NAME, back_off or BackOff(FIRST_PAUSE_S, back_off_max_s))
         self._outbox = outbox
         self._report: Report = report
-        self._back_off = back_off or BackOff(FIRST_PAUSE_S, back_off_max_s)
         self._looked_s = -LOOK_S
 
     def stop(self, within_s: float = STOP_WITHIN_S) -> None:
@@ -68,19 +42,11 @@ class Forwarder(ThreadPart, Generic[Report]):
         """The present report; safe from any thread. Its counts of waiting and pruned records are a few seconds old."""
         return self._report
 
-    def _run(self) -> None:
-        """Deliver until stopped. Every failure goes into the report and is retried."""
-        while not self._stopping.is_set():
-            try:
-                self._deliver()
-            except Exception as fault:  # noqa: BLE001 - no record, disk or receiver may end the thread
-                self._note(str(fault) or repr(fault))
-                self._outbox.rewind()
-                self._pause(self._back_off.next_s())
-
-    @abstractmethod
-    def _deliver(self) -> None:
-        """Deliver until stopped; raises an exception on failure."""
+    def _failed(self, failure: Exception) -> None:
+        """Put the failure into the report, and try again after a pause."""
+        self._note(str(failure) or repr(failure))
+        self._outbox.rewind()
+        self._pause(self._back_off.next_s())
 
     @abstractmethod
     def _note(self, fault: str) -> None:

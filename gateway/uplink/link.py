@@ -49,16 +49,22 @@ class BrokerAnswer:
 
 
 class MqttLink:
-    """Connects on construction, publishes the birth message and leaves the will with the broker.
+    """Connects on construction, leaves the will with the broker and publishes the birth message, which the broker must
+    acknowledge.
 
-    Raises LinkError if the broker cannot be reached or refuses the connection, ConfigurationError if a TLS or password
-    file cannot be used. One thread sends; paho's thread only puts what it hears into a queue.
+    Raises LinkError if the broker cannot be reached, refuses the connection or does not take the birth message,
+    ConfigurationError if a TLS or password file cannot be used. One thread sends; paho's thread only puts what it hears
+    into a queue.
     """
 
     def __init__(
-        self, settings: UplinkSettings, birth: Mapping[str, Any], on_loss: Callable[[], None] = lambda: None
+        self,
+        settings: UplinkSettings,
+        birth: Mapping[str, Any],
+        on_loss: Callable[[], None] = lambda: None,
+        is_stopping: Callable[[], bool] = lambda: False,
     ) -> None:
-        """``on_loss`` is called, in paho's thread, when the connection breaks."""
+        """``on_loss`` is called, in paho's thread, when the connection breaks; ``is_stopping`` ends the wait."""
         self._settings = settings
         self._on_loss = on_loss
         self._loss: str | None = None
@@ -68,7 +74,9 @@ class MqttLink:
         self._client = self._make_client()
         try:
             self._connect()
-            self._publish("status", json.dumps(birth), retain=True)
+            code = self._answer(self._publish("status", json.dumps(birth), retain=True), ANSWER_TIMEOUT_S, is_stopping)
+            if code is not None and code.is_failure:
+                raise LinkError(f"{settings.broker} does not take the birth message: {code}")
         except BaseException:
             self.abandon()
             raise

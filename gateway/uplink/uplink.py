@@ -6,13 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 from gateway.log import Event, log_event
+from gateway.part import BackOff
 from gateway.status import UplinkStatus
-from gateway.uplink.forwarder import IDLE_S, PAGE, BackOff, Forwarder
+from gateway.uplink.forwarder import IDLE_S, PAGE, Forwarder
 from gateway.uplink.link import LinkError, MqttLink
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import UplinkSettings
 
-Connect = Callable[[UplinkSettings, Mapping[str, Any], Callable[[], None]], MqttLink]
+Connect = Callable[[UplinkSettings, Mapping[str, Any], Callable[[], None], Callable[[], bool]], MqttLink]
 
 
 class Uplink(Forwarder[UplinkStatus]):
@@ -36,12 +37,13 @@ class Uplink(Forwarder[UplinkStatus]):
         self._settings = settings
         self._birth = {"state": "online", **birth}
         self._connect = connect
+        self._refusal: str | None = None  # of the last record, until one is accepted
 
-    def _deliver(self) -> None:
+    def _work(self) -> None:
         """Deliver until stopped. Raises LinkError if the connection breaks."""
-        link = self._connect(self._settings, self._birth, self._outbox.tell_news)
+        link = self._connect(self._settings, self._birth, self._outbox.tell_news, self._stopping.is_set)
         self._report = replace(
-            self._report, is_connected=True, n_connections=self._report.n_connections + 1, last_fault=None
+            self._report, is_connected=True, n_connections=self._report.n_connections + 1, last_fault=self._refusal
         )
         log_event(Event.UPLINK_CONNECTED, broker=self._settings.broker)
         try:
@@ -75,14 +77,17 @@ class Uplink(Forwarder[UplinkStatus]):
             return True
         report = self._report
         if answer.is_accepted:
-            self._report = replace(report, n_delivered=report.n_delivered + 1)
+            self._refusal = None
+            self._report = replace(report, n_delivered=report.n_delivered + 1, last_fault=None)
         elif answer.is_hopeless:
             log_event(
                 Event.UPLINK_REFUSED, level=logging.ERROR, broker=report.broker, id=message.id, reason=answer.reason
             )
-            self._report = replace(report, n_refused=report.n_refused + 1)
+            self._refusal = f"{report.broker} refuses records for good: {answer.reason}"
+            self._report = replace(report, n_refused=report.n_refused + 1, last_fault=self._refusal)
         else:
-            raise LinkError(f"{report.broker} does not take estimates: {answer.reason}")
+            self._refusal = f"{report.broker} does not take estimates: {answer.reason}"
+            raise LinkError(self._refusal)
         self._outbox.delivered(message)
         self._back_off.reset()
         return True

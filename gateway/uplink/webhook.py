@@ -1,6 +1,6 @@
 """The webhook: signed HTTP requests with alarms and events, posted one at a time, with retries.
 
-The format is that of Standard Webhooks (docs/adr/webhook-by-httpx.md).
+The format is that of Standard Webhooks (docs/architecture.md).
 """
 
 import asyncio
@@ -19,9 +19,10 @@ from typing import Any, Final
 from gateway.errors import ConfigurationError
 from gateway.history import ESTIMATE, Delivery
 from gateway.log import Event, OnEvent, log_event, tell_event
+from gateway.part import BackOff
 from gateway.records import json_line
 from gateway.status import WebhookStatus
-from gateway.uplink.forwarder import IDLE_S, PAGE, BackOff, Forwarder
+from gateway.uplink.forwarder import IDLE_S, PAGE, Forwarder
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import WebhookSettings
 
@@ -71,7 +72,7 @@ class Webhook(Forwarder[WebhookStatus]):
         self._settings, self._on_event, self._clock_s = settings, on_event, clock_s
         self._tls = settings.tls_context()
 
-    def _deliver(self) -> None:
+    def _work(self) -> None:
         while not self._stopping.is_set():
             messages = self._outbox.next_messages(PAGE)
             self._look()

@@ -1,8 +1,7 @@
 """The web application: one function that puts the parts together."""
 
 from collections import Counter
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Awaitable, Callable
 from typing import Any, Final
 
 from fastapi import Depends, FastAPI
@@ -28,6 +27,7 @@ from gateway.web.routes.known_weights import known_weights_router
 from gateway.web.routes.monitoring import alive_router, health_router, metrics_registry
 from gateway.web.routes.reasons import reasons_router
 from gateway.web.routes.spectra import spectra_router
+from gateway.web.routes.statements import statements_router
 from gateway.web.routes.vehicle import vehicle_router
 from gateway.web.routes.verification import verification_router
 from gateway.web.routes.weights import (
@@ -42,7 +42,7 @@ from gateway.web.schemas import problem_responses
 from gateway.weighing.calibrated import CalibratedVehicle
 
 API_VERSION: Final = "1.0.0"
-BODY_BYTES: Final = 32_768  # chosen: no route but an upload needs a tenth of it
+BODY_BYTES: Final = 2_000_000  # chosen: a table of statements, twenty thousand rows; all other bodies are small
 _DESCRIPTION: Final = """Payload and front axle share of a vehicle, weighed while it drives.
 
 Names end in the unit. Unknown is null. Errors are problem details (RFC 9457)."""
@@ -59,6 +59,7 @@ def create_app(
     known_loads: KnownLoads | None = None,
     verification: service.VerificationBackend | None = None,
     alarms: Callable[[], str] | None = None,
+    learner: service.LearnerBackend | None = None,
     *,
     are_places_read: bool = False,
 ) -> FastAPI:
@@ -71,17 +72,11 @@ def create_app(
     """
     responses: Counter[int] = Counter()
 
-    @asynccontextmanager
-    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
-        yield
-        board.close()
-
     app = _Application(
         wrap=lambda inner: SecurityHeaders(HeadAsGet(inner), responses),
         title="Springscale",
         version=API_VERSION,
         description=_DESCRIPTION,
-        lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,
@@ -92,7 +87,8 @@ def create_app(
     routers = [
         api_router(board, reader, status),
         reasons_router(),
-        vehicle_router(status, calibrated),
+        vehicle_router(status, calibrated, learner),
+        *([statements_router(learner)] if learner else ()),
         spectra_router(board, calibrated),
         *([known_weights_router(known_weights)] if known_weights else ()),
         *([verification_router(verification)] if verification else ()),
@@ -100,7 +96,7 @@ def create_app(
         export_router(reader),
         events_router(reader),
         *([alarms_router(reader, alarms)] if alarms else ()),
-        weights_router(board, scales),
+        weights_router(board, scales, status),
         cab_router(board, reader, status, scales),
         standards_router(board, scales),
         health_router(status, metrics),

@@ -1,4 +1,4 @@
-"""Pages for people: dashboard, cab page and the API's documentation, and plotly.js of the installed package."""
+"""Pages for people: dashboard, cab, teaching, the API's documentation, and plotly.js of the installed package."""
 
 import gzip
 import re
@@ -56,8 +56,8 @@ SWAGGER_FILES: Final = Path(str(files("fastapi_offline"))) / "static"
 
 
 def install(app: FastAPI, known_loads_path: str = "") -> None:
-    """/, /cab, /docs and the files they load. ``known_loads_path`` is the address of the true loads, if there are
-    any.
+    """/, /cab, /teach, /docs and the files they load. ``known_loads_path`` is the address of the true loads, if there
+    are any.
 
     Pages name files and routes relative to themselves, so that a proxy may serve them below a path of its own.
     """
@@ -73,6 +73,10 @@ def install(app: FastAPI, known_loads_path: str = "") -> None:
     @app.get("/cab", include_in_schema=False)
     async def cab() -> Response:
         return FileResponse(ASSETS / "cab.html", headers=asked_about)
+
+    @app.get("/teach", include_in_schema=False)
+    async def teach() -> Response:
+        return FileResponse(ASSETS / "teach.html", headers=asked_about)
 
     @app.get("/docs", include_in_schema=False)
     async def docs() -> Response:

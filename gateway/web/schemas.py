@@ -1,6 +1,5 @@
 """The shapes of the answers, for the API's description; board and store provide the finished bytes."""
 
-import json
 import re
 from datetime import UTC, datetime, timedelta, timezone
 from http import HTTPStatus
@@ -11,6 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSche
 
 from gateway.estimate import Lack
 from gateway.estimate_json import FIELDS, INSTANT, NUMBERS_BY_NAME, SPECTRA, WEIGHTS, EstimateField, Presence
+from gateway.stated.statement import HALF_CHARACTER, is_text
 from gateway.units import NS_PER_S
 
 _RFC_3339: Final = re.compile(
@@ -106,6 +106,14 @@ Latest: Final = create_model(
     __doc__="The last good estimate, ``age_s`` old; before any, nulls and ``no_estimate_yet``.",
     age_s=(float | None, Field(description="since its receipt, on a clock that never steps", examples=[42.0])),
     is_stale=(bool, Field(description="older than the service's stale_after_s", examples=[False])),
+    is_stored=(
+        bool | None,
+        Field(
+            description="false: in memory only, because the disk takes nothing; null: an early look or none, which is "
+            "not stored",
+            examples=[True],
+        ),
+    ),
     last_rejection=(Estimate | None, Field(description="the last batch without an answer (spectra left out)")),
 )
 
@@ -143,10 +151,8 @@ class Ready(BaseModel):
 
 def utf8_only(said: Any) -> Any:
     """JSON can escape half of a character (a lone surrogate): that is not text, and UTF-8 cannot encode it."""
-    try:
-        json.dumps(said, ensure_ascii=False, default=str).encode()
-    except UnicodeEncodeError:
-        raise ValueError("contains half a character (a lone surrogate), which is not text") from None
+    if not is_text(said):
+        raise ValueError(HALF_CHARACTER)
     return said
 
 

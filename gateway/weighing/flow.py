@@ -47,6 +47,7 @@ class Identity:
 
 
 OnBatch = Callable[[Batch, Estimate, Motion], None]
+OnWindow = Callable[[Batch, Motion], None]
 _TOO_LITTLE: Final = frozenset({Why.TOO_SHORT, Why.SPEED_SPREAD, Why.TOO_UNCERTAIN, Why.AMBIGUOUS})
 """Reasons that go away with more driving."""
 
@@ -58,7 +59,7 @@ class Flow:
     which wait in the pool (core.pool) for later windows.
     ``knowledge`` (from known weights) may be set from any thread and applies from the next batch on. ``weighed`` is the
     last load epoch with a counted batch, as measured; a known weight refers to it. ``on_batch`` is called for each
-    window before its estimate is returned, with the last estimate and the rows.
+    window before its estimate is returned, with the last estimate and the rows; ``on_window`` before it is weighed.
     """
 
     def __init__(
@@ -85,6 +86,7 @@ class Flow:
         self.weighed: WeighedLoad | None = None
         self._rules = Rules.of(calibrated.vehicle) if calibrated else Rules()
         self.on_batch: OnBatch = lambda batch, found, rows: None
+        self.on_window: OnWindow = lambda batch, rows: None
 
     @property
     def load_may_have_changed(self) -> bool:
@@ -120,6 +122,7 @@ class Flow:
         call it.
         """
         rows = self.scheduler.take_rows()
+        self.on_window(window, rows)
         found = [self._early(window)] if window.is_provisional else self._of_window(window, rows)
         if len(found) > 1:
             window = replace(window, rejected=(Why.LOAD_CHANGED,))

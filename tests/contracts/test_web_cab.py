@@ -26,31 +26,69 @@ def told(gateway: Gateway) -> dict[str, Any]:
     return Client(gateway.app).get("/api/v1/cab").json()
 
 
-def test_it_tells_how_much_more_may_go_in_the_tightest_first(gateway: Gateway) -> None:
+def test_room_counts_the_levers_of_both_axles_and_says_where(gateway: Gateway) -> None:
+    """300 kg, 48 % in front: 819 and 881 kg on the axles. The rear axle may bear 169.2 kg more, which are 225.6 kg in
+    the front half of the loading area, where it bears at most three quarters of them.
+    """
     gateway.publish(loaded(0, 300.0, 48.0))
     cab = told(gateway)
-    assert [room["place"] for room in cab["room"]] == ["rear_axle", "front_axle", "gross"]
-    assert cab["room"][2] == {
+    assert cab["room"]["kg"] == 225.6
+    assert cab["room"]["plus_minus_kg"] == pytest.approx(1.96 * 4.5 / 0.75, rel=0.1)
+    assert cab["room"]["safe"]["rear_half_kg"] == 0.0
+    assert cab["room"]["safe"]["front_half_kg"] == pytest.approx(225.6 - cab["room"]["plus_minus_kg"], abs=0.2)
+    assert cab["room"]["is_anywhere"] is False
+    assert cab["room"]["take_out"] == {"front_half_kg": 0.0, "rear_half_kg": 0.0}
+    assert [spare["place"] for spare in cab["spare"]] == ["rear_axle", "front_axle", "gross"]
+    assert cab["spare"][2] == {
         "place": "gross",
         "kg": 300.0,
         "std_kg": 6.0,
         "interval95_kg": [288.2, 311.8],
         "limit_kg": 2000.0,
     }
-    assert cab["room"][0]["kg"] == 169.2
-    assert (cab["light"], cab["light_about"], cab["has_limits"]) == ("go", [], True)
+    assert cab["spare"][0]["kg"] == 169.2
+    assert (cab["light"], cab["says"], cab["light_about"], cab["has_limits"]) == ("go", "go", [], True)
     assert cab["over_limit_probability"] < 1e-3
     assert (cab["payload_kg"], cab["payload_interval95_kg"]) == (300.0, [288.2, 311.8])
     assert (cab["load"], cab["age_s"], cab["is_stale"], cab["is_early"]) == ("weighed", 0.0, False, False)
     assert cab["vehicle_id"] == "van-17"
 
 
+@pytest.mark.parametrize("payload_kg", [300.0, 592.0, 620.0])
+def test_dashboard_and_cab_page_tell_one_verdict(gateway: Gateway, payload_kg: float) -> None:
+    gateway.publish(loaded(0, payload_kg, 50.0))
+    verdict = Client(gateway.app).get("/api/v1/weights/latest").json()["verdict"]
+    assert verdict == {name: told(gateway)[name] for name in verdict}
+
+
+def test_after_unloading_an_alarm_that_is_still_active_makes_the_light_amber(gateway: Gateway) -> None:
+    """Not green beside the alarm: the first value after unloading is below the limit, no full batch is yet."""
+    gateway.publish(loaded(0, 620.0, 50.0))
+    gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(active=("overload.gross",))})
+    assert (told(gateway)["light"], told(gateway)["says"]) == ("over", "over")
+    gateway.board.publish(replace(loaded(9, 300.0, 48.0), is_provisional=True))
+    cab = told(gateway)
+    assert (cab["light"], cab["says"], cab["light_about"]) == ("near", "was_over", ["gross"])
+    gateway.status = BEFORE
+    assert (told(gateway)["light"], told(gateway)["says"]) == ("go", "go")
+
+
+def test_vehicle_that_has_just_been_calibrated_is_ready_and_not_uncalibrated(tmp_path: Path) -> None:
+    """The batch of before was refused for lack of a calibration."""
+    with cab_gateway(tmp_path) as opened:
+        opened.publish(loaded(0, 300.0, 48.0).refused(Why.NO_CALIBRATION))
+        cab = told(opened)
+        assert (cab["says"], cab["rejected"], cab["lacks"]) == ("ready", [], "estimate")
+        opened.status = BEFORE.model_copy(update={"calibration_id": None})
+        assert (told(opened)["says"], told(opened)["rejected"]) == ("not_calibrated", ["no_calibration"])
+
+
 def test_it_weighs_by_all_batches_of_the_load_together(gateway: Gateway) -> None:
     one = replace(loaded(0, 300.0, 48.0), epoch=epoch_of(posterior_of(290.0, 48.0, 3.0, 0.1), 4))
     gateway.publish(one)
     cab = told(gateway)
-    assert cab["room"][2]["kg"] == 310.0
-    assert cab["room"][2]["std_kg"] == 3.0
+    assert cab["spare"][2]["kg"] == 310.0
+    assert cab["spare"][2]["std_kg"] == 3.0
     assert cab["payload_interval95_kg"] == [284.1, 295.9]
 
 
@@ -62,7 +100,8 @@ def test_the_light_turns_and_names_its_places(gateway: Gateway) -> None:
         lights.append((cab["light"], cab["light_about"]))
     assert lights == [("go", []), ("near", ["front_axle", "gross"]), ("over", ["gross", "front_axle"])]
     assert told(gateway)["over_limit_probability"] > 0.99
-    assert [room["kg"] for room in told(gateway)["room"]] == [-20.0, -10.0, 40.0]
+    assert [spare["kg"] for spare in told(gateway)["spare"]] == [-20.0, -10.0, 40.0]
+    assert told(gateway)["room"]["kg"] == -20.0
 
 
 def test_while_it_stands_and_until_the_new_load_is_weighed_it_says_so(gateway: Gateway) -> None:
@@ -72,12 +111,13 @@ def test_while_it_stands_and_until_the_new_load_is_weighed_it_says_so(gateway: G
     assert (cab["load"], cab["stood_s"], cab["state"]) == ("standing", 95.0, "waiting_for_speed")
     gateway.status = BEFORE.model_copy(update={"standing": Standing(is_load_weighed=False)})
     assert told(gateway)["load"] == "not_weighed_yet"
-    assert told(gateway)["room"] != []  # as it was weighed before
+    assert told(gateway)["room"] is not None  # as it was weighed before
 
 
 def test_before_the_first_estimate_everything_is_unknown(gateway: Gateway) -> None:
     cab = told(gateway)
-    assert (cab["load"], cab["light"], cab["room"], cab["payload_kg"]) == ("never_weighed", "unknown", [], None)
+    assert (cab["load"], cab["light"], cab["room"], cab["payload_kg"]) == ("never_weighed", "unknown", None, None)
+    assert (cab["says"], cab["spare"]) == ("ready", [])
     assert (cab["lacks"], cab["last_event"], cab["t_end"], cab["rejected"]) == ("estimate", None, None, [])
 
 
@@ -100,7 +140,7 @@ def test_while_batches_are_refused_for_what_they_showed_nothing_is_promised(gate
     gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 300.0, 48.0).refused(why))
     for payload_kg in (300.0, 310.0):
         cab = told(gateway)
-        assert (cab["light"], cab["room"], cab["is_doubted"], cab["rejected"]) == ("unknown", [], True, [str(why)])
+        assert (cab["light"], cab["room"], cab["is_doubted"], cab["rejected"]) == ("unknown", None, True, [str(why)])
         assert cab["payload_kg"] == payload_kg
         gateway.board.publish(early)
     gateway.publish(loaded(9, 300.0, 48.0))
@@ -126,7 +166,7 @@ def test_without_limits_or_calibration_it_says_what_is_missing(tmp_path: Path) -
         with Gateway(tmp_path / str(n), calibrated=calibrated) as opened:
             opened.publish(loaded(0, 300.0, 48.0))
             cab = told(opened)
-        assert (cab["room"], cab["light"], cab["has_limits"]) == ([], "unknown", False)
+        assert (cab["room"], cab["light"], cab["has_limits"]) == (None, "unknown", False)
         assert cab["lacks"] == (None if isinstance(calibrated, CalibratedVehicle) else "calibration")
 
 

@@ -11,7 +11,7 @@ from support.patience import PATIENCE_S
 from support.web import Client, Gateway
 
 from gateway.records import Why
-from gateway.status import LOOK, BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, StoreStatus
+from gateway.status import LOOK, BatchCounts, BusStatus, DecodeCount, SignalHealth, State, Status, StoreStatus, judged
 
 JSON = "application/json"
 
@@ -38,7 +38,12 @@ def test_latest_before_any_estimate(client: Client) -> None:
 def test_latest_is_the_estimate_with_its_age(gateway: Gateway, client: Client) -> None:
     gateway.publish(make_estimate(5, with_spectra=True))
     gateway.clock_s += 7.0
-    expected = make_record(5, with_spectra=True) | {"age_s": 7.0, "is_stale": False, "last_rejection": None}
+    expected = make_record(5, with_spectra=True) | {
+        "age_s": 7.0,
+        "is_stale": False,
+        "is_stored": True,
+        "last_rejection": None,
+    }
     assert client.get("/api/v1/estimates/latest").json() == expected
 
 
@@ -174,7 +179,7 @@ def test_a_store_that_cannot_be_read_is_503(gateway: Gateway, client: Client, tm
 
 
 def test_status_is_told_in_words_and_numbers(gateway: Gateway, client: Client) -> None:
-    gateway.status = Status(
+    now = Status(
         version="1.2.3",
         state=State.READER_FAULT,
         uptime_s=1.0,
@@ -182,6 +187,7 @@ def test_status_is_told_in_words_and_numbers(gateway: Gateway, client: Client) -
         bus=BusStatus(interface="socketcan", channel="can0", state="reader_fault", last_fault="can0: no such device"),
         store=StoreStatus(state="degraded", reason="disk full", n_held=3),
     )
+    gateway.status = judged(now, ())
     told = client.get("/api/v1/status").json()
     assert told["state"] == "reader_fault"
     assert "can0: no such device" in told["state_in_words"]

@@ -127,7 +127,7 @@ def test_without_a_report_the_command_prints_the_verdict(made: Path, numbers: Ma
     done = run("calibrate", str(made / "campaign.toml"), "--output", str(made / "again.json"), *WINDOW)
     grade = next(text for grade, text in GRADE_TEXT.items() if grade == numbers["grade"])
     said = done.stdout[
-        done.stdout.index(f"{grade}, by the cross-spectral estimator. Over the runs left out it weighs") :
+        done.stdout.index(f"{grade}, by the cross-spectral estimator. Over the drives left out it weighs") :
     ]
     reasons = numbers["verdicts"][0]["reasons"]
     assert [one["text"] in said for one in reasons] == [one["grade"] != "fit" for one in reasons]
@@ -139,7 +139,10 @@ def test_an_evaluation_has_a_report_of_its_own(made: Path) -> None:
         "ratio_index", "--report", str(made / "evaluated"), *WINDOW, "--json",
     )  # fmt: skip
     numbers = json.loads((made / "evaluated" / "report.json").read_text(encoding="utf-8"))
-    assert numbers["errors"] == {"ratio_index": {"validation": json.loads(told.stdout)}}
+    answer = json.loads(told.stdout)
+    verdict = answer.pop("verdict")
+    assert numbers["errors"] == {"ratio_index": {"validation": answer}}
+    assert verdict["grade"] in set(GRADE_TEXT)
     page = Page((made / "evaluated" / "report.html").read_text(encoding="utf-8"))
     assert {"verdict", "accuracy-ratio-index", "provenance"} <= set(page.ids)
     assert not {"half-car", "spectra", "runs"} & set(page.ids)

@@ -118,7 +118,7 @@ def test_a_stop_makes_the_load_unknown_until_it_is_weighed_again(config: Path) -
     [
         (AlarmService, "alarms failed"),
         (LoadEventLog, "load events failed"),
-        (BatchLog, "the log of batches failed"),
+        (BatchLog, "log of batches failed"),
     ],
 )
 def test_what_listens_to_batches_fails_alone_and_weighing_goes_on(

@@ -69,7 +69,7 @@ def test_a_disk_that_takes_no_frames_costs_no_estimate(tmp_path: Path, log: Path
     def meet(service: Running) -> None:
         service.play(log)
         ring = service.gateway.ring_log
-        assert wait_until(lambda: ring.fault is not None)
+        assert wait_until(lambda: ring.status().last_fault is not None)
         told = first_answer(f"{service.gateway.url}/api/v1/status").json()
         assert any("frames are not being recorded" in one for one in told["warnings"])
         assert told["is_ready"] is True
@@ -114,11 +114,11 @@ assert wait_until(lambda: log.status().n_frames_written)
 _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
 resource.setrlimit(resource.RLIMIT_FSIZE, (log.status().size_bytes + 1000, hard))  # what comes next is cut short
 log.put(drive)
-assert wait_until(lambda: log.fault is not None)
-fault = log.fault
+assert wait_until(lambda: log.status().last_fault is not None)
+fault = log.status().last_fault
 resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
 log.put(drive)
-assert wait_until(lambda: log.fault is None)
+assert wait_until(lambda: log.status().last_fault is None)
 log.stop(60.0)
 told = log.status()
 n_read = sum(sum(map(len, open_whole_log(path)[0])) for path in folder.glob("*.log"))

@@ -34,7 +34,7 @@ def test_every_change_of_state_is_a_line(journal: ReplayedService) -> None:
     assert events.count("uplink not reached") == 1  # tried again and again, told once
     states = [entry["state"] for entry in entries if entry["event"] == "state"]
     assert all(one != other for one, other in pairwise(states))
-    assert not {"batch rejected", "provisional estimate"} & set(events)
+    assert "batch rejected" not in events
 
 
 @pytest.mark.parametrize("journal", ["warning"], indirect=True)

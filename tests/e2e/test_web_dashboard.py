@@ -61,7 +61,7 @@ def test_it_shows_where_the_load_lies(site: str, watched: Watched) -> None:
     front, rear = (float(x) for x in page.evaluate(AXLE_PLACES))
     centre = float(drawing.locator("circle.load").get_attribute("cx"))
     assert (centre - front) / (rear - front) == pytest.approx(1.71 / 2.8, abs=0.01)
-    expect(page.locator("#overload")).to_have_text("Rear axle is over its limit.")
+    expect(page.locator("#overload")).to_have_text("Rear axle: too heavy.")
     expect(drawing.locator("text.over")).to_contain_text(["865", "limit 850"])
 
 
@@ -140,7 +140,7 @@ def test_in_german_on_a_phone_and_on_a_wide_desk(site: str, browser: Any, width:
     expect(page.locator("#share")).to_have_text("48,0 %")
     expect(page.locator("#payload-range")).to_have_text("95 %: 258 bis 282 kg")
     expect(page.locator("#state-name")).to_have_text("Wiegt")
-    expect(page.locator("#overload")).to_have_text("Hinterachse über der Grenze.")
+    expect(page.locator("#overload")).to_have_text("Hinterachse: zu schwer.")
     expect(page.locator("#calibrated")).to_contain_text("Kreuzspektren", use_inner_text=False)
     expect(page.locator("#rejected")).to_contain_text(
         "Zu langsam: zu viel des Abschnitts war langsamer", use_inner_text=False
@@ -190,7 +190,7 @@ def test_it_looks_further_back_when_asked(site: str, watched: Watched) -> None:
 def test_it_follows_what_happens(gateway: Gateway, dashboard: Look) -> None:
     page = dashboard()
     expect(page.locator("#payload")).to_have_text("unknown")
-    expect(page.locator("#note")).to_have_text("No estimate yet.")
+    expect(page.locator("#note")).to_have_text("Ready: weighs after the next five minutes of driving.")
     expect(page.locator("#history")).to_contain_text("No batch yet.")
     expect(page.locator("#payload-chart")).to_be_hidden()
     expect(page.locator("#link")).to_have_text("live")
@@ -348,15 +348,15 @@ def test_the_keyboard_reaches_everything_in_order(site: str, watched: Watched) -
     for late in ("History as a table", "Spectra as a table", "Verify with a known load …"):
         expect(page.get_by_text(late)).to_be_visible()  # each is drawn when its numbers come
     expect(page.locator("#link")).to_have_text("live")
-    watched.wait_until(f"{REACHABLE} === 12")  # the span's three buttons are one stop
+    watched.wait_until(f"{REACHABLE} === 13")  # the span's three buttons are one stop
     order = []
-    for _ in range(10):
+    for _ in range(11):
         page.keyboard.press("Tab")
         order.append(page.evaluate(FOCUSED))
         assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid", order[-1]
     assert order[:4] == ["Skip to the load", "Theme: system", "24", "History as a table"]
     assert order[4:7] == ["Spectra as a table", "Bus and sensors", "Verify with a known load …"]
-    assert order[7:] == ["In the cab", "API", "Metrics"]
+    assert order[7:] == ["In the cab", "Teach the vehicle", "API", "Metrics"]
 
 
 REACHABLE = """[...document.querySelectorAll("a[href], button, select, input, summary, [tabindex='0']")]

@@ -103,13 +103,18 @@ def test_every_refusal_of_a_known_weight_is_explained_and_the_numbers_are_the_co
 
 
 def test_every_finding_is_explained_once_as_the_code_has_it_and_found_somewhere_in_the_code() -> None:
-    rows = [re.split(r" *\| *", line)[1:5] for line in text_of("findings.md").splitlines() if line.startswith("| `")]
+    rows = [
+        re.split(r" *\| *", line)[1:5]
+        for line in text_of("reasons.md").partition("## Findings of the inspection")[2].splitlines()
+        if line.startswith("| `")
+    ]
     told = {name.strip("`"): (weight, advice.replace("`", "")) for name, weight, _, advice in rows}
     assert all(means for _, _, means, _ in rows)
     assert len(told) == len(rows)
     assert told == {str(kind): (" or ".join(kind.severities), kind.advice.replace("`", "")) for kind in Kind}
     room = ROOT / "gateway/calibration/inspection"
-    code = "".join(path.read_text(encoding="utf-8") for path in room.glob("*.py"))
+    sources = [*room.glob("*.py"), room.parent / "calibrate.py"]
+    code = "".join(path.read_text(encoding="utf-8") for path in sources)
     assert [kind for kind in Kind if not re.search(rf"Kind\.{kind.name}\b", code)] == []
 
 

@@ -66,8 +66,8 @@ def test_every_key_is_on_its_page(page: str, tables: tuple[type, ...]) -> None:
     assert keys - rows <= {"signals", "vehicle", "runs", "vehicles", "batch"}  # these are tables themselves
 
 
-def test_every_column_of_a_data_set_is_on_its_page() -> None:
-    assert set(columns()) <= set(named_in(ARCHIVE))
+def test_every_column_of_a_data_set_is_on_its_page_or_a_field_of_an_estimate() -> None:
+    assert set(columns()) - set(named_in(ESTIMATE)) <= set(named_in(ARCHIVE))
 
 
 @pytest.mark.parametrize("example", examples_of(SIGNAL_MAP))
@@ -89,7 +89,7 @@ def test_an_example_of_a_campaign_can_be_loaded(example: str, tmp_path: Path) ->
 
 
 def test_the_pages_have_examples() -> None:
-    assert (len(examples_of(SIGNAL_MAP)), len(examples_of(CAMPAIGN))) == (5, 1)
+    assert (len(examples_of(SIGNAL_MAP)), len(examples_of(CAMPAIGN))) == (2, 1)
 
 
 def test_every_field_of_an_estimate_is_described_and_says_when_it_is_unknown() -> None:

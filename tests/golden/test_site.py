@@ -14,6 +14,9 @@ LINKED = re.compile(r"<link[^>]*?href=[\"']?([^\"' >]+)")
 FETCHED = re.compile(r"(?:@import|url\()\s*[\"']?([^\"')]+)")
 
 
+MOST_PAGES = 36  # chosen: what a reader of the navigation takes in; a page more is a page merged
+
+
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("site")
@@ -27,6 +30,12 @@ def test_every_page_is_there(site: Path) -> None:
     pages = [page.relative_to(make_site.DOCS).with_suffix(".html") for page in make_site.DOCS.rglob("*.md")]
     assert [page for page in pages if not (site / page).is_file()] == []
     assert (site / "index.html").is_file()
+
+
+def test_a_reader_finds_every_page_behind_one_of_four_doors() -> None:
+    nav = (make_site.ROOT / "mkdocs.yml").read_text(encoding="utf-8").partition("\nnav:\n")[2]
+    assert re.findall(r"^  - ([^:\n]+):$", nav, re.MULTILINE) == ["Start", "Do", "Look up", "Understand"]
+    assert len(re.findall(r"^ +- [^:\n]+: [\w-]+\.md$", nav, re.MULTILINE)) <= MOST_PAGES
 
 
 def test_a_link_to_a_heading_that_is_not_there_fails_the_site(

@@ -40,6 +40,12 @@ ANY = st.recursive(
 AXLES = {"by": "axles", "front_axle_kg": 850.0, "rear_axle_kg": 1040.0}
 PAYLOAD = {"by": "payload", "payload_kg": 100.0, "position_m": 1.4, "at": iso_utc(START_NS + 60_000_000_000)}
 SOUND: dict[str, dict[str, Any]] = {  # by route, a body that it takes
+    "/api/v1/statements": {
+        "from": "2026-11-26T07:40:00Z",
+        "source": "scale",
+        "load": {"gross_kg": 1890.0},
+        "note": "x",
+    },
     "/api/v1/known-weights": {"kind": "axle_pads", "weight": AXLES, "note": "scales"},
     "/api/v1/calibration/tare": {"is_empty": True, "note": ""},
     "/api/v1/calibration/tickets": {"weight": PAYLOAD, "note": "ticket"},
@@ -47,7 +53,10 @@ SOUND: dict[str, dict[str, Any]] = {  # by route, a body that it takes
     "/api/v1/calibration/commissioning": {"note": "begin"},
     "/api/v1/calibration/commissioning/vehicle": ANSWERS,
     "/api/v1/calibration/commissioning/empty": {"is_empty": True, "again": False},
+    "/api/v1/vehicle": ANSWERS,
+    "/api/v1/learning": {"use": "newest"},
 }
+PUT: Final = {"/api/v1/vehicle", "/api/v1/learning"}
 
 
 @st.composite
@@ -108,7 +117,9 @@ def test_any_body_is_answered_or_refused_in_words(client: Client, route: str, ca
     @given(body=bodies(SOUND[route]), kind=TYPES)
     def ask(body: bytes, kind: str) -> None:
         begun_s = time.monotonic()
-        answer = client.request("POST", route, content=body, headers={"content-type": kind} if kind else {})
+        answer = client.request(
+            "PUT" if route in PUT else "POST", route, content=body, headers={"content-type": kind} if kind else {}
+        )
         assert time.monotonic() - begun_s < SLOWEST_S
         assert answer.status_code < 500, answer.text
         told = answer.json()

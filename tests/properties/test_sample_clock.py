@@ -63,7 +63,7 @@ def off_s(found_ns: I64, t_s: F64) -> F64:
 @pytest.mark.parametrize("stamping", STAMPINGS)
 @pytest.mark.parametrize("period_s", [0.005, 0.01])
 @pytest.mark.parametrize("error_ppm", [0.0, 180.0])
-def test_delays_are_taken_off(stamping: str, period_s: float, error_ppm: float) -> None:
+def test_delays_are_removed_from_the_stamps(stamping: str, period_s: float, error_ppm: float) -> None:
     t_s = taken(period_s, error_ppm)
     timing = sample_times(ns(STAMPINGS[stamping](t_s, np.random.default_rng(3))))
     off = off_s(timing.t_ns, t_s)
@@ -87,7 +87,7 @@ def test_a_clock_that_warms_up_is_followed() -> None:
 
 @pytest.mark.parametrize("lost", [0.02, 0.1, 0.3])
 @pytest.mark.parametrize("mean_s", [0.0, 0.001])
-def test_lost_frames_are_told_from_late_ones(lost: float, mean_s: float) -> None:
+def test_lost_frames_are_distinguished_from_late_ones(lost: float, mean_s: float) -> None:
     rng = np.random.default_rng(4)
     t_s = taken(0.01)
     t_s = t_s[np.r_[True, rng.random(len(t_s) - 2) > lost, True]]
@@ -104,7 +104,7 @@ def test_a_counter_tells_lost_frames_where_stamps_come_in_heaps() -> None:
     assert float(np.quantile(np.abs(off_s(timing.t_ns, t_s[kept])), 0.99)) < 2e-3
 
 
-def test_stamps_without_a_clock_behind_them_have_none() -> None:
+def test_random_stamps_give_no_clock() -> None:
     rng = np.random.default_rng(6)
     assert sample_times(ns(np.sort(rng.uniform(0.0, DURATION_S, 12_000)))) is None
     assert sample_times(ns(np.zeros(12_000))) is None
@@ -112,7 +112,7 @@ def test_stamps_without_a_clock_behind_them_have_none() -> None:
 
 @given(st.data())
 @settings(max_examples=60, deadline=None)
-def test_any_stamps_give_times_that_rise_or_a_plain_no(data: st.DataObject) -> None:
+def test_any_stamps_give_rising_times_or_none(data: st.DataObject) -> None:
     """No exception, and as many times as samples, whatever comes."""
     n = data.draw(st.integers(0, 1500))
     scale_ns = data.draw(st.sampled_from([1, 2_000, 10_000_000, 10**9]))
@@ -133,7 +133,7 @@ def test_stamps_stay_where_they_show_the_samples_as_smooth() -> None:
     assert is_believed.all()
 
 
-def test_late_stamps_give_way_to_the_clock() -> None:
+def test_late_stamps_are_replaced_by_the_clock() -> None:
     rng = np.random.default_rng(8)
     t_s = taken(0.01)
     x = np.sin(2.0 * np.pi * 6.0 * t_s) + 0.05 * rng.standard_normal(len(t_s))
@@ -146,7 +146,7 @@ def stamped(motion: Motion, stamping: Stamping) -> Motion:
     return Motion(motion.signals, ns(stamping(t_s, np.random.default_rng(9))), motion.columns)
 
 
-def test_a_batch_nobody_can_time_says_so() -> None:
+def test_a_batch_without_a_clock_is_refused_as_time_stamps() -> None:
     def shuffled(t_s: F64, rng: np.random.Generator) -> F64:
         return np.sort(rng.uniform(0.0, 100.0, len(t_s)))
 

@@ -1,6 +1,6 @@
 """A real Home Assistant beside a real broker: a vehicle appears there, fills, and is seen to be away.
 
-Runs where `hass` and mosquitto are found (support.parts); docs/real-parts.md says which versions it was run with, and
+Runs where `hass` and mosquitto are found (support.parts); docs/faults.md says which versions it was run with, and
 how they are installed.
 """
 

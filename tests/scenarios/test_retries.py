@@ -54,7 +54,7 @@ def serving(*answers: bytes) -> Iterator[int]:
                         for answer in answers:
                             near.recv(65_536)
                             near.sendall(answer)
-                        near.recv(65_536)
+                        near.recv(1024)
 
         thread = threading.Thread(target=serve, daemon=True)
         thread.start()

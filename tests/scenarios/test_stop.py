@@ -1,6 +1,5 @@
 """SIGTERM ends the service with code 0 whatever its threads are doing."""
 
-import asyncio
 import os
 import re
 import signal
@@ -123,31 +122,3 @@ def test_a_question_of_a_client_that_hangs_does_not_keep_the_process_from_ending
             httpx.get(f"{url}/api/v1/calibration/commissioning", timeout=1.0, trust_env=False)
 
     told_until_stopped("held_service", config, ask)
-
-
-@pytest.mark.parametrize("name", ["webhook", "uplink"])
-def test_the_death_of_a_sender_is_shown_and_the_weighing_goes_on(
-    config: Path, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It ended the process."""
-    settings = load_settings(config)
-
-    class Dead(ServicePart):
-        NAME = name
-
-        def death(self) -> str:
-            return "died"
-
-        def report(self) -> None:
-            return None
-
-    monkeypatch.setattr(gateway, f"{name}_of", lambda *known, **named: Dead())
-    told: list[tuple[str, ...]] = []
-
-    def on_started(running: gateway.Gateway) -> None:
-        told.append(running.status().warnings)
-        asyncio.get_running_loop().call_later(3.0 * gateway.SUPERVISE_S, running.request_stop)
-
-    gateway.Gateway(settings, setup_of(settings), on_started=on_started).run()
-    ((warning,),) = told
-    assert warning.startswith(f"the {name} died; weighing goes on")

@@ -18,9 +18,9 @@ from support.ports import free_port
 from support.receiver import SECRET_TEXT, Fault, Receiver, cut, slow, status, trickle
 
 from gateway.log import Event
+from gateway.part import BackOff
 from gateway.records import json_line
 from gateway.store import Store
-from gateway.uplink.forwarder import BackOff
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import WebhookSettings
 from gateway.uplink.webhook import Webhook
@@ -31,7 +31,7 @@ SENDER = """
 import pathlib, sys, time
 from gateway.store import Store
 from gateway.uplink.outbox import Outbox
-from gateway.uplink.forwarder import BackOff
+from gateway.part import BackOff
 from gateway.uplink.settings import WebhookSettings
 from gateway.uplink.webhook import Webhook
 

@@ -13,6 +13,7 @@ from gateway.service.verification.verification import VerificationService
 from gateway.setup import Subject
 from gateway.stated.facts import Rule
 from gateway.store import Store
+from support.learner import LearnerBench
 
 NOBODY = Subject(None, "ratio_index", "van-17")
 COMMISSIONING = {"is_allowed": False, "why_not": "nobody can calibrate here", "is_offered": False, "is_pending": False}
@@ -52,4 +53,5 @@ def of_no_vehicle(directory: Path, store: Store) -> dict[str, Any]:
         ),
         "alarms": AlarmService(AlarmRules(), NOBODY, store).standing,
         "commissioning": NoCommissioning(),
+        "learner": LearnerBench(directory / "learner").learner,
     }

@@ -22,6 +22,7 @@ VAN = CalibratedVehicle(
         name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0,
         unsprung_front_kg=80.0, unsprung_rear_kg=80.0,
         gross_limit_kg=2000.0, front_axle_limit_kg=1000.0, rear_axle_limit_kg=1050.0,
+        loading_area_m=(1.4, 2.8),
     ),
     payload_seen_kg=(0.0, 600.0),
     front_share_seen_pct=(42.0, 55.0),

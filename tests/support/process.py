@@ -39,10 +39,11 @@ def running_service(config: Path, *options: str, **environment: str) -> Iterator
 class ReplayedService:
     """The service and a drive on its bus, in a process of its own; every line it writes, read as it comes.
 
-    It weighs 12 kg with 51 % on the front axle, in windows of 20 s; ``keys`` are further settings.
+    It weighs 12 kg with 51 % on the front axle, in windows of 20 s; ``keys`` are further settings. With ``is_later`` it
+    drives when it is told to.
     """
 
-    def __init__(self, folder: Path, **keys: str | float) -> None:
+    def __init__(self, folder: Path, *, is_later: bool = False, **keys: str | float) -> None:
         weighs = calibration_file(payload_kg=12.0, front_share_pct=51.0)
         calibration = calibration_text(weighs, unsprung_front_kg=80.0, unsprung_rear_kg=80.0)
         weighing = {"estimator": "ratio_index", "vehicle__id": "van-17", "batch__window_s": 20.0}
@@ -50,7 +51,7 @@ class ReplayedService:
         write_candump(white_noise(70.0, START_NS, seed=5), "can0", log)
         self.lines: list[str] = []
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "support.replayed_service", str(config), str(log)],
+            [sys.executable, "-m", "support.replayed_service", str(config), str(log), *["later"] * is_later],
             stdin=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -70,6 +71,10 @@ class ReplayedService:
     def entries(self) -> list[dict[str, Any]]:
         """Every line without the priority before it."""
         return [json.loads(line[3:]) for line in list(self.lines)]
+
+    def drive(self) -> None:
+        self.process.stdin.write("drive\n")
+        self.process.stdin.flush()
 
     def events(self) -> list[str]:
         return [entry["event"] for entry in self.entries()]

@@ -1,8 +1,9 @@
-"""A broker of a few lines that takes no packet over a limit, and says so in the way the test chooses (MQTT 5)."""
+"""A broker of a few lines that refuses what the test chooses: packets over a limit, or by topic (MQTT 5)."""
 
 import contextlib
 import socket
 import threading
+from collections.abc import Callable
 from types import TracebackType
 from typing import BinaryIO, Literal
 
@@ -13,9 +14,20 @@ Refusal = Literal["puback", "disconnect", "close"]
 
 
 class SmallBroker:
-    """Acknowledges what is within ``most_bytes`` and keeps it in ``taken``, by topic."""
+    """Acknowledges what is within ``most_bytes`` and keeps it in ``taken``, by topic.
 
-    def __init__(self, most_bytes: int, refusal: Refusal, *, is_announced: bool = False) -> None:
+    ``code_of`` gives the reason code of the acknowledgement by topic, None for no acknowledgement at all.
+    """
+
+    def __init__(
+        self,
+        most_bytes: int,
+        refusal: Refusal,
+        *,
+        is_announced: bool = False,
+        code_of: Callable[[str], int | None] = lambda topic: 0,
+    ) -> None:
+        self.code_of = code_of
         self._most_bytes = most_bytes
         self._refusal = refusal
         self._is_announced = is_announced
@@ -52,6 +64,12 @@ class SmallBroker:
             elif kind == PUBLISH:
                 n_topic = int.from_bytes(body[:2], "big")
                 topic, mid = body[2 : 2 + n_topic].decode(), body[2 + n_topic : 4 + n_topic]
+                code = self.code_of(topic)
+                if code is None:
+                    continue
+                if code:
+                    near.sendall(bytes([PUBACK << 4, 3]) + mid + bytes([code]))
+                    continue
                 if len(body) <= self._most_bytes:
                     self.taken.append((topic, body))
                     near.sendall(bytes([PUBACK << 4, 2]) + mid)

@@ -22,7 +22,12 @@ from gateway.web.access.serving import server_config
 from gateway.web.access.tokens import TokenFile
 from gateway.web.app import create_app
 from gateway.web.live.board import Board
-from gateway.web.routes.service_calls import CommissioningBackend, KnownWeightBackend, VerificationBackend
+from gateway.web.routes.service_calls import (
+    CommissioningBackend,
+    KnownWeightBackend,
+    LearnerBackend,
+    VerificationBackend,
+)
 from gateway.web.routes.weights import KnownLoads
 from gateway.weighing.calibrated import CalibratedVehicle
 from support.absent import of_no_vehicle
@@ -41,6 +46,7 @@ class Gateway:
         calibrated: CalibratedVehicle | None = None,
         known_loads: KnownLoads | None = None,
         verification: VerificationBackend | None = None,
+        learner: LearnerBackend | None = None,
     ) -> None:
         self.clock_s = 1000.0
         self.status = Status(version="1.2.3", state=State.COLLECTING, uptime_s=5.0, vehicle_id="van-17")
@@ -53,6 +59,7 @@ class Gateway:
             **of_no_vehicle(directory, self.store),
         }
         known = {"known_weights": known_weights, "commissioning": commissioning, "verification": verification}
+        known |= {"learner": learner}
         self._known |= {name: part for name, part in known.items() if part is not None}
         self.app = self._make_app()
 

@@ -1,5 +1,6 @@
 """Logs that no recorder writes: each is counted or refused in words, at once; none is read for ever."""
 
+import re
 import sqlite3
 import struct
 import time
@@ -105,6 +106,43 @@ def test_an_absurd_object_ends_a_blf(spoil: Callable[[bytearray], None], said: s
     (tmp_path / "a.blf").write_bytes(content)
     with pytest.raises(LogUnreadableError, match=said):
         read(tmp_path / "a.blf")
+
+
+def other_versions(content: bytearray) -> None:
+    """Both frames get headers that python-can passes over."""
+    first, second = (found.start() for found in re.finditer(b"LOBJ", content) if found.start() > 150)
+    content[first + 6], content[second + 6] = 3, 0
+
+
+def without_details(content: bytearray) -> None:
+    """The second frame becomes an error frame of the old kind."""
+    at = content.rindex(b"LOBJ")
+    content[at + 12] = 2
+
+
+def cut_off(content: bytearray) -> None:
+    """The second frame is longer than the rest of the file."""
+    at = content.rindex(b"LOBJ")
+    content[at + 8] = 200
+
+
+@pytest.mark.parametrize(
+    ("spoil", "n_frames", "left_out", "said"),
+    [
+        (other_versions, 0, {"unknown_version": 2}, "unknown version: 2: 'header of version 3'"),
+        (without_details, 1, {"error_frames": 1}, None),
+        (cut_off, 1, {}, "the last object is cut off; everything before was read"),
+    ],
+)
+def test_no_frame_of_a_blf_is_passed_over_without_a_count(
+    spoil: Callable[[bytearray], None], n_frames: int, left_out: dict[str, int], said: str | None, tmp_path: Path
+) -> None:
+    content = blf(tmp_path / "a.blf")
+    spoil(content)
+    (tmp_path / "a.blf").write_bytes(content)
+    frames, report = read(tmp_path / "a.blf")
+    assert (len(frames), report.left_out) == (n_frames, left_out)
+    assert said is None or any(said in remark for remark in report.remarks())
 
 
 def test_a_row_of_a_database_without_an_identifier_is_counted(tmp_path: Path) -> None:

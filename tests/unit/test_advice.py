@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from support.calibrated import calibration_file
 
 from gateway.calibration.calibrate import Outcome
+from gateway.calibration.file.parts import FoundPart
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.judgement.advice import Grade, Verdict, verdicts_of
@@ -135,14 +136,28 @@ def test_runs_that_cannot_be_used_count(severities: tuple[Severity | None, ...],
     assert found.get("runs") is grade
 
 
-def test_a_run_that_the_others_weigh_otherwise_makes_a_calibration_unfit_unless_it_took_no_part() -> None:
-    doubt = Finding(Kind.LOAD_DISAGREES, Severity.WARNING, "weighed at 5 kg", "check the load")
-    fault = Finding(Kind.GAPS, Severity.FAULT, "gaps", "drive again")
-    rows = [judged(run) for run in range(1, 5)]
-    found = verdict(rows, runs=(RunVerdict(1, "a.log"), RunVerdict(2, "b.log", (doubt,)), RunVerdict(3, "c.log")))
-    assert (found.grade, grade_of(found, "labels")) == (Grade.UNFIT, Grade.UNFIT)
-    out = verdict(rows, runs=(RunVerdict(1, "a.log"), RunVerdict(2, "b.log", (fault, doubt)), RunVerdict(3, "c.log")))
-    assert "labels" not in [reason.rule for reason in out.reasons]
+@pytest.mark.parametrize(("n_held", "grade"), [(0, None), (1, Grade.RESERVED), (2, Grade.RESERVED), (3, Grade.UNFIT)])
+def test_statements_that_were_held_reserve_and_most_of_them_make_unfit(n_held: int, grade: Grade | None) -> None:
+    file = calibration_file()
+    (drive,) = file.provenance.drives
+    found = FoundPart(
+        payload_kg=5.0,
+        payload_std_kg=9.0,
+        front_share_pct=50.0,
+        without_statement_kg=5.0,
+        without_statement_std_kg=9.0,
+        is_held=False,
+    )
+    drives = tuple(
+        drive.model_copy(update={"number": n, "found": found.model_copy(update={"is_held": n <= n_held})})
+        for n in range(1, 6)
+    )
+    file = file.model_copy(update={"provenance": file.provenance.model_copy(update={"drives": drives})})
+    parts = {BatchSet.LEFT_OUT: [judged(run) for run in range(1, 5)]}
+    outcome = Outcome(file, Inspection((), (), ()))
+    (told,) = verdicts_of(Assessment("", file, VAN, (judgement(parts),), outcome))
+    labels = {reason.grade for reason in told.reasons if reason.rule == "labels"}
+    assert labels == ({grade} if grade else set())
 
 
 def test_the_headline_judges_the_estimator_that_the_service_runs_though_the_other_is_better() -> None:

@@ -17,7 +17,7 @@ from gateway.core.change import Rules
 from gateway.records import Why
 from gateway.service.alarms import rules_of
 from gateway.service.batch_log import ledger_of
-from gateway.status import BusStatus, SignalHealth, State, Status
+from gateway.status import BusStatus, DecodeCount, SignalHealth, State, Status
 
 OVER = LIMIT_KG + 60.0
 
@@ -97,6 +97,37 @@ def test_a_silent_sensor_raises_an_alarm_after_a_while(bench: AlarmBench) -> Non
     assert look(1500.0, State.ESTIMATING) == []
     assert look(1600.0, State.READER_FAULT) == []
     assert look(2200.0, State.READER_FAULT) == ["No signal: can0 is down"]
+
+
+WRONG_LENGTH = "IMU_GYRO (121): 900 frames have 7 bytes, the database says 8"
+
+
+@pytest.mark.parametrize(
+    ("last_age_s", "counts", "causes", "sentence"),
+    [
+        (None, {"ok": 0}, (), "pitch rate (no frame of its message)"),
+        (312.4, {"ok": 900}, (), "pitch rate (last heard 312 s ago)"),
+        (
+            None,
+            {"ok": 0, "wrong_length": 900},
+            (WRONG_LENGTH,),
+            f"pitch rate (900 frames came, all wrong length); {WRONG_LENGTH}",
+        ),
+    ],
+)
+def test_an_alarm_of_a_silent_sensor_says_why_it_is_silent(
+    last_age_s: float | None, counts: dict[str, int], causes: tuple[str, ...], sentence: str, bench: AlarmBench
+) -> None:
+    """It named the sensor alone, and whoever read it checked a sensor that was well."""
+    now = status(State.SENSOR_FAULT).model_copy(
+        update={
+            "signals": (SignalHealth(signal="pitch_rate", last_age_s=last_age_s),),
+            "decode": tuple(DecodeCount(signal="pitch_rate", reason=reason, n=n) for reason, n in counts.items()),
+        }
+    )
+    for bench.clock_s in (0.0, 600.0):
+        bench.desk.watch(now, causes)
+    assert [alarm["sentence"] for alarm in bench.standing()] == [f"No signal: {sentence}"]
 
 
 @pytest.mark.parametrize("text", ['{"id": "alarm-1-a", "revision": 1}', '{"kind": 5}'])

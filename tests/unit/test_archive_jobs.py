@@ -52,7 +52,7 @@ def names(jobs: Sequence[ArchiveJob]) -> list[tuple[str, list[str], list[str]]]:
     return [(job.slot.month, [one.log.path for one in job.lead_in], [one.log.path for one in job.logs]) for job in jobs]
 
 
-def test_a_job_is_a_month_and_begins_as_the_day_before_it_ended(van: Assignment) -> None:
+def test_a_job_is_a_month_and_continues_the_state_of_the_day_before(van: Assignment) -> None:
     starts = [MIDNIGHT_NS + hours * HOUR for hours in (-60, -24, -1, 0, 5, 29 * 24)]
     jobs = jobs_of(van, starts)
     assert names(jobs) == [

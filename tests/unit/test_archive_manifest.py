@@ -103,7 +103,7 @@ def test_a_fault_is_told_with_its_place_and_how_to_mend_it(tmp_path: Path, text:
         load_manifest(str(tmp_path))
 
 
-def test_names_tell_what_is_a_log() -> None:
+def test_the_extension_decides_what_is_a_log() -> None:
     names = ("a.log", "b/c.LOG.gz", "d.mf4", "truth.csv", "notes.txt", ".e.log")
     assert [name for name in names if is_log(name)] == [
         "a.log",

@@ -48,18 +48,18 @@ def gain_of(bends: Bends) -> tuple[float, float] | None:
 
 
 @pytest.mark.parametrize("gain", [0.95, 1.0, 1.03])
-def test_a_winding_road_tells_the_gain(gain: float) -> None:
+def test_a_winding_road_gives_the_gyros_gain(gain: float) -> None:
     found = gain_of(winding(gain=gain))
     told, std = found
     assert std < 0.01
     assert told == pytest.approx(gain, abs=3.0 * std)
 
 
-def test_a_straight_road_tells_nothing() -> None:
+def test_a_straight_road_gives_no_gain() -> None:
     assert gain_of(winding(bend_mps2=0.005)) is None
 
 
-def test_what_is_not_usable_does_not_count() -> None:
+def test_unusable_samples_are_not_counted() -> None:
     bends = winding()
     spoiled = bends.yaw_rate_radps.copy()
     spoiled[3000:6000] *= 3.0
@@ -77,7 +77,7 @@ def test_less_than_a_minute_and_silence_tell_nothing() -> None:
     assert gain_of(replace(silent, roll_rate_radps=np.full_like(silent.speed_mps, np.nan))) is None
 
 
-def test_several_batches_tell_more() -> None:
+def test_several_batches_give_a_smaller_error() -> None:
     assert joined_gains([None, (1.02, 0.01), (1.00, 0.01)]) == (pytest.approx(1.01), pytest.approx(0.01 / 2.0**0.5))
     assert joined_gains([None]) is None
 

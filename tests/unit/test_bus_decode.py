@@ -50,7 +50,7 @@ def test_all_signals_of_a_message_share_its_row(reference):
     assert np.isnan(row[Signal.SPEED])
 
 
-def test_nothing_decodes_to_nothing(reference):
+def test_no_frames_decode_to_no_rows(reference):
     assert reference.decode(empty_frames(8)).columns.shape == (0, 12)
 
 

@@ -3,13 +3,14 @@
 import threading
 
 import can
+import numpy as np
 import pytest
 from support.encoded import frames_of
 from support.patience import PATIENCE_S, wait_until
 
 from gateway.bus.live import source as source_module
 from gateway.bus.live.python_can import PythonCanReceiver
-from gateway.bus.live.receiver import Inbox
+from gateway.bus.live.receiver import DRAINED_FRAMES, Inbox
 from gateway.bus.live.source import LiveSource, SourceState
 from gateway.bus.signals import load_signal_map
 
@@ -25,6 +26,20 @@ def test_what_was_put_comes_out_at_once_in_order():
     assert len(inbox) == 5
     assert inbox.drain(0.0).t_ns.tolist() == [0, 1, 2, 3, 4]
     assert inbox.drain(0.0) is None
+
+
+@pytest.mark.parametrize("sizes", [[DRAINED_FRAMES] * 3, [3 * DRAINED_FRAMES], [1000] * 13, [1, DRAINED_FRAMES, 5000]])
+def test_one_drain_gives_no_more_than_a_turn_of_the_pipeline_can_take(sizes):
+    """A full inbox of stamps that jump was half a minute of one turn; the watchdog waits for 20 s."""
+    inbox = Inbox(20_000, 8)
+    for n, first in zip(sizes, np.cumsum([0, *sizes[:-1]]), strict=True):
+        inbox.put(burst(int(first), n))
+    drained = []
+    while (frames := inbox.drain(0.0)) is not None:
+        assert 0 < len(frames) <= DRAINED_FRAMES
+        drained += frames.t_ns.tolist()
+        assert len(inbox) == sum(sizes) - len(drained)
+    assert drained == list(range(sum(sizes)))
 
 
 def test_a_full_inbox_keeps_the_oldest_and_counts_the_rest():

@@ -108,7 +108,7 @@ DATA = classic(0x12345678 | EXTENDED_ID, b"\1")
         ([classic(0x20000000 | 0x004, bytes(8))], False),
     ],
 )
-def test_the_last_word_on_bus_off_counts(sent, is_bus_off, wire):
+def test_the_last_error_frame_decides_on_bus_off(sent, is_bus_off, wire):
     receiver = wire.receiver()
     for datagram in sent:
         wire.send(datagram)
@@ -129,7 +129,7 @@ def test_can_fd_frames_among_classic_ones(width, kept, wire):
     assert frames.payload[1].tolist() == [7] * kept + [0] * (width - kept)
 
 
-def test_nothing_comes_of_silence(wire):
+def test_a_silent_interface_gives_no_frames(wire):
     assert len(wire.receiver().receive(0.01).frames) == 0
 
 
@@ -152,7 +152,7 @@ def test_filters_ask_for_frames_of_one_format(wire):
     assert struct.unpack("=4I", wire.filters) == (0x120, 0x800007FF, 0x80FEF100, 0x83FFFF00)
 
 
-def test_the_buffer_is_as_large_as_we_may_have(wire):
+def test_the_receive_buffer_is_never_made_smaller(wire):
     before = wire.receiving.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
     with_enough_room(wire.receiving)
     assert wire.receiving.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) >= before

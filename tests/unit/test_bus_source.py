@@ -157,7 +157,7 @@ class Pauses(threading.Event):
         return self.is_set()
 
 
-def test_a_failing_channel_is_not_spun_on(monkeypatch):
+def test_a_failing_channel_is_retried_with_pauses(monkeypatch):
     monkeypatch.setattr(source_module, "FIRST_PAUSE_S", 0.25)
     monkeypatch.setattr(source_module, "LONGEST_PAUSE_S", 5.0)
     missing = ScriptedInterface(*[AtOpening(OSError(errno.ENODEV, "No such device"))] * 7)
@@ -174,7 +174,7 @@ def test_a_silent_bus_is_no_fault(listen):
     assert source.state is SourceState.BUS_SILENT
 
 
-def test_a_silent_bus_that_talks_of_other_things_is_told_apart(listen, monkeypatch):
+def test_a_bus_with_only_unmapped_frames_is_distinguished_from_a_silent_one(listen, monkeypatch):
     packets = iter(range(1000, 10**9, 10))
     monkeypatch.setattr(source_module, "packets_received", lambda channel: next(packets))
     source, _ = listen(Burst(frames(1)), silence_s=0.02)
@@ -210,7 +210,7 @@ def test_bus_off_behind_frames_of_the_same_burst_is_no_silence(listen):
     assert source.counts().frames == 3
 
 
-def test_what_kills_the_thread_surfaces(listen):
+def test_an_exception_in_the_thread_becomes_a_reader_fault(listen):
     source, interface = listen(Burst(frames(1)), ZeroDivisionError("a bug"))
     wait_for(lambda: source.reason and "the receive thread died" in source.reason)
     assert isinstance(source.failure, ZeroDivisionError)

@@ -59,6 +59,20 @@ def test_another_vehicles_calibration_is_named_as_the_likely_cause(monkeypatch: 
     assert likely in str(fault)
 
 
+def test_without_a_calibration_the_advice_is_how_to_get_one(monkeypatch: pytest.MonkeyPatch, log: Path) -> None:
+    """Seven refusals were printed and the command ended with 0; --json gives the spectra, and ends with 0."""
+
+    def weighed(*_: Any, **__: Any) -> Iterator[Estimate]:
+        yield from (make_estimate(n, Why.NO_CALIBRATION) for n in range(7))
+
+    monkeypatch.setattr(command, "with_remainders", weighed)
+    done = called("estimate", log, "--signals", "springscale:reference")
+    assert done.exit_code == 1
+    assert "no_calibration (7 batches)" in str(done.exception)
+    assert "`springscale learn LOGS" in str(done.exception)
+    assert len(run("estimate", log, "--signals", "springscale:reference", "--json").stdout.splitlines()) == 7
+
+
 def test_what_the_road_or_a_sensor_did_is_not_laid_on_the_calibration(
     monkeypatch: pytest.MonkeyPatch, log: Path
 ) -> None:
@@ -177,7 +191,7 @@ def test_frames_of_several_channels_are_told_unless_one_is_named(log_of):
 def test_estimate_tells_them_on_standard_error(tmp_path):
     packed = zstd.compress("".join(LINE.format(i / 100, "can0") for i in range(20_000)).encode())
     (tmp_path / "a.log.zst").write_bytes(packed[: len(packed) // 2])
-    ran = run("estimate", tmp_path / "a.log.zst", "--signals", "springscale:reference")
+    ran = called("estimate", tmp_path / "a.log.zst", "--signals", "springscale:reference")
     assert ran.stderr.startswith(f"{tmp_path / 'a.log.zst'}: the zstd stream is cut off; everything before was read\n")
 
 
@@ -189,11 +203,11 @@ def test_a_log_without_a_date_gives_relative_times_in_every_form(tmp_path: Path,
     noise = np.random.default_rng(1).standard_normal((3, len(t_s)))
     write(log, (9.81 + noise[0], 0.05 * noise[1], 0.05 * noise[2], speed), start_s + t_s - 1.7e9)
     asked = ("estimate", log, *MAP, "--window-s", "20")
-    text, as_json, as_csv = (run(*asked, *form).stdout for form in ((), ("--json",), ("--csv",)))
+    text, as_json, as_csv = (called(*asked, *form).stdout for form in ((), ("--json",), ("--csv",)))
     records = [json.loads(one) for one in as_json.splitlines()]
     rows = list(csv.DictReader(as_csv.splitlines()))
     assert len(records) == len(rows) == text.count("\n") >= 2
-    assert ("no date, 0:00:20  " in text, "has no date" in run(*asked).stderr) == (not start_s, not start_s)
+    assert ("no date, 0:00:20  " in text, "has no date" in called(*asked).stderr) == (not start_s, not start_s)
     assert "1970" not in text + as_json + as_csv
     for n, record in enumerate(records):
         assert (record["t_start"] is None, record["t_end"] is None) == (not start_s, not start_s)

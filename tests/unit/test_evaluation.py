@@ -52,8 +52,8 @@ def judged(true_kg: float, found_kg: float | None, true_pct: float = 50.0, found
     ("true", "is_covered"), [(89.9, False), (90.0, True), (110.0, True), (110.1, False), (float("nan"), None)]
 )
 def test_an_interval_holds_the_truth_between_its_ends(true: float, is_covered: bool | None) -> None:
-    assert Comparison(true, 100.0, 90.0, 110.0).is_covered is is_covered
-    assert Comparison(true, 100.0, float("nan"), float("nan")).is_covered is None
+    assert Comparison(true, 100.0, 90.0, 110.0).is_covered() is is_covered
+    assert Comparison(true, 100.0, float("nan"), float("nan")).is_covered() is None
 
 
 def test_error_table_by_hand() -> None:

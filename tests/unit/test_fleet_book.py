@@ -97,7 +97,7 @@ def test_what_comes_twice_is_one_row_and_the_highest_revision_stays(book: Book, 
         assert looked.execute("SELECT count(*) FROM estimate").fetchone() == (1,)
 
 
-def test_a_death_leaves_what_the_birth_told(book: Book) -> None:
+def test_a_vehicle_that_goes_offline_keeps_what_it_reported(book: Book) -> None:
     book.write([message("van-1", "status", state="online", vin="WVW1"), message("van-1", "status", state="offline")])
     (line,) = book.fleet().items
     assert (line.status.state, line.status.vin) == ("offline", "WVW1")
@@ -145,7 +145,7 @@ def test_a_database_that_is_away_is_told_to_the_caller_and_used_when_it_is_back(
     book.close()
 
 
-def test_it_is_there_after_a_restart(book: Book, tmp_path: Path) -> None:
+def test_records_are_kept_over_a_restart(book: Book, tmp_path: Path) -> None:
     book.write([estimate("van-1", 55, 200.0)])
     again = Book(str(tmp_path / "fleet.sqlite"), lambda: NOW_S)
     assert again.fleet().items == book.fleet().items
@@ -157,7 +157,7 @@ def test_it_is_there_after_a_restart(book: Book, tmp_path: Path) -> None:
         [estimate("van-1", n, 10.0 * n) for n in range(4)] + [alarm("van-1", n, is_active=n < 3) for n in range(4)]
     )
 )
-def test_order_of_arrival_leaves_no_trace(arrivals: list[Message]) -> None:
+def test_the_order_of_arrival_does_not_matter(arrivals: list[Message]) -> None:
     book = Book(":memory:", lambda: NOW_S)
     book.write(arrivals)
     (line,) = book.fleet().items

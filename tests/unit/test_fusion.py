@@ -58,7 +58,7 @@ def test_order_does_not_matter_within_an_epoch(payloads_kg: list[float], random:
     assert one.mean[PAYLOAD] == pytest.approx(np.mean(payloads_kg))
 
 
-def test_surer_batches_count_for_more() -> None:
+def test_batches_with_smaller_errors_count_for_more() -> None:
     assert together(batch(260.0, own_kg=10.0), batch(270.0, own_kg=5.0)).posterior.mean[PAYLOAD] == pytest.approx(268.0)
 
 
@@ -93,7 +93,7 @@ def test_a_stop_opens_a_new_epoch_whatever_the_numbers() -> None:
     ],
     ids=["rejected", "no posterior", "payload alone", "early look"],
 )
-def test_what_says_nothing_leaves_the_epoch_unless_a_stop_ended_it(silent: Estimate) -> None:
+def test_a_batch_without_an_answer_keeps_the_epoch_unless_the_load_could_have_changed(silent: Estimate) -> None:
     epoch = together(batch(100.0))
     assert fused_epoch(epoch, silent, RULES) is epoch
     assert fused_epoch(epoch, silent, RULES, could_have_changed=True) is None
@@ -148,7 +148,7 @@ def load(kg: float, share_pct: float = 50.0, left_m: float | None = None, correl
     return Posterior(mean, own, {Source.CALIBRATION: np.array([[15.0, 0.2, 0.01][: len(mean)]])})
 
 
-def test_the_probability_is_bayes_own() -> None:
+def test_the_probability_of_a_change_follows_bayes_theorem() -> None:
     """By brute force: changes drawn from the prior, densities averaged."""
     before, after = load(300.0, correlation=0.6), load(328.0, 50.4, correlation=0.6)
     x, unchanged = difference(before, after, is_one_load=True)
@@ -182,7 +182,7 @@ def test_what_is_certain_before_stays_certain(prior: float) -> None:
 
 
 @given(st.floats(-150.0, 150.0), st.floats(0.001, 0.999))
-def test_more_prior_is_more_posterior(change_kg: float, prior: float) -> None:
+def test_a_higher_prior_probability_gives_a_higher_posterior(change_kg: float, prior: float) -> None:
     pair = load(300.0), load(300.0 + change_kg)
     assert probability(*pair, 0.5 * prior, RULES) <= probability(*pair, prior, RULES)
     assert probability(*pair, 1.0, RULES) == 1.0

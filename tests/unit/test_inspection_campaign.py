@@ -7,8 +7,7 @@ from support.half_car_road import VAN, batch_over_road
 from support.known_runs import LOADS, campaign, known_run
 
 from gateway.calibration.inspection.campaign import Inspection, inspect_campaign, load_findings
-from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
-from gateway.calibration.inspection.loads import _Compared, compare_loads
+from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.known_run import KnownRun
@@ -41,56 +40,6 @@ def test_loads_that_teach_too_little_are_named(loads: list[tuple[float, float]],
 @pytest.fixture(scope="module")
 def runs() -> list[KnownRun]:
     return [known_run(number, *load, seed=7) for number, load in enumerate(LOADS, 1)]
-
-
-def relabelled(run: KnownRun, like: KnownRun) -> KnownRun:
-    return replace(run, payload_kg=like.payload_kg, front_share_pct=like.front_share_pct)
-
-
-def test_true_labels_raise_no_doubt(runs: list[KnownRun]) -> None:
-    assert list(compare_loads(runs, VAN)) == []
-    assert list(compare_loads(runs[:1], VAN)) == []
-    assert list(compare_loads(labelled((0.0, 52.0), (100.0, 50.0)), VAN)) == []
-
-
-@pytest.mark.parametrize(("i", "j"), [(0, 1), (2, 3)])
-def test_two_exchanged_labels_are_found_whichever_they_are(i: int, j: int, runs: list[KnownRun]) -> None:
-    wrong = list(runs)
-    wrong[i], wrong[j] = relabelled(runs[i], runs[j]), relabelled(runs[j], runs[i])
-    findings = dict(compare_loads(wrong, VAN))
-    assert {number: finding.kind for number, finding in findings.items()} == dict.fromkeys(
-        (i + 1, j + 1), Kind.LOADS_SWAPPED
-    )
-    assert f"runs {i + 1} and {j + 1}" in findings[i + 1].text
-
-
-def test_after_one_exchanged_pair_the_others_are_asked_again(
-    runs: list[KnownRun], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def next_pair(compared: _Compared) -> dict[int, Finding] | None:
-        numbers = [known.run.number for known in compared.known]
-        told = [pair for pair in ((1, 3), (2, 4)) if set(pair) <= set(numbers)]
-        text = "runs {} and {}".format(*told[0]) if told else ""
-        return {numbers.index(one): Finding.of(Kind.LOADS_SWAPPED, text) for one in told[0]} if told else None
-
-    monkeypatch.setattr(_Compared, "swapped", next_pair)
-    findings = list(compare_loads([*runs, known_run(5, 100.0, 1.4, seed=7)], VAN))
-    assert [number for number, _ in findings] == [1, 3, 2, 4]
-    assert "runs 2 and 4" in findings[-1][1].text
-
-
-def test_exchanged_labels_are_found_in_runs_out_of_order(runs: list[KnownRun]) -> None:
-    wrong = [relabelled(runs[1], runs[3]), runs[2], relabelled(runs[3], runs[1]), runs[0]]
-    assert sorted(number for number, _ in compare_loads(wrong, VAN)) == [2, 4]
-
-
-def test_a_load_that_was_noted_wrong_is_told_with_what_the_others_weigh(runs: list[KnownRun]) -> None:
-    more = [*runs, known_run(5, 100.0, 1.4, seed=7)]
-    more[4] = relabelled(more[4], more[3])
-    ((number, finding),) = compare_loads(more, VAN)
-    assert (number, finding.kind, finding.severity) == (5, Kind.LOAD_DISAGREES, Severity.WARNING)
-    weighed_kg = float(finding.text.split("at ")[1].split(" kg")[0])
-    assert weighed_kg == pytest.approx(100.0, abs=40.0)
 
 
 def inspected(run: KnownRun) -> SplitRun:

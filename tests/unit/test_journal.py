@@ -15,8 +15,8 @@ from test_uplink import SETTINGS, FakeBroker, accepted
 
 from gateway.history import BATCHES, ENTRIES, KINDS
 from gateway.log import Event
+from gateway.part import BackOff
 from gateway.store import Store, reader, writer
-from gateway.uplink.forwarder import BackOff
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.uplink import Uplink
 from gateway.web.live.board import Board

@@ -47,7 +47,7 @@ def test_distance_is_the_integral_of_the_speed():
     assert first.stops == ()
 
 
-def test_a_gap_of_the_speed_is_no_way():
+def test_time_without_a_speed_counts_no_distance():
     rows = drive(60.5)
     gone = rows.columns.copy()
     t_s = (rows.t_ns - T0_NS) / 1e9
@@ -71,12 +71,12 @@ def test_a_stop_has_its_time_and_its_door():
 
 
 @pytest.mark.parametrize(("stood_s", "n_stops"), [(9.0, 0), (11.0, 1)])
-def test_a_stop_in_traffic_is_none(stood_s: float, n_stops: int):
+def test_only_a_long_enough_stop_is_listed(stood_s: float, n_stops: int):
     short = drive(60.5, lambda t_s: np.where((t_s > 20.0) & (t_s < 20.0 + stood_s), 0.0, 15.0))
     assert len(ways(short)[0].stops) == n_stops
 
 
-def test_what_happens_while_it_is_parked_is_told_by_the_next_drive():
+def test_a_door_opened_while_parked_is_reported_by_the_next_drive():
     rows = drive(150.0, lambda t_s: np.where((t_s > 20.0) & (t_s < 90.0), 0.0, 15.0))
     seen = ways(beside(rows, 150.0, lambda t_s: ((t_s > 70.0) & (t_s < 75.0)) * 1.0))
     assert [way.before.door_opened for way in seen] == [None, True]
@@ -84,7 +84,7 @@ def test_what_happens_while_it_is_parked_is_told_by_the_next_drive():
     assert [way.before for way in ways(rows)] == [Watched()] * 2
 
 
-def test_what_happens_while_the_sensors_sleep_is_told_too():
+def test_a_door_opened_while_the_sensors_sleep_is_reported():
     rows = without_rows(drive(120.0), 50.0, 80.0)
     seen = ways(beside(rows, 120.0, lambda t_s: ((t_s > 60.0) & (t_s < 65.0)) * 1.0))
     assert [way.before.door_opened for way in seen] == [None, True]
@@ -98,7 +98,7 @@ def test_no_position_is_kept_unless_asked_for():
     assert ways(rows, decimals=1)[0].end == Place(47.0, 8.0)
 
 
-def test_an_old_position_is_no_place():
+def test_an_old_position_is_not_used():
     rows = drive(120.5)
     told = beside(rows, 30.0)
     first, second = ways(told, decimals=5)[:2]
@@ -128,6 +128,6 @@ def test_json_and_back():
     assert way_to_json(Way())["distance_m"] is None
 
 
-def test_a_clock_that_steps_back_begins_a_new_way():
+def test_a_clock_that_steps_back_starts_a_new_journey():
     rows = joined(drive(50.0), later(drive(50.0, seed=2), 20.0))
     assert len(ways(rows)) == 2

@@ -43,7 +43,7 @@ def test_a_delivery_is_told_with_its_weight_time_and_both_loads():
     assert found["revision"] == 1
 
 
-def test_a_change_is_the_less_sure_the_less_alike_the_loads_are():
+def test_a_change_between_unlike_loads_has_a_larger_error():
     """What grows with the load by a tenth errs by a tenth of the change."""
     for after_kg in (320.0, 900.0):
         loads = [
@@ -56,7 +56,7 @@ def test_a_change_is_the_less_sure_the_less_alike_the_loads_are():
         assert change_of(*loads).std == pytest.approx(std_kg)
 
 
-def test_nothing_loaded_is_nothing_told():
+def test_an_unchanged_load_gives_no_event():
     assert not events(day(300.0, 305.0, 297.0, 300.0, batches=2))
 
 
@@ -93,7 +93,7 @@ def test_an_event_that_later_batches_contradict_is_withdrawn():
 
 
 @pytest.mark.parametrize(("door", "is_told"), [(True, True), (None, True), (False, False)])
-def test_a_door_that_stayed_shut_asks_for_more(door, is_told):
+def test_a_door_that_stayed_shut_raises_the_evidence_needed(door, is_told):
     found = events(day(300.0, 257.0, door=door))
     assert bool(found) is is_told
     if found:
@@ -134,7 +134,7 @@ def test_a_stop_says_where_and_from_when():
     assert T0_NS == 1_790_000_000_000_000_000
 
 
-def test_a_jump_without_a_stop_must_be_plain():
+def test_a_change_without_a_stop_needs_a_large_jump():
     rolling = [batch(5.0 * i, 5.0 * i + 5.0, kg) for i, kg in enumerate((300.0, 300.0, 270.0, 270.0))]
     assert not events(rolling)
     dropped = [batch(5.0 * i, 5.0 * i + 5.0, kg) for i, kg in enumerate((300.0, 300.0, 100.0, 100.0))]
@@ -164,7 +164,7 @@ def test_a_refused_batch_takes_no_known_weight_back():
     assert after == before
 
 
-def test_another_calibration_is_compared_with_none():
+def test_batches_of_different_calibrations_are_not_compared():
     first, second = day(300.0, 100.0)
     assert not events([first, replace(second, calibration_id="sha256:2")])
 

@@ -2,6 +2,7 @@
 
 import json
 import resource
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from support.bus_drive import bus_drive
 from support.commands import called, printed
 from support.encoded import encode_signals
 from support.half_car_road import VAN
+from support.spoiled import limits
 
 from gateway.bus.frames import merge_frames, message_of
 from gateway.bus.logs import write_candump
@@ -24,6 +26,8 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.offline.campaigns import _silent, read_whole_log
+from gateway.offline.look import look as look_module
+from gateway.offline.look.look import MOST_IDENTIFIERS
 from gateway.offline.look.roles import axis_of
 from gateway.records import EXTENDED_ID, Frames, Signal
 from gateway.status import DecodeCount, SignalHealth, State, Status
@@ -100,6 +104,7 @@ def test_a_box_on_its_side_is_mapped_by_gravity_and_braking(box: Path, tmp_path:
     assert "BOX.AccZ: +0." in told or "BOX.AccZ: -0." in told
     assert "points rearward: goes with the change of speed" in told
     assert "This can work." in told
+    assert f'Next: `springscale run` with signals = "{output}" in springscale.toml' in told
     mapped = {m.signal: m for message in load_signal_map(output).messages for m in message.signals}
     # up = -y, forward = -z, left = up x forward = y x z = x
     assert (mapped[Signal.VERTICAL_ACCELERATION].dbc_signal, mapped[Signal.VERTICAL_ACCELERATION].to_si) == ("AccY", -1)
@@ -147,6 +152,35 @@ def test_of_many_identifiers_that_nothing_describes_a_dozen_are_shown(
     assert [line for line in told if line.startswith("...")] == (
         [] if last is None else [f"{last} that no database describes"]
     )
+
+
+def test_more_identifiers_than_a_bus_has_are_counted_and_left_out(tmp_path: Path) -> None:
+    """A million and a half of them took two gigabytes and a minute."""
+    n, seconds = 300_000, 60.0
+    step_ns = round(seconds * 1e9 / n)
+    at = np.arange(n)
+    can_id = (0x8000_0000 | (at % 200_000)).astype(np.uint32)
+    payload = np.zeros((n, 8), np.uint8)
+    frames = Frames(T0_NS + step_ns * at, can_id, np.full(n, 8, np.uint8), payload)
+    write_candump(frames, "can0", tmp_path / "a.log")
+    begun_s = time.process_time()
+    with limits():
+        told = run(tmp_path / "a.log")
+    assert time.process_time() - begun_s < 10.0
+    n_kept = sum(1 for one in at if one % 200_000 < MOST_IDENTIFIERS)
+    assert f"300000 frames in 60 s on can0\n  {n - n_kept} frames are under further identifiers" in told
+    assert f"... and {MOST_IDENTIFIERS - 12} identifiers more that no database describes" in told
+
+
+def test_the_frames_kept_of_a_long_log_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 2 GB of other traffic 5 GB were kept; the counts are of all."""
+    t_ns = T0_NS + np.arange(40_000) * 1_000_000
+    frames = merge_frames([packed(0x6A0 + n, 8, t_ns + n) for n in range(5)])
+    write_candump(frames, "can0", tmp_path / "a.log")
+    monkeypatch.setattr(look_module, "KEPT_BYTES", 1000)
+    heard, _ = look_module.heard_in(tmp_path / "a.log")
+    assert [one.n_frames for one in heard] == [40_000] * 5
+    assert [len(one.kept) for one in heard[1:]] == [look_module.FIRST_FRAMES] * 4
 
 
 def test_a_map_is_not_written_over(box: Path) -> None:

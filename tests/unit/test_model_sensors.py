@@ -266,7 +266,7 @@ def amplified(batch: Batch, gain: float) -> Batch:
     )
 
 
-def test_gravity_that_reads_otherwise_is_told() -> None:
+def test_a_changed_reading_of_gravity_is_refused() -> None:
     assert taught().gravity_mps2 == pytest.approx(9.81)
     for gain in (0.95, 1.05):
         assert told(amplified(drive_of(LOAD, 63), gain)).rejected == (Why.SENSOR_CHANGED,)
@@ -368,7 +368,7 @@ def test_a_gyro_that_is_far_too_late_is_refused(lag_s: float, with_roll: bool) -
     assert set(late_by(lag_s, with_roll=with_roll, slack=USUAL_SLACK).rejected) & REFUSED_AS_CHANGED
 
 
-def test_it_is_told_that_the_gyro_is_far_too_late() -> None:
+def test_without_a_roll_rate_a_gyro_that_is_far_too_late_is_a_changed_sensor() -> None:
     assert late_by(0.05, with_roll=False, slack=USUAL_SLACK).rejected == (Why.SENSOR_CHANGED,)
 
 
@@ -478,7 +478,9 @@ def _gyro_on_another_axis(batch: Batch) -> Batch:
         (_gyro_on_another_axis, Why.MODEL_MISFIT),
     ],
 )
-def test_a_spoilt_batch_is_refused_with_the_reason(spoil: Callable[[Batch], Batch], why: Why, with_roll: bool) -> None:
+def test_a_batch_with_a_faulty_sensor_is_refused_with_the_reason(
+    spoil: Callable[[Batch], Batch], why: Why, with_roll: bool
+) -> None:
     found = told(spoil(drive_of(LOAD, 4, with_roll=with_roll)), with_roll=with_roll)
     assert found.rejected == (why,)
     assert np.isnan(found.payload.number)
@@ -521,7 +523,7 @@ def test_a_roll_rate_changes_nothing_for_a_vehicle_taught_without_one() -> None:
     assert np.isnan(one.cg_left.number)
 
 
-def test_what_is_left_of_the_line_is_positive() -> None:
+def test_a_load_left_of_the_centre_line_has_a_positive_place() -> None:
     model = taught(with_roll=True)
     left, right = (
         estimated(drive_of((300.0, 48.0), 70, with_roll=True, cg_left_m=left_of(300.0, y)), model) for y in (0.3, -0.3)

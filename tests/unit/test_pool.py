@@ -122,7 +122,7 @@ def test_a_load_that_came_shortly_before_the_window_ended_waits(weighed: Callabl
     assert spans(told(motion), motion) == [(0, 100, 100), (100, 150, "rest"), (100, 300, 300)]
 
 
-def test_a_stop_of_traffic_is_no_border(weighed: Callable[[float, float], None]) -> None:
+def test_a_stop_in_traffic_does_not_separate_loads(weighed: Callable[[float, float], None]) -> None:
     weighed(80.0, 300.0)
     motion = drive(150.5, driven_with_stops((75.0, 84.0)))
     assert next(kg for *_, kg in spans(told(motion), motion)) not in (100, 300)
@@ -164,7 +164,7 @@ def test_a_sensor_at_fault_is_refused_and_never_pooled() -> None:
     assert spans(told(stuck), stuck)[0][2] == str(Why.ACCELERATION_STUCK)
 
 
-def test_chunks_leave_no_trace() -> None:
+def test_batches_are_the_same_however_the_rows_are_chunked() -> None:
     motion = drive(420.0, driven_with_stops(*((t_s, t_s + 45.0) for t_s in (20.0, 100.0, 180.0, 260.0))))
     flow = Flow(SETTINGS, {}, CALIBRATED, "cross_spectrum", Identity("van-17"))
     cuts = [0, 100, 7_000, 31_000, len(motion)]
@@ -172,7 +172,7 @@ def test_chunks_leave_no_trace() -> None:
     assert spans(iter([*found, *flow.flush()]), motion) == spans(told(motion), motion)
 
 
-def test_what_is_missing_shrinks_with_every_stretch() -> None:
+def test_missing_s_shrinks_with_every_usable_stretch() -> None:
     flow = Flow(SETTINGS, {}, CALIBRATED, "cross_spectrum", Identity("van-17"))
     assert flow.missing_s == pytest.approx(90.0)
     motion = drive(150.5, driven_with_stops((20.0, 60.0), (100.0, 150.0)))

@@ -69,7 +69,7 @@ def test_a_linear_function_has_the_error_of_its_slopes(
     assert one.covariance_of(slopes, others) == pytest.approx(whole @ one.covariance @ across, abs=1e-9)
 
 
-def test_what_hangs_on_an_unknown_place_is_unknown() -> None:
+def test_a_result_that_needs_an_unknown_place_is_unknown() -> None:
     one = drawn(3, size=2)
     found = one.linear(5.0, [1.0, 0.0, 2.0])
     assert found.number == 5.0
@@ -127,7 +127,7 @@ def test_fusion_weighs_by_own_information(seeds: list[int]) -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 2**32 - 1), st.sampled_from([2, 3])), min_size=1, max_size=5), st.randoms())
-def test_fusion_does_not_know_the_order(drawn_of: list[tuple[int, int]], random: object) -> None:
+def test_fusion_does_not_depend_on_the_order(drawn_of: list[tuple[int, int]], random: object) -> None:
     parts = [drawn(*each) for each in drawn_of]
     shuffled = parts.copy()
     random.shuffle(shuffled)  # type: ignore[attr-defined]
@@ -206,7 +206,7 @@ def test_a_difference_is_as_sure_in_either_direction(one: Posterior, other: Post
 
 
 @given(posteriors)
-def test_of_itself_nothing_is_left_but_own_errors_twice(one: Posterior) -> None:
+def test_two_batches_of_one_load_differ_by_their_own_errors_only(one: Posterior) -> None:
     assert difference(one, one, is_one_load=True)[1] == pytest.approx(2.0 * one.own)
 
 
@@ -301,7 +301,7 @@ def test_each_source_has_the_remedy_that_helps_it() -> None:
     assert found[Source.SIDEWAYS] is Remedy.READ_ROLL_RATE
 
 
-def test_nothing_is_offered_that_was_done() -> None:
+def test_a_remedy_that_was_applied_is_not_offered_again() -> None:
     assert {remedies(is_shape_said=True)[name] for name in SHAPE} == {Remedy.WEIGH_ONCE}
     assert {remedies(is_empty_weighed=True)[name] for name in (Source.DAY, Source.SENSOR)} == {None}
 
@@ -311,7 +311,7 @@ def test_driving_on_leaves_a_third_of_what_is_the_batchs_own() -> None:
     assert line.payload_with_remedy_kg**2 == pytest.approx(with_all().covariance[0, 0] - 36.0 * 2.0 / 3.0)
 
 
-def test_what_adds_nothing_has_no_line() -> None:
+def test_a_source_without_error_has_no_line() -> None:
     assert budget_of(exactly(300.0, 50.0), is_shape_said=False) == ()
     quiet = Posterior(np.array([300.0, 50.0]), np.eye(2), {Source.DAY: np.zeros((3, 2))})
     assert [line.source for line in budget_of(quiet, is_shape_said=False)] == [OWN]

@@ -196,7 +196,7 @@ def test_stamps_of_whole_seconds_are_told_and_not_the_road(tmp_path: Path) -> No
 def test_the_service_warns_of_it(spoiled: tuple[Case, Path, Path]) -> None:
     case, log, signals = spoiled
     signal_map = load_signal_map(signals)
-    flow = SimpleNamespace(settings=BatchSettings())
+    flow = SimpleNamespace(settings=BatchSettings(), on_batch=lambda *handed: None, on_window=lambda *handed: None)
     pipeline = Pipeline(*cast(Any, (None, Decoder(signal_map), flow, None, None)))
     assert pipeline.fault is None
     for frames in open_log(log, signal_map)[0]:

@@ -13,7 +13,7 @@ from support.log import fields_of
 from support.patience import PATIENCE_S, wait_until
 
 from gateway.bus import ring_log
-from gateway.bus.frames import take
+from gateway.bus.frames import message_of, take
 from gateway.bus.logs import open_whole_log
 from gateway.bus.logs.open import open_log
 from gateway.bus.ring_log import RingLog
@@ -62,13 +62,32 @@ def test_what_was_put_is_what_is_read(tmp_path: Path) -> None:
     told = log.status()
     assert (told.n_frames_written, told.n_frames_dropped, told.n_frames_held) == (len(DRIVE), 0, 0)
     assert told.size_bytes == path.stat().st_size
-    assert (log.fault, path.parent.stat().st_mode & 0o027) == (None, 0)
+    assert (log.status().last_fault, path.parent.stat().st_mode & 0o027) == (None, 0)
 
 
 def test_runs_are_kept_one_behind_the_other(tmp_path: Path) -> None:
     recorded(tmp_path, take(DRIVE, slice(0, 1000)), take(DRIVE, slice(1000, None)))
     assert [path.name for path in files(tmp_path)] == ["00000001.log", "00000002.log"]
     assert same(read(*files(tmp_path)), DRIVE)
+
+
+def test_frames_that_cannot_be_written_are_lost_once_and_the_next_are_recorded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What had been written before the fault was written again at every attempt."""
+    one, other = take(DRIVE, slice(0, 100)), take(DRIVE, slice(100, 200))
+    log = RingLog(tmp_path, "can0", 10**9, 0, write_s=0.01)
+    with monkeypatch.context() as breaking:
+        breaking.setattr(ring_log, "message_of", lambda frames, row: {}[row] if row == 50 else message_of(frames, row))
+        log.put(one)
+        log.start()
+        assert wait_until(lambda: log.status().last_fault is not None)
+        assert log.status().n_frames_dropped == 100
+    log.put(other)
+    assert wait_until(lambda: log.status().last_fault is None)
+    log.stop(PATIENCE_S)
+    assert (log.status().n_frames_written, log.status().n_frames_dropped) == (100, 100)
+    assert same(read(files(tmp_path)[-1]), other)
 
 
 def test_the_oldest_give_way(tmp_path: Path) -> None:
@@ -110,11 +129,11 @@ def test_a_disk_that_refuses_is_waited_for(tmp_path: Path) -> None:
     log = RingLog(directory, "can0", 10**9, 0, write_s=0.01)
     log.start()
     log.put(DRIVE)
-    assert wait_until(lambda: log.fault is not None)
+    assert wait_until(lambda: log.status().last_fault is not None)
     assert log.status().n_frames_held == len(DRIVE)
     directory.unlink()
     assert wait_until(lambda: log.status().n_frames_written == len(DRIVE))
-    assert wait_until(lambda: log.fault is None)
+    assert wait_until(lambda: log.status().last_fault is None)
     assert log.status().n_frames_dropped == 0
     log.stop(PATIENCE_S)
 
@@ -137,7 +156,7 @@ def test_a_disk_with_little_room_is_left_alone(tmp_path: Path) -> None:
     log.start()
     log.put(DRIVE)
     log.stop(PATIENCE_S)
-    assert "free_mb" in str(log.fault)
+    assert "free_mb" in str(log.status().last_fault)
     assert (files(tmp_path / "record"), log.status().n_frames_dropped) == ([], len(DRIVE))
 
 
@@ -178,7 +197,7 @@ def test_what_kills_the_recorder_is_told(tmp_path: Path, monkeypatch: pytest.Mon
         raise ZeroDivisionError
 
     monkeypatch.setattr(ring_log, "message_of", broken)
-    assert "ZeroDivisionError" in str(recorded(tmp_path, DRIVE).shown_fault())
+    assert "ZeroDivisionError" in str(recorded(tmp_path, DRIVE).status().last_fault)
 
 
 @pytest.fixture

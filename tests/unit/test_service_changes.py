@@ -53,7 +53,6 @@ def test_reasons_are_a_line_only_where_their_set_changes(caplog: pytest.LogCaptu
         make_estimate(0, Why.TOO_SLOW, Why.GAP),
         make_estimate(1, Why.GAP, Why.TOO_SLOW),
         make_estimate(2, Why.GAP),
-        make_estimate(2, Why.TOO_SHORT, is_provisional=True),
         make_estimate(3, Why.GAP),
         make_estimate(4),
         make_estimate(5),
@@ -65,13 +64,13 @@ def test_reasons_are_a_line_only_where_their_set_changes(caplog: pytest.LogCaptu
         {"rejected": (), "before": [Why.GAP]},
     ]
     assert names(caplog).count(Event.ESTIMATE) == 2
-    assert not {Event.REJECTED, Event.PROVISIONAL} & set(names(caplog))
+    assert Event.REJECTED not in names(caplog)
 
 
 def test_whoever_looks_for_a_fault_reads_of_every_batch(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("DEBUG", "gateway")
-    Told().hear(make_estimate(0, Why.GAP), make_estimate(1, is_provisional=True))
-    assert names(caplog) == [Event.REJECTED, Event.REASONS_CHANGED, Event.PROVISIONAL]
+    Told().hear(make_estimate(0, Why.GAP))
+    assert names(caplog) == [Event.REJECTED, Event.REASONS_CHANGED]
     assert dict(logged(caplog))[Event.REJECTED]["payload_kg"] is None
 
 

@@ -95,24 +95,6 @@ def test_an_estimate_is_collected_shown_and_grows_old() -> None:
     assert report(ALL_HEARD, is_stale=True) is State.STALE
 
 
-@pytest.mark.parametrize(
-    ("state", "calibration", "reason"),
-    [
-        (State.COLLECTING, object(), None),
-        (State.WAITING_FOR_BUS, object(), None),
-        (State.COLLECTING, None, "no calibration: batches carry spectra only"),
-        (State.READER_FAULT, None, "can0: no such device"),
-    ],
-)
-def test_it_is_ready_while_estimates_can_come(state: State, calibration: object, reason: str | None) -> None:
-    """Without a calibration none can come, whatever the bus says: /health/ready once answered 200."""
-    told: Any = StatusReport.__new__(StatusReport)
-    told.setup, told.source = SimpleNamespace(calibration=calibration), SimpleNamespace(reason="can0: no such device")
-    why = told._why_not_ready(state)
-    assert (why or "").startswith(reason or "")
-    assert (why is None) is (reason is None)
-
-
 VAN = Vehicle(
     name="van",
     empty_mass_kg=1240.0,

@@ -111,7 +111,7 @@ def test_the_default_step_is_fine_enough_on_a_rough_road() -> None:
 
 
 @pytest.mark.parametrize("loads", [(), (Load(300.0, 2.6, 0.3),), (Load(250.0, 0.4, resonance_hz=12.0),)])
-def test_what_rests_stays_at_rest(loads: tuple[Load, ...]) -> None:
+def test_a_vehicle_at_rest_stays_at_rest(loads: tuple[Load, ...]) -> None:
     still = ride(PAPER_VAN, loads, FLAT, Drive(np.zeros(101), np.zeros(101)))
     assert np.max(np.abs(still.acceleration)) < 1e-9
     assert np.ptp(still.position, axis=0) == pytest.approx(np.zeros(3), abs=1e-12)

@@ -55,7 +55,7 @@ def test_the_spectrum_is_the_one_asked_for(waviness: float) -> None:
         assert np.sum(density_per_rad[band]) == pytest.approx(np.sum(recipe.spectrum_m3(omega[band])), rel=0.08)
 
 
-def test_the_tracks_part_company_at_short_waves() -> None:
+def test_the_tracks_coherence_falls_at_short_waves() -> None:
     recipe = SpectralRoad(4e-6, coherence_decay_m=0.7)
     road = recipe.lay(60_000.0, np.random.default_rng(4))
     wave, coherence = signal.coherence(road.left_m, road.right_m, 1.0 / road.step_m, nperseg=4096)

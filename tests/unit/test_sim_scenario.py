@@ -91,7 +91,7 @@ def test_steps_among_constant_loads_are_refused_not_left_out() -> None:
         simulate_drive(PAPER_VAN, mixed, PaperRoad(), STOP_AND_GO, IDEAL, 1)
 
 
-def test_no_scatter_is_the_type_itself() -> None:
+def test_without_scatter_a_van_is_the_type_itself() -> None:
     assert scattered(PAPER_VAN, Scatter(), np.random.default_rng(1)) == PAPER_VAN
 
 
@@ -152,7 +152,7 @@ def test_kinds_differ_as_their_names_say() -> None:
     assert len(shaped_load(Shape.ROOF, van, 250.0, 1.4, np.random.default_rng(1))) == 2
 
 
-def test_what_is_drawn_is_of_every_kind() -> None:
+def test_random_loads_are_short_and_long() -> None:
     van = VANS["paper_van"]
     lengths = {round(drawn_load(van, 250.0, 1.4, np.random.default_rng(seed))[0].length_m, 3) for seed in range(60)}
     assert len(lengths) > 30

@@ -152,7 +152,7 @@ def test_drop_outs_read_zero_without_a_fix() -> None:
     assert np.mean(~recording.gps_fix) == pytest.approx(60 * 6.0 / 3600.0, rel=0.4)
 
 
-def test_the_clock_runs_wrong_trembles_and_loses() -> None:
+def test_stamps_drift_jitter_and_lose_frames_as_asked() -> None:
     clock = Clock(error_ppm=1000.0, jitter_mean_s=5e-4, lost_share=0.02)
     recording = read(resting(1000.0), Sensors(clock=clock))
     assert len(recording.imu_t_ns) == pytest.approx(0.98 * 100_000 / 1.001, rel=0.003)
@@ -162,7 +162,7 @@ def test_the_clock_runs_wrong_trembles_and_loses() -> None:
     assert len(recording.accel_mps2) == len(recording.gyro_radps) == len(recording.imu_t_ns)
 
 
-def test_the_engine_is_heard_at_its_orders() -> None:
+def test_the_engine_shows_at_its_orders() -> None:
     engine = Engine(level_mps2=1.0, idle_rpm=900.0)
     accel = read(resting(60.0), Sensors(imu=Imu(rate_hz=500.0), engine=engine)).accel_mps2[:, 2]
     spectrum = np.abs(np.fft.rfft((accel - accel.mean()) * np.hanning(len(accel))))
@@ -180,7 +180,7 @@ def test_gears_keep_the_crank_in_its_range() -> None:
     assert np.count_nonzero(np.diff(rpm) < 0.0) == 4  # four times up
 
 
-def test_each_error_is_its_own(driven: Ride) -> None:
+def test_each_error_of_the_unit_is_independent(driven: Ride) -> None:
     """Noise on the gyroscope changes no accelerometer reading."""
     felt = felt_at(driven, PAPER_VAN, Mount())
     base = Sensors(imu=Imu(accel=Channel(noise_density=0.01)))

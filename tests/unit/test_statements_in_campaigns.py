@@ -47,23 +47,23 @@ NOTE = {"front_share_pct": nan, "payload_plus_minus_kg": 25.0}
 
 
 def test_an_unknown_load_teaches_and_is_found_and_is_not_judged(tmp_path: Path) -> None:
-    campaign, outcome = calibrated(tmp_path, split(run_3=UNKNOWN))
+    _, outcome = calibrated(tmp_path, split(run_3=UNKNOWN))
     told = outcome.file.provenance.drives[2]
     assert (told.statement.payload_kg, told.statement.front_share_pct) == (None, None)
     assert told.found is not None
     assert (told.found.without_statement_kg, told.found.is_held) == (None, False)
     assert told.found.payload_kg == pytest.approx(300.0, abs=60.0)
-    (judgement,) = assess_calibration(campaign, outcome).judgements
+    (judgement,) = assess_calibration(outcome).judgements
     assert {one.run for one in judgement.tables[BatchSet.LEFT_OUT].judged} == {1, 2, 4}
     validation = judgement.tables[BatchSet.VALIDATION]
     assert validation.errors.n_batches == 4
-    answered = [one for one in validation.judged if one.compared("payload").is_covered is not None]
+    answered = [one for one in validation.judged if one.is_covered("payload") is not None]
     assert {one.run for one in answered} == {1, 2, 4}
     assert validation.to_json()["runs"][2]["true_payload_kg"] is None
 
 
 def test_a_note_is_judged_by_its_kilograms_alone(tmp_path: Path) -> None:
-    campaign, outcome = calibrated(tmp_path, split(run_2=NOTE))
+    _, outcome = calibrated(tmp_path, split(run_2=NOTE))
     told = outcome.file.provenance.drives[1].statement
     assert (told.payload_kg, told.payload_plus_minus_kg, told.front_share_pct, told.is_compact) == (
         200,
@@ -71,23 +71,23 @@ def test_a_note_is_judged_by_its_kilograms_alone(tmp_path: Path) -> None:
         None,
         False,
     )
-    (judgement,) = assess_calibration(campaign, outcome).judgements
+    (judgement,) = assess_calibration(outcome).judgements
     noted = [one for one in judgement.tables[BatchSet.VALIDATION].judged if one.run == 2]
-    assert all(one.compared("payload").is_covered is not None for one in noted)
-    assert all(one.compared("front_share").is_covered is None for one in noted)
+    assert all(one.is_covered("payload") is not None for one in noted)
+    assert all(one.is_covered("front_share") is None for one in noted)
 
 
 def test_a_wrong_statement_is_held_and_named_and_condemns_no_other(tmp_path: Path) -> None:
-    campaign, outcome = calibrated(tmp_path, split(run_3={"payload_kg": 0.0, "front_share_pct": 52.0}))
+    _, outcome = calibrated(tmp_path, split(run_3={"payload_kg": 0.0, "front_share_pct": 52.0}))
     assert [one.found.is_held for one in outcome.file.provenance.drives if one.found] == [False, False, True, False]
     assert outcome.file.provenance.drives[2].found is not None
     assert outcome.file.provenance.drives[2].found.payload_kg == pytest.approx(300.0, abs=60.0)
     (warning,) = [one for one in outcome.file.warnings if str(Kind.LOAD_DISAGREES) in one]
     assert warning.startswith("run 3: load_disagrees: the campaign says 0 kg at 52.0 % front, the drive shows ")
     assert outcome.file.seen.payload_kg == (0.0, 400.0)
-    (verdict,) = verdicts_of(assess_calibration(campaign, outcome))
+    (verdict,) = verdicts_of(assess_calibration(outcome))
     (labels,) = [reason for reason in verdict.reasons if reason.rule == "labels"]
-    assert "run 3" in labels.text
+    assert "drive 3" in labels.text
     assert labels.grade is Grade.RESERVED
 
 
@@ -108,7 +108,7 @@ def test_the_file_is_read_back_as_it_was_written(tmp_path: Path) -> None:
 
 
 def test_the_verdict_says_what_to_drive_next(tmp_path: Path) -> None:
-    campaign, outcome = calibrated(tmp_path, split()[:1])
-    (verdict,) = verdicts_of(assess_calibration(campaign, outcome))
+    _, outcome = calibrated(tmp_path, split()[:1])
+    (verdict,) = verdicts_of(assess_calibration(outcome))
     assert verdict.advice.startswith("Next: a known load ")
     assert verdict.advice in verdict.text

@@ -14,8 +14,8 @@ from gateway.config import VehicleSection
 from gateway.config.sections import UplinkSection
 from gateway.errors import ConfigurationError
 from gateway.log import Event
+from gateway.part import BackOff
 from gateway.store import Retention, Store
-from gateway.uplink.forwarder import BackOff
 from gateway.uplink.link import BrokerAnswer, LinkError
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import UplinkSettings, uplink_settings

@@ -69,7 +69,7 @@ def test_the_estimate_is_shown_as_it_is_with_its_age(board: Board, clock: Clock)
     board.publish(make_estimate(3))
     clock.now_s += 12.34
     told = latest(board)
-    assert told == make_record(3) | {"age_s": 12.3, "is_stale": False, "last_rejection": None}
+    assert told == make_record(3) | {"age_s": 12.3, "is_stale": False, "is_stored": True, "last_rejection": None}
 
 
 def test_it_becomes_stale_after_the_time_set(board: Board, clock: Clock) -> None:

@@ -23,7 +23,7 @@ LEAST_LIKELIHOOD_RATIO: Final = 12.0  # chosen: twice the logarithm, for a day t
 
 
 class Health(StrEnum):
-    """The state of a sensor by one reason."""
+    """How often a sensor has caused refusals for one reason."""
 
     BAD = "bad"  # now: surely more than BAD_SHARE of the recent days
     WAS_BAD = "was bad"  # had as many bad days in a row as make a sensor bad, but not now

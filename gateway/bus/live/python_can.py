@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import can
 
-from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of
+from gateway.bus.frames import LAST_EXTENDED, LAST_SECOND, LAST_STANDARD, ExactStamp, frames_of
 from gateway.bus.live.adapter_clock import AdapterClock
 from gateway.bus.live.receiver import Burst
 from gateway.bus.signals import IdFilter
@@ -26,6 +26,7 @@ from gateway.records import EXTENDED_ID
 BURST_FRAMES: Final = 4096  # chosen: taken before they are handed on
 GATHER_S: Final = 0.05  # chosen: frames are left to gather in the kernel this long: few wake-ups
 RECEIVE_BUFFER_BYTES: Final = 4 << 20  # chosen: for what comes while this process does not get the processor
+LONGEST: Final = 64  # bytes of a CAN FD frame, ISO 11898-1
 VIRTUAL_QUEUE_FRAMES: Final = 4096  # chosen: an in-process sender waits when it is full
 
 _BUS_OFF: Final = 0x40  # CAN_ERR_BUSOFF of linux/can/error.h, in the identifier of an error frame
@@ -62,13 +63,24 @@ class PythonCanReceiver:
     """Messages of an open python-can bus as bursts of frames."""
 
     def __init__(
-        self, bus: can.BusABC, width: int, kernel_socket: socket.socket | None = None, interface: str = ""
+        self,
+        bus: can.BusABC,
+        width: int,
+        kernel_socket: socket.socket | None = None,
+        interface: str = "",
+        *,
+        has_error_classes: bool | None = None,
     ) -> None:
-        """``kernel_socket`` is the bus's own, if the kernel receives into it (SocketCAN)."""
+        """``kernel_socket`` is the bus's own, if the kernel receives into it (SocketCAN). ``has_error_classes`` is
+        whether identifiers of error frames are the kernel's error classes; None: if there is a kernel socket.
+        """
         self._bus = bus
         self._width = width
         self._socket = kernel_socket
         self._clock = AdapterClock(interface)
+        self._has_error_classes = kernel_socket is not None if has_error_classes is None else has_error_classes
+        streams = (one for one in vars(bus).values() if isinstance(one, socket.socket))
+        self._stream = next((one for one in streams if one.type == socket.SOCK_STREAM), None)
         self._n_dropped = 0
         self._fault: Exception | None = None
 
@@ -92,6 +104,7 @@ class PythonCanReceiver:
             while self._fault is None and len(messages) < BURST_FRAMES:
                 message = self._bus.recv(0.0 if messages else timeout_s)
                 if message is None:
+                    self._require_open_stream()
                     break
                 if not messages:
                     now_s = time.time()
@@ -100,14 +113,20 @@ class PythonCanReceiver:
                 messages.append(message)
         except (OSError, can.CanError) as fault:
             self._fault = fault
-        except (ValueError, LookupError) as fault:
-            # python-can's parsers raise whatever int() or an index raises on noise
+        except Exception as fault:  # noqa: BLE001 - python-can's parsers raise whatever they meet in noise
             self._fault = can.CanOperationError(
-                f"what the adapter sends cannot be read ({fault}): check its cable and its speed"
+                f"what the adapter sends cannot be read ({fault!r}): check its cable and its speed"
             )
         if self._fault is not None and not messages:
             raise self._fault
         return self._burst(messages, now_s)
+
+    def _require_open_stream(self) -> None:
+        """Raise OSError if the bus is a TCP connection that the other end has closed: python-can calls it silent."""
+        if self._stream is not None:
+            with suppress(BlockingIOError):
+                if not self._stream.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT):
+                    raise ConnectionResetError("the server of the bus has closed the connection")
 
     def _burst(self, messages: Sequence[can.Message], now_s: float) -> Burst:
         """``now_s`` is the system's clock at the first of them."""
@@ -117,7 +136,9 @@ class PythonCanReceiver:
         for message in messages:
             if message.is_error_frame:
                 n_errors += 1
-                is_bus_off |= self._socket is not None and bool(message.arbitration_id & _BUS_OFF)
+                is_bus_off |= self._has_error_classes and bool(message.arbitration_id & _BUS_OFF)
+            elif not _is_possible(message):
+                n_errors += 1
             elif not message.is_remote_frame:
                 is_bus_off = False
                 self._date(message, now_s)
@@ -138,6 +159,12 @@ class PythonCanReceiver:
         self._bus.shutdown()
 
 
+def _is_possible(message: can.Message) -> bool:
+    """Whether a CAN bus can carry it. python-can's code for most adapters passes on what it has read in noise."""
+    last = LAST_EXTENDED if message.is_extended_id else LAST_STANDARD
+    return 0 <= message.arbitration_id <= last and len(message.data) <= LONGEST
+
+
 def open_python_can(
     interface: str, channel: str, filters: Sequence[IdFilter], width: int, options: Mapping[str, Any]
 ) -> PythonCanReceiver:
@@ -156,7 +183,7 @@ def open_python_can(
     except (TypeError, ValueError) as fault:
         raise BusError(f"interface {interface!r} does not take these options: {fault}") from fault
     if interface != "socketcan":
-        return PythonCanReceiver(bus, width, interface=interface)
+        return PythonCanReceiver(bus, width, interface=interface, has_error_classes=interface == "socketcand")
     kernel_socket: socket.socket = bus.socket  # type: ignore[attr-defined] # of SocketcanBus
     with_enough_room(kernel_socket)
     _discard_unfiltered(bus)

@@ -3,10 +3,14 @@
 import threading
 import time
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 from gateway.bus.frames import join, take
 from gateway.records import Frames
+
+DRAINED_FRAMES: Final = 4096
+"""Chosen: at once. Stamps that jump at random end a window with every row, which costs up to 1 ms a frame: this bounds
+one turn of the pipeline to 4 s, of the 20 s that the watchdog waits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,14 +84,21 @@ class Inbox:
                 self._changed.notify_all()
 
     def drain(self, timeout_s: float) -> Frames | None:
-        """All waiting frames at once; None if there are none within ``timeout_s``."""
+        """The waiting frames, at most DRAINED_FRAMES of them; None if there are none within ``timeout_s``."""
         deadline = time.monotonic() + timeout_s
         with self._changed:
             while not self._bursts and not self._is_closed:
                 left_s = deadline - time.monotonic()
                 if left_s <= 0 or not self._changed.wait(left_s):
                     break
-            bursts, self._bursts, self._n_waiting = self._bursts, [], 0
+            room, n_bursts = DRAINED_FRAMES, 0
+            while n_bursts < len(self._bursts) and (room := room - len(self._bursts[n_bursts])) >= 0:
+                n_bursts += 1
+            bursts, self._bursts = self._bursts[:n_bursts], self._bursts[n_bursts:]
+            if self._bursts and not bursts:
+                bursts = [take(self._bursts[0], slice(DRAINED_FRAMES))]
+                self._bursts[0] = take(self._bursts[0], slice(DRAINED_FRAMES, None))
+            self._n_waiting -= sum(map(len, bursts))
             self._changed.notify_all()
         return join(bursts, self._width) if bursts else None
 

@@ -82,6 +82,7 @@ class LiveSource(ThreadPart):
     """
 
     NAME = "bus reader"
+    IS_VITAL = True
 
     def __init__(
         self,
@@ -143,12 +144,13 @@ class LiveSource(ThreadPart):
             clock_wraps=self._tally["clock_wraps"],
         )
 
-    def _run(self) -> None:
+    def _work(self) -> None:
         try:
             self._listen_until_stopped()
-        except BaseException as failure:  # noqa: BLE001 # every failure of the thread must be reported
+        except BaseException as failure:
             self.failure = failure
             self._enter(SourceState.READER_FAULT, f"the receive thread died: {failure!r}")
+            raise
         else:
             self._enter(SourceState.STOPPED, self._reason)
         finally:
@@ -243,5 +245,6 @@ def opener_of(
 def system_reason(fault: Exception, channel: str) -> str:
     """Why ``channel`` cannot be used, with what to do if the system's own words do not say it."""
     number = fault.errno if isinstance(fault, OSError) else getattr(fault, "error_code", None)
-    reason = _SYSTEM_REASONS.get(number or 0, str(fault) or type(fault).__name__)
+    told = str(fault).partition("\n")[0].partition("Traceback")[0].strip()  # python-can's may end in a traceback
+    reason = _SYSTEM_REASONS.get(number or 0, told or type(fault).__name__)
     return reason.format(channel=channel)

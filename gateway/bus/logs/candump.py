@@ -36,7 +36,7 @@ def read_candump(selection: Selection, block_bytes: int = BLOCK_BYTES) -> Iterat
 
 
 class IdPattern:
-    """The text of an identifier before its ``#``, as a masked comparison of one 64-bit word."""
+    """Compares the text of an identifier before its ``#`` as one masked 64-bit word."""
 
     def __init__(self, text: str) -> None:
         """``text`` is matched at the end of the eight bytes, case ignored; ``?`` stands for any byte."""

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator
 from datetime import UTC, datetime, tzinfo
 from itertools import islice
-from typing import Final, TextIO, cast
+from typing import BinaryIO, Final, TextIO, cast
 
 import can
 from can.io import blf
@@ -31,6 +31,11 @@ CHUNK_MESSAGES: Final = 4096  # chosen: of python-can in memory
 KEPT_HEADER: Final = 16  # chosen: lines of a header for a reader that is restarted; PEAK writes three
 MOST_OF_CONTAINER: Final = 16_000_000  # chosen: bytes inflated at once of a .blf; Vector writes 128 KiB
 _OF_NO_LENGTH: Final = re.compile(rb"LOBJ.{4}\0{4}", re.DOTALL)
+_CAN_ERROR: Final = 2  # an error frame without its details, which python-can passes over
+_UNREAD: Final = re.compile(rb"LOBJ..(?:(?![\x01\x02]\0)|.{6}\x02\0{3})", re.DOTALL)
+_FRAMES: Final = (blf.CAN_MESSAGE, blf.CAN_MESSAGE2, blf.CAN_FD_MESSAGE, blf.CAN_FD_MESSAGE_64)
+_ERRORS: Final = (_CAN_ERROR, blf.CAN_ERROR_EXT)
+_VERSIONS: Final = (1, 2)  # of an object's header
 LONGEST_LINE: Final = 1 << 16  # chosen: characters of a line that are read at once
 
 
@@ -279,8 +284,12 @@ MESSAGE_SUFFIXES: Final = (*_TEXTS, ".blf", ".db")
 
 class _BlfReader(can.BLFReader):
     """Ends at the first container that is damaged or absurd; python-can passes over some, takes all memory for others,
-    and reads an object of no length for ever.
+    and reads an object of no length for ever. Counts the frames that python-can passes over.
     """
+
+    def __init__(self, stream: BinaryIO, report: LogReport) -> None:
+        super().__init__(stream)
+        self._report = report
 
     def __iter__(self) -> Generator[can.Message, None, None]:
         head = blf.OBJ_HEADER_BASE_STRUCT
@@ -291,8 +300,29 @@ class _BlfReader(can.BLFReader):
             content = self.file.read(n_bytes - head.size)
             self.file.read(n_bytes % 4)  # padding
             if kind == blf.LOG_CONTAINER:
-                yield from self._parse_container(self._unpacked(content))
+                packed = self._unpacked(content)
+                self._count_unread(self._tail + packed)
+                yield from self._parse_container(packed)
+        if b"LOBJ" in self._tail:
+            raise EOFError("the last object is cut off")
         self.stop()
+
+    def _count_unread(self, content: bytes) -> None:
+        """Count the whole objects of a container that are frames, and that python-can passes over."""
+        if _UNREAD.search(content) is None:
+            return
+        at = 0
+        while (at := content.find(b"LOBJ", at, at + 8)) >= 0 and at + blf.OBJ_HEADER_BASE_STRUCT.size <= len(content):
+            _, _, version, n_bytes, kind = blf.OBJ_HEADER_BASE_STRUCT.unpack_from(content, at)
+            at += n_bytes
+            if at > len(content):
+                return
+            is_read = version in _VERSIONS and kind != _CAN_ERROR
+            if kind in _ERRORS and not is_read:
+                self._report.error_frames += 1
+            elif kind in _FRAMES and not is_read:
+                self._report.frames += 1
+                self._report.reject(LogReject.UNKNOWN_VERSION, text=f"header of version {version}")
 
     def _unpacked(self, content: bytes) -> bytes:
         method, _ = blf.LOG_CONTAINER_STRUCT.unpack_from(content)
@@ -309,7 +339,7 @@ class _BlfReader(can.BLFReader):
 def _blf_messages(report: LogReport, zone: tzinfo | None) -> Iterator[tuple[can.Message, int]]:
     with report.until_damage(".blf"), open_log_file(report.path) as stream:
         n_bytes = None if is_packed(stream) else report.path.stat().st_size  # a packed one says itself where it is cut
-        reader = _BlfReader(stream)
+        reader = _BlfReader(stream, report)
         as_utc_ns, shift_ns = round(reader.start_timestamp * 1000) * 1_000_000, 0
         if reader.start_timestamp:
             date = datetime.fromtimestamp(as_utc_ns // NS_PER_S, UTC).replace(tzinfo=None)

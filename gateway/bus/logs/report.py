@@ -43,6 +43,7 @@ class LogReject(StrEnum):
     TOO_LONG = "too_long"  # more bytes than a frame can hold
     GARBLED = "garbled"
     OVERLONG_LINE = "overlong_line"
+    UNKNOWN_VERSION = "unknown_version"  # a frame in a form that python-can does not know
 
 
 _KNOWN_LINES: Final = (
@@ -156,6 +157,11 @@ class LogReport:
         self._span_ns = min(least, self._span_ns[0]), max(most, self._span_ns[1])
 
     @property
+    def span_s(self) -> float:
+        """Seconds between the earliest and the latest stamp of the frames given out."""
+        return (self._span_ns[1] - self._span_ns[0]) / NS_PER_S
+
+    @property
     def _suffix(self) -> str:
         return next((end for end in self.path.suffixes if end.lower() in (".asc", ".trc", ".csv")), "-").lower()
 
@@ -236,17 +242,15 @@ class LogReport:
             return None
         if (why := self.why_whole_seconds(0.0)) is not None:
             return why
-        span_s = (self._span_ns[1] - self._span_ns[0]) / NS_PER_S
         if not self.is_dated and 8 * self.out_of_order > self.wanted:
             return "its stamps are the pauses between frames (candump -td): record with candump -L alone"
-        if self.wanted > MOST_PER_S * span_s:
-            return f"it has {self.wanted} frames in {span_s:.3g} s by its stamps, which no bus carries"
+        if self.wanted > MOST_PER_S * self.span_s:
+            return f"it has {self.wanted} frames in {self.span_s:.3g} s by its stamps, which no bus carries"
         return None
 
     def why_whole_seconds(self, least_s: float = JUDGED_SECONDS) -> str | None:
         """The same of stamps whose fractions are gone; None too before so many seconds are read."""
-        span_s = (self._span_ns[1] - self._span_ns[0]) / NS_PER_S
-        is_cut = self._n_whole_seconds == self.wanted > WHOLE_PER_S * span_s and span_s >= least_s
+        is_cut = self._n_whole_seconds == self.wanted > WHOLE_PER_S * self.span_s and self.span_s >= least_s
         return f"its {self.wanted} stamps are whole seconds: a spreadsheet has cut them off?" if is_cut else None
 
     @contextmanager

@@ -88,8 +88,8 @@ class BitField:
 
     @property
     def physical_range(self) -> tuple[float, float]:
-        """Smallest and largest physical number the bits can carry; infinite for floats."""
-        if self.coding is Coding.FLOAT:
+        """Smallest and largest physical number the bits can carry; infinite for floats, and for more bits than any."""
+        if self.coding is Coding.FLOAT or self.length > 64:
             return -np.inf, np.inf
         ends = [raw * self.scale + self.offset for raw in self.raw_range]
         return min(ends), max(ends)

@@ -17,6 +17,7 @@ from cantools.database.can import Signal as CantoolsSignal
 
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.signals.dbc import DbcMessage, messages_in
+from gateway.bus.signals.sane import require_sane
 from gateway.bus.text import text_of
 from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID
@@ -131,6 +132,7 @@ def _messages(map_path: Path, path: Path, read: Read) -> Iterator[tuple[str, Rea
 
 def _loaded(where: str, text: str, kind: str) -> list[CantoolsMessage]:
     try:
+        require_sane(kind, text)
         # not strict: vendors' databases with overlapping signals are common, and a field is checked when it is mapped
         database = cantools.database.load_string(text, kind, strict=False)
     except Exception as fault:  # noqa: BLE001 - numbers beyond a double, texts that are none, a thousand brackets
@@ -162,7 +164,8 @@ def _signal(signal: CantoolsSignal) -> DatabaseSignal:
     conversion = signal.conversion
     choices: dict[str, tuple[int, ...]] = {}
     for raw, text in (conversion.choices or {}).items():
-        choices[str(text)] = (*choices.get(str(text), ()), int(raw))
+        if math.isfinite(raw):
+            choices[str(text)] = (*choices.get(str(text), ()), int(raw))
     coding = Coding.FLOAT if conversion.is_float else Coding.SIGNED if signal.is_signed else Coding.UNSIGNED
     field = BitField(
         start=signal.start,

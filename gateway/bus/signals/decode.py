@@ -112,7 +112,7 @@ def _fails(condition: Condition, payload: U8) -> Bool:
 
 
 def is_j1939_code(field: BitField, bits: U64) -> Bool:
-    """Which raw bits (n,) are no measurement by SAE J1939-71.
+    """Whether each raw value (n,) is a code of SAE J1939-71 in place of a measurement.
 
     From 8 bits on, a most significant byte above 0xFA is a reserved code, an error or "not available"
     (8 bits: 0xFB to 0xFF, 16 bits: 0xFB00 to 0xFFFF, ...). From 2 to 7 bits the two highest codes mean error and not

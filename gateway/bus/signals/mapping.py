@@ -58,7 +58,7 @@ class IdFilter:
 
     @property
     def is_of_any_source(self) -> bool:
-        """Whether it is a J1939 group of whatever device."""
+        """Whether frames of a J1939 group count whichever device sends them."""
         return not self.mask & SOURCE_ADDRESS and bool(self.can_id & EXTENDED_ID)
 
     def is_for(self, can_id: int) -> bool:

@@ -248,6 +248,7 @@ _RULES: Final[tuple[Callable[[VehicleAnswers, Vehicle | None], Iterator[Doubt]],
 
 
 _SHARED: Final = (
+    "loading_area_m",
     "track_width_m",
     "payload_range_kg",
     "front_share_range_pct",

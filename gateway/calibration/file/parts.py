@@ -54,6 +54,8 @@ class DrivePart(Part):
     number: int
     log: str
     sha256: str
+    t_start: str | None = Field(None, description="of the piece of the log that was used; null: not known")
+    t_end: str | None = None
     n_batches: int
     statement: Statement
     found: FoundPart | None = Field(description="null: cross_spectrum was not fitted to this drive")

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
-from gateway.calibration.inspection.loads import compare_loads
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.inspection.run import inspect_run
@@ -92,7 +91,6 @@ def inspect_campaign(
 
     for check in (_same_drive, _beyond_range, _beside_the_others):
         tell(check(drives, vehicle))
-    tell(compare_loads(usable(), vehicle))
     roll_sign = roll_sign_of(usable(), vehicle)
     if roll_sign is not None and roll_sign.sign < 0:
         tell((run.number, Finding.of(Kind.ROLL_RATE_SIGN, roll_sign.why)) for run in usable())

@@ -21,7 +21,7 @@ _FAULT_OR_WARNING: Final = (Severity.FAULT, Severity.WARNING)
 
 class Kind(StrEnum):
     """Every kind of finding: its name, the severities it may have (the gravest first), and what a fitter should do, as
-    part of a sentence. docs/findings.md also says what each means.
+    part of a sentence. docs/reasons.md also says what each means.
     """
 
     severities: tuple[Severity, ...]
@@ -116,7 +116,7 @@ class Kind(StrEnum):
     LOADS_ALIKE = "loads_alike", _WARNING, "drive the vehicle empty, and with nearly its permitted payload"
     SHARES_ALIKE = "shares_alike", _WARNING, "drive one load far forward and one far back"
     LOAD_AND_SHARE_TOGETHER = "load_and_share_together", _WARNING, "drive the same load at another place"
-    LOADS_SWAPPED = ("loads_swapped", _FAULT,
+    LOADS_SWAPPED = ("loads_swapped", _WARNING,
         "exchange their loads in the campaign file if your notes allow it; otherwise drive both again")
     LOAD_DISAGREES = ("load_disagrees", _WARNING,
         "check payload and position in the campaign file, and what else was on board")

@@ -8,15 +8,15 @@ A calibration is as good as its worst rule. docs/calibration.md lists them.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
+from typing import Any, Final
 
-from gateway.calibration.ahead import next_steps
+from gateway.calibration.ahead import Step, next_steps
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import ErrorTable, Target
 from gateway.config import ESTIMATOR_NAMES
+from gateway.core.vehicle import USEFUL_SHARE, Vehicle
 from gateway.words import decimal, estimator_name
 
 
@@ -56,7 +56,7 @@ class Verdict:
     estimator: str
     accuracy: str
     reasons: tuple[Reason, ...]
-    advice: str = ""
+    steps: tuple[Step, ...] = ()
 
     @property
     def grade(self) -> Grade:
@@ -64,11 +64,30 @@ class Verdict:
         return max((reason.grade for reason in self.reasons), key=lambda grade: grade.rank, default=Grade.RESERVED)
 
     @property
+    def advice(self) -> str:
+        """What to state or drive next; empty if the steps are not known."""
+        if not self.steps:
+            return ""
+        best = self.steps[0]
+        if best.then_kg > (1.0 - WORTH_SAYING) * best.now_kg:
+            return "No single further drive or statement would narrow the intervals by a tenth."
+        return f"Next: {best.text}."
+
+    @property
     def text(self) -> str:
         """The grade, the accuracy, the reasons for a grade below fit, and the advice."""
         below = [f"    {one.text}" for one in self.reasons if one.grade is not Grade.FIT]
         head = f"{GRADE_TEXT[self.grade]}, by the {estimator_name(self.estimator)}. {self.accuracy}"
         return "\n".join([head, *below, *([f"    {self.advice}"] if self.advice else [])])
+
+    def to_json(self) -> dict[str, Any]:
+        """The same for programs."""
+        return {
+            "grade": str(self.grade),
+            "accuracy": self.accuracy,
+            "reasons": [{"rule": one.rule, "grade": str(one.grade), "text": one.text} for one in self.reasons],
+            "advice": self.advice,
+        }
 
 
 def _share_rejected(table: ErrorTable) -> float:
@@ -90,7 +109,7 @@ def _uncovered(target: Target) -> Callable[[ErrorTable], float | None]:
     """The least share of intervals that may miss the truth, as few runs determine it; None with fewer than two runs."""
 
     def figure(table: ErrorTable) -> float | None:
-        covered = [(hit, one.run) for one in table.judged if (hit := one.compared(target).is_covered) is not None]
+        covered = [(hit, one.run) for one in table.judged if (hit := one.is_covered(target)) is not None]
         if len({run for _, run in covered}) < 2:
             return None
         return 100.0 * (1.0 - coverage_of([hit for hit, _ in covered], [run for _, run in covered]).high)
@@ -124,6 +143,7 @@ class Rule:
 
 
 WORTH_SAYING: Final = 0.1  # chosen: relative gain of a step that is advised
+FIT_HALF_WIDTH_PCT, MOST_HALF_WIDTH_PCT = 100.0 * USEFUL_SHARE, 50.0  # chosen: of the range
 
 # All limits are chosen. A guess at mid-range errs by 25 % over evenly spread loads; an interval is half as wide as the
 # range for a mean normal error of 20 %; 95 % intervals with certainly less than 70 % coverage mislead.
@@ -140,7 +160,7 @@ RULES: Final = (
     ),
     Rule(
         "payload_half_width", "Half of the 95 % interval of payload, in percent of the range,",
-        lambda table: table.errors.payload.half_width_pct, 25.0, 50.0,
+        lambda table: table.errors.payload.half_width_pct, FIT_HALF_WIDTH_PCT, MOST_HALF_WIDTH_PCT,
     ),
     Rule(
         "front_share_half_width", "Half of the 95 % interval of front share, in percent of the range,",
@@ -165,26 +185,25 @@ def verdicts_of(assessment: Assessment) -> tuple[Verdict, ...]:
 
 
 def _verdict(assessment: Assessment, judgement: Judgement) -> Verdict:
-    reasons = [*_of_errors(judgement), *_of_one_load(assessment, judgement.estimator)]
+    steps = _steps(assessment, judgement.estimator)
+    reasons = [*_of_errors(judgement, assessment.vehicle, steps), *_of_one_load(assessment, judgement.estimator)]
     if assessment.outcome:
         reasons += _of_runs(assessment.outcome)
-    return Verdict(judgement.estimator, _accuracy(judgement), tuple(reasons), _advice(assessment, judgement.estimator))
+    return Verdict(judgement.estimator, _accuracy(judgement, steps), tuple(reasons), steps)
 
 
-def _advice(assessment: Assessment, estimator: str) -> str:
-    """What to state or drive next; empty if nothing would narrow the answer by a tenth."""
+def _steps(assessment: Assessment, estimator: str) -> tuple[Step, ...]:
+    """What further drives and statements would gain, the most useful first; none if they cannot be computed."""
     model = assessment.file.cross_spectrum
     if estimator != "cross_spectrum" or model is None or assessment.outcome is None:
-        return ""
-    best = next_steps(model, assessment.vehicle)[0]
-    if best.then_kg > (1.0 - WORTH_SAYING) * best.now_kg:
-        return "No single further drive or statement would narrow the intervals by a tenth."
-    return f"Next: {best.text}."
+        return ()
+    return next_steps(model, assessment.vehicle)
 
 
-def _accuracy(judgement: Judgement) -> str:
+def _accuracy(judgement: Judgement, steps: Sequence[Step]) -> str:
     if judgement.unseen is None:
-        return "How well it weighs is not known: no data were kept aside to judge by."
+        ahead = f"By the model a middling payload is weighed to ± {steps[0].now_kg:.0f} kg. " if steps else ""
+        return f"{ahead}How well it weighs is not tested: no drive was kept aside to judge by."
     errors = judgement.tables[judgement.unseen].errors
     payload, share = errors.payload, errors.front_share
     return (
@@ -194,11 +213,19 @@ def _accuracy(judgement: Judgement) -> str:
     )
 
 
-def _of_errors(judgement: Judgement) -> Iterator[Reason]:
+def _of_errors(judgement: Judgement, vehicle: Vehicle, steps: Sequence[Step]) -> Iterator[Reason]:
     part = judgement.unseen
     if part is None:
-        text = "No data were kept aside to judge by: fewer than three runs and no validation part."
+        text = "No data were kept aside to judge by: fewer than three drives of known payload and no validation part."
         yield Reason("unseen", Grade.RESERVED, text)
+        if steps:
+            low_kg, high_kg = vehicle.payload_range_kg
+            half_pct = 100.0 * steps[0].now_kg / (high_kg - low_kg)
+            text = (
+                f"Half of the 95 % interval of a middling payload, by the model: {half_pct:.1f} % of the range (no use "
+                f"beyond {MOST_HALF_WIDTH_PCT:g} %)."
+            )
+            yield Reason("payload_ahead", Grade.RESERVED if half_pct <= MOST_HALF_WIDTH_PCT else Grade.UNFIT, text)
         return
     judged = (rule.judged(judgement.tables[part], PART_NAMES[part]) for rule in RULES)
     yield from (reason for reason in judged if reason is not None)
@@ -207,8 +234,8 @@ def _of_errors(judgement: Judgement) -> Iterator[Reason]:
 _WARNINGS: Final[Mapping[str, str]] = {
     "springs_from_priors": "Only one load was driven: it sets the zero; the springs are those of a typical vehicle. "
     "Weights away from that load are as uncertain as their intervals say.",
-    "intervals_untested": "Fewer than three runs of known load: intervals rest on the errors of other vehicles, not on "
-    "this one's.",
+    "intervals_untested": "Fewer than three drives of known load: intervals rest on the errors of other vehicles, not "
+    "on this one's.",
 }
 
 
@@ -230,23 +257,18 @@ def _of_runs(outcome: Outcome) -> Iterator[Reason]:
     unusable = [one.number for one in verdicts if not one.is_usable]
     if unusable:
         grade = Grade.UNFIT if 2 * len(unusable) > len(verdicts) else Grade.RESERVED
-        yield Reason("runs", grade, f"{len(unusable)} of {len(verdicts)} runs cannot be used: {_listed(unusable)}.")
-    mislabelled = [
-        one.number
-        for one in verdicts
-        if one.is_usable and any(finding.kind is Kind.LOAD_DISAGREES for finding in one.findings)
-    ]
-    held = [drive.number for drive in outcome.file.provenance.drives if drive.found is not None and drive.found.is_held]
-    if mislabelled:
+        yield Reason("runs", grade, f"{len(unusable)} of {len(verdicts)} drives cannot be used: {_listed(unusable)}.")
+    drives = [one for one in outcome.file.provenance.drives if one.statement.is_of_payload]
+    held = [one.number for one in drives if one.found is not None and one.found.is_held]
+    if held:
         text = (
-            f"The other runs find another weight for {_listed(mislabelled)} than the campaign file says: correct the "
-            "load, or calibrate without these runs (--runs)."
+            f"The drives contradict what is stated of {_listed(held)}: nothing was learnt from it. Correct the load, "
+            "or leave it out."
         )
-        grade = Grade.RESERVED if set(mislabelled) <= set(held) else Grade.UNFIT  # what is held taught nothing
-        yield Reason("labels", grade, text)
+        yield Reason("labels", Grade.UNFIT if 2 * len(held) > len(drives) else Grade.RESERVED, text)
     for doubt in outcome.doubts:
         yield Reason("facts", Grade.UNFIT, f"{doubt.sentence[:1].upper()}{doubt.sentence[1:]}.")
 
 
 def _listed(numbers: Sequence[int]) -> str:
-    return ", ".join(f"run {number}" for number in numbers)
+    return f"drive{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"

@@ -6,7 +6,6 @@ from enum import StrEnum
 
 from gateway.budget import BudgetLine, typical_budget
 from gateway.calibration.calibrate import Outcome, drive_name
-from gateway.calibration.campaign import Campaign
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.judgement.evaluation import ErrorTable, Judged, Target, error_table, judge
 from gateway.core.ratio_index.regression import RegressionModel
@@ -23,13 +22,13 @@ class BatchSet(StrEnum):
 
 
 PART_NAMES: Mapping[BatchSet, str] = {
-    BatchSet.LEFT_OUT: "runs left out",
+    BatchSet.LEFT_OUT: "drives left out",
     BatchSet.IDENTIFICATION: "identification part (in-sample)",
     BatchSet.VALIDATION: "validation part",
     BatchSet.ALL: "all batches",
 }
 PART_TEXT: Mapping[BatchSet, str] = {
-    BatchSet.LEFT_OUT: "Runs left out: every run's identification part, weighed by a calibration from the other runs.",
+    BatchSet.LEFT_OUT: "Drives left out: the identification part of each, weighed by a calibration from the others.",
     BatchSet.IDENTIFICATION: "Identification part: the batches of the fit, where errors look small.",
     BatchSet.VALIDATION: "Validation part: later batches of the same runs, new to the fit; their loads are not new.",
     BatchSet.ALL: "All batches of the campaign, whether the calibration was fitted to them or not.",
@@ -81,9 +80,9 @@ def stated_budget(judgement: Judgement) -> tuple[BudgetLine, ...]:
     return typical_budget(budgets) if budgets else ()
 
 
-def assess_calibration(campaign: Campaign, outcome: Outcome) -> Assessment:
+def assess_calibration(outcome: Outcome) -> Assessment:
     """Every estimator judged on runs left out, on the data of its fit and on the validation part."""
-    file, vehicle, calibrated = outcome.file, campaign.vehicle, outcome.file.for_core()
+    file, vehicle, calibrated = outcome.file, outcome.file.vehicle, outcome.file.for_core()
     judgements = []
     for estimator in file.estimators:
         judged = {
@@ -96,10 +95,10 @@ def assess_calibration(campaign: Campaign, outcome: Outcome) -> Assessment:
     return Assessment(f"Calibration of {vehicle.name}", file, vehicle, tuple(judgements), outcome)
 
 
-def assess_evaluation(campaign: Campaign, file: CalibrationFile, part: BatchSet, table: ErrorTable) -> Assessment:
+def assess_evaluation(vehicle: Vehicle, file: CalibrationFile, part: BatchSet, table: ErrorTable) -> Assessment:
     """One estimator of a calibration file judged on one part of a campaign."""
     judgement = Judgement(table.estimator, {part: table}, _dof(file, table.estimator))
-    return Assessment(f"Evaluation of {campaign.vehicle.name}", file, campaign.vehicle, (judgement,))
+    return Assessment(f"Evaluation of {vehicle.name}", file, vehicle, (judgement,))
 
 
 def judged_left_out(outcome: Outcome, estimator: str) -> list[Judged]:

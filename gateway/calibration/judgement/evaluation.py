@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
-from math import isfinite, nan
+from math import hypot, isfinite, nan
 from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -33,10 +33,14 @@ class Comparison(NamedTuple):
     low: float
     high: float
 
-    @property
-    def is_covered(self) -> bool | None:
-        """Whether the interval contains the truth; None if either is unknown."""
-        return self.low <= self.true <= self.high if self.low <= self.high and isfinite(self.true) else None
+    def is_covered(self, doubt: float = 0.0) -> bool | None:
+        """Whether the interval contains the truth, which is known to within ``doubt`` (half a 95 % interval); None if
+        either is unknown.
+        """
+        if not (self.low <= self.high and isfinite(self.true)):
+            return None
+        below, above = hypot(self.estimated - self.low, doubt), hypot(self.high - self.estimated, doubt)
+        return self.estimated - below <= self.true <= self.estimated + above
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +48,8 @@ class Judged:
     """One batch of a run: what was estimated, and what was true.
 
     Payload and front share are NaN if nobody knows them. cg_left_m is the sprung mass's centre of gravity left of the
-    centre line, NaN if not stated; unsprung is what calibration found.
+    centre line, NaN if not stated; unsprung is what calibration found. payload_doubt_kg is half the 95 % interval of
+    the true payload.
     """
 
     run: int
@@ -54,6 +59,11 @@ class Judged:
     estimate: Estimate
     cg_left_m: float = nan
     unsprung: Unsprung = NOT_CALIBRATED
+    payload_doubt_kg: float = 0.0
+
+    def is_covered(self, target: Target) -> bool | None:
+        """Whether the interval of one quantity contains the truth; None if either is unknown."""
+        return self.compared(target).is_covered(self.payload_doubt_kg if target == "payload" else 0.0)
 
     def compared(self, target: Target) -> Comparison:
         """One of the two quantities, truth and estimate."""
@@ -312,6 +322,7 @@ def judge(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: st
             weighed(_budgeted(batch, calibrated, estimator), calibrated.vehicle, calibrated.unsprung),
             _noted_cg_left_m(run, calibrated.vehicle),
             calibrated.unsprung,
+            run.payload_plus_minus_kg,
         )
         for run in runs
         for batch in run.batches

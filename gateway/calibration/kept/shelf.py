@@ -16,6 +16,7 @@ from typing import Final
 from gateway.calibration.kept.batch_file import KeptBatch, packed, unpacked
 from gateway.errors import KeptBatchError
 from gateway.files.kept import MOST_BYTES, KeptFiles
+from gateway.files.reserve import require_room
 from gateway.units import NS_PER_S
 
 FOLDER: Final = "batches"
@@ -87,7 +88,8 @@ class Shelf:
         """Store a batch, removing the oldest if needed; on disk when this returns. False if it is already there or too
         big.
 
-        Raises OSError if the disk fails; the batch is then not stored, but old ones may have been removed.
+        Raises OSError if the disk fails or is short of room; the batch is then not stored, but old ones may have been
+        removed.
         """
         with self._lock:
             if kept.id in self._entries or self._limits.most_batches < 1:
@@ -99,6 +101,7 @@ class Shelf:
             entry = Entry(kept.id, kept.batch.t_start_ns, len(content), number)
             if not self._make_room(entry.n_bytes):
                 return False
+            require_room(self._files.directory, entry.n_bytes)
             self._files.write(entry.file_name, content)
             self._entries[entry.id] = entry
             return True

@@ -148,5 +148,7 @@ def _said(cause: AlarmCause, figure: AlarmFigure) -> str:
         subject = _PLACES.get(cause.where, f"The wheel at the {cause.where.replace('_', ' ')}")
         take = "" if math.isnan(figure.std_kg) else f" +- {Z95 * figure.std_kg:.0f}"
         return f"{subject} weighs {figure.found_kg:.0f}{take} kg, limit {figure.limit_kg:.0f} kg"
-    said = "No signal" if cause == SILENT else "Batches are refused because of a sensor"
+    if cause == SILENT:
+        return f"No signal: {figure.detail}" if figure.detail else "No signal"
+    said = "Batches are refused because of a sensor"
     return f"{said}: {figure.detail.replace('_', ' ')}" if figure.detail else said

@@ -29,7 +29,7 @@ class Unsprung:
 
     @property
     def is_estimated(self) -> bool:
-        """True if either mass was not stated."""
+        """Whether an unsprung mass was estimated because nobody stated it."""
         return self.front.std > 0.0 or self.rear.std > 0.0
 
     def unless_stated(self, vehicle: Vehicle) -> "Unsprung":
@@ -149,7 +149,7 @@ class _Known:
         *,
         is_estimated: bool,
     ) -> Weight:
-        """A weight; ``slopes`` are by payload (kg), front share (0..1) and lateral place (m), as many as it depends on.
+        """A weight with its error; ``slopes`` are its derivatives by payload (kg), front share (0..1) and place (m).
 
         ``is_estimated`` is of the unsprung mass: errors of both axles may cancel in the weight, and yet it was not
         stated.

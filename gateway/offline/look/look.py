@@ -8,10 +8,11 @@ from typing import Final
 
 import numpy as np
 
-from gateway.bus.frames import join, merge_frames, take
+from gateway.bus.frames import join, merge_frames, take, widened
 from gateway.bus.logs import LogReport, open_whole_log
 from gateway.bus.signals import (
     CAN_FD_BYTES,
+    CLASSIC_BYTES,
     Coding,
     DatabaseMessage,
     Databases,
@@ -41,6 +42,9 @@ from gateway.records import ASIDE, EXTENDED_ID, F64, Frames, Signal
 from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2, TO_SI
 
 KEPT_FRAMES: Final = 100_000  # chosen: of one identifier: a quarter of an hour at 100 Hz; counts cover all frames
+KEPT_BYTES: Final = 100_000_000  # chosen: of all frames kept; beyond it an identifier gets its first few
+FIRST_FRAMES: Final = 200  # chosen: the few
+MOST_IDENTIFIERS: Final = 4096  # chosen: of one channel; a bus has some hundreds
 LEAST_RATE_HZ: Final = RATE_MIN_SHARE * BatchSettings().rate_hz
 MOST_TILT_DEG: Final = 15.0  # chosen: 3 % of gravity; beyond it the horizontal axes mix in noticeably
 KINDS: Final = (".dbc", ".kcd", ".arxml", ".sym")  # databases by their suffix
@@ -55,7 +59,12 @@ class Heard:
     can_id: int
     n_frames: int
     duration_s: float
-    frames: Frames
+    kept: Frames
+
+    @property
+    def frames(self) -> Frames:
+        """The kept frames with payload rows of all their possible bytes."""
+        return widened(self.kept, CAN_FD_BYTES)
 
     @property
     def rate_hz(self) -> float:
@@ -65,7 +74,7 @@ class Heard:
     @cached_property
     def lengths(self) -> dict[int, int]:
         """How many of the kept frames have which length, the most frequent first."""
-        lengths, n_times = np.unique(self.frames.length, return_counts=True)
+        lengths, n_times = np.unique(self.kept.length, return_counts=True)
         order = np.argsort(-n_times, kind="stable")
         return dict(zip(lengths[order].tolist(), n_times[order].tolist(), strict=True))
 
@@ -78,30 +87,58 @@ class Heard:
 def heard_in(log: Path) -> tuple[tuple[Heard, ...], LogReport]:
     """Every identifier in order of channel and number. Raises LogUnreadableError if nothing can be read."""
     chunks, report = open_whole_log(log)
-    of_all = _heard_of(chunks, None)
+    of_all, n_others = _heard_of(chunks, None)
     report.require_frames()
+    if n_others:
+        report.notes.append(
+            f"{n_others} frames are under further identifiers than the first {MOST_IDENTIFIERS}, which no bus has; "
+            "they are left out here"
+        )
     channels = sorted(report.channels)
     if len(channels) < 2:
         return tuple(replace(one, channel=next(iter(channels), None)) for one in of_all), report
-    return tuple(one for each in channels for one in _heard_of(open_whole_log(log, each)[0], each)), report
+    return tuple(one for each in channels for one in _heard_of(open_whole_log(log, each)[0], each)[0]), report
 
 
-def _heard_of(chunks: Iterable[Frames], channel: str | None) -> list[Heard]:
-    """Every identifier of the frames, all of one channel, ordered by identifier."""
+def _heard_of(chunks: Iterable[Frames], channel: str | None) -> tuple[list[Heard], int]:
+    """The identifiers of the frames, all of one channel, ordered by identifier, and the number of frames of those that
+    come when there are MOST_IDENTIFIERS.
+    """
     spans: dict[int, tuple[int, int, int]] = {}  # number of frames, first and last stamp
     kept: dict[int, list[Frames]] = {}
-    for frames in chunks:
-        for can_id in np.unique(frames.can_id).tolist():
-            ours = take(frames, frames.can_id == can_id)
-            first_ns, last_ns = int(ours.t_ns.min()), int(ours.t_ns.max())
+    n_others = n_bytes = 0
+    for chunk in chunks:
+        order = np.argsort(chunk.can_id, kind="stable")
+        can_ids, begins = np.unique(chunk.can_id[order], return_index=True)
+        for can_id, begin, end in zip(can_ids.tolist(), begins.tolist(), [*begins[1:].tolist(), None], strict=True):
+            rows = order[begin:end]
+            if can_id not in spans and len(spans) >= MOST_IDENTIFIERS:
+                n_others += len(rows)
+                continue
+            t_ns = chunk.t_ns[rows]
+            first_ns, last_ns = int(t_ns.min()), int(t_ns.max())
             n, before_ns, after_ns = spans.get(can_id, (0, first_ns, last_ns))
-            spans[can_id] = n + len(ours), min(first_ns, before_ns), max(last_ns, after_ns)
-            if n < KEPT_FRAMES:
+            spans[can_id] = n + len(rows), min(first_ns, before_ns), max(last_ns, after_ns)
+            if (room := (KEPT_FRAMES if n_bytes < KEPT_BYTES else FIRST_FRAMES) - n) > 0:
+                ours = _narrowed(take(chunk, rows[:room]))
                 kept.setdefault(can_id, []).append(ours)
+                n_bytes += sum(column.nbytes for column in (ours.t_ns, ours.can_id, ours.length, ours.payload))
     return [
-        Heard(channel, can_id, n, (last_ns - first_ns) / NS_PER_S, join(kept[can_id], CAN_FD_BYTES))
+        Heard(channel, can_id, n, (last_ns - first_ns) / NS_PER_S, _joined(kept[can_id]))
         for can_id, (n, first_ns, last_ns) in sorted(spans.items())
-    ]
+    ], n_others
+
+
+def _narrowed(frames: Frames) -> Frames:
+    """Frames, at least one, with payload rows of 8 bytes where these hold all of them."""
+    if int(frames.length.max()) > CLASSIC_BYTES:
+        return frames
+    return replace(frames, payload=frames.payload[:, :CLASSIC_BYTES].copy())
+
+
+def _joined(parts: list[Frames]) -> Frames:
+    width = max(part.payload.shape[1] for part in parts)
+    return join([widened(part, width) for part in parts], width)
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,14 +249,14 @@ def refused_in(
     """What a map by these databases would refuse of the messages with a known unit."""
     for one in messages:
         quantities = frozenset(filter(None, map(_quantity_of, one.message.signals.values())))
-        counts, n_all = dict(one.heard.lengths), len(one.heard.frames)
+        counts, n_all = dict(one.heard.lengths), len(one.heard.kept)
         n_right = counts.pop(one.message.length, 0)
         if counts and quantities and one.message.source in sources:
             text = f"{one.message.name} ({one.heard.name}): {told_lengths(counts, n_all, one.message.length)}"
             yield Refused(text, 1.0 - n_right / n_all, quantities)
     for each in readings:
         if (n := len(each.beyond)) and each.described.message.source in sources:
-            n_all, to_si = len(each.described.heard.frames), TO_SI[each.quantity]
+            n_all, to_si = len(each.described.heard.kept), TO_SI[each.quantity]
             factor, unit = to_si[_unit_of(each.signal)], next(iter(to_si))
             low, high = (end * factor for end in each.signal.limits)
             read = float(each.beyond.min()), float(each.beyond.max())
@@ -315,7 +352,7 @@ def look(log: Path, databases: Sequence[Path] = ()) -> Look:
     by_own = described(heard, own)
     others = [one for one in heard if not any(one is each.heard for each in by_own)]
     messages = (*by_own, *described(others, _messages_of(shipped_databases())[0]))
-    origin_ns = min(int(one.frames.t_ns.min()) for one in heard)
+    origin_ns = min(int(one.kept.t_ns.min()) for one in heard)
     readings = tuple(reading for one in messages for reading in readings_of(one, origin_ns))
     heard_of = [reading for reading in readings if len(reading.x)]
     found = roles_of([r for r in heard_of if r.described in by_own] or heard_of)

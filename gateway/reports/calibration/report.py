@@ -1,9 +1,8 @@
 """The report of a calibration, or of an evaluation alone: report.html with its figures, and report.json.
 
-    write_calibration_report(DIR, campaign, outcome)      springscale calibrate ... --report DIR
-    write_evaluation_report(DIR, assessment)                springscale evaluate ... --report DIR
+    write_report_of(DIR, assessment)      springscale calibrate, learn and evaluate ... --report DIR
 
-They raise ConfigurationError if the directory cannot be created. The page is self-contained: it loads nothing
+It raises ConfigurationError if the directory cannot be created. The page is self-contained: it loads nothing
 from elsewhere, and reads without scripts.
 """
 
@@ -13,9 +12,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.campaign import Campaign
 from gateway.calibration.judgement.advice import GRADE_TEXT, Grade, Verdict, verdicts_of
-from gateway.calibration.judgement.assessment import Assessment, assess_calibration, stated_budget
+from gateway.calibration.judgement.assessment import Assessment, stated_budget
 from gateway.estimate_json.kinds import budget_to_json
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.fitted_vehicle import fitted_vehicle_section
@@ -34,21 +32,14 @@ from gateway.reports.charts.html import (
 from gateway.words import counted, estimator_name, span
 
 
-def write_calibration_report(
-    directory: Path, campaign: Campaign, outcome: Outcome, on_chart: OnChart = lambda done, of: None
-) -> Path:
-    """Everything known of a calibration; the path of report.html."""
-    assessment = assess_calibration(campaign, outcome)
-    sections = [*_calibration_sections(outcome, campaign), *_evaluation_sections(assessment)]
-    return _write(directory, assessment, sections, on_chart)
+def write_report_of(directory: Path, assessment: Assessment, on_chart: OnChart = lambda done, of: None) -> Path:
+    """How a calibration weighs, and how it came about if this is known; the path of report.html."""
+    made = list(_calibration_sections(assessment.outcome)) if assessment.outcome else []
+    accuracy = [accuracy_section(one, stated_budget(one)) for one in assessment.judgements]
+    return _write(directory, assessment, [*made, *accuracy, provenance_section(assessment)], on_chart)
 
 
-def write_evaluation_report(directory: Path, assessment: Assessment, on_chart: OnChart = lambda done, of: None) -> Path:
-    """How a calibration did on a campaign; the path of report.html."""
-    return _write(directory, assessment, _evaluation_sections(assessment), on_chart)
-
-
-def _calibration_sections(outcome: Outcome, campaign: Campaign) -> Iterator[Section]:
+def _calibration_sections(outcome: Outcome) -> Iterator[Section]:
     identification = [one.identification for one in outcome.split]
     yield runs_section(outcome)
     ratio_index = outcome.ratio_index.calibration if outcome.ratio_index else None
@@ -58,12 +49,7 @@ def _calibration_sections(outcome: Outcome, campaign: Campaign) -> Iterator[Sect
     if outcome.ratio_index is not None:
         yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in outcome.split])
     if outcome.cross_spectrum is not None:
-        yield fitted_vehicle_section(identification, outcome.cross_spectrum, campaign.vehicle)
-
-
-def _evaluation_sections(assessment: Assessment) -> list[Section]:
-    accuracy = [accuracy_section(one, stated_budget(one)) for one in assessment.judgements]
-    return [*accuracy, provenance_section(assessment)]
+        yield fitted_vehicle_section(identification, outcome.cross_spectrum, outcome.file.vehicle)
 
 
 def _write(directory: Path, assessment: Assessment, sections: list[Section], on_chart: OnChart) -> Path:

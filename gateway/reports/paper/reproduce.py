@@ -73,7 +73,7 @@ QUICK: Final = "A quick try with a part of the driving and shorter batches: its 
 
 
 def accuracy_page(results: Mapping[str, Any]) -> str:
-    """accuracy.md, from results.json alone."""
+    """The text of accuracy.md, made from the numbers of results.json."""
     head = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
     lines = ["| " + " | ".join(row) + " |" for row in rows_of(results["tables"])]
     is_whole = results.get("is_whole", True)  # not said by results that were always of the whole

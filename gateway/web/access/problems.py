@@ -83,6 +83,9 @@ _CODES: Final = {
     "not_allowed": 403,
     "no_such_line": 404,
     "no_such_weight": 404,
+    "no_such_statement": 404,
+    "no_such_version": 404,
+    "unreadable": 422,
 }  # of reasons; else 409
 
 

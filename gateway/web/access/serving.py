@@ -6,8 +6,10 @@ reach stands behind a reverse proxy, which limits each of them (deploy/Caddyfile
 
 import asyncio
 import contextlib
+import logging
+import socket
 import ssl
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -16,11 +18,15 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from gateway.errors import ConfigurationError
-from gateway.permission import Holder, Kind, encryption_to, may_leave
+from gateway.log import Event, log_event
+from gateway.part import FIRST_PAUSE_S, LAST_PAUSE_S, BackOff
+from gateway.permission import Holder, Kind, encryption_to, is_loopback, may_leave
 
 CONNECTIONS: Final = 100  # chosen: of all clients together, streams among them; beyond them the answer is 503
 HEAD_BYTES: Final = 32_768  # chosen: request line and headers
 STOP_WITHIN_S: Final = 1  # chosen: for answers under way
+UNREAD_MS: Final = 30_000  # chosen: a client that takes nothing for so long is closed
+ANSWER_WITHIN_S: Final = 5.0  # chosen: for the service's own question
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,17 +92,12 @@ def _tls_settings(tls: Tls) -> dict[str, Any]:
     return wanted | {"ssl_ca_certs": str(tls.client_ca), "ssl_cert_reqs": ssl.CERT_REQUIRED}
 
 
-class WebServer(uvicorn.Server):
+class _Server(uvicorn.Server):
     """uvicorn without its own signal handling, which would raise the signal again after stopping."""
 
     def __init__(self, config: uvicorn.Config) -> None:
         super().__init__(config)
-        self._ending = asyncio.Event()
-
-    def end(self) -> None:
-        """Begin to shut down; from the event loop's thread."""
-        self.should_exit = True
-        self._ending.set()
+        self.ending = asyncio.Event()
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -104,7 +105,94 @@ class WebServer(uvicorn.Server):
         yield
 
     async def main_loop(self) -> None:
-        """Until :meth:`end`. uvicorn's own wakes ten times a second, parked vehicle or not, to see whether it is to
+        """Until ``ending``. uvicorn's own wakes ten times a second, parked vehicle or not, to see whether it is to
         end.
         """
-        await self._ending.wait()
+        await self.ending.wait()
+
+
+class WebServer:
+    """Serves the application until :meth:`end`; a server that dies begins anew after a pause. ``fault`` says why."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        self._config = config
+        self._server = _Server(config)
+        self._ending = asyncio.Event()
+        self._own: tuple[str, int] = ("", 0)  # where this machine can ask, whatever the address of the settings
+        self.port = 0
+        self.fault: str | None = None
+
+    @property
+    def is_started(self) -> bool:
+        return bool(self._server.started)
+
+    def loop_factory(self) -> Callable[[], asyncio.AbstractEventLoop] | None:
+        """How uvicorn makes its event loop."""
+        return self._config.get_loop_factory()
+
+    @property
+    def scheme(self) -> str:
+        return "https" if self._config.is_ssl else "http"
+
+    async def serve(self) -> None:
+        """Returns after :meth:`end`, and at once if not even the first server can start."""
+        back_off = BackOff(FIRST_PAUSE_S, LAST_PAUSE_S)
+        while True:
+            died = "it ended"
+            try:
+                await self._server.serve(self._listening())
+            except SystemExit:  # uvicorn's way to say that the address cannot be used
+                died = "its address cannot be used"
+            except Exception as failure:  # noqa: BLE001 - weighing does not depend on it
+                died = repr(failure)
+            if self._ending.is_set() or not self.port:
+                return
+            if self.fault is None:
+                log_event(Event.PART_FAILED, level=logging.ERROR, part="web server", failure=died)
+            self.fault = f"the web server failed: {died}; weighing goes on"
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._ending.wait(), back_off.next_s())
+                return
+            self._server = _Server(self._config)
+
+    def end(self) -> None:
+        """Begin to shut down; from the event loop's thread."""
+        self._server.should_exit = True
+        self._server.ending.set()
+        self._ending.set()
+
+    async def is_answering(self) -> bool:
+        """Whether a request to this very server is answered in time."""
+        context = None
+        if self._config.is_ssl:
+            context = ssl.create_default_context()
+            context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+        try:
+            async with asyncio.timeout(ANSWER_WITHIN_S):
+                reader, writer = await asyncio.open_connection(*self._own, ssl=context)
+                with contextlib.closing(writer):
+                    writer.write(b"GET /health/live HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n")
+                    is_answered = bool(await reader.read(1))
+        except ssl.SSLError:  # it answers, and wants a certificate
+            is_answered = True
+        except OSError:  # a timeout is one
+            is_answered = False
+        is_answered |= self.is_started and self._config.ssl_cert_reqs == ssl.CERT_REQUIRED
+        if is_answered:
+            self.fault = None
+        return is_answered
+
+    def _listening(self) -> list[socket.socket]:
+        """At the address of the settings and, if that is not this machine's own, also at one that is. A client that
+        takes nothing for a while is closed by the kernel. Raises SystemExit.
+        """
+        listening = [self._config.bind_socket()]
+        host, port, *_ = listening[0].getsockname()
+        self.port, self._own = port, (host, port)
+        if not is_loopback(host):
+            listening.append(socket.create_server(("127.0.0.1", 0)))
+            self._own = listening[1].getsockname()
+        for one in listening:
+            one.set_inheritable(False)
+            one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNREAD_MS)  # connections inherit it
+        return listening

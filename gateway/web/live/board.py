@@ -20,6 +20,7 @@ from gateway.web.live.stream import Fanout
 
 RECENT: Final = 100  # chosen: good estimates for the warnings, which look back over eight hours of driving
 PROVISIONAL: Final = "provisional"
+_JSON: Final = {None: b"null", True: b"true", False: b"false"}
 _NOT_CALIBRATED: Final = Weights()
 
 
@@ -88,7 +89,10 @@ class Board:
         stale_after_s: float = 900.0,
         clock: Callable[[], float] = boot_clock_s,
         unweighed: Weights = _NOT_CALIBRATED,
+        is_stored: Callable[[str], bool] = lambda estimate_id: True,
     ) -> None:
+        """``is_stored`` is whether the record of this id is on disk."""
+        self._is_stored = is_stored
         self._stale_after_s = stale_after_s
         self._clock = clock
         self._lock = threading.Lock()
@@ -142,8 +146,11 @@ class Board:
         age_s = self._age_s(answer)
         is_stale = self._is_stale(answer)
         age = b"null" if age_s is None else b"%.1f" % age_s
-        head = b'{"age_s":' + age + (b',"is_stale":true' if is_stale else b',"is_stale":false')
-        return (f"{answer.tag}.stale" if is_stale else answer.tag), head + answer.rest
+        shown = answer.estimate
+        is_stored = None if shown is None or shown.is_provisional else self._is_stored(shown.id)
+        head = b'{"age_s":%b,"is_stale":%b,"is_stored":%b' % (age, _JSON[is_stale], _JSON[is_stored])
+        tag = f"{answer.tag}{'.stale' * is_stale}{'.held' * (is_stored is False)}"
+        return tag, head + answer.rest
 
     def shown(self) -> Shown:
         answer = self._answer

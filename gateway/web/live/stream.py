@@ -18,6 +18,8 @@ from gateway.store import StoreReader
 
 RETRY_MS: Final = 3000  # chosen: pause of a browser before it connects again
 ASK_AGAIN_S: Final = 5.0  # chosen: how soon a token that was revoked ends a stream on which nothing comes
+STREAMS: Final = 60  # chosen: at a time, so that other requests have the rest of the 100 connections
+STREAMS_EACH: Final = 20  # chosen: of one client: more pages than a person opens
 _PAGE: Final = 5  # chosen: records in memory for each client
 
 EVENT_SCHEMA: Final[dict[str, Any]] = {
@@ -31,6 +33,10 @@ EVENT_SCHEMA: Final[dict[str, Any]] = {
     "required": ["event", "data"],
 }
 _CLOSING: Final = ServerSentEvent(event="closing", data={"detail": "the service stops"})
+
+
+class TooManyStreamsError(Exception):
+    """There are as many streams as there may be, of this client or of all."""
 
 
 class Subscription:
@@ -126,7 +132,7 @@ class Fanout:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._subscriptions: set[Subscription] = set()
+        self._subscriptions: dict[Subscription, str] = {}  # and whose each is
         self._is_closed = False
 
     @property
@@ -141,12 +147,16 @@ class Fanout:
 
     @contextmanager
     def joined(
-        self, reader: StoreReader, behind: str | None, shown: Callable[[str], str] = str
+        self, reader: StoreReader, behind: str | None, shown: Callable[[str], str] = str, whose: str = ""
     ) -> Iterator[Subscription]:
-        """A subscription to events from now on, in the loop that will read it."""
-        subscription = Subscription(reader, behind, shown)
+        """A subscription to events from now on, in the loop that will read it. Raises TooManyStreamsError."""
         with self._lock:
-            self._subscriptions.add(subscription)
+            if len(self._subscriptions) >= STREAMS:
+                raise TooManyStreamsError(f"{STREAMS} streams are open, and no more are served: close one")
+            if sum(other == whose for other in self._subscriptions.values()) >= STREAMS_EACH:
+                raise TooManyStreamsError(f"this client has {STREAMS_EACH} streams open: close one")
+            subscription = Subscription(reader, behind, shown)
+            self._subscriptions[subscription] = whose
             if self._is_closed:
                 subscription.end()
         try:
@@ -154,7 +164,7 @@ class Fanout:
         finally:
             subscription.close()
             with self._lock:
-                self._subscriptions.discard(subscription)
+                del self._subscriptions[subscription]
 
     def close(self) -> None:
         """End all streams, now and later."""

@@ -10,15 +10,16 @@ from typing import Final, Literal, get_args
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from gateway.core.alarms.rules import as_of_load
 from gateway.core.events.entry import EntryKind
-from gateway.core.weights.limits import Light, Room, nearness, rooms_of
-from gateway.estimate import Estimate, Lack, Quantity
-from gateway.reasons import EXPLANATIONS, Cause
-from gateway.records import Why, iso_utc, rounded
+from gateway.core.vehicle import Vehicle
+from gateway.core.weights.limits import Room, rooms_of
+from gateway.core.weights.room import Halves, room_of
+from gateway.estimate import Estimate, Lack, Quantity, Weights
+from gateway.records import iso_utc, rounded
 from gateway.status import OwnReading, State, Status
 from gateway.store import StoreReader
 from gateway.web.live.board import Board
+from gateway.web.routes.verdict import VerdictTold, present_load
 from gateway.web.routes.weights import Scales
 from gateway.web.schemas import problem_responses
 
@@ -34,10 +35,29 @@ class LoadKnown(StrEnum):
     NEVER_WEIGHED = "never_weighed"
 
 
-class RoomLeft(BaseModel):
-    """The load that can still go aboard before one place reaches its limit, all of it resting there; negative: too
-    heavy.
-    """
+class HalvesTold(BaseModel):
+    """A load in the front half of the loading area and one in its rear half."""
+
+    front_half_kg: float = Field(examples=[65.0])
+    rear_half_kg: float = Field(examples=[185.0])
+
+
+class RoomTold(BaseModel):
+    """How much more may go in so that neither the gross weight nor an axle passes its limit, and where."""
+
+    kg: float = Field(description="best estimate; negative: too heavy", examples=[262.0])
+    plus_minus_kg: float = Field(description="half its 95 % interval", examples=[12.0])
+    safe: HalvesTold = Field(
+        description="holds at the unfavourable ends of all intervals, wherever in its half each load lies"
+    )
+    is_anywhere: bool = Field(description="`safe` may lie anywhere in the loading area, all in one place")
+    take_out: HalvesTold | None = Field(
+        description="what must come out so that surely no limit is passed; null: unloading alone does not help"
+    )
+
+
+class SpareLeft(BaseModel):
+    """What one place may bear more before it reaches its limit; negative: it bears too much."""
 
     place: RoomPlace
     kg: float = Field(examples=[288.7])
@@ -58,7 +78,7 @@ class CabEvent(BaseModel):
     payload_kg: float = Field(description="aboard after it")
 
 
-class Cab(BaseModel):
+class Cab(VerdictTold):
     """By all batches of the present load together. Unknown is null."""
 
     vehicle_id: str | None
@@ -72,13 +92,8 @@ class Cab(BaseModel):
     age_s: float | None
     is_stale: bool
     is_early: bool = Field(description="true: an early look, not a whole batch yet")
-    light: Light = Field(
-        description="near: a limit lies within the 95 % interval; over: too much is more probable than not; unknown: "
-        "no limit or no weight is known, or it is doubted"
-    )
-    light_about: list[str] = Field(description="places the light is about, the worst first", examples=[["rear_axle"]])
-    over_limit_probability: float | None = Field(description="of the worst place, 0 to 1", examples=[0.02])
-    room: list[RoomLeft] = Field(description="the tightest first; empty: unknown, as the light is")
+    room: RoomTold | None = Field(description="null: no limit is known, or a weight is not known or is doubted")
+    spare: list[SpareLeft] = Field(description="of each place with a limit, the tightest first; empty as `room`")
     is_doubted: bool = Field(
         description="the last whole batch was refused because of the sensors or the answer, so the earlier weight may "
         "no longer be valid; never if that was too heavy"
@@ -95,7 +110,6 @@ class Cab(BaseModel):
     own_readings: tuple[OwnReading, ...] = Field(description="of the vehicle's own load sensors, not weighed here")
 
 
-_DOUBTING: Final = {Cause.SENSORS, Cause.ANSWER}  # roads and driving say nothing against an earlier weight
 _EVENTS: Final = 20  # chosen: looked through; a corrected one comes again behind newer ones
 
 
@@ -106,11 +120,9 @@ def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
     async def cab() -> Cab:
         """How much can still be loaded, whether it is too much, how old that is, and what was loaded last."""
         now, shown = status(), board.shown()
-        load = None if shown.estimate is None else as_of_load(shown.estimate)
-        weights = scales.weigh(load)
-        near = nearness(weights)
-        rejected = _rejected(board.heard(), shown.estimate)
-        is_doubted = near.light is not Light.OVER and any(EXPLANATIONS[why].cause in _DOUBTING for why in rejected)
+        found = present_load(board, scales.weigh, now)
+        load, weights = found.load, found.weights
+        is_known = not found.is_doubted
         return Cab(
             vehicle_id=now.vehicle_id,
             state=now.state,
@@ -120,17 +132,16 @@ def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
             age_s=shown.age_s,
             is_stale=shown.is_stale,
             is_early=load is not None and load.is_provisional,
-            light=Light.UNKNOWN if is_doubted else near.light,
-            light_about=[] if is_doubted else list(near.places()),
-            over_limit_probability=rounded(max(near.probabilities.values(), default=None), 4),
-            room=[] if is_doubted else [_room(room) for room in rooms_of(weights)],
-            is_doubted=is_doubted,
+            **found.told().model_dump(),
+            room=_room(weights, scales.vehicle) if is_known else None,
+            spare=[_spare(room) for room in rooms_of(weights)] if is_known else [],
+            is_doubted=found.is_doubted,
             has_limits=any(getattr(weights, place).limit_kg is not None for place in get_args(RoomPlace)),
             lacks=weights.gross.lacks,
             payload_kg=None if load is None else rounded(load.payload.number, 1),
             payload_interval95_kg=None if load is None else _interval(load.payload),
             alarms=now.alarms.active,
-            rejected=[str(why) for why in rejected],
+            rejected=[str(why) for why in found.rejected],
             last_event=await asyncio.to_thread(_last_event, reader),
             own_readings=now.own_readings,
         )
@@ -146,22 +157,32 @@ def _known(load: Estimate | None, now: Status) -> LoadKnown:
     return LoadKnown.WEIGHED if now.standing.is_load_weighed else LoadKnown.NOT_WEIGHED_YET
 
 
-def _room(room: Room) -> RoomLeft:
-    return RoomLeft(
+def _room(weights: Weights, vehicle: Vehicle | None) -> RoomTold | None:
+    room = None if vehicle is None else room_of(weights, vehicle)
+    if room is None:
+        return None
+    low_kg, high_kg = room.most.interval95
+    return RoomTold(
+        kg=round(room.most.number, 1),
+        plus_minus_kg=round((high_kg - low_kg) / 2.0, 1),
+        safe=_halves(room.safe),
+        is_anywhere=room.is_anywhere,
+        take_out=None if room.take_out is None else _halves(room.take_out),
+    )
+
+
+def _halves(halves: Halves) -> HalvesTold:
+    return HalvesTold(front_half_kg=round(halves.front_kg, 1), rear_half_kg=round(halves.rear_kg, 1))
+
+
+def _spare(room: Room) -> SpareLeft:
+    return SpareLeft(
         place=room.place,
         kg=round(room.left.number, 1),
         std_kg=rounded(room.left.std, 1),
         interval95_kg=_interval(room.left),
         limit_kg=room.limit_kg,
     )
-
-
-def _rejected(heard: Estimate | None, shown: Estimate | None) -> tuple[Why, ...]:
-    """Of the last whole batch, if none was weighed since. A provisional estimate does not replace a refused batch."""
-    if heard is None:
-        return ()
-    is_weighed_since = shown is not None and not shown.is_provisional and shown.t_end_ns >= heard.t_end_ns
-    return () if is_weighed_since else heard.rejected
 
 
 def _last_event(reader: StoreReader) -> CabEvent | None:

@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Final, Literal
 
-from fastapi import APIRouter, Depends, Header, Query, Request
+from fastapi import APIRouter, Depends, Header, HTTPException, Query, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -23,7 +23,7 @@ from gateway.status import Status
 from gateway.store import StoreReader
 from gateway.web.file_response import FORMATS, file_responses, sent_as_file
 from gateway.web.live.board import Board, LatestResponse
-from gateway.web.live.stream import EVENT_SCHEMA
+from gateway.web.live.stream import EVENT_SCHEMA, TooManyStreamsError
 from gateway.web.routes.service_calls import AsShown, Shown
 from gateway.web.schemas import EstimatesPage, Instant, Latest, problem_responses
 
@@ -223,23 +223,30 @@ def api_router(board: Board, reader: StoreReader, status: Callable[[], Status]) 
         return status()
 
     async def joined(
-        shown: AsShown, last_event_id: Annotated[Cursor | SkipJsonSchema[None], Header()] = None
+        request: Request,
+        shown: AsShown,
+        last_event_id: Annotated[Cursor | SkipJsonSchema[None], Header()] = None,
     ) -> AsyncIterator[Any]:
-        with board.fanout.joined(reader, last_event_id, shown) as subscription:
-            yield subscription
+        address = request.client.host if request.client else ""
+        whose = f"{address} {getattr(request.state, 'token_name', '')}"
+        try:
+            with board.fanout.joined(reader, last_event_id, shown, whose) as subscription:
+                yield subscription
+        except TooManyStreamsError as refusal:
+            raise HTTPException(503, str(refusal)) from None
 
     @router.get(
         "/stream",
         response_class=EventSourceResponse,
         responses={
             200: {"content": {EventSourceResponse.media_type: {"itemSchema": EVENT_SCHEMA}}},
-            **problem_responses(422),
+            **problem_responses(422, 503),
         },
     )
     async def stream(subscription: Annotated[Any, Depends(joined)]) -> AsyncIterator[ServerSentEvent]:
         """Server-sent events: estimate, rejection, provisional; data is the estimate object.
 
-        With Last-Event-ID, missed events come first.
+        With Last-Event-ID, missed events come first. 503: this client, or all together, have too many streams open.
         """
         async for event in subscription.events():
             yield event

@@ -6,6 +6,7 @@ that change something raise RefusedError, which becomes problem details.
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
+from datetime import tzinfo
 from typing import Annotated, Any, Final, ParamSpec, Protocol
 
 from fastapi import Depends, Request
@@ -13,6 +14,8 @@ from starlette.responses import Response
 
 from gateway.core.known_weights import KnownWeightKind
 from gateway.stated.facts import StatedWeight, VehicleAnswers
+from gateway.stated.learning import StatedVehicle
+from gateway.stated.statement import StatementRecord
 from gateway.web.schemas import problem_responses
 
 
@@ -48,6 +51,24 @@ class CommissioningBackend(Protocol):
     def fit_now(self, by: str) -> str: ...
     def cancel(self, by: str) -> str: ...
     def undo(self, by: str, *, to_factory: bool) -> str: ...
+
+
+class LearnerBackend(Protocol):
+    """Statements and learning; ``vehicle`` is what somebody stated, None if nobody has."""
+
+    def state(self, record: StatementRecord, by: str) -> str: ...
+    def import_all(
+        self, content: bytes, by: str, *, where: str, zone: tzinfo | None = None, is_dry_run: bool = False
+    ) -> str: ...
+    def statements(
+        self, *, since_ns: int | None = None, state: str | None = None, limit: int = 500, cursor: str | None = None
+    ) -> str: ...
+    def withdraw(self, statement_id: str, by: str) -> str: ...
+    def confirm(self, statement_id: str, by: str) -> str: ...
+    def learning(self) -> str: ...
+    def use(self, version: str, by: str) -> str: ...
+    def vehicle(self) -> StatedVehicle | None: ...
+    def state_vehicle(self, answers: VehicleAnswers, by: str, *, is_confirmed: bool) -> None: ...
 
 
 LOCAL: Final = "local"  # name of the client if no tokens are in use

@@ -1,12 +1,18 @@
 """/api/v1/vehicle: the vehicle, its calibration and its signals."""
 
+import asyncio
 from collections.abc import Callable
+from typing import Annotated
 
-from fastapi import APIRouter
-from pydantic import BaseModel, Field
+from fastapi import APIRouter, Query
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from gateway.core.vehicle import Vehicle
+from gateway.stated.facts import VehicleAnswers
+from gateway.stated.learning import StatedVehicle
 from gateway.status import SignalHealth, Status
+from gateway.web.routes.service_calls import By, LearnerBackend
+from gateway.web.schemas import problem_responses, utf8_only
 from gateway.weighing.calibrated import CalibratedVehicle
 
 
@@ -37,15 +43,24 @@ class VehicleDescription(BaseModel):
         description="the vehicle as its campaign stated it, with the limits in force; unknown is null"
     )
     signals: tuple[SignalHealth, ...]
+    stated: StatedVehicle | None = Field(None, description="as somebody stated it to this service; null: nobody has")
 
 
-def vehicle_router(status: Callable[[], Status], calibrated: CalibratedVehicle | None) -> APIRouter:
+class ConfirmQuery(BaseModel):
+    """Whether unlikely figures are right."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    confirm: bool = Field(False, description="the figures are right, although some are unlikely (`doubts`)")
+
+
+def vehicle_router(
+    status: Callable[[], Status], calibrated: CalibratedVehicle | None, learner: LearnerBackend | None = None
+) -> APIRouter:
     """The routes about the vehicle itself; ``calibrated`` is the calibration that the service uses."""
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
 
-    @router.get("/vehicle")
-    async def vehicle() -> VehicleDescription:
-        """The vehicle's identity, its calibration and ranges, the health of its signals."""
+    def described() -> VehicleDescription:
         now = status()
         return VehicleDescription(
             vehicle_id=now.vehicle_id,
@@ -54,7 +69,29 @@ def vehicle_router(status: Callable[[], Status], calibrated: CalibratedVehicle |
             calibration=None if calibrated is None else _calibration(calibrated),
             figures=None if calibrated is None else calibrated.vehicle,
             signals=now.signals,
+            stated=None if learner is None else learner.vehicle(),
         )
+
+    @router.get("/vehicle")
+    async def vehicle() -> VehicleDescription:
+        """The vehicle's identity, its calibration and ranges, the health of its signals, and what was stated of it."""
+        return described()
+
+    if learner is not None:
+
+        @router.put("/vehicle", responses=problem_responses(400, 403, 409, 422, 503))
+        async def state_vehicle(
+            by: By,
+            said: Annotated[VehicleAnswers, BeforeValidator(utf8_only)],
+            query: Annotated[ConfirmQuery, Query()],
+        ) -> VehicleDescription:
+            """State the vehicle: axle weights of the empty vehicle, wheelbase, the sensor's place, limits.
+
+            Unlikely figures are kept and asked about (`stated.doubts`): nothing is learnt until they are corrected, or
+            confirmed with `?confirm=true`.
+            """
+            await asyncio.to_thread(learner.state_vehicle, said, by, is_confirmed=query.confirm)
+            return described()
 
     return router
 

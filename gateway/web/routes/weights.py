@@ -17,7 +17,9 @@ from gateway.estimate import Estimate, Weight, Weights
 from gateway.quantities import QUANTITIES
 from gateway.records import iso_utc, rounded
 from gateway.stated.facts import Instant
+from gateway.status import Status
 from gateway.web.live.board import Board, Shown
+from gateway.web.routes.verdict import VerdictTold, present_load
 from gateway.web.schemas import WeightFigure, WeightFigures
 from gateway.weighing.calibrated import CalibratedVehicle
 
@@ -46,7 +48,8 @@ class WeighedWhen(BaseModel):
 class LatestWeights(WeightFigures, WeighedWhen):
     """Static weights, unsprung masses included, of the estimate that ``/estimates/latest`` shows.
 
-    ``is_over_limit`` begins above the limit and ends 3 % below it, looking back over the last estimates.
+    ``is_over_limit`` begins above the limit and ends 3 % below it, looking back over the last estimates; ``verdict`` is
+    what pages show.
     """
 
     load: LoadPlace | None = Field(description="null: unknown, or no payload that is surely there")
@@ -80,13 +83,20 @@ class Scales:
         return place_of(self.vehicle, estimate.posterior)
 
 
-def weights_router(board: Board, scales: Scales) -> APIRouter:
+class JudgedWeights(LatestWeights):
+    """The same with the verdict on the present load: all its batches together, and the alarms."""
+
+    verdict: VerdictTold
+
+
+def weights_router(board: Board, scales: Scales, status: Callable[[], Status]) -> APIRouter:
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
 
     @router.get("/weights/latest")
-    async def latest_weights() -> LatestWeights:
-        """Gross weight, axle and wheel loads in kg, with standard deviation, limit and warning."""
-        return weigh_latest(board, scales)
+    async def latest_weights() -> JudgedWeights:
+        """Gross weight, axle and wheel loads in kg, with standard deviation and limit, and the verdict on them."""
+        verdict = present_load(board, scales.weigh, status()).told()
+        return JudgedWeights(**weigh_latest(board, scales).model_dump(), verdict=verdict)
 
     return router
 

@@ -1,7 +1,8 @@
 // The cab page: asks one small question every few seconds and shows the answer, its age, and what is unknown.
 
 import { stayAwake } from "./wake-lock.js";
-import { aboard, about, alarm, alarmText, eventText, lightText, notSeen, ownReading, phrase, question, roomText, stood } from "./sentences.js";
+import { aboard, about, alarm, alarmText, eventText, lightText, notSeen, ownReading, phrase, question, spareText, stood } from "./sentences.js";
+import { listen, offer } from "./tell.js";
 import { Refused, ask, setToken } from "../dashboard/gateway.js";
 import { element, made, pair, say, write } from "../dashboard/page.js";
 import { number } from "../dashboard/words.js";
@@ -68,18 +69,20 @@ function draw() {
   if (cab === null || isRefused) return;
   element("main").dataset.light = cab.light;
   const isCurrent = validity(silentS) === "current";
-  const [asked, kg, likely] = question(cab, isCurrent);
+  const [asked, kg, where, likely] = question(cab, isCurrent);
   write("vehicle", cab.vehicle_id ?? "");
   sayBoth("not-seen", ["stood", stood(cab, silentS)], ["not-seen-what", notSeen(cab)]);
   write("light", lightText(cab, isCurrent));
   write("about", about(cab));
   write("question", asked);
   writeNumber(kg);
-  const isAnswered = cab.room.length > 0;
+  say("where", where);
+  const isAnswered = cab.room !== null;
   say("why", isAnswered ? "" : likely); // why there is no answer is no detail
   write("likely", isAnswered ? likely : "");
-  element("rooms").replaceChildren(...cab.room.map((room) => pair(...roomText(room))));
+  element("rooms").replaceChildren(...cab.spare.map((spare) => pair(...spareText(spare))));
   say("alarms", alarmText(cab));
+  offer(cab);
   write("aboard", aboard(cab, cab.age_s === null ? null : cab.age_s + silentS));
   write("last-event", eventText(cab.last_event));
   element("own").hidden = cab.own_readings.length === 0;
@@ -103,6 +106,7 @@ document.addEventListener("visibilitychange", () => {
 });
 
 fill(phrase);
+listen();
 document.title = phrase("title");
 askNow();
 setInterval(askNow, ASK_EVERY_MS);

@@ -17,14 +17,10 @@ const up = (kg) => Math.ceil(kg / STEP_KG) * STEP_KG;
 
 const said = (text, isCurrent) => (isCurrent ? text : phrase("earlier", { text }));
 
-/** A wheel carries too much, but neither an axle nor the whole does: unloading is not the remedy. */
-const isUneven = (cab) => cab.light === "over" && cab.room.length > 0 && cab.room.every((room) => room.kg >= 0);
-
-export function lightText(cab, isCurrent) {
-  if (cab.light !== "unknown") return said(phrase(`light.${isUneven(cab) ? "uneven" : cab.light}`), isCurrent);
-  if (cab.load === "never_weighed") return phrase("light_never");
-  return phrase(cab.has_limits ? "light.unknown" : "light_no_limit");
-}
+export const lightText = (cab, isCurrent) => {
+  const text = phrase(`says.${cab.says}`);
+  return cab.light === "unknown" ? text : said(text, isCurrent);
+};
 
 /** The places that the light refers to, and the probability of an overload. */
 export function about(cab) {
@@ -33,41 +29,51 @@ export function about(cab) {
   return phrase("about", { places: capital(cab.light_about.map(placeName).join(", ")), percent });
 }
 
+const half = (best, plusMinus) => phrase("best", { best: figure(best, 0, "kg"), half: figure(plusMinus, 0, "kg") });
+
+/** Each half rounded by itself, so that both together are the number shown. */
+const rounded = (halves, round) => ({ front: round(halves.front_half_kg), rear: round(halves.rear_half_kg) });
+
+function where({ front, rear }) {
+  if (!front && !rear) return "";
+  if (!front || !rear) return phrase(front ? "all_front" : "all_rear");
+  return phrase("both_halves", { front: figure(front, 0, "kg"), rear: figure(rear, 0, "kg") });
+}
+
 /**
- * The one answer: the question, the kilograms (null: unknown), and how they are found.
- * They are safe: by the lower end of the 95 % interval, of the tightest of the whole and the axles. What must come out
- * uses the same end of the interval, so that the load is safe afterwards too.
+ * The one answer: the question, the kilograms (null: unknown), where they go, and how they are found.
+ * They are safe: by the unfavourable ends of the 95 % intervals of the gross weight and both axles.
  */
 export function question(cab, isCurrent) {
-  if (!cab.room.length) return unknownRoom(cab);
-  const [tightest] = cab.room; // by the lower end
-  const low = tightest.interval95_kg === null ? tightest.kg : tightest.interval95_kg[0];
-  const place = placeName(tightest.place);
-  if (cab.room.some((room) => room.kg < 0)) {
-    const over = { ...tightest, interval95_kg: tightest.interval95_kg && tightest.interval95_kg.map((kg) => -kg).reverse() };
-    return [
-      said(phrase("take_out"), isCurrent), up(-low),
-      phrase("too_heavy", { best: figure(-tightest.kg, 0, "kg"), interval: intervalText(over.interval95_kg), place }),
-    ];
-  }
-  const safe = cab.light === "go" ? Math.max(0, down(low)) : 0;
-  return [
-    said(phrase("load_more"), isCurrent), safe,
-    phrase("safe", { safe: figure(safe, 0, "kg"), best: figure(tightest.kg, 0, "kg"), interval: intervalText(tightest.interval95_kg), place }),
-  ];
+  const { room } = cab;
+  if (room === null) return unknownRoom(cab);
+  if (room.kg < 0) return tooMuch(cab, room, isCurrent);
+  const safe = cab.light === "go" ? rounded(room.safe, down) : { front: 0, rear: 0 };
+  const total = room.is_anywhere && cab.light === "go" ? down(room.safe.front_half_kg + room.safe.rear_half_kg) : safe.front + safe.rear;
+  const place = total === 0 ? "" : room.is_anywhere ? phrase("anywhere") : where(safe);
+  return [said(phrase("load_more"), isCurrent), total, place, phrase("safe", { safe: figure(total, 0, "kg"), best: half(room.kg, room.plus_minus_kg) })];
+}
+
+function tooMuch(cab, room, isCurrent) {
+  const best = phrase("too_heavy", { best: half(-room.kg, room.plus_minus_kg) });
+  if (room.take_out === null) return [said(phrase("move_load"), isCurrent), null, "", best];
+  const out = rounded(room.take_out, up);
+  const gross = cab.spare.find((spare) => spare.place === "gross");
+  const isByPlace = cab.light_about.length > 0 && !cab.light_about.includes("gross") && !(gross?.kg < 0);
+  return [said(phrase("take_out"), isCurrent), out.front + out.rear, where(out), `${best}${isByPlace ? phrase("or_move") : ""}`];
 }
 
 function unknownRoom(cab) {
-  if (cab.payload_kg === null || cab.is_doubted) return [phrase("load_more"), null, whyNot(cab)];
-  return [phrase("aboard_now"), cab.payload_kg, phrase("room_unknown", { missing: phrase(cab.has_limits ? "missing_empty" : "missing_limit") })];
+  if (cab.payload_kg === null || cab.is_doubted) return [phrase("load_more"), null, "", whyNot(cab)];
+  return [phrase("aboard_now"), cab.payload_kg, "", phrase("room_unknown", { missing: phrase(cab.has_limits ? "missing_empty" : "missing_limit") })];
 }
 
 function whyNot(cab) {
   if (cab.rejected.length) return phrase("not_weighed", { reasons: reasons(cab.rejected) });
-  return phrase(cab.lacks === "calibration" ? "not_calibrated" : "not_yet");
+  return phrase(cab.says === "not_calibrated" ? "not_calibrated" : "not_yet");
 }
 
-export const roomText = (room) => [capital(placeName(room.place)), phrase(room.kg < 0 ? "too_much" : "spare", { kg: figure(Math.abs(room.kg), 0, "kg") })];
+export const spareText = (spare) => [capital(placeName(spare.place)), phrase(spare.kg < 0 ? "too_much" : "spare", { kg: figure(Math.abs(spare.kg), 0, "kg") })];
 
 /** What cannot be known now; empty if the weighed load is still aboard. */
 export function notSeen(cab) {
@@ -75,10 +81,9 @@ export function notSeen(cab) {
   return cab.load === "not_weighed_yet" ? phrase("changed") : "";
 }
 
-/** Active alarms, without those that the red light shows already. */
+/** Active alarms of sensors: the light and its sentence tell of an overload. */
 export function alarmText(cab) {
-  const isSaid = (name) => cab.light === "over" && cab.light_about.some((place) => name === `overload.${place}`);
-  const names = cab.alarms.filter((name) => !isSaid(name)).map((name) => alarmName(...name.split(".")));
+  const names = cab.alarms.map((name) => name.split(".")).filter(([kind]) => kind !== "overload").map((name) => alarmName(...name));
   return names.length ? phrase("alarms", { names: names.join(", ") }) : "";
 }
 

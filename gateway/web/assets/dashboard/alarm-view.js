@@ -18,17 +18,20 @@ function plain({ kind, where, found_kg, std_kg, limit_kg, detail }) {
   return `${phrase(where === "silent" ? "fault_silent" : "fault_refused")}${detail ? `: ${reasons(detail.split(", "))}` : ""}`;
 }
 
-function item(alarm) {
-  const built = made("li", [made("span", `${plain(alarm)}. `), made("span", when(alarm))], alarm.is_active ? "alarm" : "");
+/** An overload alarm that stands is red only where the verdict on the present load is. */
+function item(alarm, verdict) {
+  const isEnding = alarm.is_active && alarm.kind === "overload" && verdict?.light !== "over";
+  const tone = !alarm.is_active ? "" : isEnding ? "warning" : "alarm";
+  const built = made("li", [made("span", `${plain(alarm)}. `), made("span", `${when(alarm)}${isEnding ? `. ${phrase("alarm_ending")}` : ""}`)], tone);
   built.dataset.id = alarm.id;
   return built;
 }
 
-show(({ alarms }) => {
+show(({ alarms, weights }) => {
   if (alarms === null) return;
   const [active, ended] = [alarms.filter((alarm) => alarm.is_active), alarms.filter((alarm) => !alarm.is_active)];
   element("alarms").hidden = active.length === 0;
-  element("alarms-open").replaceChildren(...active.map(item));
+  element("alarms-open").replaceChildren(...active.map((alarm) => item(alarm, weights?.verdict)));
   element("alarms-past").hidden = ended.length === 0;
-  element("alarms-entries").replaceChildren(...ended.map(item));
-}, "alarms");
+  element("alarms-entries").replaceChildren(...ended.map((alarm) => item(alarm)));
+}, "alarms", "weights");

@@ -16,7 +16,7 @@ async function askNow() {
   try {
     const [status, latest] = await Promise.all([load("api/v1/status"), load("api/v1/estimates/latest")]);
     learn({ status, latest, latestAtMs: performance.now(), isReachable: true, isRefused: false });
-    if (known.weights?.id !== latest.id || latest.id === null) learn({ weights: await load("api/v1/weights/latest") });
+    learn({ weights: await load("api/v1/weights/latest") }); // the verdict changes with alarms too
     if (known.verifications && known.verifications.due.n_records !== status.verification.n_records) await askVerifications();
     if (known.commissioning?.underway || known.commissioning?.is_pending) await askCommissioning();
     if (known.knownWeights && known.knownWeights.known_weights_id !== status.known_weights_id) await askKnownWeights(); // somebody else changed them
@@ -90,6 +90,7 @@ function onEvent(kind, record) {
     learn({ trips: revised(known.trips, record) });
   } else if (kind === "alarm") {
     learn({ alarms: revised(known.alarms, record) });
+    askSoon();
   }
 }
 

@@ -12,7 +12,8 @@ export const setToken = (text) => sessionStorage.setItem(TOKEN, text.trim());
 
 export const hasToken = () => sessionStorage.getItem(TOKEN) !== null;
 
-function headers(token = sessionStorage.getItem(TOKEN)) {
+/** With the token of this session, if there is one. */
+export function headers(token = sessionStorage.getItem(TOKEN)) {
   return token ? { Authorization: `Bearer ${token}` } : {};
 }
 

@@ -8,7 +8,9 @@ import { UNKNOWN, Z95, ago, between, capital, clock, figure, kmh, reasons as nam
 const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interval", { between: between(bounds, digits, unit) }));
 
 /** The outcome of the last batch, if none was weighed yet, and what to do about it. */
-function noneYet(refusal, reasons, commissioning) {
+function noneYet(refusal, reasons, commissioning, status) {
+  const isFromBefore = refusal?.rejected.includes("no_calibration") && status?.calibration_id != null;
+  if (isFromBefore || (refusal == null && status?.calibration_id != null)) return phrase("ready");
   if (refusal == null) return phrase("none_yet");
   const here = refusal.rejected.includes("no_calibration") ? calibratedHere(commissioning) : null;
   if (here !== null) return here;
@@ -23,12 +25,13 @@ function isDoubted({ last_rejection: refusal, ...latest }, reasons) {
   return refusal.rejected.some((reason) => ["The sensors", "The answer"].includes(reasons.get(reason)?.cause));
 }
 
-function notes(latest, reasons, commissioning) {
+function notes(latest, reasons, commissioning, status) {
   const said = [];
   if (isDoubted(latest, reasons)) said.push(phrase("note_doubted", { reasons: named(latest.last_rejection.rejected) }));
+  if (latest.is_stored === false) said.push(phrase("note_unstored"));
   if (latest.is_stale) said.push(phrase("note_old"));
   if (latest.provisional) said.push(phrase("note_early"));
-  if (latest.rejected.includes("no_estimate_yet")) said.push(noneYet(latest.last_rejection, reasons, commissioning));
+  if (latest.rejected.includes("no_estimate_yet")) said.push(noneYet(latest.last_rejection, reasons, commissioning, status));
   else if (latest.rejected.length) said.push(phrase("note_none", { reasons: named(latest.rejected) }));
   return said.join(" ");
 }
@@ -96,7 +99,7 @@ show(({ latest, sources, remedies: advised }) => {
     made("li", phrase("budget_remedy", { advice: capital(advised.get(remedy)), now: half(latest.payload_std_kg), then: half(then) }))));
 }, "latest", "sources", "remedies");
 
-show(({ latest, vehicle, reasons, commissioning, isReachable }) => {
+show(({ latest, vehicle, reasons, commissioning, status, isReachable }) => {
   if (latest === null) return;
   const seen = vehicle?.calibration;
   writeNumber("payload", latest.payload_kg, 0, "kg");
@@ -111,11 +114,11 @@ show(({ latest, vehicle, reasons, commissioning, isReachable }) => {
   element("conditioned").hidden = latest.raw_payload_kg == null;
   write("raw-payload", withStd(latest.raw_payload_kg, latest.raw_payload_std_kg, 0, "kg"));
   element("latest").classList.toggle("stale", latest.is_stale || isReachable === false);
-  say("note", notes(latest, reasons, commissioning));
+  say("note", notes(latest, reasons, commissioning, status));
   document.title = latest.payload_kg == null ? "Springscale" : `${figure(latest.payload_kg, 0, "kg")} – Springscale`;
   showAge();
   announce(latest);
-}, "latest", "vehicle", "reasons", "commissioning", "isReachable");
+}, "latest", "vehicle", "reasons", "commissioning", "status", "isReachable");
 
 element("budget").open = matchMedia("(min-width: 56rem)").matches; // where there is room for it
 setInterval(() => known.latest && showAge(), 1000);

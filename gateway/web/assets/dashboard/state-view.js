@@ -11,14 +11,6 @@ const TONES = {
   estimating: "good", stale: "warn", reader_fault: "bad",
 };
 
-/** Faults beside the state. */
-function beside({ store, uplink, warnings }) {
-  const said = [];
-  if (store.state !== "ok") said.push(phrase("memory_only", { reason: store.reason }));
-  if (uplink && !uplink.is_connected && uplink.last_fault) said.push(phrase("broker_away", { fault: uplink.last_fault }));
-  return [...said, ...warnings].join(" ");
-}
-
 /** The gateway's own English sentence has more details than the translation. */
 function sentence(status) {
   if (language === "en") return status.state_in_words;
@@ -26,7 +18,7 @@ function sentence(status) {
   if (status.state === "sensor_fault") said.push(phrase("silent_signals", { signals: silentSignals(status).join(", ") }));
   if (status.state === "reader_fault" && status.bus.last_fault) said.push(phrase("last_fault", { fault: status.bus.last_fault }));
   if (status.calibration_id === null) said.push(phrase("spectra_only"));
-  return [...said, beside(status)].join(" ");
+  return [...said, ...status.warnings].join(" ");
 }
 
 function told(known) {
@@ -36,7 +28,7 @@ function told(known) {
   if (status === null) return [phrase("loading"), "busy", phrase("asking")];
   const tone = TONES[status.state] ?? "warn";
   if (status.calibration_id === null && tone !== "bad") return [phrase("no_calibration"), "warn", sentence(status)];
-  if (isAsleep(known)) return [phrase("asleep"), "calm", `${phrase("asleep_since")} ${beside(status)}`];
+  if (isAsleep(known)) return [phrase("asleep"), "calm", `${phrase("asleep_since")} ${status.warnings.join(" ")}`];
   return [phrase.named("state", status.state), tone, sentence(status)];
 }
 

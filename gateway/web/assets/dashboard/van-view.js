@@ -8,6 +8,7 @@ import { UNKNOWN, capital, figure, withStd } from "./words.js";
 
 const WHEELS = ["front_left", "front_right", "rear_left", "rear_right"];
 const LIMITED = ["gross", "front_axle", "rear_axle", ...WHEELS];
+const SAID = ["near", "over", "uneven", "was_over"];
 const NO_WHEELS = { track_width: "no_track", roll_rate: "no_roll" };
 
 /** Weights and payload come in two answers: the load is drawn only if both belong to one estimate. */
@@ -31,11 +32,21 @@ function centreInWords(weights) {
   return `${phrase("behind_front", { metres: withStd(place.position_m, place.std_m, 2, "m") })}${across && `, ${across}`}`;
 }
 
-function overloads(weights) {
-  return LIMITED.filter((place) => weights[place].is_over_limit).map((place) => phrase("overload", { place: capital(phrase.named("place", place)) })).join(" ");
+/** The weights with the places that the verdict calls too heavy marked so: the drawing and the sentence agree. */
+function judged(weights) {
+  const over = weights.verdict.light === "over" ? weights.verdict.light_about : [];
+  const marked = LIMITED.map((place) => [place, { ...weights[place], is_over_limit: over.includes(place) }]);
+  return { ...weights, ...Object.fromEntries(marked) };
 }
 
-show(({ vehicle, weights, latest, isReachable }) => {
+/** The verdict as a sentence; empty while nothing is near a limit. */
+export function verdictText({ says, light_about: about }) {
+  if (!SAID.includes(says)) return "";
+  return phrase(`verdict.${says}`, { places: capital(about.map((place) => phrase.named("place", place)).join(", ")) });
+}
+
+show(({ vehicle, weights: found, latest, isReachable }) => {
+  const weights = found && judged(found);
   if (vehicle?.figures) element("van").replaceChildren(drawVan(vehicle, weights, loadOf(weights, latest), latest?.payload_kg));
   element("van").classList.toggle("stale", Boolean(latest?.is_stale) || isReachable === false);
   if (!weights) return;
@@ -44,5 +55,6 @@ show(({ vehicle, weights, latest, isReachable }) => {
     pair(phrase("centre"), centreInWords(weights)),
     ...wheelPairs(weights),
   );
-  say("overload", overloads(weights));
+  say("overload", verdictText(weights.verdict));
+  element("overload").className = weights.verdict.light === "over" ? "alarm" : "warning";
 }, "vehicle", "weights", "latest", "isReachable");

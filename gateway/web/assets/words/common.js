@@ -1,6 +1,7 @@
 // Words that all pages share: [English, German].
 
 export const COMMON = {
+  number_hint: ["A number, such as {example}", "Eine Zahl, zum Beispiel {example}"],
   unknown: ["unknown", "unbekannt"],
   never: ["never", "nie"],
   between: ["{low} to {high}", "{low} bis {high}"],

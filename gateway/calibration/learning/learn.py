@@ -1,0 +1,168 @@
+"""From pieces of drives and statements about them to a calibration."""
+
+import hashlib
+import json
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from math import isfinite, nan
+from pathlib import Path
+from typing import Final
+
+from gateway.calibration.assigned import Assigned, assign
+from gateway.calibration.calibrate import OnFit, Outcome, calibrate_inspected, drive_name
+from gateway.calibration.campaign import Campaign, DraftTable
+from gateway.calibration.empties import looking_empty
+from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
+from gateway.calibration.inspection.log import LogFacts, SplitRun
+from gateway.calibration.inspection.run import inspect_run
+from gateway.calibration.known_run import KnownRun
+from gateway.calibration.learning.drives import Driven, chosen
+from gateway.calibration.statements import Statement
+from gateway.calibration.vehicle import FoundClaim, FoundLoad
+from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Vehicle, front_share_pct
+from gateway.errors import CalibrationImpossibleError
+from gateway.stated.statement import StatementRecord
+
+OF_CAMPAIGNS: Final = frozenset(
+    {Kind.TOO_SHORT, Kind.BATCHES_LOST, Kind.UNSTEADY, Kind.SMOOTH_ROAD, Kind.SPEED_DIFFERS, Kind.NO_USABLE_BATCH}
+)
+"""Kinds of findings about drives that were meant to be alike; ordinary ones are not."""
+LOOKED_FOR: Final = frozenset(Kind) - OF_CAMPAIGNS
+
+
+@dataclass(frozen=True, slots=True)
+class Learnt:
+    """The calibration, the pieces it was made from with what is stated of each, and what became of each statement.
+
+    drives, statements and ``holding`` (records that hold for it) go together, numbered from 1; ``n_unneeded`` pieces of
+    unknown load were not used, ``findings`` are of pieces that were left out for a fault of a sensor or of the map.
+    """
+
+    outcome: Outcome
+    drives: tuple[Driven, ...]
+    statements: tuple[Statement, ...]
+    holding: tuple[tuple[int, ...], ...]
+    n_unneeded: int
+    findings: Mapping[str, tuple[Finding, ...]]
+
+    @property
+    def loads(self) -> dict[int, FoundLoad]:
+        """What was found of each drive's load, by its number."""
+        taught = self.outcome.cross_spectrum
+        by_name = {one.name: one for one in taught.loads} if taught else {}
+        numbers = range(1, len(self.drives) + 1)
+        return {number: by_name[drive_name(number)] for number in numbers if drive_name(number) in by_name}
+
+    def claims_of(self, number: int) -> list[FoundClaim]:
+        """What became of the statements about a drive."""
+        taught = self.outcome.cross_spectrum
+        return [one for one in (taught.claims if taught else ()) if one.drive == drive_name(number)]
+
+    @property
+    def empty(self) -> tuple[int, ...]:
+        """The numbers of the drives of unknown load that look empty."""
+        unknown = {number: one for number, one in self.loads.items() if not self.statements[number - 1].is_of_payload}
+        members = looking_empty(list(unknown.values()), self.outcome.file.vehicle)
+        return tuple(number for number, one in unknown.items() if any(one is member for member in members))
+
+
+def matched(records: Sequence[StatementRecord], driven: Sequence[Driven], vehicle: Vehicle) -> Assigned:
+    """What these records say of the pieces."""
+    return assign(records, [one.piece for one in driven], vehicle)
+
+
+def command_of(like: CalibrationFile | None, window_s: float) -> str:
+    """What decides the result, beside drives and statements, as a command."""
+    words = ["springscale", "learn"]
+    words += [] if like is None else ["--like", like.id]
+    words += [] if window_s == BatchSettings().window_s else ["--window-s", f"{window_s:g}"]
+    return shlex.join(words)
+
+
+def learn(
+    vehicle: Vehicle,
+    driven: Sequence[Driven],
+    assigned: Assigned,
+    settings: BatchSettings,
+    *,
+    like: CalibrationFile | None = None,
+    on_fit: OnFit = lambda name, done, of: None,
+) -> Learnt:
+    """The calibration that these pieces and statements give. The same from logs and in a service, byte for byte.
+
+    Raises CalibrationImpossibleError if no drive can teach.
+    """
+    faults = {one.name: found for one in driven if (found := _faults(one, vehicle, settings))}
+    sound = [i for i, one in enumerate(driven) if one.name not in faults]
+    if not sound:
+        raise CalibrationImpossibleError(_nothing(faults))
+    best = chosen([driven[i] for i in sound], [bool(assigned.holding[i]) for i in sound])
+    used = [sound[i] for i in best]
+    split, verdicts = [], []
+    for number, i in enumerate(used, 1):
+        run = _run(number, driven[i], assigned.statements[i], vehicle)
+        split.append(SplitRun(run, replace(run, batches=()), log=_facts(driven[i])))
+        verdicts.append(RunVerdict(number, run.name))
+    outcome = calibrate_inspected(
+        Campaign(Path(vehicle.name), DraftTable(vehicle=vehicle)),
+        Inspection(tuple(split), tuple(verdicts), ()),
+        estimators=("cross_spectrum",),
+        like=like,
+        command=command_of(like, settings.window_s),
+        campaign_sha256=_sha256(vehicle),
+        on_fit=on_fit,
+    )
+    return Learnt(
+        outcome,
+        tuple(driven[i] for i in used),
+        tuple(assigned.statements[i] for i in used),
+        tuple(assigned.holding[i] for i in used),
+        len(sound) - len(used),
+        faults,
+    )
+
+
+def _nothing(faults: Mapping[str, Sequence[Finding]]) -> str:
+    if not faults:
+        return "nothing to learn from yet: a drive teaches from a minute of steady driving with both sensors on"
+    told = dict.fromkeys(f"{one.kind}: {one.text}: {one.advice}" for found in faults.values() for one in found)
+    return "nothing to learn from: every drive has a fault: " + "; ".join(told)
+
+
+def _sha256(vehicle: Vehicle) -> str:
+    return hashlib.sha256(json.dumps(asdict(vehicle), sort_keys=True).encode()).hexdigest()
+
+
+def _facts(one: Driven) -> LogFacts:
+    return LogFacts(sha256=one.sha256, duration_s=one.facts.duration_s, span_ns=(one.piece.begin_ns, one.piece.end_ns))
+
+
+def _faults(one: Driven, vehicle: Vehicle, settings: BatchSettings) -> tuple[Finding, ...]:
+    """What is wrong with the sensors or the map in this piece."""
+    run = KnownRun(1, one.name, nan, nan, one.batches)
+    whole = SplitRun(run, replace(run, batches=()), one.facts, log=_facts(one))
+    found = inspect_run(whole, vehicle, settings, LOOKED_FOR).findings
+    return tuple(finding for finding in found if finding.severity is Severity.FAULT)
+
+
+def _run(number: int, one: Driven, statement: Statement, vehicle: Vehicle) -> KnownRun:
+    payload_kg = nan if statement.payload_kg is None else statement.payload_kg
+    share_pct = nan
+    if statement.front_share_pct is not None:
+        share_pct = statement.front_share_pct
+    elif isfinite(payload_kg) and statement.has_place:
+        share_pct = front_share_pct(vehicle, payload_kg, statement.position_m)
+    return KnownRun(
+        number,
+        one.name,
+        payload_kg,
+        share_pct,
+        one.batches,
+        statement.left_m,
+        statement.payload_plus_minus_kg,
+        said=statement,
+    )

@@ -1,0 +1,115 @@
+"""What was learnt, as an object: for the command's JSON, and from the process that learns to its service."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from gateway.calibration.ahead import Step
+from gateway.calibration.assigned import Assigned
+from gateway.calibration.judgement.advice import WORTH_SAYING, Verdict
+from gateway.calibration.learning.learn import Learnt
+from gateway.calibration.learning.spans import STATES
+from gateway.calibration.questions import common_errors, question
+from gateway.calibration.statements import Statement
+from gateway.calibration.vehicle import ClaimState
+from gateway.quantity import Z95
+from gateway.records import iso_utc, rounded
+from gateway.stated.statement import StatementRecord
+
+Record = dict[str, Any]
+
+
+def drives_record(found: Learnt) -> list[Record]:
+    """Each drive, with what is stated and found of its load."""
+    drives = []
+    for number, (one, said) in enumerate(zip(found.drives, found.statements, strict=True), 1):
+        load, claims = found.loads.get(number), found.claims_of(number)
+        drives.append(
+            {
+                "number": number,
+                "log": one.source,
+                "t_start": iso_utc(one.piece.begin_ns),
+                "t_end": iso_utc(one.piece.end_ns),
+                "driven_s": rounded(one.usable_s, 1),
+                "stated": _stated(said),
+                "found": load and _kg(load.load.payload_kg, load.payload_std_kg),
+                "found_without_statement": load and _kg(load.without_kg, load.without_std_kg),
+                "state": str(max((claim.state for claim in claims), key=_gravity)) if claims else None,
+            }
+        )
+    return drives
+
+
+def _stated(said: Statement) -> Record | None:
+    if said.payload_kg is None:
+        return None
+    plus_minus_kg = min(claim.stated_plus_minus_kg for claim in said.claims)
+    return {"payload_kg": rounded(said.payload_kg, 1), "plus_minus_kg": rounded(plus_minus_kg, 1)}
+
+
+def _gravity(state: ClaimState) -> int:
+    return list(ClaimState).index(state)
+
+
+def _kg(payload_kg: float, std_kg: float) -> Record | None:
+    if math.isnan(payload_kg):
+        return None
+    return {"payload_kg": rounded(payload_kg, 1), "plus_minus_kg": rounded(Z95 * std_kg, 1)}
+
+
+def statements_record(records: Sequence[StatementRecord], assigned: Assigned, found: Learnt) -> list[Record]:
+    """What became of each statement: its state, and what its drives said without it."""
+    statements = []
+    for i, (record, fate) in enumerate(zip(records, assigned.fates, strict=True)):
+        numbers = [n for n, holding in enumerate(found.holding, 1) if i in holding]
+        claims = [one for n in numbers for one in found.claims_of(n) if one.name == record.id]
+        state, shown, asked = STATES[fate], None, None
+        if claims:
+            worst = max(claims, key=lambda one: (_gravity(one.state), one.disagreement))
+            state, shown = str(worst.state), _kg(worst.without_kg, worst.without_std_kg)
+            if worst.state is not ClaimState.USED:
+                asked = f"{worst.drive} {question(worst, record, found.outcome.file.vehicle)}"
+        elif not record.learn and (loads := [found.loads[n] for n in numbers if n in found.loads]):
+            state, shown = "checked", _kg(loads[0].load.payload_kg, loads[0].payload_std_kg)
+        told = record.model_dump(mode="json", by_alias=True)
+        statements.append(
+            {
+                **told,
+                "drives": numbers,
+                "state": state,
+                "found": shown,
+                "question": asked,
+                "reason": assigned.reasons[i] or None,
+            }
+        )
+    return statements
+
+
+def learning_record(found: Learnt, verdict: Verdict) -> Record:
+    """How well a load is weighed now, and what would narrow it."""
+    taught = found.outcome.cross_spectrum
+    helps = [one for one in verdict.steps if one.then_kg <= (1.0 - WORTH_SAYING) * one.now_kg]
+    return {
+        "plus_minus_kg": rounded(verdict.steps[0].now_kg, 1) if verdict.steps else None,
+        "useful_at_kg": rounded(found.outcome.file.vehicle.useful_half_width_kg, 1),
+        "tested_on": len({one.run for one in taught.errors}) if taught else 0,
+        "helps": [_help(one) for one in helps],
+        "findings": list(_findings(found)),
+    }
+
+
+def _help(step: Step) -> Record:
+    return {
+        "do": step.candidate.name,
+        "then_plus_minus_kg": rounded(step.then_kg, 1),
+        "text": f"{step.candidate.words}: ± {step.now_kg:.0f} kg would become ± {step.then_kg:.0f} kg",
+    }
+
+
+def _findings(found: Learnt) -> Iterator[str]:
+    taught = found.outcome.cross_spectrum
+    if taught is not None:
+        yield from common_errors(taught.causes)
+    faults = dict.fromkeys(f"{one.text}: {one.advice}" for findings in found.findings.values() for one in findings)
+    for told in faults:
+        yield f"some drives are left out: {told}"

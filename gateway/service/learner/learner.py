@@ -1,0 +1,713 @@
+"""Statements, the vehicle and what is learnt, as the web asks for them; a thread that keeps drives and starts fits."""
+
+import hashlib
+import json
+import logging
+import queue
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from datetime import tzinfo
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from gateway.bus.signals import SignalMap
+from gateway.calibration.assigned import Assigned, Fate, Piece, assign, moments
+from gateway.calibration.commissioning.answers import doubts_of, vehicle_table
+from gateway.calibration.kept.batch_file import kept_batch_of
+from gateway.calibration.learning.job import LearnJob, LearnResult
+from gateway.calibration.learning.spans import (
+    MOST_DRIVES,
+    PROBLEMS,
+    STATES,
+    can_teach,
+    rows_told,
+    spans_of,
+    standing,
+    worth,
+)
+from gateway.calibration.sister import require_alike
+from gateway.calibration.statements_csv import StatementsFileError, ToldRow, ToldRows, read_statements
+from gateway.config.sections import LearningSection
+from gateway.core.scheduler import Scheduler
+from gateway.core.settings import BatchSettings
+from gateway.core.vehicle import Vehicle
+from gateway.errors import CalibrationFileError, CampaignError, NoSisterError, RefusedError
+from gateway.log import Event, log_event
+from gateway.part import STOP_WITHIN_S, BackOff, ThreadPart
+from gateway.records import Batch, Motion, iso_utc, rounded
+from gateway.service.learner.book import MOST_STATEMENTS, MOST_VERSIONS, Book, LearningRecord, Outcome, Said, Stated
+from gateway.service.learner.book import Version as LearntVersion
+from gateway.service.learner.drives import FOLDER, DriveFiles, Window
+from gateway.service.learner.worker import OnResult, Worker
+from gateway.stated.doubt import meant_by
+from gateway.stated.facts import VehicleAnswers
+from gateway.stated.learning import (
+    STATES as STATE_NAMES,
+)
+from gateway.stated.learning import (
+    DoubtOfVehicle,
+    Help,
+    ImportTold,
+    LearningState,
+    ProblemRow,
+    Question,
+    StatedVehicle,
+    StatementPage,
+    StatementTold,
+    VersionTold,
+)
+from gateway.stated.statement import StatementRecord, StatementSource
+from gateway.units import NS_PER_S
+from gateway.words import counted
+
+OnEvent = Callable[[str, Mapping[str, Any]], None]
+MakeWorker = Callable[[OnResult], Worker]
+
+MOST_WAITING: Final = 4  # chosen: windows in the queue; each has some megabytes of rows, one comes every few minutes
+TURN_S: Final = 1.0  # chosen: interval between looks whether there is something to learn
+FIRST_RETRY_S, LAST_RETRY_S = 60.0, 3600.0  # chosen: after a process that was ended from outside
+BYTES_PER_MB: Final = 1_000_000  # SI
+NEWEST, BY_FILE = "newest", "file"
+OTHER_TIME_NS: Final = 86_400 * NS_PER_S  # chosen: a bus whose time is further off than a day has a time of its own
+NO_VEHICLE: Final = "the vehicle is not stated yet: its axle weights, wheelbase and the sensor's place are needed"
+NEXT_FIT: Final = "its drive is there: it is learnt from with the next fit"
+
+
+@dataclass(frozen=True, slots=True)
+class LearnerVehicle:
+    """The vehicle as the service knows it, and whether the service may learn it.
+
+    ``like`` is the calibration file of its sister, ``sister`` the vehicle in it. ``by_file`` is the calibration file
+    that the settings name, ``in_file`` the vehicle in it; None without one.
+    """
+
+    id: str
+    name: str
+    signals_id: str
+    why_not_allowed: str | None = None
+    is_name_fixed: bool = False
+    like: Path | None = None
+    sister: Vehicle | None = None
+    by_file: Path | None = None
+    in_file: Vehicle | None = None
+
+    def stated(self, answers: VehicleAnswers) -> Vehicle:
+        """The vehicle that follows from what somebody stated. Raises CampaignError, NoSisterError.
+
+        What it may carry follows from its limit unless it is stated.
+        """
+        gross_kg = answers.kerb_front_axle_kg + answers.kerb_rear_axle_kg
+        if answers.payload_range_kg is None and (answers.gross_limit_kg or 0.0) > gross_kg:
+            answers = replace(answers, payload_range_kg=(0.0, (answers.gross_limit_kg or 0.0) - gross_kg))
+        table = vehicle_table(answers, self.name, self.sister)
+        if self.sister is not None and not doubts_of(answers, self.sister):
+            require_alike(self.sister, table)
+        return replace(table, name=self.name) if self.is_name_fixed else table
+
+
+class _Handed(NamedTuple):
+    batch: Batch
+    rows: Motion
+
+
+class Learner(ThreadPart):
+    """Keeps statements and drives, and learns the vehicle from them. Thread-safe; a call may wait for the disk.
+
+    What is answered is on disk. A stop or a power cut during a fit loses nothing: the next start fits anew.
+    """
+
+    NAME = "learner"
+
+    def __init__(
+        self,
+        directory: Path,
+        settings: LearningSection,
+        batch: BatchSettings,
+        drives: Scheduler,
+        signal_map: SignalMap,
+        vehicle: LearnerVehicle,
+        *,
+        on_event: OnEvent,
+        clock_ns: Callable[[], int] = time.time_ns,
+        make_worker: MakeWorker | None = None,
+    ) -> None:
+        """``make_worker`` replaces the process that learns (tests)."""
+        super().__init__("learner")
+        self._settings, self._batch, self._scheduler = settings, batch, drives
+        self._signal_map, self._vehicle = signal_map, vehicle
+        self._clock_ns = clock_ns
+        self._book = Book(directory, on_event, clock_ns)
+        self._files = DriveFiles(directory / FOLDER, round(settings.size_mb * BYTES_PER_MB))
+        self._worker = (make_worker or (lambda on_result: Worker(directory, on_result)))(self._on_result)
+        active = self._book.record.active
+        self._started_with = active.id if active else None
+        self._waiting: queue.Queue[_Handed | None] = queue.Queue(MOST_WAITING)
+        self._retry = BackOff(FIRST_RETRY_S, LAST_RETRY_S)
+        self._not_before_s = 0.0
+        self._disk_fault: str | None = None
+        self._fates_of: tuple[LearningRecord, tuple[Window, ...], dict[str, tuple[Fate, str]]] | None = None
+        self._looked: tuple[LearningRecord, tuple[Window, ...], int | None] | None = None  # nothing to learn there
+        self.n_lost = 0  # windows that should have been kept and were not
+
+    # -- the pipeline, and the thread --
+
+    def take(self, batch: Batch, rows: Motion) -> None:
+        """Queue a window, from the pipeline's thread; if the queue is full it is lost and counted."""
+        if not can_teach(batch, self._batch):
+            return
+        try:
+            self._waiting.put_nowait(_Handed(batch, rows))
+        except queue.Full:
+            self._lose(f"{MOST_WAITING} windows wait for the disk already")
+
+    def flush(self) -> None:
+        """Wait until every queued window is stored or lost."""
+        self._waiting.join()
+
+    def stop(self, within_s: float = STOP_WITHIN_S) -> None:
+        """Store the queued windows, and end the process that learns; the next start begins it anew."""
+        self._worker.end()
+        end_s = time.monotonic() + within_s
+        self._stopping.set()
+        with suppress(queue.Full):
+            self._waiting.put(None, timeout=within_s)
+        super().stop(max(0.0, end_s - time.monotonic()))
+
+    def _work(self) -> None:
+        while True:
+            try:
+                handed = self._waiting.get(timeout=TURN_S)
+            except queue.Empty:
+                self._learn_if_due()
+                continue
+            try:
+                if handed is None:
+                    return
+                self._keep(handed)
+            except Exception as failure:  # noqa: BLE001 - a failure with one window must not stop the thread
+                self._lose(repr(failure))
+            finally:
+                self._waiting.task_done()
+
+    def _keep(self, handed: _Handed) -> None:
+        signal_map, batch = self._signal_map, handed.batch
+        name = f"{batch.t_end_ns}-{batch.t_start_ns:012x}"
+        kept = kept_batch_of(name, signal_map.id, batch, handed.rows, signal_map.traits)
+        try:
+            self._files.add(kept, self._is_stated)
+        except OSError as refusal:
+            self._lose(str(refusal))
+        else:
+            self._disk_fault = None
+
+    def _is_stated(self, begin_ns: int, end_ns: int) -> bool:
+        """Whether a statement that stands may be about this time."""
+        pieces = [Piece(begin_ns, end_ns, 1)]
+        vehicle = self._known_vehicle
+        return vehicle is not None and bool(assign(self._book.record.records, pieces, vehicle).holding[0])
+
+    def _lose(self, why: str) -> None:
+        self.n_lost += 1
+        if self._disk_fault is None:  # log it once until it works again
+            log_event(Event.DRIVE_NOT_KEPT, level=logging.WARNING, fault=why)
+        self._disk_fault = f"drives cannot be kept to learn from: {why}; weighing goes on"
+
+    @property
+    def fault(self) -> str | None:
+        """Faults of the record and of the disk."""
+        return "; ".join(filter(None, (super().fault, self._book.fault, self._disk_fault))) or None
+
+    @property
+    def is_due(self) -> bool:
+        """Whether another calibration than at the start waits for the next drive."""
+        active = self._book.record.active
+        return (active.id if active else None) != self._started_with
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a fit is under way."""
+        return self._worker.is_busy
+
+    @property
+    def has_settled(self) -> bool:
+        """Whether everything that teaches was learnt from, or cannot be."""
+        with self._book.lock:
+            job = self._job()
+            is_done = job is None or (self._book.record.last is not None and self._book.record.last.key == job.key)
+            return is_done and not self._worker.is_busy and self._waiting.unfinished_tasks == 0
+
+    # -- learning --
+
+    def _learn_if_due(self) -> None:
+        """Start a fit if something new teaches; after a process that was ended, only after a pause."""
+        with self._book.lock:
+            if self._stopping.is_set() or self._worker.is_busy or time.monotonic() < self._not_before_s:
+                return
+            looked = (self._book.record, self._files.windows(), self._scheduler.drive_start_ns)
+            if self._looked is not None and self._looked[0] is looked[0] and self._looked[1:] == looked[1:]:
+                return
+            job, last = self._job(), self._book.record.last
+            if job is None or (last is not None and last.key == job.key):
+                self._looked = looked
+                return
+            try:
+                self._worker.start(job)
+            except OSError as refusal:
+                self._lose(f"nothing can be learnt: {refusal}")
+
+    def _job(self) -> LearnJob | None:
+        """What there is to learn from; None if that is nothing yet."""
+        record = self._book.record
+        vehicle = self._learnt_vehicle
+        windows = self._finished
+        if vehicle is None or not windows or self._vehicle.why_not_allowed is not None:
+            return None
+        active = record.active
+        before = self._vehicle.by_file if active is None else self._book.directory / active.file_name
+        settings = asdict(self._batch)
+        return LearnJob(
+            key=self._key(vehicle, windows, record.records),
+            vehicle=vehicle,
+            windows=tuple(self._files.path(one) for one in windows),
+            records=tuple(record.records),
+            settings=settings,
+            like=self._vehicle.like,
+            before=before,
+            is_file_before=active is None and before is not None,
+            most_memory_mb=self._settings.memory_mb,
+        )
+
+    @property
+    def _finished(self) -> list[Window]:
+        """The windows of drives that are over."""
+        under_way = self._scheduler.drive_start_ns
+        return [one for one in self._files.windows() if one.drive_start_ns != under_way]
+
+    def _key(self, vehicle: Vehicle, windows: Sequence[Window], records: Sequence[StatementRecord]) -> str:
+        """Of what a fit would learn from: the vehicle, the pieces that teach most, and the statements that hold."""
+        pieces = spans_of([one.span for one in windows], moments(records))
+        holding = assign(records, pieces, vehicle).holding
+        newest_ns = max(one.t_end_ns for one in windows)
+
+        def value(i: int) -> tuple[tuple[bool, float], int]:
+            piece = pieces[i]
+            driven_s = sum(_common_s(one, piece) for one in windows)
+            return worth(driven_s, piece.end_ns, newest_ns, is_stated=bool(holding[i])), i
+
+        best = sorted(sorted(range(len(pieces)), key=value, reverse=True)[:MOST_DRIVES])
+        held = sorted({i for piece in best for i in holding[piece]})
+        content = {
+            "vehicle": asdict(vehicle),
+            "like": str(self._vehicle.like),
+            "signals": self._vehicle.signals_id,
+            "pieces": [(pieces[i].begin_ns, pieces[i].end_ns) for i in best],
+            "records": [records[i].model_dump(mode="json", by_alias=True) for i in held],
+        }
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+    def _on_result(self, job: LearnJob, result: LearnResult) -> None:
+        """Take the result of a fit, in the worker's thread."""
+        with self._book.lock:
+            if self._stopping.is_set():
+                return
+            for name in result.damaged:
+                self._files.remove(name)
+            if result.fault is not None and "killed" in result.fault:
+                self._not_before_s = time.monotonic() + self._retry.next_s()
+                self._book.tell(Event.NOT_LEARNT, {"fault": result.fault}, level=logging.WARNING)
+                self._disk_fault = result.fault
+                return
+            self._retry.reset()
+            self._disk_fault = None
+            try:
+                self._take_result(job, result)
+            except (OSError, RefusedError, CalibrationFileError) as refusal:
+                self._lose(f"what was learnt cannot be stored: {refusal}")
+
+    def _take_result(self, job: LearnJob, result: LearnResult) -> None:
+        record = self._book.record
+        outcome = Outcome(
+            key=job.key,
+            at=self._book.now(),
+            learning=result.learning,
+            statements={str(one["id"]): one for one in result.statements},
+            drives=result.drives,
+            looks_empty=result.looks_empty,
+            fault=result.fault,
+        )
+        changed = record.model_copy(update={"last": outcome})
+        if result.calibration is None or result.calibration_id is None:
+            self._book.save(changed)
+            self._book.tell(Event.NOT_LEARNT, {"fault": result.fault}, level=logging.WARNING)
+            return
+        name = self._book.write_calibration(result.calibration, result.calibration_id)
+        known = [one for one in record.versions if one.id != result.calibration_id]
+        version = self._version(result, name, record)
+        versions = (*known, version)[-MOST_VERSIONS:]
+        self._book.save(changed.model_copy(update={"versions": versions}))
+        self._book.tell(
+            Event.LEARNT,
+            {
+                "calibration_id": version.id,
+                "text": version.text,
+                "worse": version.worse,
+                "seconds": round(result.seconds, 1),
+                "most_memory_mb": round(result.most_memory_mb, 1),
+            },
+        )
+        with suppress(OSError):
+            self._book.forget_others()
+
+    def _version(self, result: LearnResult, name: str, record: LearningRecord) -> LearntVersion:
+        used = [one for one in result.statements if one["state"] in ("used", "weak")]
+        now_kg, active = result.learning.get("plus_minus_kg"), record.active
+        since = f"{counted(len(result.drives), 'drive')} and {counted(len(used), 'statement')}"
+        became = "" if now_kg is None else f": ± {now_kg:.0f} kg"
+        if active is not None and active.plus_minus_kg is not None and now_kg is not None:
+            became = f": ± {active.plus_minus_kg:.0f} kg became ± {now_kg:.0f} kg"
+        return LearntVersion(
+            id=result.calibration_id or "",
+            file_name=name,
+            at=self._book.now(),
+            text=since + became,
+            plus_minus_kg=now_kg,
+            n_drives=len(result.drives),
+            n_statements=len(used),
+            worse=result.worse,
+        )
+
+    # -- the vehicle --
+
+    @property
+    def _learnt_vehicle(self) -> Vehicle | None:
+        """The vehicle to learn; None if it is not stated, or in doubt."""
+        stated = self._book.record.vehicle
+        if stated is None or (self._doubts(stated) and stated.confirmed is None):
+            return None
+        try:
+            return self._vehicle.stated(stated.figures)
+        except (CampaignError, NoSisterError):  # the settings were changed since
+            return None
+
+    @property
+    def _known_vehicle(self) -> Vehicle | None:
+        """The vehicle that statements are compared with: as stated, else as in the file of the settings."""
+        return self._learnt_vehicle or self._vehicle.in_file
+
+    def _doubts(self, stated: Stated) -> list[DoubtOfVehicle]:
+        return [
+            DoubtOfVehicle(kind=one.kind, text=one.text, advice=one.advice, meant=one.meant)
+            for one in doubts_of(stated.figures, self._vehicle.sister)
+        ]
+
+    def vehicle(self) -> StatedVehicle | None:
+        """The vehicle as somebody stated it; None if nobody has."""
+        stated = self._book.record.vehicle
+        if stated is None:
+            return None
+        return StatedVehicle(
+            figures=stated.figures,
+            by=stated.by,
+            at=stated.at,
+            doubts=self._doubts(stated),
+            is_confirmed=stated.confirmed is not None,
+        )
+
+    def state_vehicle(self, answers: VehicleAnswers, by: str, *, is_confirmed: bool) -> None:
+        """State the vehicle's figures; ``is_confirmed``: they are right, although unusual. Raises RefusedError."""
+        self._require_allowed()
+        try:
+            self._vehicle.stated(answers)
+        except NoSisterError as fault:
+            raise RefusedError("not_its_sister", str(fault)) from None
+        except CampaignError as fault:
+            meant = meant_by(doubts_of(answers, self._vehicle.sister))
+            raise RefusedError("vehicle_unusable", f"{fault}{meant}") from None
+        with self._book.lock:
+            act = self._book.act(by)
+            stated = Stated(figures=answers, at=act.at, by=by, confirmed=act if is_confirmed else None)
+            self._book.save(self._book.record.model_copy(update={"vehicle": stated}))
+            self._book.tell(Event.VEHICLE_STATED, {"by": by})
+
+    def _require_allowed(self) -> None:
+        if self._vehicle.why_not_allowed is not None:
+            raise RefusedError("not_allowed", self._vehicle.why_not_allowed)
+
+    # -- statements --
+
+    def state(self, record: StatementRecord, by: str) -> str:
+        """Take one statement; JSON: a StatementTold. Raises RefusedError if another one has its id, or the disk fails.
+
+        The same statement again changes nothing, unless it was withdrawn: then it stands again.
+        """
+        with self._book.lock:
+            said = self._store([record.identified()], by)[0]
+            return self._told([said])[0].model_dump_json(by_alias=True)
+
+    def import_all(
+        self, content: bytes, by: str, *, where: str, zone: tzinfo | None = None, is_dry_run: bool = False
+    ) -> str:
+        """Take the good rows of a table or a list; JSON: an ImportTold. Raises RefusedError if there is none."""
+        try:
+            told = read_statements(content, where, zone)
+        except StatementsFileError as fault:
+            raise RefusedError("unreadable", str(fault)) from None
+        with self._book.lock:
+            rows = [row for row in told.rows if self._is_mine(row)]
+            if not told.rows and told.faults:
+                lines = [line for lines in told.faults.values() for line in lines]
+                raise RefusedError("unreadable", "; ".join(lines[:20]))
+            stored = [] if is_dry_run else self._store([row.record for row in rows], by)
+            answer = self._imported(told, rows, stored, is_dry_run=is_dry_run)
+        return answer.model_dump_json(by_alias=True)
+
+    def _is_mine(self, row: ToldRow) -> bool:
+        stated = self._book.record.vehicle
+        names = {self._vehicle.id, self._vehicle.name, stated.figures.name if stated else ""}
+        return row.vehicle is None or row.vehicle.strip().casefold() in {name.strip().casefold() for name in names}
+
+    def _store(self, records: Sequence[StatementRecord], by: str) -> list[Said]:
+        """Put statements into the book at once. Raises RefusedError; then nothing has changed."""
+        record, taken = self._book.record, []
+        for one in records:
+            signed = one if one.by else one.model_copy(update={"by": by})
+            known = record.find(one.id)
+            if known is not None and known.record != signed and known.record.model_copy(update={"by": one.by}) != one:
+                raise RefusedError(
+                    "id_taken",
+                    f"{one.id} is another statement: leave its id out, or withdraw the other one and give a new id",
+                )
+            if known is not None and known.withdrawn is None:
+                taken.append(known)
+                continue
+            if known is None and len(record.said) >= MOST_STATEMENTS:
+                raise RefusedError("too_many", f"{MOST_STATEMENTS} statements are kept already")
+            said = Said(record=signed if known is None else known.record, at=self._book.now())
+            record = record.with_said(said)
+            taken.append(said)
+        if record is not self._book.record:
+            self._book.save(record)
+            self._book.tell(Event.STATED, {"n": len(taken), "by": by})
+        return taken
+
+    def _imported(
+        self, told: ToldRows, rows: Sequence[ToldRow], stored: Sequence[Said], *, is_dry_run: bool
+    ) -> ImportTold:
+        """What became of the rows, each beside all statements that stand."""
+        others = [one.effective for one in self._book.record.said if one.withdrawn is None]
+        records = standing([*others, *(row.record for row in rows)])
+        fates = self._fates(records)
+        problems = [
+            ProblemRow(row=number, kind="bad", text=line.partition(": ")[2])
+            for number, lines in told.faults.items()
+            for line in lines
+        ]
+        problems += [
+            ProblemRow(row=row.number, kind="unknown_vehicle", text=f"vehicle: {row.vehicle}: this one is another")
+            for row in told.rows
+            if row not in rows
+        ]
+        n_match = 0
+        for row in rows:
+            fate, why = fates.get(row.record.id, (Fate.REPLACED, f"replaced by a later one: {row.record.ref}"))
+            n_match += fate is Fate.MATCHED
+            if fate in PROBLEMS:
+                problems.append(ProblemRow(row=row.number, kind=PROBLEMS[fate], text=why))
+        problems.sort(key=lambda one: (one.row, one.text))
+        return ImportTold(
+            n_rows=told.n_rows,
+            n_match=n_match,
+            text=rows_told(told.n_rows, n_match, [one.model_dump() for one in problems]),
+            problems=problems,
+            notes=list(told.notes),
+            items=self._told(stored),
+            is_dry_run=is_dry_run,
+        )
+
+    def _fates(self, records: Sequence[StatementRecord]) -> dict[str, tuple[Fate, str]]:
+        """By id what becomes of the statements before any fit, and why."""
+        vehicle = self._known_vehicle
+        if vehicle is None:
+            return {one.id: (Fate.WAITING, NO_VEHICLE) for one in records}
+        assigned = self._assigned(records, vehicle)
+        return {one.id: (assigned.fates[i], assigned.reasons[i]) for i, one in enumerate(records)}
+
+    def _assigned(self, records: Sequence[StatementRecord], vehicle: Vehicle) -> Assigned:
+        return assign(records, spans_of([one.span for one in self._files.windows()], moments(records)), vehicle)
+
+    def statements(
+        self, *, since_ns: int | None = None, state: str | None = None, limit: int = 500, cursor: str | None = None
+    ) -> str:
+        """JSON: a StatementPage, the newest first: by when they begin. Raises RefusedError for a foreign cursor."""
+        with self._book.lock:
+            every = sorted(self._book.record.said, key=lambda one: (one.record.from_ns, one.record.id), reverse=True)
+            if since_ns is not None:
+                every = [one for one in every if (one.record.until_ns or one.record.from_ns) >= since_ns]
+            told = [one for one in self._told(every) if state is None or one.state == state]
+        if cursor is not None:
+            ids = [one.id for one in told]
+            if cursor not in ids:
+                raise RefusedError("bad_cursor", "this cursor is of no such list: begin anew without it")
+            told = told[ids.index(cursor) + 1 :]
+        page = told[:limit]
+        more = page[-1].id if len(told) > limit else None
+        return StatementPage(items=page, next_cursor=more).model_dump_json(by_alias=True)
+
+    def withdraw(self, statement_id: str, by: str) -> str:
+        """Withdraw a statement; JSON: a StatementTold. With the next fit it is as if it had never been stated."""
+        with self._book.lock:
+            said = self._standing(statement_id)
+            changed = said.model_copy(update={"withdrawn": self._book.act(by)})
+            self._book.save(self._book.record.changing(changed))
+            self._book.tell(Event.STATEMENT_WITHDRAWN, {"id": statement_id, "by": by})
+            return self._told([changed])[0].model_dump_json(by_alias=True)
+
+    def confirm(self, statement_id: str, by: str) -> str:
+        """Somebody has seen the contradiction, and the statement is right; JSON: a StatementTold."""
+        with self._book.lock:
+            said = self._standing(statement_id)
+            if said.confirmed is None:
+                said = said.model_copy(update={"confirmed": self._book.act(by)})
+                self._book.save(self._book.record.changing(said))
+                self._book.tell(Event.STATEMENT_CONFIRMED, {"id": statement_id, "by": by})
+            return self._told([said])[0].model_dump_json(by_alias=True)
+
+    def _standing(self, statement_id: str) -> Said:
+        said = self._book.record.find(statement_id)
+        if said is None:
+            raise RefusedError("no_such_statement", "there is no such statement: the list has all of them")
+        if said.withdrawn is not None:
+            raise RefusedError("withdrawn", "this statement was withdrawn: state it anew")
+        return said
+
+    def _told(self, chosen: Sequence[Said]) -> list[StatementTold]:
+        """These statements with what became of them."""
+        record, windows = self._book.record, self._files.windows()
+        if self._fates_of is None or self._fates_of[0] is not record or self._fates_of[1] != windows:
+            self._fates_of = (record, windows, self._fates(record.records))
+        fates = self._fates_of[2]
+        return [self._one_told(said, fates.get(said.record.id), record.last) for said in chosen]
+
+    def _one_told(self, said: Said, fate: tuple[Fate, str] | None, last: Outcome | None) -> StatementTold:
+        found = last.statements.get(said.record.id) if last is not None else None
+        told: dict[str, Any] = {"state": "waiting"}
+        if said.withdrawn is not None:
+            told = {"state": "withdrawn", "reason": f"withdrawn by {said.withdrawn.by}, {said.withdrawn.at[:16]}Z"}
+        elif fate is None:
+            told = {"state": "withdrawn", "reason": f"replaced by a later one with the ref {said.record.ref}"}
+        elif found is not None and found["confirmed"] == said.effective.confirmed and fate[0] is Fate.MATCHED:
+            drives = [one["t_start"] for one in last.drives if one["number"] in found["drives"]] if last else []
+            told = {name: found[name] for name in ("state", "found", "question")} | {"drives": drives}
+            told["reason"] = found.get("reason")
+        else:
+            told["state"] = STATES[fate[0]]
+            told["reason"] = fate[1] or (NO_VEHICLE if self._learnt_vehicle is None else NEXT_FIT)
+        content = said.effective.model_dump(mode="json", by_alias=True)
+        return StatementTold.model_validate({**content, "vehicle": self._vehicle.id, "at": said.at, **told})
+
+    # -- what is learnt --
+
+    def learning(self) -> str:
+        """JSON: a LearningState."""
+        with self._book.lock:
+            return self._learning().model_dump_json(by_alias=True)
+
+    def _learning(self) -> LearningState:
+        record, vehicle = self._book.record, self._known_vehicle
+        windows, window_ns = self._files.windows(), self._scheduler.open_window_ns
+        last, told = record.last, self._told(record.said)
+        learning = last.learning if last is not None else {}
+        open_s = 0.0 if window_ns is None else (window_ns[1] - window_ns[0]) / NS_PER_S
+        counts = Counter(one.state for one in told)
+        return LearningState(
+            is_allowed=self._vehicle.why_not_allowed is None,
+            why_not=self._vehicle.why_not_allowed,
+            vehicle_time=iso_utc(self._vehicle_time_ns(windows)),
+            plus_minus_kg=learning.get("plus_minus_kg"),
+            useful_at_kg=None if vehicle is None else rounded(vehicle.useful_half_width_kg, 1),
+            tested_on=learning.get("tested_on", 0),
+            helps=[Help.model_validate(one) for one in learning.get("helps", ())],
+            findings=[*learning.get("findings", ()), *([last.fault] if last and last.fault else [])],
+            takes_effect="next_drive" if self.is_due else None,
+            lacks=list(self._lacks(windows)),
+            is_learning=self._worker.is_busy,
+            driven_s=round(sum(one.usable_s for one in windows) + open_s, 1),
+            n_drives=len({one.drive_start_ns for one in windows}),
+            statements={name: counts.get(name, 0) for name in STATE_NAMES},
+            questions=list(self._questions(told, last)),
+            versions=[self._version_told(one, record) for one in reversed(record.versions)],
+            held_version=record.held,
+            fault=self.fault,
+        )
+
+    def _vehicle_time_ns(self, windows: Sequence[Window]) -> int:
+        """The time that a statement without one is of: in a replay or a demonstration the bus has a time of its own."""
+        now_ns, window_ns = self._clock_ns(), self._scheduler.open_window_ns
+        bus_ns = [one.t_end_ns for one in windows] if window_ns is None else [window_ns[1]]
+        newest_ns = max(bus_ns, default=now_ns)
+        return newest_ns if abs(now_ns - newest_ns) > OTHER_TIME_NS else now_ns
+
+    def _lacks(self, windows: Sequence[Window]) -> Iterator[Any]:
+        stated = self._book.record.vehicle
+        if stated is None:
+            yield "vehicle"
+        elif self._learnt_vehicle is None:
+            yield "confirmed_vehicle"
+        if not windows:
+            yield "drives"
+
+    def _questions(self, told: Sequence[StatementTold], last: Outcome | None) -> Iterator[Question]:
+        for one in told:
+            if one.question and one.state in ("held", "weak"):
+                kind = "held" if one.state == "held" else "weak"
+                named = one.ref or f"the statement from {one.from_:%Y-%m-%d %H:%M}Z"
+                yield Question(kind=kind, text=f"{named}: {one.question}", statement_id=one.id)
+        if last is None or not last.looks_empty:
+            return
+        drives = [one for one in last.drives if one["number"] in last.looks_empty]
+        begun = ", ".join(str(one["t_start"])[:16].replace("T", " ") for one in drives)
+        which = f"The drive of {begun} looks" if len(drives) == 1 else f"These {len(drives)} drives look"
+        listed = "" if len(drives) == 1 else f" ({begun})"
+        source = str(StatementSource.EMPTY)
+        propose = tuple({"from": one["t_start"], "until": one["t_end"], "source": source} for one in drives)
+        yield Question(kind="looks_empty", text=f"{which} empty{listed}. Is that right?", propose=propose)
+
+    def _version_told(self, one: LearntVersion, record: LearningRecord) -> VersionTold:
+        active = record.active
+        is_active = active is not None and active.id == one.id
+        state = "earlier"
+        if is_active:
+            state = "in_use" if one.id == self._started_with else "next_drive"
+        elif one.withdrawn is not None:
+            state = "withdrawn"
+        elif one.worse is not None:
+            state = "worse"
+        return VersionTold(
+            id=one.id,
+            at=one.at,
+            text=one.text + (f"; not used: {one.worse}" if one.worse else ""),
+            plus_minus_kg=one.plus_minus_kg,
+            n_drives=one.n_drives,
+            n_statements=one.n_statements,
+            state=state,
+        )
+
+    def use(self, version: str, by: str) -> str:
+        """Use this version from the next drive on, or the newest, or the file of the settings; JSON: LearningState."""
+        self._require_allowed()
+        with self._book.lock:
+            record = self._book.record
+            if version not in (NEWEST, BY_FILE) and all(one.id != version for one in record.versions):
+                raise RefusedError("no_such_version", "there is no such version: GET /api/v1/learning lists them")
+            self._book.save(record.model_copy(update={"held": None if version == NEWEST else version}))
+            self._book.tell(Event.VERSION_CHOSEN, {"use": version, "by": by})
+            return self._learning().model_dump_json(by_alias=True)
+
+
+def _common_s(window: Window, piece: Piece) -> float:
+    """Driving of a window that lies in a piece, as if it were spread evenly."""
+    common_ns = min(window.t_end_ns, piece.end_ns) - max(window.t_start_ns, piece.begin_ns)
+    return window.usable_s * max(0, common_ns) / (window.t_end_ns - window.t_start_ns)

@@ -1,0 +1,233 @@
+// The page that teaches a vehicle: what it is, what was aboard, how exactly it weighs now, and what would help most.
+
+import { headers, load, setToken, Refused } from "../dashboard/gateway.js";
+import { acceptNumbers, button, element, made, numberText, row, say, typedNumber, write } from "../dashboard/page.js";
+import { clock, duration, figure } from "../dashboard/words.js";
+import { fill, speaker } from "../language.js";
+import { COMMON } from "../words/common.js";
+import { TEACH } from "../words/teach.js";
+
+const ASK_EVERY_MS = 5000; // chosen: as the cab page
+const USEFUL_HELP = 0.1; // chosen: what narrows ± by less is not worth saying
+const REQUIRED = ["kerb_front_axle_kg", "kerb_rear_axle_kg", "wheelbase_m", "sensor_position_m", "gross_limit_kg", "front_axle_limit_kg", "rear_axle_limit_kg"];
+const MORE = ["loading_begin_m", "loading_end_m", "sensor_offset_left_m", "track_width_m"];
+const SIGNED = ["sensor_position_m", "sensor_offset_left_m", "loading_begin_m"];
+const CARRIES = ["", "pallets", "parcels", "long_goods", "tools", "mixed"];
+const STATEMENTS = "api/v1/statements";
+
+const phrase = speaker(COMMON, TEACH);
+const kg = (x) => figure(x, 0, "kg");
+
+let learning = null;
+let stated = null; // the figures that were sent last, with those that no field shows
+
+/** Sends a change; what the gateway says against it becomes the page's fault. */
+async function send(method, path, body, type = "application/json") {
+  say("fault", "");
+  try {
+    const response = await fetch(path, { method, body, headers: { ...headers(), "Content-Type": type } });
+    const told = await response.json();
+    if (!response.ok) throw new Error(told.detail);
+    return told;
+  } catch (error) {
+    say("fault", error.message);
+    return null;
+  } finally {
+    askNow();
+  }
+}
+
+const state = (statement) => send("POST", STATEMENTS, JSON.stringify({ from: learning.vehicle_time, ...statement }));
+
+// -- the van --
+
+function field(name, isRequired) {
+  const input = made("input");
+  Object.assign(input, { id: name, name, required: isRequired, autocomplete: "off", inputMode: "decimal" });
+  input.dataset.number = SIGNED.includes(name) ? "signed" : "";
+  const label = made("label", [made("span", phrase(`field.${name}`)), input]);
+  return label;
+}
+
+function carriesField() {
+  const select = made("select");
+  select.id = "carries";
+  select.append(...CARRIES.map((name) => new Option(phrase(`carries.${name}`), name)));
+  return made("label", [made("span", phrase("field.carries")), select]);
+}
+
+function fillVan(figures) {
+  const [begin, end] = figures.loading_area_m ?? [null, null];
+  const shown = { ...figures, loading_begin_m: begin, loading_end_m: end };
+  for (const name of [...REQUIRED, ...MORE]) element(name).value = shown[name] == null ? "" : numberText(shown[name]);
+  element("carries").value = figures.carries ?? "";
+}
+
+function typedVan() {
+  const typed = (name) => (element(name).value.trim() === "" ? null : typedNumber(element(name).value));
+  const [begin, end] = [typed("loading_begin_m"), typed("loading_end_m")];
+  const numbers = [...REQUIRED, "sensor_offset_left_m", "track_width_m"].map((name) => [name, typed(name)]);
+  const area = begin === null || end === null ? null : [begin, end];
+  return { ...stated, ...Object.fromEntries(numbers), loading_area_m: area, carries: element("carries").value || null };
+}
+
+async function stateVan(isConfirmed) {
+  const told = await send("PUT", `api/v1/vehicle${isConfirmed ? "?confirm=true" : ""}`, JSON.stringify(typedVan()));
+  if (told !== null) showVan(told);
+}
+
+function showVan(vehicle) {
+  write("vehicle", vehicle.vehicle_id ?? "");
+  if (vehicle.stated === null) return;
+  stated = vehicle.stated.figures;
+  fillVan(stated);
+  const doubts = vehicle.stated.is_confirmed ? [] : vehicle.stated.doubts;
+  element("doubts").hidden = doubts.length === 0;
+  element("doubts-list").replaceChildren(...doubts.map((one) => made("li", `${one.text} ${one.advice}`)));
+}
+
+// -- what it has learnt --
+
+/** What to do now, as a name of a row of the words. */
+function next({ lacks, is_learning: isLearning, takes_effect: takesEffect, versions, statements }) {
+  if (lacks.length) return lacks[0];
+  if (isLearning) return "learning";
+  if (takesEffect !== null) return "next_drive";
+  if (versions.some((one) => one.state === "in_use")) return "learnt";
+  return Object.entries(statements).some(([name, n]) => n > 0 && name !== "withdrawn") ? "drives" : "state";
+}
+
+function accuracy({ plus_minus_kg: now, useful_at_kg: useful, tested_on: n }) {
+  if (now === null) return phrase("accuracy_none");
+  const told = n ? phrase("accuracy_tested", { now: phrase("accuracy_now", { kg: kg(now) }), n }) : phrase("accuracy_now", { kg: kg(now) });
+  return useful !== null && now > useful ? phrase("accuracy_rough", { now: told, useful: kg(useful) }) : `${told}.`;
+}
+
+/** How far it is: the driving so far until something is learnt, then the accuracy; never full before it is of use. */
+function progress({ driven_s: drivenS, plus_minus_kg: now, useful_at_kg: useful }) {
+  if (now === null || useful === null) return Math.min(0.5, drivenS / 3600); // half an hour is half of it
+  return Math.min(1, Math.max(0.5, useful / now));
+}
+
+function showLearning() {
+  if (!learning.is_allowed) say("fault", phrase("closed", { why: learning.why_not }));
+  else if (learning.fault) say("fault", learning.fault);
+  write("now", phrase(`now.${next(learning)}`));
+  write("accuracy", accuracy(learning));
+  element("progress").value = progress(learning);
+  write("driven", phrase("driven_so_far", { duration: duration(learning.driven_s), n: learning.n_drives }));
+  const worth = learning.helps.filter((one) => one.then_plus_minus_kg <= (1 - USEFUL_HELP) * learning.plus_minus_kg);
+  const helps = worth.map((one) => made("li", phrase("helps_to", { what: one.text || one.do, kg: kg(one.then_plus_minus_kg) })));
+  const isStuck = learning.plus_minus_kg > learning.useful_at_kg && learning.useful_at_kg !== null && !helps.length;
+  element("helps").replaceChildren(...helps, ...(isStuck ? [made("li", phrase("only_statement"))] : []), ...learning.findings.map((text) => made("li", text)));
+  element("questions-card").hidden = learning.questions.length === 0;
+  element("questions").replaceChildren(...learning.questions.map(question));
+  element("versions-card").hidden = learning.versions.length === 0;
+  element("versions").replaceChildren(...learning.versions.map((one) => made("li", `${one.text} (${phrase(`version.${one.state}`)})`)));
+}
+
+/** A question with its answers: yes sends what it proposes, or confirms the statement that it is about. */
+function question(one) {
+  const yes = async () => {
+    if (one.statement_id) await send("POST", `${STATEMENTS}/${encodeURIComponent(one.statement_id)}/confirm`);
+    else await send("POST", STATEMENTS, JSON.stringify(one.propose));
+  };
+  const answers = [button(phrase("yes"), `${phrase("yes")}: ${one.text}`, yes)];
+  if (one.statement_id) answers.push(button(phrase("withdraw"), `${phrase("withdraw")}: ${one.text}`, () => withdraw(one.statement_id)));
+  return made("li", [made("span", `${one.text} `), ...answers]);
+}
+
+// -- statements --
+
+const withdraw = (id) => send("DELETE", `${STATEMENTS}/${encodeURIComponent(id)}`);
+
+function loadText({ payload_kg: payload, gross_kg: gross, front_axle_kg: front, rear_axle_kg: rear, change_kg: change, plus_minus_kg: half }) {
+  const half95 = (x) => (half === null ? kg(x) : phrase("with_plus_minus", { kg: figure(x, 0, ""), half: kg(half) }));
+  if (payload !== null) return phrase("payload", { kg: half95(payload) });
+  if (gross !== null) return phrase("gross", { kg: half95(gross) });
+  if (front !== null) return phrase("axles", { front: kg(front), rear: kg(rear) });
+  return phrase("change", { kg: half95(change) });
+}
+
+function statementRow(one) {
+  const source = one.source === "empty" ? phrase("source.empty") : loadText(one.load);
+  const found = one.found === null ? "" : phrase("with_plus_minus", { kg: figure(one.found.payload_kg, 0, ""), half: kg(one.found.plus_minus_kg) });
+  const why = one.question ?? one.reason;
+  const built = row([clock(one.from), source, found, `${phrase(`state.${one.state}`)}${why ? `: ${why}` : ""}`]);
+  const isThere = one.state !== "withdrawn";
+  built.append(made("td", isThere ? [button(phrase("withdraw"), `${phrase("withdraw")}: ${clock(one.from)}, ${source}`, () => withdraw(one.id), "link")] : ""));
+  return built;
+}
+
+function showStatements({ items }) {
+  element("no-statements").hidden = items.length > 0;
+  element("statements-table").hidden = items.length === 0;
+  element("statements").replaceChildren(...items.map(statementRow));
+}
+
+// -- a table of notes --
+
+const timezone = () => `timezone=${encodeURIComponent(Intl.DateTimeFormat().resolvedOptions().timeZone)}`;
+
+async function importNotes(isDryRun) {
+  const [file] = element("import-file").files;
+  const told = await send("POST", `${STATEMENTS}?${timezone()}&dry_run=${isDryRun}`, await file.text(), "text/csv");
+  element("import-sure").hidden = told === null || !isDryRun;
+  if (told === null) return;
+  say("import-told", isDryRun ? told.text : phrase("taken", { text: told.text }));
+  element("import-problems").replaceChildren(...[...told.notes, ...told.problems.map((one) => one.text)].map((text) => made("li", text)));
+  if (!isDryRun) element("import").reset();
+}
+
+// -- in step with the gateway --
+
+async function askNow() {
+  try {
+    const [now, statements] = await Promise.all([load("api/v1/learning"), load(STATEMENTS)]);
+    learning = now;
+    element("token").hidden = true;
+    element("main").hidden = false;
+    showLearning();
+    showStatements(statements);
+  } catch (error) {
+    const isRefused = error instanceof Refused;
+    element("token").hidden = !isRefused;
+    element("main").hidden = isRefused || learning === null;
+    if (!isRefused) say("fault", `${phrase("gone")} ${phrase("last_heard")}`);
+  }
+}
+
+async function begin() {
+  await askNow();
+  if (learning !== null) showVan(await load("api/v1/vehicle"));
+}
+
+fill(phrase);
+document.title = phrase("title");
+element("van-required").append(...REQUIRED.map((name) => field(name, true)));
+element("van-more").append(...MORE.map((name) => field(name, false)), carriesField());
+acceptNumbers(phrase("number_hint", { example: numberText(1.5) }));
+element("van").addEventListener("submit", (event) => {
+  event.preventDefault();
+  stateVan(false);
+});
+element("confirm").addEventListener("click", () => stateVan(true));
+element("empty").addEventListener("click", () => state({ source: "empty" }));
+element("aboard").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const source = element("aboard-source").value, weight = typedNumber(element("aboard-kg").value);
+  const told = await state({ source, load: source === "scale" ? { gross_kg: weight } : { payload_kg: weight } });
+  if (told !== null) element("aboard").reset();
+});
+element("import").addEventListener("submit", (event) => {
+  event.preventDefault();
+  importNotes(true);
+});
+element("import-send").addEventListener("click", () => importNotes(false));
+element("token").addEventListener("submit", (event) => {
+  event.preventDefault();
+  setToken(element("token-text").value);
+  begin();
+});
+begin();
+setInterval(askNow, ASK_EVERY_MS);

@@ -1,0 +1,72 @@
+"""The page that teaches a vehicle, as somebody uses it who has just connected the box."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.browser import expect
+from support.cab import BEFORE
+from support.dashboard import Watched
+from support.learner import LearnerBench
+from support.web import Gateway, serving
+
+MOST_CLICKS, MOST_NUMBERS = 12, 8
+VAN = {
+    "kerb_front_axle_kg": "690",
+    "kerb_rear_axle_kg": "710",
+    "wheelbase_m": "2.75",
+    "sensor_position_m": "1.2",
+    "gross_limit_kg": "2000",
+    "front_axle_limit_kg": "1000",
+    "rear_axle_limit_kg": "1100",
+}
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> LearnerBench:
+    return LearnerBench(tmp_path / "learner")
+
+
+@pytest.fixture
+def page(browser: Any, tmp_path: Path, bench: LearnerBench) -> Iterator[Any]:
+    """The page of a gateway that knows nothing yet."""
+    watched = Watched(browser, color_scheme="light")
+    with Gateway(tmp_path / "store", learner=bench.learner) as gateway, serving(gateway.app) as server:
+        gateway.status = BEFORE.model_copy(update={"calibration_id": None})
+        watched.page.goto(f"{server.url}/teach")
+        yield watched.page
+        watched.page.close()
+        gateway.board.close()
+    assert watched.complaints == []
+
+
+def test_from_nothing_to_the_drive_it_takes_few_clicks_and_numbers(page: Any, bench: LearnerBench) -> None:
+    """Every number is typed into a field that was clicked; then the van is stated, and stated empty."""
+    expect(page.locator("#now")).to_have_text("Next: state the van below.")
+    n_clicks = n_numbers = 0
+    for name, number in VAN.items():
+        page.locator(f"#{name}").click()
+        page.keyboard.type(number)
+        n_clicks, n_numbers = n_clicks + 1, n_numbers + 1
+    page.get_by_role("button", name="State the van").click()
+    expect(page.locator("#now")).to_have_text("Next: drive. Ordinary drives are enough.")
+    page.get_by_role("button", name="It is empty").click()
+    expect(page.locator("#statements tr")).to_have_count(1)
+    expect(page.locator("#statements")).to_contain_text("waits")
+    assert n_clicks + 2 <= MOST_CLICKS
+    assert n_numbers <= MOST_NUMBERS
+    bench.drive(0)
+    expect(page.locator("#driven")).to_have_text("5 min of driving kept, 1 drive")
+
+
+def test_a_stated_load_is_listed_and_can_be_withdrawn(page: Any) -> None:
+    for name, number in VAN.items():
+        page.locator(f"#{name}").fill(number)
+    page.get_by_role("button", name="State the van").click()
+    expect(page.locator("#now")).to_have_text("Next: drive. Ordinary drives are enough.")
+    page.get_by_label("Kilograms").fill("310")
+    page.get_by_role("button", name="That is aboard").click()
+    expect(page.locator("#statements")).to_contain_text("310 kg")
+    page.get_by_role("button", name="Withdraw").click()
+    expect(page.locator("#statements")).to_contain_text("withdrawn")

@@ -1,0 +1,245 @@
+"""From statements to what is stated of each drive: when one holds, which replaces which, and weights to payloads."""
+
+from dataclasses import replace
+from datetime import datetime, timedelta
+from typing import Any
+
+import pytest
+from support.half_car_road import VAN as HALF_CAR
+
+from gateway.calibration.assigned import Assigned, Fate, Piece, assign, cut, moments
+from gateway.quantity import Z95
+from gateway.stated.statement import StatementRecord
+
+DAY = datetime.fromisoformat("2026-11-26T00:00:00Z")
+VAN = replace(HALF_CAR, kerb_front_axle_kg=730.0, kerb_rear_axle_kg=680.0)  # 1240 kg sprung, 52 % in front
+AT = int(DAY.timestamp()) * 10**9
+
+
+def ns(clock: str) -> int:
+    hours, minutes = clock.split(":")
+    return AT + (int(hours) * 3600 + int(minutes) * 60) * 10**9
+
+
+def when(clock: str) -> datetime:
+    hours, minutes = clock.split(":")
+    return DAY + timedelta(hours=int(hours), minutes=int(minutes))
+
+
+def told(begin: str, until: str | None = None, source: str = "delivery_note", **said: Any) -> StatementRecord:
+    ref, place, learn = said.pop("ref", None), said.pop("place", None), said.pop("learn", True)
+    return StatementRecord.model_validate(
+        {
+            "ref": ref,
+            "from": when(begin),
+            "until": None if until is None else when(until),
+            "source": source,
+            "load": said or None,
+            "place": place,
+            "learn": learn,
+        }
+        if said
+        else {"ref": ref, "from": when(begin), "until": None if until is None else when(until), "source": source}
+    ).identified()
+
+
+def drives(*spans: str) -> list[Piece]:
+    """One for each of "07:50-08:30"."""
+    return [Piece(*(ns(clock) for clock in span.split("-")), number) for number, span in enumerate(spans, 1)]
+
+
+def payloads(found: Assigned) -> list[float | None]:
+    return [one.payload_kg for one in found.statements]
+
+
+MORNING = drives("07:50-08:30", "09:00-09:40", "13:00-13:30")
+
+
+@pytest.mark.parametrize(
+    ("records", "expected"),
+    [
+        pytest.param([told("07:40", payload_kg=310.0)], [310.0, None, None], id="before its drive"),
+        pytest.param([told("08:00", payload_kg=310.0)], [310.0, None, None], id="during it"),
+        pytest.param([told("08:29", payload_kg=310.0)], [None, 310.0, None], id="at its end it is of the next"),
+        pytest.param([told("07:40", "10:00", payload_kg=310.0)], [310.0, 310.0, None], id="until it says"),
+        pytest.param([told("07:40", "08:31", payload_kg=310.0)], [310.0, None, None], id="to the end of one drive"),
+        pytest.param(
+            [told("07:40", payload_kg=310.0), told("07:45", payload_kg=200.0)], [200.0, None, None], id="said anew"
+        ),
+        pytest.param(
+            [told("07:40", "10:00", payload_kg=310.0), told("08:45", change_kg=-60.0)],
+            [310.0, 250.0, None],
+            id="a change of load",
+        ),
+        pytest.param(
+            [told("07:40", payload_kg=310.0), told("08:45", change_kg=-60.0), told("09:50", "14:00", change_kg=40.0)],
+            [310.0, 250.0, 290.0],
+            id="two changes",
+        ),
+        pytest.param(
+            [told("07:40", "14:00", payload_kg=310.0), told("09:50", source="empty")],
+            [310.0, 310.0, 0.0],
+            id="empty ends it",
+        ),
+        pytest.param([told("07:40", "14:00", source="empty")], [0.0, 0.0, 0.0], id="empty all day"),
+        pytest.param([told("07:40", payload_kg=310.0, learn=False)], [None, None, None], id="only a check"),
+        pytest.param([], [None, None, None], id="nothing said"),
+    ],
+)
+def test_a_statement_holds_for_its_drives(records: list[StatementRecord], expected: list[float | None]) -> None:
+    assert payloads(assign(records, MORNING, VAN)) == expected
+
+
+@pytest.mark.parametrize(
+    ("records", "fates", "reason"),
+    [
+        pytest.param([told("15:00", payload_kg=1.0e2)], [Fate.WAITING], "no drive within 12 hours", id="no drive yet"),
+        pytest.param([told("10:00", "11:00", payload_kg=310.0)], [Fate.WAITING], "no drive from", id="between drives"),
+        pytest.param(
+            [told("06:00", source="empty"), told("07:00", payload_kg=310.0)],
+            [Fate.WAITING, Fate.MATCHED],
+            "another statement began before the drive",
+            id="loaded before it drove",
+        ),
+        pytest.param(
+            [told("07:40", payload_kg=310.0, ref="A"), told("07:41", payload_kg=130.0, ref="A")],
+            [Fate.REPLACED, Fate.MATCHED],
+            "replaced by a later one with the ref A",
+            id="one ref twice",
+        ),
+        pytest.param(
+            [told("07:40", "09:00", payload_kg=310.0, ref="A"), told("08:00", "09:00", payload_kg=200.0, ref="B")],
+            [Fate.OVERLAPPING] * 2,
+            "of the same time as B",
+            id="two notes for one load",
+        ),
+        pytest.param(
+            [told("07:40", payload_kg=310.0), told("07:40", payload_kg=310.5)],
+            [Fate.OVERLAPPING] * 2,
+            "of the same time as that from 2026-11-26T07:40Z",
+            id="two notes from one minute",
+        ),
+        pytest.param(
+            [told("07:40", "08:50", payload_kg=310.0), told("08:49", "09:50", payload_kg=200.0)],
+            [Fate.MATCHED] * 2,
+            "",
+            id="times written to the minute touch",
+        ),
+        pytest.param(
+            [told("07:40", payload_kg=310.0), told("07:45", source="scale", gross_kg=1720.0)],
+            [Fate.MATCHED] * 2,
+            "",
+            id="a note and a scale ticket",
+        ),
+    ],
+)
+def test_what_becomes_of_a_record_is_told(records: list[StatementRecord], fates: list[Fate], reason: str) -> None:
+    found = assign(records, MORNING, VAN)
+    assert list(found.fates) == fates
+    assert found.reasons[0].startswith(reason)
+    assert bool(found.reasons[0]) is bool(reason)
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ({"payload_kg": 0.31}, "write 310 if these are tonnes"),
+        ({"payload_kg": 1720.0}, "write gross_kg if that is the whole vehicle"),
+        ({"payload_kg": 1100.0}, "more than 2 times what the vehicle may carry (450 kg): is it in pounds"),
+        ({"source": "scale", "gross_kg": 310.0}, "1100 kg less than the empty vehicle: write payload_kg"),
+        ({"source": "scale", "gross_kg": 3800.0}, "is it in pounds, or another vehicle's?"),
+        (
+            {"source": "axle_scales", "front_axle_kg": 90.0, "rear_axle_kg": 1600.0},
+            "read the ticket again, axle by axle",
+        ),
+        ({"payload_kg": 310.0, "place": {"behind_front_axle_m": 26.0}}, "from the front axle rearwards, in metres"),
+        ({"change_kg": -60.0}, "no statement of the load before it"),
+    ],
+)
+def test_what_cannot_be_true_of_this_vehicle_is_told_with_what_was_meant(said: dict[str, Any], words: str) -> None:
+    found = assign([told("07:40", **said)], MORNING, VAN)
+    assert found.fates == (Fate.IMPOSSIBLE,)
+    assert words in found.reasons[0]
+    assert payloads(found) == [None, None, None]
+
+
+@pytest.mark.parametrize(
+    ("before", "change_kg", "words"),
+    [
+        (told("06:40", "07:00", payload_kg=310.0), -60.0, "the statement before it ended at 2026-11-26T07:00Z"),
+        (told("07:40", payload_kg=310.0), -400.0, "would leave -90 kg of the 310 kg aboard"),
+    ],
+)
+def test_a_change_needs_a_load_that_it_changes(before: StatementRecord, change_kg: float, words: str) -> None:
+    found = assign([before, told("08:45", change_kg=change_kg)], MORNING, VAN)
+    assert found.fates[1] is Fate.IMPOSSIBLE
+    assert words in found.reasons[1]
+
+
+def test_gross_weight_less_the_empty_vehicle_is_the_payload() -> None:
+    (said, *_) = assign([told("07:40", source="scale", gross_kg=1720.0)], MORNING, VAN).statements
+    assert said.payload_kg == pytest.approx(310.0)
+    assert said.claims[0].stated_plus_minus_kg == pytest.approx(12.0)
+
+
+def test_axle_weights_are_a_payload_and_a_front_share() -> None:
+    """Statics by hand: 1240 kg sprung, 52 % in front, so that wheels and axles weigh 85.2 and 84.8 kg."""
+    record = told("07:40", source="axle_scales", front_axle_kg=790.0, rear_axle_kg=930.0, plus_minus_kg=10.0)
+    (said, *_) = assign([record], MORNING, VAN).statements
+    assert said.payload_kg == pytest.approx(310.0)
+    assert said.front_share_pct == pytest.approx(100.0 * (790.0 - 85.2) / 1550.0)
+    assert said.claims[0].stated_plus_minus_kg == pytest.approx(10.0 * 2**0.5)
+    assert said.front_share_plus_minus_pct == pytest.approx(100.0 * 10.0 / 1550.0 / 2**0.5, rel=0.02)
+    assert said.placed_by == record.id
+
+
+def test_unsprung_masses_that_nobody_knows_are_an_error_of_every_ticket() -> None:
+    bare = replace(VAN, kerb_front_axle_kg=None, kerb_rear_axle_kg=None)
+    (said, *_) = assign([told("07:40", source="scale", gross_kg=1720.0)], MORNING, bare).statements
+    assert said.payload_kg == pytest.approx(1720.0 - 1240.0 - 2 * 0.065 * 1240.0)
+    assert dict(said.claims[0].shared)["scale"] > 30.0
+
+
+def test_notes_share_an_error_and_each_has_its_own() -> None:
+    records = [told("07:40", payload_kg=300.0, plus_minus_kg=20.0), told("08:45", payload_kg=100.0)]
+    one, other, _ = (
+        dict(said.claims[0].shared) if said.claims else {} for said in assign(records, MORNING, VAN).statements
+    )
+    assert one == {records[0].id: pytest.approx(20.0 / Z95), "delivery_note": pytest.approx(15.0)}
+    assert other["delivery_note"] == pytest.approx(5.0)
+
+
+def test_a_change_inherits_the_errors_of_what_it_changes() -> None:
+    records = [told("07:40", payload_kg=300.0, plus_minus_kg=20.0), told("08:45", change_kg=-60.0, plus_minus_kg=5.0)]
+    changed = assign(records, MORNING, VAN).statements[1].claims[0]
+    assert set(dict(changed.shared)) == {records[0].id, "delivery_note", records[1].id}
+    assert changed.std_kg > 20.0 / Z95
+
+
+@pytest.mark.parametrize(
+    ("source", "payload_kg", "plus_minus_kg"),
+    [("delivery_note", 300.0, 25.0), ("delivery_note", 800.0, 40.0), ("known", 300.0, 4.0), ("scale", 300.0, 12.0)],
+)
+def test_each_source_has_its_usual_doubt(source: str, payload_kg: float, plus_minus_kg: float) -> None:
+    (said, *_) = assign([told("07:40", source=source, payload_kg=payload_kg)], MORNING, VAN).statements
+    assert said.claims[0].stated_plus_minus_kg == pytest.approx(plus_minus_kg)
+
+
+def test_place_and_goods_are_said_of_the_load() -> None:
+    record = told("07:40", payload_kg=300.0, place={"behind_front_axle_m": 1.8, "plus_minus_m": 0.6, "left_m": -0.2})
+    record = record.model_copy(update={"shape": record.model_validate(
+        {**record.model_dump(by_alias=True), "shape": {"carries": "parcels"}}).shape})  # fmt: skip
+    (said, *_) = assign([record], MORNING, VAN).statements
+    assert (said.position_m, said.position_plus_minus_m, said.left_m, said.carries) == (1.8, 0.6, -0.2, "parcels")
+
+
+def test_a_drive_is_cut_where_a_statement_begins_or_ends_inside_it() -> None:
+    records = [told("07:40", "08:10", payload_kg=310.0), told("08:10", payload_kg=200.0), told("08:29", source="empty")]
+    pieces = [Piece(*span, 1) for span in cut(ns("07:50"), ns("08:30"), moments(records))]
+    assert [(one.begin_ns, one.end_ns) for one in pieces] == [(ns("07:50"), ns("08:10")), (ns("08:10"), ns("08:30"))]
+    assert payloads(assign(records, pieces, VAN)) == [310.0, 200.0]
+
+
+def test_ids_are_of_the_content() -> None:
+    assert told("07:40", payload_kg=310.0).id == told("07:40", payload_kg=310.0).id
+    assert told("07:40", payload_kg=310.0).id != told("07:41", payload_kg=310.0).id

@@ -1,0 +1,68 @@
+"""The drives that a service keeps: bounded in size, forgotten by what they teach, and there again after a start."""
+
+from pathlib import Path
+
+import pytest
+from support.learner import NOW_NS, kept_window
+
+from gateway.calibration.kept.batch_file import packed, unpacked
+from gateway.service.learner.drives import DriveFiles
+from gateway.units import NS_PER_S
+
+BYTES = len(packed(kept_window(0, 0)))
+
+
+def nothing(begin_ns: int, end_ns: int) -> bool:
+    """No statement is about any time."""
+    return False
+
+
+def begun(files: DriveFiles) -> list[int]:
+    """When the windows begin, in seconds after the bench's first drive."""
+    return [(one.t_start_ns - NOW_NS) // NS_PER_S for one in files.windows()]
+
+
+def test_windows_are_there_after_a_start(tmp_path: Path) -> None:
+    files = DriveFiles(tmp_path, 10 * BYTES)
+    assert files.add(kept_window(0, 0), nothing)
+    assert not files.add(kept_window(0, 0), nothing)
+    assert files.add(kept_window(0, 300), nothing)
+    again = DriveFiles(tmp_path, 10 * BYTES)
+    assert again.windows() == files.windows()
+    assert again.n_bytes == sum(path.stat().st_size for path in tmp_path.iterdir())
+    assert unpacked(again.path(again.windows()[0]).read_bytes()).batch.usable_s == 300.0
+
+
+def test_the_drive_that_teaches_least_is_forgotten_first(tmp_path: Path) -> None:
+    files = DriveFiles(tmp_path, round(3.2 * BYTES))
+    files.add(kept_window(0, 0), nothing)
+    files.add(kept_window(0, 300), nothing)
+    files.add(kept_window(3600, 3600), nothing)  # half as long a drive
+    files.add(kept_window(7200, 7200), nothing)
+    assert begun(files) == [0, 300, 7200]
+    files.add(kept_window(7200, 7500), nothing)
+    assert begun(files) == [7200, 7500]  # of two that are as long, the newer one
+
+
+def test_a_drive_with_a_statement_outlives_all_others(tmp_path: Path) -> None:
+    files = DriveFiles(tmp_path, round(2.2 * BYTES))
+
+    def is_stated(begin_ns: int, end_ns: int) -> bool:
+        return begin_ns == NOW_NS
+
+    for n in range(5):
+        files.add(kept_window(n * 3600, n * 3600), is_stated)
+    assert begun(files) == [0, 4 * 3600]
+
+
+def test_of_a_long_drive_the_first_half_hour_is_kept(tmp_path: Path) -> None:
+    files = DriveFiles(tmp_path, 100 * BYTES)
+    for n in range(20):
+        files.add(kept_window(0, n * 300), nothing)
+    assert begun(files) == [n * 300 for n in range(6)]
+
+
+def test_a_failing_disk_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "drives").write_text("in the way")
+    with pytest.raises(OSError, match="drives"):
+        DriveFiles(tmp_path / "drives", 10 * BYTES).add(kept_window(0, 0), nothing)
