@@ -66,12 +66,8 @@ NULL: Final = {
     "diagnostics": "empty if rejected before a fit",
     "epoch": "absent if rejected or provisional; the lateral position is null if no batch has one",
     "way": "null in records of early versions, and in a provisional estimate; unknown parts are null",
-    "known_weights_id": "absent if no known weight is in use",
-    "raw_payload": "absent if no known weight is in use",
-    "raw_front_share": "absent if no known weight is in use",
     "error_budget": "empty where rejected",
     "posterior": "absent where rejected",
-    "measured": "absent if no known weight is in use",
 }
 """When a field is unknown, by the part of Estimate that it shows. Empty: never."""
 
@@ -85,11 +81,10 @@ LACKS: Final = {
 }
 """What a weight may lack, in words."""
 
-KNOWN: Final = ("known_weights_id", "raw_payload", "raw_front_share", "error_budget", "posterior", "measured")
 GROUPS: Final = {
     "batch": ("",),
     "epoch": ("epoch",),
-    "known": KNOWN,
+    "errors": ("error_budget", "posterior"),
 }
 """Tables of the page, by the parts of Estimate that they show; the batch has all the others."""
 
@@ -206,7 +201,7 @@ PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
     "estimate.md": {
         "batch": lambda: fields_table("batch"),
         "epoch": lambda: fields_table("epoch"),
-        "known": lambda: fields_table("known"),
+        "errors": lambda: fields_table("errors"),
         "lacks": lambda: _named("`lacks` | meaning", LACKS),
         "diagnostics": lambda: _named("name | meaning", DIAGNOSTICS),
     },

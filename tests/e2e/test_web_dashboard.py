@@ -5,10 +5,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 from support.browser import expect
 from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Look, Watched, furnished
 from support.estimates import make_estimate
+from support.learner import ANSWERS, LearnerBench, at, found
 from support.web import Gateway, below, serving
 
 from gateway.estimate import Z95
@@ -43,7 +45,7 @@ def test_it_shows_the_load_and_its_interval(site: str, watched: Watched) -> None
     expect(page.locator("#payload-range")).to_have_text("95 %: 258 to 282 kg")
     expect(page.locator("#share")).to_have_text("48.0 %")
     expect(page.locator("#share-range")).to_have_text("95 %: 47.6 to 48.4 %")
-    expect(page.locator("#epoch")).to_have_text("270 ± 8 kg over 2 batches")
+    expect(page.locator("#load-so-far")).to_have_text("270 ± 8 kg over 2 batches")
     expect(page.locator("#age")).to_have_text(re.compile(r"^\d+ s ago$"))
     expect(page.locator("#state")).to_contain_text("Estimating Driving; the estimate is kept up to date.")
     expect(page.locator("#vehicle")).to_have_text("van-17")
@@ -94,6 +96,30 @@ def test_it_shows_how_bus_sensors_and_calibration_are(site: str, watched: Watche
     expect(page.locator("#calibrated")).to_contain_text("0 to 420 kg")
 
 
+def test_it_shows_how_exactly_a_load_is_weighed_and_what_to_teach_next(tmp_path: Path, watched: Watched) -> None:
+    bench, page = LearnerBench(tmp_path / "learner"), watched.page
+    with Gateway(tmp_path / "store", learner=bench.learner) as gateway, serving(gateway.app) as server:
+        gateway.status = STATUS
+        page.goto(server.url)
+        expect(page.locator("#teach-accuracy")).to_have_text("nothing is learnt yet")
+        expect(page.locator("#teach-help")).to_have_text("state the van")
+        expect(page.locator("#teach-questions")).to_have_text("none")
+        httpx.put(f"{server.url}/api/v1/vehicle", json=ANSWERS).raise_for_status()
+        load = {"from": at(60), "source": "delivery_note", "load": {"payload_kg": 310.0}}
+        httpx.post(f"{server.url}/api/v1/statements", json=load).raise_for_status()
+        bench.drive(60)
+        bench.turn()
+        helps = [{"do": "scale", "then_plus_minus_kg": 17.0}, {"do": "empty_drive", "then_plus_minus_kg": 30.0}]
+        learning = {"plus_minus_kg": 34.0, "helps": helps}
+        bench.finish(learning=learning, **found(bench, "held", 120.0, "is it of another drive?"))
+        expect(page.locator("#teach-accuracy")).to_have_text("± 34 kg")
+        expect(page.locator("#teach-help")).to_have_text("a large load on a scale: then ± 17 kg")
+        expect(page.locator("#teach-questions")).to_have_text("1")
+        page.locator("#teach").get_by_role("link", name="Teach the vehicle").click()
+        expect(page).to_have_url(f"{server.url}/teach")
+        gateway.board.close()
+
+
 def test_the_charts_show_estimates_bands_truth_and_model(drawn: Watched) -> None:
     page = drawn.page
     truth, band, _early, estimate, refused = page.evaluate("document.getElementById('payload-chart').data")
@@ -131,7 +157,7 @@ def test_numbers_and_tables_need_no_charts(site: str, watched: Watched) -> None:
 @pytest.mark.parametrize("width", [390, 1800])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_in_german_on_a_phone_and_on_a_wide_desk(site: str, browser: Any, width: int, scheme: str) -> None:
-    """Numbers and times as Germans write them, and no word of English outside of the commissioning's card."""
+    """Numbers and times as Germans write them, and no word of English."""
     made = Watched(browser, locale="de-DE", color_scheme=scheme, viewport={"width": width, "height": 1000})
     page = made.page
     page.route("**/plotly-*", lambda route: route.abort())
@@ -146,7 +172,6 @@ def test_in_german_on_a_phone_and_on_a_wide_desk(site: str, browser: Any, width:
         "Zu langsam: zu viel des Abschnitts war langsamer", use_inner_text=False
     )
     expect(page.locator("#spectra-of")).to_contain_text("Abschnitt bis 1. Jan. 1970, 00:20")
-    page.evaluate("document.getElementById('commissioning').remove()")
     for fold in page.locator("button.fold:visible").all():
         fold.click()
     for summary in page.locator("summary:visible").all():
@@ -345,7 +370,7 @@ def test_the_keyboard_reaches_everything_in_order(site: str, watched: Watched) -
     page = watched.page
     page.goto(site)
     expect(page.locator("#recent tr")).to_have_count(4)
-    for late in ("History as a table", "Spectra as a table", "Verify with a known load …"):
+    for late in ("History as a table", "Spectra as a table", "state the van"):
         expect(page.get_by_text(late)).to_be_visible()  # each is drawn when its numbers come
     expect(page.locator("#link")).to_have_text("live")
     watched.wait_until(f"{REACHABLE} === 13")  # the span's three buttons are one stop
@@ -355,7 +380,7 @@ def test_the_keyboard_reaches_everything_in_order(site: str, watched: Watched) -
         order.append(page.evaluate(FOCUSED))
         assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid", order[-1]
     assert order[:4] == ["Skip to the load", "Theme: system", "24", "History as a table"]
-    assert order[4:7] == ["Spectra as a table", "Bus and sensors", "Verify with a known load …"]
+    assert order[4:7] == ["Spectra as a table", "Teach the vehicle", "Bus and sensors"]
     assert order[7:] == ["In the cab", "Teach the vehicle", "API", "Metrics"]
 
 

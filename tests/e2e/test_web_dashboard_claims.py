@@ -84,6 +84,16 @@ def test_where_all_was_refused_the_reason_stands_beside_the_missing_number(gatew
     expect(note).to_contain_text("What to do: nothing; an open road is enough.")
 
 
+def test_a_vehicle_that_is_not_taught_is_sent_to_teach_and_not_to_a_command(gateway: Gateway, dashboard: Look) -> None:
+    gateway.status = STATUS.model_copy(update={"calibration_id": None})
+    gateway.publish(make_estimate(0, Why.NO_CALIBRATION))
+    page = dashboard()
+    expect(page.locator("#note")).to_contain_text("the vehicle is not taught yet. “Teach” says what comes next.")
+    expect(page.locator("#note")).not_to_contain_text("springscale")
+    expect(page.locator("#rejected")).to_contain_text("the vehicle is not taught yet", use_inner_text=False)
+    expect(page.locator("#rejected")).not_to_contain_text("springscale", use_inner_text=False)
+
+
 def test_a_refused_batch_casts_doubt_on_the_number_before_it_and_on_early_ones(
     gateway: Gateway, dashboard: Look
 ) -> None:

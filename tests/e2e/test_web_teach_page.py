@@ -70,3 +70,23 @@ def test_a_stated_load_is_listed_and_can_be_withdrawn(page: Any) -> None:
     expect(page.locator("#statements")).to_contain_text("310 kg")
     page.get_by_role("button", name="Withdraw").click()
     expect(page.locator("#statements")).to_contain_text("withdrawn")
+
+
+@pytest.mark.parametrize(
+    ("locale", "typed", "is_valid"),
+    [("de-DE", "1240,5", True), ("de-DE", "1240.5", True), ("de-DE", "1.240,5", False), ("en-GB", "1,240.5", False)],
+)
+def test_a_decimal_comma_is_a_comma_in_german_and_refused_in_english(
+    page: Any, browser: Any, locale: str, typed: str, is_valid: bool
+) -> None:
+    """A field of type "number" made 15 of a typed "1,5" where the browser itself is English."""
+    other = browser.new_page(locale=locale)
+    other.goto(page.url)
+    field = other.locator("#aboard-kg")
+    field.press_sequentially(typed)
+    assert field.evaluate("field => field.validity.valid") == is_valid
+    if is_valid:
+        with other.expect_request(lambda asked: asked.method == "POST") as sent:
+            field.press("Enter")
+        assert sent.value.post_data_json["load"] == {"payload_kg": 1240.5}
+    other.close()

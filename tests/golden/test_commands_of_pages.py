@@ -49,12 +49,9 @@ OWN_RUN_BY = {  # how a command of ours begins: what runs it
     "springscale evaluate my-van.zip": PACK,
     "springscale calibrate": "tests/golden/test_recorded_roll.py",
     "springscale calibration sprung": "tests/unit/test_vehicle_statics.py",
-    "springscale calibration tare": "tests/unit/test_known_weights_command.py",
-    "springscale calibration ticket": "tests/unit/test_known_weights_command.py",
     "springscale calibration": "tests/unit/test_calibration_commands.py",
     "springscale campaign pack": PACK,
     "springscale check-config": "tests/unit/test_command_line.py",
-    "springscale commission": "tests/unit/test_commission_command.py",
     "springscale demo": DEMO,
     "springscale estimate": "tests/unit/test_estimate_command.py",
     "springscale evaluate": "tests/golden/test_recorded_roll.py",
@@ -69,7 +66,6 @@ OWN_RUN_BY = {  # how a command of ours begins: what runs it
     "springscale run": "tests/e2e/test_gateway_service.py",
     "springscale simulate": "tests/e2e/test_cli_simulate.py",
     "springscale state": "tests/unit/test_state_command.py",
-    "springscale verification": "tests/e2e/test_verification_service.py",
 }
 ON_PI = "a real Raspberry Pi"
 BY_HAND = "by hand"

@@ -3,7 +3,7 @@
 
 import { follow } from "./event-stream.js";
 import { alarmsOf } from "./alarm-view.js";
-import { ALARMS, COMMISSIONING, KNOWN_WEIGHTS, Refused, VERIFICATIONS, load } from "./gateway.js";
+import { ALARMS, LEARNING, Refused, load } from "./gateway.js";
 import { known, learn } from "./known.js";
 import { explained } from "./phrases.js";
 
@@ -16,10 +16,8 @@ async function askNow() {
   try {
     const [status, latest] = await Promise.all([load("api/v1/status"), load("api/v1/estimates/latest")]);
     learn({ status, latest, latestAtMs: performance.now(), isReachable: true, isRefused: false });
-    learn({ weights: await load("api/v1/weights/latest") }); // the verdict changes with alarms too
-    if (known.verifications && known.verifications.due.n_records !== status.verification.n_records) await askVerifications();
-    if (known.commissioning?.underway || known.commissioning?.is_pending) await askCommissioning();
-    if (known.knownWeights && known.knownWeights.known_weights_id !== status.known_weights_id) await askKnownWeights(); // somebody else changed them
+    const [weights, learning] = await Promise.all([load("api/v1/weights/latest"), load(LEARNING)]);
+    learn({ weights, learning }); // the verdict changes with alarms, and learning with statements, at any time
   } catch (error) {
     learn({ isReachable: error instanceof Refused, isRefused: error instanceof Refused });
   }
@@ -49,12 +47,6 @@ function revised(entries, entry) {
 
 const askSpectra = async () => learn({ spectra: await load("api/v1/spectra/latest") });
 
-const askKnownWeights = async () => learn({ knownWeights: await load(KNOWN_WEIGHTS) });
-
-export const askCommissioning = async () => learn({ commissioning: await load(COMMISSIONING) });
-
-const askVerifications = async () => learn({ verifications: await load(VERIFICATIONS) });
-
 async function askOnce() {
   const [vehicle, reasons] = await Promise.all([load("api/v1/vehicle"), load("api/v1/reasons")]);
   learn({ vehicle, ...explained(reasons) });
@@ -73,7 +65,7 @@ let asking = null;
 function askSoon() {
   asking ??= setTimeout(() => {
     asking = null;
-    Promise.all([askNow(), askSpectra(), askTruth(), askKnownWeights()]).catch(giveUpUntilNext);
+    Promise.all([askNow(), askSpectra(), askTruth()]).catch(giveUpUntilNext);
   }, GATHER_MS);
 }
 
@@ -99,7 +91,7 @@ const giveUpUntilNext = (error) => console.info(error.message);
 /** What the page needs to be complete; fetched again whenever the stream comes back. */
 async function catchUp() {
   await askNow();
-  await Promise.all([askOnce(), askSpectra(), askTruth(), askKnownWeights(), askVerifications(), askCommissioning()]);
+  await Promise.all([askOnce(), askSpectra(), askTruth()]);
   await Promise.all([askAlarms(), askDay()]);
 }
 

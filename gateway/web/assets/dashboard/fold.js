@@ -9,9 +9,6 @@ function toggle(card, isFolded) {
   if (!isFolded) card.dispatchEvent(new Event("unfold", { bubbles: true }));
 }
 
-/** For the content that is needed now. */
-export const unfold = (card) => toggle(card, false);
-
 function button(card) {
   const built = document.createElement("button");
   built.type = "button";

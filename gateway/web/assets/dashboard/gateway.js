@@ -1,16 +1,12 @@
 // Requests to the gateway: with the token of this session, if one was entered.
 
 const TOKEN = `springscale-token ${new URL(".", document.baseURI).pathname}`; // one proxy may serve several vehicles
-export const KNOWN_WEIGHTS = "api/v1/known-weights";
-export const COMMISSIONING = "api/v1/calibration/commissioning";
-export const VERIFICATIONS = "api/v1/calibration/verifications";
+export const LEARNING = "api/v1/learning";
 export const ALARMS = "api/v1/alarms?order=newest_first&limit=50";
 
 export class Refused extends Error {}
 
 export const setToken = (text) => sessionStorage.setItem(TOKEN, text.trim());
-
-export const hasToken = () => sessionStorage.getItem(TOKEN) !== null;
 
 /** With the token of this session, if there is one. */
 export function headers(token = sessionStorage.getItem(TOKEN)) {
@@ -35,13 +31,3 @@ export async function download(path, name) {
 }
 
 export const load = async (path) => (await ask(path)).json();
-
-/** Requests a change, with another token if one is given; returns the `state` after it, or throws the gateway's words. */
-export async function change(method, path, token, claim, state) {
-  const said = { ...headers(token || undefined), "Content-Type": "application/json" };
-  const response = await fetch(path, { method, body: claim && JSON.stringify(claim), headers: said }).catch(() => {
-    throw new Error("The gateway did not answer. Check whether anything changed before you try again.");
-  });
-  if (!response.ok) throw new Error((await response.json()).detail);
-  return load(state);
-}

@@ -2,7 +2,7 @@
 
 import { show } from "./known.js";
 import { element, made, pair, row } from "./page.js";
-import { calibratedHere, phrase } from "./phrases.js";
+import { phrase, taughtHere } from "./phrases.js";
 import { isAsleep, isSilent } from "./sleep.js";
 import { UNKNOWN, between, capital, clock, duration, figure, number } from "./words.js";
 
@@ -109,26 +109,26 @@ function withCode(text) {
 const N_SHOWN = 3; // chosen: refused batches, the newest
 const USUAL = "The drive"; // a cause that asks nobody for anything
 
-/** What to do about a reason; a vehicle without calibration is calibrated on this page where that is allowed. */
-function advised(reason, advice, commissioning) {
-  const here = reason === "no_calibration" ? calibratedHere(commissioning) : null;
+/** What to do about a reason; a vehicle without calibration is taught where that is allowed. */
+function advised(reason, advice, learning) {
+  const here = reason === "no_calibration" ? taughtHere(learning) : null;
   return here === null ? [made("em", phrase("what_to_do")), ...withCode(advice), "."] : [here];
 }
 
-function rejection(batch, reasons, commissioning) {
+function rejection(batch, reasons, learning) {
   const when = made("time", clock(batch.t_end));
   when.dateTime = batch.t_end;
   const parts = batch.rejected.map((reason) => {
     const told = reasons.get(reason);
-    const said = told ? [": ", ...withCode(told.happened), ". ", ...advised(reason, told.advice, commissioning)] : [];
+    const said = told ? [": ", ...withCode(told.happened), ". ", ...advised(reason, told.advice, learning)] : [];
     return made("p", [made("strong", capital(phrase.named("reason", reason))), ...said], told?.cause === USUAL ? "usual" : "");
   });
   return made("li", [when, ...parts]);
 }
 
-show(({ batches, reasons, commissioning }) => {
+show(({ batches, reasons, learning }) => {
   if (batches === null) return;
   const rejected = batches.filter((batch) => batch.rejected.length > 0).slice(0, N_SHOWN);
-  const items = rejected.map((batch) => rejection(batch, reasons, commissioning));
+  const items = rejected.map((batch) => rejection(batch, reasons, learning));
   element("rejected").replaceChildren(...(items.length ? items : [made("li", phrase("none"))]));
-}, "batches", "reasons", "commissioning");
+}, "batches", "reasons", "learning");

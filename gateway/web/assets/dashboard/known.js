@@ -8,9 +8,7 @@ export const known = {
   vehicle: null,
   weights: null,
   spectra: null,
-  commissioning: null, // GET /calibration/commissioning
-  knownWeights: null, // GET /known-weights
-  verifications: null, // GET /calibration/verifications
+  learning: null, // GET /learning
   alarms: null, // newest first, those that stand among them
   events: null, // load events, newest first
   trips: null, // likewise

@@ -2,17 +2,17 @@
 
 import { ageNow, known, show } from "./known.js";
 import { element, made, say, write } from "./page.js";
-import { calibratedHere, phrase } from "./phrases.js";
+import { phrase, taughtHere } from "./phrases.js";
 import { UNKNOWN, Z95, ago, between, capital, clock, figure, kmh, reasons as named, withStd, words } from "./words.js";
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interval", { between: between(bounds, digits, unit) }));
 
 /** The outcome of the last batch, if none was weighed yet, and what to do about it. */
-function noneYet(refusal, reasons, commissioning, status) {
+function noneYet(refusal, reasons, learning, status) {
   const isFromBefore = refusal?.rejected.includes("no_calibration") && status?.calibration_id != null;
   if (isFromBefore || (refusal == null && status?.calibration_id != null)) return phrase("ready");
   if (refusal == null) return phrase("none_yet");
-  const here = refusal.rejected.includes("no_calibration") ? calibratedHere(commissioning) : null;
+  const here = refusal.rejected.includes("no_calibration") ? taughtHere(learning) : null;
   if (here !== null) return here;
   const advice = refusal.rejected.map((reason) => reasons.get(reason)?.advice).filter(Boolean).map((text) => `${text.replaceAll("`", "")}.`);
   const todo = advice.length ? phrase("to_do", { advice: advice.join(" ") }) : "";
@@ -25,13 +25,13 @@ function isDoubted({ last_rejection: refusal, ...latest }, reasons) {
   return refusal.rejected.some((reason) => ["The sensors", "The answer"].includes(reasons.get(reason)?.cause));
 }
 
-function notes(latest, reasons, commissioning, status) {
+function notes(latest, reasons, learning, status) {
   const said = [];
   if (isDoubted(latest, reasons)) said.push(phrase("note_doubted", { reasons: named(latest.last_rejection.rejected) }));
   if (latest.is_stored === false) said.push(phrase("note_unstored"));
   if (latest.is_stale) said.push(phrase("note_old"));
   if (latest.provisional) said.push(phrase("note_early"));
-  if (latest.rejected.includes("no_estimate_yet")) said.push(noneYet(latest.last_rejection, reasons, commissioning, status));
+  if (latest.rejected.includes("no_estimate_yet")) said.push(noneYet(latest.last_rejection, reasons, learning, status));
   else if (latest.rejected.length) said.push(phrase("note_none", { reasons: named(latest.rejected) }));
   return said.join(" ");
 }
@@ -59,10 +59,10 @@ function writeNumber(id, value, digits, unit) {
   element(id).classList.toggle("none", value == null);
 }
 
-function epoch(latest) {
+function loadSoFar(latest) {
   const n = latest.epoch_n_batches;
   if (!(n > 1)) return n === 1 ? phrase("one_batch") : UNKNOWN;
-  return phrase("epoch_of", { n, weight: withStd(latest.epoch_payload_kg, latest.epoch_payload_std_kg, 0, "kg") });
+  return phrase("load_so_far_of", { n, weight: withStd(latest.epoch_payload_kg, latest.epoch_payload_std_kg, 0, "kg") });
 }
 
 function showAge() {
@@ -99,7 +99,7 @@ show(({ latest, sources, remedies: advised }) => {
     made("li", phrase("budget_remedy", { advice: capital(advised.get(remedy)), now: half(latest.payload_std_kg), then: half(then) }))));
 }, "latest", "sources", "remedies");
 
-show(({ latest, vehicle, reasons, commissioning, status, isReachable }) => {
+show(({ latest, vehicle, reasons, learning, status, isReachable }) => {
   if (latest === null) return;
   const seen = vehicle?.calibration;
   writeNumber("payload", latest.payload_kg, 0, "kg");
@@ -109,16 +109,14 @@ show(({ latest, vehicle, reasons, commissioning, status, isReachable }) => {
   write("share-range", interval(latest.front_share_interval95_pct, 1, "%"));
   gauge("share-gauge", latest.front_share_pct, latest.front_share_interval95_pct, seen?.front_share_seen_pct, "%");
   write("age-at", latest.t_end ? phrase("age_at", { time: clock(latest.t_end) }) : "");
-  write("epoch", epoch(latest));
+  write("load-so-far", loadSoFar(latest));
   write("speed", kmh(latest.mean_speed_mps));
-  element("conditioned").hidden = latest.raw_payload_kg == null;
-  write("raw-payload", withStd(latest.raw_payload_kg, latest.raw_payload_std_kg, 0, "kg"));
   element("latest").classList.toggle("stale", latest.is_stale || isReachable === false);
-  say("note", notes(latest, reasons, commissioning, status));
+  say("note", notes(latest, reasons, learning, status));
   document.title = latest.payload_kg == null ? "Springscale" : `${figure(latest.payload_kg, 0, "kg")} – Springscale`;
   showAge();
   announce(latest);
-}, "latest", "vehicle", "reasons", "commissioning", "status", "isReachable");
+}, "latest", "vehicle", "reasons", "learning", "status", "isReachable");
 
 element("budget").open = matchMedia("(min-width: 56rem)").matches; // where there is room for it
 setInterval(() => known.latest && showAge(), 1000);

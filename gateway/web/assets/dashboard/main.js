@@ -11,9 +11,7 @@ import "./health-view.js";
 import "./history-view.js";
 import "./day-view.js";
 import "./spectra-view.js";
-import "./known-weights-view.js";
-import "./commissioning-view.js";
-import "./verification-view.js";
+import "./teach-view.js";
 
 import { feed, lookBack } from "./feed.js";
 import { download, setToken } from "./gateway.js";

@@ -1,13 +1,11 @@
 // The dashboard's words in the reader's language; loading this module translates those in the page itself.
 
-import { acceptNumbers, numberText } from "./page.js";
 import { fill, language, speaker } from "../language.js";
-import { COMMISSIONING_WORDS } from "../words/commissioning.js";
 import { COMMON } from "../words/common.js";
 import { DASHBOARD } from "../words/dashboard.js";
 import { REASONS_DE, REMEDIES_DE, SOURCES_DE } from "../words/reasons.js";
 
-export const phrase = speaker(COMMON, DASHBOARD, COMMISSIONING_WORDS);
+export const phrase = speaker(COMMON, DASHBOARD);
 
 /** The gateway's English texts of reasons, sources and remedies, by name, in the reader's language. */
 export function explained({ items, sources, remedies }) {
@@ -23,11 +21,10 @@ export function explained({ items, sources, remedies }) {
   };
 }
 
-/** What to do about a batch without calibration where this page may calibrate the vehicle; null where it may not. */
-export function calibratedHere(commissioning) {
-  if (!commissioning?.is_allowed) return null;
-  return phrase(commissioning.underway || commissioning.is_pending ? "none_meanwhile" : "none_uncalibrated");
+/** What to do about a batch without calibration where the vehicle can be taught; null where it cannot. */
+export function taughtHere(learning) {
+  if (!learning?.is_allowed) return null;
+  return phrase(learning.takes_effect === null ? "none_untaught" : "none_until_next_drive");
 }
 
 fill(phrase);
-acceptNumbers(phrase("number_hint", { example: numberText(1.5) }));
