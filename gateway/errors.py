@@ -34,7 +34,7 @@ class NoSisterError(ConfigurationError):
 
 
 class RefusedError(SpringscaleError):
-    """The service cannot do now what somebody asks for: a known weight, a step of a commissioning.
+    """The service cannot do now what somebody asks for: a statement, another version of the calibration.
 
     ``reason`` is for programs; the message says why, and what to do.
     """

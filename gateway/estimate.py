@@ -150,9 +150,8 @@ class Estimate:
 
     With a roll rate also ``cg_left``, the centre of gravity of the sprung mass (m left of the centre line),
     ``left_share``, its share on the left wheels (%), and ``roll_share_front``, the part of a sideways load's moment
-    that the front axle's springs and bar carry (0 to 1). ``posterior`` contains all of these errors by source;
-    ``measured`` is the estimate before known weights were applied (None: there were none), and ``known_weights_id``
-    names these. A remainder is neither an answer nor a refusal: a window, or a piece of one, with too little driving
+    that the front axle's springs and bar carry (0 to 1). ``posterior`` contains all of these errors by source.
+    A remainder is neither an answer nor a refusal: a window, or a piece of one, with too little driving
     for a batch, kept for its way; ``rejected`` says what it lacks.
     """
 
@@ -177,8 +176,6 @@ class Estimate:
     diagnostics: Mapping[str, float] = field(default_factory=dict)
     epoch: Epoch | None = None
     posterior: Posterior | None = None
-    measured: Posterior | None = None
-    known_weights_id: str | None = None
     error_budget: tuple[BudgetLine, ...] = ()
     vehicle_id: str | None = None
     vin: str | None = None
@@ -205,8 +202,6 @@ class Estimate:
             roll_share_front=math.nan,
             roll_share_front_std=math.nan,
             posterior=None,
-            measured=None,
-            known_weights_id=None,
             error_budget=(),
             weights=Weights(),
             rejected=whys,
@@ -229,16 +224,6 @@ class Estimate:
         return self.t_start_ns if since_ns is None else since_ns
 
     @property
-    def raw_payload(self) -> Quantity | None:
-        """The estimate before known weights changed it."""
-        return None if self.measured is None else self.measured.quantity(PAYLOAD)
-
-    @property
-    def raw_front_share(self) -> Quantity | None:
-        """The estimate before known weights changed it."""
-        return None if self.measured is None else self.measured.quantity(FRONT_SHARE)
-
-    @property
     def payload_front_share_correlation(self) -> float:
         """Correlation of both errors, -1 to 1."""
         return self._correlation(PAYLOAD, FRONT_SHARE)
@@ -257,17 +242,10 @@ class Estimate:
         return math.nan if self.posterior is None else self.posterior.correlation(one, other)
 
     @property
-    def as_measured(self) -> Posterior | None:
-        """The estimate of the batch and the calibration alone: known weights come and go without a change of the
-        load.
-        """
-        return self.posterior if self.measured is None else self.measured
-
-    @property
     def id(self) -> str:
-        """The same batch, vehicle, estimator, calibration and known weights always have the same id."""
+        """The same batch, vehicle, estimator and calibration always have the same id."""
         parts: tuple[object, ...] = (self.vehicle_id, self.t_start_ns, self.t_end_ns, self.estimator)
-        parts += (self.calibration_id, *((self.known_weights_id,) if self.known_weights_id else ()))
+        parts += (self.calibration_id,)
         digest = hashlib.sha256("|".join(map(str, parts)).encode()).hexdigest()
         return f"{self.t_end_ns}-{digest[:12]}"
 

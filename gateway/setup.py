@@ -1,13 +1,11 @@
-"""The setup that turns frames into estimates: signal map, calibration, estimator and known weights, all checked."""
+"""The setup that turns frames into estimates: signal map, calibration and estimator, all checked."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
-from gateway.calibration.known_weights_file import load_known_weights
 from gateway.config import Settings
-from gateway.core.known_weights import Knowledge
 from gateway.core.settings import BatchSettings
 from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError
@@ -44,7 +42,6 @@ class Setup:
     calibration: CalibrationFile | None
     estimator: str
     identity: Identity
-    knowledge: Knowledge | None = None
     limits: Limits = NO_OTHER
     calibrated: CalibratedVehicle | None = field(init=False)  # the calibration, as the core knows it, limits in force
 
@@ -66,14 +63,7 @@ class Setup:
 
     def flow(self, settings: BatchSettings) -> Flow:
         """A fresh pipeline."""
-        return Flow(settings, self.signal_map.traits, self.calibrated, self.estimator, self.identity, self.knowledge)
-
-    def with_known_weights_of(self, path: Path) -> "Setup":
-        """The setup with the known weights in ``path`` for this calibration and estimator.
-
-        Raises ConfigurationError for an invalid file.
-        """
-        return replace(self, knowledge=load_known_weights(path).knowledge(self.calibration_id, self.estimator))
+        return Flow(settings, self.signal_map.traits, self.calibrated, self.estimator, self.identity)
 
 
 def load_setup(

@@ -34,7 +34,6 @@ LONGEST_FIRST = (
     "unit/test_sensitivity_study.py",
     "scenarios/test_fleet_view.py",
     "unit/test_inspection_campaign.py",
-    "e2e/test_web_dashboard_commissioning.py",
     "unit/test_line_commands.py",
     "scenarios/test_calibrate_options.py",
     "scenarios/test_bad_campaigns.py",

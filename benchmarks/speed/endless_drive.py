@@ -1,6 +1,5 @@
 """A bus that repeats one drive, as fast as the service reads it."""
 
-import threading
 import time
 from collections.abc import Iterator
 from itertools import pairwise
@@ -53,41 +52,3 @@ class EndlessDrive:
                     part = take(self._drive, slice(begin, end))
                     yield Frames(part.t_ns + later_ns, part.can_id, part.length, part.payload)
             self.days_done = day + 1
-
-
-class ParkedFirst:
-    """A receiver: silent at first; then the beginning of a drive, a day before the week; silent again; then the
-    week.
-    """
-
-    dropped_kernel = 0
-
-    def __init__(self, drive: Frames, seconds: float, week: EndlessDrive) -> None:
-        """``drive_empty`` and ``go`` may be called from another thread."""
-        self._week = week
-        n = int(np.searchsorted(drive.t_ns, int(drive.t_ns[0]) + round(seconds * NS_PER_S)))
-        part = take(drive, slice(0, n))
-        self._empty = Frames(part.t_ns - DAY_S * NS_PER_S, part.can_id, part.length, part.payload)
-        self._at = 0
-        self._is_driven, self._is_going = threading.Event(), threading.Event()
-
-    def drive_empty(self) -> None:
-        """The first drive, at once."""
-        self._is_driven.set()
-
-    def go(self) -> None:
-        """The week begins."""
-        self._is_going.set()
-
-    def receive(self, timeout_s: float) -> Burst:
-        """The next burst."""
-        if self._is_going.is_set():
-            return self._week.receive(timeout_s)
-        time.sleep(timeout_s)
-        begin = self._at
-        if self._is_driven.is_set():
-            self._at += PARKED_BURST
-        return Burst(take(self._empty, slice(begin, self._at)))
-
-    def close(self) -> None:
-        """Nothing to release."""

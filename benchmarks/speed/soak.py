@@ -1,10 +1,9 @@
 """A simulated week in the real service at high speed: memory, file handles, threads and database do not grow.
 
-`make soak` runs it and prints one line per simulated day; it exits with 1 if something grew. The service begins without
-a calibration and is commissioned over HTTP, from a quarter of an hour of empty driving and the vehicle's line; then
-each day has hours of driving and a night of silence. A client polls the latest estimate, and every frame is recorded.
-The bus is replaced by a receiver that repeats the frames of one simulated drive with later stamps; everything behind it
-is the service as in a vehicle.
+`make soak` runs it and prints one line per simulated day; it exits with 1 if something grew. The service weighs by a
+calibration file; each day has hours of driving and a night of silence. A client polls the latest estimate, and every
+frame is recorded. The bus is replaced by a receiver that repeats the frames of one simulated drive with later stamps;
+everything behind it is the service as in a vehicle.
 """
 
 import asyncio
@@ -19,7 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-from benchmarks.speed.endless_drive import EndlessDrive, ParkedFirst
+from benchmarks.speed.endless_drive import EndlessDrive
 from benchmarks.speed.meter import CALIBRATION, print_and_write
 from gateway.config import load_settings
 from gateway.service.gateway import Gateway
@@ -28,6 +27,7 @@ from gateway.workbench.simulate import demo_drive, frames_of
 
 SETTINGS: Final = """\
 signals = "springscale:reference"
+calibration = "vehicle.json"
 [bus]
 interface = "virtual"
 [web]
@@ -38,23 +38,9 @@ max_size_mb = 4.0
 [record]
 enabled = true
 max_size_mb = 16.0
-[commissioning]
-lines = "."
 [log]
 level = "error"
 """
-COMMISSIONING: Final = "/api/v1/calibration/commissioning"
-ANSWERS: Final = {  # of the van that made the demo's drive: axle weights with its 80 kg under each
-    "kerb_front_axle_kg": 700.0,
-    "kerb_rear_axle_kg": 700.0,
-    "unsprung_front_kg": 80.0,
-    "unsprung_rear_kg": 80.0,
-    "wheelbase_m": 2.8,
-    "sensor_position_m": 3.2,
-    "sensor_offset_left_m": 0.15,
-}
-EMPTY_S: Final = 910.0  # of the demo's drive: three windows before its load comes on board
-COMMISSIONED_WITHIN_S: Final = 300.0  # chosen: timeout
 # What may grow from the end of the first day to the end of the last: caches fill, then nothing more; and one connection
 # more or less is open at any moment.
 GROWTH_ALLOWED: Final = {"memory_mb": 15.0, "handles": 2, "threads": 0}
@@ -75,7 +61,7 @@ def footprint(state: Path) -> dict[str, float]:
 
 
 class Service:
-    """The running gateway, which restarts once the vehicle is commissioned."""
+    """The running gateway, which restarts when it has learnt another calibration."""
 
     def __init__(self) -> None:
         self.gateway: Gateway | None = None
@@ -103,24 +89,6 @@ class Service:
         return told
 
 
-def commission(service: Service, receiver: ParkedFirst) -> None:
-    """All steps of a commissioning, until the service uses its result."""
-    for step, said in (
-        ("", {"note": "soak"}),
-        ("/line", {"line": {"name": "vehicle.json", "source": "administrator"}}),
-        ("/vehicle", ANSWERS),
-        ("/empty", {"is_empty": True}),
-    ):
-        service.ask(COMMISSIONING + step, said)
-    receiver.drive_empty()
-    end_s = time.monotonic() + COMMISSIONED_WITHIN_S
-    while service.n_starts < 2:
-        if time.monotonic() > end_s:
-            raise SystemExit(f"not commissioned: {service.ask(COMMISSIONING).decode()}")
-        time.sleep(0.5)
-    receiver.go()
-
-
 def watch(service: Service, week: EndlessDrive, state: Path, days: list[dict[str, float]]) -> None:
     """Ask for the latest estimate all the time; note the footprint at every day's end."""
     is_over = False
@@ -137,9 +105,7 @@ def watch(service: Service, week: EndlessDrive, state: Path, days: list[dict[str
 
 def soak(hours_a_day: float, n_days: int) -> list[dict[str, float]]:
     """The footprint at the end of each day."""
-    drive = frames_of(demo_drive())
-    week = EndlessDrive(drive, hours_a_day, n_days)
-    receiver = ParkedFirst(drive, EMPTY_S, week)
+    week = EndlessDrive(frames_of(demo_drive()), hours_a_day, n_days)
     service, faults = Service(), list[BaseException]()
     days: list[dict[str, float]] = []
     with TemporaryDirectory() as folder:
@@ -155,13 +121,12 @@ def soak(hours_a_day: float, n_days: int) -> list[dict[str, float]]:
 
         def meet() -> None:
             try:
-                commission(service, receiver)
                 watch(service, week, settings.store.directory, days)
             except BaseException as fault:  # noqa: BLE001 - raised again where the service has ended
                 faults.append(fault)
             service.stop()
 
-        while live(settings, on_started=on_started, open_receiver=lambda: receiver):
+        while live(settings, on_started=on_started, open_receiver=lambda: week):
             pass
     if faults:
         raise faults[0]

@@ -167,10 +167,10 @@ def _weigh(found: Mapping[str, Any]) -> Iterator[Line]:
         yield _below(section, what, 1e3 * seconds, "ms", 35, 0, held_by)
     calibration_s = found["calibration"]["cpu_s"]
     yield _below(section, "calibration on ten drives of 15 minutes", calibration_s, "s", 15, 0, HELD_BY["calibration"])
-    if "commissioning" in found:
-        fit = found["commissioning"]
-        yield Line(section, "a commissioning's fit, memory", f"{fit['peak_mb']:.0f} MB")
-        yield _below(section, "a commissioning's fit of 15 minutes", fit["cpu_s"], "s", 60)
+    if "learning" in found:
+        fit = found["learning"]
+        yield Line(section, "learning in the vehicle, memory", f"{fit['peak_mb']:.0f} MB")
+        yield _below(section, "learning in the vehicle from 15 minutes", fit["cpu_s"], "s", 60)
 
 
 def _archive(found: Mapping[str, Any]) -> Iterator[Line]:

@@ -1,9 +1,9 @@
-"""The cost of weighing: one batch of five minutes by each estimator, a calibration on ten drives of 15 minutes, and a
-commissioning in the vehicle.
+"""The cost of weighing: one batch of five minutes by each estimator, a calibration on ten drives of 15 minutes, and the
+learning in the vehicle.
 
-The batch is the demo's, with a roll rate; the campaign is the paper's experiment, simulated first. The commissioning is
-the process that fits a quarter of an hour of empty driving, cut, stored and started as the service does it, with the
-calibration of a sister vehicle as its line.
+The batch is the demo's, with a roll rate; the campaign is the paper's experiment, simulated first. The learning is
+the process that learns from a quarter of an hour of empty driving, cut, stored and started as the service does it, with
+the calibration of a sister vehicle.
 """
 
 import os
@@ -18,21 +18,21 @@ from typing import Any, Final
 from benchmarks.speed.meter import CALIBRATION, ENVIRONMENT, best_of, cpu_s, springscale
 from gateway.bus.signals import Decoder, SignalMap, load_signal_map
 from gateway.calibration.campaign import CampaignTable, load_campaign
-from gateway.calibration.commissioning.job import JOB, RESULT, Drive, Job, Result, to_file
 from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of, packed
+from gateway.calibration.learning.job import JOB, RESULT, LearnJob, LearnResult
 from gateway.config import ESTIMATOR_NAMES
-from gateway.config.sections import CommissioningSection
+from gateway.config.sections import LearningSection
 from gateway.core.settings import BatchSettings
-from gateway.estimate import Estimate
 from gateway.offline.campaigns import batches_of_motion, read_whole_log
-from gateway.records import Batch, Motion
+from gateway.records import Batch, Motion, iso_utc
 from gateway.setup import load_setup
+from gateway.stated.statement import StatementRecord
 from gateway.toml_file import checked, read_toml
 from gateway.weighing.estimator import estimate
 from gateway.weighing.flow import Flow, Identity
 from gateway.workbench.simulate import demo_drive, frames_of
 
-PROGRAM: Final = (sys.executable, "-m", "gateway.calibration.commissioning.work")
+PROGRAM: Final = (sys.executable, "-m", "gateway.calibration.learning.work")
 
 
 def measure() -> dict[str, Any]:
@@ -54,49 +54,46 @@ def batch_s() -> dict[str, float]:
 
 
 def fits() -> dict[str, dict[str, float]]:
-    """CPU and clock time of `springscale calibrate` on ten drives, and of a commissioning on the vehicle's line."""
+    """CPU and clock time of `springscale calibrate` on ten drives, and of learning like a sister."""
     with tempfile.TemporaryDirectory() as name:
-        campaign, line = Path(name) / "campaign.toml", Path(name) / "vehicle.json"
+        campaign, like = Path(name) / "campaign.toml", Path(name) / "vehicle.json"
         springscale("simulate", "campaign", "experiment", name)
-        ran = springscale("calibrate", campaign, "--output", line)
+        ran = springscale("calibrate", campaign, "--output", like)
         calibration = {what: ran[what] for what in ("cpu_s", "clock_s")}
-        return {"calibration": calibration, "commissioning": commissioning(campaign, line, Path(name) / "job")}
+        return {"calibration": calibration, "learning": learning(campaign, like, Path(name) / "job")}
 
 
-def commissioning(campaign: Path, line: Path, folder: Path) -> dict[str, float]:
+def learning(campaign: Path, like: Path, folder: Path) -> dict[str, float]:
     """CPU time, clock and memory of the fit of the campaign's first drive, which is an empty one."""
     folder.mkdir()
-    to_file(_job(campaign, line, folder), folder / JOB)
+    (folder / JOB).write_text(_job(campaign, like, folder).model_dump_json(), encoding="utf-8")
     begun_s = cpu_s()
     subprocess.run([*PROGRAM, str(folder)], check=True, env=os.environ | ENVIRONMENT)
     taken_s = cpu_s() - begun_s
-    result = Result.model_validate_json((folder / RESULT).read_bytes())
+    result = LearnResult.model_validate_json((folder / RESULT).read_bytes())
     if result.calibration is None:
-        raise SystemExit(f"the commissioning made no calibration: {result.fault or result.refusal}")
+        raise SystemExit(f"nothing was learnt: {result.fault}")
     return {"cpu_s": taken_s, "clock_s": result.seconds, "peak_mb": result.most_memory_mb}
 
 
-def _job(campaign: Path, line: Path, folder: Path) -> Job:
-    loaded, wanted = load_campaign(campaign), CommissioningSection()
+def _job(campaign: Path, like: Path, folder: Path) -> LearnJob:
+    loaded = load_campaign(campaign)
     [first, *_] = loaded.runs
     if first.payload_kg:
         raise SystemExit(f"{campaign}: its first drive is not empty")
     signal_map = load_signal_map(loaded.signals)
     motion, _ = read_whole_log(loaded.log_of(first), signal_map)
-    return Job(
+    windows = kept_of(motion, signal_map)
+    begin_ns = min(one.batch.t_start_ns for one in windows)
+    empty = {"source": "empty", "from": iso_utc(begin_ns), "load": {"payload_kg": 0.0}}
+    return LearnJob(
+        key="benchmark",
         vehicle=checked(read_toml(campaign), campaign, CampaignTable).vehicle,
-        drives=(
-            Drive(
-                name="empty drive",
-                front_share_pct=loaded.front_share_pct(first),
-                batches=tuple(_files(kept_of(motion, signal_map), folder)),
-            ),
-        ),
+        windows=tuple(_files(windows, folder)),
+        records=(StatementRecord.model_validate(empty),),
         settings=asdict(BatchSettings()),
-        like=(line,),
-        goal_std_share=wanted.goal_pct / 100.0,
-        most_memory_mb=wanted.memory_mb,
-        command="benchmark",
+        like=like,
+        most_memory_mb=LearningSection().memory_mb,
     )
 
 
@@ -105,11 +102,12 @@ def kept_of(motion: Motion, signal_map: SignalMap) -> list[KeptBatch]:
     found: list[KeptBatch] = []
     flow = Flow(BatchSettings(), signal_map.traits, None, "cross_spectrum", Identity("van-17"))
 
-    def keep(batch: Batch, estimate: Estimate, rows: Motion) -> None:
+    def keep(batch: Batch, rows: Motion) -> None:
         if not batch.rejected and not batch.is_provisional:
-            found.append(kept_batch_of(estimate.id, signal_map.id, batch, rows, signal_map.traits))
+            name = f"{batch.t_end_ns}-{batch.t_start_ns:012x}"
+            found.append(kept_batch_of(name, signal_map.id, batch, rows, signal_map.traits))
 
-    flow.on_batch = keep
+    flow.on_window = keep
     for _ in (*flow.feed(motion), *flow.flush()):
         pass
     return found

@@ -56,7 +56,7 @@ PROVENANCE: Final[Mapping[str, str]] = {
     "software": "the version of springscale and the hash of the code that weighs",
     "job": "hash of all inputs of the row; also the name of its file and receipt",
 }
-"""Columns that no estimate has; `calibration_id` and `known_weights_id` are among the estimate's own."""
+"""Columns that no estimate has; `calibration_id` is among the estimate's own."""
 
 _LEFT_OUT: Final = frozenset({"spectra", "provisional", "way", "posterior", "measured_posterior", "epoch_posterior"})
 """Not in the table: large, never true of a whole batch, or of many parts."""

@@ -82,7 +82,6 @@ class JobDrives:
     def _weighed(self, flow: Flow, batches: Iterable[Batch]) -> list[Estimate]:
         found: list[Estimate] = []
         for batch in batches:
-            flow.knowledge = self._job.knowledge_at(batch.t_end_ns)
             found += (one for one in flow.weigh(batch) if not one.is_remainder)
         return found
 

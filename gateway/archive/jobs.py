@@ -13,19 +13,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
-from itertools import groupby, pairwise
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
 from gateway.archive.dataset import SCHEMA_VERSION
-from gateway.archive.manifest import FOREVER_NS, Assignment
+from gateway.archive.manifest import Assignment
 from gateway.archive.places import Location
 from gateway.archive.receipts import Slot
 from gateway.archive.survey import Facts, LogFile, SurveyedLog
-from gateway.calibration.known_weights_file import KnownWeights
-from gateway.core.known_weights import Knowledge
 from gateway.core.settings import BatchSettings
-from gateway.records import ns_of
 from gateway.setup import Setup
 from gateway.units import NS_PER_S
 from gateway.weighing.flow import Identity
@@ -84,15 +81,6 @@ UNKNOWN_MONTH: Final = "unknown"
 
 
 @dataclass(frozen=True, slots=True)
-class KnowledgeSpan:
-    """The effect of known weights, and when it applied."""
-
-    knowledge: Knowledge
-    since_ns: int
-    until_ns: int
-
-
-@dataclass(frozen=True, slots=True)
 class JobLog:
     """A log of a job: its place, its surveyed facts, and its start, or its place in time if it has no frame."""
 
@@ -118,7 +106,6 @@ class ArchiveJob:
     identity: Identity
     setup: Setup
     settings: BatchSettings
-    known_weights: tuple[KnowledgeSpan, ...]
     lead_in: tuple[JobLog, ...]
     logs: tuple[JobLog, ...]
     next_ns: int | None
@@ -127,10 +114,6 @@ class ArchiveJob:
     @property
     def size(self) -> int:
         return sum(one.log.size for one in self.logs)
-
-    def knowledge_at(self, t_ns: int) -> Knowledge | None:
-        """The knowledge from known weights at the end of a batch."""
-        return next((span.knowledge for span in self.known_weights if span.since_ns < t_ns <= span.until_ns), None)
 
 
 def plan(
@@ -151,17 +134,14 @@ def plan(
     }
     identity = Identity(assignment.vehicle, assignment.vin)
     for month, lead_in, own, next_ns in _months(_in_order(logs, facts, assignment.span_ns)):
-        start_ns, end_ns = (lead_in or own)[0].start_ns, FOREVER_NS if next_ns is None else next_ns
-        known = _spans(assignment.known_weights, setup, start_ns, end_ns)
         inputs = {
             **common,
-            "known_weights": [[span.knowledge.id, span.since_ns, span.until_ns] for span in known],
             "lead_in": [one.facts.sha256 for one in lead_in],
             "logs": [[one.log.name, one.facts.sha256] for one in own],
             "next_ns": next_ns,
         }
         slot = Slot(assignment.vehicle, month, hash_of(inputs))
-        yield ArchiveJob(dataset, slot, identity, setup, settings, known, tuple(lead_in), tuple(own), next_ns, inputs)
+        yield ArchiveJob(dataset, slot, identity, setup, settings, tuple(lead_in), tuple(own), next_ns, inputs)
 
 
 def _months(logs: Sequence[JobLog]) -> Iterator[tuple[str, Sequence[JobLog], Sequence[JobLog], int | None]]:
@@ -196,25 +176,3 @@ def signals_id(setup: Setup) -> str:
     held = setup.signal_map
     content = repr((held.channel, held.j1939, str(held.zone), [(m, sorted(m.fields.items())) for m in held.messages]))
     return "sha256:" + hashlib.sha256(content.encode()).hexdigest()
-
-
-def _spans(known: KnownWeights, setup: Setup, start_ns: int, end_ns: int) -> tuple[KnowledgeSpan, ...]:
-    """The knowledge from a gateway's known weights, from each change of their list to the next, within a span of
-    time.
-    """
-    calibration_id = setup.calibration.id if setup.calibration else None
-    moments = {
-        ns_of(moment)
-        for one in known.entries
-        for moment in (one.at, one.confirmed and one.confirmed.at, one.ended and one.ended.at)
-        if moment
-    }
-    changes = [*sorted(moments), FOREVER_NS]
-    spans = []
-    for since_ns, until_ns in pairwise(changes):
-        if since_ns >= end_ns or until_ns < start_ns:
-            continue
-        knowledge = known.as_of(since_ns + 1).knowledge(calibration_id, setup.estimator)
-        if knowledge is not None:
-            spans.append(KnowledgeSpan(knowledge, since_ns, until_ns))
-    return tuple(spans)

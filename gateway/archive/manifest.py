@@ -15,7 +15,6 @@ from typing import Annotated, Any, Final
 from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from gateway.archive.places import Location, place_of
-from gateway.calibration.known_weights_file import KnownWeights, known_weights_of
 from gateway.config import BatchSection, EstimatorName
 from gateway.config.sections import OF_CALIBRATION, LimitKg
 from gateway.core.settings import BatchSettings
@@ -68,9 +67,6 @@ class VehicleEntry(Means):
     logs: str | None = Field(None, description="folder of its logs, below the top's, or a URL [default: its id]")
     since: Instant | None = Field(None, description="counts for logs that begin then or later; a day, or with a zone")
     until: Instant | None = Field(None, description="counts for logs that begin earlier than that")
-    known_weights: str | None = Field(
-        None, description="known_weights.json of its gateway: each entry counts while it was in use"
-    )
 
     @model_validator(mode="after")
     def _makes_sense(self) -> "VehicleEntry":
@@ -115,12 +111,11 @@ class Assignment:
     shown: str  # of its folder, as the data set names its logs
     span_ns: tuple[int, int]
     setup: Setup
-    known_weights: KnownWeights
 
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """A checked archive: all its signal maps, calibrations and known weights could be loaded."""
+    """A checked archive: all its signal maps and calibrations could be loaded."""
 
     where: str
     assignments: tuple[Assignment, ...]
@@ -171,10 +166,8 @@ def _assignment(base: Location, told: ManifestFile, entry: VehicleEntry, load: A
     except ConfigurationError as fault:
         raise ConfigurationError(f"{where}: {fault}") from None
     folder = entry.logs or entry.name
-    named = entry.known_weights
-    known = known_weights_of(_read(base, named), f"{base}/{named}") if named else KnownWeights()
     place = _below(_below(base, told.logs), folder)
-    return Assignment(entry.name, entry.vin, place, folder.rstrip("/"), entry.span_ns, setup, known)
+    return Assignment(entry.name, entry.vin, place, folder.rstrip("/"), entry.span_ns, setup)
 
 
 def _found(named: str) -> tuple[Location, str, bytes]:

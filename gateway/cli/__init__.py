@@ -20,10 +20,9 @@ from gateway.errors import SpringscaleError
 
 _COMMANDS = {
     "calibrate": "Make a calibration file from drives with known loads.",
-    "calibration": "Show a calibration file, find the sprung mass, state known weights to a running service.",
+    "calibration": "Show a calibration file, and find the sprung mass.",
     "campaign": "Pack known-load drives into one archive, to pass on or to contribute.",
     "check-config": "Check a configuration, without opening the bus.",
-    "commission": "Calibrate a running service's vehicle from its axle weights and an empty drive.",
     "demo": "Run the whole service on a simulated drive: no hardware, no configuration.",
     "estimate": "Weigh from log files, one line per batch.",
     "evaluate": "Compare estimates with known loads: the error table.",
@@ -40,7 +39,6 @@ _COMMANDS = {
     "simulate": "Simulate drives, as log files or onto a bus.",
     "state": "Say to a running service what its vehicle carries, import delivery notes, and see what became of them.",
     "token": "Make, list and revoke access tokens for other machines.",
-    "verification": "Known loads compared with the estimates of a running service, as dated records.",
 }  # each in the module of its name
 
 

@@ -1,4 +1,4 @@
-"""springscale calibration: show a calibration file, find the sprung mass, state known weights to a service."""
+"""springscale calibration: show a calibration file, and find the sprung mass."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -11,7 +11,6 @@ import numpy as np
 from gateway.calibration.axle_weights import UNSPRUNG_SHARE, AxleWeights, Sprung, sprung_of
 from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.calibration.file.parts import ExpectedErrorsPart
-from gateway.cli.known_weights import tare_commands, ticket_commands
 from gateway.cli.options import FILE, NumberRange, Told, prints
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.model.table import LOG, ROWS
@@ -23,11 +22,7 @@ from gateway.words import in_sections, known
 
 @click.group("calibration")
 def calibration() -> None:
-    """Show a calibration file, find the sprung mass, and state known weights to a running service (tare, ticket)."""
-
-
-calibration.add_command(tare_commands)
-calibration.add_command(ticket_commands)
+    """Show a calibration file, and find the sprung mass."""
 
 
 @calibration.command("show")

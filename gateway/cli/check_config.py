@@ -1,6 +1,5 @@
 """springscale check-config: everything that can be checked without the bus."""
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -8,12 +7,11 @@ from typing import Any
 import click
 
 from gateway.bus.signals import unsound_messages
-from gateway.calibration.known_weights_file import FILE_NAME
 from gateway.cli.options import FILE, Told, prints
 from gateway.config import Settings, load_settings
 from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError
-from gateway.service.calibration_in_use import with_commissioned
+from gateway.service.calibration_in_use import with_learnt
 from gateway.service.lifecycle import startable_faults
 from gateway.setup import Setup, setup_of
 from gateway.uplink.settings import uplink_settings, webhook_settings
@@ -23,12 +21,9 @@ from gateway.uplink.settings import uplink_settings, webhook_settings
 @click.argument("config", type=FILE)
 @prints
 def check_config(config: Path) -> Told:
-    """Check CONFIG, its signal map, its DBC files, its calibration and its known weights; name every fault."""
+    """Check CONFIG, its signal map, its DBC files and its calibration; name every fault."""
     settings = load_settings(config)
     setup = setup_of(settings)
-    known_weights = settings.store.directory / FILE_NAME
-    if os.access(known_weights, os.R_OK):  # the service's own; others may not be allowed to see it
-        setup = setup.with_known_weights_of(known_weights)
     faults = tuple(startable_faults(settings, setup.signal_map))
     if faults:
         raise ConfigurationError("\n".join(f"{config}: {fault}" for fault in faults))
@@ -38,7 +33,6 @@ def check_config(config: Path) -> Told:
         "config": str(config),
         "signals": [str(signal) for signal in setup.signal_map.signals],
         "calibration_id": setup.calibration.id if setup.calibration else None,
-        "known_weights_id": setup.knowledge.id if setup.knowledge else None,
         "estimator": setup.estimator,
         "interface": settings.bus.interface,
         "channel": settings.bus.channel,
@@ -56,12 +50,12 @@ def _left_out(fault: str) -> str:
 
 def _sentences(config: Path, settings: Settings, setup: Setup) -> Iterator[str]:
     yield f"{config}: good. Reads {', '.join(setup.signal_map.signals)} from {settings.bus.channel}."
-    if (commissioned := with_commissioned(settings)) is not settings:
-        yield f"The service weighs with the calibration that was made on the vehicle: {commissioned.calibration}."
+    if (learning := with_learnt(settings)) is not settings:
+        yield f"The service weighs with the calibration that it has learnt: {learning.calibration}."
     elif setup.calibration is None:
         yield (
-            "No calibration is configured: batches will carry spectra and rejected = no_calibration, until one is made "
-            "on the vehicle (springscale commission)."
+            "No calibration is configured: batches will carry spectra and rejected = no_calibration, until one is "
+            "learnt from drives (springscale state vehicle)."
         )
     elif limits := limits_in_force(setup):
         yield f"It may weigh: {', '.join(f'{name} {kg:g} kg' for name, kg in limits.items())}."

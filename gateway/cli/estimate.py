@@ -14,13 +14,12 @@ import click
 
 from gateway.bus.logs import LogReport
 from gateway.calibration.file.calibration_file import CalibrationFile
-from gateway.calibration.known_weights_file import FILE_NAME
 from gateway.cli import options
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
 from gateway.config import load_settings
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
-from gateway.errors import ConfigurationError, NothingWeighedError
+from gateway.errors import NothingWeighedError
 from gateway.estimate import Estimate
 from gateway.estimate_json import COLUMNS, estimate_to_json, table_row, without_dates
 from gateway.offline.estimates import with_remainders
@@ -35,10 +34,6 @@ from gateway.units import NS_PER_S, si_factor
 @options.config
 @options.signals
 @options.calibration
-@click.option(
-    "--known-weights", type=FILE, default=None, help="known_weights.json of a service [default: that of --config]"
-)
-@click.option("--no-known-weights", is_flag=True, help="by the calibration alone, without the service's known weights")
 @one_estimator
 @window
 @as_json
@@ -48,8 +43,6 @@ def estimate(
     config_path: Path | None,
     signals: str | None,
     calibration: Path | None,
-    known_weights: Path | None,
-    no_known_weights: bool,
     estimator: str | None,
     window_s: float | None,
     as_json: bool,
@@ -63,11 +56,7 @@ def estimate(
     """
     if as_json and as_csv:
         raise click.UsageError("give --json or --csv, not both")
-    if known_weights is not None and no_known_weights:
-        raise click.UsageError("give --known-weights FILE or --no-known-weights, not both")
-    setup, settings, state = prepared(config_path, signals, calibration, estimator, window_s)
-    if not no_known_weights:
-        setup = with_known_weights(setup, known_weights, state)
+    setup, settings = prepared(config_path, signals, calibration, estimator, window_s)
     lines = partial(_csv, has_logs=len(logs) > 1) if as_csv else _json_lines if as_json else _sentences
     reasons, unlike, refused = Counter[Why | None](), Counter[Why](), list[str]()
 
@@ -168,8 +157,8 @@ def prepared(
     calibration: Path | None,
     estimator: str | None,
     window_s: float | None,
-) -> tuple[Setup, BatchSettings, Path | None]:
-    """The estimator, the batch settings, and the service's state directory (None without a service)."""
+) -> tuple[Setup, BatchSettings]:
+    """The estimator and the batch settings."""
     if config_path is not None:
         if signals is not None:
             raise click.UsageError("give --config or --signals, not both")
@@ -177,23 +166,10 @@ def prepared(
         if calibration is not None:
             configured = configured.model_copy(update={"calibration": calibration})
         batch = replace(configured.batch.for_core(window_s=window_s), position_decimals=configured.position.decimals)
-        return setup_of(configured, estimator), batch, configured.store.directory
+        return setup_of(configured, estimator), batch
     if signals is None:
         raise click.UsageError("give --config FILE, or --signals FILE (and --calibration FILE)")
-    return load_setup(signals, calibration, estimator), batch_settings(window_s), None
-
-
-def with_known_weights(setup: Setup, named: Path | None, state: Path | None) -> Setup:
-    """With those of the named file, which must have one of this calibration; else with the service's."""
-    if named is None:
-        return setup if state is None else setup.with_known_weights_of(state / FILE_NAME)
-    known = setup.with_known_weights_of(named)
-    if known.knowledge is None:
-        calibration_id = setup.calibration.id if setup.calibration else "none"
-        raise ConfigurationError(
-            f"{named}: no known weight in use for the estimator {setup.estimator} and the calibration {calibration_id}"
-        )
-    return known
+    return load_setup(signals, calibration, estimator), batch_settings(window_s)
 
 
 def sentence(record: Mapping[str, Any]) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from gateway.cli import options
-from gateway.cli.estimate import half_width, prepared, tell, when_told, with_known_weights
+from gateway.cli.estimate import half_width, prepared, tell, when_told
 from gateway.cli.options import FILE, as_json, one_estimator, window
 from gateway.core.events.entry import Entry, EntryKind
 from gateway.estimate_json import without_dates
@@ -34,12 +34,11 @@ def events(
 ) -> None:
     """What was loaded and unloaded, and every trip, from the LOGs of one vehicle in order of time.
 
-    One line each; with --json the objects that the service stores, in their last revision. Loads take the known
-    weights of the service of --config into account.
+    One line each; with --json the objects that the service stores, in their last revision.
     """
-    setup, settings, state = prepared(config_path, signals, calibration, estimator, window_s)
+    setup, settings = prepared(config_path, signals, calibration, estimator, window_s)
     require_order(logs, setup.signal_map)
-    for entry in entries_of_logs(logs, with_known_weights(setup, None, state), settings, on_read=tell):
+    for entry in entries_of_logs(logs, setup, settings, on_read=tell):
         click.echo(json_line(without_dates(entry.record)) if as_json else entry_sentence(entry))
 
 

@@ -15,8 +15,6 @@ from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, Settings
 from gateway.config.sections import (
     OF_CALIBRATION,
     AlarmsSection,
-    CommissioningSection,
-    KeepSection,
     LearningSection,
     LimitKg,
     PositionSection,
@@ -24,7 +22,6 @@ from gateway.config.sections import (
     Seconds,
     SettingsSection,
     UplinkSection,
-    VerificationSection,
     WebhookSection,
 )
 from gateway.core.settings import BatchSettings
@@ -186,11 +183,8 @@ class Settings(BaseSettings):
     batch: BatchSection = BatchSection()
     web: WebSection = WebSection()
     store: StoreSection = StoreSection()
-    keep: KeepSection = KeepSection()
     record: RecordSection = RecordSection()
-    verification: VerificationSection = VerificationSection()
     learning: LearningSection = LearningSection()
-    commissioning: CommissioningSection = CommissioningSection()
     position: PositionSection = PositionSection()
     alarms: AlarmsSection = AlarmsSection()
     uplink: UplinkSection = UplinkSection()

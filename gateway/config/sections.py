@@ -1,4 +1,4 @@
-"""Tables of springscale.toml about a service's own work: what it keeps, calibrates and verifies, reports and sends."""
+"""Tables of springscale.toml about a service's own work: what it records and learns, reports and sends."""
 
 from pathlib import Path
 from typing import Annotated, Final, Literal, Self
@@ -23,13 +23,6 @@ class SettingsSection(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class KeepSection(SettingsSection):
-    """The batches kept for later calibrations, which then need no logs."""
-
-    batches: int = Field(256, ge=0, le=100_000, description="batches kept at most, the newest (0: none)")
-    size_mb: float = Field(128.0, ge=1.0, le=100_000.0, description="disk space for them; the oldest are removed")
-
-
 class RecordSection(SettingsSection):
     """The ring log: the mapped frames themselves, kept on disk as long as there is room."""
 
@@ -37,21 +30,6 @@ class RecordSection(SettingsSection):
     directory: Path | None = Field(None, description="folder of the files [default: `record` in that of the store]")
     max_size_mb: float = Field(1024.0, ge=16.0, le=1e9, description="the oldest files are removed beyond this size")
     free_mb: float = Field(256.0, ge=0.0, le=1e9, description="with less free space on the disk nothing is recorded")
-
-
-class VerificationSection(SettingsSection):
-    """Requirements of a verification with known loads, and how often it is due: choose what your law or your customer
-    requires.
-    """
-
-    permitted_error_pct: float = Field(
-        5.0, gt=0.0, le=100.0, description="largest error of the gross weight, in percent of the known one"
-    )
-    permitted_axle_error_pct: float | None = Field(
-        None, gt=0.0, le=100.0, description="the same for each axle's [default: axles are reported and not judged]"
-    )
-    loads: int = Field(1, ge=1, le=10, description="least number of known loads for a record to pass")
-    every_days: float = Field(0.0, ge=0.0, le=36_500.0, description="due so long after the last that passed (0: never)")
 
 
 class LearningSection(SettingsSection):
@@ -62,23 +40,6 @@ class LearningSection(SettingsSection):
     size_mb: float = Field(100.0, ge=1.0, le=100_000.0, description="disk space for drives to learn from")
     memory_mb: float = Field(
         1024.0, ge=256.0, le=16_384.0, description="address space of the process that learns, which takes less memory"
-    )
-
-
-class CommissioningSection(SettingsSection):
-    """Calibrating on the vehicle itself, from an empty drive."""
-
-    is_allowed: bool = Field(True, description="whether users with scope operate may make a calibration here")
-    like: Path | None = Field(None, description="calibration file of a vehicle of the same model: the prior of the fit")
-    goal_pct: float = Field(
-        4.5,
-        ge=0.5,
-        le=50.0,
-        description="the drive is sufficient when the standard deviation of a payload is this share of the largest "
-        "payload",
-    )
-    memory_mb: float = Field(
-        768.0, ge=256.0, le=16_384.0, description="address space of the process that fits, which takes far less memory"
     )
 
 

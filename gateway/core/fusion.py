@@ -22,7 +22,7 @@ BATCH_IDS: Final = 20  # chosen: newest batch ids kept per weighed load
 
 @dataclass(frozen=True)
 class LoadEpoch:
-    """The posteriors, as measured, of the batches of one load since t_start_ns.
+    """The posteriors of the batches of one load since t_start_ns.
 
     ``is_change`` is true if a jump between batches opened the epoch.
     """
@@ -78,7 +78,7 @@ def fused_epoch(
     end the old epoch.
     """
     kept = None if could_have_changed else epoch
-    posterior = estimate.as_measured
+    posterior = estimate.posterior
     if posterior is None or not teaches(estimate):
         return kept
     if kept is None:

@@ -24,14 +24,11 @@ from gateway.units import NS_PER_S
 
 @dataclass(frozen=True, slots=True)
 class Weighing:
-    """One counted batch: ``measured`` without known weights (they come and go without a change of load), ``shown`` with
-    them. ``at`` is its index among all batches, ``by`` its calibration and estimator.
-    """
+    """One counted batch. ``at`` is its index among all batches, ``by`` its calibration and estimator."""
 
     at: int
     by: tuple[str | None, str]
-    measured: Posterior
-    shown: Posterior
+    posterior: Posterior
 
 
 class Weighings:
@@ -41,12 +38,8 @@ class Weighings:
         self.each = each
 
     @cached_property
-    def measured(self) -> Fusible:
-        return Fusible([one.measured for one in self.each])
-
-    @cached_property
-    def shown(self) -> Fusible:
-        return Fusible([one.shown for one in self.each])
+    def fusible(self) -> Fusible:
+        return Fusible([one.posterior for one in self.each])
 
     def __len__(self) -> int:
         return len(self.each)
@@ -69,21 +62,17 @@ class FusedLoad:
         return self.last - self.first + 1
 
     @cached_property
-    def measured(self) -> Posterior:
-        """The fused posterior without known weights."""
-        return self.weighings.measured.fused(self.first, self.last + 1)
-
-    @cached_property
-    def shown(self) -> Posterior:
-        return self.weighings.shown.fused(self.first, self.last + 1)
+    def posterior(self) -> Posterior:
+        """That of all of them together."""
+        return self.weighings.fusible.fused(self.first, self.last + 1)
 
 
 def weighings_of(estimates: Sequence[Estimate]) -> list[Weighing]:
     """The weighings of the batches that give a payload."""
     return [
-        Weighing(at, (one.calibration_id, one.estimator), one.as_measured, one.posterior)
+        Weighing(at, (one.calibration_id, one.estimator), one.posterior)
         for at, one in enumerate(estimates)
-        if teaches(one) and one.as_measured is not None and one.posterior is not None
+        if teaches(one) and one.posterior is not None
     ]
 
 
@@ -275,4 +264,4 @@ def _between(before: FusedLoad, after: FusedLoad, links: Sequence[LoadLink], rul
     each = before.weighings.each
     if each[before.last].by != each[after.first].by:
         return 1.0
-    return probability(before.measured, after.measured, links[before.last].prior, rules)
+    return probability(before.posterior, after.posterior, links[before.last].prior, rules)

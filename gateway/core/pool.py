@@ -117,7 +117,7 @@ def changes_of(parts: Parts, weigh: Weigh, rules: Rules) -> list[int]:
         return []
     bounds = [begin_ns, *(halt.middle[1] for halt in halts), end_ns]
     found = [weigh(spanned(parts, *span)) for span in pairwise(bounds)]
-    weighings = [Weighing(i, (None, ""), one, one) for i, one in enumerate(found) if one is not None]
+    weighings = [Weighing(i, (None, ""), one) for i, one in enumerate(found) if one is not None]
     links = [
         LoadLink(tuple(halts[one.at : other.at]), bounds[one.at + 1], bounds[other.at])
         for one, other in pairwise(weighings)

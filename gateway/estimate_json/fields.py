@@ -101,7 +101,6 @@ _CG_LEFT: Final = BY_NAME["cg_left"].words
 _ROLL_SHARE: Final = "part of a sideways load's moment that the front axle takes, 0 to 1"
 _POINTS: Final = "its standard deviation, in percentage points"
 _STD: Final = "its standard deviation"
-_RAW: Final = "by the calibration alone, without known weights"
 
 _WEIGHTS: Final = Weights(
     Weight(1711.3, 6.1, 2000.0, None),
@@ -158,16 +157,6 @@ FIELDS: Final = (
     _known("epoch_cg_left_m", "epoch.cg_left.number", _CG_LEFT, 0.02),
     _known("epoch_cg_left_std_m", "epoch.cg_left.std", _STD, 0.003),
     _known("epoch_n_batches", "epoch.n_batches", "batches since the load last changed", 3.0, COUNT),
-    _column(
-        "known_weights_id",
-        TEXT,
-        "hash of the known weights that this estimate takes into account; absent: none",
-        presence=Presence.WHERE_KNOWN,
-    ),
-    _known("raw_payload_kg", "raw_payload.number", _RAW, 283.7),
-    _known("raw_payload_std_kg", "raw_payload.std", _STD),
-    _known("raw_front_share_pct", "raw_front_share.number", _RAW),
-    _known("raw_front_share_std_pct", "raw_front_share.std", _POINTS),
     *_found("cg_left", 0.021, 0.004, [0.013, 0.029]),
     *_found("left_share", 51.2, 0.2, [50.8, 51.7]),
     _row("payload_cg_left_correlation", NUMBER, "of the errors of payload and `cg_left_m`, -1 to 1", 0.11),
@@ -204,12 +193,6 @@ FIELDS: Final = (
         _POSTERIOR,
         POSTERIOR,
     ),
-    _known(
-        "measured_posterior",
-        "measured",
-        "the same before known weights were taken into account; absent: there are none",
-        kind=POSTERIOR,
-    ),
     _known("epoch_posterior", "epoch.posterior", "of all batches of this load together", kind=POSTERIOR),
     _known("vin", "vin", "vehicle identification number", kind=TEXT),
     _known("provisional", "is_provisional", "true: an early look at a batch that is still growing", kind=FLAG),
@@ -218,10 +201,7 @@ FIELDS: Final = (
 COLUMNS: Final = tuple(column for one in FIELDS for column in one.columns)
 
 
-_FOLLOWS: Final = frozenset(one.name for one in FIELDS if one.name.startswith("raw_") or "correlation" in one.name) | {
-    "id",
-    "t_end",
-}
+_FOLLOWS: Final = frozenset(one.name for one in FIELDS if "correlation" in one.name) | {"id", "t_end"}
 """Fields that follow from others and are not read back."""
 
 

@@ -1,19 +1,10 @@
-"""The calibration that a service uses: the one learnt or made on the vehicle, else the configured file."""
+"""The calibration that a service uses: the one learnt here, else the configured file."""
 
 from gateway.config import Settings
 from gateway.errors import ConfigurationError
-from gateway.service.commissioning.record import FILE_NAME, CommissioningRecord
-from gateway.service.learner.book import FILE_NAME as LEARNING
-from gateway.service.learner.book import LearningRecord
+from gateway.service.learner.book import FILE_NAME, LearningRecord
 from gateway.service.record_file import load_record
 from gateway.setup import Setup, setup_of
-
-
-def why_not_allowed(settings: Settings) -> str | None:
-    """Why no calibration may be made on this vehicle; None if one may."""
-    if not settings.commissioning.is_allowed:
-        return "[commissioning] is_allowed = false: calibrations come by file"
-    return None
 
 
 def why_not_learning(settings: Settings) -> str | None:
@@ -23,12 +14,12 @@ def why_not_learning(settings: Settings) -> str | None:
     return None
 
 
-def with_commissioned(settings: Settings) -> Settings:
-    """The settings with the calibration that was learnt or made here and is in use; unchanged if there is none.
+def with_learnt(settings: Settings) -> Settings:
+    """The settings with the calibration that was learnt here and is in use; unchanged if there is none.
 
     An invalid record is ignored here: the service sets it aside and reports it.
     """
-    name = _learnt(settings) or _made(settings)
+    name = _learnt(settings)
     if name is None:
         return settings
     path = settings.store.directory / name
@@ -39,32 +30,22 @@ def _learnt(settings: Settings) -> str | None:
     if why_not_learning(settings) is not None:
         return None
     try:
-        active = load_record(settings.store.directory / LEARNING, LearningRecord()).active
+        active = load_record(settings.store.directory / FILE_NAME, LearningRecord()).active
     except ConfigurationError:
         return None
     return None if active is None else active.file_name
 
 
-def _made(settings: Settings) -> str | None:
-    if why_not_allowed(settings) is not None:
-        return None
-    try:
-        active = load_record(settings.store.directory / FILE_NAME, CommissioningRecord()).active
-    except ConfigurationError:
-        return None
-    return None if active is None else active.file_name
-
-
-def commissioned(settings: Settings) -> tuple[Settings, Setup, str | None]:
-    """The settings in use, the setup, and why the calibration made on the vehicle is not in use, None if it is.
+def learnt(settings: Settings) -> tuple[Settings, Setup, str | None]:
+    """The settings in use, the setup, and why the calibration learnt here is not in use, None if it is.
 
     Raises as ``setup_of``.
     """
-    chosen = with_commissioned(settings)
+    chosen = with_learnt(settings)
     if chosen is settings:
         return settings, setup_of(settings), None
     try:
         return chosen, setup_of(chosen), None
     except ConfigurationError as broken:
-        fault = f"the calibration made on the vehicle cannot be used ({broken}): make another, or undo it"
+        fault = f"the calibration that was learnt cannot be used ({broken}): choose another version, or `file`"
         return settings, setup_of(settings), fault

@@ -22,8 +22,6 @@ from gateway.service.journal_reader import JournalReader
 from gateway.service.part import CLOSE_WITHIN_S, Deadline, Periodic, Questions, in_own_thread, stop_in_turn
 from gateway.service.parts import (
     board_of,
-    commissioning_of,
-    keeper_of,
     learner_of,
     ring_log_of,
     source_of,
@@ -34,10 +32,7 @@ from gateway.service.parts import (
 )
 from gateway.service.pipeline import Beside, Pipeline
 from gateway.service.status import StatusReport
-from gateway.service.verification.known_weights import KnownWeightService
-from gateway.service.verification.verification import VerificationService
 from gateway.setup import Setup
-from gateway.stated.facts import Rule
 from gateway.uplink.settings import uplink_settings, webhook_settings
 from gateway.web.access.serving import WebServer, refuse_open_address, server_config
 from gateway.web.access.tokens import TokenFile
@@ -76,7 +71,7 @@ class Gateway:
     ) -> None:
         """``by_file`` is the calibration that the settings name, if another one is in use.
 
-        ``setup_fault`` says why the calibration that was made on the vehicle is not in use.
+        ``setup_fault`` says why the calibration that was learnt is not in use.
 
         ``open_receiver`` replaces the bus interface (soak run).
         """
@@ -97,8 +92,6 @@ class Gateway:
         self.board = board_of(settings.web.stale_after_s, self.store, setup)
         self.source = source_of(settings.bus, setup, open_receiver)
         flow = setup.flow(replace(settings.batch.for_core(is_live=True), position_decimals=settings.position.decimals))
-        self.keeper = keeper_of(settings.keep, settings.store, setup)
-        self.commissioning = commissioning_of(settings, setup, self.keeper, flow, self.store)
         self.learner = learner_of(settings, by_file or settings.calibration, setup, flow, self.store)
         log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.ring_log = ring_log_of(settings, setup)
@@ -116,19 +109,7 @@ class Gateway:
         )
         self.uplink = uplink_of(broker, setup, self.store, with_places=with_places)
         self.webhook = webhook_of(receiver, self.store, with_places=with_places)
-        directory, reader, on_event = settings.store.directory, self.store.reader(), self.store.write_event
-        self.known_weights = KnownWeightService(
-            directory, subject, self.pipeline, reader, stale_after_s=settings.web.stale_after_s, on_event=on_event
-        )
-        self.verification = VerificationService(
-            directory,
-            subject,
-            reader,
-            Rule(**settings.verification.model_dump(exclude={"every_days"})),
-            payload_without=self.known_weights.payload_without,
-            every_days=settings.verification.every_days,
-            on_event=on_event,
-        )
+        reader = self.store.reader()
         self.status = StatusReport(
             settings,
             setup,
@@ -139,7 +120,6 @@ class Gateway:
             self.uplink,
             self.webhook,
             self.ring_log,
-            self.verification.status,
             alarms=self.alarms.summary,
             faults=self._faults,
         )
@@ -149,10 +129,7 @@ class Gateway:
             self.status,
             calibrated=setup.calibrated,
             tokens=token_file,
-            known_weights=self.known_weights,
-            commissioning=self.commissioning,
             known_loads=known_loads,
-            verification=self.verification,
             alarms=self.alarms.standing,
             learner=self.learner,
             are_places_read=settings.position.forward,
@@ -162,23 +139,15 @@ class Gateway:
         self._checks = Beside()
         self._stopping = asyncio.Event()
         self._failure: str | None = None
-        beside = (
-            self.commissioning,
-            self.learner,
-            self.keeper,
-            *self.readers,
-            self.ring_log,
-            self.uplink,
-            self.webhook,
-        )
+        beside = (self.learner, *self.readers, self.ring_log, self.uplink, self.webhook)
         self._beside = [part for part in beside if part is not None]
         self.parts: list[ServicePart] = [self.store, *self._beside, self.pipeline, self.source]  # in order of start
-        self.needs_restart = False  # with the calibration that was made meanwhile; see life.py
+        self.needs_restart = False  # with the calibration that was learnt meanwhile; see lifecycle.py
 
     def _faults(self) -> tuple[str, ...]:
         """Faults of parts that the status does not tell of, as sentences for people."""
-        faults = [self._tokens.fault, self._setup_fault, self._server.fault, self.known_weights.fault]
-        faults += [self.verification.fault, self._checks.fault, *(part.fault for part in self.parts)]
+        faults = [self._tokens.fault, self._setup_fault, self._server.fault]
+        faults += [self._checks.fault, *(part.fault for part in self.parts)]
         return tuple(fault for fault in faults if fault)
 
     @property
@@ -245,8 +214,7 @@ class Gateway:
                 self._notifier.send(WATCHDOG="1")
             is_asleep = is_ready and self.source.state is SourceState.BUS_SILENT
             look.go_on(ASLEEP_LOOK_S if is_asleep else LOOK_S)
-            is_due = self.learner.is_due or self.commissioning.is_due
-            if is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
+            if self.learner.is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
                 self.needs_restart = True
                 self.request_stop()
             with contextlib.suppress(TimeoutError):
@@ -285,7 +253,6 @@ class Gateway:
             steps.callback(lambda: self.store.flush(deadline.left_s(FLUSH_WITHIN_S)))
             steps.callback(lambda: self.pipeline.stop(deadline.left_s(PIPELINE_WITHIN_S)))
             steps.callback(lambda: self.source.stop(deadline.left_s(BUS_WITHIN_S)))
-            steps.callback(self.commissioning.ignore_batches)  # a batch cut short by the stop ends no window
 
     def _close_store(self, deadline: Deadline, late: Sequence[str]) -> None:
         self.store.write_event("stopped", {"failure": self._failure})

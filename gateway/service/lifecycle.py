@@ -12,7 +12,7 @@ from gateway.bus.signals.mapping import SignalMap
 from gateway.config import Settings
 from gateway.errors import ConfigurationError
 from gateway.records import Signal
-from gateway.service.calibration_in_use import commissioned
+from gateway.service.calibration_in_use import learnt
 from gateway.service.gateway import Gateway, OnStarted
 from gateway.service.parts import tls_of
 from gateway.store import why_no_database
@@ -84,10 +84,10 @@ def live(
 ) -> bool:
     """Serve until stopped -> whether to restart. Raises as ``setup_of`` and as :meth:`Gateway.run`.
 
-    A calibration made on the vehicle takes effect between two drives, when no window is open: the service ends and
+    A calibration that was learnt takes effect between two drives, when no window is open: the service ends and
     restarts. ``open_receiver`` is as of :class:`Gateway`.
     """
-    chosen, setup, fault = commissioned(settings)
+    chosen, setup, fault = learnt(settings)
     gateway = Gateway(
         chosen,
         setup,

@@ -7,16 +7,11 @@ from pathlib import Path
 from gateway.bus.live.source import LiveSource, OpenReceiver
 from gateway.bus.ring_log import RingLog
 from gateway.calibration.file.calibration_file import load_calibration
-from gateway.calibration.kept.shelf import FOLDER, Shelf, ShelfLimits
 from gateway.config import BusSection, Settings, StoreSection
-from gateway.config.sections import KeepSection
 from gateway.errors import CalibrationFileError
 from gateway.estimate_json import read_estimate
 from gateway.log import Event, log_event
-from gateway.service.calibration_in_use import why_not_allowed, why_not_learning
-from gateway.service.commissioning.empty_drive import ServiceVehicle
-from gateway.service.commissioning.session import Commissioning
-from gateway.service.keeper import BatchKeeper
+from gateway.service.calibration_in_use import why_not_learning
 from gateway.service.learner.learner import Learner, LearnerVehicle
 from gateway.setup import Setup
 from gateway.store import Latest, Retention, Store, restored
@@ -86,37 +81,6 @@ def board_of(stale_after_s: float, store: Store, setup: Setup) -> Board:
     if heard is not None and heard.calibration_id != setup.calibration_id:
         log_event(Event.CALIBRATION_CHANGED, calibration_id=setup.calibration_id, before=heard.calibration_id)
     return board
-
-
-def keeper_of(wanted: KeepSection, store: StoreSection, setup: Setup) -> BatchKeeper:
-    limits = ShelfLimits(wanted.batches, round(wanted.size_mb * BYTES_PER_MB))
-    return BatchKeeper(Shelf(store.directory / FOLDER, limits), setup.signal_map)
-
-
-def commissioning_of(settings: Settings, setup: Setup, keeper: BatchKeeper, flow: Flow, store: Store) -> Commissioning:
-    """The commissioning, subscribed to every batch that the flow passes to the keeper."""
-    own_name = settings.vehicle.calibrated_as
-    directory, path = settings.store.directory, settings.commissioning.like
-    like = load_calibration(path) if path else None
-    desk = Commissioning(
-        directory,
-        settings.commissioning,
-        settings.batch.for_core(),
-        keeper.shelf,
-        flow.scheduler,
-        ServiceVehicle(
-            name=own_name or settings.vehicle.id,
-            signals_id=setup.signal_map.id,
-            is_calibrated=setup.calibration is not None,
-            why_not_allowed=why_not_allowed(settings),
-            is_name_fixed=own_name is not None,
-            like=settings.commissioning.like,
-            sister=like.vehicle if like else None,
-        ),
-        on_event=store.write_event,
-    )
-    flow.on_batch, keeper.listener = keeper.keep, desk
-    return desk
 
 
 def learner_of(settings: Settings, by_file: Path | None, setup: Setup, flow: Flow, store: Store) -> Learner:

@@ -104,7 +104,6 @@ class Pipeline(ThreadPart):
         self._board = board
         self._on_frames = on_frames
         self._beside = Beside()
-        flow.on_batch = self._beside.guarded("batch keeper", flow.on_batch)
         flow.on_window = self._beside.guarded("learner", flow.on_window)
 
     def stop(self, within_s: float = STOP_WITHIN_S) -> None:

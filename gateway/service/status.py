@@ -23,7 +23,6 @@ from gateway.status import (
     Standing,
     State,
     Status,
-    VerificationStatus,
     judged,
 )
 from gateway.store import Store
@@ -54,7 +53,6 @@ class StatusReport:
     uplink: Uplink | None = None
     webhook: Webhook | None = None
     ring_log: RingLog | None = None
-    verification: Callable[[], VerificationStatus] = VerificationStatus
     _: KW_ONLY
     alarms: Callable[[], AlarmsStatus] = AlarmsStatus
     faults: Callable[[], tuple[str, ...]] = tuple
@@ -69,7 +67,6 @@ class StatusReport:
             vehicle_id=self.setup.identity.vehicle_id,
             vin=self.setup.identity.vin,
             calibration_id=self.setup.calibration_id,
-            known_weights_id=known.id if (known := self.pipeline.flow.knowledge) else None,
             estimator=self.setup.estimator,
             bus=self._bus(),
             decode=self._decode(),
@@ -85,7 +82,6 @@ class StatusReport:
             uplink=self.uplink.report() if self.uplink else None,
             webhook=self.webhook.report() if self.webhook else None,
             record=self.ring_log.status() if self.ring_log else None,
-            verification=self.verification(),
             alarms=self.alarms(),
         )
         return judged(now, self.faults())

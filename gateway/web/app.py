@@ -21,15 +21,12 @@ from gateway.web.live.board import LATEST_PATH, Board, LatestResponse
 from gateway.web.routes import service_calls as service
 from gateway.web.routes.alarms import alarms_router
 from gateway.web.routes.cab import cab_router
-from gateway.web.routes.commissioning import commissioning_router
 from gateway.web.routes.history import api_router, events_router, export_router
-from gateway.web.routes.known_weights import known_weights_router
 from gateway.web.routes.monitoring import alive_router, health_router, metrics_registry
 from gateway.web.routes.reasons import reasons_router
 from gateway.web.routes.spectra import spectra_router
 from gateway.web.routes.statements import statements_router
 from gateway.web.routes.vehicle import vehicle_router
-from gateway.web.routes.verification import verification_router
 from gateway.web.routes.weights import (
     KNOWN_LOADS_PATH,
     KnownLoads,
@@ -54,10 +51,7 @@ def create_app(
     status: Callable[[], Status],
     calibrated: CalibratedVehicle | None = None,
     tokens: TokenFile | None = None,
-    known_weights: service.KnownWeightBackend | None = None,
-    commissioning: service.CommissioningBackend | None = None,
     known_loads: KnownLoads | None = None,
-    verification: service.VerificationBackend | None = None,
     alarms: Callable[[], str] | None = None,
     learner: service.LearnerBackend | None = None,
     *,
@@ -90,9 +84,6 @@ def create_app(
         vehicle_router(status, calibrated, learner),
         *([statements_router(learner)] if learner else ()),
         spectra_router(board, calibrated),
-        *([known_weights_router(known_weights)] if known_weights else ()),
-        *([verification_router(verification)] if verification else ()),
-        *([commissioning_router(commissioning)] if commissioning else ()),
         export_router(reader),
         events_router(reader),
         *([alarms_router(reader, alarms)] if alarms else ()),

@@ -12,7 +12,6 @@ from gateway.core.cargo import is_said
 from gateway.core.change import Rules
 from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, WeighedLoad, epoch_of, fused_epoch, remembered
 from gateway.core.journey import way_of
-from gateway.core.known_weights import Knowledge
 from gateway.core.pool import (
     LEAST_LOAD_S,
     MOST_DRIVEN_S,
@@ -46,7 +45,6 @@ class Identity:
     vin: str | None = None
 
 
-OnBatch = Callable[[Batch, Estimate, Motion], None]
 OnWindow = Callable[[Batch, Motion], None]
 _TOO_LITTLE: Final = frozenset({Why.TOO_SHORT, Why.SPEED_SPREAD, Why.TOO_UNCERTAIN, Why.AMBIGUOUS})
 """Reasons that go away with more driving."""
@@ -57,9 +55,8 @@ class Flow:
 
     It yields estimates and refusals in order of time, and between them remainders: windows with too little driving,
     which wait in the pool (core.pool) for later windows.
-    ``knowledge`` (from known weights) may be set from any thread and applies from the next batch on. ``weighed`` is the
-    last load epoch with a counted batch, as measured; a known weight refers to it. ``on_batch`` is called for each
-    window before its estimate is returned, with the last estimate and the rows; ``on_window`` before it is weighed.
+    ``weighed`` is the last load epoch with a counted batch. ``on_window`` is called for each window, with its rows,
+    before it is weighed.
     """
 
     def __init__(
@@ -69,7 +66,6 @@ class Flow:
         calibrated: CalibratedVehicle | None,
         estimator: str,
         identity: Identity,
-        knowledge: Knowledge | None = None,
     ) -> None:
         self.settings = settings
         self.scheduler = Scheduler(settings, traits)
@@ -82,10 +78,8 @@ class Flow:
         self._is_epoch_over = False
         self._pool: Parts = ()
         self._open_s = 0.0  # usable time in the open window, by its last provisional estimate
-        self.knowledge = knowledge
         self.weighed: WeighedLoad | None = None
         self._rules = Rules.of(calibrated.vehicle) if calibrated else Rules()
-        self.on_batch: OnBatch = lambda batch, found, rows: None
         self.on_window: OnWindow = lambda batch, rows: None
 
     @property
@@ -123,11 +117,7 @@ class Flow:
         """
         rows = self.scheduler.take_rows()
         self.on_window(window, rows)
-        found = [self._early(window)] if window.is_provisional else self._of_window(window, rows)
-        if len(found) > 1:
-            window = replace(window, rejected=(Why.LOAD_CHANGED,))
-        self.on_batch(window, found[-1], rows)
-        return found
+        return [self._early(window)] if window.is_provisional else self._of_window(window, rows)
 
     def _early(self, window: Batch) -> Estimate:
         self._is_epoch_over |= window.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
@@ -217,29 +207,15 @@ class Flow:
         return replace(found, vehicle_id=self._identity.vehicle_id, vin=self._identity.vin)
 
     def _shown(self, found: Estimate, epoch: LoadEpoch | None = None) -> Estimate:
-        """The estimate as published: corrected by known weights, with the weights on the road and the error budget."""
+        """The estimate as published: with its load epoch, the weights on the road and the error budget."""
         if found.posterior is not None:
-            found = self._with_knowledge(found, epoch)
+            found = replace(found, epoch=None if epoch is None else epoch_of(epoch.posterior, epoch.n_batches))
         if self._calibrated is None:
             return weighed(found, None)
         vehicle = self._calibrated.vehicle
         if found.posterior is not None:
             found = replace(found, error_budget=budget_of(found.posterior, is_shape_said=is_said(vehicle)))
         return weighed(found, vehicle, self._calibrated.unsprung)
-
-    def _with_knowledge(self, found: Estimate, epoch: LoadEpoch | None) -> Estimate:
-        knowledge = self.knowledge
-        if knowledge is None or not knowledge.is_for(found.calibration_id, found.estimator):
-            return replace(found, epoch=None if epoch is None else epoch_of(epoch.posterior, epoch.n_batches))
-
-        def known(posterior: Posterior) -> Posterior:
-            return knowledge.applied(posterior, found.t_end_ns)
-
-        assert found.posterior is not None
-        answer = replace(
-            found.answered(known(found.posterior)), measured=found.posterior, known_weights_id=knowledge.id
-        )
-        return replace(answer, epoch=None if epoch is None else epoch_of(known(epoch.posterior), epoch.n_batches))
 
     def _fused(self, batch: Batch, found: Estimate, is_new_load: bool) -> LoadEpoch | None:
         """The load epoch of this batch; a new drive, a long stop or a changed load opens a new one."""

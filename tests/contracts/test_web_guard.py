@@ -77,11 +77,11 @@ def test_a_token_opens_what_its_scope_allows(client: Client, tokens: TokenFile) 
     for text in (reader, operator):
         assert client.get("/api/v1/estimates/latest", headers=bearer(text)).status_code == 200
         assert client.get("/api/v1/status", headers={"authorization": f"bearer  {text} "}).status_code == 200
-    undo = "/api/v1/calibration/commissioning/undo"
-    refused = client.request("POST", undo, headers=bearer(reader))
+    undo = "/api/v1/learning"
+    refused = client.request("PUT", undo, headers=bearer(reader))
     assert refused.status_code == 403
     assert 'scope="operate"' in refused.headers["www-authenticate"]
-    allowed = client.request("POST", undo, headers=bearer(operator))
+    allowed = client.request("PUT", undo, headers=bearer(operator))
     assert "www-authenticate" not in allowed.headers
 
 
@@ -143,7 +143,7 @@ def test_without_tokens_only_this_machine_is_answered(tmp_path: Path) -> None:
 def test_without_tokens_nobody_is_answered_through_a_proxy(tmp_path: Path, name: str, method: str) -> None:
     """To the service, all clients of a proxy on the same machine are that machine."""
     with Gateway(tmp_path) as gateway:
-        answer = Client(gateway.app).request(method, "/api/v1/calibration/tare", headers={name: "203.0.113.7"})
+        answer = Client(gateway.app).request(method, "/api/v1/statements", headers={name: "203.0.113.7"})
         assert answer.status_code == 403
 
 

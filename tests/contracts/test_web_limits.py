@@ -93,7 +93,7 @@ def test_what_is_no_request_ends_with_an_error_and_leaves_no_word_in_the_log(
     [(b"Content-Length: 100000000", b""), (b"Transfer-Encoding: chunked\r\nConnection: close", 4 * CHUNK)],
 )
 def test_an_endless_body_is_refused(tmp_path: Path, kind: bytes, body: bytes) -> None:
-    head = b"POST /api/v1/calibration/tare HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    head = b"POST /api/v1/statements HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
 
     async def scenario(server: Server) -> None:
         reader, writer = await asyncio.open_connection(*server.socket.getsockname())
@@ -108,7 +108,7 @@ def test_an_endless_body_is_refused(tmp_path: Path, kind: bytes, body: bytes) ->
 def test_a_body_as_long_as_allowed_is_read(tmp_path: Path) -> None:
     with Gateway(tmp_path) as gateway, serving(gateway.app) as server:
         spaces = b"{}".ljust(BODY_BYTES)
-        url, headers = f"{server.url}/api/v1/calibration/tare", {"content-type": "application/json"}
+        url, headers = f"{server.url}/api/v1/statements", {"content-type": "application/json"}
         assert httpx.post(url, content=spaces, headers=headers, timeout=PATIENCE_S).status_code == 422
         assert httpx.post(url, content=spaces + b" ", headers=headers, timeout=PATIENCE_S).status_code == 413
 

@@ -122,9 +122,9 @@ def test_what_is_not_there_is_a_problem(client: Client) -> None:
 def test_a_question_is_told_in_words_how_to_mend_it(client: Client) -> None:
     assert "send a next_cursor or last_cursor" in client.get("/api/v1/estimates?cursor=nonsense").json()["detail"]
     assert "query.sinc: unknown here" in client.get("/api/v1/estimates?sinc=x").json()["detail"]
-    form = client.request("POST", "/api/v1/calibration/tare", content=b"is_empty=true")
+    form = client.request("POST", "/api/v1/statements", content=b"is_empty=true")
     assert form.json()["detail"] == "body: send a JSON object, with Content-Type: application/json"
-    broken = client.request("POST", "/api/v1/calibration/tare", content=b"{", headers={"Content-Type": JSON})
+    broken = client.request("POST", "/api/v1/statements", content=b"{", headers={"Content-Type": JSON})
     assert broken.json()["errors"] == [{"where": "body.1", "what": "this is no JSON"}]
 
 

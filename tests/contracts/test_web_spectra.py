@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.estimates import posterior_of
 from support.half_car_road import batch_over_road
 from support.web import Client, Gateway
 
@@ -94,16 +93,6 @@ def test_the_next_batch_has_a_model_of_its_own(client: Client, board: Board, wei
     second = told(client)
     assert second["spectra"] == first["spectra"]
     assert second["model"]["pitch_rate_radps_rthz"] != first["model"]["pitch_rate_radps_rthz"]
-
-
-def test_the_model_is_of_what_was_measured(client: Client, board: Board, weighed: Estimate) -> None:
-    board.publish(weighed)
-    plain = told(client)["model"]
-    known = posterior_of(255.0, 47.3, 6.0, 0.2)
-    board.publish(replace(weighed.answered(known), measured=posterior_of(270.0, 47.0, 9.0, 0.3), known_weights_id="cd"))
-    answer = told(client)
-    assert answer["payload_kg"] == 255.0
-    assert answer["model"] == plain
 
 
 NO_MODEL = {

@@ -218,7 +218,7 @@ PATHS = ("/health/live", "/health/ready", "/api/v1/estimates/latest")
 def test_a_broken_side_file_is_told_and_set_aside_while_the_weighing_begins(
     config: Path, content: bytes | None
 ) -> None:
-    name = "known_weights.json"
+    name = "learning.json"
     state = config.parent / "state"
     state.mkdir()
     if content is None:

@@ -24,7 +24,7 @@ from gateway.service import gateway as service
 from gateway.service.alarms import AlarmService
 from gateway.service.batch_log import BatchLog, LoadEventLog, StateLog
 from gateway.service.gateway import Gateway
-from gateway.service.keeper import BatchKeeper
+from gateway.service.learner.learner import Learner
 from gateway.service.signal_watch import SignalWatch, StandingWatch
 from gateway.service.status import StatusReport
 from gateway.setup import setup_of
@@ -32,7 +32,7 @@ from gateway.web.live.board import Board
 
 CALLS: dict[str, tuple[type, str, str]] = {  # what is made to fail, and how the status names it
     "the recorder": (RingLog, "put", "the recorder failed"),
-    "the keeper of batches": (BatchKeeper, "keep", "the batch keeper failed"),
+    "the learner": (Learner, "take", "the learner failed"),
     "the watch of signals": (SignalWatch, "saw", "the watch of signals failed"),
     "the watch of stops": (StandingWatch, "saw", "the watch of stops failed"),
     "the board": (Board, "publish", "the board failed"),

@@ -114,7 +114,7 @@ SHAPES = {  # of a row whose checksum is right
     },
 }  # fmt: skip
 ROUTES = ("estimates/latest", "estimates", "events", "trips", "alarms", "cab", "weights/latest", "export.csv", "status")
-ROUTES += ("events.csv", "trips.csv", "vss", "calibration/tickets")
+ROUTES += ("events.csv", "trips.csv", "vss", "statements", "learning")
 
 
 def plant(database: Path, kind: str, texts: dict[str, str]) -> None:

@@ -10,10 +10,7 @@ import measured
 import pytest
 
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
-from gateway.calibration.known_weight import STD_KG, WeightRefusal
-from gateway.calibration.known_weights_file import MOST_KNOWN_WEIGHTS
 from gateway.config import BatchSection, Settings
-from gateway.core.known_weights import CONTRADICTED
 from gateway.records import Why
 
 ROOT = Path(__file__).parents[2]
@@ -89,17 +86,6 @@ def test_every_limit_of_a_reason_is_a_setting() -> None:
     others = {"cross_spectrum", "ratio_index", "valid_when", "wheel_speed", "pitch_rate"}
     limits = {name for row in REASONS for name in re.findall(r"`(\w+_\w+)`", row[2] + row[3])} - others
     assert limits <= set(BatchSection.model_fields)
-
-
-def test_every_refusal_of_a_known_weight_is_explained_and_the_numbers_are_the_codes() -> None:
-    page = text_of("known-weights.md")
-    table = page[page.index("| reason | what to do") :].split("\n\n")[0]
-    assert set(re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)) == {str(each) for each in WeightRefusal}
-    usual = re.findall(r"^\| `(\w+)` \|.*\| (\d+) kg", page, re.MULTILINE)
-    assert {kind: float(kg) for kind, kg in usual} == {str(kind): kg for kind, kg in STD_KG.items()}
-    assert f"Beyond {MOST_KNOWN_WEIGHTS} entries it forgets the oldest" in page
-    assert CONTRADICTED == 3.0
-    assert "more than three standard deviations" in page
 
 
 def test_every_finding_is_explained_once_as_the_code_has_it_and_found_somewhere_in_the_code() -> None:

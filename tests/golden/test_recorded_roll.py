@@ -1,13 +1,10 @@
 """The third gyro axis on recorded drives: calibrated with a roll rate, what is promised of loads that lie sideways, and
-of sister vehicles that inherit this calibration, at a desk or commissioned at a running service.
+of sister vehicles that inherit this calibration.
 
 The bounds are promises to users, not fits: they may only ever be tightened.
 """
 
 import json
-import os
-from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -15,21 +12,10 @@ from typing import Any
 import pytest
 from support.commands import printed
 from support.recordings import calibrated_with_roll_rate, recordings
-from support.sister_van import Commissioned, commissioned
 
 CROSS = ("--estimator", "cross_spectrum")
 QUANTITIES = ("payload", "front_share", "cg_left")
-NUMBERS = (
-    "t_end_ns",
-    "payload_kg",
-    "payload_std_kg",
-    "front_share_pct",
-    "front_share_std_pct",
-    "cg_left_m",
-    "cg_left_std_m",
-)
 VANS = ("van_1", "van_2")
-N_LOGS = int(os.environ.get("SPRINGSCALE_SISTER_LOGS", "1"))  # of each van's six loads are replayed into the service
 
 
 @pytest.fixture(scope="module")
@@ -96,46 +82,6 @@ def test_a_lost_roll_rate_leaves_true_intervals(
 def test_two_empty_drives_calibrate_a_sister(calibration: Path, tmp_path: Path) -> None:
     """On mixed drives with other loads, where priors of any vehicle refuse every batch at another speed."""
     _require_true([_sister(calibration, tmp_path / "van.json", name) for name in VANS], 3.0, 1.4)
-
-
-@pytest.fixture(scope="module")
-def commissioned_vans(calibration: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Commissioned]:
-    """A sister after her quarter of an hour at the running service, and her drives with loads; each once."""
-
-    @cache
-    def van(name: str) -> Commissioned:
-        return commissioned(name, calibration, tmp_path_factory.mktemp(name), N_LOGS)
-
-    return van
-
-
-@pytest.mark.parametrize("name", VANS)
-def test_commissioned_at_a_service_a_sister_weighs_as_calibrated_at_a_desk(
-    commissioned_vans: Callable[[str], Commissioned], calibration: Path, tmp_path: Path, name: str
-) -> None:
-    """Over HTTP and a bus, provisional estimates and all, or from logs: the same numbers, to the last bit."""
-    van = commissioned_vans(name)
-    printed("calibrate", van.desk_campaign, "--like", calibration, "--output", tmp_path / "desk.json", "--json", *CROSS)
-    desk, box = (json.loads(path.read_text()) for path in (tmp_path / "desk.json", van.calibration))
-    assert box["cross_spectrum"] == desk["cross_spectrum"]
-    assert box["sister_id"] == desk["sister_id"]
-    maps = ("--signals", van.signals, "--calibration", tmp_path / "desk.json", "--json", *CROSS)
-    told = [json.loads(line) for line in printed("estimate", *van.logs, *maps).splitlines()]
-    counted = [[one[key] for key in NUMBERS] for one in told if not one["rejected"]]
-    assert len(counted) == 3 * len(van.logs)
-    assert [[one[key] for key in NUMBERS] for one in van.weighed if not one["rejected"]] == counted
-
-
-def test_commissioned_at_a_service_errors_stay_small_and_intervals_true(
-    commissioned_vans: Callable[[str], Commissioned],
-) -> None:
-    """As of one empty drive at a desk: a quarter of an hour is enough.
-
-    A mean error of 1.5 % of the front share is wanted; three runs on one machine gave 1.51 once and at most 1.5 twice.
-    """
-    vans = {name: commissioned_vans(name) for name in VANS}
-    assert all(van.n_windows <= 3 for van in vans.values())
-    _require_true([_evaluated(van.calibration, name) for name, van in vans.items()], 3.5, 1.6)
 
 
 def _require_true(judged: list[dict[str, Any]], payload_pct: float, front_share_pct: float) -> None:

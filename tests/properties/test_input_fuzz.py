@@ -13,16 +13,12 @@ from typing import Any, Final
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from support.commissioning import ANSWERS, Bench
-from support.epochs import START_NS, drive_of, stored
-from support.known_weights import SUBJECT, KnownWeightBench
-from support.verification import CALIBRATED, verification_desk
+from support.learner import ANSWERS, LearnerBench, at
 from support.web import Client, Gateway
 
 from gateway.bus.logs.message_log import _CsvLog
 from gateway.bus.logs.open import open_whole_log
 from gateway.errors import LogUnreadableError
-from gateway.records import iso_utc
 
 MANY = settings(max_examples=500, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
 SLOWEST_S: Final = 5.0  # chosen: a thousand times what an answer takes
@@ -37,26 +33,11 @@ ANY = st.recursive(
     max_leaves=12,
 )
 
-AXLES = {"by": "axles", "front_axle_kg": 850.0, "rear_axle_kg": 1040.0}
-PAYLOAD = {"by": "payload", "payload_kg": 100.0, "position_m": 1.4, "at": iso_utc(START_NS + 60_000_000_000)}
-SOUND: dict[str, dict[str, Any]] = {  # by route, a body that it takes
-    "/api/v1/statements": {
-        "from": "2026-11-26T07:40:00Z",
-        "source": "scale",
-        "load": {"gross_kg": 1890.0},
-        "note": "x",
-    },
-    "/api/v1/known-weights": {"kind": "axle_pads", "weight": AXLES, "note": "scales"},
-    "/api/v1/calibration/tare": {"is_empty": True, "note": ""},
-    "/api/v1/calibration/tickets": {"weight": PAYLOAD, "note": "ticket"},
-    "/api/v1/calibration/verifications": {"loads": [PAYLOAD], "note": "scales"},
-    "/api/v1/calibration/commissioning": {"note": "begin"},
-    "/api/v1/calibration/commissioning/vehicle": ANSWERS,
-    "/api/v1/calibration/commissioning/empty": {"is_empty": True, "again": False},
-    "/api/v1/vehicle": ANSWERS,
-    "/api/v1/learning": {"use": "newest"},
+SOUND: dict[str, tuple[str, dict[str, Any]]] = {  # by route, its method and a body that it takes
+    "/api/v1/statements": ("POST", {"source": "empty", "from": at(0), "load": {"payload_kg": 0.0}}),
+    "/api/v1/vehicle": ("PUT", ANSWERS),
+    "/api/v1/learning": ("PUT", {"use": "newest"}),
 }
-PUT: Final = {"/api/v1/vehicle", "/api/v1/learning"}
 
 
 @st.composite
@@ -87,17 +68,8 @@ TYPES = st.sampled_from(["application/json"] * 8 + ["text/plain", "", "applicati
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
     """A gateway with every part that takes a body."""
     folder = tmp_path_factory.mktemp("fuzz")
-    bench = KnownWeightBench(folder, 276.0, subject=SUBJECT)
-    weighed = stored(folder / "weighed", drive_of(3, 112.0, calibration_id=CALIBRATED.id))
-    with Gateway(
-        folder / "web",
-        known_weights=bench.service,
-        commissioning=Bench(folder).desk,
-        verification=verification_desk(folder, weighed),
-    ) as gateway:
+    with Gateway(folder / "web", learner=LearnerBench(folder).learner) as gateway:
         yield Client(gateway.app)
-    weighed.close()
-    bench.store.close()
 
 
 def routes_with_bodies(client: Client) -> set[str]:
@@ -112,14 +84,13 @@ def test_every_route_with_a_body_is_tried(client: Client) -> None:
 @pytest.mark.parametrize("route", SOUND)
 def test_any_body_is_answered_or_refused_in_words(client: Client, route: str, caplog: pytest.LogCaptureFixture) -> None:
     codes: set[int] = set()
+    method, sound = SOUND[route]
 
     @MANY
-    @given(body=bodies(SOUND[route]), kind=TYPES)
+    @given(body=bodies(sound), kind=TYPES)
     def ask(body: bytes, kind: str) -> None:
         begun_s = time.monotonic()
-        answer = client.request(
-            "PUT" if route in PUT else "POST", route, content=body, headers={"content-type": kind} if kind else {}
-        )
+        answer = client.request(method, route, content=body, headers={"content-type": kind} if kind else {})
         assert time.monotonic() - begun_s < SLOWEST_S
         assert answer.status_code < 500, answer.text
         told = answer.json()

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from support.alarms import AlarmBench
 from support.killed import told_before_kill
+from support.learner import LearnerBench
 
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import load_signal_map
-from gateway.calibration.known_weights_file import FILE_NAME, MOST_KNOWN_WEIGHTS, load_known_weights
 from gateway.store import Store
 
 WRITER = """
@@ -109,23 +109,22 @@ def test_a_kill_loses_no_alarm_that_was_stored_and_doubles_none(tmp_path: Path, 
 
 
 STATER = """
-import itertools, pathlib, sys
-from support.known_weights import KnownWeightBench
+import itertools, json, pathlib, sys
+from gateway.stated.statement import StatementRecord
+from support.learner import LearnerBench, at
 
-bench = KnownWeightBench(pathlib.Path(sys.argv[1]))
+bench = LearnerBench(pathlib.Path(sys.argv[1]))
 print("ready", flush=True)
 for n in itertools.count():
-    bench.pipeline.weigh(n % 60)
-    made = bench.empty()["id"]
-    print(made, flush=True)
-    if n % 3 == 2:
-        bench.service.take_back("b", made)
+    record = StatementRecord.model_validate(
+        {"source": "empty", "from": at(1000 * n), "ref": f"{n}", "load": {"payload_kg": 0.0}}
+    )
+    print(json.loads(bench.learner.state(record, "b"))["id"], flush=True)
 """
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_kill_loses_no_known_weight_that_was_answered(tmp_path: Path, seed: int) -> None:
+def test_a_kill_loses_no_statement_that_was_answered(tmp_path: Path, seed: int) -> None:
     answered = told_before_kill(STATER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.3), ready="ready\n")
-    kept = [entry.id for entry in load_known_weights(tmp_path / FILE_NAME).entries]
-    known = [line.strip() for line in answered][1 - MOST_KNOWN_WEIGHTS :]  # one more may have been kept, unanswered
-    assert set(known) <= set(kept)
+    kept = json.loads(LearnerBench(tmp_path).learner.statements(limit=1000))["items"]
+    assert {line.strip() for line in answered[-900:]} <= {one["id"] for one in kept}

@@ -97,14 +97,14 @@ def test_parts_stop_in_the_reverse_of_their_start_and_one_that_hangs_holds_nobod
     for_ever.set()
 
 
-def test_a_held_lock_of_the_commissioning_does_not_keep_the_stop_from_the_pipeline(config: Path) -> None:
+def test_a_held_lock_of_the_learner_does_not_keep_the_stop_from_the_pipeline(config: Path) -> None:
     """The window under way and all that was heard reach the disk first."""
     settings = load_settings(config)
     gateways: list[gateway.Gateway] = []
 
     def on_started(running: gateway.Gateway) -> None:
         gateways.append(running)
-        running.commissioning.book.lock.acquire()  # by this thread, and never given back
+        running.learner._book.lock.acquire()  # by this thread, and never given back
         running.request_stop()
 
     begun_s = time.monotonic()
@@ -119,6 +119,6 @@ def test_a_question_of_a_client_that_hangs_does_not_keep_the_process_from_ending
 
     def ask(url: str) -> None:
         with pytest.raises(httpx.ReadTimeout):
-            httpx.get(f"{url}/api/v1/calibration/commissioning", timeout=1.0, trust_env=False)
+            httpx.get(f"{url}/api/v1/learning", timeout=1.0, trust_env=False)
 
     told_until_stopped("held_service", config, ask)

@@ -53,8 +53,6 @@ def with_everything(n: int) -> Estimate:
         found,
         epoch=Epoch(Quantity(101.0 / 3.0, 4.0), Quantity(50.2, 0.1), 3, Quantity(0.01, 0.003)),
         posterior=known,
-        measured=posterior_of(112.4 + n, 50.6, 9.0, 0.3, 0.021),
-        known_weights_id="cd34",
         error_budget=budget_of(known, is_shape_said=False),
         weights=Weights(gross=Weight(1711.3, 6.1, 2000.0, None), front_axle=Weight(1006.1, 5.4, 1000.0, None)),
         cg_left=Quantity.normal(0.021, 0.004),

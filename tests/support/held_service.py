@@ -1,10 +1,10 @@
-"""``python -m support.held_service run --config FILE``: a service in which the commissioning never answers."""
+"""``python -m support.held_service run --config FILE``: a service in which the learner never answers."""
 
 import threading
 from typing import Any
 
 from gateway.cli import main
-from gateway.service.commissioning.session import Commissioning
+from gateway.service.learner.learner import Learner
 
 
 def never(*_: Any) -> str:
@@ -14,5 +14,5 @@ def never(*_: Any) -> str:
 
 
 if __name__ == "__main__":
-    Commissioning.state = never  # type: ignore[method-assign]  # a fault, put in
+    Learner.learning = never  # type: ignore[method-assign]  # a fault, put in
     main()

@@ -20,8 +20,6 @@ from support.commands import called, printed
 from support.configured import service_config
 from support.patience import PATIENCE_S, wait_until
 
-COMMISSIONING = "/api/v1/calibration/commissioning"
-
 
 def configuration(folder: Path, calibration: str, more: str = "") -> Path:
     """Settings of a service on a bus of the test's own, weighing with ``calibration``; ``more`` is appended."""
@@ -45,7 +43,7 @@ class Running:
         sent = replay(log, "virtual", self._channel, speed=speed).frames
         is_through = wait_until(lambda: gateway.source.counts().frames >= before + sent and gateway.has_caught_up)
         assert is_through, f"{log} was not worked through"
-        gateway.keeper.flush()
+        gateway.learner.flush()
 
     def ask(self, *arguments: str) -> Result:
         """springscale ... against this service."""
@@ -61,24 +59,6 @@ class Running:
         """The answer; a refusal's problem."""
         method = method or ("GET" if body is None else "POST")
         return httpx.request(method, self.gateway.url + path, json=body, timeout=PATIENCE_S).json()
-
-    def step(self, step: str, body: dict[str, Any]) -> dict[str, Any]:
-        """One step of the commissioning."""
-        return self.http(f"{COMMISSIONING}/{step}" if step else COMMISSIONING, body)
-
-    def wait_until(self, is_so: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        """Until the commissioning is so; between two starts nobody answers."""
-        seen: list[dict[str, Any]] = []
-
-        def came_true() -> bool:
-            try:
-                seen[:] = [self.http(COMMISSIONING)]
-            except (httpx.TransportError, IndexError):
-                return False
-            return is_so(seen[0])
-
-        assert wait_until(came_true), seen
-        return seen[0]
 
 
 def serve(config: Path, meet: Callable[[Running], None]) -> None:

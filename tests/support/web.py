@@ -22,12 +22,7 @@ from gateway.web.access.serving import server_config
 from gateway.web.access.tokens import TokenFile
 from gateway.web.app import create_app
 from gateway.web.live.board import Board
-from gateway.web.routes.service_calls import (
-    CommissioningBackend,
-    KnownWeightBackend,
-    LearnerBackend,
-    VerificationBackend,
-)
+from gateway.web.routes.service_calls import LearnerBackend
 from gateway.web.routes.weights import KnownLoads
 from gateway.weighing.calibrated import CalibratedVehicle
 from support.absent import of_no_vehicle
@@ -41,11 +36,8 @@ class Gateway:
         self,
         directory: Path,
         tokens: TokenFile | None = None,
-        known_weights: KnownWeightBackend | None = None,
-        commissioning: CommissioningBackend | None = None,
         calibrated: CalibratedVehicle | None = None,
         known_loads: KnownLoads | None = None,
-        verification: VerificationBackend | None = None,
         learner: LearnerBackend | None = None,
     ) -> None:
         self.clock_s = 1000.0
@@ -58,9 +50,8 @@ class Gateway:
             "known_loads": known_loads,
             **of_no_vehicle(directory, self.store),
         }
-        known = {"known_weights": known_weights, "commissioning": commissioning, "verification": verification}
-        known |= {"learner": learner}
-        self._known |= {name: part for name, part in known.items() if part is not None}
+        if learner is not None:
+            self._known["learner"] = learner
         self.app = self._make_app()
 
     def publish(self, *estimates: Estimate) -> list[str]:

@@ -41,7 +41,6 @@ def test_every_field_of_an_estimate_is_a_column_but_its_spectra() -> None:
         "error_budget",
         "posterior",
         "epoch_posterior",
-        "measured_posterior",
     }
     assert names[-len(PROVENANCE) :] == list(PROVENANCE)
 
@@ -63,7 +62,7 @@ def test_a_row_read_back_is_the_estimate_as_it_is_printed() -> None:
 def test_unknown_is_null_and_never_zero() -> None:
     row = row_of(make_record(0, Why.GAP))
     assert row["rejected"] == ["gap"]
-    assert row["payload_kg"] is row["payload_low95_kg"] is row["epoch_n_batches"] is row["known_weights_id"] is None
+    assert row["payload_kg"] is row["payload_low95_kg"] is row["epoch_n_batches"] is None
 
 
 def test_the_same_rows_make_the_same_bytes_and_the_schema_its_version() -> None:

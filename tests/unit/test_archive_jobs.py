@@ -7,22 +7,16 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from support.archive import MIDNIGHT_NS, S, write_drive, write_manifest
 from support.calibrated import calibration_file
-from support.known_weights import with_all_sources
 
 from gateway.archive import place_of
 from gateway.archive.jobs import PACKAGE, ArchiveJob, _imported, code_id, hash_of, plan, software
 from gateway.archive.manifest import Assignment, Manifest, load_manifest
 from gateway.archive.survey import LogFile, SurveyedLog, logs_of, survey
-from gateway.calibration.known_weights_file import KnownWeight, KnownWeights
-from gateway.core.known_weights import Knowledge
 from gateway.core.settings import BatchSettings
-from gateway.estimate_json import posterior_to_json
-from gateway.records import iso_utc
 
 HOUR = 3600 * S
 DATASET = place_of("/dataset")
@@ -119,56 +113,6 @@ def test_settings_content_and_neighbours_make_another_job(van: Assignment) -> No
         jobs_of(van, [MIDNIGHT_NS - HOUR, MIDNIGHT_NS])[0],
     ]
     assert len({job.slot.job for job in jobs}) == len(jobs)
-
-
-def known(van: Assignment, at_ns: int, confirmed_ns: int = 0, ended_ns: int = 0, **changed: Any) -> KnownWeight:
-    """One that its estimate contradicted where it was confirmed later."""
-    entry = KnownWeight.model_validate(
-        {
-            **{"id": "", "kind": "ticket", "at": iso_utc(at_ns), "by": "x", "estimator": "ratio_index"},
-            **{"calibration_id": van.setup.calibration.id, "t_start": iso_utc(at_ns), "t_end": iso_utc(at_ns)},
-            **{"batch_ids": ("1-a",), "n_batches": 1, "payload_kg": 300.0, "payload_std_kg": 5.0},
-            **{"posterior": posterior_to_json(with_all_sources(290.0)), "is_contradicted": confirmed_ns > 0},
-            **{"estimated_payload_kg": 290.0, "estimated_payload_std_kg": 30.0},
-            **{"confirmed": {"at": iso_utc(confirmed_ns), "by": "x"} if confirmed_ns else None},
-            **{"ended": {"at": iso_utc(ended_ns), "by": "x"} if ended_ns else None, **changed},
-        }
-    )
-    return entry.model_copy(update={"id": entry.content_id()})
-
-
-def test_a_known_weight_counts_while_it_was_in_use_and_for_its_calibration_alone(van: Assignment) -> None:
-    assert van.setup.calibration is not None
-    first = known(van, MIDNIGHT_NS - HOUR)
-    second = known(van, MIDNIGHT_NS + HOUR, MIDNIGHT_NS + 2 * HOUR, MIDNIGHT_NS + 3 * HOUR)
-    later = known(van, MIDNIGHT_NS + 40 * 24 * HOUR)
-    foreign = known(van, MIDNIGHT_NS - HOUR, calibration_id="sha256:other")
-    entries = KnownWeights(entries=(first, foreign, second, later))
-    told = replace(van, known_weights=entries)
-    november, december = jobs_of(told, [MIDNIGHT_NS, MIDNIGHT_NS + 31 * 24 * HOUR])
-    in_use = {hours: november.knowledge_at(MIDNIGHT_NS + hours * HOUR) for hours in (-2, 0, 1, 2, 3, 4)}
-
-    def id_of(*entries: KnownWeight) -> str:
-        knowledge = Knowledge.of([one.observation for one in entries])
-        return knowledge.id
-
-    assert {hours: found and found.id for hours, found in in_use.items()} == {
-        -2: None,
-        0: id_of(first),
-        1: id_of(first),
-        2: id_of(first),  # stated an hour ago, and held until now: it counts from the next batch on
-        3: id_of(first, second),
-        4: id_of(first),
-    }
-    assert [span.knowledge.id for span in december.known_weights] == [id_of(first), id_of(first, later)]
-
-
-def test_a_known_weight_stated_later_leaves_earlier_months_as_they_are(van: Assignment) -> None:
-    starts = [MIDNIGHT_NS - HOUR, MIDNIGHT_NS]
-    later = replace(van, known_weights=KnownWeights(entries=(known(van, MIDNIGHT_NS + HOUR),)))
-    before, after = jobs_of(van, starts), jobs_of(later, starts)
-    assert before[0].slot == after[0].slot
-    assert before[1].slot != after[1].slot
 
 
 def test_the_hash_of_the_code_holds_every_module_that_a_job_loads(tmp_path: Path) -> None:

@@ -89,10 +89,6 @@ def test_a_manifest_lies_in_an_object_store_with_all_it_names(tmp_path: Path) ->
             'signals = "springscale:reference"\nvehicles = [{id = "a", calibration = "none.json"}]',
             r"none\.json: no such calibration file",
         ),
-        (
-            'signals = "springscale:reference"\nvehicles = [{id = "a", known_weights = "none.json"}]',
-            r"none\.json: no such file",
-        ),
         ("batch.window_s = 5\nvehicles = []", r"batch\.window_s: 5 is below 20"),
         ("vehicles = [", r"archive\.toml: not valid TOML"),
     ],

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.commissioning.answers import vehicle_table
 from gateway.calibration.known_run import KnownRun
+from gateway.calibration.learning.answers import vehicle_table
 from gateway.calibration.statements import KNOWN_SHARE_PLUS_MINUS_PCT
 from gateway.core.vehicle import (
     MEASURED_OFFSET_STD_M,
@@ -62,7 +62,7 @@ def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
     assert loaded(tmp_path, campaign_text('signals = "springscale:aceinna"')).signals == "springscale:aceinna"
 
 
-def test_axle_weights_stand_for_the_sprung_mass_as_in_the_commissioning(tmp_path: Path) -> None:
+def test_axle_weights_stand_for_the_sprung_mass_as_where_a_vehicle_is_stated(tmp_path: Path) -> None:
     weights = {"kerb_front_axle_kg": "713.0", "kerb_rear_axle_kg": "704.0"}
     text = campaign_text(vehicle=weights).replace("empty_mass_kg = 1240.0\n", "")
     vehicle = loaded(tmp_path, text).vehicle

@@ -10,7 +10,6 @@ from typing import NoReturn
 import pytest
 from click.testing import Result
 from support.commands import called
-from support.commissioning import Bench, fitted, in_steps
 
 from gateway.bus.live.python_can import usable_interfaces, what_lacks
 from gateway.bus.signals.signal_map import shipped_map
@@ -32,13 +31,7 @@ def test_a_sound_configuration_is_good(tmp_path: Path) -> None:
 
 
 def test_it_says_by_what_is_weighed_where_no_calibration_is_configured(tmp_path: Path) -> None:
-    assert "until one is made on the vehicle (springscale commission)" in checked(tmp_path).stdout
-    bench = Bench(tmp_path / "state")
-    in_steps(bench)
-    bench.drive(0)
-    bench.drive(1)
-    bench.worker.finish(fitted())
-    assert f"made on the vehicle: {tmp_path / 'state' / 'commissioned-'}" in checked(tmp_path).stdout
+    assert "until one is learnt from drives (springscale state vehicle)" in checked(tmp_path).stdout
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ from support.patience import PATIENCE_S
 
 import gateway.cli
 from gateway.cli import INTERRUPTED
-from gateway.cli.options import LoadArgument
 from gateway.errors import BusError, SpringscaleError
 
 
@@ -46,16 +45,12 @@ def test_its_version_is_told_by_either_name() -> None:
     assert short.startswith("springscale, version ")
 
 
-NOWHERE = ("--url", "http://127.0.0.1:9")
-
-
 @pytest.mark.parametrize("text", ["nan", "inf", "-inf", "much"])
 @pytest.mark.parametrize(
     "command",
     [
         ("estimate", "drive.log", "--signals", "springscale:reference", "--window-s"),
         ("calibration", "sprung", "--rear-axle-kg", "700", "--front-axle-kg"),
-        ("commission", "start", *NOWHERE, "--sensor-m"),
         ("demo", "--once", "--speed"),
         ("record", "a.log", "--signals", "x", "--interface", "virtual", "--channel", "x", "--for-s"),
         ("simulate", "campaign", "paper", "somewhere", "--longest-s"),
@@ -72,7 +67,7 @@ def test_what_is_no_number_is_a_usage_error(command: tuple[str, ...], text: str)
     [
         (("campaign", "pack", "a.log", "--output", "a.zip"), "campaign.toml: cannot be read: Not a directory"),
         (("reprocess", "a.log", "--output", "out"), "a.log: has no archive.toml"),
-        (("verification", "show", "--url", "http://[::1"), "cannot reach the service: Invalid port"),
+        (("state", "list", "--url", "http://[::1"), "cannot reach the service: Invalid port"),
         (("check-config", "deep.toml"), "deep.toml: not valid TOML"),
         (("check-config", "long.toml"), "long.toml: not valid TOML"),
         (("check-config", "nul.toml"), "nul.toml: store.directory: contains a NUL character"),
@@ -88,29 +83,6 @@ def test_what_cannot_be_read_or_reached_is_said_in_one_line(
     Path("long.toml").write_text("a = " + "1" * 5000)
     with pytest.raises(SpringscaleError, match=re.escape(said)):
         run(*command)
-
-
-@pytest.mark.parametrize("command", [("verification", "record", "--load"), ("calibration", "ticket", "add")])
-@pytest.mark.parametrize("text", ["nan", "inf", "much"])
-def test_a_known_weight_that_is_no_number_is_a_usage_error(command: tuple[str, ...], text: str) -> None:
-    said = called(*command, f"gross_kg={text}", *NOWHERE)
-    assert said.exit_code == 2
-    assert f"gross_kg = {text!r} is no number" in said.output
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        (
-            "gross_kg=1890,at=2026-11-21T04:10Z,drive=before",
-            {"by": "gross", "gross_kg": 1890.0, "at": "2026-11-21T04:10Z", "drive": "before"},
-        ),
-        ("front_axle_kg=900.5, rear_axle_kg=1000", {"by": "axles", "front_axle_kg": 900.5, "rear_axle_kg": 1000.0}),
-        ("payload_kg=200,position_m=-1.9", {"by": "payload", "payload_kg": 200.0, "position_m": -1.9}),
-    ],
-)
-def test_a_known_weight_is_told_as_the_service_takes_it(text: str, told: dict[str, object]) -> None:
-    assert LoadArgument().convert(text, None, None) == told
 
 
 def test_a_drive_that_fails_ends_the_command_with_what_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -172,7 +144,7 @@ def test_weighing_needs_no_scipy() -> None:
 
 CODE = """
 import resource
-from gateway.calibration.commissioning.work import _take_little
+from gateway.calibration.learning.work import _take_little
 if {outside}:
     resource.setrlimit(resource.RLIMIT_AS, ({outside}, {outside}))
 _take_little(8000.0)

@@ -101,13 +101,6 @@ def test_one_batch_that_was_weighed_is_enough(monkeypatch: pytest.MonkeyPatch, l
     assert said(monkeypatch, log, make_estimate(0, Why.MODEL_MISFIT), answer) is None
 
 
-def test_known_weights_and_none_of_them_contradict_each_other(log: Path) -> None:
-    both = ("--known-weights", str(log), "--no-known-weights")
-    done = called("estimate", log, "--signals", "springscale:reference", *both)
-    assert done.exit_code == 2
-    assert "give --known-weights FILE or --no-known-weights, not both" in done.output
-
-
 ANSWER = replace(make_estimate(0), front_share=Quantity(50.5, 0.2, (50.1, 50.9)))
 
 

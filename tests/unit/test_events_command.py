@@ -10,7 +10,6 @@ from support.bus_drive import white_noise
 from support.calibrated import calibration_file
 from support.commands import called
 from support.configured import service_config
-from support.known_weights import SUBJECT, KnownWeightBench
 
 from gateway.bus.logs import write_candump
 from gateway.cli.events import entry_sentence
@@ -52,15 +51,6 @@ def test_each_drive_is_a_trip_with_what_was_aboard(tmp_path: Path, drives: tuple
     lines = said(tmp_path, *drives).splitlines()
     assert lines[0].startswith("2026-09-21 14:13 to 14:13  drove 0.3 km with 200 kg (± ")
     assert lines[1].endswith(", still going")
-
-
-def test_loads_take_the_known_weights_of_the_service_into_account(tmp_path: Path, drives: tuple[str, str]) -> None:
-    plain = [one["payload_kg"] for one in told(tmp_path, *drives)]
-    bench = KnownWeightBench(tmp_path / "state", subject=SUBJECT)
-    bench.empty()  # read as 12 kg
-    bench.store.close()
-    loads_kg = [one["payload_kg"] for one in told(tmp_path, *drives)]
-    assert all(before - 12.0 < kg < before - 1.0 for before, kg in zip(plain, loads_kg, strict=True))
 
 
 UNREADABLE = {

@@ -118,12 +118,6 @@ def test_batches_of_one_load_hardly_ever_look_like_two() -> None:
         assert changes <= 4
 
 
-def test_a_known_weight_does_not_look_like_a_change() -> None:
-    """Batches are compared as measured: what was learned between them is no change of load."""
-    learned = replace(batch(270.0), measured=batch(270.0).posterior).answered(batch(200.0).posterior)  # type: ignore[arg-type]
-    assert not together(batch(270.0), learned).is_change
-
-
 def test_a_weighed_load_names_its_newest_batches_and_outlives_a_stop() -> None:
     found = [batch(10.0, n=i) for i in range(30)]
     epoch: LoadEpoch | None = None

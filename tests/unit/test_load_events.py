@@ -142,28 +142,6 @@ def test_a_change_without_a_stop_needs_a_large_jump():
     assert found["stops"] == []
 
 
-def learned(one: Estimate, off_kg: float) -> Estimate:
-    """As it is shown once a known weight has said that the vehicle weighs so much too heavy."""
-    shown = posterior(float(one.posterior.mean[0]) - off_kg)
-    return replace(one.answered(shown), measured=one.posterior, known_weights_id="cd")
-
-
-def test_a_known_weight_is_no_change_of_load():
-    first, second, third = day(300.0, 300.0, 500.0)
-    assert not events([first, learned(second, 60.0)])
-    (found,) = events([first, learned(second, 60.0), learned(third, 60.0)])
-    assert found["after"]["payload_kg"] == pytest.approx(440.0)
-    assert found["change_kg"] == pytest.approx(200.0)
-
-
-def test_a_refused_batch_takes_no_known_weight_back():
-    first, second, refused = day(300.0, 500.0, None)
-    shown = [learned(one, 60.0) for one in (first, second)]
-    (before,), (after,) = events(shown), events([*shown, refused])
-    assert before["after"]["payload_kg"] == 440.0
-    assert after == before
-
-
 def test_batches_of_different_calibrations_are_not_compared():
     first, second = day(300.0, 100.0)
     assert not events([first, replace(second, calibration_id="sha256:2")])

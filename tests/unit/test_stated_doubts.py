@@ -8,9 +8,9 @@ import pytest
 from support.half_car_road import CAR, VAN, times
 from support.known_runs import LOADS, SIBLING, known_run
 
-from gateway.calibration.commissioning.answers import doubts_of
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.known_run import KnownRun
+from gateway.calibration.learning.answers import doubts_of
 from gateway.calibration.statements import Statement
 from gateway.calibration.vehicle import TaughtDrive, teach
 from gateway.core.vehicle import Vehicle

@@ -1,41 +1,10 @@
-"""Stored batches of a known load as a run for calibration, with the same inspection and fit as for logs."""
+"""The facts of a drive that is stored as several batches."""
 
-import hashlib
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
-from gateway.calibration.campaign import Campaign
-from gateway.calibration.inspection.campaign import Inspection, inspect_drives
-from gateway.calibration.inspection.log import LogFacts, SplitRun
 from gateway.calibration.inspection.rows import RowFacts, Stream
-from gateway.calibration.kept.batch_file import KeptBatch
-from gateway.calibration.known_run import KnownRun
-from gateway.core.settings import BatchSettings
-from gateway.records import Signal
-
-ESTIMATORS: Final = ("cross_spectrum",)  # the ratio index needs many loads
-
-
-def split_run_of(run: KnownRun, kept: Sequence[KeptBatch]) -> SplitRun:
-    """A run without a log, of stored batches (at least one): ``run`` has its number, name and load.
-
-    All batches are for identification: a calibration is validated on loads that it has not seen.
-    """
-    batches = tuple(one.batch for one in kept)
-    facts = joined_facts([one.facts for one in kept])
-    ids = hashlib.sha256("\n".join(one.id for one in kept).encode()).hexdigest()
-    span_ns = (min(batch.t_start_ns for batch in batches), max(batch.t_end_ns for batch in batches))
-    log = LogFacts(sha256=ids, duration_s=facts.duration_s, span_ns=span_ns)
-    return SplitRun(replace(run, batches=batches), replace(run, batches=()), facts, log=log)
-
-
-def inspect_kept(campaign: Campaign, split: Sequence[SplitRun], settings: BatchSettings) -> Inspection:
-    """Findings about each of these runs; ``campaign`` has their vehicle."""
-    has_roll_rate = any(Signal.ROLL_RATE in run.facts.streams for run in split)
-    return inspect_drives(split, campaign.vehicle, settings, has_roll_rate=has_roll_rate)
 
 
 def joined_facts(parts: Sequence[RowFacts]) -> RowFacts:

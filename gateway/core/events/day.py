@@ -87,7 +87,7 @@ class Day:
             "vehicle_id": newest.vehicle_id,
             "t_start": iso_utc(begin_ns),
             "t_end": iso_utc(end_ns),
-            **quantity_json(change_of(before.measured, after.measured), "change", "kg", 1),
+            **quantity_json(change_of(before.posterior, after.posterior), "change", "kg", 1),
             "probability": round(probability, 4),
             "is_withdrawn": False,
             "place": place_to_json(place),
@@ -98,7 +98,7 @@ class Day:
         return Entry(EntryKind.EVENT, str(record["id"]), end_ns, record, link.clock)
 
     def _load_json(self, load: FusedLoad) -> dict[str, Any]:
-        payload, share, cg_left = (load.shown.quantity(i) for i in (PAYLOAD, FRONT_SHARE, CG_LEFT))
+        payload, share, cg_left = (load.posterior.quantity(i) for i in (PAYLOAD, FRONT_SHARE, CG_LEFT))
         record: dict[str, Any] = quantity_json(payload, "payload", "kg", 1)
         record |= {"front_share_pct": rounded(share.number, 2), "front_share_std_pct": rounded(share.std, 2)}
         record |= {"cg_left_m": rounded(cg_left.number, 4), "cg_left_std_m": rounded(cg_left.std, 4)}
@@ -239,7 +239,7 @@ def _carried(day: Day, pieces: Sequence[_Piece]) -> dict[str, Any]:
     payload = tonne_km = Quantity()
     empty = overloaded = math.nan
     if weighed_m > 0.0:
-        told = [(distance_m, load.shown.quantity(PAYLOAD)) for distance_m, load in weighed if load is not None]
+        told = [(distance_m, load.posterior.quantity(PAYLOAD)) for distance_m, load in weighed if load is not None]
         kg_m = sum(distance_m * quantity.number for distance_m, quantity in told)
         kg_m_std = sum(distance_m * quantity.std for distance_m, quantity in told)
         payload = Quantity.normal(kg_m / weighed_m, kg_m_std / weighed_m)
@@ -263,7 +263,7 @@ def _is_overloaded(day: Day, batch: Estimate, load: FusedLoad | None) -> bool | 
     gross = batch.weights.gross
     if load is None or gross.limit_kg is None or not gross.is_known:
         return None
-    return gross.kg - batch.payload.number + load.shown.quantity(PAYLOAD).number > gross.limit_kg
+    return gross.kg - batch.payload.number + load.posterior.quantity(PAYLOAD).number > gross.limit_kg
 
 
 def _arrival_ns(batches: Sequence[Estimate]) -> int:

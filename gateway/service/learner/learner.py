@@ -15,8 +15,8 @@ from typing import Any, Final, NamedTuple
 
 from gateway.bus.signals import SignalMap
 from gateway.calibration.assigned import Assigned, Fate, Piece, assign, moments
-from gateway.calibration.commissioning.answers import doubts_of, vehicle_table
 from gateway.calibration.kept.batch_file import kept_batch_of
+from gateway.calibration.learning.answers import doubts_of, vehicle_table
 from gateway.calibration.learning.job import LearnJob, LearnResult
 from gateway.calibration.learning.spans import (
     MOST_DRIVES,

@@ -134,11 +134,6 @@ def _info(moment: Moment) -> Labelled:
     return [((now.version, now.vehicle_id or "", now.estimator or "", now.calibration_id or ""), 1.0)]
 
 
-def _passed(moment: Moment) -> Labelled | None:
-    known = moment.now.verification
-    return None if known.last_at is None else [((), float(known.last_verdict == "passed"))]
-
-
 def _found(quantity: Outward) -> tuple[MetricRow, MetricRow]:
     """The latest estimate of a quantity, and its standard deviation."""
     name, std_name, factor = quantity.metric
@@ -226,8 +221,6 @@ TABLE: Final = (
         duplicate="n_duplicates",
         pruned="n_pruned",
     ),
-    one("springscale_verification_due", "1 while one with known loads is due.", "now.verification.is_due"),
-    MetricRow("springscale_verification_passed", "1 if the last of this calibration passed.", _passed),
     by("springscale_alarm", "1 while the alarm is active, else 0.", "alarm", _active),
     one("springscale_alarms_raised_total", "Alarms raised since the start.", "now.alarms.n_raised"),
     MetricRow(

@@ -5,52 +5,17 @@ that change something raise RefusedError, which becomes problem details.
 """
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from datetime import tzinfo
-from typing import Annotated, Any, Final, ParamSpec, Protocol
+from typing import Annotated, Final, ParamSpec, Protocol
 
 from fastapi import Depends, Request
 from starlette.responses import Response
 
-from gateway.core.known_weights import KnownWeightKind
-from gateway.stated.facts import StatedWeight, VehicleAnswers
+from gateway.stated.facts import VehicleAnswers
 from gateway.stated.learning import StatedVehicle
 from gateway.stated.statement import StatementRecord
 from gateway.web.schemas import problem_responses
-
-
-class KnownWeightBackend(Protocol):
-    """The known weights. ``add`` gives the new KnownWeightEntry, the others the KnownWeightState after it.
-
-    Without a stated load ``add`` means that the vehicle is empty now.
-    """
-
-    def state(self, kinds: Sequence[KnownWeightKind] = ...) -> str: ...
-    def add(self, kind: KnownWeightKind, by: str, note: str | None, stated: StatedWeight | None = None) -> str: ...
-    def confirm(self, by: str, entry_id: str) -> str: ...
-    def take_back(self, by: str, entry_id: str, kinds: Sequence[KnownWeightKind] = ...) -> str: ...
-    def take_back_empty(self, by: str, *, to_factory: bool) -> str: ...
-
-
-class VerificationBackend(Protocol):
-    """The verifications; ``record`` is None for an unknown id."""
-
-    def state(self) -> str: ...
-    def record(self, record_id: str) -> Mapping[str, Any] | None: ...
-    def verify(self, by: str, note: str | None, stated: Sequence[StatedWeight]) -> str: ...
-
-
-class CommissioningBackend(Protocol):
-    """The commissioning: every step gives the CommissioningState after it."""
-
-    def state(self) -> str: ...
-    def begin(self, by: str, note: str | None) -> str: ...
-    def state_vehicle(self, answers: VehicleAnswers) -> str: ...
-    def confirm(self, by: str) -> str: ...
-    def is_empty(self, by: str, *, again: bool = False) -> str: ...
-    def fit_now(self, by: str) -> str: ...
-    def cancel(self, by: str) -> str: ...
-    def undo(self, by: str, *, to_factory: bool) -> str: ...
 
 
 class LearnerBackend(Protocol):

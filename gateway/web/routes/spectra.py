@@ -40,9 +40,7 @@ class LatestSpectra(BaseModel):
     t_end: str | None = Field(json_schema_extra={"format": "date-time"}, examples=["2026-11-21T03:55:00.000000Z"])
     estimator: str | None = Field(examples=["cross_spectrum"])
     rejected: list[str] = Field(examples=[[]])
-    payload_kg: float | None = Field(
-        description="final estimate; the model shows the one measured before known weights", examples=[271.3]
-    )
+    payload_kg: float | None = Field(examples=[271.3])
     front_share_pct: float | None = Field(examples=[50.4])
     spectra: Spectra | None = Field(description="as measured")
     model: Spectra | None = Field(
@@ -99,10 +97,7 @@ def modelled_of(heard: Estimate, calibrated: CalibratedVehicle | None) -> Spectr
 def _fitted(heard: Estimate, wheelbase_m: float) -> Fitted | None:
     """The delay that the estimator fitted; else that of the mean speed."""
     told = {name: x for name, x in heard.diagnostics.items() if math.isfinite(x)}
-    payload_kg, front_share_pct = (
-        (raw or shown).number
-        for raw, shown in ((heard.raw_payload, heard.payload), (heard.raw_front_share, heard.front_share))
-    )  # the fit knows no known weights
+    payload_kg, front_share_pct = heard.payload.number, heard.front_share.number
     if not (math.isfinite(payload_kg) and math.isfinite(front_share_pct) and heard.mean_speed_mps > 0.0):
         return None
     return Fitted(
