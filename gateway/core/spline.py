@@ -1,19 +1,12 @@
-"""Piecewise cubics through points: smooth ones for signals, monotone ones that do not overshoot.
+"""Piecewise cubics through the samples of a signal.
 
-Either is a cubic Hermite polynomial between neighbouring points; they differ in the slopes there. scipy.interpolate has
-both, but its import takes as long as the rest of the estimator's.
+scipy.interpolate has them too, but its import takes as long as the rest of the estimator's.
 """
-
-from typing import Final
 
 import numpy as np
 
 from gateway.core.tridiagonal import solve_tridiagonal
 from gateway.records import F64
-
-MOST_END_SLOPE: Final = (
-    3.0  # of the outermost chord's slope: a cubic that is steeper at its end is not monotone (Fritsch and Butland 1984)
-)
 
 
 def between(at: F64, t: F64, x: F64, slopes: F64) -> F64:
@@ -46,29 +39,3 @@ def smooth_slopes(t: F64, x: F64) -> F64:
     inner = solve_tridiagonal(np.r_[0.0, step[2:]], diagonal, np.r_[step[:-2], 0.0], right)
     outer = (begin - first * inner[0]) / step[1], (end - last * inner[-1]) / step[-2]
     return np.concatenate([outer[:1], inner, outer[1:]])
-
-
-def monotone_slopes(t: F64, x: F64) -> F64:
-    """(n, ...) slopes with which each cubic is monotone between its points x (n, ...).
-
-    They are weighted harmonic means of the neighbouring chords, and 0 at a peak (F. N. Fritsch and J. Butland, SIAM J.
-    Sci. Stat. Comput. 5, 1984).
-    """
-    step = np.diff(t).reshape(-1, *(1,) * (x.ndim - 1))
-    chord = np.diff(x, axis=0) / step
-    if len(t) == 2:
-        return np.concatenate([chord, chord])
-    before, after = 2.0 * step[1:] + step[:-1], step[1:] + 2.0 * step[:-1]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        mean = (before + after) / (before / chord[:-1] + after / chord[1:])
-    inner = np.where(chord[:-1] * chord[1:] > 0.0, mean, 0.0)
-    ends = [_end_slope(*step[:2], *chord[:2]), _end_slope(*step[:-3:-1], *chord[:-3:-1])]
-    return np.concatenate([ends[0][None], inner, ends[1][None]])
-
-
-def _end_slope(step: F64, next_step: F64, chord: F64, next_chord: F64) -> F64:
-    """Slope of the parabola through the outermost three points, limited so that the end stays monotone."""
-    slope = ((2.0 * step + next_step) * chord - step * next_chord) / (step + next_step)
-    slope = np.where(slope * chord > 0.0, slope, 0.0)
-    is_too_steep = (chord * next_chord <= 0.0) & (np.abs(slope) > MOST_END_SLOPE * np.abs(chord))
-    return np.where(is_too_steep, MOST_END_SLOPE * chord, slope)

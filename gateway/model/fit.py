@@ -109,10 +109,6 @@ class _Arrow:
         """By how much the cost rises along a step, to first order."""
         return float(self.gradient @ common) + sum(float(g @ s) for g, s in zip(self.own_gradients, own, strict=True))
 
-    def expected_gain(self, common: F64, own: Sequence[F64]) -> float:
-        """What an undamped step gains if the cost is a parabola."""
-        return -0.5 * self.slope(common, own)
-
 
 NOTHING: Final = Gaussian(np.empty(0), np.empty((0, 0)))
 """The prior of an empty common vector."""
@@ -143,7 +139,7 @@ def most_probable(
     best, damping, is_converged = total(common, own), 1e-3, False
     for taken in range(MOST_STEPS):
         whole, parts = arrow.step(0.0)
-        expected = arrow.expected_gain(whole, parts)
+        expected = -0.5 * arrow.slope(whole, parts)  # what an undamped step gains if the cost is a parabola
         if 0.0 <= expected < tolerance:
             common, own, best, is_converged = (
                 common + whole,

@@ -17,7 +17,7 @@ import numpy as np
 
 from gateway.core.vehicle import Load
 from gateway.model import fit
-from gateway.model.car import Ground, has_roll, roll_share_front
+from gateway.model.car import has_roll, roll_share_front
 from gateway.model.table import INDEX, LOG, ROLL, N, prior_of_size
 from gateway.model.vehicle import VehicleModel
 from gateway.model.whittle import Point, Whittle
@@ -147,13 +147,9 @@ def spectra_of_sides(whittle: Whittle, point: Point, model: VehicleModel) -> tup
     width_m = model.track_width_m or TRACK_PER_WHEELBASE * model.wheelbase_m
     off_m = payload_kg * PAYLOAD_LEFT_PER_TRACK * width_m / (model.empty_mass_kg + payload_kg)
     theta = _rolling(point.theta, model, width_m)
-    wide = Whittle(whittle.spectra, _with_track(model, width_m))
+    wide = Whittle(whittle.spectra, replace(model.ground, track_width_m=width_m))
     load = Load(point.payload_kg, 100.0 * point.front_share)
     return tuple(wide.expected(Point.of(theta, load, side * off_m)) for side in (1.0, -1.0, 0.0))
-
-
-def _with_track(model: VehicleModel, width_m: float) -> Ground:
-    return replace(model.ground, track_width_m=width_m)
 
 
 def _rolling(theta: F64, model: VehicleModel, width_m: float) -> F64:

@@ -116,8 +116,11 @@ class Wiring:
         return merge_frames([self._frames(wire, recording) for wire in self._wires])
 
     def _frames(self, wire: Wire, recording: Recording) -> Frames:
-        readings = _satellite_readings(recording) if wire.is_satellite else _inertial_readings(recording)
-        stamps = recording.gps_t_ns if wire.is_satellite else recording.imu_t_ns
+        if wire.is_satellite:
+            stamps = recording.gps_t_ns
+            readings = {"speed": recording.gps_speed_mps, "fix": recording.gps_fix.astype(np.float64)}
+        else:
+            stamps, readings = recording.imu_t_ns, _inertial_readings(recording)
         t_ns = (stamps + wire.delay_ns) // 1000 * 1000
         samples = {name: readings[reading] / si_per_unit for name, (reading, si_per_unit) in wire.signals.items()}
         frames = self._encoder.encode(wire.message, t_ns, samples)
@@ -131,10 +134,6 @@ def _inertial_readings(recording: Recording) -> dict[str, F64]:
     readings |= {f"gyro_{name}": recording.gyro_radps[:, axis] for name, axis in axes.items()}
     readings["counter"] = (np.arange(len(recording.imu_t_ns)) % 256).astype(np.float64)
     return readings
-
-
-def _satellite_readings(recording: Recording) -> dict[str, F64]:
-    return {"speed": recording.gps_speed_mps, "fix": recording.gps_fix.astype(np.float64)}
 
 
 def unrelated_traffic(start_ns: int, duration_s: float, n_ids: int, rng: np.random.Generator) -> Frames:

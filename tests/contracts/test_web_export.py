@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 from support.estimates import make_estimate, make_record
+from support.paper_van import paper_van
 from support.web import Client, Gateway
 
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
-from gateway.core.vehicle import Vehicle
 from gateway.estimate_json import COLUMNS, estimate_to_json
 from gateway.records import Why
 from gateway.status import SignalHealth
@@ -63,7 +63,7 @@ def test_a_wrong_question_is_a_problem(tmp_path: Path, query: str) -> None:
 
 CALIBRATED = CalibratedVehicle(
     id="sha256:ab",
-    vehicle=Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0, gross_limit_kg=1900.0),
+    vehicle=paper_van(gross_limit_kg=1900.0),
     payload_seen_kg=(0.0, 420.0),
     front_share_seen_pct=(42.0, 55.0),
     ratio_index=RatioIndexCalibration(

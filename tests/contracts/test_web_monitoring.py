@@ -11,9 +11,9 @@ import pytest
 import yaml
 from prometheus_client.parser import text_string_to_metric_families
 from support.estimates import make_estimate
+from support.paper_van import paper_van
 from support.web import Client, Gateway
 
-from gateway.core.vehicle import Vehicle
 from gateway.estimate import Quantity
 from gateway.status import (
     AlarmsStatus,
@@ -35,16 +35,7 @@ RULES = [
     for group in yaml.safe_load((DEPLOY / "prometheus" / "springscale.rules.yml").read_text())["groups"]
     for rule in group["rules"]
 ]
-VAN = Vehicle(
-    name="van",
-    empty_mass_kg=1240.0,
-    wheelbase_m=2.8,
-    sensor_position_m=0.0,
-    unsprung_front_kg=90.0,
-    unsprung_rear_kg=110.0,
-    gross_limit_kg=1900.0,
-    front_axle_limit_kg=900.0,
-)
+VAN = paper_van(unsprung_front_kg=90.0, unsprung_rear_kg=110.0, gross_limit_kg=1900.0, front_axle_limit_kg=900.0)
 BY_PROMETHEUS = {"up"}
 LABELS_BY_PROMETHEUS = {"instance", "job"}
 

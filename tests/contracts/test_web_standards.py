@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from support.estimates import make_estimate, posterior_of
+from support.paper_van import paper_van
 from support.web import Client, Gateway
 
 from gateway.core.vehicle import Vehicle
@@ -18,11 +19,7 @@ from gateway.web.app import create_app
 from gateway.weighing.calibrated import CalibratedVehicle
 
 VIN = "VF1" + "0" * 14
-VAN = Vehicle(
-    name="van",
-    empty_mass_kg=1240.0,
-    wheelbase_m=2.8,
-    sensor_position_m=0.0,
+VAN = paper_van(
     unsprung_front_kg=90.0,
     unsprung_rear_kg=110.0,
     gross_limit_kg=1545.0,

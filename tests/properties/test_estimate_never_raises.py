@@ -102,7 +102,7 @@ def ugly_batches(draw: st.DrawFn) -> Batch:
     acceleration, pitch_rate = GOOD.vertical_acceleration_mps2[:n], GOOD.pitch_rate_radps[:n]
     sensed = draw(ugly(acceleration)), draw(st.one_of(ugly(pitch_rate), st.just(0.3 * acceleration)))
     constant = st.sampled_from([0.0, 1e-300, 1e-3, 14.0, 1e3, 1e300, -14.0]).map(lambda v: np.full(n, v))
-    batch = batch_of(*sensed, draw(st.one_of(constant, ugly(GOOD.speed_mps[:n]))))
+    batch = batch_of(*sensed, speed_mps=draw(st.one_of(constant, ugly(GOOD.speed_mps[:n]))))
     usable = put(np.ones(n), draw(st.one_of(st.just([]), stretches(n))), 0.0) > 0.0
     gravity_mps2 = draw(st.sampled_from([9.81, 0.0, -9.81, np.nan, 1e300]))
     rolling = draw(st.sampled_from([None, pitch_rate, np.zeros(n)]))

@@ -29,7 +29,7 @@ from gateway.model.expected import Expected, Groups, log_stroke_speeds
 from gateway.model.response import Frequencies, Motion
 from gateway.model.spectra import Mount, Reading, cross_spectra_of, log_amplitude_of
 from gateway.model.table import INDEX, NAMES, N
-from gateway.model.tracks import coherence_of, coherence_slope_of
+from gateway.model.tracks import MOST_X, coherence_of, coherence_slope_of
 from gateway.records import C128, F64
 
 FREQ_HZ = np.array([0.8, 1.5, 2.4, 4.0, 8.0, 12.0])
@@ -400,8 +400,13 @@ def test_levelled_readings_are_those_of_a_sensor_on_the_centre_line(
     np.testing.assert_array_equal(np.stack(Mount(0.0, 0.0, lag_s).levelled(read, FREQ_HZ)), read)
 
 
-@given(x=st.floats(1e-3, 60.0))
+@given(x=st.floats(1e-4, MOST_X))
 def test_two_tracks_are_as_coherent_as_bessel_functions_say(x: float) -> None:
     """x K1(x), and its slope by log x, -x^2 K0(x)."""
-    assert coherence_of(np.log([x]))[0] == pytest.approx(x * scipy.special.k1(x), rel=1e-8)
-    assert coherence_slope_of(np.log([x]))[0] == pytest.approx(-(x**2) * scipy.special.k0(x), rel=1e-8)
+    assert coherence_of(np.log([x]))[0] == pytest.approx(x * scipy.special.k1(x), rel=1e-9)
+    assert coherence_slope_of(np.log([x]))[0] == pytest.approx(-(x**2) * scipy.special.k0(x), rel=1e-9)
+
+
+def test_one_track_is_coherent_with_itself_and_distant_ones_are_not() -> None:
+    assert coherence_of(np.log([1e-30, 1e6])).tolist() == pytest.approx([1.0, 0.0], abs=1e-7)
+    assert coherence_slope_of(np.log([1e-30, 1e6])).tolist() == pytest.approx([0.0, 0.0], abs=1e-6)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.paper_van import paper_van
 
 from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct, left_share_pct
 from gateway.core.weights.limits import RELEASE_SHARE, is_over_limit
@@ -15,15 +16,7 @@ from gateway.core.weights.on_the_road import PayloadPlace, place_of, unsprung_kg
 from gateway.estimate import Z95, Estimate, Lack, Quantity, Weights
 from gateway.posterior import FRONT_SHARE, PAYLOAD, Posterior, Source, exactly
 
-VAN = Vehicle(
-    name="van",
-    empty_mass_kg=1240.0,
-    wheelbase_m=2.8,
-    sensor_position_m=0.0,
-    empty_front_share_pct=52.0,
-    unsprung_front_kg=90.0,
-    unsprung_rear_kg=110.0,
-)
+VAN = paper_van(empty_front_share_pct=52.0, unsprung_front_kg=90.0, unsprung_rear_kg=110.0)
 
 payloads = st.floats(0.0, 800.0)
 positions = st.floats(-0.5, 3.5)
@@ -75,20 +68,12 @@ def test_the_front_share_is_of_the_sprung_mass(payload_kg: float, share_pct: flo
 
 
 def test_an_unsprung_mass_follows_from_the_kerb_weight() -> None:
-    kerb = Vehicle(
-        name="van",
-        empty_mass_kg=1240.0,
-        wheelbase_m=2.8,
-        empty_front_share_pct=52.0,
-        sensor_position_m=0.0,
-        kerb_front_axle_kg=0.52 * 1240.0 + 90.0,
-        kerb_rear_axle_kg=705.2,
-    )
+    kerb = paper_van(empty_front_share_pct=52.0, kerb_front_axle_kg=0.52 * 1240.0 + 90.0, kerb_rear_axle_kg=705.2)
     assert unsprung_kg(kerb) == pytest.approx((90.0, 110.0))
 
 
 def test_what_is_not_stated_is_unknown_and_never_zero() -> None:
-    half = Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0, unsprung_front_kg=90.0)
+    half = paper_van(unsprung_front_kg=90.0)
     weights = axle_loads(half, 100.0, 5.0, 50.0, 0.5)
     assert weights.front_axle.is_known
     assert not weights.rear_axle.is_known

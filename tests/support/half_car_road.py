@@ -9,16 +9,13 @@ from gateway.calibration.vehicle import TaughtDrive, teach
 from gateway.core.vehicle import Load, Vehicle
 from gateway.estimate import Estimate
 from gateway.model.car import Ground
-from gateway.model.table import INDEX, NAMES
 from gateway.model.vehicle import VehicleModel
 from gateway.records import F64, Batch
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate
 from support import model_road
 from support.kept import kept
-from support.model_road import QUIET, UNCOUPLED, paths_of, theta_of
-
-RATE_HZ = model_road.RATE_HZ
+from support.model_road import QUIET, RATE_HZ, UNCOUPLED, batch_of, paths_of, theta_of
 
 KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))  # payload (kg), front share (%)
 VAN = Vehicle(
@@ -55,37 +52,10 @@ CAR = theta_of(
 )
 
 
-def times(car: F64, **factors: float) -> F64:
-    """The car with these positive parameters multiplied."""
-    changed = car.copy()
-    for name, factor in factors.items():
-        changed[INDEX[name]] += np.log(factor)
-    return changed
-
-
 def as_if_fitted(theta: F64, std: F64, vehicle: Vehicle = VAN) -> VehicleModel:
     """As if a fit had ended with these parameters and standard deviations (n,)."""
     loads = tuple(Load(kg, share) for kg in (0.0, 420.0) for share in (40.0, 60.0))
-    return VehicleModel(
-        empty_mass_kg=vehicle.empty_mass_kg,
-        empty_front_share_pct=vehicle.empty_front_share_pct,
-        wheelbase_m=vehicle.wheelbase_m,
-        band_hz=(1.1, 14.0),
-        n_segment=256,
-        names=NAMES[: len(theta)],
-        parameters=theta,
-        covariance=np.diag(std**2),
-        directions=np.zeros((len(theta), 0)),
-        model_std=(10.0, 0.2, 0.002),
-        spread=(1.0, 1.0, 1.0),
-        misfit_limit=3.0,
-        acceleration_rms_mps2=0.5,
-        pitch_rate_rms_radps=0.05,
-        speed_seen_mps=(12.0, 15.0),
-        taught_loads=loads,
-        usual_log_amplitude=0.0,
-        track_width_m=vehicle.track_width_m,
-    )
+    return model_road.model_of(theta, np.diag(std**2), loads, vehicle)
 
 
 def batch_over_road(
@@ -120,13 +90,8 @@ def batch_over_road(
     return batch_of(
         acceleration + noise * acceleration.std() * rng.standard_normal(n),
         pitch_rate + noise * pitch_rate.std() * rng.standard_normal(n),
-        np.full(n, speed_mps),
+        speed_mps=speed_mps,
     )
-
-
-def batch_of(acceleration_mps2: F64, pitch_rate_radps: F64, speed_mps: F64) -> Batch:
-    """A batch whose every sample is usable."""
-    return model_road.batch_of(acceleration_mps2, pitch_rate_radps, speed_mps=speed_mps)
 
 
 def run_over_road(number: int, payload_kg: float, share_pct: float) -> KnownRun:

@@ -2,6 +2,7 @@
 
 import re
 from html.parser import HTMLParser
+from pathlib import Path
 
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 
@@ -47,3 +48,22 @@ class Page(HTMLParser):
     def handle_data(self, text: str) -> None:
         if self.cell is not None:
             self.cell.append(text)
+
+
+def assert_well_formed(page: Page) -> None:
+    """Every element is closed, ids are unique, headings descend by one, rows have as many cells as their heads."""
+    assert page.open == []
+    assert len(page.ids) == len(set(page.ids))
+    assert page.headings[0] == 1
+    assert all(later <= sooner + 1 for sooner, later in zip(page.headings, page.headings[1:], strict=False))
+    assert all(len(row) == len(table[0]) for table in page.tables for row in table)
+
+
+def assert_self_contained(path: Path) -> None:
+    """All that the page in this file fetches or links to lies beside it."""
+    text = path.read_text(encoding="utf-8")
+    page = Page(text)
+    for source in [*page.fetched, *(link for link in page.links if not link.startswith("#"))]:
+        assert not re.match(r"[a-z]+:|//", source)
+        assert (path.parent / source).stat().st_size > 1000
+    assert not re.search(r"https?://|url\(|@import|<link", text)

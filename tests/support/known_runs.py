@@ -5,8 +5,9 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import front_share_pct
 from gateway.model.vehicle import VehicleModel
 from gateway.records import F64
-from support.half_car_road import CAR, VAN, batch_over_road, taught_by, times
+from support.half_car_road import CAR, VAN, batch_over_road, taught_by
 from support.kept import kept
+from support.model_road import times
 
 LOADS = ((0.0, None), (200.0, 0.5), (300.0, 1.4), (400.0, 2.6))  # payload, metres behind the front axle
 SIBLING = times(CAR, spring_front_npm=0.97, damper_front_nspm=1.1, spring_rear_npm=1.03, tyre_rear_npm=0.96)

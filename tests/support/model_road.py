@@ -8,7 +8,8 @@ import numpy as np
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model.car import USUAL_LEVEL, Ground, natural, numbers_of
 from gateway.model.response import Frequencies, Motion
-from gateway.model.table import INDEX, LOG, ROLL, ROWS, UPRIGHT, prior_of
+from gateway.model.table import INDEX, LOG, NAMES, ROLL, ROWS, UPRIGHT, prior_of
+from gateway.model.vehicle import VehicleModel
 from gateway.records import C128, F64, Batch
 
 RATE_HZ = 50.0
@@ -39,6 +40,38 @@ def theta_of(*, with_roll: bool = False, vehicle: Vehicle = VAN, **units: float)
         if INDEX[name] < len(theta):
             theta[INDEX[name]] = np.log(number) if rows[INDEX[name]].scale == LOG else number
     return theta
+
+
+def times(car: F64, **factors: float) -> F64:
+    """The car with these positive parameters multiplied."""
+    changed = car.copy()
+    for name, factor in factors.items():
+        changed[INDEX[name]] += np.log(factor)
+    return changed
+
+
+def model_of(theta: F64, covariance: F64, loads: tuple[Load, ...], vehicle: Vehicle) -> VehicleModel:
+    """As if a fit by these loads had ended with these parameters (n,) and their covariance (n, n)."""
+    return VehicleModel(
+        empty_mass_kg=vehicle.empty_mass_kg,
+        empty_front_share_pct=vehicle.empty_front_share_pct,
+        wheelbase_m=vehicle.wheelbase_m,
+        band_hz=BAND_HZ,
+        n_segment=256,
+        names=NAMES[: len(theta)],
+        parameters=theta,
+        covariance=covariance,
+        directions=np.zeros((len(theta), 0)),
+        model_std=(10.0, 0.2, 0.002),
+        spread=(1.0, 1.0, 1.0),
+        misfit_limit=3.0,
+        acceleration_rms_mps2=0.5,
+        pitch_rate_rms_radps=0.05,
+        speed_seen_mps=(12.0, 15.0),
+        taught_loads=loads,
+        usual_log_amplitude=0.0,
+        track_width_m=vehicle.track_width_m,
+    )
 
 
 def motion_of(

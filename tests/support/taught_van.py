@@ -11,12 +11,12 @@ from gateway.core.vehicle import Load, Vehicle
 from gateway.estimate import Estimate
 from gateway.model.car import Ground
 from gateway.model.spectra import CrossSpectra, cross_spectra_of
-from gateway.model.table import INDEX, NAMES, ROWS, covariance_of
+from gateway.model.table import ROWS, covariance_of
 from gateway.model.vehicle import VehicleModel
 from gateway.model.weigh import Weighed, by_cross_spectrum, weigh
 from gateway.records import F64, Batch, Why
 from support.kept import kept
-from support.model_road import VAN, batch_over_road, theta_of
+from support.model_road import VAN, batch_over_road, model_of, theta_of
 
 FLAT_VAN = replace(VAN, track_width_m=None, sensor_offset_left_std_m=1e-3)
 """A vehicle of which nobody stated a width: its roll rate is not used."""
@@ -60,14 +60,6 @@ UNITS = {
 def car(*, with_roll: bool = False, **changed: float) -> F64:
     """The vehicle's vector, with these parameters in the units that end their names."""
     return theta_of(with_roll=with_roll, **(UNITS | changed))
-
-
-def times(theta: F64, **factors: float) -> F64:
-    """The vector with these positive parameters multiplied."""
-    changed = theta.copy()
-    for name, factor in factors.items():
-        changed[INDEX[name]] += np.log(factor)
-    return changed
 
 
 def left_of(payload_kg: float, left_m: float = 0.0) -> float:
@@ -117,25 +109,14 @@ def taught(*, with_roll: bool = False, slack: float = USUAL_SLACK) -> VehicleMod
 def as_if_taught(theta: F64, vehicle: Vehicle = VAN) -> VehicleModel:
     """As if a fit had ended with these parameters, all as sure as vehicles of one line are alike."""
     rows = ROWS[: len(theta)]
-    return VehicleModel(
-        empty_mass_kg=vehicle.empty_mass_kg,
-        empty_front_share_pct=vehicle.empty_front_share_pct,
-        wheelbase_m=vehicle.wheelbase_m,
-        band_hz=(1.1, 14.0),
-        n_segment=256,
-        names=NAMES[: len(theta)],
-        parameters=theta,
-        covariance=0.01 * covariance_of(rows, "line") + 1e-10 * np.eye(len(rows)),
-        directions=np.zeros((len(theta), 0)),
+    covariance = 0.01 * covariance_of(rows, "line") + 1e-10 * np.eye(len(rows))
+    return replace(
+        model_of(theta, covariance, tuple(Load(kg, share) for kg in (0.0, 500.0) for share in (38.0, 62.0)), vehicle),
         model_std=(5.0, 0.1, 0.005),
-        spread=(1.0, 1.0, 1.0),
         misfit_limit=100.0,
         acceleration_rms_mps2=0.6,
         pitch_rate_rms_radps=0.03,
         speed_seen_mps=(10.0, 20.0),
-        taught_loads=tuple(Load(kg, share) for kg in (0.0, 500.0) for share in (38.0, 62.0)),
-        usual_log_amplitude=0.0,
-        track_width_m=vehicle.track_width_m,
         sensor_left_m=vehicle.sensor_left_m,
         sensor_left_std_m=vehicle.sensor_left_std_m,
         least_slack=Ground.of(vehicle, with_roll=len(theta) > len(rows)).least_slack,

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.calibrated import calibration_file
+from support.paper_van import paper_van
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.file.parts import FoundPart
@@ -14,13 +15,10 @@ from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Se
 from gateway.calibration.judgement.advice import Grade, Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import Assessment, BatchSet, Judgement
 from gateway.calibration.judgement.evaluation import Judged, error_table
-from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate, Quantity
 from gateway.records import Why
 
-VAN = Vehicle(
-    name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0
-)  # ranges of 450 kg and of 20 points
+VAN = paper_van()  # ranges of 450 kg and of 20 points
 
 
 def judged(run: int, error_kg: float = 0.0, half_kg: float = 20.0, error_pp: float = 0.0) -> Judged:

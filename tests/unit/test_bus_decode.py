@@ -101,19 +101,14 @@ def test_out_of_the_databases_range_is_no_sample(write_map):
     assert decoder.counts[Signal.SPEED].rejected == {Rejected.OUT_OF_RANGE: 2}
 
 
-def test_a_signalling_nan_is_a_nan():
-    decoder = Decoder(load_signal_map("springscale:pcan_gps"))
-    decoder.decode(frames((0x621, struct.pack("<fI", 0.0, 0x7F800001))))
-    assert decoder.counts[Signal.SPEED].rejected == {Rejected.NOT_A_NUMBER: 1}
-
-
 def test_a_float_that_is_no_number_is_no_sample():
     decoder = Decoder(load_signal_map("springscale:pcan_gps"))
-    numbers = (36.0, float("nan"), float("inf"), 1e9)
-    motion = decoder.decode(frames(*((0x621, struct.pack("<ff", 0.0, number)) for number in numbers)))
+    numbers = [struct.pack("<f", number) for number in (36.0, float("nan"), float("inf"), 1e9)]
+    signalling_nan = struct.pack("<I", 0x7F800001)
+    motion = decoder.decode(frames(*((0x621, bytes(4) + number) for number in (*numbers, signalling_nan))))
     np.testing.assert_array_equal(motion.of(Signal.SPEED)[1], [10.0])
     rejected = decoder.counts[Signal.SPEED].rejected
-    assert rejected == {Rejected.NOT_A_NUMBER: 2, Rejected.OUT_OF_RANGE: 1}
+    assert rejected == {Rejected.NOT_A_NUMBER: 3, Rejected.OUT_OF_RANGE: 1}
 
 
 @pytest.mark.parametrize(("raw", "is_sample"), [(0xFAFF, True), (0xFB00, False), (0xFE00, False), (0xFFFF, False)])
@@ -181,23 +176,15 @@ def test_a_signal_exists_only_under_its_multiplexers_as_cantools_sees_it(write_m
     assert decoder.counts[Signal.SPEED].rejected == {Rejected.MULTIPLEXED_OUT: 17}
 
 
-def test_can_fd_payloads_are_read_to_their_end(write_map):
+def test_can_fd_payloads_are_read_to_their_end_and_too_narrow_rows_are_a_wrong_length(write_map):
     signal_map = write_map(
         'BO_ 6 M: 48 A\n SG_ S : 368|16@1- (0.001,0) [0|0] "g" A\n',
         '[signals.vertical_acceleration]\nmessage = "M"\nsignal = "S"\n',
     )
     assert signal_map.payload_width == 64
     payload = bytes(46) + struct.pack("<h", 1000)
-    motion = Decoder(signal_map).decode(frames((6, payload), width=64))
-    assert motion.columns[0, 0] == pytest.approx(G)
-
-
-def test_a_row_too_narrow_for_the_message_is_a_wrong_length(write_map):
-    signal_map = write_map(
-        'BO_ 6 M: 48 A\n SG_ S : 368|16@1- (0.001,0) [0|0] "g" A\n',
-        '[signals.vertical_acceleration]\nmessage = "M"\nsignal = "S"\n',
-    )
     decoder = Decoder(signal_map)
+    assert decoder.decode(frames((6, payload), width=64)).columns[0, 0] == pytest.approx(G)
     assert np.isnan(decoder.decode(frames((6, bytes(8)))).columns).all()
     assert decoder.counts[Signal.VERTICAL_ACCELERATION].rejected == {Rejected.WRONG_LENGTH: 1}
 

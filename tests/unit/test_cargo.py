@@ -6,6 +6,7 @@ from math import exp, log
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.paper_van import paper_van
 
 from gateway.core.cargo import (
     BODY_MASS_PART,
@@ -17,9 +18,8 @@ from gateway.core.cargo import (
     known_shape,
     shape_hypotheses,
 )
-from gateway.core.vehicle import Vehicle
 
-VAN = Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0)
+VAN = paper_van()
 KNOWN_S_M2 = 0.07  # a box of 0.8 m by 0.5 m
 
 

@@ -38,7 +38,7 @@ def moving(seed: int) -> tuple[F64, F64]:
 
 
 def batch_of(acceleration: F64, roll_rate: F64 | None) -> Batch:
-    batch = half_car_road.batch_of(acceleration, acceleration[::-1].copy(), np.full(N, 15.0))
+    batch = half_car_road.batch_of(acceleration, acceleration[::-1].copy(), speed_mps=15.0)
     return replace(batch, roll_rate_radps=roll_rate)
 
 

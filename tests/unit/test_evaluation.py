@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.calibrated import calibration_file
 from support.drives import T0_NS, drive, joined, later
+from support.paper_van import paper_van
 
 from gateway.calibration.judgement.evaluation import Comparison, Judged, error_table, errors_of, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.cli.evaluate import text_of
 from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.settings import BatchSettings
-from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import Unsprung, weighed
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import estimate_to_json
@@ -24,15 +24,7 @@ from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate
 from gateway.weighing.flow import Flow, Identity
 
-VAN = Vehicle(
-    name="van",
-    empty_mass_kg=1240.0,
-    wheelbase_m=2.8,
-    sensor_position_m=0.0,
-    payload_range_kg=(0.0, 400.0),
-    unsprung_front_kg=60.0,
-    unsprung_rear_kg=100.0,
-)
+VAN = paper_van(payload_range_kg=(0.0, 400.0), unsprung_front_kg=60.0, unsprung_rear_kg=100.0)
 BATCH = build_batch(drive(100.0), BatchWindow(T0_NS, T0_NS + 100_000_000_000, T0_NS), BatchSettings(window_s=100.0), {})
 
 

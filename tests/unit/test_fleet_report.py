@@ -12,7 +12,7 @@ import pytest
 from click.testing import Result
 from support.commands import called
 from support.fleet import DAY_S, MONDAY_S, row, week, write_table
-from support.html_page import Page
+from support.html_page import Page, assert_self_contained, assert_well_formed
 
 from gateway.archive import place_of
 from gateway.archive.fleet.fleet import FleetSummary, fleet_of
@@ -140,22 +140,13 @@ def test_a_new_calibration_is_marked_and_the_slope_begins_there(tmp_path: Path) 
 def test_every_page_is_well_formed_and_headings_descend_by_one(made: Path) -> None:
     for path in pages(made):
         page = Page(path.read_text(encoding="utf-8"))
-        assert page.open == []
-        assert len(page.ids) == len(set(page.ids))
-        assert page.headings[0] == 1
-        assert all(later <= sooner + 1 for sooner, later in zip(page.headings, page.headings[1:], strict=False))
-        assert all(len(line) == len(one[0]) for one in page.tables for line in one)
+        assert_well_formed(page)
         assert all(len(alt) > 40 for alt in page.alts)
 
 
 def test_all_that_pages_need_lies_beside_them(made: Path) -> None:
     for path in pages(made):
-        text = path.read_text(encoding="utf-8")
-        page = Page(text)
-        for source in [*page.fetched, *(link for link in page.links if not link.startswith("#"))]:
-            assert not re.match(r"[a-z]+:|//", source)
-            assert (path.parent / source).stat().st_size > 1000
-        assert not re.search(r"https?://|url\(|@import|<link", text)
+        assert_self_contained(path)
 
 
 def test_names_cannot_break_out_of_the_page(made: Path) -> None:

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.paper_van import paper_van
 
 from gateway.core.change import EVEN, ROLLING, Rules, change_of, probability
 from gateway.core.fusion import LoadEpoch, WeighedLoad, fused_epoch, remembered
-from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate, Quantity
 from gateway.posterior import CG_LEFT, PAYLOAD, Posterior, Source, difference
 from gateway.records import Why
@@ -218,15 +218,6 @@ def test_a_change_is_stated_with_the_error_of_two_different_loads() -> None:
 
 
 def test_rules_follow_from_the_vehicle() -> None:
-    rules = Rules.of(
-        Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0, payload_range_kg=(0.0, 450.0))
-    )
+    rules = Rules.of(paper_van(payload_range_kg=(0.0, 450.0)))
     assert (rules.range_kg, rules.mass_kg, rules.spread_kg) == (450.0, 1465.0, 112.5)
-    assert (
-        Rules.of(
-            Vehicle(
-                name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0, payload_range_kg=(0.0, 1.0)
-            )
-        ).range_kg
-        == 100.0
-    )
+    assert Rules.of(paper_van(payload_range_kg=(0.0, 1.0))).range_kg == 100.0

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ndtr
-from support.taught_van import FLAT_VAN, VAN, car, drive_of, estimated, spectra_of, taught, times
+from support.model_road import times
+from support.taught_van import FLAT_VAN, VAN, car, drive_of, estimated, spectra_of, taught
 
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.estimate import Estimate, Quantity

@@ -92,7 +92,7 @@ def test_spectrum_needs_six_unbroken_segments() -> None:
 def test_a_sensor_without_bands_or_without_samples_gives_no_index() -> None:
     calibration = replace(ratio_index_calibration(), pitch_rate_bands=None)
     rng, n = np.random.default_rng(2), 15_000
-    batch = batch_of(rng.standard_normal(n), rng.standard_normal(n), np.full(n, 15.0))
+    batch = batch_of(rng.standard_normal(n), rng.standard_normal(n), speed_mps=15.0)
     ra, rg = indexes_of(batch, calibration)
     assert np.isfinite(ra)
     assert np.isnan(rg)

@@ -7,6 +7,7 @@ import pytest
 from pydantic import TypeAdapter
 from scipy import signal
 from support import half_car_road
+from support.paper_van import paper_van
 
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import candidate_pairs, rank_correlations
@@ -19,14 +20,13 @@ from gateway.core.ratio_index.regression import (
     MODEL_11_PAYLOAD,
     RegressionModel,
 )
-from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimate import UNKNOWN
 from gateway.records import F64, Batch, Why
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate
 
-VAN = Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0)
+VAN = paper_van()
 N = 12_000
 LOADS = [(0.0, 50.0), (90.0, 51.0), (180.0, 46.0), (270.0, 53.0), (360.0, 47.0), (450.0, 52.0), (400.0, 49.0)]
 
@@ -43,7 +43,7 @@ def batch_of(payload_kg: float, front_share_pct: float, seed: int) -> Batch:
     bounce_hz = 2.6 / np.sqrt(1.0 + payload_kg / VAN.empty_mass_kg)
     pitch_hz = 2.0 + 0.08 * (front_share_pct - 50.0)
     acceleration_mps2, pitch_rate_radps = resonance(bounce_hz, rng), 0.05 * resonance(pitch_hz, rng)
-    return half_car_road.batch_of(acceleration_mps2, pitch_rate_radps, 15.0 + 0.2 * rng.standard_normal(N))
+    return half_car_road.batch_of(acceleration_mps2, pitch_rate_radps, speed_mps=15.0 + 0.2 * rng.standard_normal(N))
 
 
 def runs_of(loads: list[tuple[float, float]]) -> list[KnownRun]:

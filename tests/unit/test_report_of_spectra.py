@@ -29,7 +29,7 @@ from gateway.reports.charts import LineMark, Ribbon, Span
 
 def white(seed: int, n: int = 20_000) -> Batch:
     rng = np.random.default_rng(seed)
-    return batch_of(rng.standard_normal(n), 0.1 * rng.standard_normal(n), np.full(n, 14.0))
+    return batch_of(rng.standard_normal(n), 0.1 * rng.standard_normal(n), speed_mps=14.0)
 
 
 def test_white_noise_has_the_density_of_its_variance() -> None:

@@ -11,12 +11,11 @@ from typing import Any, cast
 
 import pytest
 from support.estimates import make_estimate
-from support.paper_van import paper_van_config
+from support.paper_van import paper_van, paper_van_config
 from support.ports import free_port
 
 from gateway.bus.live.source import SourceState
 from gateway.config import load_settings
-from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate, Quantity, Weights
 from gateway.records import Signal
 from gateway.service.gateway import Gateway
@@ -95,15 +94,7 @@ def test_an_estimate_is_collected_shown_and_grows_old() -> None:
     assert report(ALL_HEARD, is_stale=True) is State.STALE
 
 
-VAN = Vehicle(
-    name="van",
-    empty_mass_kg=1240.0,
-    wheelbase_m=2.8,
-    sensor_position_m=0.0,
-    unsprung_front_kg=90.0,
-    unsprung_rear_kg=110.0,
-    gross_limit_kg=1500.0,
-)
+VAN = paper_van(unsprung_front_kg=90.0, unsprung_rear_kg=110.0, gross_limit_kg=1500.0)
 
 
 def test_each_estimate_is_weighed_once_however_often_the_weights_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:

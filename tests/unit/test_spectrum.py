@@ -19,7 +19,7 @@ from gateway.weighing.estimator import estimate
 
 
 def batch_of(acceleration: F64, pitch_rate: F64, usable: Bool) -> Batch:
-    return replace(half_car_road.batch_of(acceleration, pitch_rate, np.full(len(usable), 15.0)), usable=usable)
+    return replace(half_car_road.batch_of(acceleration, pitch_rate, speed_mps=15.0), usable=usable)
 
 
 def noise(seed: int, n: int = 15_000) -> F64:

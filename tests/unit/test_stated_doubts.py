@@ -5,8 +5,9 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from support.half_car_road import CAR, VAN, times
+from support.half_car_road import CAR, VAN
 from support.known_runs import LOADS, SIBLING, known_run
+from support.model_road import times
 
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.known_run import KnownRun

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_banded
 
-from gateway.core.spline import between, monotone_slopes, smooth_slopes
+from gateway.core.spline import between, smooth_slopes
 from gateway.core.timeline import onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
 from gateway.core.tridiagonal import solve_tridiagonal
 from gateway.records import F64, I64
@@ -156,16 +156,6 @@ def test_a_tridiagonal_system_is_solved_as_scipy_does(n: int, seed: int) -> None
     bands = np.array([np.roll(above, 1), diagonal, np.roll(below, -1)])
     expected = solve_banded((1, 1), bands, right)
     np.testing.assert_allclose(solve_tridiagonal(below, diagonal, above, right), expected, rtol=1e-9, atol=1e-9)
-
-
-@given(n=st.integers(2, 12), seed=seeds)
-def test_a_monotone_curve_is_the_pchip(n: int, seed: int) -> None:
-    """Rounded, so that some neighbours are equal."""
-    rng = np.random.default_rng(seed)
-    t, x = np.cumsum(rng.uniform(0.5, 2.0, n)), np.round(rng.standard_normal((n, 3)), 1)
-    at = np.r_[t, rng.uniform(t[0], t[-1], 50)]
-    expected = PchipInterpolator(t, x)(at)
-    np.testing.assert_allclose(between(at, t, x, monotone_slopes(t, x)), expected, rtol=1e-9, atol=1e-9)
 
 
 def test_what_is_no_number_is_an_error_and_no_curve() -> None:

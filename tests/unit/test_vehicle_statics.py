@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 from support.commands import called
+from support.paper_van import paper_van
 
 from gateway.calibration.axle_weights import UNSPRUNG_SHARE, AxleWeights, Sprung, sprung_of
 from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct, left_share_pct, payload_position_m
@@ -28,7 +29,7 @@ loads_kg = st.floats(10.0, 3000.0)
 
 
 def test_an_even_vehicle_obeys_equation_3() -> None:
-    van = Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0)
+    van = paper_van()
     for load_kg, d_m in ((270.0, 0.5), (450.0, 2.8), (90.0, 1.4)):
         expected = 100.0 * (1240.0 / 2.0 + (1.0 - d_m / 2.8) * load_kg) / (1240.0 + load_kg)
         assert front_share_pct(van, load_kg, d_m) == pytest.approx(expected, rel=1e-12)
@@ -71,7 +72,7 @@ def test_the_wheels_of_a_side_carry_what_the_moments_say(
 
 
 def test_a_load_over_the_left_wheels_rests_on_them_alone() -> None:
-    van = Vehicle(name="van", empty_mass_kg=1240.0, wheelbase_m=2.8, sensor_position_m=0.0)
+    van = paper_van()
     assert left_share_pct(cg_left_m(van, 0.0, 0.0), 1.5) == 50.0
     assert left_share_pct(cg_left_m(van, 310.0, 0.75), 1.5) == pytest.approx(100.0 * (620.0 + 310.0) / 1550.0)
     assert left_share_pct(cg_left_m(van, 310.0, -0.75), 1.5) == pytest.approx(100.0 * 620.0 / 1550.0)

@@ -17,6 +17,7 @@ from support.calibrated import calibration_text
 from support.commands import called
 from support.configured import service_config
 from support.estimates import make_estimate, posterior_of
+from support.paper_van import paper_van
 from support.web import Client, Gateway
 
 from gateway.archive.manifest import load_manifest
@@ -189,11 +190,7 @@ def test_in_python_limits_are_given_by_name(tmp_path: Path) -> None:
     assert setup.calibrated.vehicle.gross_limit_kg == 1850.0
 
 
-VAN = Vehicle(
-    name="van",
-    empty_mass_kg=1240.0,
-    wheelbase_m=2.8,
-    sensor_position_m=0.0,
+VAN = paper_van(
     unsprung_front_kg=80.0,
     unsprung_rear_kg=80.0,
     gross_limit_kg=2000.0,
@@ -265,11 +262,7 @@ def test_a_wheel_can_be_what_the_light_is_about() -> None:
     assert (found.light, found.places()) == (Light.OVER, ("rear_left",))
 
 
-OTHER_VAN = Vehicle(
-    name="van",
-    empty_mass_kg=1240.0,
-    wheelbase_m=2.8,
-    sensor_position_m=0.0,
+OTHER_VAN = paper_van(
     empty_front_share_pct=57.0,
     empty_front_share_std_pct=0.0,
     track_width_m=1.5,

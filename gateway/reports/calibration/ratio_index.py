@@ -9,7 +9,7 @@ from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.fit import RatioIndexFit
 from gateway.calibration.ratio_index.regression import FittedRegression
 from gateway.calibration.ratio_index.table import IndexRows, index_rows
-from gateway.core.ratio_index.index import Band, RatioIndexCalibration
+from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.records import F64
 from gateway.reports.charts import Axis, Chart, LineMark, Mark, Marker, Panel, Points, Ribbon, Section, Table
@@ -103,15 +103,11 @@ def _predicted(name: str, model: RegressionModel, along: F64, held: float) -> F6
 
 def _bands_table(calibration: RatioIndexCalibration) -> Table:
     rows = [
-        (index, *(_band(band) for band in bands or ()))
+        (index, *(f"{band.centre_hz:g} Hz, {band.width_hz:g} Hz wide" for band in bands or ()))
         for index, bands in (("R_a", calibration.acceleration_bands), ("R_g", calibration.pitch_rate_bands))
     ]
     padded = tuple((*row, *(NONE,) * (3 - len(row))) for row in rows)
     return Table("Bands: centre and width at -3 dB", ("Index", "numerator", "denominator"), padded)
-
-
-def _band(band: Band) -> str:
-    return f"{band.centre_hz:g} Hz, {band.width_hz:g} Hz wide"
 
 
 def _model_tables(fit: RatioIndexFit) -> Iterator[Table]:

@@ -10,7 +10,7 @@ from gateway.calibration.judgement.evaluation import Judged
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.regression import fit_regression
 from gateway.calibration.ratio_index.table import N_SEGMENT, IndexRows, index_rows
-from gateway.core.ratio_index.index import PAPER_BANDS, Band, band_pass_gain, mean_spectrum
+from gateway.core.ratio_index.index import PAPER_BANDS, band_pass_gain, mean_spectrum
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
 from gateway.records import F64
 from gateway.reports.charts.still import panels
@@ -83,7 +83,8 @@ def figure_2(experiments: Experiments) -> Figure:
         freq_hz, spectrum = spectrum_of(run, ACCELERATION)
         axes.plot(freq_hz, spectrum, color="#999999", label=f"{run.payload_kg:.0f} kg")
         for band, colour in zip(bands, COLOURS[:2], strict=True):
-            axes.plot(freq_hz, band_pass_gain(freq_hz, band) * spectrum, color=colour, label=_band_name(band))
+            name = f"{band.centre_hz:g} Hz, w = {band.width_hz:g} Hz"
+            axes.plot(freq_hz, band_pass_gain(freq_hz, band) * spectrum, color=colour, label=name)
         _label(axes, "frequency [Hz]", f"{NAME[ACCELERATION]} [{UNIT[ACCELERATION]}]")
     return figure
 
@@ -279,10 +280,6 @@ def _with_intervals(
     centre = np.array([one.number for one in quantities])
     reach = np.abs(np.array([one.interval95 for one in quantities]).reshape(-1, 2) - centre[:, None]).T
     axes.errorbar(middle_min, centre, yerr=reach, fmt="o", color=colour, label=label, markersize=3.5, linewidth=0.8)
-
-
-def _band_name(band: Band) -> str:
-    return f"{band.centre_hz:g} Hz, w = {band.width_hz:g} Hz"
 
 
 def _label(axes: Axes, x: str, y: str) -> None:
