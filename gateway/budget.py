@@ -16,7 +16,7 @@ import numpy as np
 from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, SHAPE, Posterior, Source
 
 OWN: Final = "own"  # what no other batch shares, among the sources
-WEIGHBRIDGE_STD_KG: Final = 5.0  # of a known weight, as a scale of class III shows it (OIML R 76: 10 kg steps)
+WEIGHBRIDGE_STD_KG: Final = 5.0  # of a scale of class III (OIML R 76: 10 kg steps)
 
 
 class Remedy(StrEnum):
@@ -25,7 +25,7 @@ class Remedy(StrEnum):
     DRIVE_ON = "drive_on"  # another ten minutes under the same load
     WEIGH_ONCE = "weigh_once"  # loaded, on a scale
     SAY_WHAT_IS_CARRIED = "say_what_is_carried"
-    WEIGH_EMPTY = "weigh_empty"  # tell the gateway while the vehicle is empty
+    WEIGH_EMPTY = "weigh_empty"  # state that it is
     READ_ROLL_RATE = "read_roll_rate"
     WEIGH_AXLES_EMPTY = "weigh_axles_empty"  # both axles of the empty vehicle
 

@@ -244,8 +244,7 @@ class Estimate:
     @property
     def id(self) -> str:
         """The same batch, vehicle, estimator and calibration always have the same id."""
-        parts: tuple[object, ...] = (self.vehicle_id, self.t_start_ns, self.t_end_ns, self.estimator)
-        parts += (self.calibration_id,)
+        parts = (self.vehicle_id, self.t_start_ns, self.t_end_ns, self.estimator, self.calibration_id)
         digest = hashlib.sha256("|".join(map(str, parts)).encode()).hexdigest()
         return f"{self.t_end_ns}-{digest[:12]}"
 

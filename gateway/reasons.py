@@ -222,9 +222,9 @@ SOURCES: Final[Mapping[str, str]] = MappingProxyType(
 REMEDIES: Final[Mapping[Remedy, str]] = MappingProxyType(
     {
         Remedy.DRIVE_ON: "drive another ten minutes with the same load",
-        Remedy.WEIGH_ONCE: "weigh the vehicle once, loaded, and state that as a known weight",
+        Remedy.WEIGH_ONCE: "weigh the vehicle once, loaded, and state what the scale shows",
         Remedy.SAY_WHAT_IS_CARRIED: "state in the vehicle's data what it carries, with its length and height",
-        Remedy.WEIGH_EMPTY: "tell the gateway when the vehicle is empty",
+        Remedy.WEIGH_EMPTY: "state that the vehicle is empty, when it is",
         Remedy.READ_ROLL_RATE: "map the roll rate, if the device sends it",
         Remedy.WEIGH_AXLES_EMPTY: "weigh both axles of the empty vehicle",
     }

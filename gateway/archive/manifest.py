@@ -1,5 +1,4 @@
-"""The manifest of an archive: the vehicles' log folders, with the signal map, calibration and known weights for each
-span of time.
+"""The manifest of an archive: the vehicles' log folders, with the signal map and calibration for each span of time.
 
 TOML. Paths in it are relative to the manifest, which may be in an object store.
 """

@@ -281,7 +281,7 @@ def _of_scales(one: StatementRecord, vehicle: Vehicle) -> Weight:
         L = G - M - u_front - u_rear,    D = (F_front - u_front) / (M + L)
 
     Unsprung masses that nobody stated, and that no kerb weight tells, have the usual share of the sprung mass with its
-    scatter: the error is the same on every ticket.
+    scatter: the error is the same at every weighing.
     """
     load, step_kg = one.load, one.load.plus_minus_kg or PLUS_MINUS_KG[one.source]
     front, rear = (_unsprung(kg, vehicle) for kg in unsprung_kg(vehicle))
@@ -298,7 +298,7 @@ def _of_scales(one: StatementRecord, vehicle: Vehicle) -> Weight:
     if not SHARES[0] < share < SHARES[1]:
         raise ImpossibleError(
             f"front_axle_kg, rear_axle_kg: {front_kg:g} and {rear_kg:g} kg put {100.0 * share:.0f} % of the sprung "
-            "mass on the front axle: read the ticket again, axle by axle"
+            "mass on the front axle: read the scale slip again, axle by axle"
         )
     by_step = hypot(1.0 - share, share) * step_kg / Z95
     share_std = hypot(by_step, front[1]) / sprung_kg

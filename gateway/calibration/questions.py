@@ -65,5 +65,5 @@ def common_errors(causes: Mapping[str, tuple[float, float]]) -> Iterator[str]:
             )
             yield (
                 f"all {source.replace('_', ' ')}s say {off} {less} than is aboard: is it packaging, or what is always "
-                "in the vehicle? A scale ticket tells"
+                "in the vehicle? One weighing on a scale tells"
             )

@@ -17,7 +17,6 @@ from gateway.estimate import Epoch, Estimate
 from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, fused
 
 STOP_THAT_ENDS_EPOCH_S: Final = 60.0  # chosen: time enough to load or unload
-BATCH_IDS: Final = 20  # chosen: newest batch ids kept per weighed load
 
 
 @dataclass(frozen=True)
@@ -39,34 +38,6 @@ class LoadEpoch:
     @property
     def n_batches(self) -> int:
         return len(self.batches)
-
-
-@dataclass(frozen=True, slots=True)
-class WeighedLoad:
-    """The last weighed load and its batches; a known weight refers to it.
-
-    ``drive_start_ns`` and ``t_end_ns`` are those of its last counted batch; ``batch_ids`` are the newest, in order of
-    time.
-    """
-
-    epoch: LoadEpoch
-    drive_start_ns: int
-    t_end_ns: int
-    batch_ids: tuple[str, ...]
-
-
-def remembered(
-    before: WeighedLoad | None, epoch: LoadEpoch | None, shown: Estimate, drive_start_ns: int
-) -> WeighedLoad | None:
-    """The weighed load after one more full batch; ``shown`` is its published estimate, ``epoch`` the epoch after it.
-
-    A refused batch changes nothing, nor does a stop: the last load stays until the next one is weighed.
-    """
-    if epoch is None or (before is not None and before.epoch is epoch):
-        return before
-    continues = before is not None and before.epoch.t_start_ns == epoch.t_start_ns
-    earlier = before.batch_ids if before is not None and continues else ()
-    return WeighedLoad(epoch, drive_start_ns, shown.t_end_ns, (*earlier, shown.id)[-BATCH_IDS:])
 
 
 def fused_epoch(

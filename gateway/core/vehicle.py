@@ -61,7 +61,7 @@ WeightKg = Annotated[float, Interval(gt=0.0, le=100_000.0)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleFields:
-    """The fields that a vehicle shares with the answers given at commissioning, each with its description and bounds.
+    """The fields that a vehicle shares with the answers about it, each with its description and bounds.
 
     Campaign file, calibration file, web and pages derive from the metadata, which uses pydantic's constraints. The
     bounds exclude any road vehicle, so that fractions for percent, millimetres or tonnes are rejected at once.

@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
-MOST_BYTES: Final = 16_000_000  # chosen: many times a file of known weights or a campaign
+MOST_BYTES: Final = 16_000_000  # chosen: many times a campaign file
 LOCK_TIMEOUT_S: Final = 10.0  # chosen: many times what a writer holds it
 _LOCK_POLL_S: Final = 0.02  # chosen: unnoticed by people
 

@@ -12,7 +12,6 @@ from typing import Final, ParamSpec
 
 from gateway.bus.live.receiver import Inbox
 from gateway.bus.signals import Decoder
-from gateway.core.fusion import WeighedLoad
 from gateway.estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.model.sensors import NOISE_RATIOS
@@ -21,7 +20,7 @@ from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.records import Frames, Why
 from gateway.service.signal_watch import SignalWatch, StandingWatch
 from gateway.store import Store
-from gateway.web.live.board import Board, boot_clock_s
+from gateway.web.live.board import Board
 from gateway.weighing.flow import Flow
 
 DRAIN_S = 0.5  # chosen: longest wait for frames, and so the delay with which the end of a drive is noticed
@@ -98,7 +97,6 @@ class Pipeline(ThreadPart):
         self.n_frames = 0  # frames whose estimates, if any, are handed over
         self.progress = 0  # increases with every turn of the loop; the watchdog checks it
         self._silent_s = 0.0
-        self._weighed_at: tuple[WeighedLoad | None, float] = (None, 0.0)
         self._inbox = inbox
         self._store = store
         self._board = board
@@ -111,11 +109,6 @@ class Pipeline(ThreadPart):
         super().stop(within_s)
         if self.is_alive():
             log_event(Event.PIPELINE_LATE, level=logging.ERROR, n_frames_waiting=len(self._inbox))
-
-    def weighed_age_s(self) -> float | None:
-        """Seconds since ``flow.weighed`` was computed, on the board's clock; None if there is none. From any thread."""
-        weighed, found_s = self._weighed_at
-        return None if weighed is None else boot_clock_s() - found_s
 
     def is_between_drives(self, silence_s: float) -> bool:
         """Whether the next frame begins another drive: this one is over, or its bus is silent. From any thread."""
@@ -159,8 +152,6 @@ class Pipeline(ThreadPart):
     def _hand_over(self, estimates: Iterable[Estimate]) -> None:
         for found in estimates:
             self._count(found)
-            if self.flow.weighed is not self._weighed_at[0]:
-                self._weighed_at = (self.flow.weighed, boot_clock_s())
             if not found.is_remainder:  # before the journal, so that its readers find it on the board
                 self._beside.call("board", self._board.publish, found)
             if not found.is_provisional:

@@ -10,7 +10,7 @@ from gateway.budget import budget_of
 from gateway.core.batch import Traits
 from gateway.core.cargo import is_said
 from gateway.core.change import Rules
-from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, WeighedLoad, epoch_of, fused_epoch, remembered
+from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, epoch_of, fused_epoch
 from gateway.core.journey import way_of
 from gateway.core.pool import (
     LEAST_LOAD_S,
@@ -55,8 +55,7 @@ class Flow:
 
     It yields estimates and refusals in order of time, and between them remainders: windows with too little driving,
     which wait in the pool (core.pool) for later windows.
-    ``weighed`` is the last load epoch with a counted batch. ``on_window`` is called for each window, with its rows,
-    before it is weighed.
+    ``on_window`` is called for each window, with its rows, before it is weighed.
     """
 
     def __init__(
@@ -75,20 +74,10 @@ class Flow:
         self._identity = identity
         self._epoch: LoadEpoch | None = None
         self._drive_start_ns: int | None = None
-        self._is_epoch_over = False
         self._pool: Parts = ()
         self._open_s = 0.0  # usable time in the open window, by its last provisional estimate
-        self.weighed: WeighedLoad | None = None
         self._rules = Rules.of(calibrated.vehicle) if calibrated else Rules()
         self.on_window: OnWindow = lambda batch, rows: None
-
-    @property
-    def load_may_have_changed(self) -> bool:
-        """True if the vehicle has driven on since ``weighed`` after a stop long enough to load or unload."""
-        weighed, drive_start_ns = self.weighed, self.scheduler.drive_start_ns
-        if weighed is None or drive_start_ns is None:
-            return False
-        return self._is_epoch_over or drive_start_ns != weighed.drive_start_ns
 
     @property
     def missing_s(self) -> float:
@@ -120,7 +109,6 @@ class Flow:
         return [self._early(window)] if window.is_provisional else self._of_window(window, rows)
 
     def _early(self, window: Batch) -> Estimate:
-        self._is_epoch_over |= window.longest_stop_s >= STOP_THAT_ENDS_EPOCH_S
         self._open_s = window.usable_s
         parts = continued(self._pool, window)
         if parts and can_be_pooled(window, self.settings):
@@ -198,10 +186,7 @@ class Flow:
         return self._finished(batch, replace(found, way=replace(way, since_ns=since_ns)), is_new_load=is_new_load)
 
     def _finished(self, batch: Batch, found: Estimate, *, is_new_load: bool = False) -> Estimate:
-        shown = self._shown(found, self._fused(batch, found, is_new_load))
-        self.weighed = remembered(self.weighed, self._epoch, shown, batch.drive_start_ns)
-        self._is_epoch_over = self._epoch is None
-        return shown
+        return self._shown(found, self._fused(batch, found, is_new_load))
 
     def _named(self, found: Estimate) -> Estimate:
         return replace(found, vehicle_id=self._identity.vehicle_id, vin=self._identity.vin)

@@ -122,10 +122,10 @@ def test_what_is_not_there_is_a_problem(client: Client) -> None:
 def test_a_question_is_told_in_words_how_to_mend_it(client: Client) -> None:
     assert "send a next_cursor or last_cursor" in client.get("/api/v1/estimates?cursor=nonsense").json()["detail"]
     assert "query.sinc: unknown here" in client.get("/api/v1/estimates?sinc=x").json()["detail"]
-    form = client.request("POST", "/api/v1/statements", content=b"is_empty=true")
+    form = client.request("PUT", "/api/v1/learning", content=b"use=newest")
     assert form.json()["detail"] == "body: send a JSON object, with Content-Type: application/json"
     broken = client.request("POST", "/api/v1/statements", content=b"{", headers={"Content-Type": JSON})
-    assert broken.json()["errors"] == [{"where": "body.1", "what": "this is no JSON"}]
+    assert broken.json()["errors"] == [{"where": "body", "what": "this is no JSON"}]
 
 
 @pytest.mark.parametrize(
@@ -295,7 +295,7 @@ def test_the_described_latest_fits_what_is_sent(gateway: Gateway, client: Client
 def test_a_method_that_is_not_possible_is_told_without_making_the_description(tmp_path: Path) -> None:
     """The first 405 built the OpenAPI document in the event loop: nobody was answered for 0.9 s."""
     with Gateway(tmp_path) as gateway:
-        answer = Client(gateway.app).request("DELETE", "/api/v1/known-weights")
+        answer = Client(gateway.app).request("DELETE", "/api/v1/statements")
         assert (answer.status_code, answer.headers["allow"]) == (405, "GET, HEAD, POST")
         assert Client(gateway.app).request("POST", "/cab").headers["allow"] == "GET, HEAD"
         assert gateway.app.openapi_schema is None

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from support.paper_van import paper_van
 
 from gateway.core.change import EVEN, ROLLING, Rules, change_of, probability
-from gateway.core.fusion import LoadEpoch, WeighedLoad, fused_epoch, remembered
+from gateway.core.fusion import LoadEpoch, fused_epoch
 from gateway.estimate import Estimate, Quantity
 from gateway.posterior import CG_LEFT, PAYLOAD, Posterior, Source, difference
 from gateway.records import Why
@@ -116,22 +116,6 @@ def test_batches_of_one_load_hardly_ever_look_like_two() -> None:
             one, other = (batch(kg, pct, left_m=left_m if size == 3 else None) for kg, pct, left_m in pair)
             changes += together(one, other).is_change
         assert changes <= 4
-
-
-def test_a_weighed_load_names_its_newest_batches_and_outlives_a_stop() -> None:
-    found = [batch(10.0, n=i) for i in range(30)]
-    epoch: LoadEpoch | None = None
-    weighed: WeighedLoad | None = None
-    for one in found:
-        epoch = fused_epoch(epoch, one, RULES)
-        weighed = remembered(weighed, epoch, one, drive_start_ns=0)
-    assert weighed.epoch.n_batches == 30
-    assert weighed.batch_ids == tuple(one.id for one in found[-20:])
-    assert remembered(weighed, None, found[0], drive_start_ns=9) is weighed
-    assert remembered(weighed, weighed.epoch, replace(found[0], rejected=(Why.GAP,)), drive_start_ns=0) is weighed
-    later = batch(0.0, n=99)
-    other = remembered(weighed, fused_epoch(None, later, RULES), later, drive_start_ns=9)
-    assert (other.epoch.n_batches, other.batch_ids, other.drive_start_ns) == (1, (later.id,), 9)
 
 
 def load(kg: float, share_pct: float = 50.0, left_m: float | None = None, correlation: float = 0.0) -> Posterior:

@@ -110,7 +110,7 @@ def statements_router(backend: LearnerBackend) -> APIRouter:
 
     @router.get(STATEMENTS_PATH, response_model=StatementPage, responses=problem_responses(409, 422))
     async def statements(query: Annotated[ListQuery, Query()]) -> Response:
-        """Every statement with what became of it, the newest first: this list is the verification of the weighing."""
+        """Every statement with what became of it, the newest first: this list shows how well the vehicle is weighed."""
         return await answered(
             backend.statements, since_ns=query.since, state=query.state, limit=query.limit, cursor=query.cursor
         )
@@ -157,7 +157,7 @@ def _checked(content: bytes) -> StatementRecord:
 
 
 def _in_body(errors: Any) -> list[Mapping[str, Any]]:
-    return [{**one, "loc": ("body", ".".join(map(str, one["loc"])))} for one in errors]
+    return [{**one, "loc": ("body", *filter(None, [".".join(map(str, one["loc"]))]))} for one in errors]
 
 
 def _zone(name: str | None) -> ZoneInfo | None:

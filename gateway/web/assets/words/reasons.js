@@ -51,9 +51,9 @@ export const SOURCES_DE = {
 
 export const REMEDIES_DE = {
   drive_on: "weitere zehn Minuten mit derselben Ladung fahren",
-  weigh_once: "einmal beladen wiegen und als bekanntes Gewicht angeben",
+  weigh_once: "einmal beladen wiegen und angeben, was die Waage zeigt",
   say_what_is_carried: "in den Fahrzeugdaten angeben, was geladen wird und wie lang und hoch es ist",
-  weigh_empty: "dem Gateway sagen, wenn das Fahrzeug leer ist",
+  weigh_empty: "angeben, wenn das Fahrzeug leer ist",
   read_roll_rate: "die Wankrate zuordnen, falls das Gerät sie sendet",
   weigh_axles_empty: "beide Achsen des leeren Fahrzeugs wiegen",
 };
