@@ -65,7 +65,7 @@ def test_an_overload_by_the_settings_is_told_everywhere(config: Path, caplog: py
         assert (before["load"], before["light"]) == ("never_weighed", "unknown")
         cab = after(service, white_noise(45.0, START_NS, seed=3), config.parent / "drive.log")
         assert (cab["light"], cab["light_about"], cab["load"]) == ("over", ["gross"], "weighed")
-        assert [(room["place"], room["kg"]) for room in cab["room"]] == [("gross", -50.0), ("rear_axle", 171.2)]
+        assert [(spare["place"], spare["kg"]) for spare in cab["spare"]] == [("gross", -50.0), ("rear_axle", 171.2)]
         [reading] = cab["own_readings"]
         assert (reading["signal"], reading["unit"]) == ("axle_weight", "kg")
         weights = told(service, "/api/v1/estimates")["items"][-1]["weights"]

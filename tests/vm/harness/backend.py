@@ -53,7 +53,8 @@ def best_backend() -> Backend | str:
 def _uml(wiring: Wiring) -> list[str]:
     # One CPU: User Mode Linux switches between its kernel and its user process at every system call, and across
     # CPUs that costs many times more.
-    return ["taskset", "--cpu-list", str(_own_processor()), UML, "seccomp=on", f"mem={MEMORY_MB}M",
+    return ["taskset", "--cpu-list", str(_own_processor()),
+            "env", f"LD_PRELOAD={wiring.image / 'xstate.so'}", UML, "seccomp=on", f"mem={MEMORY_MB}M",
             *(f"ubd{i}={disk}" for i, disk in enumerate((wiring.disk, *wiring.further_disks))),
             "root=/dev/ubda", "rw", "rootfstype=ext4",
             f"vec0:transport=tap,ifname={wiring.tap},depth=64,gro=1", "con0=null,fd:1", "con=null",

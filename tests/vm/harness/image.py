@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 GUEST: Final = Path(__file__).parents[1] / "guest"
+XSTATE: Final = Path(__file__).with_name("xstate.c")
 SUITE: Final = "bookworm"
 DISK_MB: Final = 3000  # sparse
 UML_MODULES: Final = Path("/usr/lib/uml/modules")
@@ -20,7 +21,7 @@ PACKAGES: Final = (
     "dmsetup",
 )  # fmt: skip
 QEMU_PACKAGES: Final = ("linux-image-amd64", "initramfs-tools")  # the cloud kernel has no CAN
-TOOLS: Final = ("mmdebstrap", "mke2fs", "depmod")
+TOOLS: Final = ("mmdebstrap", "mke2fs", "depmod", "cc")
 LEFT_OUT: Final = ("man", "doc", "locale", "info")  # below /usr/share
 
 # Nothing of a test machine needs these, and each costs time at every boot.
@@ -48,7 +49,9 @@ def kept_image(backend: str) -> Path:
 
 def _recipe(backend: str) -> str:
     """Changes whenever the image would."""
-    contents = b"".join(part.read_bytes() for part in (Path(__file__), GUEST / "agent.py", GUEST / "agent.service"))
+    contents = b"".join(
+        part.read_bytes() for part in (Path(__file__), XSTATE, GUEST / "agent.py", GUEST / "agent.service")
+    )
     kernels = " ".join(sorted(kernel.name for kernel in UML_MODULES.glob("*"))) if backend == "uml" else ""
     return hashlib.sha256(contents + kernels.encode()).hexdigest()[:12]
 
@@ -59,6 +62,7 @@ def _build(folder: Path, backend: str) -> None:
         _bootstrap(root, PACKAGES + (QEMU_PACKAGES if backend == "qemu" else ()))
         if backend == "uml":
             _add_modules(root)
+            _run("cc", "-shared", "-fPIC", "-O1", "-o", str(folder / "xstate.so"), str(XSTATE))
         else:
             for name in ("vmlinuz", "initrd.img"):
                 shutil.copyfile(next((root / "boot").glob(f"{name}-*")), folder / name)
