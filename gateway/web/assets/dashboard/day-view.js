@@ -1,7 +1,8 @@
 // The last day: what was loaded and unloaded where, and the trips between; as bars over time, and as a list in words.
 
 import { known, show } from "./known.js";
-import { element, made, shape, write } from "./page.js";
+import { element, made, write } from "./page.js";
+import { shape } from "./parts.js";
 import { phrase } from "./phrases.js";
 import { SURE, clock, figure, number, span, withStd } from "./words.js";
 

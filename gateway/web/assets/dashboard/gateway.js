@@ -21,13 +21,4 @@ export async function ask(path, more = {}, signal = null) {
   return response;
 }
 
-/** Saves what is at `path` as a file. A link cannot carry the token; a question can. */
-export async function download(path, name) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(await (await ask(path)).blob());
-  link.download = name;
-  link.click();
-  URL.revokeObjectURL(link.href);
-}
-
 export const load = async (path) => (await ask(path)).json();

@@ -1,7 +1,8 @@
 // Bus and sensors, the vehicle and its calibration.
 
 import { show } from "./known.js";
-import { element, made, pair, row } from "./page.js";
+import { element, made, pair } from "./page.js";
+import { row } from "./parts.js";
 import { phrase, taughtHere } from "./phrases.js";
 import { isAsleep, isSilent } from "./sleep.js";
 import { UNKNOWN, between, capital, clock, duration, figure, number } from "./words.js";

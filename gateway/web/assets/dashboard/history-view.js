@@ -1,10 +1,11 @@
 // History: every batch with its 95 % band over time, as charts and as a table.
 
 import { known, show } from "./known.js";
-import { element, made, row, write } from "./page.js";
-import { colour, plot } from "./plot.js";
+import { element, made, write } from "./page.js";
+import { row } from "./parts.js";
+import { axisDay, colour, plot } from "./plot.js";
 import { phrase } from "./phrases.js";
-import { axisDay, between, clock, figure, kmh, reasons, withStd } from "./words.js";
+import { between, clock, figure, kmh, reasons, withStd } from "./words.js";
 
 const HOUR_MS = 3600e3;
 const QUANTITIES = {

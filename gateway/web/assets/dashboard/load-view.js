@@ -3,7 +3,7 @@
 import { ageNow, known, show } from "./known.js";
 import { element, made, say, write } from "./page.js";
 import { phrase, taughtHere } from "./phrases.js";
-import { UNKNOWN, Z95, ago, between, capital, clock, figure, kmh, reasons as named, withStd, words } from "./words.js";
+import { UNKNOWN, Z95, ago, between, capital, clock, figure, kmh, reasons as named, withStd } from "./words.js";
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interval", { between: between(bounds, digits, unit) }));
 
@@ -88,7 +88,7 @@ show(({ latest, sources, remedies: advised }) => {
   write("budget-why", phrase("why", { kg: half(latest.payload_std_kg) }));
   const shown = lines.filter((line) => Z95 * line.payload_kg >= 0.5); // less would read as 0 kg
   element("budget-lines").replaceChildren(...shown.map((line) => {
-    const built = made("li", [made("span", capital(sources.get(line.source) ?? words(line.source))), made("span", `±\u00a0${half(line.payload_kg)}`)]);
+    const built = made("li", [made("span", capital(sources.get(line.source) ?? line.source.replaceAll("_", " "))), made("span", `±\u00a0${half(line.payload_kg)}`)]);
     built.style.setProperty("--part", `${(100 * line.payload_kg) / latest.payload_std_kg}%`);
     return built;
   }));

@@ -1,13 +1,19 @@
 // plotly.js, fetched after the numbers are on the page, and what all charts have in common.
 
 import { learn } from "./known.js";
-import { locale } from "../language.js";
+import { language, locale } from "../language.js";
 
 const CONFIG = { displayModeBar: false, responsive: true, showTips: false };
 const isTouch = matchMedia("(pointer: coarse)");
 
 const part = (type) => new Intl.NumberFormat(locale, { useGrouping: "always" }).formatToParts(1234.5).find((one) => one.type === type).value;
 const SEPARATORS = part("decimal") + part("group"); // as the page writes its numbers
+
+/** A day on an axis, in the notation of d3-time-format: in the order of the locale, by number in German. */
+export function axisDay() {
+  if (language === "de") return "%-d.%-m.";
+  return new Intl.DateTimeFormat(locale, { month: "short", day: "numeric" }).formatToParts(0)[0].type === "month" ? "%b %-d" : "%-d %b";
+}
 
 let loading = null;
 

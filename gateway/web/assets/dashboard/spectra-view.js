@@ -1,7 +1,8 @@
 // Spectra of the last batch, the fitted model over them, and the bands of the ratio indexes.
 
 import { show } from "./known.js";
-import { element, made, row, write } from "./page.js";
+import { element, made, write } from "./page.js";
+import { row } from "./parts.js";
 import { colour, plot } from "./plot.js";
 import { phrase } from "./phrases.js";
 import { clock, figure, number, reasons } from "./words.js";

@@ -1,7 +1,7 @@
 // The van from above, front to the left: the load on each axle and wheel, and the load's centre of gravity.
 // To scale along by the wheelbase and across by the track width.
 
-import { shape } from "./page.js";
+import { shape } from "./parts.js";
 import { phrase } from "./phrases.js";
 import { Z95, capital, figure, number, withStd } from "./words.js";
 

@@ -1,6 +1,6 @@
 // Numbers, times and names for people, as their language writes them.
 
-import { language, locale, speaker } from "../language.js";
+import { locale, speaker } from "../language.js";
 import { COMMON } from "../words/common.js";
 
 const common = speaker(COMMON);
@@ -23,10 +23,6 @@ export const between = (bounds, digits, unit) =>
 export const withStd = (x, std, digits, unit) =>
   x == null ? UNKNOWN : `${number(x, digits)}${std == null ? "" : ` ± ${number(Z95 * std, digits)}`}${GLUE}${unit}`;
 
-const plus = (x, digits) => (Number(x.toFixed(digits)) > 0 ? "+" : "");
-
-export const signed = (x, digits, unit) => plus(x, digits) + figure(x, digits, unit);
-
 export const kmh = (mps) => figure(mps == null ? null : mps * 3.6, 0, "km/h");
 
 const TIME = { hour: "2-digit", minute: "2-digit" };
@@ -42,19 +38,11 @@ function format(...instants) {
 
 export const clock = (iso) => format(new Date(iso)).format(new Date(iso));
 
-/** A day on a chart's axis, in the notation of d3-time-format: in the order of the locale, by number in German. */
-export function axisDay() {
-  if (language === "de") return "%-d.%-m.";
-  return new Intl.DateTimeFormat(locale, { month: "short", day: "numeric" }).formatToParts(0)[0].type === "month" ? "%b %-d" : "%-d %b";
-}
-
 /** From one instant to another, as "09:05 – 09:35". */
 export function span(from, to) {
   const [start, end] = [new Date(from), new Date(to)];
   return format(start, end).formatRange(start, end);
 }
-
-export const words = (name) => name.replaceAll("_", " ");
 
 export const reasons = (names) => names.map((name) => common.named("reason", name)).join(", ");
 

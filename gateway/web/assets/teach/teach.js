@@ -1,7 +1,8 @@
 // The page that teaches a vehicle: what it is, what was aboard, how exactly it weighs now, and what would help most.
 
 import { headers, load, setToken, Refused } from "../dashboard/gateway.js";
-import { acceptNumbers, button, element, made, numberText, row, say, typedNumber, write } from "../dashboard/page.js";
+import { acceptNumbers, element, made, numberText, say, typedNumber, write } from "../dashboard/page.js";
+import { button, row } from "../dashboard/parts.js";
 import { clock, duration, figure } from "../dashboard/words.js";
 import { fill, speaker } from "../language.js";
 import { COMMON } from "../words/common.js";
