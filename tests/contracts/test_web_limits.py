@@ -90,7 +90,10 @@ def test_what_is_no_request_ends_with_an_error_and_leaves_no_word_in_the_log(
 
 @pytest.mark.parametrize(
     ("kind", "body"),
-    [(b"Content-Length: 100000000", b""), (b"Transfer-Encoding: chunked\r\nConnection: close", (BODY_BYTES // 0x8000 + 2) * CHUNK)],
+    [
+        (b"Content-Length: 100000000", b""),
+        (b"Transfer-Encoding: chunked\r\nConnection: close", (BODY_BYTES // 0x8000 + 2) * CHUNK),
+    ],
 )
 def test_an_endless_body_is_refused(tmp_path: Path, kind: bytes, body: bytes) -> None:
     head = b"POST /api/v1/statements HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"

@@ -46,7 +46,7 @@ def make_estimate(n: int, *rejected: Why, with_spectra: bool = False, is_provisi
 
 
 def with_everything(n: int) -> Estimate:
-    """The n-th batch with an epoch, known weights, a budget, weights, a place to the side, and diagnostics."""
+    """The n-th batch with an epoch, a budget, weights, a place to the side, and diagnostics."""
     found = make_estimate(n)
     known = posterior_of(100.0 + n, 50.5, 6.0, 0.2, 0.021)
     return replace(

@@ -129,7 +129,7 @@ def test_a_statement_holds_for_its_drives(records: list[StatementRecord], expect
             [told("07:40", payload_kg=310.0), told("07:45", source="scale", gross_kg=1720.0)],
             [Fate.MATCHED] * 2,
             "",
-            id="a note and a scale ticket",
+            id="a note and a weighing on a scale",
         ),
     ],
 )
@@ -150,7 +150,7 @@ def test_what_becomes_of_a_record_is_told(records: list[StatementRecord], fates:
         ({"source": "scale", "gross_kg": 3800.0}, "is it in pounds, or another vehicle's?"),
         (
             {"source": "axle_scales", "front_axle_kg": 90.0, "rear_axle_kg": 1600.0},
-            "read the ticket again, axle by axle",
+            "read the scale slip again, axle by axle",
         ),
         ({"payload_kg": 310.0, "place": {"behind_front_axle_m": 26.0}}, "from the front axle rearwards, in metres"),
         ({"change_kg": -60.0}, "no statement of the load before it"),
@@ -193,7 +193,7 @@ def test_axle_weights_are_a_payload_and_a_front_share() -> None:
     assert said.placed_by == record.id
 
 
-def test_unsprung_masses_that_nobody_knows_are_an_error_of_every_ticket() -> None:
+def test_unsprung_masses_that_nobody_knows_are_an_error_of_every_weighing() -> None:
     bare = replace(VAN, kerb_front_axle_kg=None, kerb_rear_axle_kg=None)
     (said, *_) = assign([told("07:40", source="scale", gross_kg=1720.0)], MORNING, bare).statements
     assert said.payload_kg == pytest.approx(1720.0 - 1240.0 - 2 * 0.065 * 1240.0)

@@ -152,7 +152,7 @@ def test_a_number_that_is_not_finite_is_refused(tmp_path: Path, number: str) -> 
 
 
 def test_a_file_that_lacks_an_optional_field_keeps_the_id_it_was_stored_under(tmp_path: Path) -> None:
-    """Tickets, tares and estimates name it by this id, whatever fields today's files have besides."""
+    """Statements and estimates name it by this id, whatever fields today's files have besides."""
     path = written(tmp_path, lambda c: c.pop("sister_id"))
     stored = "sha256:" + hashlib.sha256(path.read_bytes()).hexdigest()
     assert stored != calibration_file().id

@@ -80,7 +80,7 @@ def test_a_statement_that_its_drive_contradicts_is_held_and_no_other() -> None:
 
 
 def test_each_statement_is_told_what_its_drive_says_without_it() -> None:
-    """That is its verification: the drive knows the load from the others' vehicle alone."""
+    """That is its test: the drive knows the load from the vehicle of the others alone."""
     for found, (payload_kg, _) in zip(known().loads, KNOWN, strict=True):
         assert abs(found.without_kg - payload_kg) < 3.0 * found.without_std_kg
         assert found.payload_std_kg < found.without_std_kg
