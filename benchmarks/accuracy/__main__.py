@@ -14,14 +14,14 @@ from typing import Any, Final
 
 import click
 
-from benchmarks.accuracy import coverage, disturbances
+from benchmarks.accuracy import coverage, disturbances, ordinary_days
 from benchmarks.accuracy import faults as on_faults
 from benchmarks.accuracy.study import Study
 from gateway.cli.options import FILE
 from gateway.cli.progress import counted
 from gateway.errors import SpringscaleError
 
-STUDIES: Final[tuple[Study[Any], ...]] = (coverage.STUDY, disturbances.STUDY)
+STUDIES: Final[tuple[Study[Any], ...]] = (coverage.STUDY, disturbances.STUDY, ordinary_days.STUDY)
 Command = Callable[..., None]
 _workers = click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="processes")
 _kept = click.option("--kept", type=FILE, default=None, help="directory of cases to resume from: read and stored there")
