@@ -113,6 +113,10 @@ def test_a_sensor_is_at_fault_with_two_refusals_in_a_row_for_its_sake() -> None:
     assert told(watch, refused(0, Why.ACCELERATION_STUCK), refused(1, Why.TOO_SLOW)) == []
     assert told(watch, refused(2, Why.PITCH_RATE_STUCK), refused(3, Why.NO_CALIBRATION)) == []
     assert told(watch, refused(4, Why.PITCH_RATE_STUCK)) == [("sensor_fault.refused", True)]
+    (alarm,) = watch.active()
+    assert sentence(alarm) == (
+        "Batches are refused because of a sensor: the pitch rate repeated the same number for stuck_s"
+    )
     assert told(watch, refused(5, Why.TOO_SLOW)) == []
     assert told(watch, of_load(6, 300.0)) == [("sensor_fault.refused", False)]
 

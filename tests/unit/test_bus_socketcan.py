@@ -112,10 +112,11 @@ def test_the_last_error_frame_decides_on_bus_off(sent, is_bus_off, wire):
     receiver = wire.receiver()
     for datagram in sent:
         wire.send(datagram)
-    wire.send(classic(0x40000000 | 0x100, b""))  # a remote frame is not handed on
+    wire.send(classic(0x40000000 | 0x100, b""))  # a remote frame is counted, not handed on
     burst = receiver.receive(PATIENCE_S)
     assert burst.frames.can_id.tolist() == [0x12345678 | EXTENDED_ID] * sent.count(DATA)
     assert (burst.error_frames, burst.is_bus_off) == (len(sent) - sent.count(DATA), is_bus_off)
+    assert burst.remote_frames == 1
 
 
 @pytest.mark.parametrize(("width", "kept"), [(64, 12), (8, 8)])

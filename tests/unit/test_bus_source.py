@@ -92,11 +92,11 @@ def wait_for(condition):
 
 
 def test_frames_arrive_in_the_inbox_and_are_counted(listen):
-    source, interface = listen(Burst(frames(3)), Burst(frames(2, 10), error_frames=1))
+    source, interface = listen(Burst(frames(3)), Burst(frames(2, 10), error_frames=1, remote_frames=2))
     assert interface.is_played.wait(PATIENCE_S)
     assert source.inbox.drain(1.0).t_ns.tolist() == [0, 1, 2, 10, 11]
     counts = source.counts()
-    assert (counts.frames, counts.error_frames, counts.reconnects) == (5, 1, 0)
+    assert (counts.frames, counts.error_frames, counts.remote_frames, counts.reconnects) == (5, 1, 2, 0)
     assert (source.state, source.reason) == (SourceState.RECEIVING, None)
 
 

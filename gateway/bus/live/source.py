@@ -70,6 +70,7 @@ class SourceCounts:
     dropped_kernel: int
     error_frames: int
     reconnects: int
+    remote_frames: int = 0
     clock_sets: int = 0
     clock_wraps: int = 0
 
@@ -140,6 +141,7 @@ class LiveSource(ThreadPart):
             dropped_kernel=self._dropped_before + (receiver.dropped_kernel if receiver else 0),
             error_frames=self._tally["error_frames"],
             reconnects=self._tally["reconnects"],
+            remote_frames=self._tally["remote_frames"],
             clock_sets=self._tally["clock_sets"],
             clock_wraps=self._tally["clock_wraps"],
         )
@@ -183,6 +185,7 @@ class LiveSource(ThreadPart):
                 burst = receiver.receive(ASLEEP_POLL_S if self._state is SourceState.BUS_SILENT else POLL_S)
                 self._tally["frames"] += len(burst.frames)
                 self._tally["error_frames"] += burst.error_frames
+                self._tally["remote_frames"] += burst.remote_frames
                 self._note_clock(burst)
                 is_bus_off = burst.is_bus_off or (is_bus_off and not len(burst.frames))
                 if len(burst.frames):

@@ -8,7 +8,8 @@ from enum import StrEnum
 from typing import Any, Final
 
 from gateway.estimate import PLACES, Z95
-from gateway.records import iso_utc, ns_of
+from gateway.reasons import EXPLANATIONS
+from gateway.records import Why, iso_utc, ns_of
 
 ENTRY_KIND: Final = "alarm"
 """The kind of an alarm's row in the store and in the event stream."""
@@ -151,4 +152,10 @@ def _said(cause: AlarmCause, figure: AlarmFigure) -> str:
     if cause == SILENT:
         return f"No signal: {figure.detail}" if figure.detail else "No signal"
     said = "Batches are refused because of a sensor"
-    return f"{said}: {figure.detail.replace('_', ' ')}" if figure.detail else said
+    return f"{said}: {'; '.join(map(_happened, figure.detail.split(', ')))}" if figure.detail else said
+
+
+def _happened(reason: str) -> str:
+    """What a reason means, in words; a name that an other version gave stays as it is."""
+    known = EXPLANATIONS.get(Why(reason)) if reason in set(Why) else None
+    return reason.replace("_", " ") if known is None else known.happened.replace("`", "")

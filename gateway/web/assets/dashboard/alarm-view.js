@@ -15,7 +15,8 @@ function plain({ kind, where, found_kg, std_kg, limit_kg, detail }) {
     const measured = { found: withStd(found_kg, std_kg, 0, "kg"), limit: withStd(limit_kg, null, 0, "kg") };
     return phrase("over_limit", { place: capital(phrase(`place.${where}`)), ...measured });
   }
-  return `${phrase(where === "silent" ? "fault_silent" : "fault_refused")}${detail ? `: ${reasons(detail.split(", "))}` : ""}`;
+  if (where === "silent") return `${phrase("fault_silent")}${detail ? `: ${detail}` : ""}`;
+  return `${phrase("fault_refused")}${detail ? `: ${reasons(detail.split(", "))}` : ""}`;
 }
 
 /** An overload alarm that stands is red only where the verdict on the present load is. */
