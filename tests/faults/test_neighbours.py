@@ -76,7 +76,7 @@ def test_a_call_that_fails_costs_no_window_and_no_process(
 
         running.play(log)
         assert wait_until(lambda: any(told in said and "too much" in said for said in warnings()))
-        if name not in ("put", "keep"):  # which the service looked up at its start
+        if name not in ("put", "take"):  # which the service looked up at its start
             monkeypatch.setattr(owner, name, works)
             running.play(log)
             assert wait_until(lambda: not any("too much" in said for said in warnings()))
