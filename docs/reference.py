@@ -111,10 +111,10 @@ def fields_table(group: str) -> str:
     for one in named:
         unknown = NULL[part_of(one)]
         told = "as above" if unknown and unknown == before else unknown
-        columns = ", ".join(f"`{c}`" for c in one.columns)
+        columns = ", ".join(f"`{c}`" for c in one.columns if c != one.name) or ("" if one.columns else "none")
         rows.append((f"`{one.name}`", unit_of(one), one.description or "", told, columns))
         before = unknown
-    return table("field | unit | meaning | unknown | columns in CSV", rows)
+    return table("field | unit | meaning | unknown | other columns in CSV", rows)
 
 
 # -- reasons --

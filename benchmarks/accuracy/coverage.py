@@ -71,7 +71,7 @@ def rows(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:
 
 
 def _row(other: Mapping[str, Any], ours: Mapping[str, Any]) -> tuple[str, str]:
-    title = f"{ours['n_vans']} different vans, {ours['kind']}{', with roll rate' if ours['has_roll_rate'] else ''}"
+    title = f"{ours['kind']}{', with roll rate' if ours['has_roll_rate'] else ''}"
     held = " / ".join(_percent(100.0 * one["share"] if one else None, 0) for one in _both(ours, "coverage"))
     widths = " / ".join(_percent(half) for half in _both(ours, "half_width_pct"))
     scores = " / ".join(

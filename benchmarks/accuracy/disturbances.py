@@ -116,19 +116,16 @@ def _held(quantity: str) -> Callable[[Row], str]:
     return lambda line: f"{100.0 * held_or_refused(line, quantity):.0f} %"
 
 
-_WIDTH, _SCORE = zip(*(width_and_score(quantity) for quantity in ("payload", "front_share")), strict=True)
+_WIDTH = [width_and_score(quantity)[0] for quantity in ("payload", "front_share")]
 COLUMNS: Final[tuple[Column, ...]] = (
     ("Disturbance", text("kind")),
-    ("Batches", text("n_batches")),
     ("Refused, and why", lambda line: refused_cell(line["n_rejected"], line["rejected_by_reason"])),
     ("Payload, mean abs. error %", number("payload_mean_abs_pct", 1, unknown="–")),
     ("Share, mean abs. error %", number("front_share_mean_abs_pct", 1, unknown="–")),
     ("Payload held or refused", _held("payload")),
     ("Share held or refused", _held("front_share")),
     ("Payload, +- %", _WIDTH[0]),
-    ("score % (ideal)", _SCORE[0]),
     ("Share, +- %", _WIDTH[1]),
-    ("score % (ideal)", _SCORE[1]),
 )
 
 
