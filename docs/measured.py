@@ -109,9 +109,9 @@ def conditions() -> str:
         f"Python {where['python']}, with {packages}. The load average was {where['load_average_before']:.1f} before "
         f"and {where['load_average_after']:.1f} after."
     )
-    verdict = f"{len(goals) - len(missed)} of {len(goals)} goals are met" + (", missed are:" if missed else ".")
-    listed = [f"- {line.what} ({line.section}): {line.figure}, {line.goal}" for line in missed]
-    return "\n".join([fill(measured, 120), "", verdict, *(["", *listed] if listed else [])]) + "\n"
+    verdict = f"{len(goals) - len(missed)} of {len(goals)} goals are met"
+    listed = "; ".join(f"{line.what} ({line.section.partition(':')[0]})" for line in missed)
+    return f"{fill(measured, 120)}\n\n{fill(f'{verdict}. Missed: {listed}.' if missed else f'{verdict}.', 120)}\n"
 
 
 def speeds() -> str:

@@ -92,9 +92,19 @@ MENDED_WITHIN: Final = 1.25  # chosen: of the undisturbed error
 
 
 def section(found: Mapping[str, Any]) -> str:
-    """A row for every disturbance, and a verdict."""
+    """A row for every disturbance that has an effect, the names of the others, and a verdict."""
     lines = [line for line in found["lines"] if line["kind"] != ALL_KINDS]
-    return "\n".join([*table_of(COLUMNS, lines), "", *_verdicts(lines), ""])
+    undisturbed = next(line for line in lines if line["kind"] == UNDISTURBED.name)
+    harmless = [line for line in lines if line is not undisturbed and _is_harmless(line, undisturbed)]
+    shown = [line for line in lines if line not in harmless]
+    names = ", ".join(line["kind"] for line in harmless) or "none"
+    told = f"- Without effect (nothing refused, every interval held, errors within {MENDED_WITHIN:g} times those as recorded): "
+    return "\n".join([*table_of(COLUMNS, shown), "", f"{told}{names}.", *_verdicts(lines), ""])
+
+
+def _is_harmless(line: Mapping[str, Any], undisturbed: Mapping[str, Any]) -> bool:
+    is_held = all(held_or_refused(line, quantity) == 1.0 for quantity in ("payload", "front_share"))
+    return is_held and not line["n_rejected"] and is_mended(line, undisturbed)
 
 
 def held_or_refused(line: Mapping[str, Any], quantity: str) -> float:
