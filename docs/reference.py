@@ -104,17 +104,22 @@ def unit_of(one: EstimateField) -> str:
 
 
 def fields_table(group: str) -> str:
-    """The fields of one of GROUPS."""
+    """The fields of one of GROUPS; a number's standard deviation and interval are in its row."""
     elsewhere = {part for parts in GROUPS.values() for part in parts}
     named = [one for one in FIELDS if (part_of(one) if part_of(one) in elsewhere else "") in GROUPS[group]]
-    rows, before = [], ""
+    rows: dict[str, list[EstimateField]] = {}
     for one in named:
-        unknown = NULL[part_of(one)]
+        rows.setdefault(one.name.replace("_std", "").replace("_interval95", ""), []).append(one)
+    lines, before = [], ""
+    for first, *others in rows.values():
+        unknown = NULL[part_of(first)]
         told = "as above" if unknown and unknown == before else unknown
-        columns = ", ".join(f"`{c}`" for c in one.columns if c != one.name) or ("" if one.columns else "none")
-        rows.append((f"`{one.name}`", unit_of(one), one.description or "", told, columns))
+        fields, columns = [first, *others], [c for one in (first, *others) for c in one.columns]
+        names = {one.name for one in fields}
+        other = ", ".join(f"`{c}`" for c in columns if c not in names) or ("" if columns else "none")
+        lines.append((", ".join(f"`{one.name}`" for one in fields), unit_of(first), first.description or "", told, other))
         before = unknown
-    return table("field | unit | meaning | unknown | other columns in CSV", rows)
+    return table("field | unit | meaning | unknown | other columns in CSV", lines)
 
 
 # -- reasons --

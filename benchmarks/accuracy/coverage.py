@@ -58,7 +58,7 @@ def section(found: Mapping[str, Any]) -> str:
 
 
 HEAD: Final = (
-    "| mean error, payload / front share | ratio index | cross spectrum | its 95 % intervals contain the truth "
+    "| percent, payload / front share | error, ratio index | error, cross spectrum | its 95 % intervals held "
     "| half as wide as | score (ideal) | refused |\n|---|---|---|---|---|---|---|"
 )
 
@@ -88,7 +88,7 @@ def _both(line: Mapping[str, Any], ending: str) -> list[Any]:
 
 
 def _percent(number: float | None, digits: int = 1) -> str:
-    return "none" if number is None else f"{number:.{digits}f} %"
+    return "none" if number is None else f"{number:.{digits}f}"
 
 
 def _verdicts(found: Mapping[str, Any]) -> list[str]:
