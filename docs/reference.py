@@ -23,11 +23,8 @@ from gateway.reasons import EXPLANATIONS, REMEDIES, SOURCES, Cause
 
 UNITS: Final = (
     ("_kg", "kg"),
-    ("_std_pct", "pp"),
     ("_pct", "%"),
     ("_left_m", "m"),
-    ("_left_std_m", "m"),
-    ("_left_interval95_m", "m"),
     ("_mps2", "m/s²"),
     ("_mps", "m/s"),
     ("_ns", "ns"),

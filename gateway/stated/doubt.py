@@ -15,7 +15,7 @@ _PAPERS: Final = "read the vehicle's papers again, in kilograms"
 
 
 class DoubtKind(StrEnum):
-    """What a doubt is about. docs/commissioning.md has the table."""
+    """What a doubt is about. docs/teach.md lists them."""
 
     text: str  # the fact with its numbers
     advice: str
