@@ -92,12 +92,12 @@ def _percent(number: float | None, digits: int = 1) -> str:
 
 
 def _verdicts(found: Mapping[str, Any]) -> list[str]:
-    """A line for every estimator: does the pooled coverage fall short?"""
+    """Does the pooled coverage of the half-car's intervals fall short?"""
     return [
         f"- {line['estimator'].replace('_', ' ')}, {roll_in_words(line['has_roll_rate'])}, all drives, {what}: "
         f"{_verdict(line[key])}"
         for line in found["lines"]
-        if line["kind"] == ALL_KINDS
+        if line["kind"] == ALL_KINDS and line["estimator"] == "cross_spectrum"
         for what, key in (("payload", "payload_coverage"), ("share", "front_share_coverage"))
     ]
 
