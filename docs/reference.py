@@ -35,8 +35,8 @@ NULL: Final = {
     "id": "",
     "vehicle_id": "null if no configuration names the vehicle",
     "vin": "absent unless `[vehicle] vin` states it",
-    "t_start_ns": "null in a log without a date, where nanoseconds count from the zero of its stamps",
-    "t_end_ns": "null in a log without a date, where nanoseconds count from the zero of its stamps",
+    "t_start_ns": "null in a log without a date",
+    "t_end_ns": "null in a log without a date",
     "estimator": "",
     "calibration_id": "null without a calibration",
     "payload": "null if rejected, or if the ratio index has no model of it",
@@ -62,7 +62,7 @@ NULL: Final = {
     "spectra": "absent if nothing could be transformed, and if the request says `spectra=false`",
     "diagnostics": "empty if rejected before a fit",
     "epoch": "absent if rejected or provisional; the lateral position is null if no batch has one",
-    "way": "null in records of early versions, and in a provisional estimate; unknown parts are null",
+    "way": "null in a provisional estimate; unknown parts are null",
     "error_budget": "empty where rejected",
     "posterior": "absent where rejected",
 }
@@ -71,8 +71,7 @@ NULL: Final = {
 LACKS: Final = {
     Lack.CALIBRATION: "the empty vehicle's weight is unknown: no calibration is in use",
     Lack.ESTIMATE: "the batch was rejected, or the estimator does not give the front share",
-    Lack.UNSPRUNG_MASS: "`[vehicle]` of the campaign states neither the axle's unsprung mass nor its kerb weight, and "
-    "the calibration has no part for cross_spectrum, which would have found it",
+    Lack.UNSPRUNG_MASS: "neither stated in `[vehicle]` (nor the axle's kerb weight) nor found by a calibration of cross_spectrum",
     Lack.TRACK_WIDTH: "`[vehicle]` of the campaign states no `track_width_m`",
     Lack.ROLL_RATE: "the lateral position of the load is unknown: no roll rate, or a calibration without one",
 }
