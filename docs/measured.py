@@ -116,7 +116,8 @@ def conditions() -> str:
 
 def speeds() -> str:
     """A table for each section of the benchmarks."""
-    sections = groupby(lines_of(numbers("performance.json")), key=lambda line: line.section)
+    found = {name: part for name, part in numbers("performance.json").items() if name != "simulator"}
+    sections = groupby(lines_of(found), key=lambda line: line.section)
     return "\n".join(
         f"## {name[0].upper()}{name[1:]}\n\n"
         + table("what | measured | goal", ((line.what, line.figure, _goal(line)) for line in lines))
