@@ -256,10 +256,8 @@ def _counted(counts: dict[str, Any]) -> dict[str, Any]:
         "Lost": counts["estimates"] + counts["entries"] - counts["estimate_rows"] - counts["entry_rows"],
         "Ids in more than one row": counts["ids_doubled"],
         "Records whose predecessor is missing": counts["records_missing"],
-        "Messages acknowledged by the broker": counts["messages_acknowledged"],
         "Repeated after a break, at least": counts["messages_said_again"],
         "A record in the database, indexes included": f"{counts['bytes_of_an_estimate']} bytes",
-        "Connections that the vehicles made": counts["connections_of_vehicles"],
     }
 
 

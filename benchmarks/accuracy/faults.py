@@ -209,7 +209,6 @@ COLUMNS: Final[tuple[Column, ...]] = (
     ("Fault", text("fault")),
     ("Strength", text("strength")),
     ("Refused, and why", lambda line: refused_cell(line["n_refused"], line["refused_by_reason"])),
-    ("Held", text("n_held")),
     ("Outside", lambda line: str(_n_outside(line))),
     ("Payload outside by up to", _furthest("payload")),
     ("Share outside by up to", _furthest("front_share")),
