@@ -71,7 +71,7 @@ NULL: Final = {
 LACKS: Final = {
     Lack.CALIBRATION: "the empty vehicle's weight is unknown: no calibration is in use",
     Lack.ESTIMATE: "the batch was rejected, or the estimator does not give the front share",
-    Lack.UNSPRUNG_MASS: "neither stated in `[vehicle]` (nor the axle's kerb weight) nor found by a calibration of cross_spectrum",
+    Lack.UNSPRUNG_MASS: "neither it nor the axle's kerb weight is stated, and no calibration of cross_spectrum found it",
     Lack.TRACK_WIDTH: "`[vehicle]` of the campaign states no `track_width_m`",
     Lack.ROLL_RATE: "the lateral position of the load is unknown: no roll rate, or a calibration without one",
 }
@@ -113,7 +113,8 @@ def fields_table(group: str) -> str:
         fields, columns = [first, *others], [c for one in (first, *others) for c in one.columns]
         names = {one.name for one in fields}
         other = ", ".join(f"`{c}`" for c in columns if c not in names) or ("" if columns else "none")
-        lines.append((", ".join(f"`{one.name}`" for one in fields), unit_of(first), first.description or "", told, other))
+        name = ", ".join(f"`{one.name}`" for one in fields)
+        lines.append((name, unit_of(first), first.description or "", told, other))
         before = unknown
     return table("field | unit | meaning | unknown | other columns in CSV", lines)
 

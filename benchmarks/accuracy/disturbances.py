@@ -98,8 +98,8 @@ def section(found: Mapping[str, Any]) -> str:
     harmless = [line for line in lines if line is not undisturbed and _is_harmless(line, undisturbed)]
     shown = [line for line in lines if line not in harmless]
     names = ", ".join(line["kind"] for line in harmless) or "none"
-    told = f"- Without effect (nothing refused, every interval held, errors within {MENDED_WITHIN:g} times those as recorded): "
-    return "\n".join([*table_of(COLUMNS, shown), "", f"{told}{names}.", *_verdicts(lines), ""])
+    told = f"- Nothing refused, every interval held, errors within {MENDED_WITHIN:g} times those as recorded: {names}."
+    return "\n".join([*table_of(COLUMNS, shown), "", told, *_verdicts(lines), ""])
 
 
 def _is_harmless(line: Mapping[str, Any], undisturbed: Mapping[str, Any]) -> bool:
