@@ -71,7 +71,7 @@ NULL: Final = {
 LACKS: Final = {
     Lack.CALIBRATION: "the empty vehicle's weight is unknown: no calibration is in use",
     Lack.ESTIMATE: "the batch was rejected, or the estimator does not give the front share",
-    Lack.UNSPRUNG_MASS: "neither it nor the axle's kerb weight is stated, and no calibration of cross_spectrum found it",
+    Lack.UNSPRUNG_MASS: "neither it nor the axle's kerb weight is stated, and no cross_spectrum calibration found it",
     Lack.TRACK_WIDTH: "`[vehicle]` of the campaign states no `track_width_m`",
     Lack.ROLL_RATE: "the lateral position of the load is unknown: no roll rate, or a calibration without one",
 }
