@@ -23,11 +23,8 @@ from gateway.reasons import EXPLANATIONS, REMEDIES, SOURCES, Cause
 
 UNITS: Final = (
     ("_kg", "kg"),
-    ("_std_pct", "pp"),
     ("_pct", "%"),
     ("_left_m", "m"),
-    ("_left_std_m", "m"),
-    ("_left_interval95_m", "m"),
     ("_mps2", "m/s²"),
     ("_mps", "m/s"),
     ("_ns", "ns"),
@@ -38,8 +35,8 @@ NULL: Final = {
     "id": "",
     "vehicle_id": "null if no configuration names the vehicle",
     "vin": "absent unless `[vehicle] vin` states it",
-    "t_start_ns": "null in a log without a date, where nanoseconds count from the zero of its stamps",
-    "t_end_ns": "null in a log without a date, where nanoseconds count from the zero of its stamps",
+    "t_start_ns": "null in a log without a date",
+    "t_end_ns": "null in a log without a date",
     "estimator": "",
     "calibration_id": "null without a calibration",
     "payload": "null if rejected, or if the ratio index has no model of it",
@@ -65,7 +62,7 @@ NULL: Final = {
     "spectra": "absent if nothing could be transformed, and if the request says `spectra=false`",
     "diagnostics": "empty if rejected before a fit",
     "epoch": "absent if rejected or provisional; the lateral position is null if no batch has one",
-    "way": "null in records of early versions, and in a provisional estimate; unknown parts are null",
+    "way": "null in a provisional estimate; unknown parts are null",
     "error_budget": "empty where rejected",
     "posterior": "absent where rejected",
 }
@@ -74,8 +71,7 @@ NULL: Final = {
 LACKS: Final = {
     Lack.CALIBRATION: "the empty vehicle's weight is unknown: no calibration is in use",
     Lack.ESTIMATE: "the batch was rejected, or the estimator does not give the front share",
-    Lack.UNSPRUNG_MASS: "`[vehicle]` of the campaign states neither the axle's unsprung mass nor its kerb weight, and "
-    "the calibration has no part for cross_spectrum, which would have found it",
+    Lack.UNSPRUNG_MASS: "neither it nor the axle's kerb weight is stated, and no cross_spectrum calibration found it",
     Lack.TRACK_WIDTH: "`[vehicle]` of the campaign states no `track_width_m`",
     Lack.ROLL_RATE: "the lateral position of the load is unknown: no roll rate, or a calibration without one",
 }
@@ -104,17 +100,23 @@ def unit_of(one: EstimateField) -> str:
 
 
 def fields_table(group: str) -> str:
-    """The fields of one of GROUPS."""
+    """The fields of one of GROUPS; a number's standard deviation and interval are in its row."""
     elsewhere = {part for parts in GROUPS.values() for part in parts}
     named = [one for one in FIELDS if (part_of(one) if part_of(one) in elsewhere else "") in GROUPS[group]]
-    rows, before = [], ""
+    rows: dict[str, list[EstimateField]] = {}
     for one in named:
-        unknown = NULL[part_of(one)]
+        rows.setdefault(one.name.replace("_std", "").replace("_interval95", ""), []).append(one)
+    lines, before = [], ""
+    for first, *others in rows.values():
+        unknown = NULL[part_of(first)]
         told = "as above" if unknown and unknown == before else unknown
-        columns = ", ".join(f"`{c}`" for c in one.columns)
-        rows.append((f"`{one.name}`", unit_of(one), one.description or "", told, columns))
+        fields, columns = [first, *others], [c for one in (first, *others) for c in one.columns]
+        names = {one.name for one in fields}
+        other = ", ".join(f"`{c}`" for c in columns if c not in names) or ("" if columns else "none")
+        name = ", ".join(f"`{one.name}`" for one in fields)
+        lines.append((name, unit_of(first), first.description or "", told, other))
         before = unknown
-    return table("field | unit | meaning | unknown | columns in CSV", rows)
+    return table("field | unit | meaning | unknown | other columns in CSV", lines)
 
 
 # -- reasons --

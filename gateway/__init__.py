@@ -1,6 +1,6 @@
 """Springscale: weighs a vehicle by listening to its springs.
 
-What a notebook needs is here by name (docs/python-api.md); each is imported when it is first asked for.
+What a notebook needs is here by name (docs/api.md); each is imported when it is first asked for.
 """
 
 from importlib import import_module

@@ -92,9 +92,19 @@ MENDED_WITHIN: Final = 1.25  # chosen: of the undisturbed error
 
 
 def section(found: Mapping[str, Any]) -> str:
-    """A row for every disturbance, and a verdict."""
+    """A row for every disturbance that has an effect, the names of the others, and a verdict."""
     lines = [line for line in found["lines"] if line["kind"] != ALL_KINDS]
-    return "\n".join([*table_of(COLUMNS, lines), "", *_verdicts(lines), ""])
+    undisturbed = next(line for line in lines if line["kind"] == UNDISTURBED.name)
+    harmless = [line for line in lines if line is not undisturbed and _is_harmless(line, undisturbed)]
+    shown = [line for line in lines if line not in harmless]
+    names = ", ".join(line["kind"] for line in harmless) or "none"
+    told = f"- Nothing refused, every interval held, errors within {MENDED_WITHIN:g} times those as recorded: {names}."
+    return "\n".join([*table_of(COLUMNS, shown), "", told, *_verdicts(lines), ""])
+
+
+def _is_harmless(line: Mapping[str, Any], undisturbed: Mapping[str, Any]) -> bool:
+    is_held = all(held_or_refused(line, quantity) == 1.0 for quantity in ("payload", "front_share"))
+    return is_held and not line["n_rejected"] and is_mended(line, undisturbed)
 
 
 def held_or_refused(line: Mapping[str, Any], quantity: str) -> float:
@@ -116,19 +126,16 @@ def _held(quantity: str) -> Callable[[Row], str]:
     return lambda line: f"{100.0 * held_or_refused(line, quantity):.0f} %"
 
 
-_WIDTH, _SCORE = zip(*(width_and_score(quantity) for quantity in ("payload", "front_share")), strict=True)
+_WIDTH = [width_and_score(quantity)[0] for quantity in ("payload", "front_share")]
 COLUMNS: Final[tuple[Column, ...]] = (
     ("Disturbance", text("kind")),
-    ("Batches", text("n_batches")),
     ("Refused, and why", lambda line: refused_cell(line["n_rejected"], line["rejected_by_reason"])),
     ("Payload, mean abs. error %", number("payload_mean_abs_pct", 1, unknown="–")),
     ("Share, mean abs. error %", number("front_share_mean_abs_pct", 1, unknown="–")),
     ("Payload held or refused", _held("payload")),
     ("Share held or refused", _held("front_share")),
     ("Payload, +- %", _WIDTH[0]),
-    ("score % (ideal)", _SCORE[0]),
     ("Share, +- %", _WIDTH[1]),
-    ("score % (ideal)", _SCORE[1]),
 )
 
 

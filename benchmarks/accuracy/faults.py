@@ -172,7 +172,7 @@ LEAST_SAFE: Final = 0.9  # chosen: of the batches
 
 
 def section(found: Mapping[str, Any]) -> str:
-    """The sums, and a row for every fault with an answer outside an interval."""
+    """The sums, and a row for every fault with several answers outside an interval, or one that lies far outside."""
     lines = found["lines"]
     total = {name: sum(line[name] for line in lines) for name in ("n_batches", "n_refused", "n_held")}
     wrong = [line for line in lines if _n_outside(line)]
@@ -188,11 +188,17 @@ def section(found: Mapping[str, Any]) -> str:
         f"{len(wrong)} of {len(lines)} faults and strengths.",
         f"- Refused or held in at least {100.0 * LEAST_SAFE:.0f} % of the batches: {all_but(unsafe)}",
     ]
-    return "\n".join([*sums, "", *table_of(COLUMNS, wrong), ""])
+    shown = [line for line in wrong if line is lines[0] or _n_outside(line) > 1 or _is_far(line)]
+    return "\n".join([*sums, "", *table_of(COLUMNS, shown), ""])
 
 
 def _n_outside(line: Mapping[str, Any]) -> int:
     return int(line["n_batches"] - line["n_refused"] - line["n_held"])
+
+
+def _is_far(line: Mapping[str, Any]) -> bool:
+    """Whether the truth lies a half-width or more beyond the end of an interval."""
+    return max(line[f"{quantity}_furthest"] or 0.0 for quantity in ("payload", "front_share")) >= 1.0
 
 
 def _furthest(quantity: str) -> Callable[[Row], str]:
@@ -202,9 +208,7 @@ def _furthest(quantity: str) -> Callable[[Row], str]:
 COLUMNS: Final[tuple[Column, ...]] = (
     ("Fault", text("fault")),
     ("Strength", text("strength")),
-    ("Batches", text("n_batches")),
     ("Refused, and why", lambda line: refused_cell(line["n_refused"], line["refused_by_reason"])),
-    ("Held", text("n_held")),
     ("Outside", lambda line: str(_n_outside(line))),
     ("Payload outside by up to", _furthest("payload")),
     ("Share outside by up to", _furthest("front_share")),

@@ -1,6 +1,6 @@
 """``import springscale``: the package under the name that its command and its distribution have.
 
-The same objects as those of ``gateway``, each imported when it is first asked for (docs/python-api.md).
+The same objects as those of ``gateway``, each imported when it is first asked for (docs/api.md).
 """
 
 from gateway import __all__ as __all__

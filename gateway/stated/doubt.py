@@ -10,12 +10,12 @@ from typing import Final, Self
 from pydantic import BaseModel, ConfigDict
 
 _MEASURE: Final = "measure from the middle of the front wheel to the middle of the rear wheel"
-_SCALES: Final = "read the scale slip again, axle by axle, in kilograms"
+_SCALES: Final = "read the ticket of the scales again, axle by axle, in kilograms"
 _PAPERS: Final = "read the vehicle's papers again, in kilograms"
 
 
 class DoubtKind(StrEnum):
-    """What a doubt is about. docs/teach.md has the table."""
+    """What a doubt is about. docs/teach.md lists them."""
 
     text: str  # the fact with its numbers
     advice: str

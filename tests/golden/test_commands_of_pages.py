@@ -66,6 +66,7 @@ OWN_RUN_BY = {  # how a command of ours begins: what runs it
     "springscale run": "tests/e2e/test_gateway_service.py",
     "springscale simulate": "tests/e2e/test_cli_simulate.py",
     "springscale state": "tests/unit/test_state_command.py",
+    "springscale token": "tests/contracts/test_web_guard.py",
 }
 ON_PI = "a real Raspberry Pi"
 BY_HAND = "by hand"

@@ -113,7 +113,7 @@ def test_a_vehicle_without_a_name_is_refused(secret_file: Path) -> None:
 
 
 def test_the_check_in_the_document_believes_what_is_signed_and_nothing_else() -> None:
-    page = (Path(__file__).parents[2] / "docs/webhook.md").read_text()
+    page = (Path(__file__).parents[2] / "docs/uplink.md").read_text()
     block = page[page.index("    import base64") : page.index("**To change the secret**")]
     known: dict[str, Any] = {}
     exec(textwrap.dedent(block), known)
