@@ -1,6 +1,5 @@
 """A record in a JSON file beside the database: validated when read, set aside if invalid, replaced atomically."""
 
-import logging
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -8,7 +7,6 @@ from pydantic import ValidationError
 
 from gateway.errors import ConfigurationError
 from gateway.files.kept import BrokenFile, KeptFiles
-from gateway.log import Event, log_event
 from gateway.stated.facts import Part
 from gateway.toml_file import describe_faults
 
@@ -30,7 +28,7 @@ def load_record(path: Path, empty: R) -> R:
 class RecordFile(Generic[R]):
     """Not thread-safe. Every change is on disk before it is in ``record``.
 
-    ``fault`` says what happened to an invalid file.
+    ``fault`` says what happened to an invalid file, of which a subclass tells in ``set_aside``.
     """
 
     def __init__(self, path: Path, empty: R) -> None:
@@ -53,5 +51,4 @@ class RecordFile(Generic[R]):
 
     def set_aside(self, fault: str, aside: str) -> None:
         """Report an invalid file; ``aside`` says where it is now."""
-        self.fault = f"{self.path} is invalid, its history starts empty (it {aside})"
-        log_event(Event.HISTORY_SET_ASIDE, level=logging.ERROR, file=str(self.path), fault=fault, set_aside=aside)
+        raise NotImplementedError
