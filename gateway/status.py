@@ -48,7 +48,8 @@ class BusStatus(_Told):
     channel: str = ""
     state: str = Field("unknown", examples=["connected", "bus_silent", "reader_fault"])
     n_frames: int = Field(0, description="data frames received")
-    n_error_frames: int = 0
+    n_error_frames: int = Field(0, description="error frames received, and messages that no bus can carry")
+    n_remote_frames: int = Field(0, description="remote frames received: requests for a message, without its data")
     n_reconnects: int = 0
     n_inbox_dropped: int = Field(0, description="frames the pipeline did not take in time")
     n_kernel_dropped: int | None = Field(None, description="frames the kernel dropped; null if it does not say")

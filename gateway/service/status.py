@@ -126,6 +126,7 @@ class StatusReport:
             state=str(self.source.state),
             n_frames=counts.frames,
             n_error_frames=counts.error_frames,
+            n_remote_frames=counts.remote_frames,
             n_reconnects=counts.reconnects,
             n_inbox_dropped=counts.dropped_inbox,
             n_kernel_dropped=counts.dropped_kernel,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import can
 import pytest
@@ -135,7 +135,7 @@ def test_a_broker_that_takes_nothing_is_a_fault(what: str, tmp_path: Path, monke
 class ScriptedBus:
     """A bus of python-can that gives these messages, then none."""
 
-    def __init__(self, *messages: can.Message) -> None:
+    def __init__(self, *messages: can.Message | None) -> None:
         self._messages = list(messages)
 
     def recv(self, timeout_s: float) -> can.Message | None:
@@ -149,6 +149,10 @@ class ScriptedBus:
 
 def frame() -> can.Message:
     return can.Message(arbitration_id=FRAME_ID, is_extended_id=False, data=bytes(8), timestamp=time.time())
+
+
+def remote() -> can.Message:
+    return can.Message(arbitration_id=FRAME_ID, is_extended_id=False, is_remote_frame=True, dlc=8)
 
 
 def error(error_class: int) -> can.Message:
@@ -184,6 +188,28 @@ def test_a_burst_is_judged_by_the_order_of_its_frames_and_errors(what: str, inte
         with listening(PythonCanReceiver(bus, 8, kernel_socket, has_error_classes=True)) as source:
             assert wait_until(lambda: source.state is state)
             assert source.counts().error_frames == sum(message.is_error_frame for message in messages)
+
+
+OTHERS: dict[str, tuple[list[can.Message | None], str]] = {  # None ends a burst
+    "data and remote frames": ([frame(), remote(), frame(), None, remote(), remote()], "no data frame for 0.1 s, only 2 remote frames"),
+    "remote frames alone": ([remote()] * 5, "no data frame for 0.1 s, only 5 remote frames"),
+    "error frames alone": ([error(0x4)] * 4, "only 4 error frames; check the bit rate and the wiring"),
+    "an error frame as the bus goes to sleep": ([frame(), None, error(0x4)], "no data frame for 0.1 s, only 1 error frame"),
+    "error and remote frames": ([frame(), None, error(0x4), remote()], "only 1 error frame and 1 remote frame"),
+    "data frames last": ([remote(), error(0x4), frame()], "no frame for 0.1 s"),
+}
+
+
+@pytest.mark.parametrize("what", OTHERS)
+def test_every_message_is_counted_and_a_bus_without_data_frames_says_what_it_carries(what: str) -> None:
+    bursts, reason = OTHERS[what]
+    messages, bus = [one for one in bursts if one], cast(Any, ScriptedBus(*bursts))
+    with listening(PythonCanReceiver(bus, 8)) as source:
+        assert wait_until(lambda: source.state is SourceState.BUS_SILENT)
+        counts = source.counts()
+        assert (source.reason or "").endswith(reason)
+    assert counts.remote_frames == sum(message.is_remote_frame for message in messages)
+    assert counts.frames + counts.remote_frames + counts.error_frames == len(messages)
 
 
 IMPOSSIBLE: dict[str, dict[str, Any]] = {

@@ -116,6 +116,6 @@ def test_frames_that_the_kernel_lost_are_told_of(tmp_path: Path, monkeypatch: py
         source.inbox.put(DRIVE)
 
     monkeypatch.setattr(LiveSource, "start", played)
-    monkeypatch.setattr(LiveSource, "counts", lambda _: SourceCounts(len(DRIVE), 2, 5, 0, 0))
+    monkeypatch.setattr(LiveSource, "counts", lambda _: SourceCounts(len(DRIVE), 2, 5, 0, 0, 0))
     found = recorded(tmp_path / "drive.log.gz")
     assert found.output.endswith(f"{len(DRIVE)} frames, 7 lost\n")

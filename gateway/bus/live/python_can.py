@@ -132,19 +132,21 @@ class PythonCanReceiver:
         """``now_s`` is the system's clock at the first of them."""
         n_set, n_wraps = self._clock.n_set, self._clock.n_wraps
         data: list[can.Message] = []
-        n_errors, is_bus_off = 0, False
+        n_errors, n_remote, is_bus_off = 0, 0, False
         for message in messages:
             if message.is_error_frame:
                 n_errors += 1
                 is_bus_off |= self._has_error_classes and bool(message.arbitration_id & _BUS_OFF)
             elif not _is_possible(message):
                 n_errors += 1
-            elif not message.is_remote_frame:
+            elif message.is_remote_frame:
+                n_remote += 1
+            else:
                 is_bus_off = False
                 self._date(message, now_s)
                 data.append(message)
         n_set, n_wraps = self._clock.n_set - n_set, self._clock.n_wraps - n_wraps
-        return Burst(frames_of(data, self._width), n_errors, is_bus_off, n_set, n_wraps)
+        return Burst(frames_of(data, self._width), n_errors, is_bus_off, n_remote, n_set, n_wraps)
 
     def _date(self, message: can.Message, now_s: float) -> None:
         """Make the stamp a time since 1970, unless it is the kernel's or the recorded one of a replay."""

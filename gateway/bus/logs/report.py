@@ -18,6 +18,7 @@ from gateway.bus.signals.decode import TELLING_SHARE, Remark
 from gateway.errors import LogUnreadableError
 from gateway.records import FIRST_DATED_NS, I64, U32, Bool, Frames, iso_utc
 from gateway.units import NS_PER_S
+from gateway.words import counted
 
 KEPT_LINE_NUMBERS: Final = 5  # chosen: what a person looks at
 NAMED_CHANNELS: Final = 8  # chosen: likewise
@@ -201,10 +202,21 @@ class LogReport:
             "ended_early": self.ended_early,
         }
 
+    def told_others(self) -> str:
+        """The frames that are none of the data frames wanted, in words: "1 remote frame, 3 error frames"; or ""."""
+        counts = (
+            (self.other_channel, "frame", " of other channels"),
+            (self.remote_frames, "remote frame", ""),
+            (self.error_frames, "error frame", ""),
+        )
+        return ", ".join(counted(n, noun) + rest for n, noun, rest in counts if n)
+
     def remarks(self) -> Iterator[str]:
         """Warnings for people, a sentence each; none if all was well."""
         if self.ended_early:
             yield f"{self.path}: {self.ended_early}; everything before was read"
+        if others := self.told_others():
+            yield f"{self.path}: left out: {others}"
         for reason, lines in self.rejects.items():
             yield f"{self.path}: left out, {str(reason).replace('_', ' ')}: {lines.told(reason, self._suffix)}"
         if len(self.channels) > 1 and not self.other_channel:
@@ -286,11 +298,15 @@ class LogReport:
             reason, lines = max(self.rejects.items(), key=lambda each: each[1].count)
             why = f"left out, {str(reason).replace('_', ' ')}: {lines.told(reason, self._suffix)}"
             return f"holds no CAN frame that can be read; {why}" + ("" if self._suffix != "-" else f"; {AS_CANDUMP}")
+        if self.remote_frames:
+            return f"of the mapped identifiers it has only remote frames ({self.remote_frames}), which carry no data"
         if self.frames:
             return (
                 f"none of its {self.frames} frames has an identifier of the signal map; "
                 "is it the map of this vehicle? springscale look shows what is in it"
             )
+        if self.error_frames:
+            return f"holds error frames only ({self.error_frames}): check the bit rate and the wiring of the recorder"
         why = f" ({self.ended_early})" if self.ended_early else ""
         return f"holds no CAN frame{why}; {AS_CANDUMP}"
 

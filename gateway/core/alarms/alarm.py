@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import Any, Final
 
 from gateway.estimate import PLACES, Z95
+from gateway.reasons import EXPLANATIONS
 from gateway.records import iso_utc, ns_of
 
 ENTRY_KIND: Final = "alarm"
@@ -135,6 +136,7 @@ def _known(x: float, digits: int) -> float | None:
     return round(x, digits) + 0.0 if math.isfinite(x) else None
 
 
+_HAPPENED: Final[Mapping[str, str]] = {why: told.happened.replace("`", "") for why, told in EXPLANATIONS.items()}
 _PLACES: Final = {"gross": "The vehicle", "front_axle": "The front axle", "rear_axle": "The rear axle"}
 
 
@@ -151,4 +153,5 @@ def _said(cause: AlarmCause, figure: AlarmFigure) -> str:
     if cause == SILENT:
         return f"No signal: {figure.detail}" if figure.detail else "No signal"
     said = "Batches are refused because of a sensor"
-    return f"{said}: {figure.detail.replace('_', ' ')}" if figure.detail else said
+    reasons = (_HAPPENED.get(code, code) for code in figure.detail.split(", ")) if figure.detail else ()
+    return f"{said}: {'; '.join(reasons)}" if figure.detail else said

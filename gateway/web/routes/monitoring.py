@@ -168,6 +168,7 @@ TABLE: Final = (
     one("springscale_uptime_seconds", "Since the start of the service.", "now.uptime_s"),
     one("springscale_bus_frames_total", "CAN data frames received.", "now.bus.n_frames"),
     one("springscale_bus_error_frames_total", "CAN error frames received.", "now.bus.n_error_frames"),
+    one("springscale_bus_remote_frames_total", "CAN remote frames received.", "now.bus.n_remote_frames"),
     one("springscale_bus_reconnects_total", "Times the interface was opened again.", "now.bus.n_reconnects"),
     counts(
         "springscale_bus_dropped_frames_total",
