@@ -245,7 +245,8 @@ class Status(_Told):
 
     def sentence(self) -> str:
         """The state in words, with any faults."""
-        said = [SENTENCES[self.state]]
+        is_silent = self.state is State.WAITING_FOR_BUS and self.bus.last_fault
+        said = [f"No mapped frame comes: {self.bus.last_fault}." if is_silent else SENTENCES[self.state]]
         silent = [f"{s.signal.replace('_', ' ')}{self.why_silent(s)}" for s in self.signals if s.is_silent]
         if silent and self.state is State.SENSOR_FAULT:
             said.append(f"Missing: {', '.join(silent)}.")

@@ -191,12 +191,21 @@ def test_a_burst_is_judged_by_the_order_of_its_frames_and_errors(what: str, inte
 
 
 OTHERS: dict[str, tuple[list[can.Message | None], str]] = {  # None ends a burst
-    "data and remote frames": ([frame(), remote(), frame(), None, remote(), remote()], "no data frame for 0.1 s, only 2 remote frames"),
+    "data and remote frames": (
+        [frame(), remote(), frame(), None, remote(), remote()],
+        "no data frame for 0.1 s, only 2 remote frames",
+    ),
     "remote frames alone": ([remote()] * 5, "no data frame for 0.1 s, only 5 remote frames"),
     "error frames alone": ([error(0x4)] * 4, "only 4 error frames; check the bit rate and the wiring"),
-    "an error frame as the bus goes to sleep": ([frame(), None, error(0x4)], "no data frame for 0.1 s, only 1 error frame"),
+    "an error frame as the bus goes to sleep": (
+        [frame(), None, error(0x4)],
+        "no data frame for 0.1 s, only 1 error frame",
+    ),
     "error and remote frames": ([frame(), None, error(0x4), remote()], "only 1 error frame and 1 remote frame"),
-    "data frames last": ([remote(), error(0x4), frame()], "no frame for 0.1 s"),
+    "data frames last": (
+        [remote(), error(0x4), frame()],
+        "no frame for 0.1 s: the vehicle is asleep or the channel is not connected",
+    ),
 }
 
 
@@ -208,6 +217,9 @@ def test_every_message_is_counted_and_a_bus_without_data_frames_says_what_it_car
         assert wait_until(lambda: source.state is SourceState.BUS_SILENT)
         counts = source.counts()
         assert (source.reason or "").endswith(reason)
+    bus_status = BusStatus(last_fault=source.reason)
+    status = GOOD.model_copy(update={"state": State.WAITING_FOR_BUS, "bus": bus_status})
+    assert status.sentence().startswith(f"No mapped frame comes: {source.reason}. ")
     assert counts.remote_frames == sum(message.is_remote_frame for message in messages)
     assert counts.frames + counts.remote_frames + counts.error_frames == len(messages)
 

@@ -144,7 +144,8 @@ DAYS = f";$STARTTIME={(MIDNIGHT_NS / S / 86_400.0) + 25_569.0:.9f}\n"
 class Case:
     """A log, its file's name, and what is said of it: ``told`` of one that is read, ``refused`` of one that is not.
 
-    ``n_left_out`` frames of all cannot be read; ``n_others`` are no data frames. ``not_archived`` is why the archive alone refuses it.
+    ``n_left_out`` frames of all cannot be read; ``n_others`` are no data frames.
+    ``not_archived`` is why the archive alone refuses it.
     """
 
     name: str
@@ -188,7 +189,9 @@ CASES = {
         "a.log.gz", lambda: gzip.compress(candump())[:-20], told=said("cut"), n_left_out=1, n_frames=0
     ),
     "two channels": Case("a.log", two_channels, told=said("channels")),
-    "remote and error frames": Case("a.log", with_others, told=said("remote and error frames"), n_others=2 * (N // 100)),
+    "remote and error frames": Case(
+        "a.log", with_others, told=said("remote and error frames"), n_others=2 * (N // 100)
+    ),
     "candump -td": Case("a.log", lambda: candump(PAUSES_S, "({:010.6f})"), refused=said("pauses")),
     "milliseconds": Case("a.log", lambda: candump(1e3 * ABSOLUTE_S, "({:.3f})"), refused=said("fraction of a second")),
     "a decimal comma": Case("a.log", lambda: candump().replace(b".", b","), refused=said("comma")),

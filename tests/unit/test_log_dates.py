@@ -160,9 +160,7 @@ REFUSED = {
     "asc as log": ("a.log", asc("2023-03-10 15:06:12"), "name it so"),
     "GVRET": ("a.csv", "Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n1,123,0,Rx,0,1,01\n", "SavvyCAN's"),
     "CANedge": ("a.csv", "TimestampEpoch;BusChannel;ID;IDE;DLC;DataLength;Dir;EDL;BRS;DataBytes\n", "CANedge's"),
-    "remote frames": (
-        "a.log", "(1627274455.0125) can0 123#R\n" * 3, r"only remote frames \(3\), which carry no data"
-    ),
+    "remote frames": ("a.log", "(1627274455.0125) can0 123#R\n" * 3, r"only remote frames \(3\), which carry no data"),
     "remote frames in asc": ("a.asc", asc("2023-03-10 15:06:12", "0.5 1 123 Rx r 1\n"), r"only remote frames \(1\)"),
     "error frames": ("a.log", "(1627274455.0125) can0 20000004#0000000000000000\n", r"error frames only \(1\): check"),
     "error frames in asc": ("a.asc", asc("2023-03-10 15:06:12", "0.5 1 ErrorFrame\n"), r"error frames only \(1\)"),

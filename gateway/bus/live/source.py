@@ -240,7 +240,7 @@ class LiveSource(ThreadPart):
             return f"no data frame for {self._silence_s:g} s, only {came}{hint}"
         if n_seen > self._seen_at_silence:
             return f"the bus is awake ({n_seen - self._seen_at_silence} frames), none has a mapped identifier"
-        return f"no frame for {self._silence_s:g} s"
+        return f"no frame for {self._silence_s:g} s: the vehicle is asleep or the channel is not connected"
 
 
 def opener_of(
