@@ -306,9 +306,10 @@ class LogReport:
                 "is it the map of this vehicle? springscale look shows what is in it"
             )
         if self.error_frames:
-            return f"holds error frames only ({self.error_frames}): check the bit rate and the wiring of the recorder"
-        why = f" ({self.ended_early})" if self.ended_early else ""
-        return f"holds no CAN frame{why}; {AS_CANDUMP}"
+            what = f"error frames only ({self.error_frames}): check the bit rate and the wiring of the recorder"
+        else:
+            what = "no CAN frame" + (f" ({self.ended_early})" if self.ended_early else "") + f"; {AS_CANDUMP}"
+        return f"holds {what}"
 
 
 def is_same_channel(recorded: object, wanted: str | None) -> bool:
