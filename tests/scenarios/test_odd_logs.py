@@ -180,6 +180,8 @@ CASES = {
     ".trc with a date": Case("a.trc", lambda: trc("1.1", DAYS), told=said("no zone")),
     "relative stamps": Case("a.asc", lambda: asc(ZONED, "relative", PAUSES_S)),
     "seconds of the day": Case("a.asc", lambda: asc(ZONED, stamps_s=54_000.0 + RELATIVE_S), told=said("late start")),
+    "stamps since 1970 below a date": Case("a.asc", lambda: asc(DATE, stamps_s=ABSOLUTE_S)),
+    "tabs": Case("a.log", lambda: candump().replace(b" ", b"\t")),
     "negative stamps": Case(
         "a.asc", lambda: asc(ZONED, stamps_s=RELATIVE_S - 0.1), told=said("negative"),
         n_left_out=int(np.count_nonzero(RELATIVE_S < 0.0999)),
@@ -340,6 +342,27 @@ def test_check_config(case: Case, folder: Path) -> None:
     found = called("check-config", folder / "springscale.toml")
     assert found.exit_code == 0, found.output
     assert causes_in(found.output) == said()
+
+
+SET = {  # the first stamp, by how much the clock is set midway, and what is told
+    "back": (ABSOLUTE_S[0], -40.0, "its stamps step back 1 time, by up to 0:00:40"),
+    "forward": (ABSOLUTE_S[0], 86_400.0, "its stamps leap forward by 1 day, 0:00:00"),
+    "from 1970": (0.0, ABSOLUTE_S[0], "its stamps leap forward by 20758 days, 0:00:00"),
+}
+
+
+@pytest.mark.parametrize("how", SET)
+def test_a_clock_that_was_set_while_recording(how: str, folder: Path) -> None:
+    """It is told, and the years between the stamps cost no memory."""
+    first_s, set_by_s, told = SET[how]
+    stamps_s = first_s + RELATIVE_S
+    stamps_s[N // 2 :] += set_by_s
+    log = folder / "van-1" / "a.log"
+    log.write_bytes(candump(stamps_s))
+    for command in (("look", log), ("estimate", log, "--config", folder / "springscale.toml")):
+        said_of_it = all_said(called(*command))
+        assert told in said_of_it
+        assert "was the clock set?" in said_of_it
 
 
 def test_a_copy(folder: Path) -> None:

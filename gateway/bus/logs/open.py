@@ -23,6 +23,7 @@ TEXTS: Final = frozenset(READERS.keys() - {".blf", ".db", ".mf4"})
 UNMISTAKABLE: Final = frozenset(READERS.keys() - {".txt", "", ".csv", ".db"})
 
 OTHER_KINDS: Final = {
+    b"\xff\xfe\0\0": "UTF-32; save it as UTF-8",
     b"\xff\xfe": "UTF-16; save it as UTF-8",
     b"\xfe\xff": "UTF-16; save it as UTF-8",
     b"\x89PNG": "a PNG image",
@@ -30,6 +31,10 @@ OTHER_KINDS: Final = {
     b"GIF8": "a GIF image",
     b"%PDF": "a PDF document",
     b"PK\x03\x04": "a ZIP archive",
+    b"BZh": "packed with bzip2; unpack it",
+    b"7z\xbc\xaf": "a 7z archive",
+    b"\xd4\xc3\xb2\xa1": "a capture of Wireshark or tcpdump; record with candump -L",
+    b"\n\r\r\n": "a capture of Wireshark or tcpdump; record with candump -L",
     b"SQLite format 3": "an SQLite database; name it .db if it is a log of python-can",
     b"\x7fELF": "a program",
     b"LOGG": "a BLF log; name it .blf",
@@ -74,6 +79,8 @@ def _open(
         raise LogUnreadableError(
             f"{path}: cannot tell the kind of log from {suffix!r}; known are {known}, and each with {packed}"
         )
+    if not path.stat().st_size:
+        raise LogUnreadableError(f"{path}: is empty")
     if suffix in TEXTS:
         _require_no_other_kind(path)
     selection = Selection(LogReport(path), filters, channel, width, zone)

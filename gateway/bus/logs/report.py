@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from datetime import datetime, tzinfo
+from datetime import datetime, timedelta, tzinfo
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
@@ -29,6 +29,8 @@ AS_CANDUMP: Final = "candump logs are recorded with candump -L"
 JUDGED_FRAMES: Final = 1000  # chosen: least number whose stamps are judged
 JUDGED_SECONDS: Final = 3.0  # chosen: least time in which stamps of whole seconds are
 WHOLE_PER_S: Final = 10.0  # chosen: more frames a second all on whole seconds are no coincidence
+STEP_BACK_S: Final = 1.0  # chosen: further than frames of several buffers are out of order
+LEAP_S: Final = 43_200.0  # chosen: a longer pause within a log gets a remark
 MOST_PER_S: Final = 100_000.0  # chosen: several times what a bus of 1 Mbit/s can carry (ISO 11898-1: 21,000 frames)
 
 
@@ -48,6 +50,8 @@ class LogReject(StrEnum):
 
 
 _KNOWN_LINES: Final = (
+    (r"[^\r]*\r.", "lines end in a carriage return alone: save it with line feeds"),
+    (r"(?:.\0){4}|(?:\0.){4}", "this is UTF-16: save it as UTF-8"),
     (r"\(\d{4}-\d\d-\d\d", "stamps are dates (candump -tA): record with candump -L alone"),
     (r"\(-?\d+,\d+\)|(\d+\)\s+)?-?\d+,\d+\s", "stamps have a decimal comma: write a point"),
     (r"\(\d{11,}[.)]|\d{11,}\.?\d*,", "stamps are not seconds since 1970, but a fraction of it such as milliseconds"),
@@ -115,6 +119,7 @@ class LogReport:
     decoder: Decoder | None = None
     _last_t_ns: int = 0
     _span_ns: tuple[int, int] = (0, 0)
+    _steps_ns: tuple[int, int] = (0, 0)
     _n_whole_seconds: int = 0
 
     def keeps_lines_of(self, reason: LogReject) -> bool:
@@ -151,7 +156,9 @@ class LogReport:
         if self.first_ns is None:
             self.first_ns = self._last_t_ns = int(t_ns[0])
             self._span_ns = least, most
-        self.out_of_order += int(np.count_nonzero(np.diff(t_ns, prepend=self._last_t_ns) < 0))
+        steps_ns = np.diff(t_ns, prepend=self._last_t_ns)
+        self.out_of_order += int(np.count_nonzero(steps_ns < 0))
+        self._steps_ns = min(int(steps_ns.min()), self._steps_ns[0]), max(int(steps_ns.max()), self._steps_ns[1])
         self.wanted += len(t_ns)
         self._n_whole_seconds += int(np.count_nonzero(t_ns % NS_PER_S == 0))
         self._last_t_ns = int(t_ns[-1])
@@ -241,6 +248,12 @@ class LogReport:
                 f"{self.path}: its date states no zone, it is read as UTC; if that is wrong, state time_zone in the "
                 "signal map"
             )
+        back_s, leap_s = -self._steps_ns[0] / NS_PER_S, self._steps_ns[1] / NS_PER_S
+        if back_s > STEP_BACK_S or 8 * self.out_of_order > self.wanted:
+            times, what = counted(self.out_of_order, "time"), "is it several logs in one, or was the clock set?"
+            yield f"{self.path}: its stamps step back {times}, by up to {timedelta(seconds=back_s)}: {what}"
+        if leap_s > LEAP_S:
+            yield f"{self.path}: its stamps leap forward by {timedelta(seconds=leap_s)}: a pause, or was the clock set?"
         late_s = 0.0 if self.start_ns is None else (self.first_ns - self.start_ns) / NS_PER_S
         if late_s > LATE_START_S:
             yield (
@@ -308,7 +321,8 @@ class LogReport:
         if self.error_frames:
             what = f"error frames only ({self.error_frames}): check the bit rate and the wiring of the recorder"
         else:
-            what = "no CAN frame" + (f" ({self.ended_early})" if self.ended_early else "") + f"; {AS_CANDUMP}"
+            what = "no CAN frame" + (f" ({self.ended_early})" if self.ended_early else "")
+            what += f"; {AS_CANDUMP}" if self._suffix == "-" else ""
         return f"holds {what}"
 
 

@@ -186,6 +186,12 @@ class SignalReading:
     def rate_hz(self) -> float:
         return self.described.heard.rate_hz
 
+    @property
+    def driving_rate_hz(self) -> float:
+        """Frames a second as they usually follow each other, if that is more: a log may have long pauses."""
+        step_s = float(np.median(np.diff(self.t_s))) if len(self.t_s) > 1 else 0.0
+        return max(self.rate_hz, 1.0 / step_s) if step_s > 0.0 else self.rate_hz
+
     @cached_property
     def usual(self) -> float:
         """The median, SI; NaN without a sample."""
@@ -438,6 +444,6 @@ def _lacking(
     if not {Signal.SPEED, Signal.WHEEL_SPEED} & set(whole.found if whole else roles):
         why = "add [signals.speed] from a GNSS receiver or the vehicle"
         yield f"no speed: {as_told if 'speed' in lost else why}"
-    for each in (up, pitch) if whole is None else ():
-        if each is not None and each.reading.rate_hz < LEAST_RATE_HZ:
-            yield f"{each.reading.name} comes {each.reading.rate_hz:.0f} times a second; {LEAST_RATE_HZ:.0f} are needed"
+    for each in (up, pitch):
+        if each is not None and each.reading.driving_rate_hz < LEAST_RATE_HZ:
+            yield f"{each.reading.name} comes {each.reading.driving_rate_hz:.3g} times a second; {LEAST_RATE_HZ:.0f} are needed"
