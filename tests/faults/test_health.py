@@ -12,7 +12,7 @@ from typing import Any, cast
 import can
 import pytest
 from support.estimates import make_record
-from support.patience import wait_until
+from support.patience import PATIENCE_S, wait_until
 from support.small_broker import SmallBroker
 
 from gateway.bus.live import source as live_source
@@ -229,6 +229,7 @@ IMPOSSIBLE: dict[str, dict[str, Any]] = {
     "33 bits": {"arbitration_id": 1 << 33, "is_extended_id": True},
     "12 bits of a standard identifier": {"arbitration_id": 0x800, "is_extended_id": False},
     "a negative identifier": {"arbitration_id": -1, "is_extended_id": True},
+    "an identifier of text": {"arbitration_id": "120", "is_extended_id": False},
     "65 bytes": {"arbitration_id": FRAME_ID, "is_extended_id": False, "is_fd": True, "data": bytes(65)},
 }
 
@@ -240,6 +241,16 @@ def test_a_message_that_no_bus_can_carry_is_counted_as_an_error(what: str) -> No
     with listening(PythonCanReceiver(bus, 8)) as source:
         assert wait_until(lambda: source.counts().frames == 2)
         assert source.counts().error_frames == 1
+
+
+@pytest.mark.parametrize("stamp", [None, "12.5", float("nan"), float("inf"), -1.0, 1e300])
+def test_a_stamp_that_is_no_time_is_dated_by_the_system(stamp: Any) -> None:
+    message = frame()
+    message.timestamp = stamp
+    bus: Any = ScriptedBus(message)
+    with listening(PythonCanReceiver(bus, 8)) as source:
+        (t_ns,) = source.inbox.drain(PATIENCE_S).t_ns.tolist()
+    assert abs(t_ns / 1e9 - time.time()) < PATIENCE_S
 
 
 class NoisyBus(ScriptedBus):

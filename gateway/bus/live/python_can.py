@@ -152,7 +152,7 @@ class PythonCanReceiver:
         """Make the stamp a time since 1970, unless it is the kernel's or the recorded one of a replay."""
         if isinstance(message.timestamp, ExactStamp):
             return
-        if not 0.0 < message.timestamp <= LAST_SECOND:
+        if not isinstance(message.timestamp, int | float) or not 0.0 < message.timestamp <= LAST_SECOND:
             message.timestamp = ExactStamp(time.time_ns())
         elif self._socket is None:
             message.timestamp = self._clock.dated_s(message.timestamp, now_s)
@@ -164,7 +164,8 @@ class PythonCanReceiver:
 def _is_possible(message: can.Message) -> bool:
     """Whether a CAN bus can carry it. python-can's code for most adapters passes on what it has read in noise."""
     last = LAST_EXTENDED if message.is_extended_id else LAST_STANDARD
-    return 0 <= message.arbitration_id <= last and len(message.data) <= LONGEST
+    is_number = isinstance(message.arbitration_id, int)
+    return is_number and 0 <= message.arbitration_id <= last and len(message.data) <= LONGEST
 
 
 def open_python_can(
