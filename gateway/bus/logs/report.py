@@ -117,8 +117,9 @@ class LogReport:
     notes: list[str] = field(default_factory=list)
     first_ns: int | None = None
     decoder: Decoder | None = None
+    nearly: str | None = None  # how an identifier of it differs from one that is wanted
     _last_t_ns: int = 0
-    _span_ns: tuple[int, int] = (0, 0)
+    span_ns: tuple[int, int] = (0, 0)  # the earliest and the latest stamp of the frames given out
     _steps_ns: tuple[int, int] = (0, 0)
     _n_whole_seconds: int = 0
 
@@ -155,19 +156,19 @@ class LogReport:
         least, most = int(t_ns.min()), int(t_ns.max())
         if self.first_ns is None:
             self.first_ns = self._last_t_ns = int(t_ns[0])
-            self._span_ns = least, most
+            self.span_ns = least, most
         steps_ns = np.diff(t_ns, prepend=self._last_t_ns)
         self.out_of_order += int(np.count_nonzero(steps_ns < 0))
         self._steps_ns = min(int(steps_ns.min()), self._steps_ns[0]), max(int(steps_ns.max()), self._steps_ns[1])
         self.wanted += len(t_ns)
         self._n_whole_seconds += int(np.count_nonzero(t_ns % NS_PER_S == 0))
         self._last_t_ns = int(t_ns[-1])
-        self._span_ns = min(least, self._span_ns[0]), max(most, self._span_ns[1])
+        self.span_ns = min(least, self.span_ns[0]), max(most, self.span_ns[1])
 
     @property
     def span_s(self) -> float:
         """Seconds between the earliest and the latest stamp of the frames given out."""
-        return (self._span_ns[1] - self._span_ns[0]) / NS_PER_S
+        return (self.span_ns[1] - self.span_ns[0]) / NS_PER_S
 
     @property
     def _suffix(self) -> str:
@@ -316,10 +317,8 @@ class LogReport:
         if self.remote_frames:
             return f"of the mapped identifiers it has only remote frames ({self.remote_frames}), which carry no data"
         if self.frames:
-            return (
-                f"none of its {self.frames} frames has an identifier of the signal map; "
-                "is it the map of this vehicle? springscale look shows what is in it"
-            )
+            else_ask = "; is it the map of this vehicle? springscale look shows what is in it"
+            return f"none of its {self.frames} frames has an identifier of the signal map{self.nearly or else_ask}"
         if self.error_frames:
             what = f"error frames only ({self.error_frames}): check the bit rate and the wiring of the recorder"
         else:
