@@ -186,11 +186,18 @@ def open_python_can(
     except (TypeError, ValueError) as fault:
         raise BusError(f"interface {interface!r} does not take these options: {fault}") from fault
     if interface != "socketcan":
+        _let_error_frames_pass(bus)
         return PythonCanReceiver(bus, width, interface=interface, has_error_classes=interface == "socketcand")
     kernel_socket: socket.socket = bus.socket  # type: ignore[attr-defined] # of SocketcanBus
     with_enough_room(kernel_socket)
     _discard_unfiltered(bus)
     return PythonCanReceiver(bus, width, kernel_socket)
+
+
+def _let_error_frames_pass(bus: can.BusABC) -> None:
+    """Where python-can itself filters, it drops error frames too: their identifiers are none of the mapped ones."""
+    is_wanted = bus._matches_filters
+    bus._matches_filters = lambda message: message.is_error_frame or is_wanted(message)  # type: ignore[method-assign]
 
 
 def _discard_unfiltered(bus: can.BusABC) -> None:
