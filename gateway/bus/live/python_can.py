@@ -197,7 +197,7 @@ def open_python_can(
 def _let_error_frames_pass(bus: can.BusABC) -> None:
     """Where python-can itself filters, it drops error frames too: their identifiers are none of the mapped ones."""
     is_wanted = bus._matches_filters
-    bus._matches_filters = lambda message: message.is_error_frame or is_wanted(message)  # type: ignore[method-assign]
+    bus._matches_filters = lambda msg: msg.is_error_frame or is_wanted(msg)  # type: ignore[method-assign]
 
 
 def _discard_unfiltered(bus: can.BusABC) -> None:
