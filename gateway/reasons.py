@@ -139,7 +139,9 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
             "signal map",
         ),
         Why.SENSOR_RATE_LOW: Explanation(
-            Cause.SENSORS, "the sensor sends too rarely for `rate_hz`", "increase its rate"
+            Cause.SENSORS,
+            "the sensor sends too rarely for `rate_hz`",
+            "increase its rate; of a log, see whether its stamps are seconds",
         ),
         Why.SAMPLE_RATE: Explanation(
             Cause.SENSORS,

@@ -48,8 +48,8 @@ class BusStatus(_Told):
     channel: str = ""
     state: str = Field("unknown", examples=["connected", "bus_silent", "reader_fault"])
     n_frames: int = Field(0, description="data frames received")
-    n_error_frames: int = 0
-    n_remote_frames: int = Field(0, description="requests for a message (RTR): they carry no data")
+    n_error_frames: int = Field(0, description="error frames received, and messages that no bus can carry")
+    n_remote_frames: int = Field(0, description="remote frames received: requests for a message, without its data")
     n_reconnects: int = 0
     n_inbox_dropped: int = Field(0, description="frames the pipeline did not take in time")
     n_kernel_dropped: int | None = Field(None, description="frames the kernel dropped; null if it does not say")
@@ -192,6 +192,17 @@ class RecordStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class VerificationStatus:
+    """Known loads weighed with the present calibration, and when the next ones are due."""
+
+    n_records: Annotated[int, Field(description="kept in all, those of earlier calibrations among them")] = 0
+    last_at: Annotated[str | None, Field(description="of the present calibration; null: never")] = None
+    last_verdict: Annotated[str | None, Field(examples=["passed", "failed"])] = None
+    due_at: Annotated[str | None, Field(description="null: not required, [verification] every_days = 0")] = None
+    is_due: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class AlarmsStatus:
     """Active alarms; counts begin at the start of the service."""
 
@@ -210,6 +221,7 @@ class Status(_Told):
     vehicle_id: str | None = None
     vin: str | None = None
     calibration_id: str | None = None
+    known_weights_id: str | None = Field(None, description="hash of the known weights in use; null: there are none")
     estimator: str | None = None
     bus: BusStatus = BusStatus()
     decode: tuple[DecodeCount, ...] = ()
@@ -221,6 +233,7 @@ class Status(_Told):
     uplink: UplinkStatus | None = Field(None, description="null if no broker is configured")
     webhook: WebhookStatus | None = Field(None, description="null if none is configured")
     record: RecordStatus | None = Field(None, description="the ring log; null if it is off")
+    verification: VerificationStatus = VerificationStatus()
     alarms: AlarmsStatus = AlarmsStatus()
     is_ready: bool = Field(True, description="whether estimates are possible: the answer of /health/ready")
     not_ready_reason: str | None = None
@@ -232,7 +245,8 @@ class Status(_Told):
 
     def sentence(self) -> str:
         """The state in words, with any faults."""
-        said = [SENTENCES[self.state]]
+        is_silent = self.state is State.WAITING_FOR_BUS and self.bus.last_fault
+        said = [f"No mapped frame comes: {self.bus.last_fault}." if is_silent else SENTENCES[self.state]]
         silent = [f"{s.signal.replace('_', ' ')}{self.why_silent(s)}" for s in self.signals if s.is_silent]
         if silent and self.state is State.SENSOR_FAULT:
             said.append(f"Missing: {', '.join(silent)}.")

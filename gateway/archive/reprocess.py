@@ -118,6 +118,7 @@ class Summary:
             "n_failed_logs": self.n_failed_logs,
             "failures": [reason for outcome in self.outcomes for reason in outcome.failures],
             "refused": [text for outcome in self.outcomes for text in outcome.refused],
+            "overlaps": [text for outcome in self.outcomes for text in outcome.overlaps],
             "lost": self.lost,
             "copies": self.copies,
             "took_s": round(self.took_s, 3),

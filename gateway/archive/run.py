@@ -23,7 +23,9 @@ from gateway.bus.logs import LogReport
 from gateway.errors import ConfigurationError, LogUnreadableError
 from gateway.estimate import Estimate
 from gateway.estimate_json import estimate_to_json
+from gateway.units import NS_PER_S
 
+OVERLAP_NS: Final = NS_PER_S  # chosen: longer than two logs of one recorder share
 TOLD_FAILURES: Final = 5  # chosen: in the outcome; the data set has all of them
 
 
@@ -51,6 +53,7 @@ class JobOutcome:
     n_failed_logs: int = 0
     failures: tuple[str, ...] = ()  # the first few
     refused: tuple[str, ...] = ()  # likewise: frames of another length than the database says, values out of range
+    overlaps: tuple[str, ...] = ()  # likewise: logs of the same time
 
 
 def run(job: ArchiveJob) -> JobOutcome:
@@ -63,6 +66,8 @@ def run(job: ArchiveJob) -> JobOutcome:
     rows: list[dict[str, Any]] = []
     told: list[dict[str, Any]] = []
     refused: list[str] = []
+    overlaps: list[str] = []
+    longest, end_ns = "", -1  # the log that ends last so far
     failures = {one: one.facts.fault or "" for one in job.logs if one.facts.first_ns is None}
     drives = JobDrives(job)
     for one, next_ns in followed(readable(job.logs), job.next_ns):
@@ -74,6 +79,10 @@ def run(job: ArchiveJob) -> JobOutcome:
             continue
         rows += [_row(job, one, found) for found in read.estimates]
         told.append(_told(one, read.report))
+        if read.report.wanted and read.report.span_ns[0] < end_ns - OVERLAP_NS:
+            overlaps.append(f"{one.log.name}: begins before {longest} ends")
+        if read.report.wanted and read.report.span_ns[1] > end_ns:
+            longest, end_ns = one.log.name, read.report.span_ns[1]
         refused += (f"{one.log.name}: {cause.text}" for cause in read.report.causes())
     for one, reason in failures.items():
         _keep_failure(job, one, reason)
@@ -87,6 +96,7 @@ def run(job: ArchiveJob) -> JobOutcome:
         n_failed_logs=len(failures),
         failures=tuple(failures.values())[:TOLD_FAILURES],
         refused=tuple(refused)[:TOLD_FAILURES],
+        overlaps=tuple(overlaps)[:TOLD_FAILURES],
     )
     if told or rows:
         return _written(job, outcome, rows, told, failures)

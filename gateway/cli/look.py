@@ -134,6 +134,7 @@ def look_json(seen: Look) -> dict[str, Any]:
             }
             for found in seen.found
         },
+        "left_out": seen.report.left_out,
         "maps": [
             {
                 "name": f"springscale:{fit.name}",

@@ -21,6 +21,7 @@ from gateway.cli.progress import StatusLine
 from gateway.errors import SpringscaleError
 from gateway.files.whole import refusal_told
 from gateway.records import Frames
+from gateway.words import counted
 
 FLUSH_S: Final = 10.0  # chosen: a killed recording loses as much
 DRAIN_S: Final = 0.2  # chosen: how soon a stop takes effect
@@ -52,8 +53,10 @@ def record(log: Path, signals: str, interface: str, channel: str, for_s: float |
     n_dropped = counts.dropped_inbox + counts.dropped_kernel
     if not n_frames:
         raise SpringscaleError(f"{log}: no mapped frame came ({source.reason or 'the bus was silent'})")
-    remarks = [remark.text for remark in decoder.remarks()]
-    told = {"output": str(log), "n_frames": n_frames, "n_dropped": n_dropped, "remarks": remarks}
+    others = {"remote_frames": counts.remote_frames, "error_frames": counts.error_frames}
+    remarks = [f"left out: {counted(n, name[:-1].replace('_', ' '))}" for name, n in others.items() if n]
+    remarks += [remark.text for remark in decoder.remarks()]
+    told = {"output": str(log), "n_frames": n_frames, "n_dropped": n_dropped, **others, "remarks": remarks}
     return told, "\n".join([f"{log}: {n_frames} frames, {n_dropped} lost", *remarks])
 
 

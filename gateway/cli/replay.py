@@ -47,12 +47,7 @@ def _require_sent(report: LogReport, from_channel: str | None) -> None:
 
 def _sentences(report: LogReport) -> str:
     lines = [f"{report.path}: {report.wanted} frames sent"]
-    counts = {
-        "of other channels": report.other_channel,
-        "remote frames": report.remote_frames,
-        "error frames": report.error_frames,
-    }
-    lines += [f"not sent: {n} {what}" for what, n in counts.items() if n]
+    lines += [f"not sent: {others}"] if (others := report.told_others()) else []
     for reason, rejected in report.rejects.items():
         first = f", first in line {rejected.first_lines[0]}" if rejected.first_lines else ""
         lines.append(f"not read: {rejected.count} x {reason}{first}")

@@ -79,6 +79,9 @@ def summary_in_words(summary: Summary, output: str) -> str:
     if refused := [text for outcome in summary.outcomes for text in outcome.refused]:
         lines.append("frames refused, which explains batches that were not weighed:")
         lines += _some(refused)
+    if overlaps := [text for outcome in summary.outcomes for text in outcome.overlaps]:
+        lines.append("logs of the same time, whose drives may count twice or not at all: keep one of each:")
+        lines += _some(overlaps)
     if summary.lost:
         lines.append(f"not done: {len(summary.lost)}; run again to try them:")
         lines += _some([f"{what}: {why}" for what, why in summary.lost.items()])

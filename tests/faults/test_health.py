@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import can
 import pytest
 from support.estimates import make_record
-from support.patience import wait_until
+from support.patience import PATIENCE_S, wait_until
 from support.small_broker import SmallBroker
 
 from gateway.bus.live import source as live_source
@@ -135,7 +135,7 @@ def test_a_broker_that_takes_nothing_is_a_fault(what: str, tmp_path: Path, monke
 class ScriptedBus:
     """A bus of python-can that gives these messages, then none."""
 
-    def __init__(self, *messages: can.Message) -> None:
+    def __init__(self, *messages: can.Message | None) -> None:
         self._messages = list(messages)
 
     def recv(self, timeout_s: float) -> can.Message | None:
@@ -149,6 +149,10 @@ class ScriptedBus:
 
 def frame() -> can.Message:
     return can.Message(arbitration_id=FRAME_ID, is_extended_id=False, data=bytes(8), timestamp=time.time())
+
+
+def remote() -> can.Message:
+    return can.Message(arbitration_id=FRAME_ID, is_extended_id=False, is_remote_frame=True, dlc=8)
 
 
 def error(error_class: int) -> can.Message:
@@ -186,11 +190,46 @@ def test_a_burst_is_judged_by_the_order_of_its_frames_and_errors(what: str, inte
             assert source.counts().error_frames == sum(message.is_error_frame for message in messages)
 
 
+OTHERS: dict[str, tuple[list[can.Message | None], str]] = {  # None ends a burst
+    "data and remote frames": (
+        [frame(), remote(), frame(), None, remote(), remote()],
+        "no data frame for 0.1 s, only 2 remote frames",
+    ),
+    "remote frames alone": ([remote()] * 5, "no data frame for 0.1 s, only 5 remote frames"),
+    "error frames alone": ([error(0x4)] * 4, "only 4 error frames; check the bit rate and the wiring"),
+    "an error frame as the bus goes to sleep": (
+        [frame(), None, error(0x4)],
+        "no data frame for 0.1 s, only 1 error frame",
+    ),
+    "error and remote frames": ([frame(), None, error(0x4), remote()], "only 1 error frame and 1 remote frame"),
+    "data frames last": (
+        [remote(), error(0x4), frame()],
+        "no frame for 0.1 s: the vehicle is asleep or the channel is not connected",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", OTHERS)
+def test_every_message_is_counted_and_a_bus_without_data_frames_says_what_it_carries(what: str) -> None:
+    bursts, reason = OTHERS[what]
+    messages, bus = [one for one in bursts if one], cast(Any, ScriptedBus(*bursts))
+    with listening(PythonCanReceiver(bus, 8)) as source:
+        assert wait_until(lambda: source.state is SourceState.BUS_SILENT)
+        counts = source.counts()
+        assert (source.reason or "").endswith(reason)
+    bus_status = BusStatus(last_fault=source.reason)
+    status = GOOD.model_copy(update={"state": State.WAITING_FOR_BUS, "bus": bus_status})
+    assert status.sentence().startswith(f"No mapped frame comes: {source.reason}. ")
+    assert counts.remote_frames == sum(message.is_remote_frame for message in messages)
+    assert counts.frames + counts.remote_frames + counts.error_frames == len(messages)
+
+
 IMPOSSIBLE: dict[str, dict[str, Any]] = {
     "30 bits": {"arbitration_id": 0x2000_0000, "is_extended_id": True},
     "33 bits": {"arbitration_id": 1 << 33, "is_extended_id": True},
     "12 bits of a standard identifier": {"arbitration_id": 0x800, "is_extended_id": False},
     "a negative identifier": {"arbitration_id": -1, "is_extended_id": True},
+    "an identifier of text": {"arbitration_id": "120", "is_extended_id": False},
     "65 bytes": {"arbitration_id": FRAME_ID, "is_extended_id": False, "is_fd": True, "data": bytes(65)},
 }
 
@@ -202,6 +241,16 @@ def test_a_message_that_no_bus_can_carry_is_counted_as_an_error(what: str) -> No
     with listening(PythonCanReceiver(bus, 8)) as source:
         assert wait_until(lambda: source.counts().frames == 2)
         assert source.counts().error_frames == 1
+
+
+@pytest.mark.parametrize("stamp", [None, "12.5", float("nan"), float("inf"), -1.0, 1e300])
+def test_a_stamp_that_is_no_time_is_dated_by_the_system(stamp: Any) -> None:
+    message = frame()
+    message.timestamp = stamp
+    bus: Any = ScriptedBus(message)
+    with listening(PythonCanReceiver(bus, 8)) as source:
+        (t_ns,) = source.inbox.drain(PATIENCE_S).t_ns.tolist()
+    assert abs(t_ns / 1e9 - time.time()) < PATIENCE_S
 
 
 class NoisyBus(ScriptedBus):

@@ -57,6 +57,7 @@ CAUSES = {  # what a message may name, and how it does
     "half byte": "half byte",
     "cut": "is cut off",
     "channels": "if these are one bus twice",
+    "remote and error frames": f"left out: {N // 100} remote frames, {N // 100} error frames",
     "other channel": "correct channel in the signal map",
     "map": "map of this vehicle",
     "copy": "copies of other logs",
@@ -122,6 +123,16 @@ def two_channels() -> bytes:
     return "".join(line.replace("can0", f"can{i % 2}") for i, line in enumerate(lines)).encode()
 
 
+def with_others() -> bytes:
+    """Before every hundredth frame a remote frame of its identifier and an error frame."""
+    lines = candump().decode().splitlines(keepends=True)
+    for i in range(100 * (N // 100) - 1, 0, -100):
+        stamp, channel, frame = lines[i].split()
+        others = f"{stamp} {channel} {frame[:3]}#R\n{stamp} {channel} 20000004#0000000000000000\n"
+        lines[i] = others + lines[i]
+    return "".join(lines).encode()
+
+
 PAUSES_S = np.diff(RELATIVE_S, prepend=0.0)
 DATE = "date Sun Nov 01 00:00:00.000 2026\n"
 ZONED = "date 2026-11-01T00:00:00Z\n"
@@ -133,7 +144,8 @@ DAYS = f";$STARTTIME={(MIDNIGHT_NS / S / 86_400.0) + 25_569.0:.9f}\n"
 class Case:
     """A log, its file's name, and what is said of it: ``told`` of one that is read, ``refused`` of one that is not.
 
-    ``n_left_out`` frames of all cannot be read. ``not_archived`` is why the archive alone refuses it.
+    ``n_left_out`` frames of all cannot be read; ``n_others`` are no data frames.
+    ``not_archived`` is why the archive alone refuses it.
     """
 
     name: str
@@ -143,6 +155,7 @@ class Case:
     n_left_out: int = 0
     not_archived: frozenset[str] = frozenset()
     n_frames: int = N
+    n_others: int = 0
 
     @property
     def archived(self) -> frozenset[str]:
@@ -167,6 +180,8 @@ CASES = {
     ".trc with a date": Case("a.trc", lambda: trc("1.1", DAYS), told=said("no zone")),
     "relative stamps": Case("a.asc", lambda: asc(ZONED, "relative", PAUSES_S)),
     "seconds of the day": Case("a.asc", lambda: asc(ZONED, stamps_s=54_000.0 + RELATIVE_S), told=said("late start")),
+    "stamps since 1970 below a date": Case("a.asc", lambda: asc(DATE, stamps_s=ABSOLUTE_S)),
+    "tabs": Case("a.log", lambda: candump().replace(b" ", b"\t")),
     "negative stamps": Case(
         "a.asc", lambda: asc(ZONED, stamps_s=RELATIVE_S - 0.1), told=said("negative"),
         n_left_out=int(np.count_nonzero(RELATIVE_S < 0.0999)),
@@ -176,6 +191,9 @@ CASES = {
         "a.log.gz", lambda: gzip.compress(candump())[:-20], told=said("cut"), n_left_out=1, n_frames=0
     ),
     "two channels": Case("a.log", two_channels, told=said("channels")),
+    "remote and error frames": Case(
+        "a.log", with_others, told=said("remote and error frames"), n_others=2 * (N // 100)
+    ),
     "candump -td": Case("a.log", lambda: candump(PAUSES_S, "({:010.6f})"), refused=said("pauses")),
     "milliseconds": Case("a.log", lambda: candump(1e3 * ABSOLUTE_S, "({:.3f})"), refused=said("fraction of a second")),
     "a decimal comma": Case("a.log", lambda: candump().replace(b".", b","), refused=said("comma")),
@@ -264,7 +282,7 @@ def test_estimate(case: Case, folder: Path) -> None:
         assert done.stdout.startswith("no date, 0:00:0" if "undated" in case.told else "2026-11-01T")
         assert n_left_out_in(done.output) == case.n_left_out
         chunks, report = open_log(log, load_signal_map(MAP))
-        assert sum(map(len, chunks)) + sum(report.left_out.values()) == n_in(case, log)
+        assert sum(map(len, chunks)) + sum(report.left_out.values()) == n_in(case, log) + case.n_others
 
 
 def test_reprocess(case: Case, folder: Path) -> None:
@@ -274,8 +292,8 @@ def test_reprocess(case: Case, folder: Path) -> None:
     assert bool(done.exit_code) == bool(case.archived)
     for receipt in receipts(place_of(folder / "out")):
         (told,) = receipt["logs"]
-        assert told["frames"] + sum(told["left_out"].values()) == n_in(case, log)
-        assert sum(told["left_out"].values()) == case.n_left_out
+        assert told["frames"] + sum(told["left_out"].values()) == n_in(case, log) + case.n_others
+        assert sum(told["left_out"].values()) == case.n_left_out + case.n_others
         assert (told["ended_early"] is None) == ("cut" not in case.told)
         assert receipt["n_weighed"] == 1
 
@@ -324,6 +342,27 @@ def test_check_config(case: Case, folder: Path) -> None:
     found = called("check-config", folder / "springscale.toml")
     assert found.exit_code == 0, found.output
     assert causes_in(found.output) == said()
+
+
+SET = {  # the first stamp, by how much the clock is set midway, and what is told
+    "back": (ABSOLUTE_S[0], -40.0, "its stamps step back 1 time, by up to 0:00:40"),
+    "forward": (ABSOLUTE_S[0], 86_400.0, "its stamps leap forward by 1 day, 0:00:00"),
+    "from 1970": (0.0, ABSOLUTE_S[0], "its stamps leap forward by 20758 days, 0:00:00"),
+}
+
+
+@pytest.mark.parametrize("how", SET)
+def test_a_clock_that_was_set_while_recording(how: str, folder: Path) -> None:
+    """It is told, and the years between the stamps cost no memory."""
+    first_s, set_by_s, told = SET[how]
+    stamps_s = first_s + RELATIVE_S
+    stamps_s[N // 2 :] += set_by_s
+    log = folder / "van-1" / "a.log"
+    log.write_bytes(candump(stamps_s))
+    for command in (("look", log), ("estimate", log, "--config", folder / "springscale.toml")):
+        said_of_it = all_said(called(*command))
+        assert told in said_of_it
+        assert "was the clock set?" in said_of_it
 
 
 def test_a_copy(folder: Path) -> None:

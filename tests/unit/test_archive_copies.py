@@ -13,6 +13,7 @@ from gateway.archive.manifest import load_manifest
 from gateway.archive.reprocess import Summary, reprocess
 from gateway.bus.logs.packed import zstd
 from gateway.cli.reprocess import summary_in_words
+from gateway.units import NS_PER_S
 
 Write = Callable[[Path, bytes], object]
 
@@ -48,6 +49,28 @@ def test_a_copy_is_left_out_and_named(kind: str, tmp_path: Path) -> None:
         both, "both"
     )
     assert weighed(tmp_path, "both").copies == both.copies  # from the facts of the first run
+
+
+OVERLAPS: dict[str, Callable[[list[bytes]], list[bytes]]] = {
+    "other ends of lines": lambda lines: [line.replace(b"\n", b"\r\n") for line in lines],
+    "another channel": lambda lines: [line.replace(b"can0", b"can1") for line in lines],
+    "a part of it": lambda lines: lines[: len(lines) // 2],
+    "one that goes on": lambda lines: lines[len(lines) // 2 :],
+}
+
+
+@pytest.mark.parametrize("kind", OVERLAPS)
+def test_another_log_of_the_same_time_is_named(kind: str, tmp_path: Path) -> None:
+    write_drive(tmp_path / "van-1" / "1.log", MIDNIGHT_NS, 21.0)
+    write_drive(tmp_path / "van-1" / "3.log", MIDNIGHT_NS + 22 * NS_PER_S, 5.0)
+    write_manifest(tmp_path, "van-1")
+    assert weighed(tmp_path, "alone").to_json()["overlaps"] == []
+    lines = (tmp_path / "van-1" / "1.log").read_bytes().splitlines(keepends=True)
+    (tmp_path / "van-1" / "2.log").write_bytes(b"".join(OVERLAPS[kind](lines)))
+    both = weighed(tmp_path, "both")
+    assert both.copies == {}
+    assert both.to_json()["overlaps"] == ["van-1/2.log: begins before van-1/1.log ends"]
+    assert "van-1/2.log: begins before van-1/1.log ends" in summary_in_words(both, "both")
 
 
 def test_what_only_looks_alike_is_no_copy(tmp_path: Path) -> None:

@@ -142,7 +142,7 @@ def test_a_file_damaged_in_the_middle_gives_what_lies_before(tmp_path, frames):
 @pytest.mark.parametrize("content", [b"", b"MDF     4.10    ", b"no such thing" * 100])
 def test_what_is_no_measurement_is_refused(content, tmp_path):
     (tmp_path / "a.mf4").write_bytes(content)
-    with pytest.raises(LogUnreadableError, match=r"a\.mf4: cannot be read as \.mf4: "):
+    with pytest.raises(LogUnreadableError, match=r"a\.mf4: (cannot be read as \.mf4: |is empty)"):
         read(tmp_path / "a.mf4")
 
 

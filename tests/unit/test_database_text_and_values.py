@@ -5,6 +5,7 @@ import codecs
 import numpy as np
 import pytest
 
+from gateway.bus.logs.open import motion_of_log
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.errors import SignalMapError
 from gateway.records import Frames, Signal
@@ -44,6 +45,7 @@ def decoded(tmp_path, raw_accel, state):
     return decoder.decode(frames).of(Signal.VERTICAL_ACCELERATION)[1], decoder.counts[Signal.VERTICAL_ACCELERATION]
 
 
+RAWS = range(8900, 9100)
 TEXTS = {
     "UTF-8": DBC.encode(),
     "UTF-8 with a mark": codecs.BOM_UTF8 + DBC.encode(),
@@ -72,6 +74,45 @@ def test_a_named_state_means_every_raw_value_of_the_name(state, n, tmp_path):
 def test_a_named_code_of_a_measured_signal_is_no_measurement(raw, tmp_path):
     samples, counts = decoded(tmp_path, raw, 1)
     assert (len(samples), dict(counts.rejected)) == (0, {"not_available": 1})
+
+
+def test_a_database_that_names_every_raw_value_is_told_of(tmp_path):
+    """The samples were left out without a word, and the time stamps blamed."""
+    names = " ".join(f'{raw} "{raw / 1000} m/s^2"' for raw in RAWS[150:])
+    (tmp_path / "a.dbc").write_text(DBC + f"VAL_ 512 Accel {names} ;\n")
+    (tmp_path / "a.toml").write_text(MAP)
+    log = tmp_path / "a.log"
+    lines = (f"({1_790_000_000 + raw / 100:.2f}) can0 200#{raw % 256:02X}{raw // 256:02X}000000000100" for raw in RAWS)
+    log.write_text("\n".join(lines))
+    motions, report = motion_of_log(log, load_signal_map(tmp_path / "a.toml"))
+    assert sum(np.isfinite(motion.columns[:, 0]).sum() for motion in motions) == len(RAWS) - 50
+    (remark,) = report.remarks()
+    assert "vertical_acceleration (BOX): 50 of 200 raw values have a name in the database" in remark
+    assert report.causes()
+
+
+def test_messages_of_which_no_frame_came_are_told_of(tmp_path):
+    (tmp_path / "a.dbc").write_text(DBC + 'BO_ 2147484161 GYRO: 8 A\n SG_ Rate : 0|16@1- (1,0) [0|0] "dps" A\n')
+    (tmp_path / "a.toml").write_text(MAP.replace('"BOX"\nsignal = "Rate"', '"GYRO"\nsignal = "Rate"'))
+    (tmp_path / "a.log").write_text("(1790000000.5) can0 200#0000000000000100\n(1790000000.5) can0 201#00\n")
+    motions, report = motion_of_log(tmp_path / "a.log", load_signal_map(tmp_path / "a.toml"))
+    assert sum(map(len, (motion.t_ns for motion in motions))) == 1
+    assert [*report.remarks()] == [f"{tmp_path / 'a.log'}: has no frame of GYRO (00000201) for pitch_rate"]
+
+
+def test_one_signal_measures_one_thing(tmp_path):
+    (tmp_path / "a.dbc").write_text(DBC)
+    (tmp_path / "a.toml").write_text(MAP + '[signals.roll_rate]\nmessage = "BOX"\nsignal = "Rate"\n')
+    with pytest.raises(SignalMapError, match=r"signals\.roll_rate\.signal: 'Rate' is mapped as pitch_rate too"):
+        load_signal_map(tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize("zone", ["localtime", "Factory", "Europe/Berlin ", "UTC+2", "../../etc/localtime"])
+def test_a_zone_that_is_not_the_same_everywhere_is_refused(zone, tmp_path):
+    (tmp_path / "a.dbc").write_text(DBC)
+    (tmp_path / "a.toml").write_text(f'time_zone = "{zone}"\n{MAP}')
+    with pytest.raises(SignalMapError, match=r"time_zone: no zone is called"):
+        load_signal_map(tmp_path / "a.toml")
 
 
 def test_a_signal_name_that_occurs_twice_is_refused_where_it_is_mapped(tmp_path):

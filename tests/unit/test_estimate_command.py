@@ -178,7 +178,7 @@ def test_frames_of_several_channels_are_told_unless_one_is_named(log_of):
     assert remarks(path) == [
         f"{path}: mapped frames are on can0, can1; if these are one bus twice, name one in the map"
     ]
-    assert remarks(path, "can0") == []
+    assert remarks(path, "can0") == [f"{path}: left out: 1 frame of other channels"]
 
 
 def test_estimate_tells_them_on_standard_error(tmp_path):

@@ -11,8 +11,9 @@ from support.commands import called
 
 from gateway.bus.frames import merge_frames
 from gateway.bus.logs import write_candump
+from gateway.bus.logs.open import open_log
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
-from gateway.errors import SignalMapError
+from gateway.errors import LogUnreadableError, SignalMapError
 from gateway.records import EXTENDED_ID, Frames, Signal
 
 J1939: Final = shipped_map("j1939")
@@ -112,6 +113,38 @@ def test_an_address_that_means_nothing_is_refused(kind: str, tmp_path: Path) -> 
     path.write_text(path.read_text().replace(old, new))
     with pytest.raises(SignalMapError, match=said):
         load_signal_map(path)
+
+
+NEARLY = {  # the first line of the map, its source address, the identifier in the log, and what is said of it
+    "another address": ("j1939 = true", "source_address = 0x33", "18FF2021", "from the J1939 source address 0x21"),
+    "no J1939": ("", "", "18FF2021", "correct source_address, or set j1939 = true"),
+    "11 bits": ("", "", "120", "120 has the number of 00000120 in 11 bits: correct the database"),
+}
+
+
+@pytest.mark.parametrize("kind", NEARLY)
+@pytest.mark.parametrize("suffix", [".log", ".asc"])
+def test_identifiers_that_are_nearly_those_of_the_map_are_named(kind: str, suffix: str, tmp_path: Path) -> None:
+    """Not the vehicle: it is the right one."""
+    head, more, can_id, said = NEARLY[kind]
+    mapped = (0x120 if kind == "11 bits" else 0x18FF20FE) | 1 << 31
+    (tmp_path / "a.dbc").write_text(
+        f'VERSION ""\nNS_ :\nBS_:\nBU_: A\nBO_ {mapped} IMU: 8 A\n SG_ Z : 0|16@1- (0.001,0) [0|0] "m/s^2" A\n'
+    )
+    entry = f'[signals.vertical_acceleration]\nmessage = "IMU"\nsignal = "Z"\n{more}\n'
+    (tmp_path / "a.toml").write_text(f'{head}\ndbc = ["a.dbc"]\n{entry}')
+    extended = "x" if len(can_id) > 3 else ""
+    lines = {
+        ".log": f"(1790000000.5) can0 {can_id}#0011223344556677\n",
+        ".asc": f"date 2026-11-01T00:00:00Z\n0.5 1 {can_id}{extended} Rx d 8 00 11 22 33 44 55 66 77\n",
+    }
+    log = tmp_path / f"a{suffix}"
+    log.write_text(lines[suffix])
+    chunks, report = open_log(log, load_signal_map(tmp_path / "a.toml"))
+    assert list(chunks) == []
+    with pytest.raises(LogUnreadableError, match=said) as refusal:
+        report.require_frames()
+    assert "map of this vehicle" not in str(refusal.value)
 
 
 @pytest.mark.parametrize("signal", GROUPS)

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from gateway.bus.frames import join
-from gateway.bus.logs.open import open_whole_log
+from gateway.bus.logs.open import open_log, open_whole_log
 from gateway.bus.logs.report import LogReport
+from gateway.bus.signals import load_signal_map
 from gateway.errors import LogUnreadableError
 from gateway.records import Frames
 
@@ -160,6 +161,19 @@ REFUSED = {
     "asc as log": ("a.log", asc("2023-03-10 15:06:12"), "name it so"),
     "GVRET": ("a.csv", "Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n1,123,0,Rx,0,1,01\n", "SavvyCAN's"),
     "CANedge": ("a.csv", "TimestampEpoch;BusChannel;ID;IDE;DLC;DataLength;Dir;EDL;BRS;DataBytes\n", "CANedge's"),
+    "remote frames": ("a.log", "(1627274455.0125) can0 123#R\n" * 3, r"only remote frames \(3\), which carry no data"),
+    "remote frames in asc": ("a.asc", asc("2023-03-10 15:06:12", "0.5 1 123 Rx r 1\n"), r"only remote frames \(1\)"),
+    "error frames": ("a.log", "(1627274455.0125) can0 20000004#0000000000000000\n", r"error frames only \(1\): check"),
+    "error frames in asc": ("a.asc", asc("2023-03-10 15:06:12", "0.5 1 ErrorFrame\n"), r"error frames only \(1\)"),
+    "UTF-16 without a mark": ("a.log", ("(1627274455.0125) can0 123#01\n" * 9).encode("utf-16-le"), "this is UTF-16"),
+    "UTF-32": ("a.log", "(1627274455.0125) can0 123#01\n".encode("utf-32"), "UTF-32; save it as UTF-8"),
+    "carriage returns": ("a.log", "(1627274455.0125) can0 123#01\r" * 9, "lines end in a carriage return alone"),
+    "no-break spaces": ("a.log", "(1627274455.0125)\u00a0can0\u00a0123#01\n" * 9, "line 1: stamps are not seconds"),
+    "identifiers with 0x": ("a.log", "(1627274455.0125) can0 0x123#01\n" * 9, "left out, garbled: 9"),
+    "Wireshark": ("a.log", b"\xd4\xc3\xb2\xa1\2\0\4\0" + bytes(99), "a capture of Wireshark"),
+    "bzip2": ("a.log", b"BZh91AY&SY" + bytes(99), "packed with bzip2"),
+    "nothing": ("a.asc", "", "is empty"),
+    "a header alone": ("a.asc", "date 2023-03-10 15:06:12\n", "holds no CAN frame$"),
     "trc 1.2": ("a.trc", ";$FILEVERSION=1.2\n     1)      0.0 1  Rx  0123  2  01 02\n", "version '1.2'"),
     "trc 3.0": ("a.trc", ";$FILEVERSION=3.0\n", "version '3.0'"),
 }
@@ -171,6 +185,18 @@ def test_a_log_whose_stamps_or_form_cannot_be_used_names_the_cause(kind, tmp_pat
     with pytest.raises(LogUnreadableError, match=said) as refusal:
         read(tmp_path / name, text)[1].require_frames()
     assert "map of this vehicle" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    "kind", ["UTF-16 without a mark", "carriage returns", "no-break spaces", "identifiers with 0x"]
+)
+def test_lines_in_which_no_identifier_is_found_are_not_another_vehicles(kind, tmp_path):
+    name, text, said = REFUSED[kind]
+    (tmp_path / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+    chunks, report = open_log(tmp_path / name, load_signal_map("springscale:reference"))
+    assert list(chunks) == []
+    with pytest.raises(LogUnreadableError, match=said):
+        report.require_frames()
 
 
 def test_a_byte_order_mark_costs_no_frame(tmp_path):

@@ -285,6 +285,16 @@ def test_an_unknown_sensor_asks_for_its_database(tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
+def test_a_database_with_another_unit_is_told_of_the_known_ones(tmp_path: Path) -> None:
+    """It described the acceleration, and was asked for."""
+    write_candump(packed(512, 8, T0_NS + np.arange(500) * 10_000_000), "can0", tmp_path / "drive.log")
+    (tmp_path / "box.dbc").write_text(DBC.replace('"m/s^2"', '"m/s**2"'))
+    assert seen(tmp_path / "drive.log")["lacking"] == [
+        "no signal of BOX has a unit of acceleration (m/s^2, m/s2, m/s², m/s/s, g, mg): "
+        "correct the unit in the database"
+    ]
+
+
 def test_a_database_of_another_device_is_no_certainty(tmp_path: Path) -> None:
     """The shipped reference layout with its valid flags down: who knows whose frames these are?"""
     drive = bus_drive(30.0, seed=3)

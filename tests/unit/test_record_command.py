@@ -7,6 +7,7 @@ import threading
 from importlib.resources import files
 from pathlib import Path
 
+import can
 import pytest
 from click.testing import Result
 from support.bus_drive import START_NS, white_noise
@@ -60,6 +61,29 @@ def test_every_mapped_frame_is_in_the_log(tmp_path: Path, monkeypatch: pytest.Mo
     chunks, report = open_log(tmp_path / "drive.log.gz", SIGNAL_MAP)
     assert sum(map(len, chunks)) == len(DRIVE)
     assert report.ended_early is None
+
+
+def test_remote_and_error_frames_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of other identifiers than the mapped ones are the filter's affair, error frames are not."""
+    source = LiveSource("virtual", tmp_path.name, SIGNAL_MAP, silence_s=0.05)
+    monkeypatch.setattr(record, "LiveSource", lambda *_: source)
+    remote = [can.Message(arbitration_id=n, is_extended_id=False, is_remote_frame=True) for n in (0x120, 0x121, 0x7FF)]
+    errors = [can.Message(arbitration_id=4, is_error_frame=True)] * 3
+
+    def play() -> None:
+        assert wait_until(lambda: source.state == "bus_silent")  # it is open, then
+        with BusSink("virtual", tmp_path.name) as sink:
+            for message in (*remote, *errors):
+                sink._bus.send(message)
+            sink.send(DRIVE)
+        wait_until(lambda: source.counts().frames == len(DRIVE))
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    player = threading.Thread(target=play)
+    player.start()
+    found = recorded(tmp_path / "drive.log.gz", for_s=PATIENCE_S)
+    player.join()
+    assert f"{len(DRIVE)} frames, 0 lost\nleft out: 2 remote frames\nleft out: 3 error frames\n" in found.output
 
 
 def test_what_came_as_it_was_stopped_is_counted_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -116,6 +140,6 @@ def test_frames_that_the_kernel_lost_are_told_of(tmp_path: Path, monkeypatch: py
         source.inbox.put(DRIVE)
 
     monkeypatch.setattr(LiveSource, "start", played)
-    monkeypatch.setattr(LiveSource, "counts", lambda _: SourceCounts(len(DRIVE), 2, 5, 0, 0))
+    monkeypatch.setattr(LiveSource, "counts", lambda _: SourceCounts(len(DRIVE), 2, 5, 0, 0, 0))
     found = recorded(tmp_path / "drive.log.gz")
     assert found.output.endswith(f"{len(DRIVE)} frames, 7 lost\n")

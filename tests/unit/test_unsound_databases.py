@@ -19,6 +19,7 @@ BOX = """BO_ 512 BOX: 8 A
  SG_ Accel : 0|16@1- (0.001,0) [-100|100] "m/s^2" A
  SG_ Ratio : 16|32@1- (1,0) [0|0] "" A
  SG_ State : 48|8@1+ (1,0) [0|0] "" A
+ SG_ Spare : 56|8@1+ (1,0) [0|0] "" A
 """
 OTHER = 'BO_ 513 OTHER: 8 A\n SG_ Good : 0|8@1+ (1,0) [0|0] "" A\n'
 TAIL = """CM_ SG_ 512 Accel "up,
@@ -205,7 +206,7 @@ def test_message_by_message_a_database_is_what_cantools_reads_at_once(kind: str,
 
 def test_check_config_names_what_it_leaves_out_and_look_too(tmp_path: Path) -> None:
     write(tmp_path, HEAD + BOX + OTHER + UNRELATED["a billion bits"] + TAIL)
-    for name, message, signal in (("pitch_rate", "BOX", "Accel"), ("speed", "BOX", "Accel")):
+    for name, message, signal in (("pitch_rate", "BOX", "State"), ("speed", "BOX", "Spare")):
         unit = {"pitch_rate": "rad/s", "speed": "m/s"}[name]
         text = f'[signals.{name}]\nmessage = "{message}"\nsignal = "{signal}"\nunit = "{unit}"\n'
         (tmp_path / "a.toml").write_text((tmp_path / "a.toml").read_text() + text)
@@ -214,6 +215,6 @@ def test_check_config_names_what_it_leaves_out_and_look_too(tmp_path: Path) -> N
     said = called("check-config", config)
     assert said.exit_code == 0, said.output
     assert "Left out, as the signal map does not use it: " in said.stdout
-    assert "message 'OTHER' in line 13 cannot be read: signal 'Bad' is longer than any message" in said.stdout
+    assert "message 'OTHER' in line 14 cannot be read: signal 'Bad' is longer than any message" in said.stdout
     (tmp_path / "a.log").write_text("".join(f"(1790000000.{i:06d}) can0 200#0011223344556677\n" for i in range(100)))
-    assert "message 'OTHER' in line 13 cannot be read" in called("look", tmp_path / "a.log").stdout
+    assert "message 'OTHER' in line 14 cannot be read" in called("look", tmp_path / "a.log").stdout

@@ -146,13 +146,13 @@ class PythonCanReceiver:
                 self._date(message, now_s)
                 data.append(message)
         n_set, n_wraps = self._clock.n_set - n_set, self._clock.n_wraps - n_wraps
-        return Burst(frames_of(data, self._width), n_errors, is_bus_off, n_set, n_wraps, n_remote)
+        return Burst(frames_of(data, self._width), n_errors, is_bus_off, n_remote, n_set, n_wraps)
 
     def _date(self, message: can.Message, now_s: float) -> None:
         """Make the stamp a time since 1970, unless it is the kernel's or the recorded one of a replay."""
         if isinstance(message.timestamp, ExactStamp):
             return
-        if not 0.0 < message.timestamp <= LAST_SECOND:
+        if not isinstance(message.timestamp, int | float) or not 0.0 < message.timestamp <= LAST_SECOND:
             message.timestamp = ExactStamp(time.time_ns())
         elif self._socket is None:
             message.timestamp = self._clock.dated_s(message.timestamp, now_s)
@@ -164,7 +164,8 @@ class PythonCanReceiver:
 def _is_possible(message: can.Message) -> bool:
     """Whether a CAN bus can carry it. python-can's code for most adapters passes on what it has read in noise."""
     last = LAST_EXTENDED if message.is_extended_id else LAST_STANDARD
-    return 0 <= message.arbitration_id <= last and len(message.data) <= LONGEST
+    is_number = isinstance(message.arbitration_id, int)
+    return is_number and 0 <= message.arbitration_id <= last and len(message.data) <= LONGEST
 
 
 def open_python_can(
@@ -185,11 +186,18 @@ def open_python_can(
     except (TypeError, ValueError) as fault:
         raise BusError(f"interface {interface!r} does not take these options: {fault}") from fault
     if interface != "socketcan":
+        _let_error_frames_pass(bus)
         return PythonCanReceiver(bus, width, interface=interface, has_error_classes=interface == "socketcand")
     kernel_socket: socket.socket = bus.socket  # type: ignore[attr-defined] # of SocketcanBus
     with_enough_room(kernel_socket)
     _discard_unfiltered(bus)
     return PythonCanReceiver(bus, width, kernel_socket)
+
+
+def _let_error_frames_pass(bus: can.BusABC) -> None:
+    """Where python-can itself filters, it drops error frames too: their identifiers are none of the mapped ones."""
+    is_wanted = bus._matches_filters
+    bus._matches_filters = lambda msg: msg.is_error_frame or is_wanted(msg)  # type: ignore[method-assign]
 
 
 def _discard_unfiltered(bus: can.BusABC) -> None:

@@ -15,8 +15,7 @@ one turn of the pipeline to 4 s, of the 20 s that the watchdog waits."""
 
 @dataclass(frozen=True, slots=True)
 class Burst:
-    """Frames that came together in order, the numbers of error and remote frames, which carry no data, and whether
-    bus-off came behind all frames.
+    """Data frames that came together in order, the numbers of others, and whether bus-off came behind all frames.
 
     ``n_clock_sets`` and ``n_clock_wraps`` tell how often the adapter's own clock was dated, and began again at 0.
     """
@@ -24,9 +23,9 @@ class Burst:
     frames: Frames
     error_frames: int = 0
     is_bus_off: bool = False
+    remote_frames: int = 0
     n_clock_sets: int = 0
     n_clock_wraps: int = 0
-    remote_frames: int = 0
 
 
 class Receiver(Protocol):

@@ -24,6 +24,7 @@ from gateway.bus.signals import IdFilter, SignalMap
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.records import iso_utc
+from gateway.words import counted
 
 POLL_S: Final = 0.3  # chosen: longest wait inside a receiver: how soon a stop takes effect
 ASLEEP_POLL_S: Final = 1.0  # chosen: likewise while the bus is silent; a frame ends the wait at once
@@ -69,8 +70,8 @@ class SourceCounts:
     dropped_inbox: int
     dropped_kernel: int
     error_frames: int
+    remote_frames: int
     reconnects: int
-    remote_frames: int = 0
     clock_sets: int = 0
     clock_wraps: int = 0
 
@@ -140,8 +141,8 @@ class LiveSource(ThreadPart):
             dropped_inbox=self.inbox.dropped,
             dropped_kernel=self._dropped_before + (receiver.dropped_kernel if receiver else 0),
             error_frames=self._tally["error_frames"],
-            reconnects=self._tally["reconnects"],
             remote_frames=self._tally["remote_frames"],
+            reconnects=self._tally["reconnects"],
             clock_sets=self._tally["clock_sets"],
             clock_wraps=self._tally["clock_wraps"],
         )
@@ -180,16 +181,18 @@ class LiveSource(ThreadPart):
         self._receiver = receiver
         heard_s = time.monotonic()
         is_bus_off = False
+        others: Counter[str] = Counter()  # since the last data frame
         try:
             while not self._stopping.is_set():
                 burst = receiver.receive(ASLEEP_POLL_S if self._state is SourceState.BUS_SILENT else POLL_S)
                 self._tally["frames"] += len(burst.frames)
-                self._tally["error_frames"] += burst.error_frames
-                self._tally["remote_frames"] += burst.remote_frames
+                others.update(error=burst.error_frames, remote=burst.remote_frames)
+                self._tally.update(error_frames=burst.error_frames, remote_frames=burst.remote_frames)
                 self._note_clock(burst)
                 is_bus_off = burst.is_bus_off or (is_bus_off and not len(burst.frames))
                 if len(burst.frames):
                     heard_s = time.monotonic()
+                    others.clear()
                     self.inbox.put(burst.frames)
                     self._enter(SourceState.RECEIVING, None)
                 if is_bus_off:
@@ -199,7 +202,7 @@ class LiveSource(ThreadPart):
                 elif len(burst.frames):
                     continue
                 elif time.monotonic() - heard_s > self._silence_s:
-                    self._enter(SourceState.BUS_SILENT, self._silence())
+                    self._enter(SourceState.BUS_SILENT, self._silence(others))
                 elif self._state is SourceState.READER_FAULT:
                     self._enter(SourceState.STARTING, None)
         finally:
@@ -226,16 +229,18 @@ class LiveSource(ThreadPart):
             log_event(_EVENTS[state], level=level, interface=self._interface, channel=self._channel, reason=reason)
         self._state, self._reason = state, reason
 
-    def _silence(self) -> str:
-        """Why no frames come: the bus is asleep, or it carries other messages only (frames seen since the silence
-        began).
-        """
+    def _silence(self, others: Counter[str]) -> str:
+        """Why no data frames come: the bus is asleep, or it carries others only. ``others`` came since the last one."""
         n_seen = self._packets_received(self._channel)
         if self._state is not SourceState.BUS_SILENT:
             self._seen_at_silence = n_seen
+        if came := " and ".join(counted(n, f"{kind} frame") for kind, n in sorted(others.items()) if n):
+            is_never_heard = others["error"] and not self._tally["frames"]
+            hint = "; check the bit rate and the wiring" if is_never_heard else ""
+            return f"no data frame for {self._silence_s:g} s, only {came}{hint}"
         if n_seen > self._seen_at_silence:
             return f"the bus is awake ({n_seen - self._seen_at_silence} frames), none has a mapped identifier"
-        return f"no frame for {self._silence_s:g} s"
+        return f"no frame for {self._silence_s:g} s: the vehicle is asleep or the channel is not connected"
 
 
 def opener_of(

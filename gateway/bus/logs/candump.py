@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from gateway.bus.frames import in_order, payload_rows, take
 from gateway.bus.logs.candump_line import LineFrame, LineShape, NotData, learn_shape, read_line
 from gateway.bus.logs.packed import BLOCK_BYTES, LineBlock, line_blocks
-from gateway.bus.logs.report import SHOWN_CHARS, LogReject, Selection
-from gateway.bus.signals import IdFilter
+from gateway.bus.logs.report import SHOWN_CHARS, LogReject, LogReport, Selection
+from gateway.bus.signals import EVERY_IDENTIFIER, IdFilter
 from gateway.bus.text import OR_CP1252
 from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 
@@ -32,7 +32,13 @@ def read_candump(selection: Selection, block_bytes: int = BLOCK_BYTES) -> Iterat
 
     No content of the log ends the run: see LogReport. Raises LogUnreadableError if the file cannot be opened.
     """
-    yield from selection.given_out(map(_CandumpReader(selection).read, line_blocks(selection.report, block_bytes)))
+    reader, report = _CandumpReader(selection), selection.report
+    yield from selection.given_out(map(reader.read, line_blocks(report, block_bytes)))
+    if not report.wanted and isinstance(read_line(reader.first_line), LogReject):
+        whole = Selection(LogReport(report.path), EVERY_IDENTIFIER, None, selection.width)
+        for _ in map(_CandumpReader(whole).read, line_blocks(whole.report, block_bytes)):
+            """Every line is read, so that one which no filter could find is not taken for another identifier's."""
+        report.rejects = whole.report.rejects
 
 
 class IdPattern:
@@ -73,6 +79,7 @@ class _CandumpReader:
         self._last_digits = {pattern.last_digit for pattern in self._patterns}
         self._report = selection.report
         self._shapes: list[LineShape] = []
+        self.first_line = b""  # with a mark
         self._finder = _Finder()
 
     def read(self, block: LineBlock) -> Frames:
@@ -82,6 +89,8 @@ class _CandumpReader:
         n_lines = int(np.count_nonzero(self._finder.are(lines, "\n")))
         hashes = self._finder.marks(lines)
         hashes += block.start
+        if len(hashes) and not self.first_line:
+            self.first_line = _line_around(block, int(hashes[0]))
         if len(hashes) != n_lines:
             self._report_frameless(block, hashes)
         frames = self._wanted(block, self._hits(block, hashes))

@@ -24,7 +24,7 @@ from gateway.bus.logs.wall_clock import date_in, days_since_1899
 from gateway.bus.signals import CAN_FD_BYTES
 from gateway.bus.text import OR_CP1252
 from gateway.errors import LogUnreadableError
-from gateway.records import Frames
+from gateway.records import FIRST_DATED_NS, Frames
 from gateway.units import NS_PER_S
 
 CHUNK_MESSAGES: Final = 4096  # chosen: of python-can in memory
@@ -136,7 +136,9 @@ class _TextLog:
         try:
             for message in self.reader(cast(TextIO, self)):
                 self._is_awaited = False
-                yield message, self.start_ns
+                is_dated = message.timestamp * NS_PER_S >= FIRST_DATED_NS  # by itself, whatever the header says
+                self.report.has_wall_clock &= not is_dated
+                yield message, 0 if is_dated else self.start_ns
             self._count_awaited()
         except (EOFError, OSError, LogUnreadableError):
             raise

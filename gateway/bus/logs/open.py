@@ -1,18 +1,31 @@
 """Any log file as the wanted frames of a signal map."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from datetime import tzinfo
+from itertools import islice, product
 from pathlib import Path
 from typing import Final
+
+import numpy as np
 
 from gateway.bus.logs.candump import read_candump
 from gateway.bus.logs.message_log import MESSAGE_SUFFIXES, read_message_log
 from gateway.bus.logs.mf4 import read_mf4
 from gateway.bus.logs.packed import PACKED_SUFFIXES, open_log_file, unpacked_suffix
 from gateway.bus.logs.report import LogReport, Selection
-from gateway.bus.signals import CAN_FD_BYTES, EVERY_IDENTIFIER, Decoder, IdFilter, SignalMap
+from gateway.bus.signals import (
+    CAN_FD_BYTES,
+    EVERY_IDENTIFIER,
+    Decoder,
+    IdFilter,
+    SignalMap,
+    id_name,
+    j1939_filter,
+)
+from gateway.bus.signals.mapping import SOURCE_ADDRESS
 from gateway.errors import LogUnreadableError
-from gateway.records import Frames, Motion
+from gateway.records import EXTENDED_ID, Frames, Motion
 
 READERS: Final = {
     **dict.fromkeys((".log", ".txt", ".candump", ""), read_candump),
@@ -23,6 +36,7 @@ TEXTS: Final = frozenset(READERS.keys() - {".blf", ".db", ".mf4"})
 UNMISTAKABLE: Final = frozenset(READERS.keys() - {".txt", "", ".csv", ".db"})
 
 OTHER_KINDS: Final = {
+    b"\xff\xfe\0\0": "UTF-32; save it as UTF-8",
     b"\xff\xfe": "UTF-16; save it as UTF-8",
     b"\xfe\xff": "UTF-16; save it as UTF-8",
     b"\x89PNG": "a PNG image",
@@ -30,6 +44,10 @@ OTHER_KINDS: Final = {
     b"GIF8": "a GIF image",
     b"%PDF": "a PDF document",
     b"PK\x03\x04": "a ZIP archive",
+    b"BZh": "packed with bzip2; unpack it",
+    b"7z\xbc\xaf": "a 7z archive",
+    b"\xd4\xc3\xb2\xa1": "a capture of Wireshark or tcpdump; record with candump -L",
+    b"\n\r\r\n": "a capture of Wireshark or tcpdump; record with candump -L",
     b"SQLite format 3": "an SQLite database; name it .db if it is a log of python-can",
     b"\x7fELF": "a program",
     b"LOGG": "a BLF log; name it .blf",
@@ -74,10 +92,35 @@ def _open(
         raise LogUnreadableError(
             f"{path}: cannot tell the kind of log from {suffix!r}; known are {known}, and each with {packed}"
         )
+    if not path.stat().st_size:
+        raise LogUnreadableError(f"{path}: is empty")
     if suffix in TEXTS:
         _require_no_other_kind(path)
     selection = Selection(LogReport(path), filters, channel, width, zone)
-    return READERS[suffix](selection), selection.report
+    return _compared(READERS[suffix], selection), selection.report
+
+
+def _compared(read: Callable[[Selection], Iterator[Frames]], selection: Selection) -> Iterator[Frames]:
+    """The frames. If there is none, the report says how an identifier differs from one that is wanted."""
+    yield from read(selection)
+    report = selection.report
+    if not report.wanted and report.other_identifiers:
+        with suppress(LogUnreadableError):
+            for frames in islice(read(Selection(LogReport(report.path), EVERY_IDENTIFIER, None, CAN_FD_BYTES)), 1):
+                pairs = product(np.unique(frames.can_id).tolist(), selection.filters)
+                report.nearly = next((told for pair in pairs if (told := _told_difference(*pair))), None)
+
+
+def _told_difference(can_id: int, wanted: IdFilter) -> str | None:
+    """How an identifier differs from the wanted ones, if only by its width or its J1939 source address."""
+    found, asked = id_name(can_id), id_name(wanted.can_id)
+    if can_id ^ wanted.can_id == EXTENDED_ID:
+        n_bits = 29 if can_id & EXTENDED_ID else 11
+        return f", but {found} has the number of {asked} in {n_bits} bits: correct the database"
+    if can_id & wanted.can_id & EXTENDED_ID and j1939_filter(wanted.can_id).is_for(can_id):
+        source = f"from the J1939 source address {can_id & SOURCE_ADDRESS:#04x}"
+        return f", but {found} has the group of {asked} {source}: correct source_address, or set j1939 = true"
+    return None
 
 
 def motion_of_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Motion], LogReport]:

@@ -203,6 +203,8 @@ def line_blocks(report: LogReport, block_bytes: int = BLOCK_BYTES) -> Iterator[L
             if not report.lines and buffer.startswith(codecs.BOM_UTF8, MARGIN):
                 buffer[MARGIN : MARGIN + len(codecs.BOM_UTF8)] = bytes(len(codecs.BOM_UTF8))  # as a hole is
             end_of_text = MARGIN + carried + n_read
+            if buffer.find(b"\t", MARGIN + carried, end_of_text) >= 0:
+                free[:n_read] = bytes(free[:n_read]).replace(b"\t", b" ")
             is_last = n_read < len(free)
             if is_last and buffer[end_of_text - 1] != ord("\n"):
                 buffer[end_of_text] = ord("\n")

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from datetime import datetime, tzinfo
+from datetime import datetime, timedelta, tzinfo
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +18,7 @@ from gateway.bus.signals.decode import TELLING_SHARE, Remark
 from gateway.errors import LogUnreadableError
 from gateway.records import FIRST_DATED_NS, I64, U32, Bool, Frames, iso_utc
 from gateway.units import NS_PER_S
+from gateway.words import counted
 
 KEPT_LINE_NUMBERS: Final = 5  # chosen: what a person looks at
 NAMED_CHANNELS: Final = 8  # chosen: likewise
@@ -28,6 +29,8 @@ AS_CANDUMP: Final = "candump logs are recorded with candump -L"
 JUDGED_FRAMES: Final = 1000  # chosen: least number whose stamps are judged
 JUDGED_SECONDS: Final = 3.0  # chosen: least time in which stamps of whole seconds are
 WHOLE_PER_S: Final = 10.0  # chosen: more frames a second all on whole seconds are no coincidence
+STEP_BACK_S: Final = 1.0  # chosen: further than frames of several buffers are out of order
+LEAP_S: Final = 43_200.0  # chosen: a longer pause within a log gets a remark
 MOST_PER_S: Final = 100_000.0  # chosen: several times what a bus of 1 Mbit/s can carry (ISO 11898-1: 21,000 frames)
 
 
@@ -47,6 +50,8 @@ class LogReject(StrEnum):
 
 
 _KNOWN_LINES: Final = (
+    (r"[^\r]*\r.", "lines end in a carriage return alone: save it with line feeds"),
+    (r"(?:.\0){4}|(?:\0.){4}", "this is UTF-16: save it as UTF-8"),
     (r"\(\d{4}-\d\d-\d\d", "stamps are dates (candump -tA): record with candump -L alone"),
     (r"\(-?\d+,\d+\)|(\d+\)\s+)?-?\d+,\d+\s", "stamps have a decimal comma: write a point"),
     (r"\(\d{11,}[.)]|\d{11,}\.?\d*,", "stamps are not seconds since 1970, but a fraction of it such as milliseconds"),
@@ -112,8 +117,10 @@ class LogReport:
     notes: list[str] = field(default_factory=list)
     first_ns: int | None = None
     decoder: Decoder | None = None
+    nearly: str | None = None  # how an identifier of it differs from one that is wanted
     _last_t_ns: int = 0
-    _span_ns: tuple[int, int] = (0, 0)
+    span_ns: tuple[int, int] = (0, 0)  # the earliest and the latest stamp of the frames given out
+    _steps_ns: tuple[int, int] = (0, 0)
     _n_whole_seconds: int = 0
 
     def keeps_lines_of(self, reason: LogReject) -> bool:
@@ -149,17 +156,19 @@ class LogReport:
         least, most = int(t_ns.min()), int(t_ns.max())
         if self.first_ns is None:
             self.first_ns = self._last_t_ns = int(t_ns[0])
-            self._span_ns = least, most
-        self.out_of_order += int(np.count_nonzero(np.diff(t_ns, prepend=self._last_t_ns) < 0))
+            self.span_ns = least, most
+        steps_ns = np.diff(t_ns, prepend=self._last_t_ns)
+        self.out_of_order += int(np.count_nonzero(steps_ns < 0))
+        self._steps_ns = min(int(steps_ns.min()), self._steps_ns[0]), max(int(steps_ns.max()), self._steps_ns[1])
         self.wanted += len(t_ns)
         self._n_whole_seconds += int(np.count_nonzero(t_ns % NS_PER_S == 0))
         self._last_t_ns = int(t_ns[-1])
-        self._span_ns = min(least, self._span_ns[0]), max(most, self._span_ns[1])
+        self.span_ns = min(least, self.span_ns[0]), max(most, self.span_ns[1])
 
     @property
     def span_s(self) -> float:
         """Seconds between the earliest and the latest stamp of the frames given out."""
-        return (self._span_ns[1] - self._span_ns[0]) / NS_PER_S
+        return (self.span_ns[1] - self.span_ns[0]) / NS_PER_S
 
     @property
     def _suffix(self) -> str:
@@ -201,15 +210,28 @@ class LogReport:
             "ended_early": self.ended_early,
         }
 
+    def told_others(self) -> str:
+        """The frames that are none of the data frames wanted, in words: "1 remote frame, 3 error frames"; or ""."""
+        counts = (
+            (self.other_channel, "frame", " of other channels"),
+            (self.remote_frames, "remote frame", ""),
+            (self.error_frames, "error frame", ""),
+        )
+        return ", ".join(counted(n, noun) + rest for n, noun, rest in counts if n)
+
     def remarks(self) -> Iterator[str]:
         """Warnings for people, a sentence each; none if all was well."""
         if self.ended_early:
             yield f"{self.path}: {self.ended_early}; everything before was read"
+        if others := self.told_others():
+            yield f"{self.path}: left out: {others}"
         for reason, lines in self.rejects.items():
             yield f"{self.path}: left out, {str(reason).replace('_', ' ')}: {lines.told(reason, self._suffix)}"
         if len(self.channels) > 1 and not self.other_channel:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
             yield f"{self.path}: mapped frames are on {seen}; if these are one bus twice, name one in the map"
+        for silent in self.decoder.silent() if self.decoder is not None and self.wanted else ():
+            yield f"{self.path}: has no frame of {silent}"
         refused = () if self.decoder is None else self.decoder.remarks()
         for note in (*self.notes, *(remark.text for remark in refused)):
             yield f"{self.path}: {note}"
@@ -229,6 +251,12 @@ class LogReport:
                 f"{self.path}: its date states no zone, it is read as UTC; if that is wrong, state time_zone in the "
                 "signal map"
             )
+        back_s, leap_s = -self._steps_ns[0] / NS_PER_S, self._steps_ns[1] / NS_PER_S
+        if back_s > STEP_BACK_S or 8 * self.out_of_order > self.wanted:
+            times, what = counted(self.out_of_order, "time"), "is it several logs in one, or was the clock set?"
+            yield f"{self.path}: its stamps step back {times}, by up to {timedelta(seconds=back_s)}: {what}"
+        if leap_s > LEAP_S:
+            yield f"{self.path}: its stamps leap forward by {timedelta(seconds=leap_s)}: a pause, or was the clock set?"
         late_s = 0.0 if self.start_ns is None else (self.first_ns - self.start_ns) / NS_PER_S
         if late_s > LATE_START_S:
             yield (
@@ -286,13 +314,17 @@ class LogReport:
             reason, lines = max(self.rejects.items(), key=lambda each: each[1].count)
             why = f"left out, {str(reason).replace('_', ' ')}: {lines.told(reason, self._suffix)}"
             return f"holds no CAN frame that can be read; {why}" + ("" if self._suffix != "-" else f"; {AS_CANDUMP}")
+        if self.remote_frames:
+            return f"of the mapped identifiers it has only remote frames ({self.remote_frames}), which carry no data"
         if self.frames:
-            return (
-                f"none of its {self.frames} frames has an identifier of the signal map; "
-                "is it the map of this vehicle? springscale look shows what is in it"
-            )
-        why = f" ({self.ended_early})" if self.ended_early else ""
-        return f"holds no CAN frame{why}; {AS_CANDUMP}"
+            else_ask = "; is it the map of this vehicle? springscale look shows what is in it"
+            return f"none of its {self.frames} frames has an identifier of the signal map{self.nearly or else_ask}"
+        if self.error_frames:
+            what = f"error frames only ({self.error_frames}): check the bit rate and the wiring of the recorder"
+        else:
+            what = "no CAN frame" + (f" ({self.ended_early})" if self.ended_early else "")
+            what += f"; {AS_CANDUMP}" if self._suffix == "-" else ""
+        return f"holds {what}"
 
 
 def is_same_channel(recorded: object, wanted: str | None) -> bool:

@@ -58,6 +58,11 @@ class SampleReader:
         self._can_leave_range = reach[0] < self._low or reach[1] > self._high
         self._beyond = np.inf, -np.inf  # least and greatest sample out of range
 
+    @property
+    def has_named_codes(self) -> bool:
+        """Whether names of the database alone make a raw value no measurement."""
+        return bool(self._mapped.named_codes) and not self._mapped.rejects_j1939_codes
+
     def told_range(self) -> str:
         """The samples out of range, and the range."""
         return told_range(self._beyond, (self._mapped.minimum, self._mapped.maximum), self._mapped.unit)
@@ -197,12 +202,18 @@ class Decoder:
         return {signal: counts for message in self._messages for signal, counts in message.counts()}
 
     def remarks(self) -> tuple[Remark, ...]:
-        """Frames of another length than the database says, values out of range, and signals of several devices."""
+        """Frames of another length than the database says, values out of range or with names, and signals of several
+        devices.
+        """
         return tuple(remark for message in self._messages for remark in message.remarks())
 
     def causes(self) -> tuple[Remark, ...]:
         """Those that explain why nothing is weighed: they concern a good part of a signal that weighing needs."""
         return tuple(one for one in self.remarks() if one.share >= TELLING_SHARE and one.signals & NEEDED)
+
+    def silent(self) -> tuple[str, ...]:
+        """Messages of which no frame came, each with the signals that weighing needs; none for other messages."""
+        return tuple(text for message in self._messages if (text := message.told_silence()))
 
     def decode(self, frames: Frames) -> Motion:
         """One row for every frame of a mapped message, in order of arrival; other frames are passed over.
@@ -248,6 +259,15 @@ class _MessageReader:
         rejected = self._rejected.items()
         return [(signal, SignalCounts(self._n_frames - n.total(), dict(n))) for signal, n in rejected]
 
+    def told_silence(self) -> str | None:
+        """Its name and the needed signals, if no frame of it came."""
+        needed = sorted(NEEDED.intersection(self._rejected))
+        return (
+            None
+            if self._n_frames or not needed
+            else f"{self._name} ({id_name(self._frame_id)}) for {', '.join(needed)}"
+        )
+
     def remarks(self) -> Iterator[Remark]:
         """Those of this message."""
         if lengths := dict(self._wrong_lengths):
@@ -266,6 +286,13 @@ class _MessageReader:
         for signal, _, reader in self._readers:
             if n := self._rejected[signal][Rejected.OUT_OF_RANGE]:
                 text = f"{signal} ({self._name}): {told_share(n, self._n_frames)} values read {reader.told_range()}"
+                yield Remark(text, n / self._n_frames, frozenset({signal}))
+            n = self._rejected[signal][Rejected.NOT_AVAILABLE] if reader.has_named_codes else 0
+            if n > TELLING_SHARE * self._n_frames:
+                text = (
+                    f"{signal} ({self._name}): {told_share(n, self._n_frames)} raw values have a name in the database, "
+                    "which means that they are no measurement; if they are, remove the names there"
+                )
                 yield Remark(text, n / self._n_frames, frozenset({signal}))
 
     def fill(self, columns: F64, ours: I64, payload: U8, length: U8, can_id: U32) -> None:

@@ -236,7 +236,12 @@ def load_signal_map(path: Path | str, read: Read = Path.read_bytes) -> SignalMap
             raise SignalMapError(
                 f"{where}.source_address: only messages with 29-bit identifiers have one, and with j1939 = true"
             )
-        mapped.setdefault((entry.message, entry.source_address), []).append(resolved)
+        ours = mapped.setdefault((entry.message, entry.source_address), [])
+        if (twin := next((one.signal for one in ours if one.field == resolved.field), None)) is not None:
+            raise SignalMapError(
+                f"{where}.signal: {entry.signal!r} is mapped as {twin} too; it can measure one of them"
+            )
+        ours.append(resolved)
     messages = tuple(
         _mapped_message(found[name], source, tuple(signals), wanted.j1939) for (name, source), signals in mapped.items()
     )
@@ -258,8 +263,13 @@ def _opened(path: Path | str, read: Read) -> tuple[Path, SignalMapFile, Database
     return file_path, wanted, Databases(file_path, [file_path.parent / dbc for dbc in wanted.dbc], reading)
 
 
+_NO_ZONES: Final = ("localtime", "posixrules", "Factory")  # names that mean another zone on every computer
+
+
 def _zone(path: Path, name: str | None) -> ZoneInfo | None:
     try:
+        if name in _NO_ZONES:
+            raise ZoneInfoNotFoundError
         return None if name is None else ZoneInfo(name)
     except (ValueError, OSError, ZoneInfoNotFoundError):
         raise SignalMapError(

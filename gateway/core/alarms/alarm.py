@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from gateway.estimate import PLACES, Z95
 from gateway.reasons import EXPLANATIONS
-from gateway.records import Why, iso_utc, ns_of
+from gateway.records import iso_utc, ns_of
 
 ENTRY_KIND: Final = "alarm"
 """The kind of an alarm's row in the store and in the event stream."""
@@ -136,6 +136,7 @@ def _known(x: float, digits: int) -> float | None:
     return round(x, digits) + 0.0 if math.isfinite(x) else None
 
 
+_HAPPENED: Final[Mapping[str, str]] = {why: told.happened.replace("`", "") for why, told in EXPLANATIONS.items()}
 _PLACES: Final = {"gross": "The vehicle", "front_axle": "The front axle", "rear_axle": "The rear axle"}
 
 
@@ -152,10 +153,5 @@ def _said(cause: AlarmCause, figure: AlarmFigure) -> str:
     if cause == SILENT:
         return f"No signal: {figure.detail}" if figure.detail else "No signal"
     said = "Batches are refused because of a sensor"
-    return f"{said}: {'; '.join(map(_happened, figure.detail.split(', ')))}" if figure.detail else said
-
-
-def _happened(reason: str) -> str:
-    """What a reason means, in words; a name that an other version gave stays as it is."""
-    known = EXPLANATIONS.get(Why(reason)) if reason in set(Why) else None
-    return reason.replace("_", " ") if known is None else known.happened.replace("`", "")
+    reasons = (_HAPPENED.get(code, code) for code in figure.detail.split(", ")) if figure.detail else ()
+    return f"{said}: {'; '.join(reasons)}" if figure.detail else said

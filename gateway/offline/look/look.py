@@ -186,6 +186,12 @@ class SignalReading:
     def rate_hz(self) -> float:
         return self.described.heard.rate_hz
 
+    @property
+    def driving_rate_hz(self) -> float:
+        """Frames a second as they usually follow each other, if that is more: a log may have long pauses."""
+        step_s = float(np.median(np.diff(self.t_s))) if len(self.t_s) > 1 else 0.0
+        return max(self.rate_hz, 1.0 / step_s) if step_s > 0.0 else self.rate_hz
+
     @cached_property
     def usual(self) -> float:
         """The median, SI; NaN without a sample."""
@@ -360,7 +366,7 @@ def look(log: Path, databases: Sequence[Path] = ()) -> Look:
     tilt, fits = tilt_deg(readings, up) if up else float("nan"), fits_of(heard)
     sources = {one.message.source for one in by_own} | {each.reading.described.message.source for each in found}
     refused = tuple(refused_in(messages, readings, sources))
-    lacking = tuple(_lacking(found, fits, readings, tilt, refused))
+    lacking = tuple(_lacking(by_own, found, fits, readings, tilt, refused))
     causes = (cause for fit in fits if fit.is_whole for cause in fit.causes)
     to_mend = tuple(dict.fromkeys([*causes, *_rivals(found, readings)]))
     return Look(log, report, heard, messages, fits, readings, found, tilt, refused, to_mend, lacking, faults)
@@ -412,6 +418,7 @@ def _near(log: Path) -> list[Path]:
 
 
 def _lacking(
+    by_own: Sequence[Described],
     found: Sequence[FoundRole],
     fits: Sequence[MapFit],
     readings: Sequence[SignalReading],
@@ -424,7 +431,11 @@ def _lacking(
     up, pitch = roles.get(Signal.VERTICAL_ACCELERATION), roles.get(Signal.PITCH_RATE)
     lost = {quantity for one in refused if one.share >= TELLING_SHARE for quantity in one.quantities}
     if whole is None and not readings and not lost:
-        yield "no database describes an acceleration in it: give the DBC of the sensor with --dbc"
+        if own := ", ".join(sorted({one.message.name for one in by_own})):
+            units = ", ".join(TO_SI["acceleration"])
+            yield f"no signal of {own} has a unit of acceleration ({units}): correct the unit in the database"
+        else:
+            yield "no database describes an acceleration in it: give the DBC of the sensor with --dbc"
         return
     as_told = "frames or values that would show it are refused, as told above"
     if whole is None and up is None:
@@ -438,6 +449,6 @@ def _lacking(
     if not {Signal.SPEED, Signal.WHEEL_SPEED} & set(whole.found if whole else roles):
         why = "add [signals.speed] from a GNSS receiver or the vehicle"
         yield f"no speed: {as_told if 'speed' in lost else why}"
-    for each in (up, pitch) if whole is None else ():
-        if each is not None and each.reading.rate_hz < LEAST_RATE_HZ:
-            yield f"{each.reading.name} comes {each.reading.rate_hz:.0f} times a second; {LEAST_RATE_HZ:.0f} are needed"
+    for each in (up, pitch):
+        if each is not None and (rate_hz := each.reading.driving_rate_hz) < LEAST_RATE_HZ:
+            yield f"{each.reading.name} comes {rate_hz:.3g} times a second; {LEAST_RATE_HZ:.0f} are needed"

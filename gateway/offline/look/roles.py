@@ -122,17 +122,15 @@ def _with_braking(acceleration: "SignalReading", speed: "SignalReading") -> floa
     if min(len(speed.t_s), len(acceleration.t_s)) < LEAST_MOVING_S:
         return math.nan
     begin_s, end_s = max(speed.t_s[0], acceleration.t_s[0]), min(speed.t_s[-1], acceleration.t_s[-1])
-    n = int(end_s - begin_s)
-    if n < LEAST_MOVING_S:
+    second = np.floor(acceleration.t_s - begin_s)
+    is_inside = (second >= 1.0) & (second < math.floor(end_s - begin_s) - 1.0)
+    if not is_inside.any():
         return math.nan
-    speed_mps = np.interp(begin_s + 0.5 + np.arange(n), speed.t_s, speed.x)
-    slope = np.gradient(np.convolve(speed_mps, np.full(3, 1.0 / 3.0), mode="same"))
-    second = np.floor(acceleration.t_s - begin_s).astype(int)
-    sums = (np.bincount(second.clip(-1, n) + 1, weights, n + 2)[1:-1] for weights in (acceleration.x, None))
-    with np.errstate(invalid="ignore"):
-        mean = np.divide(*sums)  # NaN in a second without a sample
-    counts = (speed_mps > MOVING_MPS) & np.isfinite(mean)
-    counts[[0, -1]] = False
+    seconds, place = np.unique(second[is_inside], return_inverse=True)  # a log may be years long by its stamps
+    mean = np.bincount(place, acceleration.x[is_inside]) / np.bincount(place)
+    before, now, after = (np.interp(begin_s + 0.5 + seconds + k, speed.t_s, speed.x) for k in (-1.5, 0.0, 1.5))
+    slope = (after - before) / 3.0
+    counts = now > MOVING_MPS
     if np.count_nonzero(counts) < LEAST_MOVING_S or np.ptp(slope[counts]) == 0.0 or np.ptp(mean[counts]) == 0.0:
         return math.nan
     return float(np.corrcoef(mean[counts], slope[counts])[0, 1])
