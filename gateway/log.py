@@ -68,6 +68,7 @@ class Event(StrEnum):
     UPLINK_LOST = "uplink lost"
     UPLINK_NOT_REACHED = "uplink not reached"
     UPLINK_REFUSED = "uplink refused an estimate"
+    STATEMENTS_REFUSED = "statements from the broker refused"
     WEBHOOK_CONNECTED = "webhook taken again"
     WEBHOOK_FAILED = "webhook not taken"
     WEBHOOK_REFUSED = "webhook gives up on a message"

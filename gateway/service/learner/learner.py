@@ -448,9 +448,19 @@ class Learner(ThreadPart):
             return self._told([said])[0].model_dump_json(by_alias=True)
 
     def import_all(
-        self, content: bytes, by: str, *, where: str, zone: tzinfo | None = None, is_dry_run: bool = False
+        self,
+        content: bytes,
+        by: str,
+        *,
+        where: str,
+        zone: tzinfo | None = None,
+        is_dry_run: bool = False,
+        may_come_again: bool = False,
     ) -> str:
-        """Take the good rows of a table or a list; JSON: an ImportTold. Raises RefusedError if there is none."""
+        """Take the good rows of a table or a list; JSON: an ImportTold. Raises RefusedError if there is none.
+
+        ``may_come_again``: the same content may be delivered twice, so what was withdrawn stays withdrawn.
+        """
         try:
             told = read_statements(content, where, zone)
         except StatementsFileError as fault:
@@ -460,7 +470,8 @@ class Learner(ThreadPart):
             if not told.rows and told.faults:
                 lines = [line for lines in told.faults.values() for line in lines]
                 raise RefusedError("unreadable", "; ".join(lines[:20]))
-            stored = [] if is_dry_run else self._store([row.record for row in rows], by)
+            records = [row.record for row in rows]
+            stored = [] if is_dry_run else self._store(records, by, stands_again=not may_come_again)
             answer = self._imported(told, rows, stored, is_dry_run=is_dry_run)
         return answer.model_dump_json(by_alias=True)
 
@@ -469,8 +480,11 @@ class Learner(ThreadPart):
         names = {self._vehicle.id, self._vehicle.name, stated.figures.name if stated else ""}
         return row.vehicle is None or row.vehicle.strip().casefold() in {name.strip().casefold() for name in names}
 
-    def _store(self, records: Sequence[StatementRecord], by: str) -> list[Said]:
-        """Put statements into the book at once. Raises RefusedError; then nothing has changed."""
+    def _store(self, records: Sequence[StatementRecord], by: str, *, stands_again: bool = True) -> list[Said]:
+        """Put statements into the book at once; with ``stands_again`` also what was withdrawn.
+
+        Raises RefusedError; then nothing has changed.
+        """
         record, taken = self._book.record, []
         for one in records:
             signed = one if one.by else one.model_copy(update={"by": by})
@@ -480,7 +494,7 @@ class Learner(ThreadPart):
                     "id_taken",
                     f"{one.id} is another statement: leave its id out, or withdraw the other one and give a new id",
                 )
-            if known is not None and known.withdrawn is None:
+            if known is not None and (known.withdrawn is None or not stands_again):
                 taken.append(known)
                 continue
             if known is None and len(record.said) >= MOST_STATEMENTS:

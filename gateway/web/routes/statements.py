@@ -19,13 +19,12 @@ from gateway.stated.learning import (
     StatementState,
     StatementTold,
 )
-from gateway.stated.statement import HALF_CHARACTER, StatementRecord, is_text
+from gateway.stated.statement import HALF_CHARACTER, TYPES, StatementRecord, is_text
 from gateway.web.routes.service_calls import REFUSALS, By, LearnerBackend, answered, created
 from gateway.web.schemas import Body, Instant, problem_responses
 
 STATEMENTS_PATH: Final = "/statements"
 LEARNING_PATH: Final = "/learning"
-CSV: Final = ("text/csv", "text/plain", "application/csv", "application/vnd.ms-excel")
 _ONE: Final = TypeAdapter(StatementRecord)
 _BODY: Final[dict[str, Any]] = {
     "required": True,
@@ -140,7 +139,7 @@ def statements_router(backend: LearnerBackend) -> APIRouter:
 
 def _kind(request: Request) -> str:
     kind = request.headers.get("content-type", "application/json").partition(";")[0].strip().lower()
-    if kind != "application/json" and kind not in CSV:
+    if kind not in TYPES:
         raise HTTPException(415, f"{kind}: send application/json or text/csv")
     return kind
 
