@@ -82,6 +82,7 @@ class Event(StrEnum):
     LEARNT = "learnt"
     NOT_LEARNT = "not learnt"
     VERSION_CHOSEN = "version chosen"
+    NOT_EMPTY = "drives were not empty"
     DRIVE_NOT_KEPT = "drive not kept"
     LEARNING_SET_ASIDE = "broken learning set aside"
     TOKENS_UNREADABLE = "no token is accepted"

@@ -26,6 +26,7 @@ class LearnJob(Part):
     windows: tuple[Path, ...] = Field(min_length=1, description="files of kept windows")
     records: tuple[StatementRecord, ...]
     settings: dict[str, Any]
+    laden: tuple[tuple[int, int], ...] = Field((), description="begin and end (ns) of times that are not asked about")
     like: Path | None = None
     before: Path | None = None
     is_file_before: bool = Field(False, description="the one in use is of the settings: it stands until it is compared")

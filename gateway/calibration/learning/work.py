@@ -70,7 +70,7 @@ def done(job: LearnJob) -> LearnResult:
         learning=learning_record(found, verdict),
         statements=tuple(statements_record(records, assigned, found)),
         drives=tuple(drives_record(found)),
-        looks_empty=found.empty,
+        looks_empty=found.looking_empty(job.laden),
         damaged=damaged,
         worse=_why_worse(job, found),
     )

@@ -85,6 +85,7 @@ _CODES: Final = {
     "no_such_weight": 404,
     "no_such_statement": 404,
     "no_such_version": 404,
+    "no_such_drive": 404,
     "unreadable": 422,
 }  # of reasons; else 409
 
