@@ -36,6 +36,7 @@ class LearnJob(Part):
 class LearnResult(Part):
     """What came of a job. ``fault`` says in words why there is no calibration; its text is that of the file."""
 
+    key: str = Field("", description="that of its job; empty: there is no result of the process")
     fault: str | None = None
     calibration: str | None = None
     calibration_id: str | None = None
