@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +13,13 @@ import httpx
 import pytest
 from support.configured import service_config
 from support.half_car_road import VAN
-from support.known_load_logs import START_NS, write_known_loads
+from support.known_load_logs import START_NS, van_toml, write_known_loads
 from support.patience import wait_until
 from support.ports import first_answer, free_port
 from support.process import running_service
 from support.running_service import Running, serve
 
 from gateway.calibration.file.calibration_file import load_calibration
-from gateway.core.vehicle import Vehicle
 from gateway.records import iso_utc
 from gateway.service.learner import learner
 
@@ -81,17 +79,6 @@ def settle(running: Running) -> dict[str, Any]:
 
     assert any(wait_until(is_settled) for _ in range(5)), running.http(LEARNING)  # it learns at the lowest priority
     return running.http(LEARNING)
-
-
-def van_toml(folder: Path, vehicle: Vehicle) -> Path:
-    """The vehicle that the service stated, as a file of `springscale learn`."""
-    told = {name: value for name, value in asdict(vehicle).items() if value is not None}
-    lines = [
-        f"{name} = {json.dumps(list(value) if isinstance(value, tuple) else value)}" for name, value in told.items()
-    ]
-    path = folder / "van.toml"
-    path.write_text("\n".join(["[vehicle]", *lines, ""]))
-    return path
 
 
 def learnt_file(folder: Path, calibration_id: str) -> Path:
