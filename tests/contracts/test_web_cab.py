@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded
-from support.estimates import make_estimate, posterior_of
+from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded, vaguely_loaded
+from support.estimates import posterior_of
 from support.web import Client, Gateway
 
 from gateway.core.fusion import epoch_of
-from gateway.quantity import Z95
 from gateway.records import Why
 from gateway.status import AlarmsStatus, OwnReading, Standing, State
 from gateway.weighing.calibrated import CalibratedVehicle
@@ -200,9 +199,7 @@ def test_nothing_is_green_while_the_payload_is_not_known_exactly_enough(
     gateway: Gateway, of_useful: float, light: str, says: str
 ) -> None:
     """100 kg aboard, 500 kg below the limit: sure enough not to be too heavy, and yet a weighing of no use."""
-    assert VAN.vehicle is not None
-    std_kg = of_useful * VAN.vehicle.useful_half_width_kg / Z95
-    gateway.publish(make_estimate(0).answered(posterior_of(100.0, 50.0, std_kg, 0.2)))
+    gateway.publish(vaguely_loaded(0, 100.0, of_useful))
     cab = told(gateway)
     assert (cab["light"], cab["says"], cab["light_about"]) == (light, says, [])
     assert (cab["room"] is None, cab["spare"] == []) == ((says == "vague"), (says == "vague"))
