@@ -74,7 +74,6 @@ class Event(StrEnum):
     WEBHOOK_REFUSED = "webhook gives up on a message"
     RECORD_REFUSED = "frames not recorded"
     RECORD_RECOVERED = "frames recorded again"
-    HISTORY_SET_ASIDE = "broken history set aside"
     STATED = "stated"
     STATEMENT_WITHDRAWN = "statement withdrawn"
     STATEMENT_CONFIRMED = "statement confirmed"

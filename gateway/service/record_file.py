@@ -1,6 +1,6 @@
 """A record in a JSON file beside the database: validated when read, set aside if invalid, replaced atomically."""
 
-import logging
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -8,7 +8,6 @@ from pydantic import ValidationError
 
 from gateway.errors import ConfigurationError
 from gateway.files.kept import BrokenFile, KeptFiles
-from gateway.log import Event, log_event
 from gateway.stated.facts import Part
 from gateway.toml_file import describe_faults
 
@@ -27,7 +26,7 @@ def load_record(path: Path, empty: R) -> R:
         raise ConfigurationError(describe_faults(path, fault, type(empty))) from None
 
 
-class RecordFile(Generic[R]):
+class RecordFile(ABC, Generic[R]):
     """Not thread-safe. Every change is on disk before it is in ``record``.
 
     ``fault`` says what happened to an invalid file.
@@ -51,7 +50,6 @@ class RecordFile(Generic[R]):
         self.record = record
         self.fault = None
 
+    @abstractmethod
     def set_aside(self, fault: str, aside: str) -> None:
-        """Report an invalid file; ``aside`` says where it is now."""
-        self.fault = f"{self.path} is invalid, its history starts empty (it {aside})"
-        log_event(Event.HISTORY_SET_ASIDE, level=logging.ERROR, file=str(self.path), fault=fault, set_aside=aside)
+        """Report an invalid file in ``fault``; ``aside`` says where it is now."""

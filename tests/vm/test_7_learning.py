@@ -18,8 +18,8 @@ from gateway.calibration.file.calibration_file import load_calibration
 from gateway.records import Frames
 from gateway.sim.vehicle import Load
 
-DRIVEN_S: Final = 23.0  # one window of 20 s, and a rest
-STANDS_S: Final = 5.0  # longer than [batch] silence_s: a drive ends there
+DRIVEN_S: Final = 22.0  # one window of 20 s, and a rest
+STANDS_S: Final = 4.5  # longer than [batch] silence_s: a drive ends there
 LOADS: Final = ((), (Load(270.0, 1.3),), (Load(500.0, 1.5),))
 UNTAUGHT: Final = SETTINGS.replace('calibration = "vehicle.json"\n', "") + "[record]\nenabled = true\n"
 VAN: Final[dict[str, Any]] = {
@@ -136,7 +136,7 @@ def test_from_no_configuration_through_a_power_cut_to_what_learn_makes_of_the_sa
     assert said["X"]["state"] == "withdrawn"
     assert said["E"]["state"] == "used"
     assert said["W"]["state"] in ("held", "weak")
-    assert len(without["versions"]) == 2  # the refit that was cut left none
+    assert len(without["versions"]) == len(with_all["versions"]) + 1  # the refit that was cut left none
     newest = without["versions"][0]
     assert newest["id"] != with_all["versions"][0]["id"]
     assert vehicle.status()["calibration_id"] == newest["id"]
