@@ -292,7 +292,7 @@ def test_before_the_first_estimate_and_without_limits_it_claims_nothing(tmp_path
         expect(page.locator("#light")).to_have_text("No limit is known")
         expect(page.locator("#number")).to_have_text("300 kg")
         expect(page.locator("#question")).to_have_text("On board")
-        expect(page.locator("#why")).to_contain_text("no limit is set ([vehicle] gross_limit_kg")
+        expect(page.locator("#why")).to_contain_text("no limit is stated (/teach, settings)")
         page.close()
 
 

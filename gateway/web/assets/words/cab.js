@@ -38,7 +38,7 @@ export const CAB = {
   interval: [" (95 %: {between})", " (95 %: {between})"],
   room_unknown: ["The spare load is not known: {missing}.", "Wie viel noch geladen werden darf, ist nicht bekannt: {missing}."],
   missing_empty: ["the empty weight of the vehicle is not known", "das Leergewicht des Fahrzeugs ist nicht bekannt"],
-  missing_limit: ["no limit is stated (page /teach)", "keine Grenze ist angegeben (Seite /teach)"],
+  missing_limit: ["no limit is stated (/teach, settings)", "keine Grenze bekannt (/teach, Einstellungen)"],
   not_weighed: ["The last minutes could not be weighed: {reasons}.", "Die letzten Minuten konnten nicht gewogen werden: {reasons}."],
   not_calibrated: ["This vehicle is not calibrated.", "Dieses Fahrzeug ist nicht kalibriert."],
   not_yet: ["The first weight comes after a few minutes of driving.", "Das erste Gewicht kommt nach einigen Minuten Fahrt."],
