@@ -145,6 +145,15 @@ class StoreStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class StatementsHeard:
+    """Messages of statements that the broker sent down; counts begin at the start."""
+
+    n_taken: Annotated[int, Field(description="all good rows are on disk")] = 0
+    n_refused: Annotated[int, Field(description="as a whole, or for some of their rows")] = 0
+    last_refusal: Annotated[str | None, Field(description="why; null: none was refused since the start")] = None
+
+
+@dataclass(frozen=True, slots=True)
 class UplinkStatus:
     """How estimates get to the fleet's broker; counts begin at the start, except those that the store keeps."""
 
@@ -160,6 +169,7 @@ class UplinkStatus:
     n_connections: int = 0
     n_cuts: Annotated[int, Field(description="times an established link broke")] = 0
     last_fault: Annotated[str | None, Field(description="null while the broker accepts records")] = None
+    statements: Annotated[StatementsHeard | None, Field(description="null: none are taken from the broker")] = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Final
 
 SUBSCRIBER: Final = "fleet-subscriber"
+DISPATCHER: Final = "fleet-dispatcher"  # states loads to the vehicles
 FILES: Final = ("calibration", "signals")
 REPEAT_S: Final = 120  # four times what mosquitto.conf takes to save
 _ROUNDS: Final = 101  # mosquitto's own, for passwords that people choose; these have 256 bits of chance
@@ -33,18 +34,24 @@ class FleetError(Exception):
     """The table or the settings cannot be used."""
 
 
-def provision(table: Path, settings: Path, broker: str, ca: Path | None, output: Path) -> list[str]:
-    """Write all folders and the list -> ids of the vehicles. Raises FleetError naming the line."""
+def provision(
+    table: Path, settings: Path, broker: str, ca: Path | None, output: Path, *, hear: bool = False
+) -> list[str]:
+    """Write all folders and the list -> ids of the vehicles. Raises FleetError naming the line.
+
+    ``hear``: vehicles take statements of loads from the broker.
+    """
     shared = _shared_settings(settings)
     vehicles = _vehicles(table)
     passwords = {name: _password(output / "vehicles" / name / "broker-password") for name in vehicles}
     passwords[SUBSCRIBER] = _password(output / "subscriber" / "broker-password")
+    passwords[DISPATCHER] = _password(output / "dispatcher" / "broker-password")
     for name, vehicle in vehicles.items():
         folder = output / "vehicles" / name
         own = {key: _copied(table.parent / vehicle[key], folder) for key in FILES if vehicle.get(key)}
         if ca is not None:
             shutil.copyfile(ca, folder / "fleet-ca.pem")
-        text = _configuration(shared, own, vehicle, broker, has_ca=ca is not None)
+        text = _configuration(shared, own, vehicle, broker, has_ca=ca is not None, hear=hear)
         try:
             tomllib.loads(text)
         except tomllib.TOMLDecodeError as fault:
@@ -63,7 +70,7 @@ def _vehicles(table: Path) -> dict[str, dict[str, str]]:
     with table.open(encoding="utf-8", newline="") as lines:
         for number, line in enumerate(csv.DictReader(lines), start=2):
             name, vin = line.get("id") or "", line.get("vin") or ""
-            if not _NAME.fullmatch(name) or name == SUBSCRIBER:
+            if not _NAME.fullmatch(name) or name in (SUBSCRIBER, DISPATCHER):
                 raise FleetError(f"{table}: line {number}: id {name!r}: 1 to 64 of A-Z a-z 0-9 . _ -")
             if name in found or vin in vins:
                 raise FleetError(f"{table}: line {number}: {name} or its VIN {vin} stands there twice")
@@ -82,7 +89,9 @@ def _shared_settings(path: Path) -> str:
     return text
 
 
-def _configuration(shared: str, own: dict[str, str], vehicle: dict[str, str], broker: str, *, has_ca: bool) -> str:
+def _configuration(
+    shared: str, own: dict[str, str], vehicle: dict[str, str], broker: str, *, has_ca: bool, hear: bool
+) -> str:
     """The file of one vehicle: its own files before all that is shared, which may end in a table."""
     top = [f"{key} = {json.dumps(name)}" for key, name in own.items()]
     keys = {key: cell for key, cell in vehicle.items() if key not in FILES}
@@ -97,6 +106,7 @@ def _configuration(shared: str, own: dict[str, str], vehicle: dict[str, str], br
         'password_file = "broker-password"',
         f"repeat_s = {REPEAT_S}",
         "wait_for_listener = true",
+        *(["statements = true"] if hear else []),
     ]
     return "\n".join([*top, shared.rstrip(), "", "[vehicle]", *lines, "", "[uplink]", *uplink, ""])
 
@@ -151,9 +161,10 @@ def main() -> int:
     asked.add_argument("--broker", required=True, help="host or host:port")
     asked.add_argument("--ca", type=Path, help="authority of the broker's certificate, where it is not a public one")
     asked.add_argument("--output", type=Path, required=True)
+    asked.add_argument("--statements", action="store_true", help="vehicles take statements of loads from the broker")
     told = asked.parse_args()
     try:
-        names = provision(told.table, told.settings, told.broker, told.ca, told.output)
+        names = provision(told.table, told.settings, told.broker, told.ca, told.output, hear=told.statements)
     except (FleetError, OSError, ValueError) as fault:
         print(f"provision: {fault}", file=sys.stderr)
         return 2

@@ -52,6 +52,7 @@ TIMES: Final = ("from", "until")
 LOADS: Final = ("payload_kg", "gross_kg", "front_axle_kg", "rear_axle_kg", "change_kg")
 OF_ANSWERS: Final = ("row", "at", "state", "found", "reason", "question", "drives")
 """What a service or a command says of a statement: it is not read."""
+WITHDRAWN: Final = "withdrawn"  # state of those that a service lists and that no longer hold: they are left out
 MOST_BYTES: Final = 50_000_000  # chosen: half a million rows
 SIMILAR: Final = 0.75  # of difflib's ratio
 YES: Final = frozenset({"true", "yes", "1", "ja", "oui"})
@@ -132,6 +133,8 @@ def _of_json(text: str, where: str) -> ToldRows:
             faults[number] = (f"row {number}: {HALF_CHARACTER}",)
             continue
         content = dict(item) if isinstance(item, dict) else item
+        if isinstance(content, dict) and content.get("state") == WITHDRAWN:
+            continue
         vehicle = content.pop("vehicle", None) if isinstance(content, dict) else None
         for name in OF_ANSWERS if isinstance(content, dict) else ():
             content.pop(name, None)

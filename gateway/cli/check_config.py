@@ -55,7 +55,7 @@ def _sentences(config: Path, settings: Settings, setup: Setup) -> Iterator[str]:
     elif setup.calibration is None:
         yield (
             "No calibration is configured: batches will carry spectra and rejected = no_calibration, until one is "
-            "learnt from drives (springscale state vehicle)."
+            "learnt from drives (page /teach)."
         )
     elif limits := limits_in_force(setup):
         yield f"It may weigh: {', '.join(f'{name} {kg:g} kg' for name, kg in limits.items())}."

@@ -116,7 +116,7 @@ def learn(
     verdict = judged(found.outcome, report)
     record |= {"drives": drives_record(found), "n_drives_unneeded": found.n_unneeded}
     of_rows = [{"row": numbers[one["id"]], **one} for one in statements_record(records, assigned, found)]
-    record |= {"statements": sorted(of_rows, key=lambda one: one["row"]), "looks_empty": list(found.empty)}
+    record |= {"statements": sorted(of_rows, key=lambda one: one["row"]), "looks_empty": list(found.looking_empty())}
     record |= _verdict_record(found, verdict, output)
     click.echo(json_line(record) if as_json else "\n".join([*_drives_told(record), *_asked(record), verdict.text]))
 

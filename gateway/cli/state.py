@@ -16,6 +16,7 @@ from gateway.errors import ConfigurationError
 from gateway.stated.learning import STATES
 
 PATH: Final = "/api/v1/statements"
+LEARNING: Final = "/api/v1/learning"
 _HELD: Final = "it is not learnt from: `springscale state confirm {id}` if it is right, `... withdraw {id}` if not"
 
 
@@ -137,6 +138,28 @@ def state() -> None:
 def state_empty(service: Service, **options: Any) -> Answer:
     """The vehicle is empty."""
     return _stated(service, "empty", None, **options)
+
+
+def _left_text(learning: Answer) -> str:
+    left = [one["text"] for one in _looking_empty(learning)]
+    return "\n".join(left) or "noted: these drives are not asked about again"
+
+
+def _looking_empty(learning: Answer) -> list[Answer]:
+    return [one for one in learning["questions"] if one["kind"] == "looks_empty"]
+
+
+@state.command("not-empty")
+@click.argument("begins", metavar="[FROM]...", nargs=-1, type=Moment())
+@prints_answer(_left_text)
+def state_not_empty(service: Service, begins: tuple[datetime, ...]) -> Answer:
+    """Drives that look empty were not: those that begin at FROM, as they are asked about, or all of them."""
+    drives = [one["from"] for asked in _looking_empty(service.ask(LEARNING)) for one in asked["propose"]]
+    wanted = {f"{one:%Y-%m-%dT%H:%M}" for one in begins}
+    chosen = [one for one in drives if not wanted or one[:16] in wanted]
+    if not chosen:
+        raise ConfigurationError("no such drive is asked about: the page /teach has the questions")
+    return service.ask(LEARNING, "PUT", {"not_empty": chosen})
 
 
 @state.command("note")

@@ -90,8 +90,14 @@ class UplinkSection(SettingsSection):
         "somebody changed it there",
     )
 
+    statements: bool = Field(
+        False, description="take statements of loads from the topic `statements` below this vehicle's"
+    )
+
     @model_validator(mode="after")
     def _keeps_its_secrets(self) -> "UplinkSection":
+        if self.statements and self.host is None:
+            raise ValueError("statements come from a broker: set host")
         if (self.certificate is None) != (self.key is None):
             raise ValueError("certificate and key belong together: give both or neither")
         if self.password_file is not None and self.username is None:

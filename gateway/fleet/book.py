@@ -60,6 +60,7 @@ AWAY: Final = sql.exc.SQLAlchemyError
 """What :meth:`Book.write` raises while the database is away or full: it takes not even a record that is set aside."""
 
 BRANCH: Final = "springscale/+"  # of all vehicles, + where each has its name, as deploy/fleet/mosquitto/acl has it
+DOWN: Final = "/statements"  # what is stated to a vehicle is not from it
 _LATEST: Final = (
     sql.select(ESTIMATE.c.record)
     .where(ESTIMATE.c.vehicle_id == VEHICLE.c.vehicle_id, ESTIMATE.c.is_weighed)
@@ -115,6 +116,8 @@ class Book:
         counts, told = Counter[str](), []
         with self._begun() as database:
             for arrival in arrivals:
+                if arrival.topic.endswith(DOWN):
+                    continue
                 try:
                     found = read(arrival.topic, arrival.payload)
                 except Exception as fault:  # noqa: BLE001 - whatever a vehicle sends

@@ -107,7 +107,7 @@ class Gateway:
             self.board,
             self.ring_log.put if self.ring_log else lambda frames: None,
         )
-        self.uplink = uplink_of(broker, setup, self.store, with_places=with_places)
+        self.uplink = uplink_of(broker, setup, self.store, self.learner, with_places=with_places)
         self.webhook = webhook_of(receiver, self.store, with_places=with_places)
         reader = self.store.reader()
         self.status = StatusReport(

@@ -1,6 +1,7 @@
 """The parts of a service, each built from its section of the settings."""
 
 from contextlib import suppress
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -26,8 +27,10 @@ from gateway.web.routes.weights import Scales
 from gateway.weighing.flow import Flow
 
 
-def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with_places: bool) -> Uplink | None:
-    """None if no broker is configured."""
+def uplink_of(
+    wanted: UplinkSettings | None, setup: Setup, store: Store, learner: Learner, *, with_places: bool
+) -> Uplink | None:
+    """None if no broker is configured. Statements from there go to the learner."""
     if wanted is None:
         return None
     birth = {
@@ -44,7 +47,8 @@ def uplink_of(wanted: UplinkSettings | None, setup: Setup, store: Store, *, with
         repeat_s=wanted.repeat_s,
         with_latest=wanted.home_assistant is not None,
     )
-    return Uplink(wanted, outbox, birth)
+    take = partial(learner.import_all, where="the message", may_come_again=True)
+    return Uplink(wanted, outbox, birth, take_statements=take)
 
 
 def webhook_of(wanted: WebhookSettings | None, store: Store, *, with_places: bool) -> Webhook | None:

@@ -1,5 +1,6 @@
 """A record in a JSON file beside the database: validated when read, set aside if invalid, replaced atomically."""
 
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -25,10 +26,10 @@ def load_record(path: Path, empty: R) -> R:
         raise ConfigurationError(describe_faults(path, fault, type(empty))) from None
 
 
-class RecordFile(Generic[R]):
+class RecordFile(ABC, Generic[R]):
     """Not thread-safe. Every change is on disk before it is in ``record``.
 
-    ``fault`` says what happened to an invalid file, of which a subclass tells in ``set_aside``.
+    ``fault`` says what happened to an invalid file.
     """
 
     def __init__(self, path: Path, empty: R) -> None:
@@ -49,6 +50,6 @@ class RecordFile(Generic[R]):
         self.record = record
         self.fault = None
 
+    @abstractmethod
     def set_aside(self, fault: str, aside: str) -> None:
-        """Report an invalid file; ``aside`` says where it is now."""
-        raise NotImplementedError
+        """Report an invalid file in ``fault``; ``aside`` says where it is now."""

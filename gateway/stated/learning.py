@@ -74,7 +74,8 @@ class Help(Part):
 class Question(Part):
     """Something that only a person can answer.
 
-    ``propose`` are the statements to send if the answer is yes; ``statement_id`` is the one that is asked about:
+    ``propose`` are the statements to send if the answer is yes; if it is no, send their `from` to /api/v1/learning as
+    `not_empty`. ``statement_id`` is the one that is asked about:
     confirm it, or withdraw it and state it anew.
     """
 

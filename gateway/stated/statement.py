@@ -129,6 +129,9 @@ class StatementRecord(Part):
         return self.model_copy(update={"id": f"s-{hashlib.sha256(content.encode()).hexdigest()[:12]}"})
 
 
+TYPES: Final = ("application/json", "text/csv", "text/plain", "application/csv", "application/vnd.ms-excel")
+"""Content types of statements: records as JSON, or a table; the leading characters decide which of both it is."""
+
 HALF_CHARACTER: Final = "contains half a character (a lone surrogate), which is not text"
 
 

@@ -4,6 +4,7 @@ import json
 import queue
 import socket
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,16 +15,22 @@ from paho.mqtt.enums import CallbackAPIVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
+from paho.mqtt.subscribeoptions import SubscribeOptions
 
+from gateway.units import S_PER_DAY
 from gateway.uplink.home_assistant import discovery
 from gateway.uplink.outbox import OutboxMessage
 from gateway.uplink.settings import UplinkSettings
+from gateway.uplink.statements import MOST_BYTES, TOPIC, StatementsMessage
 
 CONNECT_TIMEOUT_S: Final = 10.0  # chosen: for the connection, and for the broker's answer to it
 ANSWER_TIMEOUT_S: Final = 30.0  # chosen: a broker that takes longer counts as lost
 FAREWELL_S: Final = 0.5  # chosen: for the broker to hear that the vehicle goes
 TURN_S: Final = 0.5  # chosen: how soon a stop ends the wait for an answer
 WILL_DELAY_S: Final = 30  # chosen: a cut that is mended within this is not announced as an absence
+KEPT_S: Final = round(30 * S_PER_DAY)  # chosen: how long the broker keeps statements for a vehicle that is away
+MOST_UNDER_WAY: Final = 10  # chosen: statements' messages that the broker sends before one of them is acknowledged
+MOST_PACKET_BYTES: Final = 2 * MOST_BYTES  # a broker sends nothing larger; what is between is refused in words
 _TOO_LARGE: Final = 0x95  # MQTT 5, table 2-6, as the next two
 _HOPELESS: Final = frozenset({_TOO_LARGE, 0x99})  # and payload format invalid
 _NOBODY: Final = 0x10  # no matching subscribers: accepted and discarded
@@ -61,12 +68,16 @@ class MqttLink:
         self,
         settings: UplinkSettings,
         birth: Mapping[str, Any],
-        on_loss: Callable[[], None] = lambda: None,
+        on_news: Callable[[], None] = lambda: None,
         is_stopping: Callable[[], bool] = lambda: False,
     ) -> None:
-        """``on_loss`` is called, in paho's thread, when the connection breaks; ``is_stopping`` ends the wait."""
+        """``on_news`` is called, in paho's thread, when statements come or the connection breaks; ``is_stopping`` ends
+        the wait.
+        """
         self._settings = settings
-        self._on_loss = on_loss
+        self._on_news = on_news
+        self.statements: deque[StatementsMessage] = deque()  # each until it is acknowledged
+        self.subscription_fault: str | None = None
         self._loss: str | None = None
         self._most_bytes: int | None = None  # the broker's Maximum Packet Size
         self._heard: queue.SimpleQueue[tuple[int | None, ReasonCode]] = queue.SimpleQueue()
@@ -80,6 +91,8 @@ class MqttLink:
         except BaseException:
             self.abandon()
             raise
+        if settings.statements:
+            self._client.subscribe(f"{settings.topic}/{TOPIC}", options=SubscribeOptions(qos=1))
         if settings.home_assistant is not None:
             topic, text = discovery(settings.home_assistant, settings.topic, birth)
             self._client.publish(topic, text.encode(), qos=1, retain=True)  # a refusal does not stop the delivery
@@ -105,6 +118,10 @@ class MqttLink:
         is_in_vain = self._settings.wait_for_listener and code.value == _NOBODY
         return BrokerAnswer(not code.is_failure and not is_in_vain, code.value in _HOPELESS, str(code))
 
+    def acknowledge_statements(self) -> None:
+        """The first of ``statements`` is done: the broker need not keep it any longer."""
+        self._client.ack(self.statements.popleft().mid, qos=1)
+
     def close(self) -> None:
         """Disconnect cleanly, so that the broker does not publish the will."""
         with suppress(LinkError):  # it was broken already, or the broker is gone
@@ -116,7 +133,7 @@ class MqttLink:
 
     def abandon(self) -> None:
         """Drop the connection; the broker publishes the will. paho's thread ends with its socket."""
-        client, self._on_loss = self._client, lambda: None
+        client, self._on_news = self._client, lambda: None
         sock = client.socket()
         if isinstance(sock, socket.socket):
             with suppress(OSError):
@@ -126,12 +143,16 @@ class MqttLink:
         if sock is not None:
             sock.close()
         # paho closes its own pair of sockets when the client is freed: nothing may hold it
-        client.on_connect = client.on_disconnect = client.on_publish = None
+        client.on_connect = client.on_disconnect = client.on_publish = client.on_message = client.on_subscribe = None
 
     def _make_client(self) -> mqtt.Client:
         settings = self._settings
         client = mqtt.Client(
-            CallbackAPIVersion.VERSION2, settings.client_id, protocol=mqtt.MQTTv5, reconnect_on_failure=False
+            CallbackAPIVersion.VERSION2,
+            settings.client_id,
+            protocol=mqtt.MQTTv5,
+            reconnect_on_failure=False,
+            manual_ack=True,
         )
         client.connect_timeout = CONNECT_TIMEOUT_S
         if settings.username is not None:
@@ -143,19 +164,25 @@ class MqttLink:
         client.will_set(f"{settings.topic}/status", lost, qos=1, retain=True, properties=will)
         client.on_connect = self._on_connect
         client.on_disconnect = self._on_disconnect
+        client.on_message = self._on_message
+        client.on_subscribe = self._on_subscribe
         client.on_publish = lambda _client, _userdata, mid, code, _told: self._heard.put((mid, code))
         return client
 
     def _connect(self) -> None:
         broker = self._settings.broker
         # the will waits no longer than the session lives
-        session = _properties(PacketTypes.CONNECT, {"SessionExpiryInterval": WILL_DELAY_S})
+        hears = self._settings.statements
+        wanted = {"SessionExpiryInterval": KEPT_S if hears else WILL_DELAY_S}
+        if hears:
+            wanted |= {"ReceiveMaximum": MOST_UNDER_WAY, "MaximumPacketSize": MOST_PACKET_BYTES}
+        session = _properties(PacketTypes.CONNECT, wanted)
         try:
             self._client.connect(
                 self._settings.host,
                 self._settings.port,
                 keepalive=self._settings.keep_alive_s,
-                clean_start=True,
+                clean_start=not hears,  # what was stated while the vehicle was away
                 properties=session,
             )
         except (OSError, ValueError) as fault:  # ssl.SSLError and socket.gaierror are OSErrors
@@ -199,7 +226,16 @@ class MqttLink:
         self._loss = f"the connection to {self._settings.broker} was lost: {code}"
         self._heard.put((None, code))  # a broker may answer a message by closing the connection
         self._connack.put(code)
-        self._on_loss()
+        self._on_news()
+
+    def _on_message(self, _client: Any, _userdata: Any, message: mqtt.MQTTMessage) -> None:
+        kind = getattr(message.properties, "ContentType", None)
+        self.statements.append(StatementsMessage(bytes(message.payload), kind, message.mid))
+        self._on_news()
+
+    def _on_subscribe(self, _client: Any, _userdata: Any, _mid: int, codes: list[ReasonCode], _told: Any) -> None:
+        self.subscription_fault = next((str(code) for code in codes if code.is_failure), None)
+        self._on_news()
 
 
 def _properties(packet: int, fields: Mapping[str, Any]) -> Properties:

@@ -12,6 +12,7 @@ from gateway.uplink.forwarder import IDLE_S, PAGE, Forwarder
 from gateway.uplink.link import LinkError, MqttLink
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import UplinkSettings
+from gateway.uplink.statements import StatementsDesk, TakeStatements
 
 Connect = Callable[[UplinkSettings, Mapping[str, Any], Callable[[], None], Callable[[], bool]], MqttLink]
 
@@ -32,11 +33,14 @@ class Uplink(Forwarder[UplinkStatus]):
         birth: Mapping[str, Any],
         connect: Connect = MqttLink,
         back_off: BackOff | None = None,
+        take_statements: TakeStatements | None = None,
     ) -> None:
+        """``take_statements`` is handed what comes from the broker, if the settings want it."""
         super().__init__(outbox, UplinkStatus(settings.broker), back_off, settings.back_off_max_s)
         self._settings = settings
         self._birth = {"state": "online", **birth}
         self._connect = connect
+        self._desk = StatementsDesk(take_statements) if settings.statements and take_statements is not None else None
         self._refusal: str | None = None  # of the last record, until one is accepted
 
     def _work(self) -> None:
@@ -62,11 +66,23 @@ class Uplink(Forwarder[UplinkStatus]):
             messages = self._outbox.next_messages(PAGE)
             self._look()
             link.check()
+            self._hear(link)
             for message in messages:
                 if not self._deliver_one(link, message):
                     return
             if not messages:
-                self._outbox.wait(IDLE_S)  # a new record or the loss of the link ends it
+                self._outbox.wait(IDLE_S)  # a new record, statements or the loss of the link end it
+
+    def _hear(self, link: MqttLink) -> None:
+        """Take the statements that came; each is acknowledged when it is on disk or refused for good."""
+        if self._desk is None:
+            return
+        if link.subscription_fault is not None:
+            self._desk.refuse_subscription(link.subscription_fault)
+            link.subscription_fault = None
+        while link.statements and not self._stopping.is_set() and self._desk.is_done(link.statements[0]):
+            link.acknowledge_statements()
+        self._report = replace(self._report, statements=self._desk.report)
 
     def _deliver_one(self, link: MqttLink, message: OutboxMessage) -> bool:
         """Send one message; False at a stop before its answer. Raises LinkError if the answer asks to retry."""

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded
+from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded, vaguely_loaded
 from support.estimates import posterior_of
 from support.web import Client, Gateway
 
@@ -192,3 +192,17 @@ def test_what_the_vehicles_own_sensors_say_is_passed_on_under_its_name(gateway: 
     reading = OwnReading(signal="air_spring_pressure", number=412.0, unit="kPa", age_s=0.4)
     gateway.status = BEFORE.model_copy(update={"own_readings": (reading,)})
     assert told(gateway)["own_readings"] == [reading.model_dump()]
+
+
+@pytest.mark.parametrize(("of_useful", "light", "says"), [(0.9, "go", "go"), (1.1, "unknown", "vague")])
+def test_nothing_is_green_while_the_payload_is_not_known_exactly_enough(
+    gateway: Gateway, of_useful: float, light: str, says: str
+) -> None:
+    """100 kg aboard, 500 kg below the limit: sure enough not to be too heavy, and yet a weighing of no use."""
+    gateway.publish(vaguely_loaded(0, 100.0, of_useful))
+    cab = told(gateway)
+    assert (cab["light"], cab["says"], cab["light_about"]) == (light, says, [])
+    assert (cab["room"] is None, cab["spare"] == []) == ((says == "vague"), (says == "vague"))
+    assert cab["payload_kg"] == 100.0
+    verdict = Client(gateway.app).get("/api/v1/weights/latest").json()["verdict"]
+    assert (verdict["light"], verdict["says"]) == (light, says)

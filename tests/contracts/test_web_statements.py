@@ -122,6 +122,29 @@ def test_drives_that_look_empty_are_proposed_and_never_taken(local: Client, benc
     assert answer["items"][0]["load"]["payload_kg"] == 0.0
 
 
+def test_a_no_is_remembered_and_those_drives_are_not_asked_about_again(local: Client, bench: LearnerBench) -> None:
+    """Another fit, a restart or another cut of the drive does not ask again; another drive is asked about."""
+    local.request("PUT", VEHICLE, json=ANSWERS)
+    bench.drive(0)
+    bench.turn()
+    drives = tuple({"number": n + 1, "t_start": at(600 * n), "t_end": at(600 * n + 300)} for n in range(2))
+    bench.finish(drives=drives, looks_empty=(1, 2))
+    first, second = (one["from"] for one in local.get(LEARNING).json()["questions"][0]["propose"])
+    (question,) = local.request("PUT", LEARNING, json={"not_empty": [first]}).json()["questions"]
+    assert [one["from"] for one in question["propose"]] == [second]
+    assert local.request("PUT", LEARNING, json={"not_empty": [first]}).status_code == 404
+    assert local.request("PUT", LEARNING, json={"not_empty": [second], "use": "newest"}).status_code == 422
+    bench.drive(3600)
+    bench.turn()
+    assert bench.worker.job is not None
+    assert [end_ns - begin_ns for begin_ns, end_ns in bench.worker.job.laden] == [300 * 10**9]
+    cut = ({"number": 1, "t_start": at(100), "t_end": at(300)}, {"number": 2, "t_start": at(600), "t_end": at(900)})
+    bench.finish(drives=cut, looks_empty=(1, 2))
+    again = LearnerBench(bench.directory)
+    (question,) = json.loads(again.learner.learning())["questions"]
+    assert [one["from"] for one in question["propose"]] == [second]
+
+
 def test_a_table_says_what_became_of_each_row(local: Client, bench: LearnerBench) -> None:
     local.request("PUT", VEHICLE, json=ANSWERS)
     bench.drive(0)

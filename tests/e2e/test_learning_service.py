@@ -2,26 +2,33 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 from support.configured import service_config
 from support.half_car_road import VAN
-from support.known_load_logs import START_NS, write_known_loads
+from support.known_load_logs import START_NS, van_toml, write_known_loads
 from support.patience import wait_until
+from support.ports import first_answer, free_port
+from support.process import running_service
 from support.running_service import Running, serve
 
 from gateway.calibration.file.calibration_file import load_calibration
-from gateway.core.vehicle import Vehicle
 from gateway.records import iso_utc
 from gateway.service.learner import learner
 
 WINDOW_S = 100.0
+BATCH: dict[str, Any] = {
+    "batch__window_s": WINDOW_S,
+    "batch__provisional_every_s": 0.0,
+    "batch__silence_s": 2.0,
+}
 DRIVEN_S = 210.0
 LOADS = ((0.0, None), (300.0, 1.4), (150.0, 1.8))
 ANSWERS: dict[str, Any] = {
@@ -46,8 +53,7 @@ def begun(number: int) -> str:
 @pytest.fixture
 def config(tmp_path: Path) -> Path:
     """A service without a calibration on a bus of the test's own."""
-    batch = {"batch__window_s": WINDOW_S, "batch__provisional_every_s": 0.0, "batch__silence_s": 2.0}
-    return service_config(tmp_path, vehicle__id="van-17", **batch)
+    return service_config(tmp_path, vehicle__id="van-17", **BATCH)
 
 
 @pytest.fixture(autouse=True)
@@ -73,17 +79,6 @@ def settle(running: Running) -> dict[str, Any]:
 
     assert any(wait_until(is_settled) for _ in range(5)), running.http(LEARNING)  # it learns at the lowest priority
     return running.http(LEARNING)
-
-
-def van_toml(folder: Path, vehicle: Vehicle) -> Path:
-    """The vehicle that the service stated, as a file of `springscale learn`."""
-    told = {name: value for name, value in asdict(vehicle).items() if value is not None}
-    lines = [
-        f"{name} = {json.dumps(list(value) if isinstance(value, tuple) else value)}" for name, value in told.items()
-    ]
-    path = folder / "van.toml"
-    path.write_text("\n".join(["[vehicle]", *lines, ""]))
-    return path
 
 
 def learnt_file(folder: Path, calibration_id: str) -> Path:
@@ -139,6 +134,7 @@ def test_a_withdrawn_statement_leaves_no_trace(config: Path, tmp_path: Path) -> 
             running.play(log)
         running.http("/api/v1/vehicle", ANSWERS, "PUT")
         said["before"] = settle(running)["versions"][0]["id"]
+        said["file"] = learnt_file(tmp_path, said["before"]).read_bytes()
         running.told("state", "note", "300", "--from", begun(2), "--ref", "N")
         said["with"] = settle(running)["versions"][0]["id"]
         running.told("state", "withdraw", "N")
@@ -148,6 +144,85 @@ def test_a_withdrawn_statement_leaves_no_trace(config: Path, tmp_path: Path) -> 
 
     assert said["with"] != said["before"]
     assert said["after"] == said["before"]
+    assert learnt_file(tmp_path, said["after"]).read_bytes() == said["file"]
+
+
+def processes_of(pid: int) -> list[int]:
+    """A process and its children."""
+    children = Path(f"/proc/{pid}/task").glob("*/children")
+    return [pid, *(int(child) for listed in children for child in listed.read_text().split())]
+
+
+def learnt_by(config: Path, folder: Path) -> tuple[dict[str, Any], bytes]:
+    """What a service in this folder has learnt at last, and the file."""
+    said: dict[str, Any] = {}
+    serve(config, lambda running: said.update(settle(running), listed=running.http(STATEMENTS)["items"]))
+    return said, learnt_file(folder, said["versions"][0]["id"]).read_bytes()
+
+
+def test_after_a_power_cut_during_learning_it_learns_the_same_once(config: Path, tmp_path: Path) -> None:
+    """Service and process are killed together; a copy of the folder that nobody cut learns the same file."""
+    drives = logs(tmp_path, LOADS[:2])
+
+    def drive(running: Running) -> None:
+        running.told("state", "empty", "--from", begun(1), "--ref", "E")
+        for log in drives:
+            running.play(log)
+
+    serve(config, drive)
+    for name in ("cut", "whole"):
+        shutil.copytree(tmp_path / "state", tmp_path / name / "state")
+    port = free_port()
+    url = f"http://127.0.0.1:{port}"
+    cut = service_config(tmp_path / "cut", vehicle__id="van-17", web__port=port, **BATCH)
+    with running_service(cut) as service:
+        assert first_answer(f"{url}{LEARNING}").json()["lacks"] == ["vehicle"]
+        httpx.put(f"{url}/api/v1/vehicle", json=ANSWERS).raise_for_status()
+        note = {"from": begun(2), "source": "delivery_note", "ref": "N", "load": {"payload_kg": 300.0}}
+        httpx.post(f"{url}{STATEMENTS}", json=note).raise_for_status()
+        assert wait_until(lambda: httpx.get(f"{url}{LEARNING}").json()["is_learning"])
+        for pid in reversed(processes_of(service.pid)):
+            os.kill(pid, signal.SIGKILL)
+    (tmp_path / "whole/state/learning.json").write_bytes((tmp_path / "cut/state/learning.json").read_bytes())
+    whole = service_config(tmp_path / "whole", vehicle__id="van-17", **BATCH)
+
+    after, file = learnt_by(cut, tmp_path / "cut")
+    _, expected = learnt_by(whole, tmp_path / "whole")
+
+    assert {one["ref"]: one["state"] for one in after["listed"]} == {"E": "used", "N": "used"}
+    assert len(after["listed"]) == 2
+    assert [(one["n_drives"], one["n_statements"]) for one in after["versions"]] == [(2, 2)]
+    assert file == expected
+
+
+def test_half_a_character_in_the_file_costs_no_weighing(config: Path, tmp_path: Path) -> None:
+    """No way in lets it pass; a file with it is put aside whole, and the service learns from its drives anew."""
+    drives = logs(tmp_path, LOADS[:2])
+    serve(config, lambda running: running.told("state", "empty", "--from", begun(1), "--note", "yard"))
+    file = tmp_path / "state/learning.json"
+    file.write_text(file.read_text().replace('"yard"', '"\\ud800"'))
+    said: dict[str, Any] = {}
+
+    def meet(running: Running) -> None:
+        said["learning"] = running.http(LEARNING)
+        said["status"] = running.http("/api/v1/status")
+        running.told("state", "empty", "--from", begun(1))
+        for log in drives:
+            running.play(log)
+        running.http("/api/v1/vehicle", ANSWERS, "PUT")
+        said["after"] = settle(running)
+
+    serve(config, meet)
+    assert "learning.json" in said["learning"]["fault"]
+    assert any("statements" in warning for warning in said["status"]["warnings"])
+    assert said["after"]["fault"] is None
+    assert said["after"]["statements"]["used"] == 1
+    (aside,) = [path for path in file.parent.iterdir() if path.name.startswith("learning") and "\\ud800" in _text(path)]
+    assert aside != file
+
+
+def _text(path: Path) -> str:
+    return path.read_text(errors="replace") if path.is_file() else ""
 
 
 def test_a_kill_during_learning_loses_nothing(config: Path, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from support.browser import expect
-from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded
+from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded, vaguely_loaded
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, Look, Watched
 from support.web import Gateway, serving
 
@@ -53,6 +53,21 @@ def cab(gateway: Gateway, phone: Watched) -> Iterator[Look]:
     with serving(gateway.app) as server:
         yield lambda: phone.opened(f"{server.url}/cab")
         phone.page.close()
+
+
+def test_nothing_is_green_on_any_page_while_the_vehicle_learns(gateway: Gateway, phone: Watched) -> None:
+    gateway.publish(vaguely_loaded(0, 100.0))
+    page = phone.page
+    with serving(gateway.app) as server:
+        page.goto(f"{server.url}/cab")
+        expect(page.locator("#light")).to_have_text("Still learning")
+        expect(page.locator("#main")).to_have_attribute("data-light", "unknown")
+        expect(page.locator("#question")).to_have_text("On board")
+        expect(page.locator("#number")).to_have_text("100 kg")
+        expect(page.locator("#why")).to_be_hidden()
+        page.goto(f"{server.url}/")
+        expect(page.locator("#state")).to_have_attribute("data-tone", "calm")
+        expect(page.locator("#overload")).to_contain_text("Still learning")
 
 
 def test_at_a_glance_it_says_what_can_be_loaded_and_the_rest_on_a_tap(gateway: Gateway, phone: Watched) -> None:
@@ -277,7 +292,7 @@ def test_before_the_first_estimate_and_without_limits_it_claims_nothing(tmp_path
         expect(page.locator("#light")).to_have_text("No limit is known")
         expect(page.locator("#number")).to_have_text("300 kg")
         expect(page.locator("#question")).to_have_text("On board")
-        expect(page.locator("#why")).to_contain_text("no limit is set ([vehicle] gross_limit_kg")
+        expect(page.locator("#why")).to_contain_text("no limit is stated (/teach, settings)")
         page.close()
 
 

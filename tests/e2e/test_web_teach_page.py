@@ -1,5 +1,6 @@
 """The page that teaches a vehicle, as somebody uses it who has just connected the box."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -8,8 +9,10 @@ import pytest
 from support.browser import expect
 from support.cab import BEFORE
 from support.dashboard import Watched
-from support.learner import LearnerBench
+from support.learner import ANSWERS, LearnerBench, at
 from support.web import Gateway, serving
+
+from gateway.stated.facts import VehicleAnswers
 
 MOST_CLICKS, MOST_NUMBERS = 12, 8
 VAN = {
@@ -70,6 +73,39 @@ def test_a_stated_load_is_listed_and_can_be_withdrawn(page: Any) -> None:
     expect(page.locator("#statements")).to_contain_text("310 kg")
     page.get_by_role("button", name="Withdraw").click()
     expect(page.locator("#statements")).to_contain_text("withdrawn")
+
+
+def learn_two_drives(bench: LearnerBench) -> None:
+    """Both look empty, and a weighing would help."""
+    bench.learner.state_vehicle(VehicleAnswers(**ANSWERS), "workshop", is_confirmed=False)
+    bench.drive(0)
+    bench.turn()
+    drives = tuple({"number": n + 1, "t_start": at(600 * n), "t_end": at(600 * n + 300)} for n in range(2))
+    helps = [{"do": "scale", "then_plus_minus_kg": 17.0, "text": "a large load on a weighbridge: ± 40 kg ..."}]
+    learning = {"plus_minus_kg": 40.0, "useful_at_kg": 150.0, "tested_on": 3, "helps": helps, "findings": []}
+    bench.finish(drives=drives, looks_empty=(1, 2), learning=learning)
+
+
+@pytest.mark.parametrize(
+    ("locale", "helps"),
+    [("en-GB", "a large load on a scale: then ± 17 kg"), ("de-DE", "eine große Ladung auf einer Waage: dann ± 17 kg")],
+)
+def test_what_helps_is_said_once_and_in_the_readers_language(
+    page: Any, browser: Any, bench: LearnerBench, locale: str, helps: str
+) -> None:
+    learn_two_drives(bench)
+    other = browser.new_page(locale=locale)
+    other.goto(page.url)
+    expect(other.locator("#helps li")).to_have_text([helps])
+    other.close()
+
+
+def test_a_no_takes_the_question_away(page: Any, bench: LearnerBench) -> None:
+    learn_two_drives(bench)
+    expect(page.locator("#questions")).to_contain_text("These 2 drives look empty", timeout=15_000)
+    page.get_by_role("button", name="No: These").click()
+    expect(page.locator("#questions-card")).to_be_hidden()
+    assert json.loads(bench.learner.statements())["items"] == []
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from pathlib import Path
 from gateway.core.events.entry import EntryKind
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
+from gateway.quantity import Z95
 from gateway.records import iso_utc, json_line
 from gateway.status import Standing, State, Status
 from gateway.weighing.calibrated import CalibratedVehicle
@@ -39,6 +40,13 @@ def cab_gateway(directory: Path) -> Gateway:
 def loaded(n: int, payload_kg: float, front_share_pct: float) -> Estimate:
     """The n-th batch with this aboard."""
     return make_estimate(n).answered(posterior_of(payload_kg, front_share_pct, 6.0, 0.2))
+
+
+def vaguely_loaded(n: int, payload_kg: float, of_useful: float = 1.1) -> Estimate:
+    """The same with a 95 % interval of so many times one that is just of use."""
+    assert VAN.vehicle is not None
+    std_kg = of_useful * VAN.vehicle.useful_half_width_kg / Z95
+    return make_estimate(n).answered(posterior_of(payload_kg, 50.0, std_kg, 0.2))
 
 
 def load_event(gateway: Gateway, t_s: int, change_kg: float, *, is_withdrawn: bool = False) -> None:

@@ -1,5 +1,7 @@
 """A campaign on disk: logs of the half-car of support.half_car_road driving known loads, and its campaign.toml."""
 
+import json
+from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
 
@@ -7,7 +9,7 @@ import numpy as np
 
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import load_signal_map
-from gateway.core.vehicle import front_share_pct
+from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.records import Signal
 from support.encoded import encode_signals
 from support.half_car_road import VAN, batch_over_road
@@ -70,3 +72,14 @@ def _write_drive(path: Path, number: int, payload_kg: float, share_pct: float, d
         Signal.SPEED: batch.speed_mps[::10] + 0.05 * rng.standard_normal(len(t_ns[::10])),
     }
     write_candump(encode_signals(load_signal_map(SIGNALS), stamps, samples), "can0", path)
+
+
+def van_toml(folder: Path, vehicle: Vehicle) -> Path:
+    """A vehicle as a file of `springscale learn`."""
+    told = {name: value for name, value in asdict(vehicle).items() if value is not None}
+    lines = [
+        f"{name} = {json.dumps(list(value) if isinstance(value, tuple) else value)}" for name, value in told.items()
+    ]
+    path = folder / "van.toml"
+    path.write_text("\n".join(["[vehicle]", *lines, ""]))
+    return path

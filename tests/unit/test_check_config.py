@@ -31,7 +31,7 @@ def test_a_sound_configuration_is_good(tmp_path: Path) -> None:
 
 
 def test_it_says_by_what_is_weighed_where_no_calibration_is_configured(tmp_path: Path) -> None:
-    assert "until one is learnt from drives (springscale state vehicle)" in checked(tmp_path).stdout
+    assert "until one is learnt from drives (page /teach)" in checked(tmp_path).stdout
 
 
 @pytest.mark.parametrize(
@@ -42,6 +42,7 @@ def test_it_says_by_what_is_weighed_where_no_calibration_is_configured(tmp_path:
         ({"web": 'host = "0.0.0.0"'}, "springscale token create NAME --config"),
         ({"web": "stale_after_s = 200.0"}, "stale_after_s = 200 is below [batch] window_s = 300"),
         ({"alarms": 'off = ["overlaod"]'}, "is no alarm; known are overload, sensor_fault, "),
+        ({"uplink": "statements = true"}, "statements come from a broker: set host"),
         ({"webhook": 'url = "https://fleet.example/hook"'}, "url needs secret_file"),
         (
             {"webhook": 'url = "http://fleet.example/hook"\nsecret_file = "none"'},

@@ -116,6 +116,11 @@ def test_what_cannot_be_read_is_set_aside_and_holds_up_nothing(book: Book, tmp_p
     assert kept == [(one.topic, one.payload) for one in poison]
 
 
+def test_statements_that_go_down_to_a_vehicle_are_no_records_of_it(book: Book) -> None:
+    assert book.write([Message("springscale/van-1/statements", b"from;source\n")]) == []
+    assert book.fleet().n_unreadable == 0
+
+
 def test_a_record_that_the_database_alone_refuses_is_set_aside(book: Book, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever is not foreseen, here a number that SQLite cannot hold: the others are stored, each once."""
     boundless = create_model("Boundless", __base__=Entry, revision=(int, ...))

@@ -92,7 +92,7 @@ def test_each_vehicle_gets_settings_that_the_service_takes(fleet: Path) -> None:
         assert len(link.password() or "") >= 40
         assert (folder / "broker-password").stat().st_mode & 0o077 == 0
     listed = [line.split(":")[0] for line in (fleet / "out/passwords").read_text().splitlines()]
-    assert listed == ["fleet-subscriber", "van-1", "van-2", "van-3"]
+    assert listed == ["fleet-dispatcher", "fleet-subscriber", "van-1", "van-2", "van-3"]
 
 
 def test_running_it_again_changes_nothing_but_what_the_table_changes(fleet: Path) -> None:

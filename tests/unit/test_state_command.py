@@ -73,6 +73,19 @@ def test_the_list_shows_what_was_found_and_what_is_asked(url: str, bench: Learne
     assert "springscale state list" in str(refused.exception)
 
 
+def test_drives_that_look_empty_and_were_not_are_not_asked_about_again(url: str, bench: LearnerBench) -> None:
+    bench.drive(0)
+    bench.turn()
+    drives = tuple({"number": n + 1, "t_start": at(600 * n), "t_end": at(600 * n + 300)} for n in range(2))
+    bench.finish(drives=drives, looks_empty=(1, 2))
+    left = called("state", "not-empty", at(600), "--url", url).stdout
+    assert left.startswith("The drive of ")
+    assert "not asked about again" in called("state", "not-empty", "--url", url).stdout
+    refused = called("state", "not-empty", "--url", url)
+    assert refused.exit_code == 1
+    assert "no such drive is asked about" in str(refused.exception)
+
+
 def test_an_empty_list_says_what_to_do(url: str) -> None:
     assert "springscale state note 310" in called("state", "list", "--url", url).stdout
 

@@ -1,5 +1,6 @@
 """Tables of statements: what spreadsheets and planning software write is read; every row that cannot be is named."""
 
+import json
 from datetime import UTC, datetime
 from zoneinfo import ZoneInfo
 
@@ -207,3 +208,13 @@ def test_the_same_row_has_the_same_id_in_every_file_and_another_row_another() ->
     first, again = (told(f"from;payload_kg\n{row}\n").rows[0].record for _ in range(2))
     other = told("from;payload_kg\n2026-11-26T07:40:00Z;311\n").rows[0].record
     assert first.id == again.id != other.id
+
+
+def test_what_a_service_lists_as_withdrawn_is_left_out() -> None:
+    listed = [
+        {"from": "2026-11-26T07:40:00Z", "source": "empty", "state": state, "ref": state}
+        for state in ("used", "withdrawn")
+    ]
+    found = told(json.dumps({"items": listed}))
+    assert [row.record.ref for row in found.rows] == ["used"]
+    assert found.n_rows == 1

@@ -31,13 +31,13 @@ def test_each_weight_has_its_light_and_sentence(
     weights: Weights, light: Light, says: Says, about: tuple[str, ...]
 ) -> None:
     """961 +- 28 of 950 kg is too heavy on every page: it is more probable than not."""
-    found = verdict_of(weights, is_calibrated=True, is_weighed=True, is_doubted=False)
+    found = verdict_of(weights, is_calibrated=True, is_weighed=True, is_doubted=False, is_vague=False)
     assert (found.light, found.says, found.about) == (light, says, about)
 
 
 def test_before_the_first_weighing_a_calibrated_vehicle_is_ready() -> None:
     states = [
-        verdict_of(Weights(), is_calibrated=is_calibrated, is_weighed=False, is_doubted=False).says
+        verdict_of(Weights(), is_calibrated=is_calibrated, is_weighed=False, is_doubted=False, is_vague=False).says
         for is_calibrated in (True, False)
     ]
     assert states == [Says.READY, Says.NOT_CALIBRATED]
@@ -45,7 +45,7 @@ def test_before_the_first_weighing_a_calibrated_vehicle_is_ready() -> None:
 
 def test_doubt_takes_back_everything_but_an_overload() -> None:
     light, heavy = (
-        verdict_of(Weights(gross=weight), is_calibrated=True, is_weighed=True, is_doubted=True).says
+        verdict_of(Weights(gross=weight), is_calibrated=True, is_weighed=True, is_doubted=True, is_vague=False).says
         for weight in (LIGHT, HEAVY)
     )
     assert (light, heavy) == (Says.DOUBTED, Says.OVER)
@@ -61,7 +61,18 @@ def test_green_never_stands_beside_an_active_overload_alarm(
         is_calibrated=is_calibrated,
         is_weighed=is_weighed,
         is_doubted=is_doubted,
+        is_vague=False,
         alarmed=("gross",),
     )
     assert found.light is not Light.GO
     assert (found.light is Light.OVER) == (found.says is Says.OVER)
+
+
+@pytest.mark.parametrize(
+    ("weight", "says"),
+    [(LIGHT, Says.VAGUE), (NEAR, Says.NEAR), (HEAVY, Says.OVER), (UNKNOWN, Says.WEIGHT_UNKNOWN)],
+)
+def test_a_weighing_that_is_of_no_use_warns_and_never_says_go(weight: Weight, says: Says) -> None:
+    found = verdict_of(Weights(gross=weight), is_calibrated=True, is_weighed=True, is_doubted=False, is_vague=True)
+    assert found.says is says
+    assert found.light is not Light.GO

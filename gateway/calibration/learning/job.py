@@ -26,6 +26,7 @@ class LearnJob(Part):
     windows: tuple[Path, ...] = Field(min_length=1, description="files of kept windows")
     records: tuple[StatementRecord, ...]
     settings: dict[str, Any]
+    laden: tuple[tuple[int, int], ...] = Field((), description="begin and end (ns) of times that are not asked about")
     like: Path | None = None
     before: Path | None = None
     is_file_before: bool = Field(False, description="the one in use is of the settings: it stands until it is compared")
@@ -35,6 +36,7 @@ class LearnJob(Part):
 class LearnResult(Part):
     """What came of a job. ``fault`` says in words why there is no calibration; its text is that of the file."""
 
+    key: str = Field("", description="that of its job; empty: there is no result of the process")
     fault: str | None = None
     calibration: str | None = None
     calibration_id: str | None = None

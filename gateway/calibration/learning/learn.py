@@ -9,7 +9,7 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Final
 
-from gateway.calibration.assigned import Assigned, assign
+from gateway.calibration.assigned import Assigned, Piece, assign
 from gateway.calibration.calibrate import OnFit, Outcome, calibrate_inspected, drive_name
 from gateway.calibration.campaign import Campaign, DraftTable
 from gateway.calibration.empties import looking_empty
@@ -62,12 +62,19 @@ class Learnt:
         taught = self.outcome.cross_spectrum
         return [one for one in (taught.claims if taught else ()) if one.drive == drive_name(number)]
 
-    @property
-    def empty(self) -> tuple[int, ...]:
-        """The numbers of the drives of unknown load that look empty."""
-        unknown = {number: one for number, one in self.loads.items() if not self.statements[number - 1].is_of_payload}
+    def looking_empty(self, laden: Sequence[tuple[int, int]] = ()) -> tuple[int, ...]:
+        """The numbers of the drives of unknown load that look empty; none of those at a time (ns) of ``laden``."""
+        unknown = {
+            number: one
+            for number, one in self.loads.items()
+            if not self.statements[number - 1].is_of_payload and not _is_during(self.drives[number - 1].piece, laden)
+        }
         members = looking_empty(list(unknown.values()), self.outcome.file.vehicle)
         return tuple(number for number, one in unknown.items() if any(one is member for member in members))
+
+
+def _is_during(piece: Piece, spans: Sequence[tuple[int, int]]) -> bool:
+    return any(piece.begin_ns < end_ns and begin_ns < piece.end_ns for begin_ns, end_ns in spans)
 
 
 def matched(records: Sequence[StatementRecord], driven: Sequence[Driven], vehicle: Vehicle) -> Assigned:

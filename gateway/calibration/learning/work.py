@@ -48,7 +48,7 @@ def main(folder: Path) -> None:
         result = LearnResult(fault=str(fault))
     except MemoryError:
         result = LearnResult(fault=f"learning needs more than {job.most_memory_mb:g} MB")
-    took = {"seconds": time.monotonic() - begun_s, "most_memory_mb": _most_memory_mb()}
+    took = {"key": job.key, "seconds": time.monotonic() - begun_s, "most_memory_mb": _most_memory_mb()}
     fresh = folder / f".{RESULT}"
     fresh.write_text(result.model_copy(update=took).model_dump_json(), encoding="utf-8")
     fresh.rename(folder / RESULT)
@@ -70,7 +70,7 @@ def done(job: LearnJob) -> LearnResult:
         learning=learning_record(found, verdict),
         statements=tuple(statements_record(records, assigned, found)),
         drives=tuple(drives_record(found)),
-        looks_empty=found.empty,
+        looks_empty=found.looking_empty(job.laden),
         damaged=damaged,
         worse=_why_worse(job, found),
     )

@@ -1,6 +1,6 @@
 """One light and one sentence on the weight of a vehicle, the same on every page.
 
-    verdict = verdict_of(weights, doubted=False, overload_alarms=(), ...)
+    verdict = verdict_of(weights, is_calibrated=True, is_weighed=True, is_doubted=False, is_vague=False)
 
 An alarm of overload needs more evidence than the light, both to begin and to end. Where an early value after unloading
 is below a limit of which the alarm is still active, the light is amber and the sentence says why: no page shows green
@@ -24,6 +24,7 @@ class Says(StrEnum):
     UNEVEN = "uneven"  # a wheel bears too much, but neither an axle nor the whole vehicle: moving the load helps
     WAS_OVER = "was_over"  # the last full batch was too heavy, the first value since is not
     DOUBTED = "doubted"
+    VAGUE = "vague"  # no limit is near, but the weight is not exact enough to say so: the vehicle still learns
     NO_LIMIT = "no_limit"
     WEIGHT_UNKNOWN = "weight_unknown"  # a limit is known, but not the weight
     NOT_CALIBRATED = "not_calibrated"
@@ -51,11 +52,13 @@ def verdict_of(
     is_calibrated: bool,
     is_weighed: bool,
     is_doubted: bool,
+    is_vague: bool,
     alarmed: tuple[str, ...] = (),
 ) -> Verdict:
     """The verdict on ``weights``; ``alarmed`` are the places of active overload alarms.
 
-    A doubt about the last weighing takes back everything but an overload.
+    A doubt about the last weighing takes back everything but an overload. A weighing that is ``is_vague`` (not exact
+    enough to be of use) says nothing good: a warning needs no accuracy, an all-clear does.
     """
     near = nearness(weights)
     probability = max(near.probabilities.values(), default=None)
@@ -71,4 +74,6 @@ def verdict_of(
         return Verdict(Light.UNKNOWN, Says.WEIGHT_UNKNOWN if has_limit else Says.NO_LIMIT)
     if alarmed:
         return Verdict(Light.NEAR, Says.WAS_OVER, alarmed, probability)
-    return Verdict(near.light, _SAYS[near.light], near.places(), probability)
+    is_unsaid = is_vague and near.light is Light.GO
+    light, says = (Light.UNKNOWN, Says.VAGUE) if is_unsaid else (near.light, _SAYS[near.light])
+    return Verdict(light, says, near.places(), probability)

@@ -23,6 +23,7 @@ LEARNT: Final = "learnt-"  # the names of calibrations begin so
 MOST_VERSIONS: Final = (
     50  # chosen: calibrations of some 100 kB; the oldest beyond are forgotten, and their files removed
 )
+MOST_LADEN: Final = 1000  # chosen: more drives than are kept
 MOST_STATEMENTS: Final = 10_000  # chosen: three years of ten a day, in 5 MB
 
 
@@ -70,6 +71,19 @@ class Version(Part):
     withdrawn: Act | None = None
 
 
+class Laden(Part):
+    """A time of which somebody said that the vehicle was not empty, though it looks so."""
+
+    begin_ns: int
+    end_ns: int
+    said: Act
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """Begin and end (ns)."""
+        return self.begin_ns, self.end_ns
+
+
 class Outcome(Part):
     """What the last fit found, and of what: ``key`` is that of its job."""
 
@@ -94,6 +108,7 @@ class LearningRecord(Part):
     vehicle: Stated | None = None
     versions: tuple[Version, ...] = ()
     held: str | None = None
+    laden: tuple[Laden, ...] = ()
     last: Outcome | None = None
 
     @property

@@ -37,8 +37,18 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, CampaignError, NoSisterError, RefusedError
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, BackOff, ThreadPart
-from gateway.records import Batch, Motion, iso_utc, rounded
-from gateway.service.learner.book import MOST_STATEMENTS, MOST_VERSIONS, Book, LearningRecord, Outcome, Said, Stated
+from gateway.records import Batch, Motion, iso_utc, ns_of, rounded
+from gateway.service.learner.book import (
+    MOST_LADEN,
+    MOST_STATEMENTS,
+    MOST_VERSIONS,
+    Book,
+    Laden,
+    LearningRecord,
+    Outcome,
+    Said,
+    Stated,
+)
 from gateway.service.learner.book import Version as LearntVersion
 from gateway.service.learner.drives import FOLDER, DriveFiles, Window
 from gateway.service.learner.worker import OnResult, Worker
@@ -274,6 +284,7 @@ class Learner(ThreadPart):
             windows=tuple(self._files.path(one) for one in windows),
             records=tuple(record.records),
             settings=settings,
+            laden=tuple(one.span for one in record.laden),
             like=self._vehicle.like,
             before=before,
             is_file_before=active is None and before is not None,
@@ -448,9 +459,19 @@ class Learner(ThreadPart):
             return self._told([said])[0].model_dump_json(by_alias=True)
 
     def import_all(
-        self, content: bytes, by: str, *, where: str, zone: tzinfo | None = None, is_dry_run: bool = False
+        self,
+        content: bytes,
+        by: str,
+        *,
+        where: str,
+        zone: tzinfo | None = None,
+        is_dry_run: bool = False,
+        may_come_again: bool = False,
     ) -> str:
-        """Take the good rows of a table or a list; JSON: an ImportTold. Raises RefusedError if there is none."""
+        """Take the good rows of a table or a list; JSON: an ImportTold. Raises RefusedError if there is none.
+
+        ``may_come_again``: the same content may be delivered twice, so what was withdrawn stays withdrawn.
+        """
         try:
             told = read_statements(content, where, zone)
         except StatementsFileError as fault:
@@ -460,7 +481,8 @@ class Learner(ThreadPart):
             if not told.rows and told.faults:
                 lines = [line for lines in told.faults.values() for line in lines]
                 raise RefusedError("unreadable", "; ".join(lines[:20]))
-            stored = [] if is_dry_run else self._store([row.record for row in rows], by)
+            records = [row.record for row in rows]
+            stored = [] if is_dry_run else self._store(records, by, stands_again=not may_come_again)
             answer = self._imported(told, rows, stored, is_dry_run=is_dry_run)
         return answer.model_dump_json(by_alias=True)
 
@@ -469,8 +491,11 @@ class Learner(ThreadPart):
         names = {self._vehicle.id, self._vehicle.name, stated.figures.name if stated else ""}
         return row.vehicle is None or row.vehicle.strip().casefold() in {name.strip().casefold() for name in names}
 
-    def _store(self, records: Sequence[StatementRecord], by: str) -> list[Said]:
-        """Put statements into the book at once. Raises RefusedError; then nothing has changed."""
+    def _store(self, records: Sequence[StatementRecord], by: str, *, stands_again: bool = True) -> list[Said]:
+        """Put statements into the book at once; with ``stands_again`` also what was withdrawn.
+
+        Raises RefusedError; then nothing has changed.
+        """
         record, taken = self._book.record, []
         for one in records:
             signed = one if one.by else one.model_copy(update={"by": by})
@@ -480,7 +505,7 @@ class Learner(ThreadPart):
                     "id_taken",
                     f"{one.id} is another statement: leave its id out, or withdraw the other one and give a new id",
                 )
-            if known is not None and known.withdrawn is None:
+            if known is not None and (known.withdrawn is None or not stands_again):
                 taken.append(known)
                 continue
             if known is None and len(record.said) >= MOST_STATEMENTS:
@@ -665,15 +690,37 @@ class Learner(ThreadPart):
                 kind = "held" if one.state == "held" else "weak"
                 named = one.ref or f"the statement from {one.from_:%Y-%m-%d %H:%M}Z"
                 yield Question(kind=kind, text=f"{named}: {one.question}", statement_id=one.id)
-        if last is None or not last.looks_empty:
+        drives = self._looking_empty(last)
+        if not drives:
             return
-        drives = [one for one in last.drives if one["number"] in last.looks_empty]
         begun = ", ".join(str(one["t_start"])[:16].replace("T", " ") for one in drives)
         which = f"The drive of {begun} looks" if len(drives) == 1 else f"These {len(drives)} drives look"
         listed = "" if len(drives) == 1 else f" ({begun})"
         source = str(StatementSource.EMPTY)
         propose = tuple({"from": one["t_start"], "until": one["t_end"], "source": source} for one in drives)
         yield Question(kind="looks_empty", text=f"{which} empty{listed}. Is that right?", propose=propose)
+
+    def _looking_empty(self, last: Outcome | None) -> list[dict[str, Any]]:
+        """The drives that look empty, without those of which somebody said that they were not."""
+        laden = [one.span for one in self._book.record.laden]
+        found = [one for one in last.drives if one["number"] in last.looks_empty] if last else []
+        return [one for one in found if not any(_is_common(_span_of(one), span) for span in laden)]
+
+    def not_empty(self, begins_ns: Sequence[int], by: str) -> str:
+        """These drives, by their begin, look empty and were not: they are not asked about again; JSON: LearningState.
+
+        Raises RefusedError for a drive that is not asked about; then nothing has changed.
+        """
+        with self._book.lock:
+            record = self._book.record
+            asked = {span[0]: span for one in self._looking_empty(record.last) for span in (_span_of(one),)}
+            if any(begin_ns not in asked for begin_ns in begins_ns):
+                raise RefusedError("no_such_drive", "no drive that looks empty begins then: the questions list them")
+            act = self._book.act(by)
+            said = [Laden(begin_ns=begin, end_ns=end, said=act) for begin, end in map(asked.__getitem__, begins_ns)]
+            self._book.save(record.model_copy(update={"laden": (*record.laden, *said)[-MOST_LADEN:]}))
+            self._book.tell(Event.NOT_EMPTY, {"n": len(said), "by": by})
+            return self._learning().model_dump_json(by_alias=True)
 
     def _version_told(self, one: LearntVersion, record: LearningRecord) -> VersionTold:
         active = record.active
@@ -705,6 +752,14 @@ class Learner(ThreadPart):
             self._book.save(record.model_copy(update={"held": None if version == NEWEST else version}))
             self._book.tell(Event.VERSION_CHOSEN, {"use": version, "by": by})
             return self._learning().model_dump_json(by_alias=True)
+
+
+def _span_of(drive: Mapping[str, Any]) -> tuple[int, int]:
+    return ns_of(str(drive["t_start"])), ns_of(str(drive["t_end"]))
+
+
+def _is_common(one: tuple[int, int], other: tuple[int, int]) -> bool:
+    return one[0] < other[1] and other[0] < one[1]
 
 
 def _common_s(window: Window, piece: Piece) -> float:

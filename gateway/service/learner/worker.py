@@ -85,17 +85,20 @@ class Worker:
         with self._lock:
             if self._process is not process:
                 return
-            result = self._result(fault)
+            result = self._result(job, fault)
             self._process = None
         self._on_result(job, result)
 
-    def _result(self, fault: str | None) -> LearnResult:
+    def _result(self, job: LearnJob, fault: str | None) -> LearnResult:
         if fault is not None:
             return LearnResult(fault=fault)
         try:
-            return LearnResult.model_validate_json((self.folder / RESULT).read_bytes())
+            result = LearnResult.model_validate_json((self.folder / RESULT).read_bytes())
         except (OSError, ValidationError) as broken:
             return LearnResult(fault=f"learning left no result that can be read: {broken}")
+        if result.key != job.key:  # a process of a service that was killed ends after its service
+            return LearnResult(fault="learning left the result of another job: it was killed, and begins anew")
+        return result
 
     def _why(self, code: int) -> str:
         if code == -signal.SIGKILL:

@@ -81,10 +81,9 @@ async def _invalid(request: Request, error: Exception) -> Response:
 _CODES: Final = {
     "not_stored": 503,
     "not_allowed": 403,
-    "no_such_line": 404,
-    "no_such_weight": 404,
     "no_such_statement": 404,
     "no_such_version": 404,
+    "no_such_drive": 404,
     "unreadable": 422,
 }  # of reasons; else 409
 

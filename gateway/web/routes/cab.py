@@ -92,7 +92,7 @@ class Cab(VerdictTold):
     age_s: float | None
     is_stale: bool
     is_early: bool = Field(description="true: an early look, not a whole batch yet")
-    room: RoomTold | None = Field(description="null: no limit is known, or a weight is not known or is doubted")
+    room: RoomTold | None = Field(description="null: no limit is known, or a weight is not known, doubted or vague")
     spare: list[SpareLeft] = Field(description="of each place with a limit, the tightest first; empty as `room`")
     is_doubted: bool = Field(
         description="the last whole batch was refused because of the sensors or the answer, so the earlier weight may "
@@ -120,9 +120,9 @@ def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
     async def cab() -> Cab:
         """How much can still be loaded, whether it is too much, how old that is, and what was loaded last."""
         now, shown = status(), board.shown()
-        found = present_load(board, scales.weigh, now)
+        found = present_load(board, scales.weigh, now, scales.vehicle)
         load, weights = found.load, found.weights
-        is_known = not found.is_doubted
+        is_known = not (found.is_doubted or found.is_vague)
         return Cab(
             vehicle_id=now.vehicle_id,
             state=now.state,

@@ -3,12 +3,12 @@
 import contextlib
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Self
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.exceptions import RequestValidationError
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
@@ -19,13 +19,12 @@ from gateway.stated.learning import (
     StatementState,
     StatementTold,
 )
-from gateway.stated.statement import HALF_CHARACTER, StatementRecord, is_text
+from gateway.stated.statement import HALF_CHARACTER, TYPES, StatementRecord, is_text
 from gateway.web.routes.service_calls import REFUSALS, By, LearnerBackend, answered, created
 from gateway.web.schemas import Body, Instant, problem_responses
 
 STATEMENTS_PATH: Final = "/statements"
 LEARNING_PATH: Final = "/learning"
-CSV: Final = ("text/csv", "text/plain", "application/csv", "application/vnd.ms-excel")
 _ONE: Final = TypeAdapter(StatementRecord)
 _BODY: Final[dict[str, Any]] = {
     "required": True,
@@ -49,14 +48,27 @@ _BODY: Final[dict[str, Any]] = {
 StatementId = Annotated[str, Path(max_length=200, description="as the list has it")]
 
 
-class UseVersion(Body):
-    """Which of the learnt calibrations to use."""
+class LearningChange(Body):
+    """Which of the learnt calibrations to use, or that drives which look empty were not: one of both."""
 
-    use: str = Field(
+    use: str | None = Field(
+        None,
         max_length=80,
         description="id of a version: it is used from the next drive on, and none replaces it; `newest`: back to "
         "learning; `file`: that of the settings",
     )
+    not_empty: list[Instant] | None = Field(
+        None,
+        min_length=1,
+        max_length=1000,
+        description="begins of drives that are asked about, as `propose` has them: they are not asked about again",
+    )
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        if (self.use is None) is (self.not_empty is None):
+            raise ValueError("give use or not_empty")
+        return self
 
 
 class ImportQuery(BaseModel):
@@ -131,16 +143,20 @@ def statements_router(backend: LearnerBackend) -> APIRouter:
         return await answered(backend.learning)
 
     @router.put(LEARNING_PATH, response_model=LearningState, responses={**of_id, **problem_responses(400, 403)})
-    async def choose_version(by: By, chosen: UseVersion) -> Response:
-        """Use an earlier version, the newest, or the file of the settings, from the next drive on."""
-        return await answered(backend.use, chosen.use, by)
+    async def change_learning(by: By, change: LearningChange) -> Response:
+        """Use an earlier version, the newest, or the file of the settings, from the next drive on; or say that drives
+        which look empty were not.
+        """
+        if change.not_empty is not None:
+            return await answered(backend.not_empty, change.not_empty, by)
+        return await answered(backend.use, change.use or "", by)
 
     return router
 
 
 def _kind(request: Request) -> str:
     kind = request.headers.get("content-type", "application/json").partition(";")[0].strip().lower()
-    if kind != "application/json" and kind not in CSV:
+    if kind not in TYPES:
         raise HTTPException(415, f"{kind}: send application/json or text/csv")
     return kind
 

@@ -8,9 +8,11 @@ from pydantic import BaseModel, Field
 
 from gateway.core.alarms.alarm import AlarmKind
 from gateway.core.alarms.rules import as_of_load
+from gateway.core.vehicle import Vehicle
 from gateway.core.weights.limits import Light
 from gateway.core.weights.verdict import Says, Verdict, verdict_of
 from gateway.estimate import Estimate, Weights
+from gateway.quantity import Z95
 from gateway.reasons import EXPLANATIONS, Cause
 from gateway.records import Why, rounded
 from gateway.status import Status
@@ -24,11 +26,12 @@ class VerdictTold(BaseModel):
 
     light: Light = Field(
         description="near: a limit lies within the 95 % interval; over: too much is more probable than not; unknown: "
-        "no limit or no weight is known, or it is doubted"
+        "no limit or no weight is known, it is doubted, or not exact enough to be of use"
     )
     says: Says = Field(
         description="the sentence beside it; was_over: an overload alarm is active, and the first value since "
-        "is below the limit; ready: calibrated, the first weight comes after the next `window_s` of driving"
+        "is below the limit; vague: no limit is near, but the payload's ± is above `useful_at_kg` of /api/v1/learning; "
+        "ready: calibrated, the first weight comes after the next `window_s` of driving"
     )
     light_about: list[str] = Field(description="places both are about, the worst first", examples=[["rear_axle"]])
     over_limit_probability: float | None = Field(description="of the worst place, 0 to 1", examples=[0.02])
@@ -42,6 +45,11 @@ class PresentLoad:
     weights: Weights
     rejected: tuple[Why, ...]
     verdict: Verdict
+
+    @property
+    def is_vague(self) -> bool:
+        """Whether the weights are not exact enough to say what may still be loaded."""
+        return self.verdict.says is Says.VAGUE
 
     @property
     def is_doubted(self) -> bool:
@@ -59,7 +67,9 @@ class PresentLoad:
         )
 
 
-def present_load(board: Board, weigh: Callable[[Estimate | None], Weights], now: Status) -> PresentLoad:
+def present_load(
+    board: Board, weigh: Callable[[Estimate | None], Weights], now: Status, vehicle: Vehicle | None
+) -> PresentLoad:
     """What is known of the present load."""
     shown = board.shown().estimate
     load = None if shown is None else as_of_load(shown)
@@ -69,11 +79,17 @@ def present_load(board: Board, weigh: Callable[[Estimate | None], Weights], now:
         is_calibrated=now.calibration_id is not None,
         is_weighed=load is not None,
         is_doubted=any(EXPLANATIONS[why].cause in _DOUBTING for why in rejected),
+        is_vague=_is_vague(load, vehicle),
         alarmed=tuple(
             where for kind, where in (name.split(".") for name in now.alarms.active) if kind == AlarmKind.OVERLOAD
         ),
     )
     return PresentLoad(load, weights, rejected, verdict)
+
+
+def _is_vague(load: Estimate | None, vehicle: Vehicle | None) -> bool:
+    """Whether the payload's 95 % interval is wider than one that is of use."""
+    return load is not None and vehicle is not None and Z95 * load.payload.std > vehicle.useful_half_width_kg
 
 
 def _rejected(heard: Estimate | None, shown: Estimate | None, now: Status) -> tuple[Why, ...]:

@@ -95,7 +95,7 @@ def weights_router(board: Board, scales: Scales, status: Callable[[], Status]) -
     @router.get("/weights/latest")
     async def latest_weights() -> JudgedWeights:
         """Gross weight, axle and wheel loads in kg, with standard deviation and limit, and the verdict on them."""
-        verdict = present_load(board, scales.weigh, status()).told()
+        verdict = present_load(board, scales.weigh, status(), scales.vehicle).told()
         return JudgedWeights(**weigh_latest(board, scales).model_dump(), verdict=verdict)
 
     return router

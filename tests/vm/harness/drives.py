@@ -31,6 +31,11 @@ def empty_drive(duration_s: float, seed: int) -> Frames:
     return _drive(duration_s, seed, "reference", ())
 
 
+def driven_with(duration_s: float, seed: int, loads: tuple[Load, ...]) -> Frames:
+    """The same van with these loads."""
+    return _drive(duration_s, seed, "reference", loads)
+
+
 def _drive(duration_s: float, seed: int, map_name: str, loads: tuple[Load, ...]) -> Frames:
     speed = constant(PAPER_SPEED_MPS, duration_s, np.random.default_rng(seed), 0.4)
     driven = simulate_drive(PAPER_VAN, [LoadStep(0.0, loads)], iso_road("B"), speed, REFERENCE, seed, START_NS)

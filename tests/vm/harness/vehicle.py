@@ -70,7 +70,7 @@ class Vehicle:
         self.machine.write("/etc/springscale/web.pem", self._certificate.bytes())
         self.run("chgrp springscale /etc/springscale/web.pem; chmod 640 /etc/springscale/web.pem")
         self.configure(SETTINGS)
-        self._token = self.run(f"springscale token create test --config {CONFIG}").strip()
+        self._token = self.run(f"springscale token create test --scope operate --config {CONFIG}").strip()
         self.run("systemctl enable --now springscale", timeout_s=90.0)
         self._is_changed = False
 
@@ -117,6 +117,19 @@ class Vehicle:
             params=query,
             headers={"authorization": f"Bearer {self._token}"},
             timeout=10.0,
+        )
+        response.raise_for_status()
+        return response.json()
+
+    def send(self, method: str, path: str, content: object = None, kind: str = "application/json") -> Answer:
+        """The answer to a change, which is JSON unless it is a text. Raises httpx.HTTPStatusError for a refusal."""
+        response = httpx.request(
+            method,
+            f"{self.url}/api/v1/{path}",
+            verify=self.trust,
+            content=content if isinstance(content, str) else json.dumps(content),
+            headers={"authorization": f"Bearer {self._token}", "content-type": kind},
+            timeout=30.0,
         )
         response.raise_for_status()
         return response.json()

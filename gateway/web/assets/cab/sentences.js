@@ -65,7 +65,8 @@ function tooMuch(cab, room, isCurrent) {
 
 function unknownRoom(cab) {
   if (cab.payload_kg === null || cab.is_doubted) return [phrase("load_more"), null, "", whyNot(cab)];
-  return [phrase("aboard_now"), cab.payload_kg, "", phrase("room_unknown", { missing: phrase(cab.has_limits ? "missing_empty" : "missing_limit") })];
+  const missing = phrase(cab.has_limits ? "missing_empty" : "missing_limit");
+  return [phrase("aboard_now"), cab.payload_kg, "", cab.says === "vague" ? "" : phrase("room_unknown", { missing })];
 }
 
 function whyNot(cab) {

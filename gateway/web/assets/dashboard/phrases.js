@@ -3,9 +3,10 @@
 import { fill, language, speaker } from "../language.js";
 import { COMMON } from "../words/common.js";
 import { DASHBOARD } from "../words/dashboard.js";
+import { HELPS } from "../words/helps.js";
 import { REASONS_DE, REMEDIES_DE, SOURCES_DE } from "../words/reasons.js";
 
-export const phrase = speaker(COMMON, DASHBOARD);
+export const phrase = speaker(COMMON, DASHBOARD, HELPS);
 
 /** The gateway's English texts of reasons, sources and remedies, by name, in the reader's language. */
 export function explained({ items, sources, remedies }) {

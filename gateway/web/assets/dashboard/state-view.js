@@ -29,7 +29,8 @@ function told(known) {
   const tone = TONES[status.state] ?? "warn";
   if (status.calibration_id === null && tone !== "bad") return [phrase("no_calibration"), "warn", sentence(status)];
   if (isAsleep(known)) return [phrase("asleep"), "calm", `${phrase("asleep_since")} ${status.warnings.join(" ")}`];
-  return [phrase.named("state", status.state), tone, sentence(status)];
+  const isVague = known.weights?.verdict.says === "vague"; // it weighs, but not exactly enough to be of use
+  return [phrase.named("state", status.state), isVague && tone === "good" ? "calm" : tone, sentence(status)];
 }
 
 show((known) => {
@@ -43,7 +44,7 @@ show((known) => {
     write("vehicle", known.status.vehicle_id ?? "");
     write("version", phrase("version", { version: known.status.version }));
   }
-}, "status", "latest", "isReachable", "isRefused");
+}, "status", "latest", "weights", "isReachable", "isRefused");
 
 show(({ isLive }) => {
   write("link", phrase(isLive ? "live" : "not_live"));

@@ -8,7 +8,7 @@ import { UNKNOWN, capital, figure, withStd } from "./words.js";
 
 const WHEELS = ["front_left", "front_right", "rear_left", "rear_right"];
 const LIMITED = ["gross", "front_axle", "rear_axle", ...WHEELS];
-const SAID = ["near", "over", "uneven", "was_over"];
+const SAID = ["near", "over", "uneven", "was_over", "vague"];
 const NO_WHEELS = { track_width: "no_track", roll_rate: "no_roll" };
 
 /** Weights and payload come in two answers: the load is drawn only if both belong to one estimate. */

@@ -6,6 +6,7 @@ import { button, row } from "../dashboard/parts.js";
 import { clock, duration, figure } from "../dashboard/words.js";
 import { fill, speaker } from "../language.js";
 import { COMMON } from "../words/common.js";
+import { HELPS } from "../words/helps.js";
 import { TEACH } from "../words/teach.js";
 
 const ASK_EVERY_MS = 5000; // chosen: as the cab page
@@ -16,7 +17,7 @@ const SIGNED = ["sensor_position_m", "sensor_offset_left_m", "loading_begin_m"];
 const CARRIES = ["", "pallets", "parcels", "long_goods", "tools", "mixed"];
 const STATEMENTS = "api/v1/statements";
 
-const phrase = speaker(COMMON, TEACH);
+const phrase = speaker(COMMON, HELPS, TEACH);
 const kg = (x) => figure(x, 0, "kg");
 
 let learning = null;
@@ -118,7 +119,7 @@ function showLearning() {
   element("progress").value = progress(learning);
   write("driven", phrase("driven_so_far", { duration: duration(learning.driven_s), n: learning.n_drives }));
   const worth = learning.helps.filter((one) => one.then_plus_minus_kg <= (1 - USEFUL_HELP) * learning.plus_minus_kg);
-  const helps = worth.map((one) => made("li", phrase("helps_to", { what: one.text || one.do, kg: kg(one.then_plus_minus_kg) })));
+  const helps = worth.map((one) => made("li", phrase("helps_to", { what: phrase.named("help", one.do), kg: kg(one.then_plus_minus_kg) })));
   const isStuck = learning.plus_minus_kg > learning.useful_at_kg && learning.useful_at_kg !== null && !helps.length;
   element("helps").replaceChildren(...helps, ...(isStuck ? [made("li", phrase("only_statement"))] : []), ...learning.findings.map((text) => made("li", text)));
   element("questions-card").hidden = learning.questions.length === 0;
@@ -127,14 +128,16 @@ function showLearning() {
   element("versions").replaceChildren(...learning.versions.map((one) => made("li", `${one.text} (${phrase(`version.${one.state}`)})`)));
 }
 
-/** A question with its answers: yes sends what it proposes, or confirms the statement that it is about. */
+/** A question with its answers: yes sends what it proposes, or confirms the statement that it is about; no is noted. */
 function question(one) {
   const yes = async () => {
     if (one.statement_id) await send("POST", `${STATEMENTS}/${encodeURIComponent(one.statement_id)}/confirm`);
     else await send("POST", STATEMENTS, JSON.stringify(one.propose));
   };
   const answers = [button(phrase("yes"), `${phrase("yes")}: ${one.text}`, yes)];
+  const no = () => send("PUT", "api/v1/learning", JSON.stringify({ not_empty: one.propose.map(({ from }) => from) }));
   if (one.statement_id) answers.push(button(phrase("withdraw"), `${phrase("withdraw")}: ${one.text}`, () => withdraw(one.statement_id)));
+  else answers.push(button(phrase("no"), `${phrase("no")}: ${one.text}`, no));
   return made("li", [made("span", `${one.text} `), ...answers]);
 }
 

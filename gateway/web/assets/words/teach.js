@@ -21,10 +21,11 @@ export const TEACH = {
   only_statement: ["Only a statement helps now.", "Jetzt hilft nur noch eine Angabe."],
   driven: ["Driving that can teach", "Fahrzeit, die etwas lehrt"],
   driven_so_far: ["{duration} of driving kept, {n} drive|{duration} of driving kept, {n} drives", "{duration} Fahrt aufbewahrt, {n} Fahrt|{duration} Fahrt aufbewahrt, {n} Fahrten"],
-  helps_to: ["{what}: ± {kg}", "{what}: ± {kg}"],
+  helps_to: ["{what}: then ± {kg}", "{what}: dann ± {kg}"],
 
   questions: ["Is that right?", "Stimmt das?"],
   yes: ["Yes", "Ja"],
+  no: ["No", "Nein"],
   withdraw: ["Withdraw", "Zurücknehmen"],
 
   aboard: ["What is aboard", "Was geladen ist"],
