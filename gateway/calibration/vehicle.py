@@ -795,6 +795,7 @@ class _Fitted:
             mean, variance = (mean / variance - share / std**2) * left, left
         return abs(mean - share) / float(np.sqrt(variance + std**2 + model_std**2))
 
+    @cached_property
     def covariance(self) -> F64:
         """(n, n) of all parameters: roll moves with the half-car by -C I_rp."""
         upright = self.half_car.covariance[:N, :N]
@@ -816,7 +817,7 @@ class _Fitted:
 
     def model(self, vehicle: Vehicle) -> VehicleModel:
         """The vehicle, its intervals not yet tested on any drive left out."""
-        return self._model(vehicle, self.theta, self.covariance())
+        return self._model(vehicle, self.theta, self.covariance)
 
     def without(self, one: _Drive, vehicle: Vehicle) -> tuple[VehicleModel, F64, F64]:
         """The vehicle as the other drives teach it, from the result of all; roll as all of them show it. With it the
@@ -825,7 +826,7 @@ class _Fitted:
         others = [i for i, each in enumerate(self.seen) if each is not one]
         start = [fit.Drive(self.seen[i], self.own_priors[i], self.half_car.own[i]) for i in others]
         found = fit.most_probable(self.half_car.common, self.prior.upright(len(self.causes)), start, FINE)
-        theta, covariance = self.theta, self.covariance().copy()
+        theta, covariance = self.theta, self.covariance.copy()
         theta[:N], covariance[:N, :N] = found.common[:N], found.covariance[:N, :N]
         covariance[N:, :N] = covariance[:N, N:] = 0.0
         fitted = replace(self, seen=[self.seen[i] for i in others], half_car=found)
