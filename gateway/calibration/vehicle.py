@@ -746,7 +746,10 @@ class _Fitted:
         upright = self.prior.upright(len(self.causes))
         priors = [_own_prior(one.stated, one.vehicle, is_said=bool(one.terms.names)) for one in drives]
         starts = ((self.half_car.common, self.half_car.own), (upright.mean, [prior.mean for prior in priors]))
-        tried = [_from_start(drives, priors, upright, *start) for start in starts]
+        tried = [
+            _lifted(drives, priors, upright, fit.most_probable(common, upright, _at(drives, priors, own), ROUGH))
+            for common, own in starts
+        ]
         return replace(self, seen=drives, own_priors=priors, half_car=min(tried, key=lambda found: found.cost))
 
     def _model_error(self, i: int) -> tuple[float, float]:
@@ -911,11 +914,13 @@ def _fitted(
             for end in ("front", "rear"):
                 common[INDEX[f"spring_{end}_npm"]] += springs
                 common[INDEX[f"damper_{end}_nspm"]] += dampers
-            tried.append(_from_start(seen, priors, upright, common, [one.mean for one in priors]))
+            tried.append(fit.most_probable(common, upright, _at(seen, priors, [one.mean for one in priors]), ROUGH))
             step()
         found = min(tried, key=lambda one: one.cost)
     else:
-        found = _from_start(seen, priors, upright, before.half_car.common, before.half_car.own)
+        start = _at(seen, priors, before.half_car.own)
+        found = fit.most_probable(before.half_car.common, upright, start, ROUGH)
+    found = _lifted(seen, priors, upright, found)
     if not with_roll:
         found = fit.most_probable(found.common, upright, _at(seen, priors, found.own), FINE)
         return _Fitted(seen, priors, causes, found, None, prior, None)
@@ -940,15 +945,10 @@ def _at(seen: Sequence[_Drive], priors: Sequence[fit.Gaussian], own: Sequence[F6
     return [fit.Drive(one, prior, x) for one, prior, x in zip(seen, priors, own, strict=True)]
 
 
-def _from_start(
-    seen: Sequence[_Drive],
-    priors: Sequence[fit.Gaussian],
-    upright: fit.Gaussian,
-    common: F64,
-    own: Sequence[F64],
+def _lifted(
+    seen: Sequence[_Drive], priors: Sequence[fit.Gaussian], upright: fit.Gaussian, found: fit.Found
 ) -> fit.Found:
-    """The peak from one start, its drives lifted out of false peaks of their own: another load, a softer mount."""
-    found = fit.most_probable(common, upright, _at(seen, priors, own), ROUGH)
+    """The peak that was found, its drives lifted out of false peaks of their own: another load, a softer mount."""
     for _ in range(RESEEDS):
         own, n_moved = _reseeded(seen, priors, found)
         if not n_moved:
