@@ -107,7 +107,7 @@ class _Plan:
     def others(self) -> F64:
         """The rows of Slopes.by below those of ``moving``."""
         each = [*self.of_road, *(i for one in self.of_sensors for i in one)]
-        return np.array([[float(i == j) for j in self.free] for i in each])
+        return np.array([[float(i == j) for j in self.free] for i in each]).reshape(len(each), len(self.free))
 
 
 _plan_of = cache(_Plan)
