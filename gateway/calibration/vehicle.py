@@ -746,7 +746,10 @@ class _Fitted:
         upright = self.prior.upright(len(self.causes))
         priors = [_own_prior(one.stated, one.vehicle, is_said=bool(one.terms.names)) for one in drives]
         starts = ((self.half_car.common, self.half_car.own), (upright.mean, [prior.mean for prior in priors]))
-        tried = [_from_start(drives, priors, upright, *start) for start in starts]
+        tried = [
+            _lifted(drives, priors, upright, fit.most_probable(common, upright, _at(drives, priors, own), ROUGH))
+            for common, own in starts
+        ]
         return replace(self, seen=drives, own_priors=priors, half_car=min(tried, key=lambda found: found.cost))
 
     def _model_error(self, i: int) -> tuple[float, float]:
@@ -795,6 +798,7 @@ class _Fitted:
             mean, variance = (mean / variance - share / std**2) * left, left
         return abs(mean - share) / float(np.sqrt(variance + std**2 + model_std**2))
 
+    @cached_property
     def covariance(self) -> F64:
         """(n, n) of all parameters: roll moves with the half-car by -C I_rp."""
         upright = self.half_car.covariance[:N, :N]
@@ -816,7 +820,7 @@ class _Fitted:
 
     def model(self, vehicle: Vehicle) -> VehicleModel:
         """The vehicle, its intervals not yet tested on any drive left out."""
-        return self._model(vehicle, self.theta, self.covariance())
+        return self._model(vehicle, self.theta, self.covariance)
 
     def without(self, one: _Drive, vehicle: Vehicle) -> tuple[VehicleModel, F64, F64]:
         """The vehicle as the other drives teach it, from the result of all; roll as all of them show it. With it the
@@ -825,7 +829,7 @@ class _Fitted:
         others = [i for i, each in enumerate(self.seen) if each is not one]
         start = [fit.Drive(self.seen[i], self.own_priors[i], self.half_car.own[i]) for i in others]
         found = fit.most_probable(self.half_car.common, self.prior.upright(len(self.causes)), start, FINE)
-        theta, covariance = self.theta, self.covariance().copy()
+        theta, covariance = self.theta, self.covariance.copy()
         theta[:N], covariance[:N, :N] = found.common[:N], found.covariance[:N, :N]
         covariance[N:, :N] = covariance[:N, N:] = 0.0
         fitted = replace(self, seen=[self.seen[i] for i in others], half_car=found)
@@ -910,11 +914,13 @@ def _fitted(
             for end in ("front", "rear"):
                 common[INDEX[f"spring_{end}_npm"]] += springs
                 common[INDEX[f"damper_{end}_nspm"]] += dampers
-            tried.append(_from_start(seen, priors, upright, common, [one.mean for one in priors]))
+            tried.append(fit.most_probable(common, upright, _at(seen, priors, [one.mean for one in priors]), ROUGH))
             step()
         found = min(tried, key=lambda one: one.cost)
     else:
-        found = _from_start(seen, priors, upright, before.half_car.common, before.half_car.own)
+        start = _at(seen, priors, before.half_car.own)
+        found = fit.most_probable(before.half_car.common, upright, start, ROUGH)
+    found = _lifted(seen, priors, upright, found)
     if not with_roll:
         found = fit.most_probable(found.common, upright, _at(seen, priors, found.own), FINE)
         return _Fitted(seen, priors, causes, found, None, prior, None)
@@ -939,15 +945,10 @@ def _at(seen: Sequence[_Drive], priors: Sequence[fit.Gaussian], own: Sequence[F6
     return [fit.Drive(one, prior, x) for one, prior, x in zip(seen, priors, own, strict=True)]
 
 
-def _from_start(
-    seen: Sequence[_Drive],
-    priors: Sequence[fit.Gaussian],
-    upright: fit.Gaussian,
-    common: F64,
-    own: Sequence[F64],
+def _lifted(
+    seen: Sequence[_Drive], priors: Sequence[fit.Gaussian], upright: fit.Gaussian, found: fit.Found
 ) -> fit.Found:
-    """The peak from one start, its drives lifted out of false peaks of their own: another load, a softer mount."""
-    found = fit.most_probable(common, upright, _at(seen, priors, own), ROUGH)
+    """The peak that was found, its drives lifted out of false peaks of their own: another load, a softer mount."""
     for _ in range(RESEEDS):
         own, n_moved = _reseeded(seen, priors, found)
         if not n_moved:

@@ -88,17 +88,20 @@ class _Rolling:
         return found.gradient, found.information
 
 
-def most_probable_place(rolling: Whittle, point: Point) -> Place:
-    """The most probable place given the payload and front share of ``point``, starting from its place.
+def search_of_place(rolling: Whittle, point: Point, start: F64 | None = None) -> fit.Found:
+    """The most probable FREE and place, given all else as ``point`` has it: from ``start``, or from there.
 
     ``rolling`` is the likelihood of all three sensors.
     """
     usual = point.theta[FREE]
     precision = np.diag(np.r_[list(FREE_STD.values()), CG_LEFT_STD_M] ** -2.0)
-    of_place = _Rolling(rolling, point)
-    start = np.r_[usual, point.cg_left_m]
-    found = fit.climb(of_place, fit.Gaussian(np.r_[usual, 0.0], precision), start, tolerance=0.01)
-    there, n = of_place.at(found.own[0]), len(point.theta)
+    start = np.r_[usual, point.cg_left_m] if start is None else start
+    return fit.climb(_Rolling(rolling, point), fit.Gaussian(np.r_[usual, 0.0], precision), start, tolerance=0.01)
+
+
+def place_of(rolling: Whittle, point: Point, found: fit.Found) -> Place:
+    """What the search of the place has ``found``, with what moves it."""
+    there, n = _Rolling(rolling, point).at(found.own[0]), len(point.theta)
     free, covariance = [*FREE, n + 2], found.own_covariances[0]
     whole = rolling.curvature(there, range(n + 3))
     moves = -covariance[-1] @ whole.information[free]

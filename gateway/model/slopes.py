@@ -40,8 +40,8 @@ class Slopes:
     """Derivatives of the matrix by e parameters, apart from the growth of the noise.
 
     dense (b, m + 2, p^2, r) are without the taper. local (p, 11, b, m), with it, change one sensor's own power: by each
-    knot of its slack, and last by its noise. The slope by a parameter is the sum of these columns, the dense ones
-    first, times its column of ``by`` (r + 11 p, e).
+    knot of its slack, and last by its noise; (p, 0, b, m) if none of these is among the parameters. The slope by a
+    parameter is the sum of these columns, the dense ones first, times its column of ``by`` (r + 11 p, e).
     """
 
     dense: F64
@@ -66,7 +66,7 @@ def slopes_of(e: Expected, free: Sequence[int]) -> Slopes:
     by = np.zeros((r + len(plan.others), len(plan.free)))
     by[:r, plan.where_moving] = far
     by[r:] = plan.others
-    return Slopes(dense, chain.local(), by)
+    return Slopes(dense, chain.local()[:, : len(plan.of_sensors[0])], by)
 
 
 @dataclass(frozen=True)
@@ -98,10 +98,16 @@ class _Plan:
         return [i for i in _OF_ROAD if i in self.free]
 
     @cached_property
+    def of_sensors(self) -> list[list[int]]:
+        """Entries of each sensor's slack and noise; none if no sensor's are free."""
+        every = _LOCAL[: self.p]
+        return every if any(i in self.free for one in every for i in one) else [[] for _ in every]
+
+    @cached_property
     def others(self) -> F64:
         """The rows of Slopes.by below those of ``moving``."""
-        each = [*self.of_road, *(i for one in _LOCAL[: self.p] for i in one)]
-        return np.array([[float(i == j) for j in self.free] for i in each])
+        each = [*self.of_road, *(i for one in self.of_sensors for i in one)]
+        return np.array([[float(i == j) for j in self.free] for i in each]).reshape(len(each), len(self.free))
 
 
 _plan_of = cache(_Plan)

@@ -22,7 +22,7 @@ from gateway.estimate import Estimate
 from gateway.model import fit
 from gateway.model.checks import VEHICLE_ROWS, Signs, disbelieved, fits, reach_of, unseen_of, why_not
 from gateway.model.expected import with_strokes
-from gateway.model.place import ROLL_BAND_HZ, Place, most_probable_place, roll_share_of, spectra_of_sides
+from gateway.model.place import ROLL_BAND_HZ, Place, place_of, roll_share_of, search_of_place, spectra_of_sides
 from gateway.model.sensors import GAIN_STD, NOISE_RATIOS, Noise, gain_of, is_changed, noise_of, watched
 from gateway.model.spectra import CrossSpectra, cross_spectra_of, level
 from gateway.model.table import INDEX, UPRIGHT, N, covariance_of
@@ -234,13 +234,13 @@ def mixture_of(
     own = _Own(Whittle(flat, model.ground, weight), roll, 0.0, most_kg)
     coarse = _coarse(own, first, model)
     best = max(coarse, key=lambda one: one.log_evidence)
-    rolling = None
+    rolling = sideways = None
     if with_roll:
         roll = level(model.parameters)[N:]
         moving = with_strokes(spectra, np.r_[model.parameters[:N], roll], best.load, model.ground)
         rolling = Whittle(moving.within(ROLL_BAND_HZ), model.ground)
-        place = most_probable_place(rolling, Point.of(np.r_[best.x[:N], roll], best.load))
-        own = _Own(Whittle(moving.without_roll, model.ground, weight), roll, place.cg_left_m, most_kg)
+        sideways = search_of_place(rolling, Point.of(np.r_[best.x[:N], roll], best.load)).own[0]
+        own = _Own(Whittle(moving.without_roll, model.ground, weight), roll, float(sideways[-1]), most_kg)
     peaks = [_climb(own, one.hypothesis, one.x, FINE) for one in coarse if _is_worth(one, best)]
     best = max(peaks, key=lambda one: one.log_evidence)
     for other in others:
@@ -257,7 +257,7 @@ def mixture_of(
     order = np.argsort(-weights, kind="stable").tolist()
     distinct, weights = [distinct[i] for i in order], weights[order] / weights.sum()
     point = own.point(distinct[0].x)
-    placed = None if rolling is None else most_probable_place(rolling, point)
+    placed = None if rolling is None else place_of(rolling, point, search_of_place(rolling, point, sideways))
     return Mixture(tuple(distinct), weights, own.whittle, point, placed)
 
 

@@ -31,6 +31,7 @@ from gateway.records import C128, F64
 EFFECTIVE_SHARE: Final = 0.5  # chosen: neighbouring Hann bins and half-overlapping segments are correlated
 ROAD_RIPPLE: Final = 0.3  # standard deviation of log s about its line; chosen (`benchmarks.accuracy sensitivity`)
 ROAD_SLOPE_STD: Final = 0.3  # chosen: of the line's slope
+AT_ONCE: Final = 8  # points of which the costs are computed together: more take memory and hardly less time
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,10 +102,12 @@ class Whittle:
         return float(self._cost(self._solved(point)[1])[0])
 
     def costs(self, points: Sequence[Point]) -> F64:
-        """(k,) costs of several points, solved at once."""
+        """(k,) costs of several points, a few of them solved at once."""
         theta, load = np.array([one.theta for one in points]), np.array([one.loaded for one in points]).T
         theta = theta[:1] if (theta == theta[0]).all() else theta
-        return self._cost(_Whitening(Expected(theta, load, self._groups).parts, self.spectra.parts))
+        parts = [slice(first, first + AT_ONCE) for first in range(0, len(points), AT_ONCE)]
+        solved = (Expected(theta if len(theta) == 1 else theta[i], load[:, i], self._groups).parts for i in parts)
+        return np.concatenate([self._cost(_Whitening(one, self.spectra.parts)) for one in solved])
 
     def misfit(self, point: Point) -> float:
         """Likelihood ratio against free matrices at every group and frequency, over what a correct model has: 1.
