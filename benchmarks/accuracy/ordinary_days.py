@@ -167,25 +167,23 @@ def _figures(answered: Sequence[Sequence[float]]) -> dict[str, Any]:
     return told
 
 
-HEAD: Final = (
-    "what is told", "days", "payload: error %", "± %", "held %", "score", "front share: error %", "held %",
-    "payload beyond twice its ±, %", "worst van held %", "refused",
-)  # fmt: skip
+HEAD: Final = ("payload error, ±, and held, in %", *(f"after {after} d" for after in DAYS), "worst van held")
 
 
 def section(found: Mapping[str, Any]) -> str:
-    """The table."""
+    """A row for each way, with the least share that the intervals of one van held after the most days."""
+    by_way: dict[str, dict[int, Mapping[str, Any]]] = {}
+    for line in found["lines"]:
+        by_way.setdefault(line["way"], {})[line["days"] or DAYS[-1]] = line
     rows = [
-        [
-            line["way"], str(line["days"] or "–"),
-            *(f"{line['payload'][name]:.1f}" for name in ("error", "half", "held", "score")),
-            *(f"{line['share'][name]:.1f}" for name in ("error", "held")),
-            f"{line['beyond_twice_pct']:.1f}", f"{line['least_held_of_a_van_pct']:.0f}",
-            f"{line['refused']} of {line['n'] + line['refused']}",
-        ]
-        for line in found["lines"]
-    ]  # fmt: skip
+        [way, *(_cell(lines.get(after)) for after in DAYS), f"{lines[max(lines)]['least_held_of_a_van_pct']:.0f}"]
+        for way, lines in by_way.items()
+    ]
     return "\n".join([f"{found['n_vans']} vans.", "", *table(HEAD, rows), ""])
+
+
+def _cell(line: Mapping[str, Any] | None) -> str:
+    return "–" if line is None else "{error:.1f} ±{half:.0f} ({held:.0f})".format(**line["payload"])
 
 
 STUDY: Final = Study(
