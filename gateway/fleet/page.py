@@ -58,6 +58,7 @@ def served(app: FastAPI, host: str, port: int) -> Iterator[int]:
         app, host, port, log_config=None, access_log=False, server_header=False, timeout_graceful_shutdown=1
     )
     server, bound = uvicorn.Server(config), config.bind_socket()  # here, so that a port in use is reported at once
+    bound.listen()  # who asks before the thread runs waits, and is not refused
     thread = threading.Thread(target=server.run, args=([bound],), name="fleet-page", daemon=True)
     thread.start()
     try:
