@@ -68,6 +68,7 @@ def test_nothing_is_green_on_any_page_while_the_vehicle_learns(gateway: Gateway,
         page.goto(f"{server.url}/")
         expect(page.locator("#state")).to_have_attribute("data-tone", "calm")
         expect(page.locator("#overload")).to_contain_text("Still learning")
+        page.close()  # with its stream
 
 
 def test_at_a_glance_it_says_what_can_be_loaded_and_the_rest_on_a_tap(gateway: Gateway, phone: Watched) -> None:

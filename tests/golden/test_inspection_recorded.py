@@ -86,7 +86,6 @@ def test_a_spoiled_signal_map_is_named(
     [
         ("known_loads", "campaign_roll", 7, "PitchRate", "RollRate", []),
         ("known_loads", "campaign_roll", 7, "RollRate", "PitchRate", ["rates_swapped"]),
-        ("known_loads", "campaign_roll", 7, "PitchRate", "PitchRate", ["roll_rate_axis"]),
         ("known_loads", "campaign_roll", 7, "PitchRate", "YawRate", ["roll_rate_axis"]),
         ("solid_axles/known_loads", "campaign_roll", 10, "PitchRate", "YawRate", ["roll_rate_axis"]),
         ("real_drive", "campaign_trip_a", 1, "AngularRateZ", "AngularRateY", []),
