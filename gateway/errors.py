@@ -1,5 +1,7 @@
 """The errors shown to people. Each message says what is wrong, where, and how to mend it."""
 
+from typing import Final
+
 
 class SpringscaleError(Exception):
     """The work failed; the command line prints only the message and exits with 1."""
@@ -31,6 +33,10 @@ class CalibrationFileError(ConfigurationError):
 
 class NoSisterError(ConfigurationError):
     """A calibration cannot serve as a sister's, or the vehicle is of another model."""
+
+
+NOT_STORED: Final = "not_stored"
+"""Reason of a refusal because the disk fails: later it may succeed."""
 
 
 class RefusedError(SpringscaleError):

@@ -67,6 +67,13 @@ EMPTY: Final = said("empty", payload_kg=0.0)
 TRUE: Final = "true"  # the note of a statement that is true although others of its drive are false
 
 
+def axles_kg(run: KnownRun, vehicle: Vehicle) -> tuple[float, float]:
+    """What scales show of the front and the rear axle under the load of a drive."""
+    share, below_kg = 0.01 * run.front_share_pct, UNSPRUNG_SHARE * vehicle.empty_mass_kg
+    sprung_kg = vehicle.empty_mass_kg + run.payload_kg
+    return below_kg + share * sprung_kg, below_kg + (1.0 - share) * sprung_kg
+
+
 @dataclass(frozen=True)
 class Recorded:
     """The recorded van: its drives by name, those to test on, and what is truly stated."""
@@ -86,9 +93,7 @@ class Recorded:
 
     def axles_kg(self, name: str) -> tuple[float, float]:
         """What scales show of the front and the rear axle."""
-        share, below_kg = 0.01 * self.drives[name].front_share_pct, UNSPRUNG_SHARE * self.vehicle.empty_mass_kg
-        sprung_kg = self.vehicle.empty_mass_kg + self.kg(name)
-        return below_kg + share * sprung_kg, below_kg + (1.0 - share) * sprung_kg
+        return axles_kg(self.drives[name], self.vehicle)
 
     def place_m(self, name: str) -> float:
         """The payload's place behind the front axle."""

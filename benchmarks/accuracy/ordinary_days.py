@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.accuracy.calibrated import taught_by
 from benchmarks.accuracy.drives import TRIPS, FreshVan, Scope, driven, fresh_van, known_loads, stated, unseen_load
-from benchmarks.accuracy.false_statements import Said, note, said
+from benchmarks.accuracy.false_statements import Said, axles_kg, note, said
 from benchmarks.accuracy.false_statements import stated as stated_of
 from benchmarks.accuracy.markdown import table
 from benchmarks.accuracy.scatter import Scatter, scattered
@@ -20,7 +20,6 @@ from benchmarks.accuracy.study import Study
 from benchmarks.accuracy.taught import SHARE_SPAN_PCT, taught, weighed
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.vehicle import TaughtDrive, teach
-from gateway.model.table import UNSPRUNG_SHARE
 from gateway.model.vehicle import VehicleModel
 
 SEED: Final = 20281  # arbitrary, of this study alone
@@ -110,10 +109,8 @@ def _notes(days: Sequence[KnownRun], seed: np.random.SeedSequence) -> dict[int, 
 
 def _scales(run: KnownRun, fresh: FreshVan) -> Said:
     """What axle scales show of this tour's load."""
-    empty_kg, below_kg = fresh.vehicle.empty_mass_kg, UNSPRUNG_SHARE * fresh.vehicle.empty_mass_kg
-    front_kg = 0.01 * run.front_share_pct * (empty_kg + run.payload_kg)
-    rear_kg = empty_kg + run.payload_kg - front_kg
-    return said("axle_scales", front_axle_kg=below_kg + front_kg, rear_axle_kg=below_kg + rear_kg)
+    front_kg, rear_kg = axles_kg(run, fresh.vehicle)
+    return said("axle_scales", front_axle_kg=front_kg, rear_axle_kg=rear_kg)
 
 
 def _sister(fresh: FreshVan, seed: np.random.SeedSequence) -> VehicleModel:

@@ -77,6 +77,10 @@ class Piece:
         """Halfway."""
         return (self.begin_ns + self.end_ns) // 2
 
+    def meets(self, begin_ns: int, end_ns: int) -> bool:
+        """Whether it has a time in common with another span."""
+        return self.begin_ns < end_ns and begin_ns < self.end_ns
+
 
 @dataclass(frozen=True, slots=True)
 class Assigned:

@@ -71,6 +71,14 @@ class ToldRow:
     vehicle: str | None
     record: StatementRecord
 
+    def is_of(self, *names: str) -> bool:
+        """Whether it is about the vehicle of these names, or names none."""
+        return self.vehicle is None or _plain(self.vehicle) in map(_plain, names)
+
+
+def _plain(name: str) -> str:
+    return name.strip().casefold()
+
 
 @dataclass(frozen=True, slots=True)
 class ToldRows:

@@ -8,13 +8,13 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 import click
 
 from gateway.bus.signals import load_signal_map
-from gateway.calibration.assigned import Assigned, Fate, moments
+from gateway.calibration.assigned import Assigned, moments
 from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.file.calibration_file import load_calibration
 from gateway.calibration.judgement.advice import Verdict
 from gateway.calibration.learning.learn import Learnt, matched
 from gateway.calibration.learning.learn import learn as learnt_from
-from gateway.calibration.learning.spans import PROBLEMS, rows_told, standing
+from gateway.calibration.learning.spans import rows_record, rows_told, standing
 from gateway.calibration.learning.told import drives_record, learning_record, statements_record
 from gateway.calibration.statements_csv import ToldRow, ToldRows, read_statements
 from gateway.cli import options
@@ -86,8 +86,7 @@ def learn(
     signal_map = load_signal_map(_signals(signals, campaign))
     sister = load_calibration(like) if like else None
     told = ToldRows((), {}, ()) if statements is None else _read(statements, zone)
-    name = campaign.vehicle.name.strip().casefold()
-    rows = [row for row in told.rows if row.vehicle is None or row.vehicle.strip().casefold() == name]
+    rows = [row for row in told.rows if row.is_of(campaign.vehicle.name)]
     numbers = {row.record.id: row.number for row in rows}
     records = standing(row.record for row in rows)
     settings = batch_settings(window_s)
@@ -164,28 +163,7 @@ def _rows_record(
 ) -> Record:
     """What became of the rows before the fit."""
     fates = {one.id: (fate, why) for one, fate, why in zip(records, assigned.fates, assigned.reasons, strict=True)}
-    problems = [
-        {"row": number, "kind": "bad", "text": line.partition(": ")[2]}
-        for number, lines in told.faults.items()
-        for line in lines
-    ]
-    problems += [
-        {"row": row.number, "kind": "unknown_vehicle", "text": f"vehicle: {row.vehicle}: this one is {name}"}
-        for row in told.rows
-        if row not in rows
-    ]
-    for row in rows:
-        fate, reason = fates.get(
-            row.record.id, (Fate.REPLACED, f"replaced by a later one with the ref {row.record.ref}")
-        )
-        if fate in PROBLEMS:
-            problems.append({"row": row.number, "kind": PROBLEMS[fate], "text": reason})
-    return {
-        "n_rows": told.n_rows,
-        "n_match": sum(fates.get(row.record.id, (None, ""))[0] is Fate.MATCHED for row in rows),
-        "problems": sorted(problems, key=lambda one: (one["row"], one["text"])),
-        "notes": list(told.notes),
-    }
+    return rows_record(told, rows, fates, name)
 
 
 def _verdict_record(found: Learnt, verdict: Verdict, output: Path | None) -> Record:

@@ -8,18 +8,15 @@ statement begins or ends inside it. Whatever cannot teach is named and counted.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from math import nan
 from pathlib import Path
 
 from gateway.bus.signals import SignalMap
 from gateway.calibration.inspection.finding import Finding, Severity
-from gateway.calibration.inspection.log import LogFacts, SplitRun
+from gateway.calibration.inspection.log import LogFacts
 from gateway.calibration.inspection.rows import row_facts
-from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.drives import Driven, Pieces, pieces
-from gateway.calibration.learning.learn import LOOKED_FOR
+from gateway.calibration.learning.learn import inspected
 from gateway.calibration.learning.spans import can_teach
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
@@ -91,9 +88,7 @@ def windows_of_motion(motion: Motion, signal_map: SignalMap, settings: BatchSett
     scheduler = Scheduler(settings, signal_map.traits)
     windows = []
     for steps in (scheduler.feed(motion), scheduler.flush()):
-        for batch in steps:
-            name = f"{batch.t_end_ns}-{batch.t_start_ns:012x}"
-            windows.append(kept_batch_of(name, signal_map.id, batch, scheduler.take_rows(), signal_map.traits))
+        windows += [kept_batch_of(signal_map.id, one, scheduler.take_rows(), signal_map.traits) for one in steps]
     return windows
 
 
@@ -108,6 +103,4 @@ def _findings(
 ) -> tuple[Finding, ...]:
     """What is wrong with the sensors, the map or the log."""
     batches = [replace(one.batch, rejected=()) if can_teach(one.batch, settings) else one.batch for one in windows]
-    run = KnownRun(1, log.name, nan, nan, tuple(batches))
-    whole = SplitRun(run, replace(run, batches=()), row_facts(motion, signal_map.traits), log=facts)
-    return inspect_run(whole, vehicle, settings, LOOKED_FOR).findings
+    return inspected(log.name, batches, row_facts(motion, signal_map.traits), facts, vehicle, settings)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from gateway.errors import RefusedError
+from gateway.errors import NOT_STORED, RefusedError
 from gateway.log import Event, log_event
 from gateway.stated.statement import TYPES
 from gateway.status import StatementsHeard
@@ -14,7 +14,6 @@ from gateway.status import StatementsHeard
 TOPIC: Final = "statements"  # below that of the vehicle
 MOST_BYTES: Final = 1_000_000  # chosen: some ten thousand rows; more than max_packet_size of deploy/fleet lets through
 BY: Final = "mqtt"  # who stated it, in the list of statements
-NOT_STORED: Final = "not_stored"  # the disk fails: later it may succeed
 
 TakeStatements = Callable[[bytes, str], str]
 """Takes the content of a message and who sent it -> JSON of an ImportTold. Raises RefusedError."""

@@ -63,6 +63,13 @@ def test_from_nothing_to_the_drive_it_takes_few_clicks_and_numbers(page: Any, be
     expect(page.locator("#driven")).to_have_text("5 min of driving kept, 1 drive")
 
 
+def test_a_place_before_the_front_axle_is_a_number_and_a_length_is_not_negative(page: Any) -> None:
+    for name, is_valid in (("sensor_position_m", True), ("sensor_offset_left_m", True), ("wheelbase_m", False)):
+        field = page.locator(f"#{name}")
+        field.fill("-0.4", force=True)
+        assert field.evaluate("field => field.checkValidity()") is is_valid
+
+
 def test_a_stated_load_is_listed_and_can_be_withdrawn(page: Any) -> None:
     for name, number in VAN.items():
         page.locator(f"#{name}").fill(number)

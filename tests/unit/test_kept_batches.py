@@ -30,7 +30,7 @@ def kept_of(motion: Motion, settings: BatchSettings = SETTINGS) -> list[KeptBatc
 
     def keep(batch: Batch, rows: Motion) -> None:
         if not batch.rejected:
-            found.append(kept_batch_of(f"{batch.t_end_ns}-{batch.t_start_ns:012x}", MAP.id, batch, rows, MAP.traits))
+            found.append(kept_batch_of(MAP.id, batch, rows, MAP.traits))
 
     flow.on_window = keep
     list(flow.feed(motion))

@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.accuracy import ordinary_days as study
 from gateway.calibration.known_run import KnownRun
+from gateway.model.table import UNSPRUNG_SHARE
 
 DAYS = [KnownRun(day, "tour", 0.0 if day % 5 == 0 else 100.0 + day, 55.0, (), 0.0) for day in range(1, 401)]
 
@@ -25,7 +26,7 @@ def test_notes_are_low_and_some_are_of_another_tour() -> None:
 def test_axle_scales_show_the_load_its_place_and_the_unsprung_masses() -> None:
     vehicle = SimpleNamespace(empty_mass_kg=1500.0)
     load = study._scales(DAYS[0], SimpleNamespace(vehicle=vehicle))["load"]
-    below_kg = study.UNSPRUNG_SHARE * 1500.0
+    below_kg = UNSPRUNG_SHARE * 1500.0
     assert load["front_axle_kg"] + load["rear_axle_kg"] == pytest.approx(1500.0 + 101.0 + 2.0 * below_kg)
     assert load["front_axle_kg"] - below_kg == pytest.approx(0.55 * 1601.0)
 

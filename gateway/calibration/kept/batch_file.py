@@ -39,10 +39,11 @@ class KeptBatch:
     facts: RowFacts
 
 
-def kept_batch_of(batch_id: str, signals_id: str, batch: Batch, rows: Motion, traits: Traits) -> KeptBatch:
-    """``rows`` are those of the batch's window, possibly with some before and after it."""
+def kept_batch_of(signals_id: str, batch: Batch, rows: Motion, traits: Traits) -> KeptBatch:
+    """Named by its time. ``rows`` are those of the batch's window, possibly with some before and after it."""
     inside = (rows.t_ns >= batch.t_start_ns) & (rows.t_ns < batch.t_end_ns)
-    return KeptBatch(batch_id, signals_id, batch, row_facts(rows.rows(inside), traits))
+    name = f"{batch.t_end_ns}-{batch.t_start_ns:012x}"
+    return KeptBatch(name, signals_id, batch, row_facts(rows.rows(inside), traits))
 
 
 def packed(kept: KeptBatch) -> bytes:

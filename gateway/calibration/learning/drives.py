@@ -9,7 +9,7 @@ from gateway.calibration.assigned import Piece
 from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.kept.batch_file import KeptBatch
 from gateway.calibration.kept.drive import joined_facts
-from gateway.calibration.learning.spans import ENOUGH_S, MOST_DRIVES, can_teach, spans_of, worth
+from gateway.calibration.learning.spans import ENOUGH_S, can_teach, spans_of, teaching_most
 from gateway.core.pool import LEAST_LOAD_S, Part, spanned
 from gateway.core.settings import BatchSettings
 from gateway.estimate import Way
@@ -75,7 +75,11 @@ def pieces(
     short_s = sum(one.batch.usable_s for one in short)
     driven: list[Driven] = []
     for piece in spans_of([_span(one.batch) for one in ordered], at_ns):
-        mine = [one for one in ordered if one.batch.drive_start_ns == starts[piece.drive - 1] and _meets(one, piece)]
+        mine = [
+            one
+            for one in ordered
+            if one.batch.drive_start_ns == starts[piece.drive - 1] and piece.meets(*_span(one.batch)[1:])
+        ]
         cuts = [(one, batch) for one in mine if (batch := _within(one.batch, piece)) is not None]
         if taught := [(one, batch) for one, batch in cuts if not batch.rejected]:
             facts = joined_facts([one.facts for one, _ in taught])
@@ -101,10 +105,6 @@ def _span(batch: Batch) -> tuple[int, int, int]:
     return batch.drive_start_ns, batch.t_start_ns, batch.t_end_ns
 
 
-def _meets(one: KeptBatch, piece: Piece) -> bool:
-    return one.batch.t_start_ns < piece.end_ns and piece.begin_ns < one.batch.t_end_ns
-
-
 def _within(window: Batch, piece: Piece) -> Batch | None:
     """The part of a window that lies in a piece, rejected if it is too short to teach; None without a sample."""
     if piece.begin_ns <= window.t_start_ns and window.t_end_ns <= piece.end_ns:
@@ -118,9 +118,4 @@ def _within(window: Batch, piece: Piece) -> Batch | None:
 
 def chosen(driven: Sequence[Driven], is_stated: Sequence[bool]) -> list[int]:
     """The pieces that teach most, in order of time."""
-    newest_ns = max((one.piece.end_ns for one in driven), default=0)
-
-    def value(i: int) -> tuple[bool, float]:
-        return worth(driven[i].usable_s, driven[i].piece.end_ns, newest_ns, is_stated=is_stated[i])
-
-    return sorted(sorted(range(len(driven)), key=lambda i: (value(i), i), reverse=True)[:MOST_DRIVES])
+    return teaching_most([(one.usable_s, one.piece.end_ns, said) for one, said in zip(driven, is_stated, strict=True)])

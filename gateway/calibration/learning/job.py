@@ -38,6 +38,7 @@ class LearnResult(Part):
 
     key: str = Field("", description="that of its job; empty: there is no result of the process")
     fault: str | None = None
+    was_killed: bool = Field(False, description="it was ended from outside, so that the same job may succeed later")
     calibration: str | None = None
     calibration_id: str | None = None
     learning: dict[str, Any] = Field(default_factory=dict)

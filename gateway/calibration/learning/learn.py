@@ -9,7 +9,7 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Final
 
-from gateway.calibration.assigned import Assigned, Piece, assign
+from gateway.calibration.assigned import Assigned, assign
 from gateway.calibration.calibrate import OnFit, Outcome, calibrate_inspected, drive_name
 from gateway.calibration.campaign import Campaign, DraftTable
 from gateway.calibration.empties import looking_empty
@@ -17,6 +17,7 @@ from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.log import LogFacts, SplitRun
+from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.drives import Driven, chosen
@@ -25,6 +26,7 @@ from gateway.calibration.vehicle import FoundClaim, FoundLoad
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.errors import CalibrationImpossibleError
+from gateway.records import Batch
 from gateway.stated.statement import StatementRecord
 
 OF_CAMPAIGNS: Final = frozenset(
@@ -67,14 +69,11 @@ class Learnt:
         unknown = {
             number: one
             for number, one in self.loads.items()
-            if not self.statements[number - 1].is_of_payload and not _is_during(self.drives[number - 1].piece, laden)
+            if not self.statements[number - 1].is_of_payload
+            and not any(self.drives[number - 1].piece.meets(*span) for span in laden)
         }
         members = looking_empty(list(unknown.values()), self.outcome.file.vehicle)
         return tuple(number for number, one in unknown.items() if any(one is member for member in members))
-
-
-def _is_during(piece: Piece, spans: Sequence[tuple[int, int]]) -> bool:
-    return any(piece.begin_ns < end_ns and begin_ns < piece.end_ns for begin_ns, end_ns in spans)
 
 
 def matched(records: Sequence[StatementRecord], driven: Sequence[Driven], vehicle: Vehicle) -> Assigned:
@@ -150,10 +149,17 @@ def _facts(one: Driven) -> LogFacts:
 
 def _faults(one: Driven, vehicle: Vehicle, settings: BatchSettings) -> tuple[Finding, ...]:
     """What is wrong with the sensors or the map in this piece."""
-    run = KnownRun(1, one.name, nan, nan, one.batches)
-    whole = SplitRun(run, replace(run, batches=()), one.facts, log=_facts(one))
-    found = inspect_run(whole, vehicle, settings, LOOKED_FOR).findings
+    found = inspected(one.name, one.batches, one.facts, _facts(one), vehicle, settings)
     return tuple(finding for finding in found if finding.severity is Severity.FAULT)
+
+
+def inspected(
+    name: str, batches: Sequence[Batch], rows: RowFacts, log: LogFacts, vehicle: Vehicle, settings: BatchSettings
+) -> tuple[Finding, ...]:
+    """What is wrong with the sensors, the map or the log of an ordinary drive, whatever is known of its load."""
+    run = KnownRun(1, name, nan, nan, tuple(batches))
+    whole = SplitRun(run, replace(run, batches=()), rows, log=log)
+    return inspect_run(whole, vehicle, settings, LOOKED_FOR).findings
 
 
 def _run(number: int, one: Driven, statement: Statement, vehicle: Vehicle) -> KnownRun:

@@ -5,6 +5,7 @@ from itertools import groupby
 from typing import Any, Final
 
 from gateway.calibration.assigned import Fate, Piece, cut
+from gateway.calibration.statements_csv import ToldRow, ToldRows
 from gateway.core.pool import LEAST_LOAD_S, can_be_pooled
 from gateway.core.settings import BatchSettings
 from gateway.records import Batch
@@ -59,6 +60,19 @@ def worth(usable_s: float, end_ns: int, newest_ns: int, *, is_stated: bool) -> t
     return is_stated, min(usable_s, ENOUGH_S) * 0.5 ** (age_days / HALVED_AFTER_DAYS)
 
 
+def teaching_most(drives: Sequence[tuple[float, int, bool]]) -> list[int]:
+    """Which MOST_DRIVES of these teach most, in their order: of each its driving (s), its end (ns), and whether a
+    statement is about it.
+    """
+    newest_ns = max((end_ns for _, end_ns, _ in drives), default=0)
+
+    def value(i: int) -> tuple[tuple[bool, float], int]:
+        usable_s, end_ns, is_stated = drives[i]
+        return worth(usable_s, end_ns, newest_ns, is_stated=is_stated), i
+
+    return sorted(sorted(range(len(drives)), key=value, reverse=True)[:MOST_DRIVES])
+
+
 def standing(records: Iterable[StatementRecord]) -> list[StatementRecord]:
     """Those that stand, of records in the order in which they were made, in an order of their own.
 
@@ -69,6 +83,32 @@ def standing(records: Iterable[StatementRecord]) -> list[StatementRecord]:
     by_ref = {one.ref: one.id for one in by_id.values() if one.ref}
     kept = [one for one in by_id.values() if not one.ref or by_ref[one.ref] == one.id]
     return sorted(kept, key=lambda one: (one.from_ns, one.id))
+
+
+def rows_record(
+    told: ToldRows, mine: Sequence[ToldRow], fates: Mapping[str, tuple[Fate, str]], this_one: str
+) -> dict[str, Any]:
+    """What became of the rows of a table before any fit. ``mine`` are those of this vehicle, ``fates`` their records'
+    by id, without those that a later one replaces; ``this_one`` names the vehicle.
+    """
+    problems: list[dict[str, Any]] = [
+        {"row": number, "kind": "bad", "text": line.partition(": ")[2]}
+        for number, lines in told.faults.items()
+        for line in lines
+    ]
+    problems += [
+        {"row": row.number, "kind": "unknown_vehicle", "text": f"vehicle: {row.vehicle}: this one is {this_one}"}
+        for row in told.rows
+        if row not in mine
+    ]
+    n_match = 0
+    for row in mine:
+        fate, why = fates.get(row.record.id, (Fate.REPLACED, f"replaced by a later one with the ref {row.record.ref}"))
+        n_match += fate is Fate.MATCHED
+        if fate in PROBLEMS:
+            problems.append({"row": row.number, "kind": PROBLEMS[fate], "text": why})
+    problems.sort(key=lambda one: (one["row"], one["text"]))
+    return {"n_rows": told.n_rows, "n_match": n_match, "problems": problems, "notes": list(told.notes)}
 
 
 def rows_told(n_rows: int, n_match: int, problems: Sequence[Mapping[str, Any]]) -> str:

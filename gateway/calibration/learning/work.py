@@ -29,10 +29,10 @@ from gateway.calibration.learning.told import drives_record, learning_record, st
 from gateway.calibration.left_out import LeftOut
 from gateway.core.settings import BatchSettings
 from gateway.errors import CalibrationFileError, KeptBatchError, SpringscaleError
+from gateway.units import BYTES_PER_MB
 from gateway.weighing.estimator import estimate
 
 LOWEST: Final = 19  # of Linux's nice values
-BYTES_PER_MB: Final = 1_000_000  # SI
 LEAST_COMPARED: Final = 3  # chosen: drives with a statement; fewer decide nothing
 WORSE_BY: Final = 0.5  # chosen: mean difference of logarithmic scores a drive, beyond which chance is unlikely
 

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from gateway.calibration.file.calibration_file import load_calibration
 from gateway.calibration.learning.spans import standing
-from gateway.errors import CalibrationFileError, RefusedError
+from gateway.errors import NOT_STORED, CalibrationFileError, RefusedError
 from gateway.files.kept import KeptFiles
 from gateway.log import Event, OnEvent, tell_event
 from gateway.records import iso_utc
@@ -154,9 +154,7 @@ class Book(RecordFile[LearningRecord]):
         try:
             self.keep(record)
         except OSError as fault:
-            raise RefusedError(
-                "not_stored", f"{self.path} cannot be written, so nothing has changed: {fault}"
-            ) from None
+            raise RefusedError(NOT_STORED, f"{self.path} cannot be written, so nothing has changed: {fault}") from None
 
     def write_calibration(self, text: str, calibration_id: str) -> str:
         """Write a calibration that was learnt here -> the name of its file, after reading it back.

@@ -19,14 +19,13 @@ from gateway.calibration.kept.batch_file import kept_batch_of
 from gateway.calibration.learning.answers import doubts_of, vehicle_table
 from gateway.calibration.learning.job import LearnJob, LearnResult
 from gateway.calibration.learning.spans import (
-    MOST_DRIVES,
-    PROBLEMS,
     STATES,
     can_teach,
+    rows_record,
     rows_told,
     spans_of,
     standing,
-    worth,
+    teaching_most,
 )
 from gateway.calibration.sister import require_alike
 from gateway.calibration.statements_csv import StatementsFileError, ToldRow, ToldRows, read_statements
@@ -62,7 +61,6 @@ from gateway.stated.learning import (
     Help,
     ImportTold,
     LearningState,
-    ProblemRow,
     Question,
     StatedVehicle,
     StatementPage,
@@ -70,7 +68,7 @@ from gateway.stated.learning import (
     VersionTold,
 )
 from gateway.stated.statement import StatementRecord, StatementSource
-from gateway.units import NS_PER_S
+from gateway.units import BYTES_PER_MB, NS_PER_S
 from gateway.words import counted
 
 OnEvent = Callable[[str, Mapping[str, Any]], None]
@@ -79,7 +77,6 @@ MakeWorker = Callable[[OnResult], Worker]
 MOST_WAITING: Final = 4  # chosen: windows in the queue; each has some megabytes of rows, one comes every few minutes
 TURN_S: Final = 1.0  # chosen: interval between looks whether there is something to learn
 FIRST_RETRY_S, LAST_RETRY_S = 60.0, 3600.0  # chosen: after a process that was ended from outside
-BYTES_PER_MB: Final = 1_000_000  # SI
 NEWEST, BY_FILE = "newest", "file"
 OTHER_TIME_NS: Final = 86_400 * NS_PER_S  # chosen: a bus whose time is further off than a day has a time of its own
 NO_VEHICLE: Final = "the vehicle is not stated yet: its axle weights, wheelbase and the sensor's place are needed"
@@ -204,8 +201,7 @@ class Learner(ThreadPart):
 
     def _keep(self, handed: _Handed) -> None:
         signal_map, batch = self._signal_map, handed.batch
-        name = f"{batch.t_end_ns}-{batch.t_start_ns:012x}"
-        kept = kept_batch_of(name, signal_map.id, batch, handed.rows, signal_map.traits)
+        kept = kept_batch_of(signal_map.id, batch, handed.rows, signal_map.traits)
         try:
             self._files.add(kept, self._is_stated)
         except OSError as refusal:
@@ -301,14 +297,10 @@ class Learner(ThreadPart):
         """Of what a fit would learn from: the vehicle, the pieces that teach most, and the statements that hold."""
         pieces = spans_of([one.span for one in windows], moments(records))
         holding = assign(records, pieces, vehicle).holding
-        newest_ns = max(one.t_end_ns for one in windows)
-
-        def value(i: int) -> tuple[tuple[bool, float], int]:
-            piece = pieces[i]
-            driven_s = sum(_common_s(one, piece) for one in windows)
-            return worth(driven_s, piece.end_ns, newest_ns, is_stated=bool(holding[i])), i
-
-        best = sorted(sorted(range(len(pieces)), key=value, reverse=True)[:MOST_DRIVES])
+        driven_s = (sum(_common_s(one, piece) for one in windows) for piece in pieces)
+        best = teaching_most(
+            [(s, piece.end_ns, bool(found)) for s, piece, found in zip(driven_s, pieces, holding, strict=True)]
+        )
         held = sorted({i for piece in best for i in holding[piece]})
         content = {
             "vehicle": asdict(vehicle),
@@ -326,7 +318,7 @@ class Learner(ThreadPart):
                 return
             for name in result.damaged:
                 self._files.remove(name)
-            if result.fault is not None and "killed" in result.fault:
+            if result.was_killed:
                 self._not_before_s = time.monotonic() + self._retry.next_s()
                 self._book.tell(Event.NOT_LEARNT, {"fault": result.fault}, level=logging.WARNING)
                 self._disk_fault = result.fault
@@ -488,8 +480,7 @@ class Learner(ThreadPart):
 
     def _is_mine(self, row: ToldRow) -> bool:
         stated = self._book.record.vehicle
-        names = {self._vehicle.id, self._vehicle.name, stated.figures.name if stated else ""}
-        return row.vehicle is None or row.vehicle.strip().casefold() in {name.strip().casefold() for name in names}
+        return row.is_of(self._vehicle.id, self._vehicle.name, stated.figures.name if stated else "")
 
     def _store(self, records: Sequence[StatementRecord], by: str, *, stands_again: bool = True) -> list[Said]:
         """Put statements into the book at once; with ``stands_again`` also what was withdrawn.
@@ -525,32 +516,9 @@ class Learner(ThreadPart):
         others = [one.effective for one in self._book.record.said if one.withdrawn is None]
         records = standing([*others, *(row.record for row in rows)])
         fates = self._fates(records)
-        problems = [
-            ProblemRow(row=number, kind="bad", text=line.partition(": ")[2])
-            for number, lines in told.faults.items()
-            for line in lines
-        ]
-        problems += [
-            ProblemRow(row=row.number, kind="unknown_vehicle", text=f"vehicle: {row.vehicle}: this one is another")
-            for row in told.rows
-            if row not in rows
-        ]
-        n_match = 0
-        for row in rows:
-            fate, why = fates.get(row.record.id, (Fate.REPLACED, f"replaced by a later one: {row.record.ref}"))
-            n_match += fate is Fate.MATCHED
-            if fate in PROBLEMS:
-                problems.append(ProblemRow(row=row.number, kind=PROBLEMS[fate], text=why))
-        problems.sort(key=lambda one: (one.row, one.text))
-        return ImportTold(
-            n_rows=told.n_rows,
-            n_match=n_match,
-            text=rows_told(told.n_rows, n_match, [one.model_dump() for one in problems]),
-            problems=problems,
-            notes=list(told.notes),
-            items=self._told(stored),
-            is_dry_run=is_dry_run,
-        )
+        found = rows_record(told, rows, fates, "another")
+        text = rows_told(found["n_rows"], found["n_match"], found["problems"])
+        return ImportTold(**found, text=text, items=self._told(stored), is_dry_run=is_dry_run)
 
     def _fates(self, records: Sequence[StatementRecord]) -> dict[str, tuple[Fate, str]]:
         """By id what becomes of the statements before any fit, and why."""
@@ -704,7 +672,7 @@ class Learner(ThreadPart):
         """The drives that look empty, without those of which somebody said that they were not."""
         laden = [one.span for one in self._book.record.laden]
         found = [one for one in last.drives if one["number"] in last.looks_empty] if last else []
-        return [one for one in found if not any(_is_common(_span_of(one), span) for span in laden)]
+        return [one for one in found if not any(Piece(*_span_of(one), one["number"]).meets(*span) for span in laden)]
 
     def not_empty(self, begins_ns: Sequence[int], by: str) -> str:
         """These drives, by their begin, look empty and were not: they are not asked about again; JSON: LearningState.
@@ -756,10 +724,6 @@ class Learner(ThreadPart):
 
 def _span_of(drive: Mapping[str, Any]) -> tuple[int, int]:
     return ns_of(str(drive["t_start"])), ns_of(str(drive["t_end"]))
-
-
-def _is_common(one: tuple[int, int], other: tuple[int, int]) -> bool:
-    return one[0] < other[1] and other[0] < one[1]
 
 
 def _common_s(window: Window, piece: Piece) -> float:

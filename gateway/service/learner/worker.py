@@ -74,40 +74,40 @@ class Worker:
             process.wait()
 
     def _wait(self, job: LearnJob, process: subprocess.Popen[bytes]) -> None:
-        fault = None
+        failed = None
         try:
             code = process.wait(WITHIN_S)
-            fault = None if code == 0 else self._why(code)
+            failed = None if code == 0 else self._failed(code)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-            fault = f"learning took longer than {WITHIN_S:.0f} s and was ended"
+            failed = LearnResult(fault=f"learning took longer than {WITHIN_S:.0f} s and was ended")
         with self._lock:
             if self._process is not process:
                 return
-            result = self._result(job, fault)
+            result = failed or self._result(job)
             self._process = None
         self._on_result(job, result)
 
-    def _result(self, job: LearnJob, fault: str | None) -> LearnResult:
-        if fault is not None:
-            return LearnResult(fault=fault)
+    def _result(self, job: LearnJob) -> LearnResult:
         try:
             result = LearnResult.model_validate_json((self.folder / RESULT).read_bytes())
         except (OSError, ValidationError) as broken:
             return LearnResult(fault=f"learning left no result that can be read: {broken}")
         if result.key != job.key:  # a process of a service that was killed ends after its service
-            return LearnResult(fault="learning left the result of another job: it was killed, and begins anew")
+            fault = "learning left the result of another job: it was killed, and begins anew"
+            return LearnResult(fault=fault, was_killed=True)
         return result
 
-    def _why(self, code: int) -> str:
+    def _failed(self, code: int) -> LearnResult:
         if code == -signal.SIGKILL:
-            return "learning was killed: the machine has not enough memory for it, or somebody ended it; it begins anew"
+            why = "the machine has not enough memory for it, or somebody ended it"
+            return LearnResult(fault=f"learning was killed: {why}; it begins anew", was_killed=True)
         with contextlib.suppress(OSError):
             said = (self.folder / SAID).read_bytes()[-MOST_SAID:].decode("utf-8", "replace").strip()
             if said:
-                return f"learning failed: {said.splitlines()[-1]}"
-        return f"learning failed with code {code}"
+                return LearnResult(fault=f"learning failed: {said.splitlines()[-1]}")
+        return LearnResult(fault=f"learning failed with code {code}")
 
 
 def _environment() -> dict[str, str]:

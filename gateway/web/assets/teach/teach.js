@@ -46,7 +46,7 @@ const state = (statement) => send("POST", STATEMENTS, JSON.stringify({ from: lea
 function field(name, isRequired) {
   const input = made("input");
   Object.assign(input, { id: name, name, required: isRequired, autocomplete: "off", inputMode: "decimal" });
-  input.dataset.number = SIGNED.includes(name) ? "signed" : "";
+  input.dataset.number = "";
   const label = made("label", [made("span", phrase(`field.${name}`)), input]);
   return label;
 }
@@ -211,6 +211,7 @@ document.title = phrase("title");
 element("van-required").append(...REQUIRED.map((name) => field(name, true)));
 element("van-more").append(...MORE.map((name) => field(name, false)), carriesField());
 acceptNumbers(phrase("number_hint", { example: numberText(1.5) }));
+for (const name of SIGNED) element(name).pattern = element(name).pattern.replace(" *", " *(-|−)?");
 element("van").addEventListener("submit", (event) => {
   event.preventDefault();
   stateVan(false);
