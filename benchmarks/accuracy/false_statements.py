@@ -3,10 +3,10 @@
     python -m benchmarks.accuracy.false_statements DATA [--output docs]
 
 One empty drive and five mixed ones of the recorded van teach, each with a statement: empty, or a delivery note with an
-error of its own. Then one statement, or all, are false in one of the ways of KINDS. Of each is told whether it was
-refused before any fit, held, counts less (weak) or was used; how many true statements were accused; and how well the
-vehicle then weighs three other drives. At last all eight mixed drives teach: with true notes, with notes that are all
-10 % low, with and without one scale ticket, and with two notes exchanged.
+error of its own. Then one statement, or all, are false in one of the ways of KINDS. For each way the study counts the
+false statements that were refused before any fit, held, weakened or used, and the true ones that were accused, and
+weighs three other drives with the vehicle that was learnt. In a last run all eight mixed drives teach: with true notes,
+with notes that are all 10 % low, with and without one weighing on a scale, and with two notes exchanged.
 """
 
 import argparse
@@ -76,7 +76,7 @@ def axles_kg(run: KnownRun, vehicle: Vehicle) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Recorded:
-    """The recorded van: its drives by name, those to test on, and what is truly stated."""
+    """The recorded van: its drives by name, the drives to test on, and the true statements."""
 
     vehicle: Vehicle
     drives: Mapping[str, KnownRun]
@@ -104,8 +104,8 @@ class Recorded:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A way to be false: which drives' statements are, and what is told then. ``unloaded``: of a drive, at half of
-    which its load became that of another one.
+    """One kind of false statement: the drives that it concerns, and what it says. ``unloaded``: a drive whose load
+    became that of another drive halfway.
     """
 
     title: str
