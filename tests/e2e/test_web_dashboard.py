@@ -199,8 +199,7 @@ def test_a_wide_screen_is_used(site: str, browser: Any) -> None:
     boxes = [made.page.locator(card).bounding_box() for card in ("#latest", "#place", "#day")]
     assert len({box["y"] for box in boxes}) == 1
     assert boxes[-1]["x"] + boxes[-1]["width"] > 1750
-    packed = [card.bounding_box() for card in made.page.locator("#packed > .card").all()]
-    assert len({box["x"] for box in packed}) == 3
+    made.page.wait_for_function(IN_THREE_COLUMNS)
     made.page.close()
 
 
@@ -240,6 +239,9 @@ def test_an_old_estimate_is_said_to_be_old(gateway: Gateway, dashboard: Look) ->
     expect(page.locator("#latest")).to_have_class(re.compile("stale"))
 
 
+#: The cards below the history stand in three columns; they move until all their numbers have come.
+IN_THREE_COLUMNS = """new Set([...document.querySelectorAll("#packed > .card")].map(
+  card => card.getBoundingClientRect().x)).size === 3"""
 ENGLISH = re.compile(r"\b(the|and|not|of|load|weighed|batch|unknown|heard|never)\b")
 NEVER_HEARD = STATUS.bus.model_copy(update={"n_frames": 0})
 STATES = {
