@@ -31,7 +31,7 @@ PLACE_PLUS_MINUS_M: Final = 0.5  # chosen: of a place that nobody measured
 LEFT_PLUS_MINUS_M: Final = 0.1  # chosen: likewise across
 BIAS: Final[Mapping[StatementSource, tuple[float, float]]] = MappingProxyType(
     {
-        StatementSource.DELIVERY_NOTE: (0.05, 0.0),  # packaging and what is always aboard
+        StatementSource.DELIVERY_NOTE: (0.1, 0.0),  # packaging and what is always aboard
         StatementSource.SCALE: (0.0, 5.0),  # driver and tank, compared with the empty vehicle as it was weighed
         StatementSource.AXLE_SCALES: (0.0, 5.0),
     }
