@@ -77,13 +77,13 @@ vcan: .venv/.package
 	PATH="$(CURDIR)/$(BIN):$$PATH" deploy/try-on-vcan.sh
 
 # A simulated week in the service at high speed, some minutes of one processor; then, where `make test-vm` can run, 200
-# kills of the service and 30 power cuts of its machine at random moments, half an hour.
+# kills of the service, 30 power cuts of its machine at random moments and 30 drives to learn from, half an hour.
 SOAK_TESTS := tests/vm/test_4_process_faults.py::test_killed_again_and_again_it_loses_and_doubles_nothing \
-	tests/vm/test_6_power.py
+	tests/vm/test_6_power.py tests/vm/test_7_learning.py
 soak: .venv/.development deb
 	$(BIN)/python -m benchmarks.speed.soak --output build/soak.json
 	rm -f build/vm-soak.json
-	SPRINGSCALE_VM_RESULTS=vm-soak.json SPRINGSCALE_KILLS=200 SPRINGSCALE_POWER_CUTS=30 \
+	SPRINGSCALE_VM_RESULTS=vm-soak.json SPRINGSCALE_KILLS=200 SPRINGSCALE_POWER_CUTS=30 SPRINGSCALE_DRIVES=30 \
 		$(BIN)/python -m pytest -n 2 --dist loadfile $(SOAK_TESTS)
 
 # Debian packages in build/, for this machine's architecture or another, such as `make deb ARCHITECTURE=arm64`; dpkg-deb
