@@ -5,8 +5,8 @@ Prose lives in the pages. Two marks stand for what a program writes:
     <!-- made: NAME -->             what a function of docs/make.py returns
     <!-- end: NAME -->
 
-    <!-- from feed_cost.json: {cpu_pct:.1f} % of one core and {rss_mb:.0f} MB. -->
-    the same sentence with the numbers of docs/feed_cost.json
+    <!-- from soak.json: {hours_a_day:g} h of driving a day. -->
+    the same sentence with the numbers of docs/soak.json
     <!-- end -->
 """
 

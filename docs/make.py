@@ -25,7 +25,6 @@ PARTS: Final[Mapping[str, Mapping[str, Callable[[], str]]]] = {
         "days": measured.soak_days,
         "endured": measured.endured,
     },
-    "docs/feed.md": {"printed": measured.feed_printed},
     "docs/fleet.md": {"fleet test": measured.fleet_test},
     "docs/performance.md": {"conditions": measured.conditions, "speeds": measured.speeds},
 }

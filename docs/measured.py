@@ -130,11 +130,6 @@ def _goal(line: Line) -> str:
     return line.goal and f"{line.goal}: {'met' if line.is_met else 'missed'}"
 
 
-def feed_printed() -> str:
-    """The output of the feed in its measurement."""
-    return f"```json\n{json.dumps(numbers('feed_cost.json')['told'], separators=(',', ':'))}\n```\n"
-
-
 # -- faults --
 
 RECORDED: Final = {
