@@ -163,7 +163,7 @@ def _web(found: Mapping[str, Any]) -> Iterator[Line]:
 def _weigh(found: Mapping[str, Any]) -> Iterator[Line]:
     section = "weighing"
     for name, seconds in found["batch_s"].items():
-        what, held_by = f"a batch of 5 minutes, {name}", HELD_BY.get(name, "")
+        what, held_by = f"a batch of 5 minutes of mixed driving, {name}", HELD_BY.get(name, "")
         yield _below(section, what, 1e3 * seconds, "ms", 35, 0, held_by)
     calibration_s = found["calibration"]["cpu_s"]
     yield _below(section, "calibration on ten drives of 15 minutes", calibration_s, "s", 15, 0, HELD_BY["calibration"])
