@@ -14,7 +14,7 @@ from typing import Any, Final
 from made import DOCS, ROOT, numbers, table
 
 sys.path.insert(0, str(ROOT))
-from benchmarks.accuracy import coverage, disturbances, ordinary_days  # benchmarks are not installed
+from benchmarks.accuracy import coverage, disturbances, false_statements, ordinary_days  # benchmarks are not installed
 from benchmarks.accuracy import faults as faults_of_sensors
 from benchmarks.speed.table import Line, lines_of
 
@@ -73,6 +73,7 @@ def taught() -> str:
 ACCURACY: Final = {
     "taught": taught,
     "ordinary_days": lambda: ordinary_days.section(numbers("ordinary_days.json")),
+    "false_statements": lambda: false_statements.section(numbers("false_statements.json")),
     "coverage": lambda: coverage.section(numbers("coverage.json")),
     "disturbances": lambda: disturbances.section(numbers("disturbances.json")),
     "faults": lambda: faults_of_sensors.section(numbers("sensor-faults.json")),

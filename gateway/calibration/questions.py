@@ -56,6 +56,7 @@ SURE: Final = 1.64  # chosen: standard deviations
 
 def common_errors(causes: Mapping[str, tuple[float, float]]) -> Iterator[str]:
     """A sentence for each source whose statements all err by the same part of the load."""
+    is_weighed = bool({StatementSource.SCALE, StatementSource.AXLE_SCALES} & causes.keys())
     for source, (part, _) in BIAS.items():
         mean, std = causes.get(str(source), (0.0, 1.0))
         if part and abs(mean) > SURE * std and abs(part * mean) > BIAS_SHOWN:
@@ -65,5 +66,5 @@ def common_errors(causes: Mapping[str, tuple[float, float]]) -> Iterator[str]:
             )
             yield (
                 f"all {source.replace('_', ' ')}s say {off} {less} than is aboard: is it packaging, or what is always "
-                "in the vehicle? One weighing on a scale tells"
+                f"in the vehicle? {'The scale is allowed for' if is_weighed else 'One weighing on a scale tells'}"
             )
