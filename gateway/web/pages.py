@@ -1,4 +1,4 @@
-"""Pages for people: dashboard, cab, teaching, the API's documentation, and plotly.js of the installed package."""
+"""Pages for people: those of springscale, the API's documentation, and plotly.js of the installed package."""
 
 import gzip
 import re
@@ -56,19 +56,33 @@ SWAGGER_FILES: Final = Path(str(files("fastapi_offline"))) / "static"
 
 
 def install(app: FastAPI, known_loads_path: str = "") -> None:
-    """/, /cab, /teach, /docs and the files they load. ``known_loads_path`` is the address of the true loads, if there
-    are any.
+    """/, /cab, /teach, /engineer, /docs and the files they load.
+
+    ``known_loads_path`` is the address of the true loads, if there are any.
 
     Pages name files and routes relative to themselves, so that a proxy may serve them below a path of its own.
     """
-    page = Template((ASSETS / "dashboard.html").read_text(encoding="utf-8")).substitute(
-        chart_library=LIBRARY_URL[1:], chart_styles=" ".join(style_ids()), known_loads=known_loads_path[1:]
-    )
+    frame = Template((ASSETS / "frame.html").read_text(encoding="utf-8"))
     asked_about = {"cache-control": "no-cache"}
+
+    def framed(cards: str, script: str) -> str:
+        return frame.substitute(
+            cards=(ASSETS / cards).read_text(encoding="utf-8"),
+            script=script,
+            chart_library=LIBRARY_URL[1:],
+            chart_styles=" ".join(style_ids()),
+            known_loads=known_loads_path[1:],
+        )
+
+    of_dispatcher, of_engineer = framed("dashboard.html", "main"), framed("engineer.html", "engineer")
 
     @app.get("/", include_in_schema=False)
     async def dashboard() -> Response:
-        return HTMLResponse(page, headers=asked_about)
+        return HTMLResponse(of_dispatcher, headers=asked_about)
+
+    @app.get("/engineer", include_in_schema=False)
+    async def engineer() -> Response:
+        return HTMLResponse(of_engineer, headers=asked_about)
 
     @app.get("/cab", include_in_schema=False)
     async def cab() -> Response:

@@ -57,7 +57,9 @@ def test_an_address_of_no_route_tells_nothing(client: Client, path: str) -> None
     assert client.get(path).status_code in (401, 404)
 
 
-@pytest.mark.parametrize("path", ["/", "/cab", "/docs", "/openapi.json", "/health/live", "/assets/dashboard/main.js"])
+@pytest.mark.parametrize(
+    "path", ["/", "/engineer", "/cab", "/docs", "/openapi.json", "/health/live", "/assets/dashboard/main.js"]
+)
 def test_what_tells_nothing_of_the_vehicle_is_public(client: Client, path: str) -> None:
     assert client.get(path).status_code == 200
 

@@ -45,7 +45,7 @@ def test_only_the_api_documentation_may_write_styles(client: Client) -> None:
     assert "script-src 'self';" in policies[0]
 
 
-@pytest.mark.parametrize("path", ["/", "/cab", "/docs"])
+@pytest.mark.parametrize("path", ["/", "/engineer", "/cab", "/docs"])
 def test_the_page_holds_no_script_and_no_style_of_its_own(client: Client, path: str) -> None:
     page = client.get(path).text
     assert re.findall(r"<script(?![^>]*\bsrc=)", page) == []
@@ -54,7 +54,13 @@ def test_the_page_holds_no_script_and_no_style_of_its_own(client: Client, path: 
 
 
 @pytest.mark.parametrize(
-    ("path", "tables"), [("/cab", ("common", "cab")), ("/", ("common", "dashboard")), ("/teach", ("common", "teach"))]
+    ("path", "tables"),
+    [
+        ("/cab", ("common", "cab")),
+        ("/", ("common", "dashboard")),
+        ("/engineer", ("common", "dashboard")),
+        ("/teach", ("common", "teach")),
+    ],
 )
 def test_every_word_stands_in_the_table_in_every_language(client: Client, path: str, tables: tuple[str, ...]) -> None:
     """A row per phrase; English and German have the same fields; what a page names has a row."""
@@ -80,7 +86,7 @@ def test_german_has_every_reason_source_and_remedy(client: Client) -> None:
     assert [str(name) for name in EXPLANATIONS if f'"reason.{name}"' not in common] == []
 
 
-@pytest.mark.parametrize("path", ["/", "/cab"])
+@pytest.mark.parametrize("path", ["/", "/engineer", "/cab"])
 def test_an_id_stands_once_in_a_page(client: Client, path: str) -> None:
     """Two parts of the dashboard had one, and a script filled the first that it found."""
     ids = re.findall(r'\sid="([^"]+)"', client.get(path).text)
@@ -104,7 +110,13 @@ def loaded(client: Client, page: str) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("prefix", ["", PREFIX])
 @pytest.mark.parametrize(
-    ("path", "one"), [("/", LIBRARY_URL), ("/cab", "/assets/cab/cab.js"), ("/docs", "/swagger/swagger-ui.css")]
+    ("path", "one"),
+    [
+        ("/", LIBRARY_URL),
+        ("/engineer", LIBRARY_URL),
+        ("/cab", "/assets/cab/cab.js"),
+        ("/docs", "/swagger/swagger-ui.css"),
+    ],
 )
 def test_every_file_the_page_names_is_there(client: Client, path: str, one: str, prefix: str) -> None:
     """Also below a path of a proxy, which cuts it off."""
@@ -114,7 +126,7 @@ def test_every_file_the_page_names_is_there(client: Client, path: str, one: str,
 
 def test_scripts_ask_for_routes_relative_to_the_page(client: Client) -> None:
     """An absolute one would leave the path of a proxy."""
-    paths = {path for page in ("/", "/cab") for path in loaded(client, page) if path.endswith(".js")}
+    paths = {path for page in ("/", "/engineer", "/cab") for path in loaded(client, page) if path.endswith(".js")}
     paths = {path for path in paths if "plotly" not in path and "/words/" not in path}
     asked = [text for path in paths for text in re.findall(r"[\"`]/(?:api|assets)/", client.get(path).text)]
     assert asked == []

@@ -1,4 +1,4 @@
-"""Alarms on the dashboard: active ones at the top, ended ones in a card of their own."""
+"""Alarms: active ones at the top of the dashboard, ended ones on the page for engineers."""
 
 from pathlib import Path
 
@@ -11,7 +11,9 @@ from support.web import serving
 from gateway.web.app import create_app
 
 
-def test_an_alarm_comes_by_the_stream_and_moves_down_when_it_ends(tmp_path: Path, watched: Watched) -> None:
+def test_an_alarm_comes_by_the_stream_and_goes_to_the_engineers_page_when_it_ends(
+    tmp_path: Path, watched: Watched
+) -> None:
     bench, page = AlarmBench(tmp_path / "store"), watched.page
     parts = of_no_vehicle(tmp_path / "store", bench.store) | {"alarms": bench.desk.standing}
     with serving(create_app(bench.board, bench.store.reader(), lambda: STATUS, **parts)) as server:
@@ -23,6 +25,7 @@ def test_an_alarm_comes_by_the_stream_and_moves_down_when_it_ends(tmp_path: Path
         assert [text for contrast, text in page.evaluate(CONTRASTS) if contrast < LEAST_CONTRAST] == []
         bench.weigh(of_load(2, 100.0))
         expect(page.locator("#alarms")).to_be_hidden()
+        page.get_by_role("link", name="For engineers").click()
         expect(page.locator("#alarms-entries li")).to_contain_text("Whole vehicle: 2,560 ± 22 kg")
         assert [said for said in watched.complaints if "ERR_FAILED" not in said] == []
         bench.board.close()

@@ -31,7 +31,7 @@ def gateway(tmp_path: Path) -> Iterator[Gateway]:
 def test_the_state_stays_in_view(site: str, browser: Any, options: dict[str, Any]) -> None:
     page = browser.new_page(**options)
     page.goto(site)
-    expect(page.locator("#calibrated")).to_contain_text("Wheelbase")
+    expect(page.locator("#payload-chart[data-drawn]")).to_be_visible()
     page.locator("footer").scroll_into_view_if_needed()
     assert page.evaluate("scrollY") > 400
     expect(page.locator("#state")).to_be_in_viewport(ratio=1.0)
@@ -90,6 +90,7 @@ def test_a_vehicle_that_is_not_taught_is_sent_to_teach_and_not_to_a_command(gate
     page = dashboard()
     expect(page.locator("#note")).to_contain_text("the vehicle is not taught yet. “Teach” says what comes next.")
     expect(page.locator("#note")).not_to_contain_text("springscale")
+    page.get_by_role("link", name="For engineers").click()
     expect(page.locator("#rejected")).to_contain_text("the vehicle is not taught yet", use_inner_text=False)
     expect(page.locator("#rejected")).not_to_contain_text("springscale", use_inner_text=False)
 
@@ -132,6 +133,7 @@ def test_a_phone_shows_the_load_and_folds_the_rest(site: str, browser: Any) -> N
     expect(page.locator("#payload-chart[data-drawn]")).to_be_visible()
     assert page.evaluate("document.documentElement.scrollHeight / innerHeight") < MOST_SCREENS_ON_A_PHONE
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["viewport"]["width"]
+    page.goto(f"{site}/engineer")
     fold = page.get_by_role("button", name="Spectra of the suspension")
     expect(fold).to_have_attribute("aria-expanded", "false")
     expect(page.locator("#spectra-charts")).to_be_hidden()

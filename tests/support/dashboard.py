@@ -96,7 +96,7 @@ class Watched:
 
     def wait_for_charts(self) -> None:
         """Until the last of them is drawn."""
-        for chart in ("#payload-chart", "#share-chart", "#spectra-pitch_rate_radps_rthz", "#spectra-phase_rad"):
+        for chart in ("#payload-chart", "#share-chart"):
             self.page.wait_for_selector(f"{chart}[data-drawn]")
 
     def wait_until(self, condition: str) -> None:

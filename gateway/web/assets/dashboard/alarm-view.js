@@ -1,4 +1,4 @@
-// Alarms: active ones come first on the page, ended ones are below.
+// Alarms: active ones come first on the dashboard, ended ones are on the engineer's page.
 
 import { show } from "./known.js";
 import { element, made } from "./page.js";
@@ -28,11 +28,15 @@ function item(alarm, verdict) {
   return built;
 }
 
+/** Those that stand are on the dashboard, those that ended on the engineer's page. */
+function list(card, entries, alarms, verdict) {
+  if (element(card) === null) return;
+  element(card).hidden = alarms.length === 0;
+  element(entries).replaceChildren(...alarms.map((alarm) => item(alarm, verdict)));
+}
+
 show(({ alarms, weights }) => {
   if (alarms === null) return;
-  const [active, ended] = [alarms.filter((alarm) => alarm.is_active), alarms.filter((alarm) => !alarm.is_active)];
-  element("alarms").hidden = active.length === 0;
-  element("alarms-open").replaceChildren(...active.map((alarm) => item(alarm, weights?.verdict)));
-  element("alarms-past").hidden = ended.length === 0;
-  element("alarms-entries").replaceChildren(...ended.map((alarm) => item(alarm)));
+  list("alarms", "alarms-open", alarms.filter((alarm) => alarm.is_active), weights?.verdict);
+  list("alarms-past", "alarms-entries", alarms.filter((alarm) => !alarm.is_active));
 }, "alarms", "weights");

@@ -5,12 +5,16 @@ import { follow } from "./event-stream.js";
 import { alarmsOf } from "./alarm-view.js";
 import { ALARMS, LEARNING, Refused, load } from "./gateway.js";
 import { known, learn } from "./known.js";
+import { element } from "./page.js";
 import { explained } from "./phrases.js";
 
 const ASK_EVERY_MS = 5000; // chosen: as the cab page
 const GATHER_MS = 50; // chosen: shorter than a person notices
 const MOST_BATCHES = 1000; // the limit of a page of the API
 const BATCHES_BY_HOURS = { 3: 300, 24: 300, 168: MOST_BATCHES };
+
+/** Whether this page shows it: a dashboard asks for no spectra, an engineer's page for no day. */
+const has = (card) => element(card) !== null;
 
 async function askNow() {
   try {
@@ -32,6 +36,7 @@ async function askBatches() {
 const ENTRIES = "order=newest_first&limit=200";
 
 async function askDay() {
+  if (!has("day")) return;
   const [events, trips] = await Promise.all([load(`api/v1/events?${ENTRIES}`), load(`api/v1/trips?${ENTRIES}`)]);
   learn({ events: events.items, trips: trips.items });
 }
@@ -45,7 +50,9 @@ function revised(entries, entry) {
   return [entry, ...(entries ?? []).filter((one) => one.id !== entry.id)];
 }
 
-const askSpectra = async () => learn({ spectra: await load("api/v1/spectra/latest") });
+async function askSpectra() {
+  if (has("spectra")) learn({ spectra: await load("api/v1/spectra/latest") });
+}
 
 async function askOnce() {
   const [vehicle, reasons] = await Promise.all([load("api/v1/vehicle"), load("api/v1/reasons")]);

@@ -1,4 +1,4 @@
-// The dashboard: creates the views, then the feed that fills them.
+// The dashboard: what a dispatcher asks. Creates the views, then the feed that fills them.
 
 import "./phrases.js"; // first: the others find its words in the page
 import "./theme-button.js";
@@ -7,14 +7,12 @@ import "./state-view.js";
 import "./alarm-view.js";
 import "./load-view.js";
 import "./van-view.js";
-import "./health-view.js";
 import "./history-view.js";
 import "./day-view.js";
-import "./spectra-view.js";
 import "./teach-view.js";
 
 import { feed, lookBack } from "./feed.js";
-import { ask, setToken } from "./gateway.js";
+import { ask } from "./gateway.js";
 import { element } from "./page.js";
 
 /** Saves what is at `path` as a file. A link cannot carry the token; a question can. */
@@ -25,12 +23,6 @@ async function download(path, name) {
   link.click();
   URL.revokeObjectURL(link.href);
 }
-
-element("token").addEventListener("submit", (event) => {
-  event.preventDefault();
-  setToken(element("token-text").value);
-  location.reload();
-});
 
 element("export").addEventListener("click", (event) => {
   event.preventDefault();

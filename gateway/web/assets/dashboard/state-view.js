@@ -1,5 +1,6 @@
 // The state of the service in words, and whether this page hears it.
 
+import { setToken } from "./gateway.js";
 import { show } from "./known.js";
 import { element, write } from "./page.js";
 import { phrase } from "./phrases.js";
@@ -50,3 +51,9 @@ show(({ isLive }) => {
   write("link", phrase(isLive ? "live" : "not_live"));
   element("link").className = isLive ? "live" : "lost";
 }, "isLive");
+
+element("token").addEventListener("submit", (event) => {
+  event.preventDefault();
+  setToken(element("token-text").value);
+  location.reload();
+});

@@ -1,0 +1,13 @@
+// The engineer's page: why batches were refused, spectra, sensors, bus and calibration.
+
+import "./phrases.js"; // first: the others find its words in the page
+import "./theme-button.js";
+import "./fold.js";
+import "./state-view.js";
+import "./alarm-view.js";
+import "./health-view.js";
+import "./spectra-view.js";
+
+import { feed } from "./feed.js";
+
+feed();
