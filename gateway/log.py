@@ -78,6 +78,7 @@ class Event(StrEnum):
     STATEMENT_WITHDRAWN = "statement withdrawn"
     STATEMENT_CONFIRMED = "statement confirmed"
     VEHICLE_STATED = "vehicle stated"
+    SISTER_STATED = "vehicle of the same model stated"
     LEARNT = "learnt"
     NOT_LEARNT = "not learnt"
     VERSION_CHOSEN = "version chosen"

@@ -133,6 +133,13 @@ class DoubtOfVehicle(Part):
     meant: dict[str, float | tuple[float, float]] = Field(description="figures that would leave no doubt")
 
 
+class SisterTold(Part):
+    """The vehicle of the same model whose calibration is the prior of what is learnt."""
+
+    name: str
+    calibration_id: str | None = Field(description="of the file that was handed in; null: the settings name it")
+
+
 class StatedVehicle(Part):
     """The vehicle as somebody stated it to the service."""
 

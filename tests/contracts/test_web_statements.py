@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,15 @@ import pytest
 from support.learner import ANSWERS, LearnerBench, at, found
 from support.web import Client, Gateway
 
+from gateway.calibration.file.calibration_file import load_calibration
+from gateway.stated.learning import SisterTold
 from gateway.web.access.tokens import Scope, TokenFile
 
 STATEMENTS = "/api/v1/statements"
 LEARNING = "/api/v1/learning"
 VEHICLE = "/api/v1/vehicle"
+SISTER = f"{VEHICLE}/sister"
+DEMO = Path(str(files("gateway"))) / "demo" / "paper_van.json"
 NOTE: dict[str, Any] = {
     "from": at(0),
     "source": "delivery_note",
@@ -246,6 +251,45 @@ def test_a_vehicle_that_cannot_be_is_refused(local: Client) -> None:
     assert (answer.status_code, answer.json()["reason"]) == (409, "vehicle_unusable")
     assert local.request("PUT", VEHICLE, json={"wheelbase_m": 2.7}).status_code == 422
     assert local.get(VEHICLE).json()["stated"] is None
+
+
+def test_learning_begins_with_the_file_of_a_vehicle_of_the_same_model(local: Client, bench: LearnerBench) -> None:
+    alike = load_calibration(DEMO)
+    local.request("PUT", VEHICLE, json={**ANSWERS, "wheelbase_m": alike.vehicle.wheelbase_m})
+    bench.drive(0)
+    bench.turn()
+    alone = bench.worker.job
+    assert alone is not None
+    assert alone.like is None
+    bench.finish()
+    assert local.request("PUT", SISTER, content=DEMO.read_bytes()).json()["sister"] == {
+        "name": alike.vehicle.name,
+        "calibration_id": alike.id,
+    }
+    bench.turn()
+    like = bench.worker.job
+    assert like is not None
+    assert like.like is not None
+    assert like.key != alone.key
+    assert load_calibration(like.like).id == alike.id
+    bench.finish()
+    again = LearnerBench(bench.directory)  # after a restart
+    assert again.learner.sister() == SisterTold(name=alike.vehicle.name, calibration_id=alike.id)
+    assert local.request("DELETE", SISTER).json()["sister"] is None
+    bench.turn()
+    assert bench.worker.job is not None
+    assert bench.worker.job.key == alone.key
+    assert list(bench.directory.glob("sister-*")) == []
+
+
+def test_a_file_that_is_no_calibration_of_this_model_is_refused(local: Client) -> None:
+    for content in (b"", b"[]", b"{}", b'{"format": "springscale-calibration", "version": 99}', b"\xff"):
+        answer = local.request("PUT", SISTER, content=content)
+        assert (answer.status_code, answer.json()["reason"]) == (409, "no_calibration_file")
+    local.request("PUT", VEHICLE, json={**ANSWERS, "wheelbase_m": 3.4})
+    answer = local.request("PUT", SISTER, content=DEMO.read_bytes())
+    assert (answer.status_code, answer.json()["reason"]) == (409, "not_its_sister")
+    assert local.get(VEHICLE).json()["sister"] is None
 
 
 def test_every_version_is_kept_explained_and_may_be_chosen(local: Client, bench: LearnerBench) -> None:

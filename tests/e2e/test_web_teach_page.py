@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -133,3 +134,12 @@ def test_a_decimal_comma_is_a_comma_in_german_and_refused_in_english(
             field.press("Enter")
         assert sent.value.post_data_json["load"] == {"payload_kg": 1240.5}
     other.close()
+
+
+def test_a_vehicle_of_the_same_model_is_handed_in_and_taken_back(page: Any) -> None:
+    page.get_by_text("More", exact=True).click()
+    shipped = Path(str(files("gateway"))) / "demo" / "paper_van.json"
+    page.locator("#sister-file").set_input_files(shipped)
+    expect(page.locator("#sister")).to_contain_text("Learning begins with what is known of")
+    page.locator("#sister").get_by_role("button").click()
+    expect(page.locator("#sister")).to_be_hidden()

@@ -8,8 +8,9 @@ from typing import Any, Final, Literal
 
 from pydantic import Field
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
 from gateway.calibration.learning.spans import standing
+from gateway.core.vehicle import Vehicle
 from gateway.errors import NOT_STORED, CalibrationFileError, RefusedError
 from gateway.files.kept import KeptFiles
 from gateway.log import Event, OnEvent, tell_event
@@ -20,6 +21,7 @@ from gateway.stated.statement import StatementRecord
 
 FILE_NAME: Final = "learning.json"
 LEARNT: Final = "learnt-"  # the names of calibrations begin so
+SISTER: Final = "sister-"
 MOST_VERSIONS: Final = (
     50  # chosen: calibrations of some 100 kB; the oldest beyond are forgotten, and their files removed
 )
@@ -55,6 +57,15 @@ class Stated(Part):
     at: str
     by: str
     confirmed: Act | None = None
+
+
+class Sister(Part):
+    """A vehicle of the same model: its calibration, which somebody handed in, is the prior of what is learnt."""
+
+    file_name: str
+    id: str
+    vehicle: Vehicle
+    said: Act
 
 
 class Version(Part):
@@ -106,6 +117,7 @@ class LearningRecord(Part):
     version: Literal[1] = 1
     said: tuple[Said, ...] = ()
     vehicle: Stated | None = None
+    sister: Sister | None = None
     versions: tuple[Version, ...] = ()
     held: str | None = None
     laden: tuple[Laden, ...] = ()
@@ -167,10 +179,19 @@ class Book(RecordFile[LearningRecord]):
             raise CalibrationFileError(f"{name}: is not what was learnt")
         return name
 
+    def write_sister(self, content: bytes, held: CalibrationFile, by: str) -> Sister:
+        """Write the calibration of a vehicle of the same model. Raises RefusedError if the disk fails."""
+        name = f"{SISTER}{held.id.removeprefix('sha256:')[:16]}.json"
+        try:
+            KeptFiles(self.directory).write(name, content)
+        except OSError as fault:
+            raise RefusedError(NOT_STORED, f"{name} cannot be written, so nothing has changed: {fault}") from None
+        return Sister(file_name=name, id=held.id, vehicle=held.vehicle, said=self.act(by))
+
     def forget_others(self) -> None:
         """Remove calibrations that the record no longer names. Raises OSError."""
-        named = {one.file_name for one in self.record.versions}
-        for path in self.directory.glob(f"{LEARNT}*.json"):
+        named = {one.file_name for one in (*self.record.versions, self.record.sister) if one is not None}
+        for path in (one for kind in (LEARNT, SISTER) for one in self.directory.glob(f"{kind}*.json")):
             if path.name not in named:
                 path.unlink()
 

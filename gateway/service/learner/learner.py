@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple
 
 from gateway.bus.signals import SignalMap
 from gateway.calibration.assigned import Assigned, Fate, Piece, assign, moments
+from gateway.calibration.file.calibration_file import load_calibration
 from gateway.calibration.kept.batch_file import kept_batch_of
 from gateway.calibration.learning.answers import doubts_of, vehicle_table
 from gateway.calibration.learning.job import LearnJob, LearnResult
@@ -27,7 +28,7 @@ from gateway.calibration.learning.spans import (
     standing,
     teaching_most,
 )
-from gateway.calibration.sister import require_alike
+from gateway.calibration.sister import require_alike, sister_in
 from gateway.calibration.statements_csv import StatementsFileError, ToldRow, ToldRows, read_statements
 from gateway.config.sections import LearningSection
 from gateway.core.scheduler import Scheduler
@@ -46,6 +47,7 @@ from gateway.service.learner.book import (
     LearningRecord,
     Outcome,
     Said,
+    Sister,
     Stated,
 )
 from gateway.service.learner.book import Version as LearntVersion
@@ -62,6 +64,7 @@ from gateway.stated.learning import (
     ImportTold,
     LearningState,
     Question,
+    SisterTold,
     StatedVehicle,
     StatementPage,
     StatementTold,
@@ -281,7 +284,7 @@ class Learner(ThreadPart):
             records=tuple(record.records),
             settings=settings,
             laden=tuple(one.span for one in record.laden),
-            like=self._vehicle.like,
+            like=self._named.like,
             before=before,
             is_file_before=active is None and before is not None,
             most_memory_mb=self._settings.memory_mb,
@@ -304,7 +307,7 @@ class Learner(ThreadPart):
         held = sorted({i for piece in best for i in holding[piece]})
         content = {
             "vehicle": asdict(vehicle),
-            "like": str(self._vehicle.like),
+            "like": str(self._named.like),
             "signals": self._vehicle.signals_id,
             "pieces": [(pieces[i].begin_ns, pieces[i].end_ns) for i in best],
             "records": [records[i].model_dump(mode="json", by_alias=True) for i in held],
@@ -385,13 +388,21 @@ class Learner(ThreadPart):
     # -- the vehicle --
 
     @property
+    def _named(self) -> LearnerVehicle:
+        """The vehicle with its sister: the one that somebody handed in, else that of the settings."""
+        given = self._book.record.sister
+        if given is None:
+            return self._vehicle
+        return replace(self._vehicle, like=self._book.directory / given.file_name, sister=given.vehicle)
+
+    @property
     def _learnt_vehicle(self) -> Vehicle | None:
         """The vehicle to learn; None if it is not stated, or in doubt."""
         stated = self._book.record.vehicle
         if stated is None or (self._doubts(stated) and stated.confirmed is None):
             return None
         try:
-            return self._vehicle.stated(stated.figures)
+            return self._named.stated(stated.figures)
         except (CampaignError, NoSisterError):  # the settings were changed since
             return None
 
@@ -403,7 +414,7 @@ class Learner(ThreadPart):
     def _doubts(self, stated: Stated) -> list[DoubtOfVehicle]:
         return [
             DoubtOfVehicle(kind=one.kind, text=one.text, advice=one.advice, meant=one.meant)
-            for one in doubts_of(stated.figures, self._vehicle.sister)
+            for one in doubts_of(stated.figures, self._named.sister)
         ]
 
     def vehicle(self) -> StatedVehicle | None:
@@ -423,17 +434,53 @@ class Learner(ThreadPart):
         """State the vehicle's figures; ``is_confirmed``: they are right, although unusual. Raises RefusedError."""
         self._require_allowed()
         try:
-            self._vehicle.stated(answers)
+            self._named.stated(answers)
         except NoSisterError as fault:
             raise RefusedError("not_its_sister", str(fault)) from None
         except CampaignError as fault:
-            meant = meant_by(doubts_of(answers, self._vehicle.sister))
+            meant = meant_by(doubts_of(answers, self._named.sister))
             raise RefusedError("vehicle_unusable", f"{fault}{meant}") from None
         with self._book.lock:
             act = self._book.act(by)
             stated = Stated(figures=answers, at=act.at, by=by, confirmed=act if is_confirmed else None)
             self._book.save(self._book.record.model_copy(update={"vehicle": stated}))
             self._book.tell(Event.VEHICLE_STATED, {"by": by})
+
+    def sister(self) -> SisterTold | None:
+        """The vehicle of the same model whose calibration is the prior."""
+        given, named = self._book.record.sister, self._named.sister
+        if named is None:
+            return None
+        return SisterTold(name=named.name, calibration_id=given and given.id)
+
+    def state_sister(self, content: bytes, by: str) -> None:
+        """Take the calibration file of a vehicle of the same model as the prior of the next fits. Raises RefusedError
+        for another file, or one of another model.
+        """
+        self._require_allowed()
+        try:
+            held = load_calibration("the file", lambda path: content)
+            sister_in(held)
+            with self._book.lock:
+                if (stated := self._book.record.vehicle) is not None:
+                    replace(self._vehicle, sister=held.vehicle).stated(stated.figures)
+                self._keep_sister(self._book.write_sister(content, held, by), by)
+        except CalibrationFileError as fault:
+            raise RefusedError("no_calibration_file", str(fault)) from None
+        except (NoSisterError, CampaignError) as fault:
+            raise RefusedError("not_its_sister", str(fault)) from None
+
+    def forget_sister(self, by: str) -> None:
+        """Learn again without the calibration that somebody handed in, or with that of the settings."""
+        self._require_allowed()
+        with self._book.lock:
+            self._keep_sister(None, by)
+
+    def _keep_sister(self, sister: Sister | None, by: str) -> None:
+        self._book.save(self._book.record.model_copy(update={"sister": sister}))
+        self._book.tell(Event.SISTER_STATED, {"by": by, "calibration_id": sister and sister.id})
+        with suppress(OSError):
+            self._book.forget_others()
 
     def _require_allowed(self) -> None:
         if self._vehicle.why_not_allowed is not None:

@@ -2,14 +2,14 @@
 
 import asyncio
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from gateway.core.vehicle import Vehicle
 from gateway.stated.facts import VehicleAnswers
-from gateway.stated.learning import StatedVehicle
+from gateway.stated.learning import SisterTold, StatedVehicle
 from gateway.status import SignalHealth, Status
 from gateway.web.routes.service_calls import By, LearnerBackend
 from gateway.web.schemas import problem_responses, utf8_only
@@ -44,6 +44,13 @@ class VehicleDescription(BaseModel):
     )
     signals: tuple[SignalHealth, ...]
     stated: StatedVehicle | None = Field(None, description="as somebody stated it to this service; null: nobody has")
+    sister: SisterTold | None = Field(None, description="null: nothing is known of a vehicle of its model")
+
+
+_CALIBRATION: Final[dict[str, Any]] = {
+    "required": True,
+    "content": {"application/json": {"schema": {"type": "object"}}},
+}
 
 
 class ConfirmQuery(BaseModel):
@@ -59,6 +66,7 @@ def vehicle_router(
 ) -> APIRouter:
     """The routes about the vehicle itself; ``calibrated`` is the calibration that the service uses."""
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
+    of_sister = problem_responses(400, 403, 409, 413, 503)
 
     def described() -> VehicleDescription:
         now = status()
@@ -70,6 +78,7 @@ def vehicle_router(
             figures=None if calibrated is None else calibrated.vehicle,
             signals=now.signals,
             stated=None if learner is None else learner.vehicle(),
+            sister=None if learner is None else learner.sister(),
         )
 
     @router.get("/vehicle")
@@ -91,6 +100,18 @@ def vehicle_router(
             confirmed with `?confirm=true`.
             """
             await asyncio.to_thread(learner.state_vehicle, said, by, is_confirmed=query.confirm)
+            return described()
+
+        @router.put("/vehicle/sister", responses=of_sister, openapi_extra={"requestBody": _CALIBRATION})
+        async def state_sister(by: By, request: Request) -> VehicleDescription:
+            """Hand in the calibration file of a vehicle of the same model: what is learnt begins with it."""
+            await asyncio.to_thread(learner.state_sister, await request.body(), by)
+            return described()
+
+        @router.delete("/vehicle/sister", responses=of_sister)
+        async def forget_sister(by: By) -> VehicleDescription:
+            """Learn again without the file that was handed in."""
+            await asyncio.to_thread(learner.forget_sister, by)
             return described()
 
     return router

@@ -80,12 +80,28 @@ async function stateVan(isConfirmed) {
 
 function showVan(vehicle) {
   write("vehicle", vehicle.vehicle_id ?? "");
+  showSister(vehicle.sister);
   if (vehicle.stated === null) return;
   stated = vehicle.stated.figures;
   fillVan(stated);
   const doubts = vehicle.stated.is_confirmed ? [] : vehicle.stated.doubts;
   element("doubts").hidden = doubts.length === 0;
   element("doubts-list").replaceChildren(...doubts.map((one) => made("li", `${one.text} ${one.advice}`)));
+}
+
+/** The vehicle of the same model; one that was handed in here can be removed. */
+function showSister(sister) {
+  element("sister").hidden = sister === null;
+  if (sister === null) return;
+  const forget = button(phrase("withdraw"), `${phrase("withdraw")}: ${sister.name}`, () => changeSister("DELETE"), "link");
+  const isGiven = sister.calibration_id !== null;
+  element("sister").replaceChildren(`${phrase("sister_is", { name: sister.name })} `, ...(isGiven ? [forget] : []));
+}
+
+async function changeSister(method, body) {
+  const told = await send(method, "api/v1/vehicle/sister", body);
+  element("sister-file").value = "";
+  if (told !== null) showSister(told.sister);
 }
 
 // -- what it has learnt --
@@ -217,6 +233,7 @@ element("van").addEventListener("submit", (event) => {
   stateVan(false);
 });
 element("confirm").addEventListener("click", () => stateVan(true));
+element("sister-file").addEventListener("change", async ({ target }) => changeSister("PUT", await target.files[0].text()));
 element("empty").addEventListener("click", () => state({ source: "empty" }));
 element("aboard").addEventListener("submit", async (event) => {
   event.preventDefault();

@@ -77,6 +77,8 @@ export const TEACH = {
   "field.loading_end_m": ["Loading area ends behind the front axle [m]", "Ladefläche endet hinter der Vorderachse [m]"],
   "field.sensor_offset_left_m": ["Sensor left of the centre line [m]", "Sensor links der Mittellinie [m]"],
   "field.track_width_m": ["Track width [m]", "Spurweite [m]"],
+  sister: ["Same model as: its calibration file", "Gleiches Modell wie: dessen Kalibrierdatei"],
+  sister_is: ["Learning begins with what is known of {name}, a vehicle of the same model.", "Es wird von dem aus gelernt, was von {name} bekannt ist, einem Fahrzeug gleichen Modells."],
   "field.carries": ["Usually carries", "Fährt meistens"],
   "carries.": ["anything", "alles"],
   "carries.pallets": ["pallets", "Paletten"],
