@@ -216,7 +216,7 @@ def test_a_wide_screen_is_used(site: str, browser: Any) -> None:
     assert len({box["y"] for box in boxes}) == 1
     assert boxes[-1]["x"] + boxes[-1]["width"] > 1750
     made.page.goto(f"{site}/engineer")
-    made.page.wait_for_function(IN_THREE_COLUMNS)
+    made.wait_until(IN_THREE_COLUMNS)
     made.page.close()
 
 

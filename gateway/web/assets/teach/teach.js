@@ -8,6 +8,7 @@ import { fill, speaker } from "../language.js";
 import { COMMON } from "../words/common.js";
 import { HELPS } from "../words/helps.js";
 import { TEACH } from "../words/teach.js";
+import { finding, translated } from "./translated.js";
 
 const ASK_EVERY_MS = 5000; // chosen: as the cab page
 const USEFUL_HELP = 0.1; // chosen: what narrows ± by less is not worth saying
@@ -86,7 +87,7 @@ function showVan(vehicle) {
   fillVan(stated);
   const doubts = vehicle.stated.is_confirmed ? [] : vehicle.stated.doubts;
   element("doubts").hidden = doubts.length === 0;
-  element("doubts-list").replaceChildren(...doubts.map((one) => made("li", `${one.text} ${one.advice}`)));
+  element("doubts-list").replaceChildren(...doubts.map((one) => made("li", `${translated(one.text)}: ${translated(one.advice)}`)));
 }
 
 /** The vehicle of the same model; one that was handed in here can be removed. */
@@ -128,7 +129,7 @@ function progress({ driven_s: drivenS, plus_minus_kg: now, useful_at_kg: useful 
 }
 
 function showLearning() {
-  if (!learning.is_allowed) say("fault", phrase("closed", { why: learning.why_not }));
+  if (!learning.is_allowed) say("fault", phrase("closed", { why: translated(learning.why_not) }));
   else if (learning.fault) say("fault", learning.fault);
   write("now", phrase(`now.${next(learning)}`));
   write("accuracy", accuracy(learning));
@@ -137,24 +138,25 @@ function showLearning() {
   const worth = learning.helps.filter((one) => one.then_plus_minus_kg <= (1 - USEFUL_HELP) * learning.plus_minus_kg);
   const helps = worth.map((one) => made("li", phrase("helps_to", { what: phrase.named("help", one.do), kg: kg(one.then_plus_minus_kg) })));
   const isStuck = learning.plus_minus_kg > learning.useful_at_kg && learning.useful_at_kg !== null && !helps.length;
-  element("helps").replaceChildren(...helps, ...(isStuck ? [made("li", phrase("only_statement"))] : []), ...learning.findings.map((text) => made("li", text)));
+  element("helps").replaceChildren(...helps, ...(isStuck ? [made("li", phrase("only_statement"))] : []), ...learning.findings.map((text) => made("li", finding(text, phrase))));
   element("questions-card").hidden = learning.questions.length === 0;
   element("questions").replaceChildren(...learning.questions.map(question));
   element("versions-card").hidden = learning.versions.length === 0;
-  element("versions").replaceChildren(...learning.versions.map((one) => made("li", `${one.text} (${phrase(`version.${one.state}`)})`)));
+  element("versions").replaceChildren(...learning.versions.map((one) => made("li", `${translated(one.text)} (${phrase(`version.${one.state}`)})`)));
 }
 
 /** A question with its answers: yes sends what it proposes, or confirms the statement that it is about; no is noted. */
 function question(one) {
+  const asked = translated(one.text);
   const yes = async () => {
     if (one.statement_id) await send("POST", `${STATEMENTS}/${encodeURIComponent(one.statement_id)}/confirm`);
     else await send("POST", STATEMENTS, JSON.stringify(one.propose));
   };
-  const answers = [button(phrase("yes"), `${phrase("yes")}: ${one.text}`, yes)];
+  const answers = [button(phrase("yes"), `${phrase("yes")}: ${asked}`, yes)];
   const no = () => send("PUT", "api/v1/learning", JSON.stringify({ not_empty: one.propose.map(({ from }) => from) }));
-  if (one.statement_id) answers.push(button(phrase("withdraw"), `${phrase("withdraw")}: ${one.text}`, () => withdraw(one.statement_id)));
-  else answers.push(button(phrase("no"), `${phrase("no")}: ${one.text}`, no));
-  return made("li", [made("span", `${one.text} `), ...answers]);
+  if (one.statement_id) answers.push(button(phrase("withdraw"), `${phrase("withdraw")}: ${asked}`, () => withdraw(one.statement_id)));
+  else answers.push(button(phrase("no"), `${phrase("no")}: ${asked}`, no));
+  return made("li", [made("span", `${asked} `), ...answers]);
 }
 
 // -- statements --
@@ -172,7 +174,7 @@ function loadText({ payload_kg: payload, gross_kg: gross, front_axle_kg: front, 
 function statementRow(one) {
   const source = one.source === "empty" ? phrase("source.empty") : loadText(one.load);
   const found = one.found === null ? "" : phrase("with_plus_minus", { kg: figure(one.found.payload_kg, 0, ""), half: kg(one.found.plus_minus_kg) });
-  const why = one.question ?? one.reason;
+  const why = translated(one.question ?? one.reason ?? "");
   const built = row([clock(one.from), source, found, `${phrase(`state.${one.state}`)}${why ? `: ${why}` : ""}`]);
   const isThere = one.state !== "withdrawn";
   built.append(made("td", isThere ? [button(phrase("withdraw"), `${phrase("withdraw")}: ${clock(one.from)}, ${source}`, () => withdraw(one.id), "link")] : ""));
@@ -189,13 +191,23 @@ function showStatements({ items }) {
 
 const timezone = () => `timezone=${encodeURIComponent(Intl.DateTimeFormat().resolvedOptions().timeZone)}`;
 
+const KINDS = ["waits", "overlap", "replaced", "unknown_vehicle", "bad"];
+
+/** How many rows match a drive, and which do not. */
+function rowsText({ n_rows: nRows, n_match: nMatch, problems }) {
+  const of = (kind) => [...new Set(problems.filter((one) => one.kind === kind).map((one) => one.row))];
+  const others = KINDS.map((kind) => [kind, of(kind)]).filter(([, rows]) => rows.length);
+  const told = others.map(([kind, rows]) => phrase(`rows.${kind}`, { n: rows.length, rows: rows.join(", ") }));
+  return `${phrase("rows", { n: nRows })}: ${[phrase("rows.match", { n: nMatch }), ...told].join(", ")}`;
+}
+
 async function importNotes(isDryRun) {
   const [file] = element("import-file").files;
   const told = await send("POST", `${STATEMENTS}?${timezone()}&dry_run=${isDryRun}`, await file.text(), "text/csv");
   element("import-sure").hidden = told === null || !isDryRun;
   if (told === null) return;
-  say("import-told", isDryRun ? told.text : phrase("taken", { text: told.text }));
-  element("import-problems").replaceChildren(...[...told.notes, ...told.problems.map((one) => one.text)].map((text) => made("li", text)));
+  say("import-told", isDryRun ? rowsText(told) : phrase("taken", { text: rowsText(told) }));
+  element("import-problems").replaceChildren(...[...told.notes, ...told.problems.map((one) => translated(one.text))].map((text) => made("li", text)));
   if (!isDryRun) element("import").reset();
 }
 
