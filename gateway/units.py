@@ -2,6 +2,7 @@
 
 import math
 from typing import Final
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from gateway.errors import SignalMapError
 
@@ -44,6 +45,21 @@ TO_SI: Final[dict[str, dict[str, float]]] = {
     "temperature": {"degc": 1.0, "°c": 1.0, "deg c": 1.0, "c": 1.0},
     "state": {"": 1.0, "1": 1.0, "bit": 1.0},
 }
+
+
+_NO_ZONES: Final = ("localtime", "posixrules", "Factory")  # names that mean another zone on every computer
+
+
+def zone_of(name: str) -> ZoneInfo:
+    """The time zone of this name (IANA). Raises ValueError for a name that this computer does not know, and for one
+    that means another zone elsewhere.
+    """
+    try:
+        if name not in _NO_ZONES:
+            return ZoneInfo(name)
+    except (ZoneInfoNotFoundError, ValueError, OSError):
+        pass
+    raise ValueError(f"no zone is called {name!r} on this computer; write one as Europe/Berlin, or UTC") from None
 
 
 def si_factor(quantity: str, unit: str | None) -> float:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+from zoneinfo import ZoneInfo
 
 import click
 
@@ -26,6 +26,7 @@ from gateway.files.whole import refusal_told, write_whole
 from gateway.offline.learn import Drives, read_drives
 from gateway.records import json_line, rounded
 from gateway.stated.statement import StatementRecord
+from gateway.units import zone_of
 from gateway.words import counted as n_of
 from gateway.words import one_or_more
 
@@ -42,9 +43,9 @@ class Zone(click.ParamType[ZoneInfo]):
         if isinstance(value, ZoneInfo):
             return value
         try:
-            return ZoneInfo(str(value))
-        except (ZoneInfoNotFoundError, ValueError, OSError):
-            self.fail(f"no zone is called {value!r} on this computer; write one as Europe/Berlin, or UTC", param, ctx)
+            return zone_of(str(value))
+        except ValueError as fault:
+            self.fail(str(fault), param, ctx)
 
 
 @click.command("learn")

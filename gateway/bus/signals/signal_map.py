@@ -4,7 +4,7 @@ import math
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Final, Literal
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+from zoneinfo import ZoneInfo
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -24,7 +24,7 @@ from gateway.bus.signals.mapping import (
 from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID, Signal
 from gateway.toml_file import Read, load_toml
-from gateway.units import si_factor
+from gateway.units import si_factor, zone_of
 
 FEWEST_COUNTER_BITS: Final = 2  # chosen: one bit cannot tell a lost frame from two
 MOST_COUNTER_BITS: Final = 32  # chosen: no frames are lost round a longer one
@@ -263,18 +263,11 @@ def _opened(path: Path | str, read: Read) -> tuple[Path, SignalMapFile, Database
     return file_path, wanted, Databases(file_path, [file_path.parent / dbc for dbc in wanted.dbc], reading)
 
 
-_NO_ZONES: Final = ("localtime", "posixrules", "Factory")  # names that mean another zone on every computer
-
-
 def _zone(path: Path, name: str | None) -> ZoneInfo | None:
     try:
-        if name in _NO_ZONES:
-            raise ZoneInfoNotFoundError
-        return None if name is None else ZoneInfo(name)
-    except (ValueError, OSError, ZoneInfoNotFoundError):
-        raise SignalMapError(
-            f"{path}: time_zone: no zone is called {name!r} on this computer; write one as Europe/Berlin, or UTC"
-        ) from None
+        return None if name is None else zone_of(name)
+    except ValueError as fault:
+        raise SignalMapError(f"{path}: time_zone: {fault}") from None
 
 
 def shipped_maps() -> tuple[str, ...]:

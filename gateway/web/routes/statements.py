@@ -4,7 +4,7 @@ import contextlib
 import json
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Self
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+from zoneinfo import ZoneInfo
 
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.exceptions import RequestValidationError
@@ -20,6 +20,7 @@ from gateway.stated.learning import (
     StatementTold,
 )
 from gateway.stated.statement import HALF_CHARACTER, TYPES, StatementRecord, is_text
+from gateway.units import zone_of
 from gateway.web.routes.service_calls import REFUSALS, By, LearnerBackend, answered, created
 from gateway.web.schemas import Body, Instant, problem_responses
 
@@ -177,10 +178,8 @@ def _in_body(errors: Any) -> list[Mapping[str, Any]]:
 
 
 def _zone(name: str | None) -> ZoneInfo | None:
-    if name is None:
-        return None
     try:
-        return ZoneInfo(name)
-    except (ZoneInfoNotFoundError, ValueError, OSError):
-        told = {"type": "value_error", "loc": ("query", "timezone"), "msg": f"no zone is called {name!r} here"}
+        return None if name is None else zone_of(name)
+    except ValueError as fault:
+        told = {"type": "value_error", "loc": ("query", "timezone"), "msg": str(fault)}
         raise RequestValidationError([told]) from None
