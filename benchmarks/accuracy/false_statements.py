@@ -400,23 +400,36 @@ def _accused(states: Sequence[str]) -> str:
     return _counted(accused) if len(accused) != 1 else f"1 {accused[0]}"
 
 
-KINDS_HEAD: Final = ("what is false", "the false ones", "true ones accused", "error %", "held %", "± %")
+KINDS_HEAD: Final = ("the false ones are", "of these kinds", "true ones accused", "error %", "± %")
 ALL_HEAD: Final = ("all eight mixed drives", "the false ones", "true ones accused", "error kg", "held %")
 
 
 def section(found: Mapping[str, Any]) -> str:
-    """Both tables in Markdown."""
-
-    def of(title: str, one: Mapping[str, Any]) -> list[str]:
-        return [title, _counted(one["states"]["false"]), _accused(one["states"]["true"])]
-
-    figures = ("error", "held", "half")
+    """Kinds by what becomes of the false statements, and the table of all drives, in Markdown."""
+    by_state: dict[str, list[Mapping[str, Any]]] = {}
+    for one in found["kinds"]:
+        by_state.setdefault(max(one["states"]["false"], key=_ORDER.index, default="–"), []).append(one)
     kinds = [
-        [*of(one["weighs"]["title"], one), *(f"{one['weighs']['payload'][name]:.1f}" for name in figures)]
-        for one in found["kinds"]
+        [
+            state,
+            "; ".join(one["weighs"]["title"] for one in ones),
+            _accused([state for one in ones for state in one["states"]["true"]]),
+            *(_span([one["weighs"]["payload"][name] for one in ones]) for name in ("error", "half")),
+        ]
+        for state in ("–", *_ORDER)
+        if (ones := by_state.get(state))
     ]
-    every = [[*of(one["title"], one), f"{one['error_kg']:.0f}", f"{one['held_pct']:.0f}"] for one in found["all"]]
+    every = [
+        [one["title"], _counted(one["states"]["false"]), _accused(one["states"]["true"]), f"{one['error_kg']:.0f}",
+         f"{one['held_pct']:.0f}"]
+        for one in found["all"]
+    ]  # fmt: skip
     return "\n".join([*table(KINDS_HEAD, kinds), "", *table(ALL_HEAD, every), ""])
+
+
+def _span(numbers: Sequence[float]) -> str:
+    low, high = min(numbers), max(numbers)
+    return f"{low:.1f}" if low == high else f"{low:.1f} to {high:.1f}"
 
 
 def main() -> None:
