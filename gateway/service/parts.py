@@ -13,7 +13,8 @@ from gateway.errors import CalibrationFileError
 from gateway.estimate_json import read_estimate
 from gateway.log import Event, log_event
 from gateway.service.calibration_in_use import why_not_learning
-from gateway.service.learner.learner import Learner, LearnerVehicle
+from gateway.service.learner.learner import Learner
+from gateway.service.learner.van import LearnerVehicle
 from gateway.setup import Setup
 from gateway.store import Latest, Retention, Store, restored
 from gateway.units import BYTES_PER_MB, S_PER_DAY
@@ -47,7 +48,7 @@ def uplink_of(
         repeat_s=wanted.repeat_s,
         with_latest=wanted.home_assistant is not None,
     )
-    take = partial(learner.import_all, where="the message", may_come_again=True)
+    take = partial(learner.loads.import_all, where="the message", may_come_again=True)
     return Uplink(wanted, outbox, birth, take_statements=take)
 
 

@@ -276,7 +276,7 @@ def test_learning_begins_with_the_file_of_a_vehicle_of_the_same_model(local: Cli
     assert load_calibration(like.like).id == alike.id
     bench.finish()
     again = LearnerBench(bench.directory)  # after a restart
-    assert again.learner.sister() == SisterTold(name=alike.vehicle.name, calibration_id=alike.id)
+    assert again.learner.van.sister() == SisterTold(name=alike.vehicle.name, calibration_id=alike.id)
     assert local.request("DELETE", SISTER).json()["sister"] is None
     bench.turn()
     assert bench.worker.job is not None
@@ -354,12 +354,12 @@ def test_reading_needs_a_token_to_read_and_stating_one_to_operate(tmp_path: Path
         assert status("POST", STATEMENTS, read, json=NOTE) == 403
         assert status("PUT", VEHICLE, read, json=ANSWERS) == 403
         assert status("POST", STATEMENTS, operate, json=NOTE) == 201
-    assert json.loads(bench.learner.statements())["items"][0]["by"] == "operate"
+    assert json.loads(bench.learner.loads.page())["items"][0]["by"] == "operate"
 
 
 def test_everything_is_on_disk_when_answered(local: Client, bench: LearnerBench) -> None:
     local.request("PUT", VEHICLE, json=ANSWERS)
     one = post(local)
     again = LearnerBench(bench.directory)  # as after a power cut
-    assert json.loads(again.learner.statements())["items"][0]["id"] == one["id"]
-    assert again.learner.vehicle() is not None
+    assert json.loads(again.learner.loads.page())["items"][0]["id"] == one["id"]
+    assert again.learner.van.told() is not None

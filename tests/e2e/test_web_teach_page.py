@@ -16,7 +16,7 @@ from support.web import Gateway, serving
 
 from gateway.calibration.inspection.finding import Kind, Severity
 from gateway.calibration.learning.learn import LOOKED_FOR
-from gateway.service.learner.learner import NEXT_FIT, NO_VEHICLE
+from gateway.service.learner.loads import NEXT_FIT, NO_VEHICLE
 from gateway.stated.doubt import DoubtKind
 from gateway.stated.facts import VehicleAnswers
 
@@ -90,7 +90,7 @@ def test_a_stated_load_is_listed_and_can_be_withdrawn(page: Any) -> None:
 
 def learn_two_drives(bench: LearnerBench) -> None:
     """Both look empty, and a weighing would help."""
-    bench.learner.state_vehicle(VehicleAnswers(**ANSWERS), "workshop", is_confirmed=False)
+    bench.learner.van.state(VehicleAnswers(**ANSWERS), "workshop", is_confirmed=False)
     bench.drive(0)
     bench.turn()
     drives = tuple({"number": n + 1, "t_start": at(600 * n), "t_end": at(600 * n + 300)} for n in range(2))
@@ -118,7 +118,7 @@ def test_a_no_takes_the_question_away(page: Any, bench: LearnerBench) -> None:
     expect(page.locator("#questions")).to_contain_text("These 2 drives look empty", timeout=15_000)
     page.get_by_role("button", name="No: These").click()
     expect(page.locator("#questions-card")).to_be_hidden()
-    assert json.loads(bench.learner.statements())["items"] == []
+    assert json.loads(bench.learner.loads.page())["items"] == []
 
 
 @pytest.mark.parametrize(

@@ -46,11 +46,11 @@ def records(told: list[Told]) -> list[StatementRecord]:
 def bench_in(folder: str, told: list[Told]) -> LearnerBench:
     """A learner with three drives that was told these statements in this order."""
     bench = LearnerBench(Path(folder))
-    bench.learner.state_vehicle(VehicleAnswers(**ANSWERS), "workshop", is_confirmed=True)
+    bench.learner.van.state(VehicleAnswers(**ANSWERS), "workshop", is_confirmed=True)
     for begin_s in (0, 3600, 7200):
         bench.drive(begin_s)
     for one in records(told):
-        bench.learner.state(one, "workshop")
+        bench.learner.loads.state(one, "workshop")
     return bench
 
 
@@ -79,12 +79,12 @@ def test_withdrawing_undoes_everything(told: list[Told], wrong: Told, place: int
     place = min(place, len(others))
     with TemporaryDirectory() as one, TemporaryDirectory() as other:
         bench = bench_in(one, [*others[:place], wrong, *others[place:]])
-        bench.learner.confirm(gone.id, "workshop")
-        bench.learner.withdraw(gone.id, "workshop")
+        bench.learner.loads.confirm(gone.id, "workshop")
+        bench.learner.loads.withdraw(gone.id, "workshop")
         without = bench_in(other, others)
         assert job_of(bench) == job_of(without)
-        shown = [item for item in json.loads(bench.learner.statements())["items"] if item["id"] != gone.id]
-        assert shown == json.loads(without.learner.statements())["items"]
+        shown = [item for item in json.loads(bench.learner.loads.page())["items"] if item["id"] != gone.id]
+        assert shown == json.loads(without.learner.loads.page())["items"]
 
 
 @given(st.lists(SAID, min_size=1, max_size=6))

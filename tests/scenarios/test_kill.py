@@ -119,12 +119,12 @@ for n in itertools.count():
     record = StatementRecord.model_validate(
         {"source": "empty", "from": at(1000 * n), "ref": f"{n}", "load": {"payload_kg": 0.0}}
     )
-    print(json.loads(bench.learner.state(record, "b"))["id"], flush=True)
+    print(json.loads(bench.learner.loads.state(record, "b"))["id"], flush=True)
 """
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_kill_loses_no_statement_that_was_answered(tmp_path: Path, seed: int) -> None:
     answered = told_before_kill(STATER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.3), ready="ready\n")
-    kept = json.loads(LearnerBench(tmp_path).learner.statements(limit=1000))["items"]
+    kept = json.loads(LearnerBench(tmp_path).learner.loads.page(limit=1000))["items"]
     assert {line.strip() for line in answered[-900:]} <= {one["id"] for one in kept}

@@ -42,7 +42,7 @@ def bench(tmp_path: Path) -> LearnerBench:
 
 def taking(bench: LearnerBench) -> TakeStatements:
     """As the service hands a message on."""
-    return partial(bench.learner.import_all, where="the message", may_come_again=True)
+    return partial(bench.learner.loads.import_all, where="the message", may_come_again=True)
 
 
 @contextmanager
@@ -80,7 +80,7 @@ def send(port: int, content: object, *, kind: str | None = None, retain: bool = 
 
 def stated(bench: LearnerBench) -> list[tuple[str, str]]:
     """Ref and state of every statement, the oldest first."""
-    items = json.loads(bench.learner.statements())["items"]
+    items = json.loads(bench.learner.loads.page())["items"]
     return [(one["ref"], one["state"]) for one in reversed(items)]
 
 
@@ -92,7 +92,7 @@ def test_one_statement_a_list_and_a_table_are_taken(tmp_path: Path, bench: Learn
         send(broker.port, TABLE, kind="text/csv")
         assert wait_until(lambda: heard(part).n_taken == 3), part.report()
     assert [ref for ref, _ in stated(bench)] == ["LS-1", "E", "LS-2", "E-2"]
-    assert {one["by"] for one in json.loads(bench.learner.statements())["items"]} == {"mqtt"}
+    assert {one["by"] for one in json.loads(bench.learner.loads.page())["items"]} == {"mqtt"}
     assert heard(part) == StatementsHeard(n_taken=3)
 
 
@@ -147,8 +147,8 @@ def test_what_comes_again_is_stated_once_and_brings_nothing_back(tmp_path: Path,
             send(broker.port, [NOTE, EMPTY])
             assert wait_until(lambda: heard(part).n_taken == 2), part.report()
             assert len(stated(bench)) == 2
-            ids = {one["ref"]: one["id"] for one in json.loads(bench.learner.statements())["items"]}
-            bench.learner.withdraw(ids["LS-1"], "local")
+            ids = {one["ref"]: one["id"] for one in json.loads(bench.learner.loads.page())["items"]}
+            bench.learner.loads.withdraw(ids["LS-1"], "local")
             link.cut()
             assert wait_until(lambda: heard(part).n_taken == 3), part.report()
     assert stated(bench) == [("LS-1", "withdrawn"), ("E", "waiting")]

@@ -12,7 +12,8 @@ from gateway.calibration.learning.job import LearnJob, LearnResult
 from gateway.config.sections import LearningSection
 from gateway.core.settings import BatchSettings
 from gateway.records import Batch, iso_utc
-from gateway.service.learner.learner import Learner, LearnerVehicle
+from gateway.service.learner.learner import Learner
+from gateway.service.learner.van import LearnerVehicle
 from gateway.units import NS_PER_S
 from support.calibrated import calibration_file
 

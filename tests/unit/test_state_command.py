@@ -16,7 +16,7 @@ from gateway.stated.facts import VehicleAnswers
 @pytest.fixture
 def bench(tmp_path: Path) -> LearnerBench:
     made = LearnerBench(tmp_path / "vehicle")
-    made.learner.state_vehicle(VehicleAnswers(**ANSWERS), "workshop", is_confirmed=False)
+    made.learner.van.state(VehicleAnswers(**ANSWERS), "workshop", is_confirmed=False)
     return made
 
 

@@ -1,4 +1,4 @@
-"""Statements, the vehicle and what is learnt, as the web asks for them; a thread that keeps drives and starts fits."""
+"""A thread that keeps drives, starts fits and takes what they found; and what is learnt, as the web asks for it."""
 
 import hashlib
 import json
@@ -8,68 +8,30 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
-from datetime import tzinfo
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from gateway.bus.signals import SignalMap
-from gateway.calibration.assigned import Assigned, Fate, Piece, assign, moments
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.assigned import Piece, assign, moments
 from gateway.calibration.kept.batch_file import kept_batch_of
-from gateway.calibration.learning.answers import doubts_of, vehicle_table
 from gateway.calibration.learning.job import LearnJob, LearnResult
-from gateway.calibration.learning.spans import (
-    STATES,
-    can_teach,
-    rows_record,
-    rows_told,
-    spans_of,
-    standing,
-    teaching_most,
-)
-from gateway.calibration.sister import require_alike, sister_in
-from gateway.calibration.statements_csv import StatementsFileError, ToldRow, ToldRows, read_statements
+from gateway.calibration.learning.spans import can_teach, spans_of, teaching_most
 from gateway.config.sections import LearningSection
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
-from gateway.errors import CalibrationFileError, CampaignError, NoSisterError, RefusedError
+from gateway.errors import CalibrationFileError, RefusedError
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, BackOff, ThreadPart
 from gateway.records import Batch, Motion, iso_utc, ns_of, rounded
-from gateway.service.learner.book import (
-    MOST_LADEN,
-    MOST_STATEMENTS,
-    MOST_VERSIONS,
-    Book,
-    Laden,
-    LearningRecord,
-    Outcome,
-    Said,
-    Sister,
-    Stated,
-)
+from gateway.service.learner.book import MOST_LADEN, MOST_VERSIONS, Book, Laden, LearningRecord, Outcome
 from gateway.service.learner.book import Version as LearntVersion
 from gateway.service.learner.drives import FOLDER, DriveFiles, Window
+from gateway.service.learner.loads import StatedLoads
+from gateway.service.learner.van import LearnerVehicle, StatedVan
 from gateway.service.learner.worker import OnResult, Worker
-from gateway.stated.doubt import meant_by
-from gateway.stated.facts import VehicleAnswers
-from gateway.stated.learning import (
-    STATES as STATE_NAMES,
-)
-from gateway.stated.learning import (
-    DoubtOfVehicle,
-    Help,
-    ImportTold,
-    LearningState,
-    Question,
-    SisterTold,
-    StatedVehicle,
-    StatementPage,
-    StatementTold,
-    VersionTold,
-)
+from gateway.stated.learning import STATES, Help, LearningState, Question, StatementTold, VersionTold
 from gateway.stated.statement import StatementRecord, StatementSource
 from gateway.units import BYTES_PER_MB, NS_PER_S
 from gateway.words import counted
@@ -82,40 +44,6 @@ TURN_S: Final = 1.0  # chosen: interval between looks whether there is something
 FIRST_RETRY_S, LAST_RETRY_S = 60.0, 3600.0  # chosen: after a process that was ended from outside
 NEWEST, BY_FILE = "newest", "file"
 OTHER_TIME_NS: Final = 86_400 * NS_PER_S  # chosen: a bus whose time is further off than a day has a time of its own
-NO_VEHICLE: Final = "the vehicle is not stated yet: its axle weights, wheelbase and the sensor's place are needed"
-NEXT_FIT: Final = "its drive is there: it is learnt from with the next fit"
-
-
-@dataclass(frozen=True, slots=True)
-class LearnerVehicle:
-    """The vehicle as the service knows it, and whether the service may learn it.
-
-    ``like`` is the calibration file of its sister, ``sister`` the vehicle in it. ``by_file`` is the calibration file
-    that the settings name, ``in_file`` the vehicle in it; None without one.
-    """
-
-    id: str
-    name: str
-    signals_id: str
-    why_not_allowed: str | None = None
-    is_name_fixed: bool = False
-    like: Path | None = None
-    sister: Vehicle | None = None
-    by_file: Path | None = None
-    in_file: Vehicle | None = None
-
-    def stated(self, answers: VehicleAnswers) -> Vehicle:
-        """The vehicle that follows from what somebody stated. Raises CampaignError, NoSisterError.
-
-        What it may carry follows from its limit unless it is stated.
-        """
-        gross_kg = answers.kerb_front_axle_kg + answers.kerb_rear_axle_kg
-        if answers.payload_range_kg is None and (answers.gross_limit_kg or 0.0) > gross_kg:
-            answers = replace(answers, payload_range_kg=(0.0, (answers.gross_limit_kg or 0.0) - gross_kg))
-        table = vehicle_table(answers, self.name, self.sister)
-        if self.sister is not None and not doubts_of(answers, self.sister):
-            require_alike(self.sister, table)
-        return replace(table, name=self.name) if self.is_name_fixed else table
 
 
 class _Handed(NamedTuple):
@@ -147,10 +75,12 @@ class Learner(ThreadPart):
         """``make_worker`` replaces the process that learns (tests)."""
         super().__init__("learner")
         self._settings, self._batch, self._scheduler = settings, batch, drives
-        self._signal_map, self._vehicle = signal_map, vehicle
+        self._signal_map = signal_map
         self._clock_ns = clock_ns
         self._book = Book(directory, on_event, clock_ns)
         self._files = DriveFiles(directory / FOLDER, round(settings.size_mb * BYTES_PER_MB))
+        self.van = StatedVan(self._book, vehicle)
+        self.loads = StatedLoads(self._book, self._files, self.van)
         self._worker = (make_worker or (lambda on_result: Worker(directory, on_result)))(self._on_result)
         active = self._book.record.active
         self._started_with = active.id if active else None
@@ -158,7 +88,6 @@ class Learner(ThreadPart):
         self._retry = BackOff(FIRST_RETRY_S, LAST_RETRY_S)
         self._not_before_s = 0.0
         self._disk_fault: str | None = None
-        self._fates_of: tuple[LearningRecord, tuple[Window, ...], dict[str, tuple[Fate, str]]] | None = None
         self._looked: tuple[LearningRecord, tuple[Window, ...], int | None] | None = None  # nothing to learn there
         self.n_lost = 0  # windows that should have been kept and were not
 
@@ -215,7 +144,7 @@ class Learner(ThreadPart):
     def _is_stated(self, begin_ns: int, end_ns: int) -> bool:
         """Whether a statement that stands may be about this time."""
         pieces = [Piece(begin_ns, end_ns, 1)]
-        vehicle = self._known_vehicle
+        vehicle = self.van.known
         return vehicle is not None and bool(assign(self._book.record.records, pieces, vehicle).holding[0])
 
     def _lose(self, why: str) -> None:
@@ -270,12 +199,12 @@ class Learner(ThreadPart):
     def _job(self) -> LearnJob | None:
         """What there is to learn from; None if that is nothing yet."""
         record = self._book.record
-        vehicle = self._learnt_vehicle
+        vehicle = self.van.learnt
         windows = self._finished
-        if vehicle is None or not windows or self._vehicle.why_not_allowed is not None:
+        if vehicle is None or not windows or self.van.given.why_not_allowed is not None:
             return None
         active = record.active
-        before = self._vehicle.by_file if active is None else self._book.directory / active.file_name
+        before = self.van.given.by_file if active is None else self._book.directory / active.file_name
         settings = asdict(self._batch)
         return LearnJob(
             key=self._key(vehicle, windows, record.records),
@@ -284,7 +213,7 @@ class Learner(ThreadPart):
             records=tuple(record.records),
             settings=settings,
             laden=tuple(one.span for one in record.laden),
-            like=self._named.like,
+            like=self.van.named.like,
             before=before,
             is_file_before=active is None and before is not None,
             most_memory_mb=self._settings.memory_mb,
@@ -307,8 +236,8 @@ class Learner(ThreadPart):
         held = sorted({i for piece in best for i in holding[piece]})
         content = {
             "vehicle": asdict(vehicle),
-            "like": str(self._named.like),
-            "signals": self._vehicle.signals_id,
+            "like": str(self.van.named.like),
+            "signals": self.van.given.signals_id,
             "pieces": [(pieces[i].begin_ns, pieces[i].end_ns) for i in best],
             "records": [records[i].model_dump(mode="json", by_alias=True) for i in held],
         }
@@ -385,269 +314,6 @@ class Learner(ThreadPart):
             worse=result.worse,
         )
 
-    # -- the vehicle --
-
-    @property
-    def _named(self) -> LearnerVehicle:
-        """The vehicle with its sister: the one that somebody handed in, else that of the settings."""
-        given = self._book.record.sister
-        if given is None:
-            return self._vehicle
-        return replace(self._vehicle, like=self._book.directory / given.file_name, sister=given.vehicle)
-
-    @property
-    def _learnt_vehicle(self) -> Vehicle | None:
-        """The vehicle to learn; None if it is not stated, or in doubt."""
-        stated = self._book.record.vehicle
-        if stated is None or (self._doubts(stated) and stated.confirmed is None):
-            return None
-        try:
-            return self._named.stated(stated.figures)
-        except (CampaignError, NoSisterError):  # the settings were changed since
-            return None
-
-    @property
-    def _known_vehicle(self) -> Vehicle | None:
-        """The vehicle that statements are compared with: as stated, else as in the file of the settings."""
-        return self._learnt_vehicle or self._vehicle.in_file
-
-    def _doubts(self, stated: Stated) -> list[DoubtOfVehicle]:
-        return [
-            DoubtOfVehicle(kind=one.kind, text=one.text, advice=one.advice, meant=one.meant)
-            for one in doubts_of(stated.figures, self._named.sister)
-        ]
-
-    def vehicle(self) -> StatedVehicle | None:
-        """The vehicle as somebody stated it; None if nobody has."""
-        stated = self._book.record.vehicle
-        if stated is None:
-            return None
-        return StatedVehicle(
-            figures=stated.figures,
-            by=stated.by,
-            at=stated.at,
-            doubts=self._doubts(stated),
-            is_confirmed=stated.confirmed is not None,
-        )
-
-    def state_vehicle(self, answers: VehicleAnswers, by: str, *, is_confirmed: bool) -> None:
-        """State the vehicle's figures; ``is_confirmed``: they are right, although unusual. Raises RefusedError."""
-        self._require_allowed()
-        try:
-            self._named.stated(answers)
-        except NoSisterError as fault:
-            raise RefusedError("not_its_sister", str(fault)) from None
-        except CampaignError as fault:
-            meant = meant_by(doubts_of(answers, self._named.sister))
-            raise RefusedError("vehicle_unusable", f"{fault}{meant}") from None
-        with self._book.lock:
-            act = self._book.act(by)
-            stated = Stated(figures=answers, at=act.at, by=by, confirmed=act if is_confirmed else None)
-            self._book.save(self._book.record.model_copy(update={"vehicle": stated}))
-            self._book.tell(Event.VEHICLE_STATED, {"by": by})
-
-    def sister(self) -> SisterTold | None:
-        """The vehicle of the same model whose calibration is the prior."""
-        given, named = self._book.record.sister, self._named.sister
-        if named is None:
-            return None
-        return SisterTold(name=named.name, calibration_id=given and given.id)
-
-    def state_sister(self, content: bytes, by: str) -> None:
-        """Take the calibration file of a vehicle of the same model as the prior of the next fits. Raises RefusedError
-        for another file, or one of another model.
-        """
-        self._require_allowed()
-        try:
-            held = load_calibration("the file", lambda path: content)
-            sister_in(held)
-            with self._book.lock:
-                if (stated := self._book.record.vehicle) is not None:
-                    replace(self._vehicle, sister=held.vehicle).stated(stated.figures)
-                self._keep_sister(self._book.write_sister(content, held, by), by)
-        except CalibrationFileError as fault:
-            raise RefusedError("no_calibration_file", str(fault)) from None
-        except (NoSisterError, CampaignError) as fault:
-            raise RefusedError("not_its_sister", str(fault)) from None
-
-    def forget_sister(self, by: str) -> None:
-        """Learn again without the calibration that somebody handed in, or with that of the settings."""
-        self._require_allowed()
-        with self._book.lock:
-            self._keep_sister(None, by)
-
-    def _keep_sister(self, sister: Sister | None, by: str) -> None:
-        self._book.save(self._book.record.model_copy(update={"sister": sister}))
-        self._book.tell(Event.SISTER_STATED, {"by": by, "calibration_id": sister and sister.id})
-        with suppress(OSError):
-            self._book.forget_others()
-
-    def _require_allowed(self) -> None:
-        if self._vehicle.why_not_allowed is not None:
-            raise RefusedError("not_allowed", self._vehicle.why_not_allowed)
-
-    # -- statements --
-
-    def state(self, record: StatementRecord, by: str) -> str:
-        """Take one statement; JSON: a StatementTold. Raises RefusedError if another one has its id, or the disk fails.
-
-        The same statement again changes nothing, unless it was withdrawn: then it stands again.
-        """
-        with self._book.lock:
-            said = self._store([record.identified()], by)[0]
-            return self._told([said])[0].model_dump_json(by_alias=True)
-
-    def import_all(
-        self,
-        content: bytes,
-        by: str,
-        *,
-        where: str,
-        zone: tzinfo | None = None,
-        is_dry_run: bool = False,
-        may_come_again: bool = False,
-    ) -> str:
-        """Take the good rows of a table or a list; JSON: an ImportTold. Raises RefusedError if there is none.
-
-        ``may_come_again``: the same content may be delivered twice, so what was withdrawn stays withdrawn.
-        """
-        try:
-            told = read_statements(content, where, zone)
-        except StatementsFileError as fault:
-            raise RefusedError("unreadable", str(fault)) from None
-        with self._book.lock:
-            rows = [row for row in told.rows if self._is_mine(row)]
-            if not told.rows and told.faults:
-                lines = [line for lines in told.faults.values() for line in lines]
-                raise RefusedError("unreadable", "; ".join(lines[:20]))
-            records = [row.record for row in rows]
-            stored = [] if is_dry_run else self._store(records, by, stands_again=not may_come_again)
-            answer = self._imported(told, rows, stored, is_dry_run=is_dry_run)
-        return answer.model_dump_json(by_alias=True)
-
-    def _is_mine(self, row: ToldRow) -> bool:
-        stated = self._book.record.vehicle
-        return row.is_of(self._vehicle.id, self._vehicle.name, stated.figures.name if stated else "")
-
-    def _store(self, records: Sequence[StatementRecord], by: str, *, stands_again: bool = True) -> list[Said]:
-        """Put statements into the book at once; with ``stands_again`` also what was withdrawn.
-
-        Raises RefusedError; then nothing has changed.
-        """
-        record, taken = self._book.record, []
-        for one in records:
-            signed = one if one.by else one.model_copy(update={"by": by})
-            known = record.find(one.id)
-            if known is not None and known.record != signed and known.record.model_copy(update={"by": one.by}) != one:
-                raise RefusedError(
-                    "id_taken",
-                    f"{one.id} is another statement: leave its id out, or withdraw the other one and give a new id",
-                )
-            if known is not None and (known.withdrawn is None or not stands_again):
-                taken.append(known)
-                continue
-            if known is None and len(record.said) >= MOST_STATEMENTS:
-                raise RefusedError("too_many", f"{MOST_STATEMENTS} statements are kept already")
-            said = Said(record=signed if known is None else known.record, at=self._book.now())
-            record = record.with_said(said)
-            taken.append(said)
-        if record is not self._book.record:
-            self._book.save(record)
-            self._book.tell(Event.STATED, {"n": len(taken), "by": by})
-        return taken
-
-    def _imported(
-        self, told: ToldRows, rows: Sequence[ToldRow], stored: Sequence[Said], *, is_dry_run: bool
-    ) -> ImportTold:
-        """What became of the rows, each beside all statements that stand."""
-        others = [one.effective for one in self._book.record.said if one.withdrawn is None]
-        records = standing([*others, *(row.record for row in rows)])
-        fates = self._fates(records)
-        found = rows_record(told, rows, fates, "another")
-        text = rows_told(found["n_rows"], found["n_match"], found["problems"])
-        return ImportTold(**found, text=text, items=self._told(stored), is_dry_run=is_dry_run)
-
-    def _fates(self, records: Sequence[StatementRecord]) -> dict[str, tuple[Fate, str]]:
-        """By id what becomes of the statements before any fit, and why."""
-        vehicle = self._known_vehicle
-        if vehicle is None:
-            return {one.id: (Fate.WAITING, NO_VEHICLE) for one in records}
-        assigned = self._assigned(records, vehicle)
-        return {one.id: (assigned.fates[i], assigned.reasons[i]) for i, one in enumerate(records)}
-
-    def _assigned(self, records: Sequence[StatementRecord], vehicle: Vehicle) -> Assigned:
-        return assign(records, spans_of([one.span for one in self._files.windows()], moments(records)), vehicle)
-
-    def statements(
-        self, *, since_ns: int | None = None, state: str | None = None, limit: int = 500, cursor: str | None = None
-    ) -> str:
-        """JSON: a StatementPage, the newest first: by when they begin. Raises RefusedError for a foreign cursor."""
-        with self._book.lock:
-            every = sorted(self._book.record.said, key=lambda one: (one.record.from_ns, one.record.id), reverse=True)
-            if since_ns is not None:
-                every = [one for one in every if (one.record.until_ns or one.record.from_ns) >= since_ns]
-            told = [one for one in self._told(every) if state is None or one.state == state]
-        if cursor is not None:
-            ids = [one.id for one in told]
-            if cursor not in ids:
-                raise RefusedError("bad_cursor", "this cursor is of no such list: begin anew without it")
-            told = told[ids.index(cursor) + 1 :]
-        page = told[:limit]
-        more = page[-1].id if len(told) > limit else None
-        return StatementPage(items=page, next_cursor=more).model_dump_json(by_alias=True)
-
-    def withdraw(self, statement_id: str, by: str) -> str:
-        """Withdraw a statement; JSON: a StatementTold. With the next fit it is as if it had never been stated."""
-        with self._book.lock:
-            said = self._standing(statement_id)
-            changed = said.model_copy(update={"withdrawn": self._book.act(by)})
-            self._book.save(self._book.record.changing(changed))
-            self._book.tell(Event.STATEMENT_WITHDRAWN, {"id": statement_id, "by": by})
-            return self._told([changed])[0].model_dump_json(by_alias=True)
-
-    def confirm(self, statement_id: str, by: str) -> str:
-        """Somebody has seen the contradiction, and the statement is right; JSON: a StatementTold."""
-        with self._book.lock:
-            said = self._standing(statement_id)
-            if said.confirmed is None:
-                said = said.model_copy(update={"confirmed": self._book.act(by)})
-                self._book.save(self._book.record.changing(said))
-                self._book.tell(Event.STATEMENT_CONFIRMED, {"id": statement_id, "by": by})
-            return self._told([said])[0].model_dump_json(by_alias=True)
-
-    def _standing(self, statement_id: str) -> Said:
-        said = self._book.record.find(statement_id)
-        if said is None:
-            raise RefusedError("no_such_statement", "there is no such statement: the list has all of them")
-        if said.withdrawn is not None:
-            raise RefusedError("withdrawn", "this statement was withdrawn: state it anew")
-        return said
-
-    def _told(self, chosen: Sequence[Said]) -> list[StatementTold]:
-        """These statements with what became of them."""
-        record, windows = self._book.record, self._files.windows()
-        if self._fates_of is None or self._fates_of[0] is not record or self._fates_of[1] != windows:
-            self._fates_of = (record, windows, self._fates(record.records))
-        fates = self._fates_of[2]
-        return [self._one_told(said, fates.get(said.record.id), record.last) for said in chosen]
-
-    def _one_told(self, said: Said, fate: tuple[Fate, str] | None, last: Outcome | None) -> StatementTold:
-        found = last.statements.get(said.record.id) if last is not None else None
-        told: dict[str, Any] = {"state": "waiting"}
-        if said.withdrawn is not None:
-            told = {"state": "withdrawn", "reason": f"withdrawn by {said.withdrawn.by}, {said.withdrawn.at[:16]}Z"}
-        elif fate is None:
-            told = {"state": "withdrawn", "reason": f"replaced by a later one with the ref {said.record.ref}"}
-        elif found is not None and found["confirmed"] == said.effective.confirmed and fate[0] is Fate.MATCHED:
-            drives = [one["t_start"] for one in last.drives if one["number"] in found["drives"]] if last else []
-            told = {name: found[name] for name in ("state", "found", "question")} | {"drives": drives}
-            told["reason"] = found.get("reason")
-        else:
-            told["state"] = STATES[fate[0]]
-            told["reason"] = fate[1] or (NO_VEHICLE if self._learnt_vehicle is None else NEXT_FIT)
-        content = said.effective.model_dump(mode="json", by_alias=True)
-        return StatementTold.model_validate({**content, "vehicle": self._vehicle.id, "at": said.at, **told})
-
     # -- what is learnt --
 
     def learning(self) -> str:
@@ -656,15 +322,15 @@ class Learner(ThreadPart):
             return self._learning().model_dump_json(by_alias=True)
 
     def _learning(self) -> LearningState:
-        record, vehicle = self._book.record, self._known_vehicle
+        record, vehicle = self._book.record, self.van.known
         windows, window_ns = self._files.windows(), self._scheduler.open_window_ns
-        last, told = record.last, self._told(record.said)
+        last, told = record.last, self.loads.told(record.said)
         learning = last.learning if last is not None else {}
         open_s = 0.0 if window_ns is None else (window_ns[1] - window_ns[0]) / NS_PER_S
         counts = Counter(one.state for one in told)
         return LearningState(
-            is_allowed=self._vehicle.why_not_allowed is None,
-            why_not=self._vehicle.why_not_allowed,
+            is_allowed=self.van.given.why_not_allowed is None,
+            why_not=self.van.given.why_not_allowed,
             vehicle_time=iso_utc(self._vehicle_time_ns(windows)),
             plus_minus_kg=learning.get("plus_minus_kg"),
             useful_at_kg=None if vehicle is None else rounded(vehicle.useful_half_width_kg, 1),
@@ -676,7 +342,7 @@ class Learner(ThreadPart):
             is_learning=self._worker.is_busy,
             driven_s=round(sum(one.usable_s for one in windows) + open_s, 1),
             n_drives=len({one.drive_start_ns for one in windows}),
-            statements={name: counts.get(name, 0) for name in STATE_NAMES},
+            statements={name: counts.get(name, 0) for name in STATES},
             questions=list(self._questions(told, last)),
             versions=[self._version_told(one, record) for one in reversed(record.versions)],
             held_version=record.held,
@@ -694,7 +360,7 @@ class Learner(ThreadPart):
         stated = self._book.record.vehicle
         if stated is None:
             yield "vehicle"
-        elif self._learnt_vehicle is None:
+        elif self.van.learnt is None:
             yield "confirmed_vehicle"
         if not windows:
             yield "drives"
@@ -759,7 +425,7 @@ class Learner(ThreadPart):
 
     def use(self, version: str, by: str) -> str:
         """Use this version from the next drive on, or the newest, or the file of the settings; JSON: LearningState."""
-        self._require_allowed()
+        self.van.require_allowed()
         with self._book.lock:
             record = self._book.record
             if version not in (NEWEST, BY_FILE) and all(one.id != version for one in record.versions):

@@ -115,28 +115,28 @@ def statements_router(backend: LearnerBackend) -> APIRouter:
         """
         kind, content = _kind(request), await request.body()
         if not query.dry_run and kind == "application/json" and not content.lstrip().startswith(b"["):
-            return await created(backend.state, _checked(content), by)
+            return await created(backend.loads.state, _checked(content), by)
         where = "the list" if kind == "application/json" else "the table"
         ask = answered if query.dry_run else created
         zone = _zone(query.timezone)
-        return await ask(backend.import_all, content, by, where=where, zone=zone, is_dry_run=query.dry_run)
+        return await ask(backend.loads.import_all, content, by, where=where, zone=zone, is_dry_run=query.dry_run)
 
     @router.get(STATEMENTS_PATH, response_model=StatementPage, responses=problem_responses(409, 422))
     async def statements(query: Annotated[ListQuery, Query()]) -> Response:
         """Every statement with what became of it, the newest first: this list shows how well the vehicle is weighed."""
         return await answered(
-            backend.statements, since_ns=query.since, state=query.state, limit=query.limit, cursor=query.cursor
+            backend.loads.page, since_ns=query.since, state=query.state, limit=query.limit, cursor=query.cursor
         )
 
     @router.delete(STATEMENTS_PATH + "/{statement_id}", response_model=StatementTold, responses=of_id)
     async def withdraw_statement(by: By, statement_id: StatementId) -> Response:
         """Withdraw a statement: with the next fit it is as if it had never been stated."""
-        return await answered(backend.withdraw, statement_id, by)
+        return await answered(backend.loads.withdraw, statement_id, by)
 
     @router.post(STATEMENTS_PATH + "/{statement_id}/confirm", response_model=StatementTold, responses=of_id)
     async def confirm_statement(by: By, statement_id: StatementId) -> Response:
         """Confirm a statement that its drive contradicts: you have seen both numbers, and the stated one is right."""
-        return await answered(backend.confirm, statement_id, by)
+        return await answered(backend.loads.confirm, statement_id, by)
 
     @router.get(LEARNING_PATH, response_model=LearningState)
     async def learning() -> Response:

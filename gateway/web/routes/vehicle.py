@@ -77,8 +77,8 @@ def vehicle_router(
             calibration=None if calibrated is None else _calibration(calibrated),
             figures=None if calibrated is None else calibrated.vehicle,
             signals=now.signals,
-            stated=None if learner is None else learner.vehicle(),
-            sister=None if learner is None else learner.sister(),
+            stated=None if learner is None else learner.van.told(),
+            sister=None if learner is None else learner.van.sister(),
         )
 
     @router.get("/vehicle")
@@ -99,19 +99,19 @@ def vehicle_router(
             Unlikely figures are kept and asked about (`stated.doubts`): nothing is learnt until they are corrected, or
             confirmed with `?confirm=true`.
             """
-            await asyncio.to_thread(learner.state_vehicle, said, by, is_confirmed=query.confirm)
+            await asyncio.to_thread(learner.van.state, said, by, is_confirmed=query.confirm)
             return described()
 
         @router.put("/vehicle/sister", responses=of_sister, openapi_extra={"requestBody": _CALIBRATION})
         async def state_sister(by: By, request: Request) -> VehicleDescription:
             """Hand in the calibration file of a vehicle of the same model: what is learnt begins with it."""
-            await asyncio.to_thread(learner.state_sister, await request.body(), by)
+            await asyncio.to_thread(learner.van.state_sister, await request.body(), by)
             return described()
 
         @router.delete("/vehicle/sister", responses=of_sister)
         async def forget_sister(by: By) -> VehicleDescription:
             """Learn again without the file that was handed in."""
-            await asyncio.to_thread(learner.forget_sister, by)
+            await asyncio.to_thread(learner.van.forget_sister, by)
             return described()
 
     return router
