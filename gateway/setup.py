@@ -53,7 +53,7 @@ class Setup:
 
     @property
     def subject(self) -> Subject:
-        """What is weighed and by which calibration."""
+        """The vehicle that is weighed and the calibration that weighs it."""
         return Subject(self.calibrated, self.estimator, self.identity.vehicle_id)
 
     @property

@@ -114,7 +114,7 @@ def readable(logs: Sequence[JobLog]) -> list[JobLog]:
 
 
 def followed(logs: Sequence[JobLog], next_ns: int | None) -> Iterator[tuple[JobLog, int | None]]:
-    """Each log with the first frame of the one after it; ``next_ns`` is that after the last."""
+    """Yields each log with the first frame of the log after it; ``next_ns`` follows the last log."""
     return zip(logs, [*(one.facts.first_ns for one in logs[1:]), next_ns], strict=False)  # no logs, none after them
 
 

@@ -44,7 +44,7 @@ class ManifestTable(BaseModel):
 
 
 class Means(ManifestTable):
-    """How logs are read and weights judged: at the top for every vehicle, in an entry for this one."""
+    """How logs are read and weights judged: the top of the file holds for every vehicle, an entry for its own."""
 
     signals: str | None = Field(None, description="signal map: a TOML file, or springscale:NAME")
     calibration: str | None = Field(None, description="calibration file; without it batches carry reasons only")

@@ -145,7 +145,7 @@ def _told(one: JobLog, report: LogReport) -> dict[str, Any]:
 
 
 def _keep_failure(job: ArchiveJob, one: JobLog | None, reason: str) -> None:
-    """Of one log, or of the whole job."""
+    """Keeps the failure of one log, or of the whole job."""
     slot, log = job.slot, None if one is None else one.log.name
     content = {"vehicle": slot.vehicle, "month": slot.month, "job": slot.job, "log": log, "reason": reason}
     job.dataset.replace(slot.failure(log), text_of(content | ({"sha256": one.facts.sha256} if one else {})))

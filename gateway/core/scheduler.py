@@ -181,7 +181,7 @@ class Scheduler:
                 yield self._reach(mark_ns) if newest_ns[begin] >= mark_ns else self._overflow()
 
     def _n_that_fit(self, rows: Motion, begin: int) -> int:
-        """How many rows from ``begin`` on the window can still hold; rows aside do not count."""
+        """The number of rows from ``begin`` on that the window can still hold; rows aside do not count."""
         n_left = self._most_rows - self._n_rows
         if rows.aside is None:
             return n_left
@@ -244,7 +244,7 @@ class Scheduler:
         self._newest_ns = None
 
     def _skip_until_moving(self, motion: Motion) -> int:
-        """How many rows to skip until the vehicle moves; a moving row ends the parked state."""
+        """The number of rows to skip until the vehicle moves; a moving row ends the parked state."""
         moving = np.flatnonzero(self._moving_and_still(motion)[0])
         n = int(moving[0]) if moving.size else len(motion)
         self._between = self._between.joined(watched_all([motion.part(0, n)]))

@@ -73,7 +73,7 @@ class Link:
         self._client.loop_stop()
 
     def some(self, timeout_s: float) -> list[Message]:
-        """What has come, at most one transaction's worth; waits for the first."""
+        """The messages that have come, at most one transaction's worth; waits for the first."""
         found: list[Message] = []
         with contextlib.suppress(queue.Empty):
             found.append(self._arrivals.get(timeout=timeout_s))
@@ -82,7 +82,7 @@ class Link:
         return found
 
     def acknowledge(self, arrivals: list[Message]) -> None:
-        """They are safe; of a connection that broke meanwhile they come again."""
+        """Acknowledges messages that are safe; those of a connection that broke meanwhile come again."""
         for arrival in arrivals:
             if arrival.connection == self._connection:
                 self._client.ack(arrival.mid, qos=1)

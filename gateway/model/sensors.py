@@ -1,4 +1,4 @@
-"""What gravity, bends and the floor of the spectra say of the sensors before anything is weighed."""
+"""Faults of the sensors that gravity, bends and the floor of the spectra show before anything is weighed."""
 
 from dataclasses import dataclass
 from typing import Final

@@ -122,5 +122,5 @@ class VehicleModel:
         )
 
     def with_warning(self, warning: str) -> "VehicleModel":
-        """The same with one more warning."""
+        """This vehicle with one more warning."""
         return replace(self, warnings=(*self.warnings, warning))

@@ -131,7 +131,7 @@ class AlarmService:
             return f"[{','.join(map(_text, self._watch.active()))}]"
 
     def summary(self) -> AlarmsStatus:
-        """For status and metrics."""
+        """The alarms in numbers, for status and metrics."""
         with self._lock:
             return AlarmsStatus(
                 active=tuple(alarm.cause.name for alarm in self._watch.active()),

@@ -100,7 +100,7 @@ def delivery(connection: sqlite3.Connection, uplink: str, kinds: Sequence[str]) 
 
 
 def count_pruned(connection: sqlite3.Connection, condition: str, asked: tuple[object, ...]) -> None:
-    """Before rows are removed under ``condition``: add the undelivered ones to the counts of each uplink."""
+    """Adds the undelivered rows under ``condition``, which will be removed, to the counts of each uplink."""
     for column, kinds in (("n_pruned", BATCHES), ("n_pruned_entries", ENTRIES)):
         marks = ", ".join(f"'{kind}'" for kind in kinds)
         connection.execute(

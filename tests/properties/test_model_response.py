@@ -53,7 +53,7 @@ def heavy_theta(slope_per_kn: float, **units: float) -> F64:
 
 
 def off(theta: F64, left_m: float, speed_mps: float = 14.0) -> float:
-    """How far the model is from four wheels: the largest difference over the largest reading of the same sensor."""
+    """The model's distance from four wheels: the largest difference over the largest reading of the same sensor."""
     wheels = FourWheels(theta, HEAVY_GROUND, PAYLOAD_KG, POSITION_M, left_m)
     expected = wheels.paths(FREQ_HZ, speed_mps)
     found = paths_of(theta, wheels.load, FREQ_HZ, 3, speed_mps, HEAVY_GROUND)

@@ -55,7 +55,7 @@ def ns(t_s: F64) -> I64:
 
 
 def off_s(found_ns: I64, t_s: F64) -> F64:
-    """How far times lie off the truth, but for the least delay, which nobody can see."""
+    """The distance of times from the truth, apart from the least delay, which nobody can see."""
     off: F64 = (found_ns - ns(t_s)) * 1e-9
     return off - float(np.median(off))
 

@@ -104,12 +104,12 @@ def test_an_unknown_weight_changes_no_warning() -> None:
 
 
 @given(st.floats(20.0, 800.0), positions)
-def test_the_place_told_is_the_place_loaded(payload_kg: float, position_m: float) -> None:
+def test_the_estimated_place_is_the_loaded_place(payload_kg: float, position_m: float) -> None:
     place = placed(VAN, payload_kg, 1.0, front_share_pct(VAN, payload_kg, position_m), 0.0)
     assert place.position_m == pytest.approx(position_m, abs=1e-6)
 
 
-def test_what_the_empty_share_adds_to_the_share_moves_no_place() -> None:
+def test_an_error_of_the_empty_share_moves_no_place() -> None:
     """It is in the share of the empty vehicle too, and drops out."""
     own = believed([270.0, 48.0], [8.0, 0.3], -0.6)
     with_empty_share = own.with_source(Source.EMPTY_SHARE, np.array([[0.0, 0.5]]))
@@ -117,7 +117,7 @@ def test_what_the_empty_share_adds_to_the_share_moves_no_place() -> None:
 
 
 @given(st.floats(-100.0, 100.0), st.floats(0.1, 50.0), shares)
-def test_what_may_not_be_there_has_no_place(payload_kg: float, std_kg: float, share_pct: float) -> None:
+def test_a_payload_that_may_be_zero_has_no_place(payload_kg: float, std_kg: float, share_pct: float) -> None:
     place = placed(VAN, payload_kg, std_kg, share_pct, 0.3)
     assert (place is None) == (payload_kg - Z95 * std_kg <= 0.0)
 
@@ -203,7 +203,9 @@ PAYLOAD_ALONE = Posterior(np.array([270.0]), np.array([[36.0]]))
         (replace(ANSWER, roll_share_front=math.nan), TRACKED, Lack.ROLL_RATE),
     ],
 )
-def test_an_unknown_wheel_says_what_it_lacks(estimate: Estimate, vehicle: Vehicle | None, lacks: Lack | None) -> None:
+def test_an_unknown_wheel_names_the_missing_signal(
+    estimate: Estimate, vehicle: Vehicle | None, lacks: Lack | None
+) -> None:
     wheel = weighed(estimate, vehicle).weights.front_left
     assert wheel.lacks is lacks
     assert wheel.is_known is (lacks is None)

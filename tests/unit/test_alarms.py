@@ -35,7 +35,7 @@ RAISED, ENDED = ("overload.gross", True), ("overload.gross", False)
 
 
 def told(watch: AlarmWatch, *estimates: Estimate) -> list[tuple[str, bool]]:
-    """What is told of, batch by batch: cause, and whether it is active."""
+    """The changes of alarms, batch by batch: the cause, and whether it is active."""
     alarms = [alarm for one in estimates for alarm in watch.weigh(one, VAN)]
     return [(alarm.cause.name, alarm.is_active) for alarm in alarms]
 
@@ -68,7 +68,7 @@ def test_a_clock_that_is_put_back_silences_no_alarm() -> None:
     assert begun.t_start_ns == of_load(1, OVER).t_end_ns
 
 
-def test_a_load_that_denies_what_one_batch_says_raises_nothing() -> None:
+def test_one_batch_against_its_load_raises_no_alarm() -> None:
     assert told(watching(), of_load(0, OVER, LIMIT_KG - 40.0, n_batches=5)) == []
 
 
@@ -98,7 +98,7 @@ def test_without_a_limit_nothing_is_too_much_and_what_stood_is_over() -> None:
     assert ended.figure.found_kg == pytest.approx(2560.0)
 
 
-def test_what_is_not_known_changes_nothing() -> None:
+def test_unknown_weights_change_no_alarm() -> None:
     watch = overloaded()
     assert told(watch, replace(of_load(2, 0.0), payload=Quantity(), posterior=None, epoch=None)) == []
     assert told(watch, batch(15.0, 20.0, None), replace(of_load(3, 0.0), is_provisional=True)) == []
@@ -124,7 +124,7 @@ def test_a_sensor_is_at_fault_with_two_refusals_in_a_row_for_its_sake() -> None:
 
 
 @pytest.mark.parametrize("off", ["overload", "overload.gross"])
-def test_what_is_switched_off_is_not_told_and_ends(off: str) -> None:
+def test_a_disabled_alarm_is_not_reported_and_ends(off: str) -> None:
     assert off in CAUSE_NAMES
     assert told(watching(off=(off,)), of_load(0, OVER, n_batches=2)) == []
     (active,) = overloaded().active()
@@ -174,7 +174,7 @@ def test_each_alarm_is_raised_and_ended_once_and_a_restart_changes_nothing(
     assert run(says, cut) == run(says)
 
 
-def test_a_sentence_says_what_is_too_heavy_and_whether_it_still_is() -> None:
+def test_the_sentence_names_what_is_too_heavy_and_whether_it_still_is() -> None:
     watch = overloaded()
     assert [sentence(alarm) for alarm in watch.active()] == ["The vehicle weighs 2560 +- 22 kg, limit 2500 kg"]
     (alarm,) = watch.weigh(of_load(2, 100.0), VAN)

@@ -93,7 +93,7 @@ def test_a_manifest_lies_in_an_object_store_with_all_it_names(tmp_path: Path) ->
         ("vehicles = [", r"archive\.toml: not valid TOML"),
     ],
 )
-def test_a_fault_is_told_with_its_place_and_how_to_mend_it(tmp_path: Path, text: str, told: str) -> None:
+def test_a_fault_is_reported_with_its_place_and_remedy(tmp_path: Path, text: str, told: str) -> None:
     (tmp_path / "archive.toml").write_text(text)
     with pytest.raises(ConfigurationError, match=told):
         load_manifest(str(tmp_path))

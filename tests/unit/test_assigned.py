@@ -133,7 +133,7 @@ def test_a_statement_holds_for_its_drives(records: list[StatementRecord], expect
         ),
     ],
 )
-def test_what_becomes_of_a_record_is_told(records: list[StatementRecord], fates: list[Fate], reason: str) -> None:
+def test_the_state_of_each_record_is_reported(records: list[StatementRecord], fates: list[Fate], reason: str) -> None:
     found = assign(records, MORNING, VAN)
     assert list(found.fates) == fates
     assert found.reasons[0].startswith(reason)
@@ -156,7 +156,7 @@ def test_what_becomes_of_a_record_is_told(records: list[StatementRecord], fates:
         ({"change_kg": -60.0}, "no statement of the load before it"),
     ],
 )
-def test_what_cannot_be_true_of_this_vehicle_is_told_with_what_was_meant(said: dict[str, Any], words: str) -> None:
+def test_impossible_statements_are_reported_with_the_probable_meaning(said: dict[str, Any], words: str) -> None:
     found = assign([told("07:40", **said)], MORNING, VAN)
     assert found.fates == (Fate.IMPOSSIBLE,)
     assert words in found.reasons[0]

@@ -83,7 +83,7 @@ def test_shares_follow_from_positions_unless_they_are_given(tmp_path: Path) -> N
     assert stated == 47.5
 
 
-def test_a_run_of_which_nothing_is_said_has_an_unknown_load(tmp_path: Path) -> None:
+def test_a_run_without_a_load_has_an_unknown_load(tmp_path: Path) -> None:
     campaign = loaded(tmp_path, campaign_text('signals = "s"', None, EMPTY_RUN, {"log": '"a.log"'}))
     run = campaign.known_run(2, campaign.runs[1], ())
     assert (run.has_payload, run.has_place, run.described) == (False, False, "an unknown load")
@@ -213,7 +213,7 @@ def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
     assert len(faults.splitlines()) == 3
 
 
-def test_a_fault_in_the_only_run_is_not_told_as_a_want_of_runs(tmp_path: Path) -> None:
+def test_a_fault_in_the_only_run_is_reported_as_itself(tmp_path: Path) -> None:
     assert fault_of(tmp_path, campaign_text('signals = "s"', None, EMPTY_RUN | {"end_s": "-1.0"})).count("\n") == 0
 
 

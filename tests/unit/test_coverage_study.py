@@ -48,7 +48,7 @@ def test_vans_differ_and_come_back_with_their_seed() -> None:
     assert len({van(number).sprung_kg for number in range(6)}) == 6
 
 
-def test_what_is_stated_gives_the_simulated_share() -> None:
+def test_stated_payloads_give_the_simulated_share() -> None:
     for number in range(3):
         one = van(number)
         for loads in known_loads(one, 6, np.random.default_rng(1))[1:]:

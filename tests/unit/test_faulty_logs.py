@@ -68,7 +68,7 @@ def test_a_gain_a_bias_and_a_sign(log: Log) -> None:
     np.testing.assert_allclose(over, -before, atol=step(log, PITCH_RATE))
 
 
-def test_what_is_late_is_what_was(log: Log) -> None:
+def test_delayed_values_are_the_earlier_ones(log: Log) -> None:
     before, late = both(log, PITCH_RATE, "pitch rate late by", "0.05 s")
     np.testing.assert_allclose(late[5:], before[:-5], atol=step(log, PITCH_RATE))
 

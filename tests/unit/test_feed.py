@@ -35,7 +35,7 @@ def at_rest(i: int) -> Scan:
 
 @contextmanager
 def listening(channel: str) -> Iterator[list[can.Message]]:
-    """What arrives on an in-process channel."""
+    """The frames that arrive on an in-process channel."""
     heard: list[can.Message] = []
     with can.Bus(interface="virtual", channel=channel, preserve_timestamps=True) as bus:
         notifier = can.Notifier(bus, [heard.append])
@@ -215,7 +215,7 @@ def test_another_receiver_is_named_once_and_counted() -> None:
     assert f"{OTHER} is left out: {ONE} counts; choose one by --gps-device" in naming[0]
 
 
-def test_no_gpsd_is_told_once_and_tried_again(tmp_path: Path) -> None:
+def test_a_missing_gpsd_is_reported_once_and_retried(tmp_path: Path) -> None:
     fake = FakeIio(tmp_path)
     device = IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
     with (
@@ -287,7 +287,7 @@ def test_mount_matrices_of_the_driver_are_applied_before_the_named_axes(tmp_path
 
 
 @pytest.mark.parametrize("text", ["1, 0; 0, 1", "a, b, c", "1, 0, 0; 0, 1, 0; 0, 0"])
-def test_a_mount_matrix_that_is_none_is_said_when_the_device_is_opened(text: str, tmp_path: Path) -> None:
+def test_an_invalid_mount_matrix_is_reported_when_the_device_is_opened(text: str, tmp_path: Path) -> None:
     fake = FakeIio(tmp_path)
     (fake.device / "in_mount_matrix").write_text(text)
     with pytest.raises(ConfigurationError, match=r"mount matrix is .* no 3 by 3 numbers"):
@@ -356,7 +356,7 @@ def test_devices_are_found_and_what_is_none_is_refused(tmp_path: Path) -> None:
         IioDevice(light, LEVEL, 100.0, fake.nodes)
 
 
-def test_the_command_tells_what_it_did_and_that_the_wrong_axis_is_up(tmp_path: Path) -> None:
+def test_the_command_reports_its_work_and_a_wrong_vertical_axis(tmp_path: Path) -> None:
     fake = FakeIio(tmp_path)
     options = ["--interface", "virtual", "--channel", "feed-cli", "--gpsd", "", "--up", "y", "--forward", "x"]
     options += ["--sysfs", str(fake.sysfs), "--nodes", str(fake.nodes), "--for-s", "4", "--json"]

@@ -48,7 +48,7 @@ def fleet_with(n_vehicles: int, per_year: float) -> dict[str, Series]:
     }
 
 
-def test_what_one_vehicle_does_alone_is_believed_and_what_all_do_is_not() -> None:
+def test_a_drift_of_one_vehicle_is_believed_and_a_common_one_is_not() -> None:
     drifts = drifts_of(fleet_with(LEAST_VEHICLES + 5, per_year=0.05))
     believed = [name for name, found in drifts.items() if found["damper_front_ratio"].is_believed]
     assert believed == ["van-0"]
@@ -63,7 +63,7 @@ def test_a_small_fleet_has_no_movement_in_common() -> None:
     assert common_movement([]) == {}
 
 
-def test_a_parameter_that_nobody_knows_has_no_drift() -> None:
+def test_an_unknown_parameter_has_no_drift() -> None:
     assert list(drifts_of(fleet_with(2, 0.0))["van-1"]) == ["damper_front_ratio"]
     few = {"van": series_of(np.ones(len(WEEKS)))}
     few["van"] = {**few["van"], "damper_front_ratio": (WEEKS[: LEAST_POINTS - 1], np.ones(LEAST_POINTS - 1))}
@@ -84,14 +84,14 @@ def test_a_slope_is_since_the_last_calibration(tmp_path: Path) -> None:
     assert len(vehicle.weeks.number) == 24
 
 
-def test_a_receipt_without_its_table_says_so(tmp_path: Path) -> None:
+def test_a_missing_table_is_reported(tmp_path: Path) -> None:
     slot = write_table(tmp_path, "van", week(0))
     (tmp_path / slot.table).unlink()
     with pytest.raises(PlaceError, match=r"is missing, though a receipt vouches for it: remove receipts/vehicle=van"):
         fleet_of(place_of(tmp_path))
 
 
-def test_a_table_that_is_cut_says_so(tmp_path: Path) -> None:
+def test_a_truncated_table_is_reported(tmp_path: Path) -> None:
     slot = write_table(tmp_path, "van", week(0))
     (tmp_path / slot.table).write_bytes((tmp_path / slot.table).read_bytes()[:100])
     with pytest.raises(PlaceError, match=r"is no Parquet file .*: remove it and receipts/"):
@@ -102,7 +102,7 @@ def test_a_table_that_is_cut_says_so(tmp_path: Path) -> None:
     ("version", "told"),
     [(str(SCHEMA_VERSION + 1), f"has schema {SCHEMA_VERSION + 1}.*install a newer one"), ("", "is no table of")],
 )
-def test_a_table_of_another_schema_says_so(tmp_path: Path, version: str, told: str) -> None:
+def test_a_table_of_another_schema_is_reported(tmp_path: Path, version: str, told: str) -> None:
     slot = write_table(tmp_path, "van", week(0))
     table = pq.read_table(tmp_path / slot.table, partitioning=None)
     pq.write_table(table.replace_schema_metadata({"springscale_schema": version}), tmp_path / slot.table)
@@ -124,7 +124,7 @@ def test_several_jobs_are_one_vehicle(tmp_path: Path) -> None:
     assert vehicle.n == 2
 
 
-def test_nothing_to_report_says_so(tmp_path: Path) -> None:
+def test_an_empty_data_set_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="holds no receipt of `springscale reprocess`"):
         fleet_of(place_of(tmp_path))
     write_table(tmp_path, "van", [])
@@ -171,7 +171,7 @@ def test_independent_points_are_judged_as_by_kendall() -> None:
     assert trend.p == pytest.approx(expected, abs=0.01)
 
 
-def test_too_few_points_tell_nothing_and_equal_ones_no_slope() -> None:
+def test_too_few_points_have_no_slope_and_equal_ones_have_zero() -> None:
     assert trend_of(X[: LEAST_POINTS - 1], X[: LEAST_POINTS - 1]) is None
     level = trend_of(X, np.zeros(len(X)))
     assert (level.slope, level.low, level.high, level.p) == (0.0, 0.0, 0.0, 1.0)

@@ -144,7 +144,7 @@ def test_every_page_is_well_formed_and_headings_descend_by_one(made: Path) -> No
         assert all(len(alt) > 40 for alt in page.alts)
 
 
-def test_all_that_pages_need_lies_beside_them(made: Path) -> None:
+def test_pages_link_only_to_files_beside_them(made: Path) -> None:
     for path in pages(made):
         assert_self_contained(path)
 
@@ -182,7 +182,7 @@ def test_a_band_does_not_span_weeks_that_are_unknown() -> None:
     assert list(runs_of(known, number)) == [slice(0, 3), slice(3, 4), slice(5, 6)]
 
 
-def test_a_data_set_that_is_none_ends_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_invalid_data_set_is_reported_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as left:
         main(["fleet-report", str(tmp_path), "--output", str(tmp_path / "report")])
     assert left.value.code == 2

@@ -105,7 +105,7 @@ def test_the_calibration_file_remembers_faults_of_runs_left_out_and_warnings_of_
     )
 
 
-def test_a_campaign_without_identification_says_so() -> None:
+def test_a_campaign_without_identification_is_reported() -> None:
     split = tuple(replace(one, has_identification=False) for one in campaign())
     verdicts = tuple(RunVerdict(n, "a.log") for n in range(1, 5))
     assert "identification_fraction" in str(Inspection(split, verdicts, ()).refusal)

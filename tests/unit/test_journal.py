@@ -54,9 +54,7 @@ def test_a_flipped_bit_in_an_event_is_passed_over_counted_and_shown(
     assert Event.STORE_BAD_RECORD in names(caplog)
 
 
-def test_a_record_that_no_sender_can_read_is_passed_over_and_told(
-    store: Store, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_an_unreadable_record_is_skipped_and_reported(store: Store, caplog: pytest.LogCaptureFixture) -> None:
     """Its checksum is right, and yet it is no record of this program."""
     entry(store, 0)
     store.write_entry("event", "event-1", 0, "[]")
@@ -86,7 +84,7 @@ def test_a_resumed_follower_gets_more_than_a_page_of_entries(store: Store) -> No
 
 
 @pytest.mark.parametrize("n_threads", [4])
-def test_what_many_threads_write_is_published_in_the_order_of_its_numbers(store: Store, n_threads: int) -> None:
+def test_records_of_many_threads_are_published_in_order(store: Store, n_threads: int) -> None:
     """A number was given under one lock and the record published under another: a live alarm overtook."""
     numbers: list[int] = []
     news = threading.Event()

@@ -24,7 +24,7 @@ def driven(duration_s: float) -> Motion:
 
 
 def kept_of(motion: Motion, settings: BatchSettings = SETTINGS) -> list[KeptBatch]:
-    """What a service of these settings would keep of the rows."""
+    """The batches that a service with these settings would keep of the rows."""
     found: list[KeptBatch] = []
     flow = Flow(settings, MAP.traits, None, "cross_spectrum", Identity("van-17"))
 

@@ -170,7 +170,7 @@ AHEAD_MIN = 3 * DAY_MIN + 7.0
 
 
 def moved(estimates: list[Estimate], minutes: float) -> list[Estimate]:
-    """The same batches by another clock; they have no stops of their own."""
+    """The batches by another clock; they have no stops of their own."""
     by_ns = round(minutes * 60e9)
     return [replace(one, t_start_ns=one.t_start_ns + by_ns, t_end_ns=one.t_end_ns + by_ns) for one in estimates]
 

@@ -31,7 +31,7 @@ def road(seed: int) -> F64:
 
 
 def frames(stamped_s: F64, kept: Bool, counting: Counting) -> list[Frames]:
-    """Both inertial messages and the speed's, stamped as told, without the lost frames."""
+    """The frames of both inertial messages and of the speed, with these stamps, without the lost ones."""
     encoder, t_ns = Encoder(REFERENCE), T0_NS + np.rint(stamped_s * 1e9).astype(np.int64)
     speed_mps = 15.0 + 0.2 * np.sin(np.arange(500.0))
     counter = counting(np.arange(N)).astype(float)

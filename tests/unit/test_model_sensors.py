@@ -140,7 +140,7 @@ def test_a_noisier_accelerometer_has_more_noise(slack: float) -> None:
 
 
 def signs(**seen: object) -> Signs:
-    """Those of a healthy answer, but for what is said."""
+    """The signs of a healthy answer with these changes."""
     healthy = {
         "model": taught(),
         "misfit": 1.0,

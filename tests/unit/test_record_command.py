@@ -26,7 +26,7 @@ DRIVE = white_noise(20.0, START_NS, seed=1)
 
 
 def recorded(log: Path, signals: str = "springscale:reference", for_s: float = 0.3) -> Result:
-    """By ``springscale record`` from a virtual bus named after the log's folder."""
+    """The log that ``springscale record`` makes from a virtual bus named after the log's folder."""
     return called(
         "record",
         log,

@@ -56,7 +56,7 @@ def as_sent(frames: Frames) -> Frames:
 
 @dataclass(frozen=True)
 class Case:
-    """How frames or database are spoiled, what is told, and of which signals."""
+    """One way to spoil frames or database, and the report that is expected of it."""
 
     told: str
     signals: frozenset[Signal]

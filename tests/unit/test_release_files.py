@@ -32,7 +32,7 @@ INSTRUCTIONS = re.findall(r"^([A-Z]+) ((?:.*\\\n)*.*)$", IMAGE, re.MULTILINE)
 
 
 def of(instruction: str) -> list[str]:
-    """What follows each of its occurrences in the image's definition, on one line."""
+    """The text after each occurrence in the image's definition, on one line."""
     return [re.sub(r"\\\n\s*", "", rest) for name, rest in INSTRUCTIONS if name == instruction]
 
 

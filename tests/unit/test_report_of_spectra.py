@@ -210,7 +210,7 @@ def test_what_the_drives_told_of_roll_is_in_the_report() -> None:
     assert before == pytest.approx(1240.0 * (0.42 * 1.5) ** 2, rel=1e-3)  # in its unit, not its logarithm
 
 
-def test_a_calibration_without_a_roll_rate_says_nothing_of_roll() -> None:
+def test_a_report_without_a_roll_rate_does_not_mention_roll() -> None:
     known = knowledge_of(as_if_fitted(*prior_of(UPRIGHT, WIDE), WIDE), WIDE)
     assert [one.name for one in known] == [row.name for row in UPRIGHT]
     assert "roll" not in [panel.title for panel in knowledge_chart(known).panels]
@@ -225,7 +225,7 @@ def judged(cg_left: CgLeftErrors | None, wheels: WheelErrors | None) -> Judgemen
     return Judgement("cross_spectrum", {BatchSet.VALIDATION: ErrorTable("cross_spectrum", batches, errors, ())})
 
 
-def test_how_well_places_to_the_side_were_told_stands_with_the_accuracy() -> None:
+def test_the_accuracy_section_has_the_lateral_errors() -> None:
     found = CgLeftErrors(mean_abs_m=0.0123, bias_m=0.0, std_m=0.02, max_abs_m=0.03, coverage95=0.9)
     (sentence,) = accuracy_section(judged(found, WheelErrors(1.26, 2.0))).paragraphs[1:]
     assert "12 mm on average over 1 answer " in sentence
@@ -235,7 +235,7 @@ def test_how_well_places_to_the_side_were_told_stands_with_the_accuracy() -> Non
     assert "gross weight" not in sentence
 
 
-def test_no_word_of_places_that_nobody_noted_or_told() -> None:
+def test_unknown_lateral_places_are_not_mentioned() -> None:
     assert len(accuracy_section(judged(None, None)).paragraphs) == 1
     untold = CgLeftErrors(None, None, None, None, None)
     assert len(accuracy_section(judged(untold, None)).paragraphs) == 1

@@ -61,7 +61,7 @@ def test_every_mark_is_drawn(mark: Mark) -> None:
     assert len(axes.lines) + len(axes.collections) + len(axes.patches) >= 1
 
 
-def test_a_label_stands_in_the_legend_once() -> None:
+def test_the_legend_has_each_label_once() -> None:
     (legend,) = draw(chart(panel(LineMark(X, X, "same")), panel(LineMark(X, -X, "same")))).legends
     assert [text.get_text() for text in legend.get_texts()] == ["same"]
 

@@ -96,7 +96,7 @@ def test_in_a_replay_the_frames_own_time_counts() -> None:
     assert driven.watch.stood_s() == pytest.approx(30.0, abs=1.1)
 
 
-def test_what_an_earlier_run_weighed_may_have_been_unloaded_since() -> None:
+def test_a_load_of_an_earlier_run_may_have_been_unloaded() -> None:
     driven = Driven()
     assert not driven.knows(0)
     driven.at(10.0, 5)
@@ -104,7 +104,7 @@ def test_what_an_earlier_run_weighed_may_have_been_unloaded_since() -> None:
     assert driven.knows(1000)
 
 
-def test_after_a_clock_that_was_put_back_nobody_knows() -> None:
+def test_the_standing_time_is_unknown_after_a_clock_step() -> None:
     driven = Driven()
     before = driven.at(10.0, 300)
     driven.t_s -= 200

@@ -50,7 +50,7 @@ def test_pages_follow_one_another_in_both_directions(store: Store) -> None:
         assert tuple(seen) == expected
 
 
-def test_the_last_cursor_of_a_page_waits_for_what_comes(store: Store) -> None:
+def test_the_last_cursor_continues_with_new_records(store: Store) -> None:
     write(store, make_record(0), make_record(1))
     for newest_first in (False, True):
         page = store.reader().estimates(newest_first=newest_first)
@@ -79,7 +79,7 @@ def test_spectra_can_be_left_out(store: Store) -> None:
     assert (item,) == texts(expected)
 
 
-def test_latest_tells_answer_and_rejection_apart(store: Store) -> None:
+def test_latest_distinguishes_answer_and_rejection(store: Store) -> None:
     assert store.reader().latest().estimate is None
     write(store, make_record(1), make_record(2), make_record(3, Why.TOO_SLOW))
     latest = store.reader().latest()
@@ -134,7 +134,7 @@ def test_numbers_go_on_after_a_restart(tmp_path: Path) -> None:
     ("first_s", "n_pruned"),
     [(1_790_000_000 - 61, 2), (7, 0)],  # a box without a clock battery wakes up in 1970: that is not old
 )
-def test_what_is_old_goes_and_is_counted(tmp_path: Path, first_s: int, n_pruned: int) -> None:
+def test_old_records_are_removed_and_counted(tmp_path: Path, first_s: int, n_pruned: int) -> None:
     clock = [first_s * NS_PER_S]
     store = Store.open(tmp_path, Retention(max_age_s=60.0), clock_ns=lambda: clock[0])
     write(store, make_record(0), make_record(1))

@@ -79,7 +79,7 @@ def test_a_statement_that_its_drive_contradicts_is_held_and_no_other() -> None:
     assert found[2].load.payload_kg == pytest.approx(KNOWN[2][0], abs=40.0)
 
 
-def test_each_statement_is_told_what_its_drive_says_without_it() -> None:
+def test_each_statement_is_compared_with_its_drive_weighed_without_it() -> None:
     """That is its test: the drive knows the load from the vehicle of the others alone."""
     for found, (payload_kg, _) in zip(known().loads, KNOWN, strict=True):
         assert abs(found.without_kg - payload_kg) < 3.0 * found.without_std_kg
@@ -145,6 +145,6 @@ def test_a_place_that_is_not_known_leaves_the_share_wide() -> None:
     assert unknown.front_share_std > 5.0 * placed.front_share_std
 
 
-def test_what_the_fitter_states_of_the_goods_leaves_one_kind_of_shape() -> None:
+def test_stated_goods_have_one_shape() -> None:
     assert [one.name for one in shape_hypotheses(VAN, 0.1, 0.3)] == ["compact", "spread"]
     assert [one.name for one in shape_hypotheses(replace(VAN, payload_length_m=2.0), 0.1, 0.3)] == ["stated"]

@@ -103,7 +103,7 @@ def test_speed_is_linear_between_samples_and_held_no_longer_than_allowed() -> No
     assert np.isnan([at[5.0], at[9.0], at[15.1]]).all()  # six seconds apart, and past the hold
 
 
-def test_no_speed_sample_is_no_speed() -> None:
+def test_without_samples_the_speed_is_unknown() -> None:
     assert np.isnan(speed_onto_grid(np.empty(0, np.int64), np.empty(0), T0_NS, 10, RATE_HZ, 3.0)).all()
 
 
@@ -158,6 +158,6 @@ def test_a_tridiagonal_system_is_solved_as_scipy_does(n: int, seed: int) -> None
     np.testing.assert_allclose(solve_tridiagonal(below, diagonal, above, right), expected, rtol=1e-9, atol=1e-9)
 
 
-def test_what_is_no_number_is_an_error_and_no_curve() -> None:
+def test_nan_samples_are_an_error() -> None:
     with pytest.raises(ValueError, match="infs or NaNs"):
         smooth_slopes(np.arange(5.0), np.array([0.0, np.nan, 1.0, 2.0, 3.0]))

@@ -75,7 +75,7 @@ HARMLESS = {
 
 @pytest.mark.parametrize("kind", [*UNRELATED, *HARMLESS])
 @pytest.mark.parametrize("place", ["before", "behind"])
-def test_a_fault_elsewhere_leaves_what_is_mapped_as_it_is(kind: str, place: str, tmp_path: Path) -> None:
+def test_a_fault_elsewhere_does_not_affect_mapped_signals(kind: str, place: str, tmp_path: Path) -> None:
     sound = load_signal_map(write(tmp_path, HEAD + BOX + OTHER + TAIL))
     other = OTHER + {**UNRELATED, **HARMLESS}[kind]
     text = HEAD + (other + BOX + TAIL if place == "before" else BOX + TAIL + other)

@@ -126,14 +126,14 @@ def test_an_early_look_without_an_answer_is_not_shown(board: Board) -> None:
     assert told["last_rejection"] is None
 
 
-def test_what_an_earlier_run_stored_is_shown_as_old_as_it_is(board: Board) -> None:
+def test_an_estimate_of_an_earlier_run_is_shown_with_its_age(board: Board) -> None:
     board.restore(json.dumps(make_record(2)), json.dumps(make_record(3, Why.GAP)), age_s=3600.0)
     told = latest(board)
     assert (told["payload_kg"], told["age_s"], told["is_stale"]) == (102.0, 3600.0, True)
     assert told["last_rejection"] is not None
 
 
-def test_nothing_restored_is_nothing_yet(board: Board) -> None:
+def test_without_a_stored_estimate_latest_is_empty(board: Board) -> None:
     board.restore(None, None, None)
     assert latest(board)["rejected"] == ["no_estimate_yet"]
 
@@ -170,7 +170,7 @@ def test_what_is_shown_is_the_same_before_and_after_a_restart(board: Board, cloc
     assert again.latest() == board.latest()
 
 
-def test_a_record_that_another_version_wrote_is_no_estimate_and_nothing_of_it_is_shown(board: Board) -> None:
+def test_a_record_of_another_version_is_not_shown(board: Board) -> None:
     strange = make_record(3, Why.GAP) | {"rejected": ["a_reason_of_tomorrow"]}
     with pytest.raises(ValueError, match="a_reason_of_tomorrow"):
         board.restore(json.dumps(make_record(2)), json.dumps(strange), age_s=1.0)
@@ -181,7 +181,7 @@ US_LAST = 253_402_300_799_999_999  # the end of 9999
 
 
 @given(st.integers(0, US_LAST))
-def test_what_we_write_we_read(t_us: int) -> None:
+def test_written_times_are_read_back(t_us: int) -> None:
     assert parse_instant(iso_utc(t_us * 1000)) == t_us * 1000
 
 

@@ -157,7 +157,7 @@ def _lengths(lists: Any) -> I64:
 
 
 def _reasons(lists: Any) -> dict[str, Bool]:
-    """For each text in a column of lists, the rows that contain it."""
+    """Finds, for each text in a column of lists, the rows that contain it."""
     row = np.repeat(np.arange(len(lists)), _lengths(lists))
     told = lists.flatten().dictionary_encode()
     code = np.asarray(told.indices)

@@ -86,7 +86,7 @@ def refused_by(batches: Batches, cause: Cause) -> Bool:
 
 
 def known_reason(reason: str) -> Why | None:
-    """None for a reason of a newer version."""
+    """The reason of this name; None if a newer version wrote it."""
     return Why(reason) if reason in CAUSES else None
 
 

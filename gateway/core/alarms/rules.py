@@ -21,7 +21,7 @@ NOTHING_FOUND: Final = AlarmFigure()
 
 
 class AlarmVerdict(StrEnum):
-    """What the newest evidence says about an alarm, whether it is active or not."""
+    """The newest evidence's verdict on an alarm, whether it is active or not."""
 
     RAISE = "raise"
     CLEAR = "clear"

@@ -1,4 +1,4 @@
-"""How much more may be loaded, and into which half of the loading area, so that no axle and no gross limit is passed.
+"""The payload that may still be loaded, and where, so that no axle and no gross limit is passed.
 
     room = room_of(weights, vehicle)      # None: a limited weight is unknown, or nothing is limited
 
@@ -130,7 +130,7 @@ class LoadingArea:
         return min(enough, key=lambda halves: (halves.kg, abs(halves.front_kg - halves.rear_kg)), default=None)
 
     def _borne(self, spare: Spare) -> Iterator[tuple[float, float, float]]:
-        """Of each limit: the largest share of a load in the front half and of one in the rear half, and the room."""
+        """The largest share of a load in each half that a limit bears, and the room."""
         yield 1.0, 1.0, spare.gross_kg
         yield _clipped(1.0 - self.begin), _clipped(1.0 - self.middle), spare.front_axle_kg
         yield _clipped(self.middle), _clipped(self.end), spare.rear_axle_kg
@@ -150,7 +150,7 @@ def _crossings(lines: list[tuple[float, float, float]]) -> Iterator[tuple[float,
 
 @dataclass(frozen=True, slots=True)
 class LoadRoom:
-    """What may still go in.
+    """The payload that may still go in.
 
     ``most`` is the best estimate with its 95 % interval, negative if something is too heavy. ``safe`` and
     ``take_out`` hold at the unfavourable ends of all the weights' intervals. ``is_anywhere``: ``safe`` may lie anywhere
