@@ -33,7 +33,7 @@ class Subject:
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """Everything that turns frames into estimates, loaded and checked.
+    """The parts that turn frames into estimates, loaded and checked.
 
     ``limits`` override those of the calibration.
     """

@@ -96,7 +96,7 @@ class JobLog:
 
 @dataclass(frozen=True, slots=True)
 class ArchiveJob:
-    """Everything that a worker needs, and that determines its result.
+    """The complete input of a worker, which determines its result.
 
     ``next_ns`` is the first frame of the following log in another job; None without one.
     """

@@ -73,7 +73,7 @@ def _finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
 
 
 def inspection_json(inspection: Inspection) -> dict[str, object]:
-    """A verdict a run, findings about all runs together, and why there is no calibration (null if there is one)."""
+    """The verdict on each run, the findings about all runs, and the refusal of the calibration, or null."""
     return {
         "refusal": inspection.refusal,
         "runs": [

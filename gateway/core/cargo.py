@@ -1,4 +1,4 @@
-"""What a vehicle carries, and so how long and how high its loads are: the table of load shapes.
+"""The table of load shapes: how long and how high loads are, by the goods that a vehicle carries.
 
 A long or high load is harder to pitch than a compact one of the same weight at the same place. The half-car sees of its
 shape only the squared radius of gyration in pitch, about the front-to-rear line through the body's centre of gravity:

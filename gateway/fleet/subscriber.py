@@ -1,4 +1,4 @@
-"""From the fleet's broker into a database: every record once, acknowledged to the broker when it is on disk; and the
+"""Stores every record from the fleet's broker once, acknowledged to the broker when it is on disk; and the
 page of the fleet, /fleet.
 
     python -m gateway.fleet.subscriber            # settings from the environment, see Settings

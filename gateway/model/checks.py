@@ -1,4 +1,4 @@
-"""What refuses a batch: before it is weighed, and after. The second list is a table of rows."""
+"""Checks that refuse a batch, before it is weighed and after. The second list is a table of rows."""
 
 import math
 from collections.abc import Callable

@@ -157,7 +157,7 @@ class CrossSpectra:
 
     @property
     def without_roll(self) -> "CrossSpectra":
-        """The same spectra with acceleration and pitch rate alone."""
+        """These spectra with acceleration and pitch rate alone."""
         if not self.has_roll:
             return self
         return replace(self, parts=self.parts[[0, 1, 3, 4]], noise=None if self.noise is None else self.noise[:2])

@@ -107,7 +107,7 @@ def loaded(client: Client, page: str) -> dict[str, bytes]:
     ("path", "one"), [("/", LIBRARY_URL), ("/cab", "/assets/cab/cab.js"), ("/docs", "/swagger/swagger-ui.css")]
 )
 def test_every_file_that_a_page_names_exists(client: Client, path: str, one: str, prefix: str) -> None:
-    """Also below a path of a proxy, which cuts it off."""
+    """They must also exist below the path of a proxy, which cuts it off."""
     behind = Client(below(prefix, client.app)) if prefix else client
     assert prefix + one in loaded(behind, prefix + path)
 

@@ -322,7 +322,7 @@ def test_a_gain_multiplies_what_the_accelerometer_reads() -> None:
     np.testing.assert_array_equal(louder[1], plain[1])
 
 
-def test_what_the_springs_push_is_what_the_body_weighs_times_its_acceleration() -> None:
+def test_spring_forces_equal_mass_times_acceleration() -> None:
     """Newton's law, both axles together: a firm payload, a sensor over the centre of gravity, no driveline."""
     share = 0.46
     theta = theta_of(sensor_position_m=(1.0 - share) * GROUND.wheelbase_m, **FIRM, **UNCOUPLED)

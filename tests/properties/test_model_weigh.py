@@ -224,7 +224,7 @@ def heavier(model: VehicleModel, by: float) -> VehicleModel:
 
 @ROLL
 @pytest.mark.parametrize("by", [0.5, 3.0])
-def test_in_another_unit_of_mass_the_payload_is_another_number_and_nothing_else_changes(
+def test_another_unit_of_mass_scales_the_payload_alone(
     by: float, with_roll: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model, batch = as_if_taught(car(with_roll=with_roll), VAN if with_roll else FLAT_VAN), None
@@ -336,7 +336,7 @@ def test_weighing_equals_fitting_one_drive_of_unknown_load() -> None:
 
 
 @ROLL
-def test_what_the_sources_add_and_the_batch_s_own_are_the_whole_covariance(with_roll: bool) -> None:
+def test_sources_and_own_errors_add_up_to_the_covariance(with_roll: bool) -> None:
     model = replace(taught(with_roll=with_roll), model_std=(0.0, 0.0, 0.0), spread=(1.0, 1.0, 1.0))
     several = known(spectra_of(drive_of(LOAD, 13, with_roll=with_roll), model), model)
     one = replace(several, peaks=(several.best,), weights=np.ones(1))
@@ -349,7 +349,7 @@ def test_what_the_sources_add_and_the_batch_s_own_are_the_whole_covariance(with_
 
 
 @pytest.mark.parametrize("name", ["spring_rear_npm", "tyre_front_npm", "damper_rear_nspm", "sensor_position_m"])
-def test_a_parameter_that_is_off_moves_the_answer_as_its_column_says(name: str) -> None:
+def test_a_wrong_parameter_moves_the_answer_by_its_column(name: str) -> None:
     """The answer to what a vehicle shows that is off its calibration by half a standard deviation of the day."""
     theta = car(with_roll=True)
     model = as_if_taught(theta)

@@ -96,7 +96,7 @@ def test_lost_frames_are_distinguished_from_late_ones(lost: float, mean_s: float
     assert float(np.mean(np.abs(off_s(timing.t_ns, t_s)) > 0.001)) < 0.01
 
 
-def test_a_counter_tells_lost_frames_where_stamps_come_in_heaps() -> None:
+def test_a_counter_shows_lost_frames_among_bunched_stamps() -> None:
     rng = np.random.default_rng(5)
     t_s, counter = taken(0.01), np.arange(round(DURATION_S / 0.01)) % 16
     kept = rng.random(len(t_s)) > 0.2

@@ -72,7 +72,7 @@ def row(n: int) -> JournalRow:
     steps=st.lists(st.sampled_from(["add", "event", "take", "settle", "give_back"]), max_size=40),
     capacity=st.integers(1, 6),
 )
-def test_what_was_accepted_is_written_held_or_counted(steps: list[str], capacity: int) -> None:
+def test_accepted_records_are_written_held_or_counted(steps: list[str], capacity: int) -> None:
     held = WriteBuffer(capacity, epoch="ab")
     n_accepted = n_written = 0
     in_flight: tuple[object, ...] = ()

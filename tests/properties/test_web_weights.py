@@ -72,7 +72,7 @@ def test_an_unsprung_mass_follows_from_the_kerb_weight() -> None:
     assert unsprung_kg(kerb) == pytest.approx((90.0, 110.0))
 
 
-def test_what_is_not_stated_is_unknown_and_never_zero() -> None:
+def test_unstated_figures_are_unknown_and_never_zero() -> None:
     half = paper_van(unsprung_front_kg=90.0)
     weights = axle_loads(half, 100.0, 5.0, 50.0, 0.5)
     assert weights.front_axle.is_known

@@ -83,7 +83,7 @@ def test_held_records_are_stored_after_those_of_an_earlier_run(tmp_path: Path) -
     store.close()
 
 
-def test_memory_is_bounded_and_what_gives_way_is_counted(tmp_path: Path) -> None:
+def test_memory_is_bounded_and_dropped_records_are_counted(tmp_path: Path) -> None:
     store = Store.open(blocked_directory(tmp_path), Retention(max_held=3))
     for n in range(5):
         store.write_estimate(make_record(n))

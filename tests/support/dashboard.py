@@ -90,7 +90,7 @@ class Watched:
         self.page.on("console", lambda said: self.complaints.append(said.text) if said.type == "error" else None)
 
     def opened(self, url: str) -> Any:
-        """The page, showing what is there."""
+        """The page once it shows the stored records."""
         self.page.goto(url)
         return self.page
 

@@ -135,7 +135,7 @@ def test_runs_that_cannot_be_used_count(severities: tuple[Severity | None, ...],
 
 
 @pytest.mark.parametrize(("n_held", "grade"), [(0, None), (1, Grade.RESERVED), (2, Grade.RESERVED), (3, Grade.UNFIT)])
-def test_statements_that_were_held_reserve_and_most_of_them_make_unfit(n_held: int, grade: Grade | None) -> None:
+def test_held_statements_are_a_reservation_and_a_majority_makes_unfit(n_held: int, grade: Grade | None) -> None:
     file = calibration_file()
     (drive,) = file.provenance.drives
     found = FoundPart(

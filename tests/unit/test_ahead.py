@@ -77,7 +77,7 @@ def test_a_longer_drive_teaches_more() -> None:
 
 
 @pytest.mark.parametrize("load", [LOADED, EMPTY])
-def test_teaching_then_gives_about_what_was_predicted(load: Load) -> None:
+def test_teaching_gives_about_the_predicted_gain(load: Load) -> None:
     before = after_one_empty_drive()
     ahead = Ahead(before, VAN)
     predicted_kg, _ = ahead.stds(ahead.after(known(load), load, DRIVE_S))

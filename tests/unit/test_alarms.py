@@ -91,7 +91,7 @@ def test_a_wheel_has_its_own_alarm() -> None:
     assert sentence(raised) == "The wheel at the rear left weighs 620 +- 10 kg, limit 600 kg"
 
 
-def test_without_a_limit_nothing_is_too_much_and_what_stood_is_over() -> None:
+def test_without_a_limit_overload_alarms_end() -> None:
     watch = overloaded()
     (ended,) = watch.weigh(of_load(2, OVER, n_batches=3), replace(VAN, gross_limit_kg=None))
     assert not ended.is_active
@@ -133,7 +133,7 @@ def test_a_disabled_alarm_is_not_reported_and_ends(off: str) -> None:
 
 
 @pytest.mark.parametrize("reasons", [*pairwise(sorted(SENSORS))])
-def test_the_sentence_of_refused_batches_says_the_reasons_in_words(reasons: tuple[Why, ...]) -> None:
+def test_the_sentence_of_refused_batches_has_their_reasons(reasons: tuple[Why, ...]) -> None:
     watch = watching()
     (raised,) = (alarm for n in range(2) for alarm in watch.weigh(refused(n, *reasons, Why.TOO_SLOW), VAN))
     assert raised.figure.detail == ", ".join(reasons)

@@ -11,7 +11,7 @@ from gateway.archive.survey import is_log
 from gateway.errors import ConfigurationError
 
 
-def test_a_manifest_maps_folders_to_vehicles_and_shares_what_they_share(tmp_path: Path) -> None:
+def test_a_manifest_maps_folders_to_vehicles_with_common_settings(tmp_path: Path) -> None:
     path = write_manifest(tmp_path, "van-1", 'vin = "WF0XXXTTGXJK12345"', 'id = "van-3"\nlogs = "/elsewhere/3"')
     manifest = load_manifest(str(path))
     assert manifest.where == load_manifest(str(tmp_path)).where == str(path)

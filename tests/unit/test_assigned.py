@@ -193,7 +193,7 @@ def test_axle_weights_are_a_payload_and_a_front_share() -> None:
     assert said.placed_by == record.id
 
 
-def test_unsprung_masses_that_nobody_knows_are_an_error_of_every_weighing() -> None:
+def test_unknown_unsprung_masses_are_an_error_of_every_weighing() -> None:
     bare = replace(VAN, kerb_front_axle_kg=None, kerb_rear_axle_kg=None)
     (said, *_) = assign([told("07:40", source="scale", gross_kg=1720.0)], MORNING, bare).statements
     assert said.payload_kg == pytest.approx(1720.0 - 1240.0 - 2 * 0.065 * 1240.0)
@@ -225,7 +225,7 @@ def test_each_source_has_its_usual_doubt(source: str, payload_kg: float, plus_mi
     assert said.claims[0].stated_plus_minus_kg == pytest.approx(plus_minus_kg)
 
 
-def test_place_and_goods_are_said_of_the_load() -> None:
+def test_a_statement_of_a_load_has_place_and_goods() -> None:
     record = told("07:40", payload_kg=300.0, place={"behind_front_axle_m": 1.8, "plus_minus_m": 0.6, "left_m": -0.2})
     record = record.model_copy(update={"shape": record.model_validate(
         {**record.model_dump(by_alias=True), "shape": {"carries": "parcels"}}).shape})  # fmt: skip

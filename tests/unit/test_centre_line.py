@@ -61,7 +61,7 @@ def test_pure_roll_is_no_motion_of_the_centre_line(lever_m: float) -> None:
     assert wrong[1][shaken] == pytest.approx(2.0 * seen[1][shaken], rel=0.1)  # turned over it counts twice
 
 
-def test_with_roll_taken_out_what_is_left_is_heave() -> None:
+def test_removing_roll_leaves_heave() -> None:
     (_, heave), (rate, roll) = moving(2), moving(3)
     on_line = acceleration_spectrum(batch_of(heave, None), N_SEGMENT, "power", 0.0)
     moved = acceleration_spectrum(batch_of(heave + 0.3 * roll, rate), N_SEGMENT, "power", 0.3)

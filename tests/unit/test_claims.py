@@ -89,7 +89,7 @@ def test_a_common_cause_is_tested_as_a_claim_is(seen: float, std: float) -> None
     assert shared_disagreement(mean, variance) == pytest.approx(abs(seen) / np.hypot(std, 1.0), rel=1e-6, abs=1e-9)
 
 
-def test_truth_is_what_claims_say_without_their_common_error() -> None:
+def test_the_truth_is_the_claims_without_their_common_error() -> None:
     terms = Terms.of([claim("a", 270.0, 10.0, note=15.0), claim("b", 180.0, 10.0, note=10.0)], ("note",))
     one, other = (
         Terms(("x",), *(part[[i]] for part in (terms.said_kg, terms.own_kg, terms.shared_kg))) for i in (0, 1)
@@ -109,6 +109,6 @@ def test_disbelieved_claims_leave_the_others() -> None:
     assert load_prior_of(NOTHING_KNOWN, VAN).payload_std_kg > 100.0
 
 
-def test_a_claim_that_counts_less_keeps_what_it_shares() -> None:
+def test_a_claim_of_less_weight_keeps_its_shared_error() -> None:
     soft = claim("a", 300.0, 10.0, a=20.0, note=15.0).softened(2.0)
     assert (soft.plus_minus_kg, dict(soft.shared)) == (20.0, {"a": 40.0, "note": 15.0})

@@ -85,7 +85,7 @@ def test_unreadable_and_unreachable_things_are_reported_in_one_line(
         run(*command)
 
 
-def test_a_drive_that_fails_ends_the_command_with_what_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_drive_ends_the_command_with_its_error(monkeypatch: pytest.MonkeyPatch) -> None:
     def drive(*_: object) -> None:
         raise BusError("springscale-demo: the bus has gone")
 

@@ -134,7 +134,7 @@ def test_sideways_errors_by_hand() -> None:
     assert errors.wheels.max_abs_pct_of_gross == pytest.approx(100.0 * np.max(off_kg) / gross_kg)
 
 
-def test_the_table_is_shown_with_what_lies_sideways() -> None:
+def test_the_table_has_lateral_errors() -> None:
     shown = text_of(error_table([placed(0.05, 0.056), placed(-0.03, -0.05)], ROLLING, "x")).splitlines()
     assert shown[4:7] == [
         "c.g. left                           -7.0 mm  13.0 mm  20.0 mm     13.0 mm   50.00 %    10.0 mm 220.0 mm",

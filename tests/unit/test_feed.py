@@ -186,7 +186,7 @@ def test_one_receiver_of_several_counts(case: str) -> None:
     assert gps.n_left_out == left_out
 
 
-def test_a_receiver_that_is_plugged_in_anew_takes_the_place_of_the_lost_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reconnected_receiver_replaces_the_lost_one(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [100.0]
     monkeypatch.setattr("gateway.bus.feed.time.monotonic", lambda: clock[0])
     gps = Gpsd("127.0.0.1", 1)
@@ -248,7 +248,7 @@ def test_a_device_that_is_gone_ends_the_feed(tmp_path: Path) -> None:
     assert "gone" in str(ended[0])
 
 
-def test_a_bus_that_is_absent_is_tried_again_and_what_was_dropped_is_counted(
+def test_an_absent_bus_is_retried_and_dropped_frames_are_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gateway.bus.feed.QUEUE", 20)
@@ -346,7 +346,7 @@ def test_axes_are_right_handed_and_one_line_is_refused() -> None:
                 assert np.linalg.det(turned(forward, up)) == pytest.approx(1.0)
 
 
-def test_devices_are_found_and_what_is_none_is_refused(tmp_path: Path) -> None:
+def test_devices_are_found_and_other_folders_refused(tmp_path: Path) -> None:
     fake = FakeIio(tmp_path)
     light = fake.sysfs / "iio:device1"
     light.mkdir()

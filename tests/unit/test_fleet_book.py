@@ -77,7 +77,7 @@ def alarm(vehicle: str, revision: int, *, is_active: bool) -> Message:
     return message(vehicle, "alarms", id="alarm-1", revision=revision, is_active=is_active, **told)
 
 
-def test_a_line_is_of_the_newest_answer_however_late_an_older_one_comes(book: Book) -> None:
+def test_a_late_older_answer_does_not_replace_the_newest(book: Book) -> None:
     book.write([estimate("van-1", 55, 200.0), estimate("van-1", 50, 100.0), estimate("van-1", 58, 0.0, "too_slow")])
     (line,) = book.fleet().items
     assert (line.vehicle_id, line.estimate.payload_kg, line.estimate.weights["gross"].kg) == ("van-1", 200.0, 1700.0)

@@ -185,7 +185,7 @@ def test_one_wild_week_moves_the_slope_little() -> None:
 
 
 @pytest.mark.parametrize("alike", [0.0, 0.3, 0.6])
-def test_the_interval_holds_a_slope_of_nothing_about_as_often_as_it_says(alike: float) -> None:
+def test_the_interval_covers_a_zero_slope_at_its_nominal_rate(alike: float) -> None:
     trends = [trend_of(X, y) for y in repeating(alike, 400, seed=3)]
     held = np.mean([trend is not None and trend.low <= 0.0 <= trend.high for trend in trends])
     assert 0.90 <= held <= 0.985

@@ -54,9 +54,7 @@ def test_the_subscriber_gets_its_settings() -> None:
 
 @needs_openssl
 @pytest.mark.parametrize("name", ["broker.fleet.example", "192.0.2.7"])
-def test_the_brokers_certificate_is_signed_by_the_fleets_authority_and_made_anew_without_another(
-    name: str, tmp_path: Path
-) -> None:
+def test_the_brokers_certificate_is_renewed_by_the_same_authority(name: str, tmp_path: Path) -> None:
     authorities = []
     for _ in range(2):
         subprocess.run([FLEET / "make_certificates.sh", name, tmp_path / "pki"], check=True, capture_output=True)
@@ -95,7 +93,7 @@ def test_each_vehicle_gets_settings_that_the_service_takes(fleet: Path) -> None:
     assert listed == ["fleet-dispatcher", "fleet-subscriber", "van-1", "van-2", "van-3"]
 
 
-def test_running_it_again_changes_nothing_but_what_the_table_changes(fleet: Path) -> None:
+def test_a_second_run_changes_only_rows_changed_in_the_table(fleet: Path) -> None:
     provision(fleet, "broker.fleet.example")
     before = {path: path.read_bytes() for path in (fleet / "out").rglob("*") if path.is_file()}
     provision(fleet, "broker.fleet.example")

@@ -235,13 +235,13 @@ def shown(number: int, names: dict[str, Any], replaced: dict[str, str]) -> dict[
     return names
 
 
-def test_duckdb_counts_what_the_report_counts(dataset: Path, fleet: FleetSummary) -> None:
+def test_duckdb_agrees_with_the_report(dataset: Path, fleet: FleetSummary) -> None:
     by_reason, by_week = (duckdb.sql(one.replace("DATASET", str(dataset))).fetchall() for one in SQL)
     assert {(vehicle, reason): n for vehicle, reason, n in by_reason} == refusals(fleet)
     assert {(vehicle, str(at)[:10]): (n, mean) for vehicle, at, n, mean in by_week} == loads(fleet)
 
 
-def test_polars_counts_what_the_report_counts(dataset: Path, fleet: FleetSummary) -> None:
+def test_polars_agrees_with_the_report(dataset: Path, fleet: FleetSummary) -> None:
     found = shown(0, {}, {"DATASET": str(dataset)})
     by_week = found["loads"].rows()
     assert {(vehicle, str(at)[:10]): (n, mean) for vehicle, at, n, mean in by_week} == loads(fleet)

@@ -43,7 +43,7 @@ def test_one_batch_is_its_own_epoch() -> None:
     assert (epoch.posterior, epoch.n_batches, epoch.is_change) == (batch(270.0).posterior, 1, False)
 
 
-def test_own_errors_average_out_and_what_batches_share_stays() -> None:
+def test_own_errors_average_out_and_shared_errors_stay() -> None:
     for n in (1, 2, 5, 100):
         std_kg = together(*[batch(270.0)] * n).posterior.std(PAYLOAD)
         assert std_kg == pytest.approx(np.hypot(8.0 / np.sqrt(n), SHARED_KG))

@@ -1,4 +1,4 @@
-"""MQTT discovery: what Home Assistant is told fits the records it is about."""
+"""The MQTT discovery messages for Home Assistant fit the records that they describe."""
 
 import json
 import math

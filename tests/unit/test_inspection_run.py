@@ -96,7 +96,7 @@ WRONG_MAPS: dict[str, tuple[Callable[[Motion], Motion], list[str]]] = {
 
 
 @pytest.mark.parametrize("mistake", WRONG_MAPS)
-def test_a_mistake_gets_its_diagnosis_and_no_other(mistake: str, sound: Motion) -> None:
+def test_each_mistake_gets_only_its_own_diagnosis(mistake: str, sound: Motion) -> None:
     spoil, expected = WRONG_MAPS[mistake]
     verdict = verdict_on(spoil(sound), EMPTY, traits_of_reference())
     assert kinds(verdict) == expected
@@ -136,7 +136,7 @@ def test_a_slow_roll_rate_is_a_warning(sound: Motion) -> None:
 
 @pytest.mark.parametrize("place", [-0.1, 0.5, 1.15])
 @pytest.mark.parametrize("name", VANS)
-def test_sign_and_place_are_right_wherever_the_sensor_sits(name: str, place: float) -> None:
+def test_sign_and_place_are_right_for_every_sensor_position(name: str, place: float) -> None:
     van = VANS[name]
     position_m = place * van.wheelbase_m
     load = (0.8 * van.rated_payload_kg, 0.8 * van.wheelbase_m)

@@ -76,7 +76,7 @@ def test_facts_are_of_the_window_alone(three: list[KeptBatch]) -> None:
     assert three[0].facts == row_facts(window, MAP.traits)
 
 
-def test_one_flipped_bit_is_told(three: list[KeptBatch]) -> None:
+def test_one_flipped_bit_is_reported(three: list[KeptBatch]) -> None:
     content = bytearray(packed(three[0]))
     for at in (3, 400, len(content) // 2, len(content) - 1):
         damaged = content.copy()

@@ -78,7 +78,7 @@ def test_a_curve_for_every_load_and_the_bands_where_they_are() -> None:
     ]
 
 
-def test_the_fitted_half_car_shows_what_was_measured() -> None:
+def test_the_fitted_half_car_agrees_with_the_measured_spectra() -> None:
     """Drives of a half-car: the one fitted to them explains their spectra, phase and coherence."""
     runs = [
         KnownRun(i, f"{i}.log", kg, pct, (batch_over_road(kg, pct, i, 200.0),))
@@ -158,7 +158,7 @@ def test_another_load_lies_beside_them(
     assert amplitude_misfit(seen, modelled_spectra(seen, calibration, other)) > 1.1 * right
 
 
-def test_what_it_says_it_says_again_of_itself(seen: Spectra, calibration: VehicleModel) -> None:
+def test_spectra_of_the_fitted_model_give_the_same_figures(seen: Spectra, calibration: VehicleModel) -> None:
     """The level is a line through the model's own spectra: nothing is left to move."""
     once = modelled_spectra(seen, calibration, LOADED)
     twice = modelled_spectra(once, calibration, LOADED)
@@ -193,7 +193,7 @@ WIDE = replace(VAN, track_width_m=1.5, sensor_offset_left_m=0.3)
 ROLL_MEAN, ROLL_STD = prior_of(ROWS, WIDE)
 
 
-def test_what_the_drives_told_of_roll_is_in_the_report() -> None:
+def test_the_report_has_the_roll_of_the_drives() -> None:
     std = ROLL_STD.copy()
     std[-1] *= 0.25
     known = knowledge_of(as_if_fitted(ROLL_MEAN, std, WIDE), WIDE)

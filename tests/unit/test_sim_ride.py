@@ -279,7 +279,7 @@ def test_the_integrator_compiles_without_a_cache(monkeypatch: pytest.MonkeyPatch
     assert asked == [True, False]
 
 
-def test_compiled_code_gives_what_python_gives() -> None:
+def test_compiled_code_agrees_with_python() -> None:
     def alternating(n: int) -> float:
         total = 0.0
         for k in range(n):

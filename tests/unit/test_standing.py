@@ -46,7 +46,7 @@ def batch(begun_s: int) -> Estimate:
 
 @pytest.mark.parametrize("signal", [Signal.SPEED, Signal.WHEEL_SPEED])
 @pytest.mark.parametrize("chunk_s", [1, 7, 1000])
-def test_a_stop_long_enough_to_load_makes_what_was_weighed_before_old(signal: Signal, chunk_s: int) -> None:
+def test_a_stop_long_enough_to_load_makes_earlier_weighings_old(signal: Signal, chunk_s: int) -> None:
     driven = Driven(signal, chunk_s)
     before = driven.at(10.0, 300)
     assert driven.knows(before)
@@ -76,7 +76,7 @@ def test_a_bus_that_slept_is_a_vehicle_that_stood() -> None:
     assert driven.watch.stood_s() is None
 
 
-def test_it_stands_after_ten_seconds_and_from_the_beginning() -> None:
+def test_a_vehicle_stands_after_ten_seconds_or_at_the_beginning() -> None:
     driven = Driven(chunk_s=1)
     assert driven.watch.stood_s() == 0.0
     driven.at(0.0, 5)

@@ -55,7 +55,7 @@ def test_without_a_time_it_holds_from_now_on(url: str) -> None:
     assert told["from"] > "2026"
 
 
-def test_the_list_shows_what_was_found_and_what_is_asked(url: str, bench: LearnerBench) -> None:
+def test_the_list_shows_findings_and_questions(url: str, bench: LearnerBench) -> None:
     one = said(url, "note", "310", "--from", at(0), "--ref", "LS-1")
     bench.drive(0)
     bench.turn()

@@ -105,7 +105,7 @@ def test_times_without_a_zone_are_read_as_utc_with_a_note() -> None:
     )
 
 
-def test_a_day_as_the_end_is_the_whole_day() -> None:
+def test_an_end_date_includes_the_whole_day() -> None:
     (row,) = told("from;until;payload_kg\n26.11.2026;26.11.2026;310\n", BERLIN).rows
     assert row.record.until is not None
     assert (row.record.until - row.record.from_).total_seconds() == 86_400.0
@@ -190,7 +190,7 @@ def test_an_hour_that_summer_time_repeats_or_skips_is_asked_about(local: str, wh
         (b"[{]", "not valid JSON"),
     ],
 )
-def test_a_file_that_is_no_table_of_statements_is_refused_with_what_to_change(content: bytes, why: str) -> None:
+def test_a_file_that_is_no_table_of_statements_is_refused_with_a_remedy(content: bytes, why: str) -> None:
     with pytest.raises(StatementsFileError, match=r"notes\.csv: ") as refused:
         told(content)
     assert why in str(refused.value)

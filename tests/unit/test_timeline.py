@@ -65,7 +65,7 @@ def test_order_and_repeated_stamps_do_not_matter() -> None:
 
 
 @pytest.mark.parametrize("rate_hz", [50.0, 100.0])
-def test_a_gap_stays_unknown_and_what_lies_around_it_known(rate_hz: float) -> None:
+def test_a_gap_is_unknown_and_its_surroundings_are_known(rate_hz: float) -> None:
     t_s, t_ns = stamps(rate_hz)
     kept = (t_s < 10.0) | (t_s > 10.3)
     back = gridded(t_ns[kept], np.ones(int(kept.sum())))

@@ -61,9 +61,7 @@ def test_without_payload_the_share_is_the_empty_one(van: Vehicle) -> None:
 
 
 @given(van=vehicles, load_kg=loads_kg, left_m=st.floats(-0.7, 0.7), empty_left_m=st.floats(-0.05, 0.05))
-def test_the_wheels_of_a_side_carry_what_the_moments_say(
-    van: Vehicle, load_kg: float, left_m: float, empty_left_m: float
-) -> None:
+def test_wheel_loads_follow_from_the_moments(van: Vehicle, load_kg: float, left_m: float, empty_left_m: float) -> None:
     van = replace(van, empty_cg_left_m=empty_left_m)
     track_m, total_kg = 1.5, van.empty_mass_kg + load_kg
     left_kg = left_share_pct(cg_left_m(van, load_kg, left_m), track_m) / 100.0 * total_kg
@@ -97,7 +95,7 @@ def test_given_unsprung_masses_lead_back_to_the_body(mass_kg: float, share: floa
 
 
 @given(mass_kg=masses_kg, share=shares)
-def test_an_unsprung_mass_nobody_gives_is_the_documented_share(mass_kg: float, share: float) -> None:
+def test_an_unstated_unsprung_mass_is_the_documented_share(mass_kg: float, share: float) -> None:
     kg = UNSPRUNG_SHARE * mass_kg
     weights = (share * mass_kg + kg, (1.0 - share) * mass_kg + kg)
     for known in ((None, None), (kg, None), (None, kg)):

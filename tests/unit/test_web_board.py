@@ -40,7 +40,7 @@ def latest(board: Board) -> dict[str, Any]:
     return told
 
 
-def test_before_any_estimate_all_is_null_and_says_why(board: Board) -> None:
+def test_before_any_estimate_all_is_null_with_a_reason(board: Board) -> None:
     told = latest(board)
     assert told["rejected"] == ["no_estimate_yet"]
     assert told["age_s"] is None
@@ -50,7 +50,7 @@ def test_before_any_estimate_all_is_null_and_says_why(board: Board) -> None:
     assert set(make_record(0)) - {"posterior"} <= set(told)
 
 
-def test_before_any_estimate_a_calibrated_vehicle_is_told_to_lack_only_that(clock: Clock) -> None:
+def test_before_any_estimate_a_calibrated_vehicle_lacks_only_an_estimate(clock: Clock) -> None:
     gross = Weight(limit_kg=2000.0, lacks=Lack.ESTIMATE)
     board = Board(stale_after_s=900.0, clock=clock, unweighed=Weights(gross=gross))
     board.publish(make_estimate(1, Why.GAP))
@@ -81,7 +81,7 @@ def test_it_becomes_stale_after_the_time_set(board: Board, clock: Clock) -> None
     assert latest(board)["is_stale"] is True
 
 
-def test_a_rejection_stands_beside_the_estimate_and_does_not_renew_it(board: Board, clock: Clock) -> None:
+def test_a_rejection_is_shown_beside_the_estimate_without_renewing_it(board: Board, clock: Clock) -> None:
     board.publish(make_estimate(3))
     clock.now_s += 300.0
     board.publish(make_estimate(4, Why.TOO_SLOW, with_spectra=True))
@@ -157,7 +157,7 @@ def test_the_tag_changes_with_all_but_the_age(board: Board, clock: Clock) -> Non
     assert is_new()
 
 
-def test_what_is_shown_is_the_same_before_and_after_a_restart(board: Board, clock: Clock) -> None:
+def test_latest_is_the_same_before_and_after_a_restart(board: Board, clock: Clock) -> None:
     thirds = replace(make_estimate(3), payload=Quantity(1000.0 / 3.0, 20.0 / 3.0), t_start_ns=3 * WINDOW_NS + 333)
     board.publish(thirds)
     clock.now_s += 12.34

@@ -98,7 +98,7 @@ def test_names_are_unique_and_unknown_ones_are_reported(path: Path) -> None:
 @pytest.mark.parametrize(
     "content", ["", "{", "[]", "[" * 5000, '{"note": "\\ud83d"}', '{"format": "other", "version": 1}']
 )
-def test_a_file_that_cannot_be_read_lets_nobody_in(path: Path, content: str) -> None:
+def test_an_unreadable_token_file_closes_access(path: Path, content: str) -> None:
     tokens = TokenFile(path)
     text = tokens.create("fleet", Scope.READ)
     assert tokens.verify(text) is not None

@@ -214,7 +214,7 @@ def test_rooms_of_all_limits_are_sorted_tightest_first() -> None:
 
 
 @given(WITHIN, st.floats(0.0, 450.0), st.floats(44.0, 54.0))
-def test_the_tightest_room_fits_wherever_between_the_axles_it_is_put(
+def test_the_tightest_room_fits_anywhere_between_the_axles(
     front_part: float, payload_kg: float, front_share_pct: float
 ) -> None:
     before = aboard(payload_kg, front_share_pct)
@@ -257,7 +257,7 @@ def test_the_light_turns_where_the_limit_enters_the_interval_and_at_the_limit(kg
     assert found.places() == (() if light is Light.GO else ("gross",))
 
 
-def test_a_wheel_can_be_what_the_light_is_about() -> None:
+def test_a_wheel_can_decide_the_light() -> None:
     found = nearness(Weights(gross=Weight(1900.0, 6.0, 2000.0, None), rear_left=Weight(560.0, 5.0, 550.0, None)))
     assert (found.light, found.places()) == (Light.OVER, ("rear_left",))
 

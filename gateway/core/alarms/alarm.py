@@ -16,7 +16,7 @@ ENTRY_KIND: Final = "alarm"
 
 
 class AlarmKind(StrEnum):
-    """What the alarm is about."""
+    """The subject of an alarm."""
 
     OVERLOAD = "overload"
     SENSOR_FAULT = "sensor_fault"
@@ -24,7 +24,7 @@ class AlarmKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class AlarmCause:
-    """What an alarm is about: its kind, and the place or the part concerned. At most one alarm of a cause is active."""
+    """The cause of an alarm: its kind, and the place or the part concerned. At most one alarm of a cause is active."""
 
     kind: AlarmKind
     where: str

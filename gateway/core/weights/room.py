@@ -42,7 +42,7 @@ NOTHING: Final = Halves(0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Spare:
-    """What gross weight and axles may still bear (kg); negative: they bear too much; infinite: no limit."""
+    """The weight (kg) that the vehicle and its axles may still bear; negative: too much; infinite: no limit."""
 
     gross_kg: float = math.inf
     front_axle_kg: float = math.inf

@@ -131,7 +131,7 @@ def _fit_chart(fit: RunFit) -> Chart:
 
 
 def _unbroken_deg(phase_rad: F64) -> F64:
-    """In degrees, with a gap where it wraps around."""
+    """A phase in degrees, with a gap where it wraps around."""
     degrees = np.degrees(phase_rad)
     leaps = np.abs(np.diff(degrees, append=degrees[-1])) > 180.0
     return np.where(leaps, np.nan, degrees)
