@@ -22,7 +22,7 @@ from gateway.model.table import INDEX, NAMES, ROWS, UPRIGHT, prior_of
 from gateway.model.vehicle import VehicleModel
 from gateway.records import Batch, Spectra, Why
 from gateway.reports.calibration.accuracy import accuracy_section
-from gateway.reports.calibration.fitted_vehicle import fits_of, knowledge_chart, knowledge_of, knowledge_table, told
+from gateway.reports.calibration.fitted_vehicle import fits_of, knowledge_of, knowledge_table, told
 from gateway.reports.calibration.spectra import ACCELERATION, N_SEGMENT, PITCH_RATE, density_of, spectra_section
 from gateway.reports.charts import LineMark, Ribbon, Span
 
@@ -203,7 +203,6 @@ def test_the_report_has_the_roll_of_the_drives() -> None:
     assert all(one.left_over == pytest.approx(1.0) for one in known[:-1])
     assert "roll_inertia_kgm2" in told(known)
     assert "empty_left_m" not in told(known)
-    assert "roll" in [panel.title for panel in knowledge_chart(known).panels]
     rows = {row[0]: row for row in knowledge_table(known).rows}
     assert set(rows) == {name for name in NAMES if not name.startswith("slack_")}
     before = float(rows["roll_inertia_kgm2"][1])
@@ -213,7 +212,6 @@ def test_the_report_has_the_roll_of_the_drives() -> None:
 def test_a_report_without_a_roll_rate_does_not_mention_roll() -> None:
     known = knowledge_of(as_if_fitted(*prior_of(UPRIGHT, WIDE), WIDE), WIDE)
     assert [one.name for one in known] == [row.name for row in UPRIGHT]
-    assert "roll" not in [panel.title for panel in knowledge_chart(known).panels]
 
 
 def judged(cg_left: CgLeftErrors | None, wheels: WheelErrors | None) -> Judgement:
