@@ -90,16 +90,12 @@ def test_latest_distinguishes_answer_and_rejection(store: Store) -> None:
     assert latest.age_s >= 0.0
 
 
-def test_events_and_calibrations_are_kept(store: Store) -> None:
+def test_events_of_the_service_are_kept(store: Store) -> None:
     store.write_event("started", {"version": "1"})
     store.write_event("bus_lost", {"channel": "can0"})
-    store.write_calibration("sha256:ab", '{"a":1}')
-    store.write_calibration("sha256:ab", '{"a":1}')
     assert store.flush(PATIENCE_S)
     events = store.reader().page((SERVICE,), newest_first=True).items
     assert [event.partition("\n")[0] for event in events] == ["bus_lost", "started"]
-    assert store.reader().calibration("sha256:ab") == '{"a":1}'
-    assert store.reader().calibration("sha256:cd") is None
 
 
 @pytest.mark.parametrize("cursor", ["", "x", "12", "abcd-", "abcd--5", "abcd-1e3", "ab cd-5", "abcd-" + "9" * 30])
