@@ -171,11 +171,13 @@ def room_of(weights: Weights, vehicle: Vehicle) -> LoadRoom | None:
         return None
     area = LoadingArea.of(vehicle)
     worst, best, well = (
-        Spare(*(_spare_kg(one, kg) for one, kg in zip(places, ends, strict=True)))
+        Spare(*(math.inf if one.limit_kg is None else one.limit_kg - kg for one, kg in zip(places, ends, strict=True)))
         for ends in zip(*map(_ends, places), strict=True)
     )
     safe = area.most(worst)
-    low_kg, most_kg, high_kg = sorted(_most_kg(area, spare) for spare in (worst, best, well))
+    low_kg, most_kg, high_kg = sorted(
+        spare.least_kg if spare.least_kg <= 0.0 else area.most(spare).kg for spare in (worst, best, well)
+    )
     return LoadRoom(
         Quantity(most_kg, (high_kg - low_kg) / (2.0 * Z95), (low_kg, high_kg)),
         safe,
@@ -188,12 +190,3 @@ def _ends(weight: Weight) -> tuple[float, float, float]:
     """The upper end of its interval, the weight, the lower end; the weight alone if its error is unknown."""
     low_kg, high_kg = (weight.kg if math.isnan(kg) else kg for kg in weight.interval95_kg)
     return high_kg, weight.kg, low_kg
-
-
-def _spare_kg(weight: Weight, kg: float) -> float:
-    return math.inf if weight.limit_kg is None else weight.limit_kg - kg
-
-
-def _most_kg(area: LoadingArea, spare: Spare) -> float:
-    """Negative if something is too heavy."""
-    return spare.least_kg if spare.least_kg <= 0.0 else area.most(spare).kg
