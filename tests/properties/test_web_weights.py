@@ -59,14 +59,6 @@ def test_moments_about_the_rear_axle_balance(payload_kg: float, position_m: floa
     assert front_kg == pytest.approx(levers / 2.8 + 90.0)
 
 
-@given(payloads, shares)
-def test_the_front_share_is_of_the_sprung_mass(payload_kg: float, share_pct: float) -> None:
-    weights = axle_loads(VAN, payload_kg, 0.0, share_pct, 0.0)
-    sprung_kg = 1240.0 + payload_kg
-    assert weights.front_axle.kg - 90.0 == pytest.approx(share_pct / 100.0 * sprung_kg)
-    assert weights.rear_axle.kg - 110.0 == pytest.approx((1.0 - share_pct / 100.0) * sprung_kg)
-
-
 def test_an_unsprung_mass_follows_from_the_kerb_weight() -> None:
     kerb = paper_van(empty_front_share_pct=52.0, kerb_front_axle_kg=0.52 * 1240.0 + 90.0, kerb_rear_axle_kg=705.2)
     assert unsprung_kg(kerb) == pytest.approx((90.0, 110.0))
@@ -81,32 +73,19 @@ def test_unstated_figures_are_unknown_and_never_zero() -> None:
     assert math.isnan(weights.gross.std_kg)
 
 
-@given(st.lists(st.floats(1500.0, 2500.0), max_size=30), st.floats(1800.0, 2200.0))
-def test_a_warning_has_hysteresis(series_kg: list[float], limit_kg: float) -> None:
+@given(st.lists(st.floats(1500.0, 2500.0) | st.just(math.nan), max_size=30), st.none() | st.floats(1800.0, 2200.0))
+def test_a_warning_has_hysteresis(series_kg: list[float], limit_kg: float | None) -> None:
     was_over = False
     for n in range(1, len(series_kg) + 1):
         is_over = is_over_limit(series_kg[:n], limit_kg)
         newest_kg = series_kg[n - 1]
-        if newest_kg > limit_kg:
+        if limit_kg is not None and newest_kg > limit_kg:
             assert is_over
-        elif newest_kg <= limit_kg * (1.0 - RELEASE_SHARE):
+        elif limit_kg is None or newest_kg <= limit_kg * (1.0 - RELEASE_SHARE):
             assert not is_over
-        else:
+        else:  # between both bounds, or unknown
             assert is_over is was_over
         was_over = is_over
-
-
-def test_an_unknown_weight_changes_no_warning() -> None:
-    assert is_over_limit([2100.0, math.nan], 2000.0)
-    assert not is_over_limit([math.nan], 2000.0)
-    assert not is_over_limit([], 2000.0)
-    assert not is_over_limit([9999.0], None)
-
-
-@given(st.floats(20.0, 800.0), positions)
-def test_the_estimated_place_is_the_loaded_place(payload_kg: float, position_m: float) -> None:
-    place = placed(VAN, payload_kg, 1.0, front_share_pct(VAN, payload_kg, position_m), 0.0)
-    assert place.position_m == pytest.approx(position_m, abs=1e-6)
 
 
 def test_an_error_of_the_empty_share_moves_no_place() -> None:
@@ -172,10 +151,10 @@ def test_the_left_share_is_that_of_the_wheels_without_axles(payload_kg: float, l
 
 
 @given(st.floats(20.0, 800.0), positions, offsets)
-def test_the_place_across_is_the_place_loaded(payload_kg: float, position_m: float, left_m: float) -> None:
+def test_the_estimated_place_is_the_loaded_place(payload_kg: float, position_m: float, left_m: float) -> None:
     share_pct, whole_left_m = front_share_pct(TRACKED, payload_kg, position_m), cg_left_m(TRACKED, payload_kg, left_m)
     place = place_of(TRACKED, believed([payload_kg, share_pct, whole_left_m], [1.0, 0.0, 0.0]))
-    assert place.left_m == pytest.approx(left_m, abs=1e-6)
+    assert (place.position_m, place.left_m) == pytest.approx((position_m, left_m), abs=1e-6)
 
 
 def test_without_a_word_from_the_side_the_place_is_known_along_alone() -> None:

@@ -151,23 +151,24 @@ def test_damage_found_while_reading_sets_the_file_aside_and_keeps_the_numbering(
     store.close()
 
 
-@pytest.mark.parametrize("version", [6, 99])
-def test_a_newer_schema_is_refused_and_left_unchanged(tmp_path: Path, version: int) -> None:
-    Store.open(tmp_path).close()
+@pytest.mark.parametrize(
+    ("is_ours", "changed", "told"),
+    [
+        (True, "PRAGMA user_version = 6", "schema 6"),
+        (True, "PRAGMA user_version = 99", "schema 99"),
+        (False, "CREATE TABLE songs (title)", "another program"),
+    ],
+)
+def test_a_newer_schema_is_refused_and_left_unchanged(tmp_path: Path, is_ours: bool, changed: str, told: str) -> None:
     path = tmp_path / "springscale.db"
+    if is_ours:
+        Store.open(tmp_path).close()
     with closing(sqlite3.connect(path)) as database:
-        database.execute(f"PRAGMA user_version = {version}")
-    with pytest.raises(StoreError, match=f"schema {version}"):
+        database.execute(changed)
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match=told):
         Store.open(tmp_path)
-    with closing(sqlite3.connect(path)) as database:
-        assert database.execute("PRAGMA user_version").fetchone()[0] == version
-
-
-def test_another_programs_database_is_refused(tmp_path: Path) -> None:
-    with closing(sqlite3.connect(tmp_path / "springscale.db")) as database:
-        database.execute("CREATE TABLE songs (title)")
-    with pytest.raises(StoreError, match="another program"):
-        Store.open(tmp_path)
+    assert path.read_bytes() == before
 
 
 def test_a_directory_in_use_is_refused(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Drift of a vehicle is told from the seasons of the fleet and from chance, by Theil-Sen slopes."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -84,36 +85,38 @@ def test_a_slope_is_since_the_last_calibration(tmp_path: Path) -> None:
     assert len(vehicle.weeks.number) == 24
 
 
-def test_a_missing_table_is_reported(tmp_path: Path) -> None:
-    slot = write_table(tmp_path, "van", week(0))
-    (tmp_path / slot.table).unlink()
-    with pytest.raises(PlaceError, match=r"is missing, though a receipt vouches for it: remove receipts/vehicle=van"):
-        fleet_of(place_of(tmp_path))
-
-
-def test_a_truncated_table_is_reported(tmp_path: Path) -> None:
-    slot = write_table(tmp_path, "van", week(0))
-    (tmp_path / slot.table).write_bytes((tmp_path / slot.table).read_bytes()[:100])
-    with pytest.raises(PlaceError, match=r"is no Parquet file .*: remove it and receipts/"):
-        fleet_of(place_of(tmp_path))
+def with_schema(path: Path, version: str) -> None:
+    table = pq.read_table(path, partitioning=None)
+    pq.write_table(table.replace_schema_metadata({"springscale_schema": version}), path)
 
 
 @pytest.mark.parametrize(
-    ("version", "told"),
-    [(str(SCHEMA_VERSION + 1), f"has schema {SCHEMA_VERSION + 1}.*install a newer one"), ("", "is no table of")],
+    ("spoil", "error", "told"),
+    [
+        (Path.unlink, PlaceError, r"is missing, though a receipt vouches for it: remove receipts/vehicle=van"),
+        (lambda path: path.write_bytes(path.read_bytes()[:100]), PlaceError, r"is no Parquet file .*: remove it and"),
+        (lambda path: with_schema(path, str(SCHEMA_VERSION + 1)), ConfigurationError, "has schema .*install a newer"),
+        (lambda path: with_schema(path, ""), ConfigurationError, "is no table of"),
+        (
+            lambda path: write_table(path.parents[3], "van", week(0), month="2026-02"),
+            ConfigurationError,
+            "vouch for the same 10 batches",
+        ),
+    ],
 )
-def test_a_table_of_another_schema_is_reported(tmp_path: Path, version: str, told: str) -> None:
-    slot = write_table(tmp_path, "van", week(0))
-    table = pq.read_table(tmp_path / slot.table, partitioning=None)
-    pq.write_table(table.replace_schema_metadata({"springscale_schema": version}), tmp_path / slot.table)
-    with pytest.raises(ConfigurationError, match=told):
+def test_a_faulty_table_is_reported(
+    tmp_path: Path, spoil: Callable[[Path], object], error: type[Exception], told: str
+) -> None:
+    spoil(tmp_path / write_table(tmp_path, "van", week(0)).table)
+    with pytest.raises(error, match=told):
         fleet_of(place_of(tmp_path))
 
 
-def test_batches_that_two_receipts_hold_are_not_counted_twice(tmp_path: Path) -> None:
-    write_table(tmp_path, "van", week(0))
-    write_table(tmp_path, "van", week(0), month="2026-02")
-    with pytest.raises(ConfigurationError, match="vouch for the same 10 batches"):
+@pytest.mark.parametrize(("is_there", "told"), [(False, "holds no receipt of"), (True, "hold no batch at all")])
+def test_an_empty_data_set_is_reported(tmp_path: Path, is_there: bool, told: str) -> None:
+    if is_there:
+        write_table(tmp_path, "van", [])
+    with pytest.raises(ConfigurationError, match=told):
         fleet_of(place_of(tmp_path))
 
 
@@ -122,14 +125,6 @@ def test_several_jobs_are_one_vehicle(tmp_path: Path) -> None:
     write_table(tmp_path, "van", [row(1_767_900_000.0)], month="2026-02")
     [vehicle] = fleet_of(place_of(tmp_path)).vehicles
     assert vehicle.n == 2
-
-
-def test_an_empty_data_set_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match="holds no receipt of `springscale reprocess`"):
-        fleet_of(place_of(tmp_path))
-    write_table(tmp_path, "van", [])
-    with pytest.raises(ConfigurationError, match="hold no batch at all"):
-        fleet_of(place_of(tmp_path))
 
 
 X = np.arange(52.0) / 52.0

@@ -1,6 +1,7 @@
 """What goes into the store comes out of it, once, in order and unchanged."""
 
 import json
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,17 @@ def test_pages_follow_one_another_in_both_directions(store: Store) -> None:
             if cursor is None:
                 break
         assert tuple(seen) == expected
+
+
+def test_a_cursor_outlives_its_store_and_one_of_another_database_begins_at_the_first_row(tmp_path: Path) -> None:
+    with closing(Store.open(tmp_path)) as first:
+        (before,) = write(first, make_record(0))
+    with closing(Store.open(tmp_path)) as second:
+        (after,) = write(second, make_record(1))
+        assert second.reader().estimates(cursor=before).items == texts(make_record(1))
+        assert len(second.reader().estimates(cursor="ffffffffffffffff-99").items) == 2
+    assert after.split("-")[0] == before.split("-")[0]
+    assert int(after.split("-")[1]) > int(before.split("-")[1])
 
 
 def test_the_last_cursor_continues_with_new_records(store: Store) -> None:
@@ -104,26 +116,9 @@ def test_a_cursor_we_never_gave_is_refused(store: Store, cursor: str) -> None:
         store.reader().estimates(cursor=cursor)
 
 
-def test_a_cursor_of_another_database_begins_at_the_first_row(store: Store) -> None:
-    write(store, make_record(0))
-    assert len(store.reader().estimates(cursor="ffffffffffffffff-99").items) == 1
-
-
 def test_a_provisional_estimate_is_refused(store: Store) -> None:
     with pytest.raises(ValueError, match="provisional"):
         store.write_estimate({**make_record(1), "provisional": True})
-
-
-def test_numbers_go_on_after_a_restart(tmp_path: Path) -> None:
-    first = Store.open(tmp_path)
-    (before,) = write(first, make_record(0))
-    assert first.close() == 0
-    second = Store.open(tmp_path)
-    (after,) = write(second, make_record(1))
-    assert second.reader().estimates(cursor=before).items == texts(make_record(1))
-    assert after.split("-")[0] == before.split("-")[0]
-    assert int(after.split("-")[1]) > int(before.split("-")[1])
-    second.close()
 
 
 @pytest.mark.parametrize(
