@@ -143,7 +143,7 @@ RECORDED: Final = {
 # Test, what it does, and the figures that tell how often, over how many records, and what the disk lost
 ENDURED = (
     (
-        "test_killed_again_and_again_it_loses_and_doubles_nothing",
+        "test_repeated_kills_lose_and_double_nothing",
         "SIGKILL",
         "kills",
         "records_after_kills",

@@ -20,7 +20,7 @@ WEIGHBRIDGE_STD_KG: Final = 5.0  # of a scale of class III (OIML R 76: 10 kg ste
 
 
 class Remedy(StrEnum):
-    """What would narrow an error. gateway.reasons has the sentences."""
+    """An action that would narrow an error. gateway.reasons has the sentences."""
 
     DRIVE_ON = "drive_on"  # another ten minutes under the same load
     WEIGH_ONCE = "weigh_once"  # loaded, on a scale

@@ -67,7 +67,7 @@ class ReaderMissingError(LogUnreadableError):
 
 
 class ArraysError(SpringscaleError):
-    """Arrays of measurements do not fit together, or not the calibration."""
+    """Arrays of measurements fit neither together nor the calibration."""
 
 
 class BusError(SpringscaleError):

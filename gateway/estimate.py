@@ -192,7 +192,7 @@ class Estimate:
         return not self.rejected
 
     def refused(self, *whys: Why) -> "Estimate":
-        """The same batch without its estimate, with the reasons."""
+        """This batch without its estimate, with the reasons."""
         return replace(
             self,
             payload=UNKNOWN,
@@ -208,7 +208,7 @@ class Estimate:
         )
 
     def answered(self, posterior: Posterior) -> "Estimate":
-        """The same batch with this answer; weights still have to be computed with the vehicle's figures."""
+        """This batch with an answer; weights still have to be computed with the vehicle's figures."""
         return replace(
             self,
             posterior=posterior,

@@ -59,7 +59,7 @@ class JournalRecord:
 
     @property
     def number(self) -> int:
-        """Its number in the journal."""
+        """The record's number in the journal."""
         return int(self.cursor.partition("-")[2])
 
 

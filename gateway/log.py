@@ -161,8 +161,9 @@ class PlainFormatter(logging.Formatter):
 
 
 def set_up_log(level: str, *, under_journald: bool) -> None:
-    """Everything goes to standard error: our own events from ``level`` on (debug, info, warning or error), and other
-    libraries' warnings and worse.
+    """Sends all log lines to standard error: our own events from ``level`` on (debug, info, warning or error).
+
+    Other libraries' lines are sent from warnings on.
     """
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(PlainFormatter() if sys.stderr.isatty() else JsonFormatter(with_priority=under_journald))

@@ -49,7 +49,7 @@ class ServicePart:
 
     @property
     def fault(self) -> str | None:
-        """What is wrong, for people; None while all is well."""
+        """The part's fault as a sentence for people; None while all is well."""
         return None
 
     def death(self) -> str | None:

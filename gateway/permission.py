@@ -8,7 +8,7 @@ from enum import StrEnum
 
 
 class Kind(StrEnum):
-    """What would leave."""
+    """The kind of what would leave the vehicle."""
 
     RECORD = "record"  # a record without positions
     POSITION = "position"

@@ -187,7 +187,7 @@ class Fusible:
 
 
 class _Sums:
-    """What each part adds to a fusion: own errors average out by their precision, shared ones stay.
+    """The sums of a fusion: own errors average out by their precision, shared ones stay.
 
     The weights are W_i = (sum P)^-1 P_i with P_i the inverse of own covariance i; a batch that does not know the
     lateral place has no precision there. Columns of one source stand for the same causes in every part and average

@@ -41,7 +41,7 @@ class Outward:
 
     @property
     def json_name(self) -> str:
-        """Its key in the JSON of an estimate: the column of CSV and Parquet."""
+        """The key in the JSON of an estimate: the column of CSV and Parquet."""
         return f"{self.name}_{self.suffix}"
 
     @property

@@ -22,11 +22,12 @@ class Quantity:
 
     @classmethod
     def normal(cls, number: float, std: float) -> "Quantity":
-        """With the interval of a normal distribution."""
+        """A quantity with the interval of a normal distribution."""
         return cls(number, std, (number - Z95 * std, number + Z95 * std))
 
     def widened(self, std: float) -> "Quantity":
-        """With one more error that is independent; an interval keeps its shape, each half grows in quadrature."""
+        """This quantity with one more independent error: its interval keeps its shape, each half grows in
+        quadrature."""
         below, above = self.number - self.interval95[0], self.interval95[1] - self.number
         interval95 = (self.number - math.hypot(below, Z95 * std), self.number + math.hypot(above, Z95 * std))
         return Quantity(self.number, math.hypot(self.std, std), interval95)

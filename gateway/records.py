@@ -163,7 +163,7 @@ class Motion:
 
     @property
     def weighing(self) -> "Motion":
-        """Without the rows of ASIDE, except those of a trailer: its signal weighs nothing but decides whether the
+        """The rows without those of ASIDE, except those of a trailer: its signal weighs nothing but decides whether the
         vehicle can be weighed.
         """
         if self.aside is None:
@@ -192,7 +192,7 @@ def joined(parts: Sequence[Motion]) -> Motion:
 
 @dataclass(frozen=True, slots=True)
 class SensorTraits:
-    """What the signal map and its DBC say about one signal. SI; NaN if the DBC does not say.
+    """The facts that the signal map and its DBC give about one signal. SI; NaN if the DBC does not say.
 
     If the map names a message counter, it counts modulo ``counter_modulus``.
     """

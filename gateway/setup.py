@@ -33,7 +33,7 @@ class Subject:
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """Everything that turns frames into estimates, loaded and checked.
+    """The parts that turn frames into estimates, loaded and checked.
 
     ``limits`` override those of the calibration.
     """
@@ -53,7 +53,7 @@ class Setup:
 
     @property
     def subject(self) -> Subject:
-        """What is weighed and by which calibration."""
+        """The vehicle that is weighed and the calibration that weighs it."""
         return Subject(self.calibrated, self.estimator, self.identity.vehicle_id)
 
     @property

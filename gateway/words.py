@@ -47,5 +47,5 @@ def span(low: float, high: float, unit: str, digits: int = 0) -> str:
 
 
 def estimator_name(estimator: str) -> str:
-    """As people call it."""
+    """The estimator's name as people call it."""
     return {"cross_spectrum": "cross-spectral estimator", "ratio_index": "ratio index"}.get(estimator, estimator)

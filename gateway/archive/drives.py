@@ -5,7 +5,6 @@ for that log.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 from gateway.archive.jobs import ArchiveJob, JobLog
 from gateway.archive.places import PlaceError
@@ -18,38 +17,23 @@ from gateway.units import NS_PER_S
 from gateway.weighing.flow import Flow
 
 
-@dataclass(frozen=True, slots=True)
-class LogRead:
-    """The result of a log: estimates of the batches that ended in it, and its reader's report."""
-
-    estimates: list[Estimate]
-    report: LogReport
-
-
-@dataclass(frozen=True, slots=True)
-class _UnderWay:
-    """A log, and the pipeline at its end."""
-
-    one: JobLog
-    flow: Flow
-
-
 class JobDrives:
     """Processes a job's logs in order."""
 
     def __init__(self, job: ArchiveJob) -> None:
         """Continues from the end of the lead-in logs."""
         self._job = job
-        self._open: _UnderWay | None = None  # the log before, if it may continue
+        self._open: tuple[JobLog, Flow] | None = None  # the log before, if it may continue, and the pipeline at its end
         self._lead_in()
 
-    def take(self, one: JobLog, next_ns: int | None) -> LogRead:
-        """Process the next log; ``next_ns`` is the first frame of the one after it.
+    def take(self, one: JobLog, next_ns: int | None) -> tuple[list[Estimate], LogReport]:
+        """The estimates of the batches that end in the next log, and its reader's report; ``next_ns`` is the first
+        frame of the log after it.
 
         Raises PlaceError if it cannot be read now, LogUnreadableError if it is invalid; then call :meth:`break_off`
         before the one after it.
         """
-        flow = self._open.flow.branch() if self._open else self._flow()
+        flow = self._open[1].branch() if self._open else self._flow()
         with one.log.place.fetched(one.log.path) as fetched:
             if fetched.sha256 != one.facts.sha256:
                 raise PlaceError(f"{one.log.name}: was changed while the archive was read; run again")
@@ -63,17 +47,18 @@ class JobDrives:
                 report.require_frames()
             except Exception as fault:
                 raise _of_the_log(fault, one, str(fetched.path)) from fault
-        self._open = _UnderWay(one, flow) if goes_on(newest_ns, next_ns, self._job.settings) else None
+        self._open = (one, flow) if goes_on(newest_ns, next_ns, self._job.settings) else None
         if self._open is None:
             estimates += self._weighed(flow, flow.scheduler.flush())
-        return LogRead(estimates, report)
+        return estimates, report
 
     def break_off(self) -> list[tuple[JobLog, Estimate]]:
         """Close the log under way as if none had followed, and return its remaining estimates."""
         before, self._open = self._open, None
         if before is None:
             return []
-        return [(before.one, found) for found in self._weighed(before.flow, before.flow.scheduler.flush())]
+        one, flow = before
+        return [(one, found) for found in self._weighed(flow, flow.scheduler.flush())]
 
     def _flow(self) -> Flow:
         setup, job = self._job.setup, self._job
@@ -114,7 +99,7 @@ def readable(logs: Sequence[JobLog]) -> list[JobLog]:
 
 
 def followed(logs: Sequence[JobLog], next_ns: int | None) -> Iterator[tuple[JobLog, int | None]]:
-    """Each log with the first frame of the one after it; ``next_ns`` is that after the last."""
+    """Yields each log with the first frame of the log after it; ``next_ns`` follows the last log."""
     return zip(logs, [*(one.facts.first_ns for one in logs[1:]), next_ns], strict=False)  # no logs, none after them
 
 

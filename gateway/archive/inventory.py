@@ -38,7 +38,7 @@ class Inventory:
         return len(self.facts)
 
     def unknown(self) -> Iterator[tuple[str, list[LogFile]]]:
-        """By vehicle: the logs that were not surveyed yet."""
+        """The logs that were not surveyed yet, by vehicle."""
         logs: dict[str, dict[str, LogFile]] = {vehicle: {} for vehicle in self.facts}
         for assignment, group in zip(self.manifest.assignments, self.logs, strict=True):
             facts = self.facts[assignment.vehicle]

@@ -64,7 +64,7 @@ def _imported(package: Path, *names: str) -> set[Path]:
 
 
 def _names_imported(path: Path, package: str) -> Iterator[str]:
-    """What a file imports of this package, inside functions too; `from a import b` may mean a module b."""
+    """The modules of this package that a file imports, inside functions too; `from a import b` may mean a module b."""
     for node in ast.walk(ast.parse(path.read_bytes())):
         if isinstance(node, ast.Import):
             names = [one.name for one in node.names]
@@ -96,7 +96,7 @@ class JobLog:
 
 @dataclass(frozen=True, slots=True)
 class ArchiveJob:
-    """Everything that a worker needs, and that determines its result.
+    """The complete input of a worker, which determines its result.
 
     ``next_ns`` is the first frame of the following log in another job; None without one.
     """

@@ -3,10 +3,11 @@
 TOML. Paths in it are relative to the manifest, which may be in an object store.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, time
-from functools import lru_cache
+from functools import cache
 from pathlib import Path, PurePosixPath
 from posixpath import normpath
 from typing import Annotated, Any, Final
@@ -44,7 +45,7 @@ class ManifestTable(BaseModel):
 
 
 class Means(ManifestTable):
-    """How logs are read and weights judged: at the top for every vehicle, in an entry for this one."""
+    """How logs are read and weights judged: the top of the file holds for every vehicle, an entry for its own."""
 
     signals: str | None = Field(None, description="signal map: a TOML file, or springscale:NAME")
     calibration: str | None = Field(None, description="calibration file; without it batches carry reasons only")
@@ -130,29 +131,15 @@ def load_manifest(named: str) -> Manifest:
     if not entries:
         raise ConfigurationError(f"{where}: names no vehicle; write [[vehicles]] with id or vin for each")
     _require_distinct(entries, where)
-    load = lru_cache(maxsize=None)(_Loader(base).setup)
+
+    @cache
+    def load(signals: str, calibration: str | None, estimator: str | None, limits: Limits) -> Setup:
+        named = signals if signals.startswith("springscale:") else base.path(signals)
+        held = base.path(calibration) if calibration else None
+        return load_setup(named, held, estimator, read=lambda path: _content(base, path), limits=limits)
+
     found = tuple(_assignment(base, told, entry, load, f"{where}: vehicles[{i}]") for i, entry in enumerate(entries, 1))
     return Manifest(str(where), found, told.batch.for_core())
-
-
-@dataclass(frozen=True)
-class _Loader:
-    """Loads the manifest's files, relative to the manifest."""
-
-    base: Location
-
-    def read(self, path: Path) -> bytes:
-        """The content of a file beside the manifest. Raises FileNotFoundError."""
-        if self.base.local("") is not None:
-            return path.read_bytes()
-        return self.base.read(path.relative_to(self.base.path("")).as_posix())
-
-    def setup(self, signals: str, calibration: str | None, estimator: str | None, limits: Limits) -> Setup:
-        """A setup shared by all vehicles with the same inputs."""
-        named = signals if signals.startswith("springscale:") else self.base.path(signals)
-        return load_setup(
-            named, self.base.path(calibration) if calibration else None, estimator, read=self.read, limits=limits
-        )
 
 
 def _assignment(base: Location, told: ManifestFile, entry: VehicleEntry, load: Any, where: str) -> Assignment:
@@ -171,28 +158,22 @@ def _assignment(base: Location, told: ManifestFile, entry: VehicleEntry, load: A
 
 def _found(named: str) -> tuple[Location, str, bytes]:
     """Folder, name and content of the manifest."""
-    if named.endswith(".toml"):
-        folder, _, name = named.rpartition("/")
-        base = place_of(folder or (Path("/") if named.startswith("/") else Path()))
-        return base, name, _read(base, name)
-    base = place_of(named)
+    is_file = named.endswith(".toml")
+    folder, _, name = named.rpartition("/") if is_file else (named, "", NAME)
+    base = place_of(folder or (Path("/") if named.startswith("/") else Path()))
+    where = base.path(name)
     try:
-        return base, NAME, _Loader(base).read(base.path(NAME))
+        return base, name, _content(base, where)
     except (FileNotFoundError, NotADirectoryError):
-        raise ConfigurationError(
-            f"{base}: has no {NAME}, which tells whose logs lie where; write one, or name yours"
-        ) from None
+        lacks = f"{base}: has no {NAME}, which tells whose logs lie where; write one, or name yours"
+        raise ConfigurationError(f"{where}: no such file" if is_file else lacks) from None
     except OSError as fault:
-        raise ConfigurationError(f"{base.path(NAME)}: cannot be read: {fault.strerror or fault}") from None
+        raise ConfigurationError(f"{where}: cannot be read: {fault.strerror or fault}") from None
 
 
-def _read(base: Location, name: str) -> bytes:
-    try:
-        return _Loader(base).read(base.path(name))
-    except FileNotFoundError:
-        raise ConfigurationError(f"{base.path(name)}: no such file") from None
-    except OSError as fault:
-        raise ConfigurationError(f"{base.path(name)}: cannot be read: {fault.strerror or fault}") from None
+def _content(base: Location, path: Path) -> bytes:
+    """The content of a file beside the manifest. Raises OSError or PlaceError."""
+    return path.read_bytes() if base.local("") is not None else base.read(path.relative_to(base.path("")).as_posix())
 
 
 def _below(base: Location, named: str) -> Location:
@@ -204,33 +185,28 @@ def _below(base: Location, named: str) -> Location:
 
 def _require_distinct(entries: Sequence[VehicleEntry], where: Path) -> None:
     """No instant of a vehicle or folder may belong to two entries."""
-    by_key: dict[str, list[tuple[int, VehicleEntry]]] = {}
+    by_key: defaultdict[str, list[tuple[int, VehicleEntry]]] = defaultdict(list)
     for i, entry in enumerate(entries, 1):
-        for key in (f"vehicle {entry.name}", f"folder {_folder(entry)}"):
-            _require_apart(i, entry, by_key.get(key, []), f"{where}: vehicles[{i}]: {key} is in")
-            by_key.setdefault(key, []).append((i, entry))
+        by_key[f"vehicle {entry.name}"].append((i, entry))
+        by_key[f"folder {_folder(entry)}"].append((i, entry))
     for i, entry in enumerate(entries, 1):
-        for parent in _parent_folders(_folder(entry)):
-            others = by_key.get(f"folder {parent}", [])
-            _require_apart(i, entry, others, f"{where}: vehicles[{i}]: folder {_folder(entry)} lies in that of")
-
-
-def _require_apart(i: int, entry: VehicleEntry, others: Sequence[tuple[int, VehicleEntry]], what: str) -> None:
-    for j, other in others:
-        if j != i and entry.covers(other):
-            raise ConfigurationError(f"{what} vehicles[{j}] too, at the same time; part them by since and until")
+        folder = _folder(entry)
+        above = [] if "://" in folder or folder == ".." else PurePosixPath(folder).parents
+        told = {key: f"{key} is in" for key in (f"vehicle {entry.name}", f"folder {folder}")}
+        told |= {f"folder {parent}": f"folder {folder} lies in that of" for parent in above}
+        for key, what in told.items():
+            for j, other in by_key.get(key, []):
+                if entry.covers(other) and (j < i or (j > i and what.endswith("that of"))):
+                    raise ConfigurationError(
+                        f"{where}: vehicles[{i}]: {what} vehicles[{j}] too, at the same time; "
+                        "part them by since and until"
+                    )
 
 
 def _folder(entry: VehicleEntry) -> str:
     """The folder in a normal form."""
     named = entry.logs or entry.name
     return named.rstrip("/") if "://" in named else normpath(named)
-
-
-def _parent_folders(folder: str) -> list[str]:
-    """The folders that contain this folder; none for a URL."""
-    parents = [str(parent) for parent in PurePosixPath(folder).parents]
-    return [] if "://" in folder or folder == ".." else parents
 
 
 def _ns(instant: datetime) -> int:

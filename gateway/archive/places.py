@@ -129,7 +129,7 @@ class Location:
             yield Fetched(copy, digest.hexdigest())
 
     def _settle(self, path: str) -> None:
-        """On a local disk, sync the file, so that a power cut cannot keep later writes and lose this; object stores
+        """Syncs the file on a local disk, so that a power cut cannot keep later writes and lose this; object stores
         guarantee it.
         """
         here = self.local(path)

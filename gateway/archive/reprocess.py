@@ -54,7 +54,7 @@ OnProgress = Callable[[Progress], None]
 def done_by(
     workers: Workers, fn: Callable[[Task], Answer], tasks: Iterable[Task]
 ) -> "Iterator[tuple[Task, Future[Answer]]]":
-    """Each task with its future, in the order of completion; ``tasks`` may be endless.
+    """Yields each task with its future as the tasks are completed; ``tasks`` may be endless.
 
     No more tasks than workers are under way: one that waits behind a task that kills its worker would be blamed too.
     """

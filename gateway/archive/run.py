@@ -72,18 +72,18 @@ def run(job: ArchiveJob) -> JobOutcome:
     drives = JobDrives(job)
     for one, next_ns in followed(readable(job.logs), job.next_ns):
         try:
-            read = drives.take(one, next_ns)
+            estimates, report = drives.take(one, next_ns)
         except LogUnreadableError as fault:
             failures[one] = str(fault)
             rows += [_row(job, before, found) for before, found in drives.break_off()]
             continue
-        rows += [_row(job, one, found) for found in read.estimates]
-        told.append(_told(one, read.report))
-        if read.report.wanted and read.report.span_ns[0] < end_ns - OVERLAP_NS:
+        rows += [_row(job, one, found) for found in estimates]
+        told.append(_told(one, report))
+        if report.wanted and report.span_ns[0] < end_ns - OVERLAP_NS:
             overlaps.append(f"{one.log.name}: begins before {longest} ends")
-        if read.report.wanted and read.report.span_ns[1] > end_ns:
-            longest, end_ns = one.log.name, read.report.span_ns[1]
-        refused += (f"{one.log.name}: {cause.text}" for cause in read.report.causes())
+        if report.wanted and report.span_ns[1] > end_ns:
+            longest, end_ns = one.log.name, report.span_ns[1]
+        refused += (f"{one.log.name}: {cause.text}" for cause in report.causes())
     for one, reason in failures.items():
         _keep_failure(job, one, reason)
     outcome = JobOutcome(
@@ -145,7 +145,7 @@ def _told(one: JobLog, report: LogReport) -> dict[str, Any]:
 
 
 def _keep_failure(job: ArchiveJob, one: JobLog | None, reason: str) -> None:
-    """Of one log, or of the whole job."""
+    """Keeps the failure of one log, or of the whole job."""
     slot, log = job.slot, None if one is None else one.log.name
     content = {"vehicle": slot.vehicle, "month": slot.month, "job": slot.job, "log": log, "reason": reason}
     job.dataset.replace(slot.failure(log), text_of(content | ({"sha256": one.facts.sha256} if one else {})))

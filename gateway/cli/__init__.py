@@ -77,7 +77,7 @@ class _Lazy(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """As click does; for an unknown name, the one that was probably meant."""
+        """Finds a command as click does; for an unknown name, suggests the one that was probably meant."""
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as fault:

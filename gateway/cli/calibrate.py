@@ -73,7 +73,7 @@ def _finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
 
 
 def inspection_json(inspection: Inspection) -> dict[str, object]:
-    """A verdict a run, findings about all runs together, and why there is no calibration (null if there is one)."""
+    """The verdict on each run, the findings about all runs, and the refusal of the calibration, or null."""
     return {
         "refusal": inspection.refusal,
         "runs": [
@@ -188,7 +188,7 @@ def _command(
 
 
 def _say_payload_range(campaign: Campaign) -> None:
-    """Errors are in percent of it: a van of 3.5 t carries far more than the default."""
+    """Prints the payload range, of which errors are percentages: a van of 3.5 t carries far more than the default."""
     if not campaign.states_payload_range:
         low_kg, high_kg = campaign.vehicle.payload_range_kg
         click.echo(
@@ -215,7 +215,7 @@ def _require_places(output: Path | None, report: Path | None) -> None:
 
 
 def judged(outcome: Outcome, report: Path | None) -> Verdict:
-    """How good the calibration is by the estimator that the service runs; with a report it is written too."""
+    """Judges the calibration by the estimator that the service runs, and writes the report if one is wanted."""
     with counted("judging"):
         assessment = assess_calibration(outcome)
     if report is not None:

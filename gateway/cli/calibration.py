@@ -132,7 +132,7 @@ Figures = list[tuple[str, float, float]]  # name, value, standard deviation
 
 
 def figures_of(file: CalibrationFile) -> dict[str, Figures]:
-    """By part of the file: the vehicle's parameters of cross_spectrum, regressions of ratio_index (constant first)."""
+    """The figures of each part of the file: the vehicle's parameters of cross_spectrum, and the ratio index's fits."""
     figures = {}
     if file.cross_spectrum is not None:
         figures["cross_spectrum"] = _parameters(file.cross_spectrum)

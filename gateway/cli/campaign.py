@@ -12,7 +12,7 @@ from gateway.words import known
 
 @click.group("campaign")
 def campaign() -> None:
-    """Known-load drives as one archive, to pass on or to contribute."""
+    """Packs known-load drives into one archive, to pass on or to contribute."""
 
 
 @campaign.command("pack")

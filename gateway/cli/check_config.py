@@ -64,6 +64,6 @@ def _sentences(config: Path, settings: Settings, setup: Setup) -> Iterator[str]:
 
 
 def limits_in_force(setup: Setup) -> dict[str, float]:
-    """By name, those of the settings and those that the calibration was made with."""
+    """The limits in force by name: those of the settings, and those that the calibration was made with."""
     of_calibration = Limits.of(setup.calibrated.vehicle) if setup.calibrated else Limits()
     return of_calibration.overridden_by(setup.limits).stated()

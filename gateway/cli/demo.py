@@ -134,7 +134,7 @@ class _Driver:
         self._n_sent += replay_frames([frames_of(driven)], sink, speed, None, self._stop)
 
     def _wait_until_taken(self, gateway: Gateway) -> None:
-        """Until the service has worked through every frame that was sent: it maps them all."""
+        """Waits until the service has worked through every frame that was sent: it maps them all."""
         while gateway.source.counts().frames < self._n_sent or not gateway.has_caught_up:
             if self._stop.wait(0.05):
                 return

@@ -31,7 +31,7 @@ PAUSE_S: Final = 0.2  # chosen: between two looks for records that are due
 
 
 def fleet_demo(n_vans: int, setup: Setup, port: int, speed: float, *, once: bool) -> None:
-    """Until Ctrl-C, or with ``once`` until each van has driven once; prints the lines of the page then.
+    """Runs the demo until Ctrl-C; with ``once`` it ends when each van has driven once, and prints the page's lines.
 
     The vans' records go straight to the subscriber's database, without a broker. Their first drives have
     just ended when this begins, further ones come at ``speed`` times real time.
@@ -70,7 +70,7 @@ class _Van:
         self._waiting: deque[tuple[int, Message]] = deque()
 
     def records_until(self, now_s: float) -> Iterator[Message]:
-        """Its records up to that time; simulates the next drive if none are waiting."""
+        """The van's records up to that time; simulates the next drive if none are waiting."""
         if not self._waiting:
             self._waiting.extend(self._driven(*next(self._drives)))
         while self._waiting and self._waiting[0][0] <= now_s * NS_PER_S:

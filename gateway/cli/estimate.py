@@ -213,5 +213,5 @@ def _too_much(record: Mapping[str, Any]) -> str:
 
 
 def half_width(interval95: Sequence[float]) -> float:
-    """Half its width: the number after ±."""
+    """Half the width of the interval: the number after ±."""
     return (interval95[1] - interval95[0]) / 2.0

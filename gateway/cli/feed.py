@@ -111,7 +111,7 @@ class _Ticker:
         self._warn_of_gravity(state)
 
     def _warn_of_gravity(self, state: FeedState) -> None:
-        """Once, if the axis that should be up does not show gravity."""
+        """Warns once if the axis that should point up does not show gravity."""
         is_settled = max(state.n_samples.values(), default=0) > SETTLED and math.isfinite(state.gravity_mps2)
         if self._has_warned or not is_settled:
             return

@@ -120,7 +120,7 @@ def _verdict(seen: Look, written: Path | None) -> Iterator[str]:
 
 
 def look_json(seen: Look) -> dict[str, Any]:
-    """The same for programs; numbers in SI."""
+    """The findings as JSON for programs; numbers in SI."""
     known = {id(one.heard): one.message for one in seen.described}
     return {
         "identifiers": [_identifier(one, known.get(id(one))) for one in seen.heard],

@@ -89,7 +89,7 @@ def summary_in_words(summary: Summary, output: str) -> str:
 
 
 def size(n_bytes: float) -> str:
-    """In a suitable unit: 999 B, 1.2 kB, 52.0 MB, ..."""
+    """A number of bytes in a suitable unit: 999 B, 1.2 kB, 52.0 MB, ..."""
     for unit in ("B", "kB", "MB", "GB"):
         if n_bytes < 1000.0:
             return f"{n_bytes:.0f} {unit}" if unit == "B" else f"{n_bytes:.1f} {unit}"
@@ -98,7 +98,7 @@ def size(n_bytes: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """In a suitable unit: 42 s, 11 min, 3.5 h, 2.1 days."""
+    """A duration in a suitable unit: 42 s, 11 min, 3.5 h, 2.1 days."""
     if seconds < 100.0:
         return f"{seconds:.0f} s"
     if seconds < 6000.0:

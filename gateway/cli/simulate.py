@@ -57,7 +57,7 @@ _BENCH = (
 
 
 def _takes_bench(command: Callable[..., None]) -> Callable[..., None]:
-    """What both commands simulate: the same argument and options."""
+    """Adds the argument and options that both commands share: what is simulated."""
     for decorate in reversed(_BENCH):
         command = decorate(command)
     return command

@@ -111,7 +111,7 @@ class BatchSection(SettingsSection):
         return self
 
     def for_core(self, *, window_s: float | None = None, is_live: bool = False) -> BatchSettings:
-        """The same settings for the core; provisional looks belong to the live service alone."""
+        """These settings for the core; provisional looks belong to the live service alone."""
         chosen = self.model_dump()
         chosen["window_s"] = window_s or self.window_s
         chosen["provisional_every_s"] = self.provisional_every_s if is_live else 0.0
@@ -156,7 +156,7 @@ class StoreSection(SettingsSection):
 
 
 class LogSection(SettingsSection):
-    """What the service writes to its log."""
+    """The content of the service's log."""
 
     level: Literal["debug", "info", "warning", "error"] = Field("info", description="least level that is written")
 

@@ -41,14 +41,18 @@ def build_batch(rows: Motion, window: BatchWindow, settings: BatchSettings, trai
     pitch_rate = _sensed(rows, Signal.PITCH_RATE, window, n, settings, traits)
     roll_rate = _sensed(rows, Signal.ROLL_RATE, window, n, settings, traits)
     speed, frozen = _speed(rows, window, n, settings, traits)
-    causes = _merge_missing(
-        _either(_causes(_ACCELERATION_FAULTS, acceleration), _causes(_PITCH_RATE_FAULTS, pitch_rate))
-    )
-    causes |= _speed_causes(speed, frozen, settings) | _trailer_cause(rows, window, n, settings)
+    causes = _sensor_causes(acceleration, pitch_rate) | {
+        Why.SPEED_MISSING: np.isnan(speed),
+        Why.TOO_SLOW: speed < settings.speed_min_mps,
+        Why.TOO_FAST: speed > settings.speed_max_mps,
+        Why.SPEED_FROZEN: frozen,
+    }
+    causes |= _trailer_cause(rows, window, n, settings)
     usable = np.ones(n, bool)
     for masked in causes.values():
         usable &= ~masked
-    gravity = _mean(acceleration.on_grid, usable)
+    gravity = float(np.mean(acceleration.on_grid[usable])) if usable.any() else float("nan")
+    slower_hz = min(acceleration.rate_hz, pitch_rate.rate_hz)
     roll_radps = _known(roll_rate, settings) if Signal.ROLL_RATE in rows.signals else None
     shares = {why: float(np.mean(masked)) for why, masked in causes.items() if masked.any()}
     return Batch(
@@ -67,7 +71,7 @@ def build_batch(rows: Motion, window: BatchWindow, settings: BatchSettings, trai
         rejected=_reasons((acceleration, pitch_rate), window, n, usable, gravity, shares, settings),
         is_provisional=window.is_provisional,
         roll_rate_radps=roll_radps,
-        sensor_rate_hz=_slower_hz(acceleration, pitch_rate),
+        sensor_rate_hz=slower_hz if slower_hz > 0.0 else float("nan"),
         gyro_gain=_gyro_gain(rows, window, roll_radps, speed, usable, settings, traits),
     )
 
@@ -134,14 +138,19 @@ def _gyro_gain(
     return gyro_gain_of(Bends(pushed, turned, roll_radps, speed), usable, settings.rate_hz)
 
 
-def _slower_hz(*sensors: _Sensed) -> float:
-    """The lower of the sampling rates; NaN if any sensor is silent."""
-    slower_hz = min(sensor.rate_hz for sensor in sensors)
-    return slower_hz if slower_hz > 0.0 else float("nan")
-
-
-def _causes(names: tuple[Why, ...], sensed: _Sensed) -> dict[Why, Bool]:
-    return dict(zip(names, sensed.faults, strict=True)) if sensed.faults else {}
+def _sensor_causes(acceleration: _Sensed, pitch_rate: _Sensed) -> dict[Why, Bool]:
+    """The faults of both sensors. A cause that both can have is set where either has it; where both are silent the
+    cause is a gap, where one is silent it is that sensor's fault.
+    """
+    causes: dict[Why, Bool] = {}
+    for names, sensed in ((_ACCELERATION_FAULTS, acceleration), (_PITCH_RATE_FAULTS, pitch_rate)):
+        for why, masked in zip(names, sensed.faults, strict=False):  # none without the sensor
+            causes[why] = masked | causes[why] if why in causes else masked
+    a, g = causes.get(Why.ACCELERATION_MISSING), causes.get(Why.PITCH_RATE_MISSING)
+    if a is None or g is None:
+        return causes
+    both = a & g
+    return causes | {Why.GAP: both, Why.ACCELERATION_MISSING: a & ~both, Why.PITCH_RATE_MISSING: g & ~both}
 
 
 def _constant_runs(t_ns: I64, x: F64, at_least_ns: float) -> I64:
@@ -201,15 +210,6 @@ def _speed(rows: Motion, window: BatchWindow, n: int, settings: BatchSettings, t
     return speed, frozen & (speed >= settings.speed_min_mps)
 
 
-def _speed_causes(speed: F64, frozen: Bool, settings: BatchSettings) -> dict[Why, Bool]:
-    return {
-        Why.SPEED_MISSING: np.isnan(speed),
-        Why.TOO_SLOW: speed < settings.speed_min_mps,
-        Why.TOO_FAST: speed > settings.speed_max_mps,
-        Why.SPEED_FROZEN: frozen,
-    }
-
-
 def _trailer_cause(rows: Motion, window: BatchWindow, n: int, settings: BatchSettings) -> dict[Why, Bool]:
     """Where a trailer is attached: each reading holds until the next, the first one from the start. Empty without
     readings.
@@ -222,26 +222,8 @@ def _trailer_cause(rows: Motion, window: BatchWindow, n: int, settings: BatchSet
     return {Why.TRAILER: x[latest] > 0.0}
 
 
-def _either(one: dict[Why, Bool], other: dict[Why, Bool]) -> dict[Why, Bool]:
-    """The causes of both sensors; a cause that both can have is set where either sensor has it."""
-    return one | {why: masked | one[why] if why in one else masked for why, masked in other.items()}
-
-
-def _merge_missing(causes: dict[Why, Bool]) -> dict[Why, Bool]:
-    """Where both sensors are silent the cause is a gap; where one is silent it is that sensor's fault."""
-    a, g = causes.get(Why.ACCELERATION_MISSING), causes.get(Why.PITCH_RATE_MISSING)
-    if a is None or g is None:
-        return causes
-    both = a & g
-    return causes | {Why.GAP: both, Why.ACCELERATION_MISSING: a & ~both, Why.PITCH_RATE_MISSING: g & ~both}
-
-
 def _gap_share(shares: Mapping[Why, float]) -> float:
     return sum(shares.get(why, 0.0) for why in _MISSING)
-
-
-def _mean(x: F64, usable: Bool) -> float:
-    return float(np.mean(x[usable])) if usable.any() else float("nan")
 
 
 def _reasons(

@@ -1,4 +1,4 @@
-"""What a vehicle carries, and so how long and how high its loads are: the table of load shapes.
+"""The table of load shapes: how long and how high loads are, by the goods that a vehicle carries.
 
 A long or high load is harder to pitch than a compact one of the same weight at the same place. The half-car sees of its
 shape only the squared radius of gyration in pitch, about the front-to-rear line through the body's centre of gravity:
@@ -23,12 +23,16 @@ from gateway.core.vehicle import Carries, Vehicle
 
 @dataclass(frozen=True, slots=True)
 class LoadExtent:
-    """Medians of a load's length and height (m) and the standard deviations of their logarithms."""
+    """Medians of a load's length and height (m) and the standard deviations of their logarithms.
+
+    ``is_of_floor``: the length is a fraction of the load floor's length.
+    """
 
     length_m: float
     length_scatter: float
     height_m: float
     height_scatter: float
+    is_of_floor: bool = False
 
 
 FLOOR_PER_WHEELBASE: Final = 0.8
@@ -46,23 +50,13 @@ OUTLYING_PARTS: Final = (0.1, 0.2, 0.3, 0.4)  # chosen: part of a load on the ro
 SMOOTHING: Final = 0.15  # chosen: kernel width in log s, about the resolution of the table
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
-    """One kind of goods; ``is_of_floor``: the length is a fraction of the load floor's length."""
-
-    extent: LoadExtent
-    is_of_floor: bool = False
-
-
-CARRIED: Final[Mapping[Carries, _Row]] = MappingProxyType(
+CARRIED: Final[Mapping[Carries, LoadExtent]] = MappingProxyType(
     {
-        Carries.PALLETS: _Row(
-            LoadExtent(1.5, 0.35, 1.1, 0.3)
-        ),  # one or two, 1.2 m long (ISO 6780), as they are stacked
-        Carries.PARCELS: _Row(LoadExtent(0.9, 0.25, 1.0, 0.3), is_of_floor=True),
-        Carries.LONG_GOODS: _Row(LoadExtent(3.0, 0.3, 0.4, 0.5)),
-        Carries.TOOLS: _Row(LoadExtent(0.8, 0.25, 1.1, 0.3), is_of_floor=True),  # racks along the walls
-        Carries.MIXED: _Row(LoadExtent(0.9, 0.3, 0.9, 0.35), is_of_floor=True),  # and as many compact loads
+        Carries.PALLETS: LoadExtent(1.5, 0.35, 1.1, 0.3),  # one or two, 1.2 m long (ISO 6780), as they are stacked
+        Carries.PARCELS: LoadExtent(0.9, 0.25, 1.0, 0.3, is_of_floor=True),
+        Carries.LONG_GOODS: LoadExtent(3.0, 0.3, 0.4, 0.5),
+        Carries.TOOLS: LoadExtent(0.8, 0.25, 1.1, 0.3, is_of_floor=True),  # racks along the walls
+        Carries.MIXED: LoadExtent(0.9, 0.3, 0.9, 0.35, is_of_floor=True),  # and as many compact loads
     }
 )
 """Chosen from the dimensions of such goods; `benchmarks.accuracy budget` measures the effect of each row."""
@@ -86,8 +80,8 @@ def shape_hypotheses(vehicle: Vehicle, known_s_m2: float, known_std: float) -> t
     ``known_s_m2`` is s of the known loads as calibrated, ``known_std`` the standard deviation of its logarithm. If the
     fitter stated what is carried, there is one kind.
     """
-    logs, weights = np.log([s for s, _ in _points(vehicle)]), np.array([weight for _, weight in _points(vehicle)])
-    weights = weights / weights.sum()
+    s_m2, weights = np.array(list(_points(vehicle))).T
+    logs, weights = np.log(s_m2), weights / weights.sum()
     mean = float(weights @ logs)
     std = float(np.sqrt(weights @ (logs - mean) ** 2 + SMOOTHING**2))
     if is_said(vehicle):
@@ -129,9 +123,8 @@ def _extent(vehicle: Vehicle) -> LoadExtent:
         if vehicle.payload_height_m is not None:
             height_m, height_scatter = vehicle.payload_height_m, LENGTH_SCATTER
         return LoadExtent(vehicle.payload_length_m, LENGTH_SCATTER, height_m, height_scatter)
-    row = CARRIED[Carries(vehicle.carries or Carries.MIXED)]
-    extent = row.extent
-    floor_m = FLOOR_PER_WHEELBASE * vehicle.wheelbase_m if row.is_of_floor else 1.0
+    extent = CARRIED[Carries(vehicle.carries or Carries.MIXED)]
+    floor_m = FLOOR_PER_WHEELBASE * vehicle.wheelbase_m if extent.is_of_floor else 1.0
     height_m = extent.height_m if vehicle.payload_height_m is None else vehicle.payload_height_m
     return LoadExtent(extent.length_m * floor_m, extent.length_scatter, height_m, extent.height_scatter)
 

@@ -60,7 +60,7 @@ def watched(rows: Motion, begin_ns: int, end_ns: int) -> Watched:
 
 
 def watched_all(parts: Iterable[Motion]) -> Watched:
-    """The same over all rows, whatever their time stamps."""
+    """Watches all rows, whatever their time stamps."""
     seen = UNWATCHED
     for rows in parts:
         if _has_journey(rows):

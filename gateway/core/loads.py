@@ -63,7 +63,7 @@ class FusedLoad:
 
     @cached_property
     def posterior(self) -> Posterior:
-        """That of all of them together."""
+        """The posterior of all of them together."""
         return self.weighings.fusible.fused(self.first, self.last + 1)
 
 

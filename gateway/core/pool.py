@@ -24,7 +24,7 @@ from gateway.core.settings import BatchSettings
 from gateway.core.spectrum import longest_run
 from gateway.estimate import Estimate, Way
 from gateway.posterior import Posterior
-from gateway.records import F64, Batch, Bool, Why
+from gateway.records import Batch, Why
 from gateway.units import NS_PER_S
 
 LEAST_RUN_S: Final = 6.0  # chosen: unbroken usable driving that holds one segment of a spectrum
@@ -69,7 +69,10 @@ def has_stretch(window: Batch) -> bool:
 
 def continued(parts: Parts, window: Batch) -> Parts:
     """The parts that a window may be pooled with: none after a long break or a clock set back; if the window is a batch
-    by itself, none of another drive; and no rest of an earlier load (:func:`_is_rest`).
+    by itself, none of another drive; and no rest of an earlier load.
+
+    Such a rest is too short for the change test; if the vehicle then stood long enough to load, and the window is long
+    enough to do without it, it would weigh as a part of the old load.
     """
     if not parts:
         return ()
@@ -77,15 +80,9 @@ def continued(parts: Parts, window: Batch) -> Parts:
     break_ns = window.t_start_ns - last.t_end_ns
     is_next = 0 <= break_ns <= MOST_BREAK_S * NS_PER_S
     is_of_drive = bool(window.rejected) or window.drive_start_ns == last.drive_start_ns
-    return parts if is_next and is_of_drive and not _is_rest(parts, window, break_ns) else ()
-
-
-def _is_rest(parts: Parts, window: Batch, break_ns: int) -> bool:
-    """True if the parts are too short for the change test, and the vehicle then stood long enough to load, while the
-    window is long enough to do without them: mixed in, they would weigh as a part of the old load.
-    """
     is_short = sum(part.batch.usable_s for part in parts) < LEAST_SIDE_S
-    return is_short and break_ns >= LONG_S * NS_PER_S and window.usable_s >= LEAST_LOAD_S
+    is_rest = is_short and break_ns >= LONG_S * NS_PER_S and window.usable_s >= LEAST_LOAD_S
+    return parts if is_next and is_of_drive and not is_rest else ()
 
 
 def is_batch(parts: Parts, settings: BatchSettings) -> bool:
@@ -157,10 +154,12 @@ def spanned(parts: Sequence[Part], begin_ns: int, end_ns: int) -> Batch:
     if len(cuts) == 1:
         return cuts[0]
     first, last = cuts[0], cuts[-1]
-    usable = np.concatenate([_closed(cut.usable) for cut in cuts])
+    usable = np.concatenate([cut.usable for cut in cuts])
+    usable[np.cumsum([len(cut.usable) for cut in cuts]) - 1] = False
     known = [cut for cut in cuts if cut.usable.any()]
     gravity_mps2 = np.average([cut.gravity_mps2 for cut in known], weights=[np.count_nonzero(c.usable) for c in known])
     weights = np.array([len(cut.usable) for cut in cuts]) / len(usable)
+    rolls = [cut.roll_rate_radps for cut in cuts if cut.roll_rate_radps is not None]
     return Batch(
         t_start_ns=first.t_start_ns,
         t_end_ns=last.t_end_ns,
@@ -178,7 +177,7 @@ def spanned(parts: Sequence[Part], begin_ns: int, end_ns: int) -> Batch:
         },
         longest_stop_s=max(cut.longest_stop_s for cut in cuts),
         is_provisional=last.is_provisional,
-        roll_rate_radps=_roll_rate(cuts),
+        roll_rate_radps=np.concatenate(rolls) if len(rolls) == len(cuts) else None,
         sensor_rate_hz=min(cut.sensor_rate_hz for cut in cuts),
         gyro_gain=joined_gains([cut.gyro_gain for cut in cuts]),
     )
@@ -211,14 +210,3 @@ def _samples(window: Batch, begin_ns: int, end_ns: int) -> slice:
     begin, end = (round((t_ns - since_ns) * window.rate_hz / NS_PER_S) for t_ns in (begin_ns, end_ns))
     begin = min(max(begin, 0), n)
     return slice(begin, n if end_ns >= window.t_end_ns else min(max(end, begin), n))
-
-
-def _closed(usable: Bool) -> Bool:
-    closed = usable.copy()
-    closed[-1:] = False
-    return closed
-
-
-def _roll_rate(cuts: Sequence[Batch]) -> F64 | None:
-    rates = [cut.roll_rate_radps for cut in cuts if cut.roll_rate_radps is not None]
-    return np.concatenate(rates) if len(rates) == len(cuts) else None

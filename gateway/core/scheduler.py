@@ -111,8 +111,12 @@ class Scheduler:
                 n = int(np.argmax(decides)) if decides.any() else len(motion)
                 self._between = self._between.joined(watched_all([motion.part(0, n)]))
                 return n
-            self._begin_drive(int(motion.t_ns[0]))
-        t_ns = self._deciding_times(motion.t_ns, decides)
+            self._drive_start_ns = self._newest_ns = int(motion.t_ns[0])
+            self._still_since_ns = _MOVING
+            self._begin_window(self._newest_ns)
+            self._before, self._between = self._between, UNWATCHED
+        last = np.maximum.accumulate(np.where(decides, np.arange(len(motion)), -1))
+        t_ns = np.where(last >= 0, motion.t_ns[last], self._newest_ns)  # of the last row that decides
         n, broken_by = self._next_break(t_ns)
         newest_ns = np.maximum.accumulate(np.r_[self._newest_ns or 0, t_ns[:n]])[1:]
         still_since_ns = self._standing_since(motion.part(0, n))
@@ -128,11 +132,6 @@ class Scheduler:
         else:
             self._still_since_ns = int(still_since_ns[-1])
         return n
-
-    def _deciding_times(self, t_ns: I64, decides: Bool) -> I64:
-        """(n,) the stamp of each row; a row that decides nothing gets the stamp of the last row before it that does."""
-        last = np.maximum.accumulate(np.where(decides, np.arange(len(t_ns)), -1))
-        return np.where(last >= 0, t_ns[last], self._newest_ns or 0)
 
     def _next_break(self, t_ns: I64) -> tuple[int, Why | None]:
         """Index of the first row after silence or a backward clock step, and which of both; all rows and None without
@@ -178,10 +177,13 @@ class Scheduler:
                 self._newest_ns = int(newest_ns[end - 1])
                 begin = end
             if begin < len(rows):
-                yield self._reach(mark_ns) if newest_ns[begin] >= mark_ns else self._overflow()
+                if newest_ns[begin] >= mark_ns:
+                    yield self._reach(mark_ns)
+                else:  # the window is full: it ends at its newest stamp, at least a nanosecond after its start
+                    yield self._end_window(max(self._newest_ns or 0, self._window_start_ns + 1), Why.TIME_STAMPS)
 
     def _n_that_fit(self, rows: Motion, begin: int) -> int:
-        """How many rows from ``begin`` on the window can still hold; rows aside do not count."""
+        """The number of rows from ``begin`` on that the window can still hold; rows aside do not count."""
         n_left = self._most_rows - self._n_rows
         if rows.aside is None:
             return n_left
@@ -209,24 +211,13 @@ class Scheduler:
         if mark_ns < self._window_start_ns + self._ns(self._settings.window_s):
             self._provisional_ns += self._ns(self._settings.provisional_every_s)
             return self._build(mark_ns, is_provisional=True)
-        batch = self._build(mark_ns)
-        self._begin_window(mark_ns)
-        self._before = UNWATCHED
-        return batch
+        return self._end_window(mark_ns)
 
-    def _overflow(self) -> Batch:
-        """End a full window at its newest stamp, at least a nanosecond after its start."""
-        t_end_ns = max(self._newest_ns or 0, self._window_start_ns + 1)
-        batch = self._build(t_end_ns, Why.TIME_STAMPS)
+    def _end_window(self, t_end_ns: int, ended_by: Why | None = None) -> Batch:
+        batch = self._build(t_end_ns, ended_by)
         self._begin_window(t_end_ns)
         self._before = UNWATCHED
         return batch
-
-    def _begin_drive(self, t_ns: int) -> None:
-        self._drive_start_ns = self._newest_ns = t_ns
-        self._still_since_ns = _MOVING
-        self._begin_window(t_ns)
-        self._before, self._between = self._between, UNWATCHED
 
     def _begin_window(self, t_ns: int) -> None:
         self._rows = [part.part(0, 0) for part in (*self._rows, *self._loose)[:1]]  # one without rows has signals too
@@ -244,7 +235,7 @@ class Scheduler:
         self._newest_ns = None
 
     def _skip_until_moving(self, motion: Motion) -> int:
-        """How many rows to skip until the vehicle moves; a moving row ends the parked state."""
+        """The number of rows to skip until the vehicle moves; a moving row ends the parked state."""
         moving = np.flatnonzero(self._moving_and_still(motion)[0])
         n = int(moving[0]) if moving.size else len(motion)
         self._between = self._between.joined(watched_all([motion.part(0, n)]))

@@ -57,7 +57,7 @@ def frequencies_hz(n_segment: int, rate_hz: float) -> F64:
 
 
 def _detrended(segments: F64) -> F64:
-    """Each row minus its least-squares straight line."""
+    """Subtracts from each row its least-squares straight line."""
     n = segments.shape[1]
     ramp = np.linspace(-1.0, 1.0, n)
     slope = segments @ ramp / np.sum(ramp**2)

@@ -209,7 +209,7 @@ class Vehicle(VehicleFields):
 
     @property
     def largest_payload_kg(self) -> float:
-        """What it may carry: the end of its range, but no less than any vehicle can."""
+        """The payload it may carry: the end of its range, but no less than any vehicle can."""
         return max(self.payload_range_kg[1], LEAST_RANGE_SHARE * self.empty_mass_kg)
 
     @property

@@ -56,7 +56,7 @@ class Estimate(_Told):
     sequence: Place | None = None
 
     def columns(self) -> dict[str, Any]:
-        """What the database finds it by."""
+        """The columns by which the database finds the record."""
         place = self.sequence.model_dump() if self.sequence else {}
         return {"id": self.id, "t_end_s": self.t_end.timestamp(), "is_weighed": not self.rejected, **place}
 

@@ -1,4 +1,4 @@
-"""From the fleet's broker into a database: every record once, acknowledged to the broker when it is on disk; and the
+"""Stores every record from the fleet's broker once, acknowledged to the broker when it is on disk; and the
 page of the fleet, /fleet.
 
     python -m gateway.fleet.subscriber            # settings from the environment, see Settings
@@ -73,7 +73,7 @@ class Link:
         self._client.loop_stop()
 
     def some(self, timeout_s: float) -> list[Message]:
-        """What has come, at most one transaction's worth; waits for the first."""
+        """The messages that have come, at most one transaction's worth; waits for the first."""
         found: list[Message] = []
         with contextlib.suppress(queue.Empty):
             found.append(self._arrivals.get(timeout=timeout_s))
@@ -82,7 +82,7 @@ class Link:
         return found
 
     def acknowledge(self, arrivals: list[Message]) -> None:
-        """They are safe; of a connection that broke meanwhile they come again."""
+        """Acknowledges messages that are safe; those of a connection that broke meanwhile come again."""
         for arrival in arrivals:
             if arrival.connection == self._connection:
                 self._client.ack(arrival.mid, qos=1)

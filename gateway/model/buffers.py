@@ -32,5 +32,5 @@ def buffer(name: str, shape: tuple[int, ...]) -> F64:
 
 
 def complex_buffer(name: str, shape: tuple[int, ...]) -> C128:
-    """The same for complex numbers."""
+    """A buffer of complex numbers."""
     return buffer(name, (*shape[:-1], 2 * shape[-1])).view(complex)

@@ -1,4 +1,4 @@
-"""What refuses a batch: before it is weighed, and after. The second list is a table of rows."""
+"""Checks that refuse a batch, before it is weighed and after. The second list is a table of rows."""
 
 import math
 from collections.abc import Callable
@@ -79,7 +79,7 @@ def reach_of(load: Load, model: VehicleModel) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signs:
-    """What an answer shows of itself, for the checks.
+    """The signs by which the checks judge an answer.
 
     off (N,) are the deviations of the parameters from the calibration, deviations (N,) the same in standard deviations,
     tension their chi-squared. If the misfit exceeds its limit, off and deviations are of a fit that follows the batch
@@ -149,7 +149,7 @@ def _is_too_wide(signs: Signs) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """What makes an answer unbelievable, and the reason that is told.
+    """A sign that makes an answer unbelievable, and the reason that is reported.
 
     ``of_sensor``: a sign of a changed sensor, which proves nothing beyond the loads that taught the vehicle.
     """

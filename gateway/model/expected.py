@@ -35,7 +35,7 @@ TRACKS_APART, TWIST_LEVEL = INDEX["tracks_apart_m"], INDEX["twist_level"]
 
 
 class Groups:
-    """What the model needs to know of measured spectra, computed once."""
+    """The figures of measured spectra that the model needs, computed once."""
 
     def __init__(self, spectra: CrossSpectra, ground: Ground) -> None:
         self.ground = ground

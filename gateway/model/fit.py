@@ -30,7 +30,7 @@ class Gaussian:
 
     @classmethod
     def of(cls, mean: F64, covariance: F64) -> "Gaussian":
-        """From its covariance."""
+        """The result, made from its covariance."""
         return cls(np.asarray(mean, float), np.asarray(np.linalg.inv(covariance), float))
 
     def cost(self, x: F64) -> float:
@@ -47,7 +47,7 @@ class Likelihood(Protocol):
     """Minus the log-likelihood of one drive, as a function of the common vector (n,) and its own (k,)."""
 
     def cost(self, common: F64, own: F64) -> float:
-        """Its value; infinite where the model has none."""
+        """The cost at these parameters; infinite where the model has none."""
 
     def curvature(self, common: F64, own: F64) -> tuple[F64, F64]:
         """Gradient (n + k,) and expected second derivative (n + k, n + k)."""

@@ -100,7 +100,7 @@ def search_of_place(rolling: Whittle, point: Point, start: F64 | None = None) ->
 
 
 def place_of(rolling: Whittle, point: Point, found: fit.Found) -> Place:
-    """What the search of the place has ``found``, with what moves it."""
+    """The result of the search of the place, ``found``, with what moves it."""
     there, n = _Rolling(rolling, point).at(found.own[0]), len(point.theta)
     free, covariance = [*FREE, n + 2], found.own_covariances[0]
     whole = rolling.curvature(there, range(n + 3))

@@ -333,7 +333,7 @@ def _wide(of_axles: C128) -> C128:
 
 
 def _inverse(ff: C128, rr: C128, fr: C128) -> C128:
-    """Of symmetric matrices of two rows."""
+    """The inverses of symmetric matrices of two rows."""
     per_determinant = 1.0 / (ff * rr - fr**2)
     found = np.empty((2, 2, *per_determinant.shape), complex)
     np.multiply(rr, per_determinant, out=found[0, 0])

@@ -1,4 +1,4 @@
-"""What gravity, bends and the floor of the spectra say of the sensors before anything is weighed."""
+"""Faults of the sensors that gravity, bends and the floor of the spectra show before anything is weighed."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -76,7 +76,7 @@ class Noise:
         return bool(self.excess.any())
 
     def on(self, spectra: CrossSpectra) -> F64 | None:
-        """(p, m) of it in these spectra; None if there is none."""
+        """The level of each sensor (p, m) in these spectra; None if there is none."""
         if not self.is_there:
             return None
         return as_read(self.excess, spectra.reading, spectra.freq_hz[1:-1], with_roll=spectra.has_roll)

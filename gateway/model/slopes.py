@@ -50,7 +50,7 @@ class Slopes:
 
 
 def slopes_of(e: Expected, free: Sequence[int]) -> Slopes:
-    """By the ``free`` entries of theta (n,) and, numbered from n on, of the load; some share a column."""
+    """Slopes by the ``free`` entries of theta (n,) and, numbered from n on, of the load; some share a column."""
     g, chain, plan = e.groups, _Chain(e), _plan_of(tuple(free), e.theta.shape[1], e.groups.n_sensors)
     by_number, far = numbers_about(e.natural[0], e.load[:, 0], g.ground, plan.moving)
     r = len(far)

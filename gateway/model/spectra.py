@@ -91,7 +91,7 @@ class Reading:
     usual_stroke_mps: tuple[float, float] | None = None
 
     def with_gyro_late_by(self, lag_s: float) -> "Reading":
-        """The same with another lag of the gyro, if it has a mount."""
+        """This reading with another lag of the gyro, if it has a mount."""
         return replace(self, mount=replace(self.mount, gyro_lag_s=lag_s)) if self.mount else self
 
 
@@ -157,13 +157,13 @@ class CrossSpectra:
 
     @property
     def without_roll(self) -> "CrossSpectra":
-        """The same spectra with acceleration and pitch rate alone."""
+        """These spectra with acceleration and pitch rate alone."""
         if not self.has_roll:
             return self
         return replace(self, parts=self.parts[[0, 1, 3, 4]], noise=None if self.noise is None else self.noise[:2])
 
     def within(self, band_hz: tuple[float, float]) -> "CrossSpectra":
-        """The same at fewer frequencies; the guard frequencies are just outside the band."""
+        """These spectra at fewer frequencies; the guard frequencies are just outside the band."""
         kept = np.flatnonzero((self.freq_hz[1:-1] >= band_hz[0]) & (self.freq_hz[1:-1] <= band_hz[1]))
         inner, guarded = slice(kept[0], kept[-1] + 1), slice(kept[0], kept[-1] + 3)
         return replace(
@@ -175,7 +175,7 @@ class CrossSpectra:
         )
 
     def showing(self, parts: F64) -> "CrossSpectra":
-        """The same drive with these spectra (p^2, b, m)."""
+        """This drive with other spectra (p^2, b, m)."""
         return replace(self, parts=parts)
 
     def with_sensors_times(self, *gains: float) -> "CrossSpectra":

@@ -26,7 +26,7 @@ def coherence_of(log_x: F64) -> F64:
 
 
 def coherence_slope_of(log_x: F64) -> F64:
-    """Its derivative by log x, -x^2 K0(x)."""
+    """The derivative of the coherence by log x, -x^2 K0(x)."""
     return -_of_grid(log_x, 1)
 
 

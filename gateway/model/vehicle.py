@@ -1,4 +1,4 @@
-"""What drives have taught of a vehicle: the posterior of its parameters, and what weighing needs besides."""
+"""The vehicle as its drives taught it: the posterior of its parameters, and what weighing needs besides."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -109,7 +109,7 @@ class VehicleModel:
 
     @property
     def reading(self) -> Reading:
-        """How spectra of this vehicle are computed."""
+        """The settings by which spectra of this vehicle are computed."""
         mount = mount_of(self.parameters)
         return Reading(
             self.wheelbase_m,
@@ -122,5 +122,5 @@ class VehicleModel:
         )
 
     def with_warning(self, warning: str) -> "VehicleModel":
-        """The same with one more warning."""
+        """This vehicle with one more warning."""
         return replace(self, warnings=(*self.warnings, warning))

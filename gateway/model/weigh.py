@@ -104,19 +104,19 @@ class Hypothesis:
 
     @property
     def prior(self) -> fit.Gaussian:
-        """Of parameters, payload and front share; flat in the load."""
+        """The prior of parameters, payload and front share; flat in the load."""
         precision = np.zeros((N + 2, N + 2))
         precision[:N, :N] = np.linalg.inv(self.covariance)
         return fit.Gaussian(np.r_[self.mean, 0.0, 0.0], precision)
 
     def soft(self) -> "Hypothesis":
-        """The same load on a soft mount."""
+        """The load as if it stood on a soft mount."""
         mean = self.mean.copy()
         mean[_MODE] = math.log(SOFT_HZ)
         return replace(self, name=f"{self.name}, soft", mean=mean, cost=self.cost + SOFT_COST, is_soft=True)
 
     def worn(self) -> "Hypothesis":
-        """The same on dampers that have worn or been replaced."""
+        """The load as if the dampers had worn or been replaced."""
         covariance = self.covariance.copy()
         covariance[_DAMPERS, _DAMPERS] += WORN_STD**2
         return replace(self, name=f"{self.name}, worn", covariance=covariance, cost=self.cost + WORN_COST, is_worn=True)

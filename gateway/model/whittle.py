@@ -85,7 +85,7 @@ class Whittle:
         self._last: tuple[tuple[float, ...], Expected, _Whitening] | None = None
 
     def showing(self, spectra: CrossSpectra) -> "Whittle":
-        """The likelihood of other measurements of the same drive. It shares the model as last solved."""
+        """The likelihood of other measurements of this drive; it keeps the model as it was last solved."""
         other = copy(self)
         other.spectra = spectra
         if self._last is not None:

@@ -46,7 +46,7 @@ def with_remainders(
     *,
     on_read: Callable[[LogReport], None] = lambda report: None,
 ) -> Iterator[Estimate]:
-    """The same with the stretches too short for a batch (``is_remainder``), which have a way."""
+    """These batches with the stretches too short for a batch (``is_remainder``), which have a way."""
     for log in logs:
         flow = setup.flow(settings)
         motions, report = motion_of_log(log, setup.signal_map)

@@ -18,7 +18,7 @@ from gateway.core.alarms.alarm import (
     alarm_to_json,
     sentence,
 )
-from gateway.core.alarms.rules import AlarmRules, AlarmVerdict, Says
+from gateway.core.alarms.rules import AlarmRules, Says
 from gateway.core.alarms.watch import AlarmWatch
 from gateway.estimate import Estimate
 from gateway.estimate_json import read_estimate
@@ -50,13 +50,13 @@ class Silence:
         """The verdict for the present status; ``causes`` are what the decoder refuses so often that it explains it."""
         if status.state not in _AT_FAULT:
             self._since_s = None
-            return Says(SILENT, AlarmVerdict.CLEAR if status.state in _HEARD else AlarmVerdict.HOLD)
+            return Says(SILENT, False if status.state in _HEARD else None)
         if self._since_s is None:
             self._since_s = self._clock_s()
         silent_s = self._clock_s() - self._since_s
         if silent_s < self._rules.sensor_silent_s:
-            return Says(SILENT, AlarmVerdict.HOLD)
-        return Says(SILENT, AlarmVerdict.RAISE, AlarmFigure(detail=what_is_silent(status, causes)))
+            return Says(SILENT, None)
+        return Says(SILENT, True, AlarmFigure(detail=what_is_silent(status, causes)))
 
 
 def what_is_silent(status: Status, causes: Sequence[str] = ()) -> str:
@@ -131,7 +131,7 @@ class AlarmService:
             return f"[{','.join(map(_text, self._watch.active()))}]"
 
     def summary(self) -> AlarmsStatus:
-        """For status and metrics."""
+        """The alarms in numbers, for status and metrics."""
         with self._lock:
             return AlarmsStatus(
                 active=tuple(alarm.cause.name for alarm in self._watch.active()),

@@ -1,4 +1,4 @@
-"""What the service writes about batches and its own state: log lines when they change, load events and trips."""
+"""The service's log lines about changes of state, and its records of load events and trips."""
 
 import json
 import logging

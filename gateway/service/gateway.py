@@ -84,8 +84,6 @@ class Gateway:
         broker = uplink_settings(settings.uplink, settings.vehicle)
         receiver, with_places = webhook_settings(settings.webhook, settings.vehicle), settings.position.forward
         self.store = store_of(settings.store, broker, receiver)
-        if setup.calibration is not None:
-            self.store.write_calibration(setup.calibration.id, setup.calibration.to_json())
         if setup_fault is not None:
             log_event(Event.SETUP_REFUSED, level=logging.ERROR, fault=setup_fault)
             self.store.write_event("setup_fault", {"fault": setup_fault})

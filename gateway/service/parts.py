@@ -31,7 +31,7 @@ from gateway.weighing.flow import Flow
 def uplink_of(
     wanted: UplinkSettings | None, setup: Setup, store: Store, learner: Learner, *, with_places: bool
 ) -> Uplink | None:
-    """None if no broker is configured. Statements from there go to the learner."""
+    """The uplink, which hands statements to the learner; None if no broker is configured."""
     if wanted is None:
         return None
     birth = {
@@ -53,7 +53,7 @@ def uplink_of(
 
 
 def webhook_of(wanted: WebhookSettings | None, store: Store, *, with_places: bool) -> Webhook | None:
-    """None if none is configured."""
+    """The webhook; None if none is configured."""
     if wanted is None:
         return None
     outbox = Outbox(store, wanted.queue, with_places=with_places, only=wanted.kinds)
@@ -132,7 +132,7 @@ def source_of(wanted: BusSection, setup: Setup, open_receiver: OpenReceiver | No
 
 
 def ring_log_of(settings: Settings, setup: Setup) -> RingLog | None:
-    """None if nothing is to be recorded. Frames are recorded with the channel of the signal map."""
+    """The recorder, which records frames with the channel of the signal map; None if nothing is to be recorded."""
     wanted = settings.record
     if not wanted.enabled:
         return None

@@ -55,7 +55,7 @@ class Beside:
             self._faults.pop(name, None)
 
     def guarded(self, name: str, neighbour: Callable[P, object]) -> Callable[P, None]:
-        """The same as a function."""
+        """Guards a function."""
 
         def call(*args: P.args, **named: P.kwargs) -> None:
             self.call(name, neighbour, *args, **named)

@@ -27,7 +27,7 @@ def load_record(path: Path, empty: R) -> R:
 
 
 class RecordFile(ABC, Generic[R]):
-    """Not thread-safe. Every change is on disk before it is in ``record``.
+    """A record that is on disk before it is in ``record``. Not thread-safe.
 
     ``fault`` says what happened to an invalid file.
     """

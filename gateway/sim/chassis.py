@@ -1,4 +1,4 @@
-"""From a vehicle and its loads to the numbers that the integrator needs.
+"""The numbers that the integrator needs, from a vehicle and its loads.
 
 Positions are counted from the empty vehicle's equilibrium. The body's reference point is the empty
 body's centre of gravity; a place f metres before it and y metres left of it moves by

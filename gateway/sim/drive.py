@@ -52,7 +52,7 @@ class Drive:
         )
 
     def part(self, start_s: float, end_s: float) -> "Drive":
-        """From start_s to end_s, both rounded to the grid."""
+        """The piece from start_s to end_s, both rounded to the grid."""
         begin, end = round(start_s / self.step_s), round(end_s / self.step_s)
         return Drive(self.speed_mps[begin : end + 1], self.lateral_mps2[begin : end + 1], self.step_s)
 

@@ -22,7 +22,7 @@ _MARGIN_M: Final = 50.0  # chosen: of road beyond the drive
 
 @dataclass(frozen=True, slots=True)
 class LoadStep:
-    """From t_s of the drive on, the vehicle carries these loads."""
+    """A load that the vehicle carries from t_s of the drive on."""
 
     t_s: float
     loads: tuple[Load, ...]
@@ -30,7 +30,7 @@ class LoadStep:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What was carried, from t_ns (k,) on: payload_kg, front_share_pct, cg_left_m (k,), and the scale readings.
+    """The true loads from t_ns (k,) on: payload_kg, front_share_pct, cg_left_m (k,), and the scale readings.
 
     cg_left_m is the sprung mass's centre of gravity left of the centre line; axle_loads_kg (k, 2) front and rear;
     wheel_loads_kg (k, 4) front left and right, rear left and right.

@@ -1,4 +1,4 @@
-"""From what the vehicle does to what its sensors say."""
+"""The sensors' readings of a vehicle's motion."""
 
 import math
 from dataclasses import dataclass
@@ -61,7 +61,7 @@ def felt_at(ride: Ride, vehicle: Vehicle, mount: Mount) -> Felt:
 
 
 def record(felt: Felt, sensors: Sensors, rng: np.random.Generator, start_ns: int) -> Recording:
-    """What the sensors send; the first instant of ``felt`` is start_ns."""
+    """The samples that the sensors send; the first instant of ``felt`` is start_ns."""
     shaken = felt.force_mps2 + _engine_vibration(felt, sensors.engine, rng)
     t_s = _sample_times(felt, sensors.imu.rate_hz, sensors.clock.error_ppm)
     accel = _read(shaken, felt.step_s, t_s, sensors.imu, sensors.imu.accel, rng)

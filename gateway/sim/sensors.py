@@ -1,4 +1,4 @@
-"""What is bolted to the vehicle: inertial unit, satellite receiver, and their clock.
+"""The sensors that are bolted to the vehicle: inertial unit, satellite receiver, and their clock.
 
 Axes ISO 8855: x forward, y left, z up; specific force, so a vehicle at rest reads +9.81 m/s2 along z;
 rates about +x (left side up), +y (nose down), +z (nose left).

@@ -125,7 +125,7 @@ class Doubt(BaseModel):
 
     @property
     def advice(self) -> str:
-        """What to do, as part of a sentence."""
+        """Advice on what to do, as part of a sentence."""
         return self.kind.advice
 
     @property

@@ -113,16 +113,16 @@ class StatementRecord(Part):
 
     @property
     def from_ns(self) -> int:
-        """From when it holds, in nanoseconds since 1970."""
+        """The first moment of the statement, in nanoseconds since 1970."""
         return _ns(self.from_)
 
     @property
     def until_ns(self) -> int | None:
-        """Until when it holds; None: until the load changes."""
+        """The last moment of the statement; None: it holds until the load changes."""
         return None if self.until is None else _ns(self.until)
 
     def identified(self) -> Self:
-        """With an id: its own, else one made from its content."""
+        """The statement with an id: its own, or one made from its content."""
         if self.id:
             return self
         content = json.dumps(self.model_dump(mode="json", by_alias=True), sort_keys=True)

@@ -8,7 +8,6 @@ import sqlite3
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, TypeVar
@@ -22,7 +21,6 @@ from gateway.store.schema import (
     TABLES,
     Chain,
     DeliveryRow,
-    DocumentRow,
     JournalRow,
     Row,
     checksum,
@@ -40,14 +38,8 @@ MOST_SET_ASIDE: Final = 3  # chosen: damaged databases that are kept, the newest
 MOST_BAD_RECORDS: Final = 1000  # chosen: bad records that are kept, the newest
 
 
-@dataclass(frozen=True, slots=True)
-class Opened:
-    """The epoch and the last numbers of an opened database."""
-
-    epoch: str
-    last_seq: int
-    last_batch: int
-    newest: dict[str, int]  # the newest number of each kind
+# epoch, last number, last batch's number, and the newest number of each kind, of an opened database
+Opened = tuple[str, int, int, dict[str, int]]
 
 
 class DamagedError(sqlite3.DatabaseError):
@@ -64,30 +56,16 @@ def is_damaged(error: Exception) -> bool:
 
 @contextmanager
 def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """A transaction that is rolled back on failure; the connection stays usable."""
-    connection.execute("BEGIN IMMEDIATE")
+    """A transaction, or a part of the present one, that leaves nothing behind if it fails."""
+    is_part = connection.in_transaction
+    connection.execute("SAVEPOINT part" if is_part else "BEGIN IMMEDIATE")
     try:
         yield
-        connection.execute("COMMIT")
+        connection.execute("RELEASE part" if is_part else "COMMIT")
     except BaseException:
         if connection.in_transaction:  # some failures have rolled back already
-            connection.execute("ROLLBACK")
+            connection.execute("ROLLBACK TO part" if is_part else "ROLLBACK")
         raise
-
-
-@contextmanager
-def _savepoint(connection: sqlite3.Connection) -> Iterator[None]:
-    """A part of a transaction that leaves nothing behind if it fails."""
-    connection.execute("SAVEPOINT part")
-    try:
-        yield
-    except BaseException:
-        if connection.in_transaction:
-            connection.execute("ROLLBACK TO part")
-        raise
-    finally:
-        if connection.in_transaction:
-            connection.execute("RELEASE part")
 
 
 def _identity(path: Path) -> tuple[int, int] | None:
@@ -155,7 +133,7 @@ class Database:
             for row in rows:
                 linked = chain.linked(row) if isinstance(row, JournalRow) else row
                 try:
-                    with _savepoint(connection):
+                    with _transaction(connection):
                         is_new = _add_row(connection, linked)
                 except Exception as fault:
                     if not connection.in_transaction or is_damaged(fault) or missing_tables(connection):
@@ -310,7 +288,7 @@ class Database:
         epoch, last_batch = known or (new_epoch, 0)
         sql = "SELECT max(seq) FROM journal WHERE kind = ?"
         newest = {kind: connection.execute(sql, (kind,)).fetchone()[0] or 0 for kind in (*KINDS, REMAINDER)}
-        return Opened(epoch, _last_number(connection, "journal"), last_batch, newest)
+        return epoch, _last_number(connection, "journal"), last_batch, newest
 
 
 def missing_tables(connection: sqlite3.Connection) -> list[str]:
@@ -328,33 +306,15 @@ def _set_refused_aside(connection: sqlite3.Connection, row: Row, fault: Exceptio
 
 
 def _add_row(connection: sqlite3.Connection, row: Row) -> bool:
-    """Store a row -> False if it is a batch that was already stored."""
-    if isinstance(row, JournalRow):
-        return _add_record(connection, row)
+    """Store a row -> False if it is a batch that was already stored. A later revision replaces the earlier one."""
     if isinstance(row, DeliveryRow):
-        _keep_delivery(connection, row)
-    else:
-        _keep_document(connection, row)
-    return True
-
-
-def _add_record(connection: sqlite3.Connection, row: JournalRow) -> bool:
-    """Insert a record -> False if the batch was already stored. A later revision replaces the earlier one."""
+        sql = "INSERT INTO uplinks (name, seq) VALUES (?, ?) ON CONFLICT (name) DO UPDATE SET seq = excluded.seq"
+        connection.execute(sql, (row.name, row.seq))
+        return True
     if row.kind in KINDS and KINDS[row.kind].is_revised:
         connection.execute("DELETE FROM journal WHERE id = ? AND seq < ?", (row.id, row.seq))
     columns = row.columns()
     return connection.execute(f"{INSERT} ON CONFLICT (id) DO NOTHING", (*columns, checksum(columns))).rowcount > 0
-
-
-def _keep_document(connection: sqlite3.Connection, row: DocumentRow) -> None:
-    columns = (row.name, row.received_ns, row.text)
-    sql = "INSERT OR REPLACE INTO documents (name, received_ns, text, crc) VALUES (?, ?, ?, ?)"
-    connection.execute(sql, (*columns, checksum(columns)))
-
-
-def _keep_delivery(connection: sqlite3.Connection, row: DeliveryRow) -> None:
-    sql = "INSERT INTO uplinks (name, seq) VALUES (?, ?) ON CONFLICT (name) DO UPDATE SET seq = excluded.seq"
-    connection.execute(sql, (row.name, row.seq))
 
 
 def _keep_receipt(connection: sqlite3.Connection, stored: Sequence[JournalRow], boot_id: str) -> None:

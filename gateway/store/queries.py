@@ -29,14 +29,12 @@ class JournalQuery:
 
     kinds: tuple[str, ...]
     after_seq: int | None = None
-    since_ns: int | None = None
-    until_ns: int | None = None
+    since_ns: int = -LAST
+    until_ns: int = LAST
     newest_first: bool = False
 
     def holds(self, row: JournalRow) -> bool:
-        if row.kind not in self.kinds:
-            return False
-        if not (self.since_ns or -LAST) <= row.t_end_ns < (LAST if self.until_ns is None else self.until_ns):
+        if row.kind not in self.kinds or not self.since_ns <= row.t_end_ns < self.until_ns:
             return False
         if self.after_seq is None:
             return True
@@ -100,7 +98,7 @@ def delivery(connection: sqlite3.Connection, uplink: str, kinds: Sequence[str]) 
 
 
 def count_pruned(connection: sqlite3.Connection, condition: str, asked: tuple[object, ...]) -> None:
-    """Before rows are removed under ``condition``: add the undelivered ones to the counts of each uplink."""
+    """Adds the undelivered rows under ``condition``, which will be removed, to the counts of each uplink."""
     for column, kinds in (("n_pruned", BATCHES), ("n_pruned_entries", ENTRIES)):
         marks = ", ".join(f"'{kind}'" for kind in kinds)
         connection.execute(
@@ -123,15 +121,10 @@ def _rows_behind(
     """Find the next numbers of each kind in an index, then read only the rows of the result."""
     beyond, order = ("<", "DESC") if window.newest_first else (">", "ASC")
     start = after if after is not None else (LAST if window.newest_first else -LAST)
-    is_timed = window.since_ns is not None or window.until_ns is not None
-    index, within = "journal_by_kind", ""
-    times: tuple[int, ...] = ()
-    if is_timed:
-        index, within = "journal_by_time", "AND t_end_ns >= ? AND t_end_ns < ?"
-        times = (
-            -LAST if window.since_ns is None else window.since_ns,
-            LAST if window.until_ns is None else window.until_ns,
-        )
+    times: tuple[int, ...] = (window.since_ns, window.until_ns)
+    index, within = "journal_by_time", "AND t_end_ns >= ? AND t_end_ns < ?"
+    if times == (-LAST, LAST):
+        index, within, times = "journal_by_kind", "", ()
     of_kind = (
         f"SELECT seq FROM (SELECT seq FROM journal INDEXED BY {index}"
         f" WHERE kind = ? AND seq {beyond} ? {within} ORDER BY seq {order} LIMIT ?)"

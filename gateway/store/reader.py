@@ -6,7 +6,8 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, TypedDict, TypeVar, Unpack
+from functools import partialmethod
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from gateway.errors import StoreError
 from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, Delivery, HistoryPage, JournalRecord
@@ -14,7 +15,7 @@ from gateway.log import Event, log_event
 from gateway.store import queries
 from gateway.store.database import is_damaged
 from gateway.store.queries import LAST, JournalQuery, without_spectra
-from gateway.store.schema import Chain, JournalRow, checksum, connect_reader
+from gateway.store.schema import Chain, JournalRow, connect_reader
 from gateway.store.write_buffer import WriteBuffer
 from gateway.units import NS_PER_S
 
@@ -38,17 +39,6 @@ class Latest:
     estimate: str | None
     rejection: str | None
     age_s: float | None
-
-
-class PageQuery(TypedDict, total=False):
-    """Keyword arguments of :meth:`StoreReader.page`."""
-
-    since_ns: int | None
-    until_ns: int | None
-    limit: int
-    cursor: str | None
-    newest_first: bool
-    with_spectra: bool
 
 
 class StoreReader:
@@ -84,8 +74,8 @@ class StoreReader:
         window = JournalQuery(
             tuple(kinds),
             seq_after(cursor, epoch),
-            None if since_ns is None else _within_64_bits(since_ns),
-            None if until_ns is None else _within_64_bits(until_ns),
+            -LAST if since_ns is None else _within_64_bits(since_ns),
+            LAST if until_ns is None else _within_64_bits(until_ns),
             newest_first,
         )
         with self._connection() as connection:
@@ -114,11 +104,9 @@ class StoreReader:
                 self._store.note_unread(text, fault)
         return found
 
-    def estimates(self, **question: Unpack[PageQuery]) -> HistoryPage:
-        """Estimates and rejections, as ``page``."""
-        return self.page(BATCHES, **question)
+    estimates = partialmethod(page, BATCHES)  # and rejections
 
-    def entries(self, *, kind: str | None = None, **question: Unpack[PageQuery]) -> HistoryPage:
+    def entries(self, *, kind: str | None = None, **question: Any) -> HistoryPage:
         """Load events, trips and alarms, each in its last revision, as ``page``; ``kind`` None: all."""
         return self.page(ENTRIES if kind is None else (kind,), **question)
 
@@ -138,21 +126,8 @@ class StoreReader:
         _, held = self._store.held()
         with self._connection() as connection:
             answer, rejection = (self._newest(connection, held, kind) for kind in (ESTIMATE, REJECTION))
-            age_s = None if answer is None else self._age_s(connection, answer)
-        return Latest(
-            estimate=None if answer is None else answer.text,
-            rejection=None if rejection is None else rejection.text,
-            age_s=age_s,
-        )
-
-    def calibration(self, calibration_id: str) -> str | None:
-        """A stored calibration; None if there is none with a valid checksum."""
-        with self._connection() as connection:
-            if connection is None:
-                return None
-            sql = "SELECT CAST(name AS BLOB), received_ns, CAST(text AS BLOB), crc FROM documents WHERE name = ?"
-            found = connection.execute(sql, (f"calibration {calibration_id}",)).fetchone()
-        return found[2].decode() if found and checksum(found[:3]) == found[3] else None
+            age_s = self._age_s(connection, answer) if answer else None
+        return Latest(answer.text if answer else None, rejection.text if rejection else None, age_s)
 
     def delivery(self, uplink: str, kinds: Sequence[str] = (*BATCHES, *ENTRIES)) -> Delivery:
         """The position up to which ``uplink`` has delivered, as on disk; the cursor is None before its first delivery.
@@ -295,28 +270,26 @@ class Follower:
 
         Raises StoreError or TimeoutError.
         """
-        memory = self._buffer.in_memory()
-        seq = self._seq(memory.epoch)
+        epoch, floor, head, recent = self._buffer.in_memory()
+        seq = self._seq(epoch)
         if seq >= self._buffer.newest(self._kinds):
-            self._after = f"{memory.epoch}-{max(seq, memory.head)}"
+            self._after = f"{epoch}-{max(seq, head)}"
             return []
-        last_revision = {row.id: row.seq for row in memory.rows}
+        last_revision = {row.id: row.seq for row in recent}
         rows = [
             row
-            for row in self._link(memory.rows)
+            for row in self._link(recent)
             if row.seq > seq and row.kind in self._kinds and (row.kind in BATCHES or last_revision[row.id] == row.seq)
         ]
-        if seq < memory.floor:
+        if seq < floor:
             stored = self._reader.behind(self._kinds, seq, limit)
             last = stored[-1].seq if stored else seq
             rows = stored + ([] if len(stored) >= limit else [row for row in rows if row.seq > last])
-        found = [
-            JournalRecord(f"{memory.epoch}-{row.seq}", row.kind, row.id, row.previous, row.text) for row in rows[:limit]
-        ]
+        found = [JournalRecord(f"{epoch}-{row.seq}", row.kind, row.id, row.previous, row.text) for row in rows[:limit]]
         if len(found) == limit:
             self._after = found[-1].cursor
         else:  # all up to there was looked through
-            self._after = f"{memory.epoch}-{max(memory.head, found[-1].number if found else 0)}"
+            self._after = f"{epoch}-{max(head, found[-1].number if found else 0)}"
         return found
 
     def go_to(self, cursor: str | None) -> None:

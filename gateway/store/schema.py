@@ -31,7 +31,6 @@ CREATE TABLE journal (
 );
 CREATE INDEX journal_by_kind ON journal (kind, seq);
 CREATE INDEX journal_by_time ON journal (kind, t_end_ns);
-CREATE TABLE documents (name TEXT PRIMARY KEY, received_ns INTEGER NOT NULL, text TEXT NOT NULL, crc INTEGER NOT NULL);
 -- how far each uplink has delivered, and what retention took from it before it could
 CREATE TABLE uplinks (
     name TEXT PRIMARY KEY,
@@ -141,15 +140,6 @@ class JournalRow:
 
 
 @dataclass(frozen=True, slots=True)
-class DocumentRow:
-    """The last version of a text, stored under a name."""
-
-    name: str
-    received_ns: int
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
 class DeliveryRow:
     """How far an uplink has delivered: every record up to number ``seq``."""
 
@@ -157,7 +147,7 @@ class DeliveryRow:
     seq: int
 
 
-Row = JournalRow | DocumentRow | DeliveryRow
+Row = JournalRow | DeliveryRow
 
 JOURNAL_COLUMNS: Final = "seq, kind, id, revision, t_end_ns, previous, received_ns, text"
 

@@ -4,24 +4,14 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 from gateway.history import KINDS
-from gateway.store.schema import DeliveryRow, DocumentRow, JournalRow, Row
+from gateway.store.schema import DeliveryRow, JournalRow, Row
 
 SEQ_STRIDE: Final = 1 << 20  # chosen: each opening of a database begins a new stride
 RECENT: Final = 16  # chosen: records on disk that stay in memory: whoever follows closely needs no disk
-
-
-@dataclass(frozen=True, slots=True)
-class InMemory:
-    """Snapshot of the records in memory, which are all those after number ``floor``; oldest first."""
-
-    epoch: str
-    floor: int
-    head: int  # the newest number given
-    rows: tuple[JournalRow, ...]
 
 
 class WriteBuffer:
@@ -89,10 +79,6 @@ class WriteBuffer:
                     on_news()
             return f"{self._epoch}-{numbered.seq}"
 
-    def add(self, document: DocumentRow) -> None:
-        with self._changed:
-            self._add(document)
-
     def add_delivery(self, name: str, cursor: str) -> bool:
         """Accept the position up to which an uplink has delivered, replacing a waiting one; False for another epoch."""
         with self._changed:
@@ -124,11 +110,10 @@ class WriteBuffer:
         with self._changed:
             return f"{self._epoch}-{self._next_seq - 1}"
 
-    def in_memory(self) -> InMemory:
-        """The newest records, on disk or not."""
+    def in_memory(self) -> tuple[str, int, int, tuple[JournalRow, ...]]:
+        """The epoch, a number, the newest number given, and all records after the first number, oldest first."""
         with self._changed:
-            held = (row for row in (*self._in_flight, *self._waiting) if isinstance(row, JournalRow))
-            return InMemory(self._epoch, self._floor, self._next_seq - 1, (*self._recent, *held))
+            return self._epoch, self._floor, self._next_seq - 1, (*self._recent, *self.held()[1])
 
     def held(self) -> tuple[str, tuple[JournalRow, ...]]:
         """The epoch and the records not yet on disk, oldest first."""

@@ -23,7 +23,7 @@ from gateway.status import StoreState, StoreStatus
 from gateway.store.database import FILE_NAME, Database, is_damaged
 from gateway.store.reader import Follower, StoreReader
 from gateway.store.retention import Retention, boot_ns
-from gateway.store.schema import Chain, DocumentRow, JournalRow
+from gateway.store.schema import Chain, JournalRow
 from gateway.store.write_buffer import WriteBuffer
 
 IDLE_S: Final = 900.0  # chosen: without new rows: how often age is looked at
@@ -34,7 +34,7 @@ PAGE_OF_BAD: Final = 1000  # chosen: numbers of bad records that wait to be set 
 
 
 class Store(ServicePart):
-    """Estimates, events and calibrations in one directory. Every method may be called from any thread.
+    """Estimates and events in one directory. Every method may be called from any thread.
 
     If the disk is full, read-only or gone, the store keeps records in memory and says so in ``health`` and in the log.
     It retries by itself and then writes the records it kept.
@@ -103,10 +103,6 @@ class Store(ServicePart):
 
     def write_event(self, kind: str, detail: Mapping[str, Any]) -> None:
         self._append(SERVICE, "", self._clock_ns(), f"{kind}\n{json_line(detail)}")
-
-    def write_calibration(self, calibration_id: str, text: str) -> None:
-        """Store the calibration that later estimates refer to."""
-        self._buffer.add(DocumentRow(f"calibration {calibration_id}", self._clock_ns(), text))
 
     def write_delivery(self, uplink: str, cursor: str) -> bool:
         """Store that ``uplink`` has delivered everything up to ``cursor``.
@@ -266,7 +262,7 @@ class Store(ServicePart):
             return
         opened = self._database.open(self._buffer.epoch)
         if not self._has_numbers:
-            self._buffer.rebase(opened.epoch, opened.last_seq, opened.last_batch, opened.newest)
+            self._buffer.rebase(*opened)
             self._has_numbers = True
 
     def _set_bad_records_aside(self) -> None:

@@ -123,7 +123,7 @@ class Outbox:
         self._journal.write_delivery(self._name, message.cursor)
 
     def rewind(self) -> None:
-        """After a broken connection: send undelivered messages again, and those delivered in the last ``repeat_s``."""
+        """Sends undelivered messages again after a broken connection, with those delivered in the last ``repeat_s``."""
         self._under_way = None
         self._delivered = self._lately.before_it(self._delivered)
         self._follower.go_to(self._delivered)

@@ -92,8 +92,8 @@ def require_own_id(key: str, vehicle: VehicleSection, why: str) -> None:
     """Raises ConfigurationError if ``key`` makes the vehicle send while it has the default id."""
     if vehicle.id == VehicleSection().id:
         raise ConfigurationError(
-            f"{key} is set, but [vehicle] id is {vehicle.id!r}, that of every vehicle that was given none: "
-            f"{why}; set [vehicle] id to a name of its own"
+            f"{key} is set, but [vehicle] id is {vehicle.id!r}, the default of every vehicle: "
+            f"{why}; set [vehicle] id to a unique name"
         )
 
 

@@ -29,7 +29,7 @@ class StatementsMessage:
 
 
 class StatementsDesk:
-    """Not thread-safe. Whatever a message holds, it is taken or refused, and ``report`` tells how many were."""
+    """Takes or refuses statements from messages, and counts both in ``report``. Not thread-safe."""
 
     def __init__(self, take: TakeStatements) -> None:
         self._take = take

@@ -82,7 +82,7 @@ class CalibratedVehicle:
 
     @property
     def front_share_believed_pct(self) -> tuple[float, float] | None:
-        """Likewise of the front share; None if calibration saw a single load or place, which sets no limit."""
+        """The believed range of the front share; None if calibration saw one load or place, which sets no limit."""
         low, high = self.front_share_seen_pct
         return None if self.is_of_one_load or low == high else _widened(low, high)
 

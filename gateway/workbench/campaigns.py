@@ -148,7 +148,7 @@ def speeds(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan
 
 
 def sensitivity(vehicle: Vehicle, rng: np.random.Generator, longest_s: float) -> Plan:
-    """Half the rated payload at the centre of gravity, at other speeds and on other roads than the paper's."""
+    """Drives with half the rated payload at the centre of gravity, at other speeds and roads than the paper's."""
     loads = (Load(vehicle.rated_payload_kg / 2.0, vehicle.cog_position_m),)
     each_s = min(600.0, longest_s)
     by_speed = [

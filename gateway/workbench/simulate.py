@@ -35,7 +35,7 @@ from gateway.workbench.wiring import Wiring, unrelated_traffic
 
 
 def sideways(plan: Plan, most_m: float, rng: np.random.Generator) -> Plan:
-    """The same plan with random lateral load positions within most_m of the centre line, constant during a drive."""
+    """The plan with random lateral load positions within most_m of the centre line, constant during a drive."""
     return replace(plan, drives=tuple(_sideways(planned, most_m, rng) for planned in plan.drives))
 
 
@@ -102,7 +102,7 @@ class Bench:
         return simulate_drive(self.vehicle, planned.steps, planned.road, planned.drive, self.sensors, seed, start_ns)
 
     def frames_of(self, planned: PlannedDrive, number: int, driven: SimulatedDrive) -> Frames:
-        """Its frames in order of time, together with the unrelated traffic."""
+        """The drive's frames in order of time, together with the unrelated traffic."""
         frames = Wiring(self.map_name).frames_of(driven.recording)
         if self.n_unrelated == 0:
             return frames

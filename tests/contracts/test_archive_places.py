@@ -22,7 +22,7 @@ def place(request: pytest.FixtureRequest, tmp_path: Path, bucket: str) -> Locati
     return place_of(tmp_path if request.param == "local" else f"{bucket}/{tmp_path.name}")
 
 
-def test_what_is_there_is_never_written_again(place: Location) -> None:
+def test_existing_files_are_never_overwritten(place: Location) -> None:
     assert place.create("receipts/vehicle=a/1.json", b"first")
     assert not place.create("receipts/vehicle=a/1.json", b"second")
     assert place.read("receipts/vehicle=a/1.json") == b"first"
@@ -48,7 +48,7 @@ def test_a_stamp_follows_the_content(place: Location) -> None:
     assert before.stamp != after.stamp
 
 
-def test_what_is_not_there_is_told_by_name(place: Location) -> None:
+def test_a_missing_file_is_reported_by_name(place: Location) -> None:
     with pytest.raises(FileNotFoundError, match="nowhere: no such file"):
         place.read("nowhere")
     with pytest.raises(FileNotFoundError, match=r"nowhere\.log: no such file"), place.fetched("nowhere.log"):
@@ -56,7 +56,7 @@ def test_what_is_not_there_is_told_by_name(place: Location) -> None:
     place.remove("nowhere")
 
 
-def test_a_large_file_comes_to_disk_and_goes(place: Location) -> None:
+def test_a_large_file_is_fetched_and_removed_afterwards(place: Location) -> None:
     content = bytes(range(256)) * 80_000
     place.create("van/1.log.gz", content)
     with place.fetched("van/1.log.gz") as fetched:
@@ -66,12 +66,12 @@ def test_a_large_file_comes_to_disk_and_goes(place: Location) -> None:
     assert fetched.path.exists() == (place.local("") is not None)
 
 
-def test_a_bucket_that_is_not_there_is_told_in_one_line(bucket: str) -> None:
+def test_a_missing_bucket_is_reported_in_one_line(bucket: str) -> None:
     with pytest.raises(PlaceError, match=r"^s3://nobody/x: .*NoSuchBucket|^s3://nobody/x: .*404") as told:
         place_of("s3://nobody/x").items()
     assert "\n" not in str(told.value)
 
 
-def test_another_scheme_is_refused_with_those_there_are() -> None:
+def test_an_unknown_scheme_is_refused_with_the_known_ones() -> None:
     with pytest.raises(ConfigurationError, match=r"ftp://x/y: ftp:// is not read here; there are file, s3, and paths"):
         place_of("ftp://x/y")

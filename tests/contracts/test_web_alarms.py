@@ -47,7 +47,7 @@ def alarmed(tmp_path: Path) -> Iterator[Alarmed]:
         yield opened
 
 
-def test_what_stands_and_what_stood(alarmed: Alarmed) -> None:
+def test_active_and_past_alarms_are_listed(alarmed: Alarmed) -> None:
     client = Client(alarmed.app)
     told = client.get(URL).json()
     assert [one["sentence"] for one in told["active"]] == ["The vehicle weighs 2560 +- 22 kg, limit 2500 kg"]
@@ -68,7 +68,7 @@ def test_metrics_name_every_alarm_that_is_watched(alarmed: Alarmed) -> None:
     assert Client(alarmed.app).get("/api/v1/status").json()["alarms"]["active"] == ["overload.gross"]
 
 
-def test_a_stream_that_is_resumed_tells_what_was_missed(alarmed: Alarmed) -> None:
+def test_a_resumed_stream_sends_what_was_missed(alarmed: Alarmed) -> None:
     async def first() -> list[ServerSentEvent]:
         board = alarmed.bench.board
         told = []
@@ -83,7 +83,7 @@ def test_a_stream_that_is_resumed_tells_what_was_missed(alarmed: Alarmed) -> Non
     assert json.loads(text or "")["kind"] == "overload"
 
 
-def test_what_is_told_is_as_the_schema_says(alarmed: Alarmed) -> None:
+def test_answers_match_the_schema(alarmed: Alarmed) -> None:
     schema = json.loads((Path(__file__).parents[2] / "docs/alarms.schema.json").read_text())
     validator = jsonschema_rs.validator_for(schema)
     client = Client(alarmed.app)

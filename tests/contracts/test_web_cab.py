@@ -83,7 +83,7 @@ def test_vehicle_that_has_just_been_calibrated_is_ready_and_not_uncalibrated(tmp
         assert (told(opened)["says"], told(opened)["rejected"]) == ("not_calibrated", ["no_calibration"])
 
 
-def test_it_weighs_by_all_batches_of_the_load_together(gateway: Gateway) -> None:
+def test_all_batches_of_the_load_count_together(gateway: Gateway) -> None:
     one = replace(loaded(0, 300.0, 48.0), epoch=epoch_of(posterior_of(290.0, 48.0, 3.0, 0.1), 4))
     gateway.publish(one)
     cab = told(gateway)
@@ -104,7 +104,7 @@ def test_the_light_turns_and_names_its_places(gateway: Gateway) -> None:
     assert told(gateway)["room"]["kg"] == -20.0
 
 
-def test_while_it_stands_and_until_the_new_load_is_weighed_it_says_so(gateway: Gateway) -> None:
+def test_standing_and_an_unweighed_load_are_shown(gateway: Gateway) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     gateway.status = BEFORE.model_copy(update={"standing": Standing(stood_s=95.04), "state": State.WAITING_FOR_SPEED})
     cab = told(gateway)
@@ -121,12 +121,12 @@ def test_before_the_first_estimate_everything_is_unknown(gateway: Gateway) -> No
     assert (cab["lacks"], cab["last_event"], cab["t_end"], cab["rejected"]) == ("estimate", None, None, [])
 
 
-def test_an_early_look_says_that_it_is_one(gateway: Gateway) -> None:
+def test_an_early_look_is_marked_as_one(gateway: Gateway) -> None:
     gateway.board.publish(replace(loaded(0, 300.0, 48.0), is_provisional=True))
     assert told(gateway)["is_early"] is True
 
 
-def test_what_could_not_be_weighed_since_is_told_with_its_reasons(gateway: Gateway) -> None:
+def test_refusals_since_the_last_answer_are_shown_with_their_reasons(gateway: Gateway) -> None:
     gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 300.0, 48.0).refused(Why.TOO_SLOW, Why.GAP))
     assert told(gateway)["rejected"] == ["too_slow", "gap"]
     gateway.publish(loaded(2, 300.0, 48.0))
@@ -134,7 +134,7 @@ def test_what_could_not_be_weighed_since_is_told_with_its_reasons(gateway: Gatew
 
 
 @pytest.mark.parametrize("why", [Why.MODEL_MISFIT, Why.ACCELERATION_STUCK])
-def test_while_batches_are_refused_for_what_they_showed_nothing_is_promised(gateway: Gateway, why: Why) -> None:
+def test_no_room_is_promised_while_batches_are_refused(gateway: Gateway, why: Why) -> None:
     """Neither by what was weighed before, nor by early looks between refused batches."""
     early = replace(loaded(9, 310.0, 48.0), is_provisional=True)
     gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 300.0, 48.0).refused(why))
@@ -147,7 +147,7 @@ def test_while_batches_are_refused_for_what_they_showed_nothing_is_promised(gate
     assert (told(gateway)["light"], told(gateway)["is_doubted"]) == ("go", False)
 
 
-def test_a_road_that_told_nothing_takes_nothing_back_and_no_doubt_takes_back_an_overload(gateway: Gateway) -> None:
+def test_a_useless_road_changes_nothing_and_doubt_never_clears_an_overload(gateway: Gateway) -> None:
     gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 300.0, 48.0).refused(Why.NOT_ENOUGH_EXCITATION))
     assert (told(gateway)["light"], told(gateway)["is_doubted"]) == ("go", False)
     gateway.publish(loaded(2, 620.0, 50.0), loaded(3, 620.0, 50.0).refused(Why.MODEL_MISFIT))
@@ -160,7 +160,7 @@ def test_an_old_number_is_stale(gateway: Gateway) -> None:
     assert (told(gateway)["age_s"], told(gateway)["is_stale"]) == (3600.0, True)
 
 
-def test_without_limits_or_calibration_it_says_what_is_missing(tmp_path: Path) -> None:
+def test_missing_limits_or_calibration_are_named(tmp_path: Path) -> None:
     unlimited = replace(VAN.vehicle, gross_limit_kg=None, front_axle_limit_kg=None, rear_axle_limit_kg=None)
     for n, calibrated in enumerate([replace(VAN, vehicle=unlimited), None]):
         with Gateway(tmp_path / str(n), calibrated=calibrated) as opened:
@@ -170,7 +170,7 @@ def test_without_limits_or_calibration_it_says_what_is_missing(tmp_path: Path) -
         assert cab["lacks"] == (None if isinstance(calibrated, CalibratedVehicle) else "calibration")
 
 
-def test_the_last_load_event_by_the_clock_is_told_and_none_that_was_withdrawn(gateway: Gateway) -> None:
+def test_the_latest_load_event_is_shown_unless_withdrawn(gateway: Gateway) -> None:
     load_event(gateway, 100, 240.0)
     load_event(gateway, 200, -180.0)
     load_event(gateway, 50, 20.0)  # of earlier, corrected later
@@ -180,7 +180,7 @@ def test_the_last_load_event_by_the_clock_is_told_and_none_that_was_withdrawn(ga
     assert last["t_end"] == "1970-01-01T00:03:20.000000Z"
 
 
-def test_alarms_that_stand_are_told_by_name(gateway: Gateway) -> None:
+def test_active_alarms_are_named(gateway: Gateway) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     assert told(gateway)["alarms"] == []
     active = ("overload.gross", "sensor_fault.silent")
@@ -188,7 +188,7 @@ def test_alarms_that_stand_are_told_by_name(gateway: Gateway) -> None:
     assert told(gateway)["alarms"] == list(active)
 
 
-def test_what_the_vehicles_own_sensors_say_is_passed_on_under_its_name(gateway: Gateway) -> None:
+def test_readings_of_the_vehicles_own_sensors_are_passed_on(gateway: Gateway) -> None:
     reading = OwnReading(signal="air_spring_pressure", number=412.0, unit="kPa", age_s=0.4)
     gateway.status = BEFORE.model_copy(update={"own_readings": (reading,)})
     assert told(gateway)["own_readings"] == [reading.model_dump()]

@@ -56,7 +56,7 @@ def test_every_order_of_the_history_is_named_with_its_meaning(history: dict[str,
         assert value in order["description"]
 
 
-def test_what_a_load_epoch_tells_is_described(description: dict[str, Any]) -> None:
+def test_the_fields_of_a_load_epoch_are_described(description: dict[str, Any]) -> None:
     """The fields epoch_* were once in no schema."""
     fields = description["components"]["schemas"]["Estimate"]["properties"]
     described = {name: one for name, one in fields.items() if name.startswith("epoch_")}

@@ -37,7 +37,7 @@ def test_events_and_trips_of_a_day(gateway):
     assert {one["is_over"] for one in trips} == {True, False}
 
 
-def test_the_cursor_leads_through_all_of_them(gateway):
+def test_the_cursor_pages_through_all_events(gateway):
     client, found, cursor = Client(gateway.app), [], ""
     while cursor is not None:
         page = client.get(f"/api/v1/trips?limit=2{cursor and f'&cursor={cursor}'}").json()
@@ -46,7 +46,7 @@ def test_the_cursor_leads_through_all_of_them(gateway):
     assert len(found) == len(set(found)) == 5
 
 
-def test_what_is_told_is_as_the_schema_says(gateway):
+def test_answers_match_the_schema(gateway):
     validator = jsonschema_rs.validator_for(
         json.loads((Path(__file__).parents[2] / "docs/events.schema.json").read_text())
     )
@@ -57,7 +57,7 @@ def test_what_is_told_is_as_the_schema_says(gateway):
 
 
 @pytest.mark.parametrize(("question", "status"), [("cursor=nonsense", 422), ("limit=0", 422), ("since=when", 422)])
-def test_wrong_questions_are_refused(gateway, question, status):
+def test_invalid_queries_are_refused(gateway, question, status):
     assert Client(gateway.app).get(f"/api/v1/events?{question}").status_code == status
 
 

@@ -44,7 +44,7 @@ def test_every_batch_is_in_the_json_lines_once(tmp_path: Path) -> None:
         assert [json.loads(line) for line in plain] == [make_record(n) for n in range(N_ROWS)]
 
 
-def test_a_span_is_cut_out(tmp_path: Path) -> None:
+def test_since_and_until_limit_the_export(tmp_path: Path) -> None:
     with Gateway(tmp_path) as gateway:
         gateway.publish(*(make_estimate(n) for n in range(4)))
         query = "?since=1970-01-01T00:10:00Z&until=1970-01-01T00:20:00Z"
@@ -55,7 +55,7 @@ def test_a_span_is_cut_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("query", ["since=now", "spectra=perhaps", "limit=5"])
-def test_a_wrong_question_is_a_problem(tmp_path: Path, query: str) -> None:
+def test_an_invalid_query_is_a_problem(tmp_path: Path, query: str) -> None:
     with Gateway(tmp_path) as gateway:
         answer = Client(gateway.app).get(f"/api/v1/export.jsonl?{query}")
         assert (answer.status_code, answer.headers["content-type"]) == (422, "application/problem+json")
@@ -72,7 +72,7 @@ CALIBRATED = CalibratedVehicle(
 )
 
 
-def test_the_vehicle_is_told_with_its_calibration_and_ranges(tmp_path: Path) -> None:
+def test_the_vehicle_is_shown_with_its_calibration_and_ranges(tmp_path: Path) -> None:
     health = SignalHealth(signal="speed", rate_hz=5.0)
     with Gateway(tmp_path, calibrated=CALIBRATED) as gateway:
         gateway.status = gateway.status.model_copy(update={"vin": "VF1" + "0" * 14, "signals": (health,)})
@@ -93,7 +93,7 @@ def test_the_vehicle_is_told_with_its_calibration_and_ranges(tmp_path: Path) -> 
     assert told["signals"][0]["rate_hz"] == 5.0
 
 
-def test_a_vehicle_without_calibration_says_so(tmp_path: Path) -> None:
+def test_a_missing_calibration_is_reported(tmp_path: Path) -> None:
     with Gateway(tmp_path) as gateway:
         told = Client(gateway.app).get("/api/v1/vehicle").json()
         assert told["calibration"] is None

@@ -44,7 +44,7 @@ def bearer(text: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("path", GUARDED)
-def test_without_a_token_nothing_is_told(client: Client, path: str) -> None:
+def test_without_a_token_nothing_is_answered(client: Client, path: str) -> None:
     answer = client.get(path)
     assert answer.status_code == 401
     assert answer.headers["www-authenticate"] == 'Bearer realm="springscale"'
@@ -53,18 +53,18 @@ def test_without_a_token_nothing_is_told(client: Client, path: str) -> None:
 
 
 @pytest.mark.parametrize("path", OF_NO_ROUTE)
-def test_an_address_of_no_route_tells_nothing(client: Client, path: str) -> None:
+def test_an_unknown_address_reveals_nothing(client: Client, path: str) -> None:
     assert client.get(path).status_code in (401, 404)
 
 
 @pytest.mark.parametrize(
     "path", ["/", "/engineer", "/cab", "/docs", "/openapi.json", "/health/live", "/assets/dashboard/main.js"]
 )
-def test_what_tells_nothing_of_the_vehicle_is_public(client: Client, path: str) -> None:
+def test_routes_that_reveal_nothing_are_public(client: Client, path: str) -> None:
     assert client.get(path).status_code == 200
 
 
-def test_public_folders_lead_nowhere_else(client: Client) -> None:
+def test_public_folders_give_access_to_nothing_else(client: Client) -> None:
     for path in (
         "/assets/../api/v1/status",
         "/assets/%2e%2e/api/v1/status",
@@ -129,7 +129,7 @@ ELSEWHERE = ["evil.example", "localhost.evil.example:8000", "192.168.1.7:8000", 
 
 
 @pytest.mark.parametrize(("host", "code"), [*((h, 200) for h in LOCAL), *((h, 421) for h in ELSEWHERE)])
-def test_without_tokens_only_local_names_are_answered_for(tmp_path: Path, host: str, code: int) -> None:
+def test_without_tokens_only_local_host_names_are_answered(tmp_path: Path, host: str, code: int) -> None:
     with Gateway(tmp_path) as gateway:
         assert Client(gateway.app).get("/api/v1/status", headers={"Host": host}).status_code == code
 
@@ -183,7 +183,7 @@ def test_tls_and_client_certificates(tmp_path: Path) -> None:
         assert httpx.get(address, verify=client_side, timeout=PATIENCE_S).json() == {"is_alive": True}
 
 
-def test_tls_files_that_cannot_be_used_are_said(tmp_path: Path) -> None:
+def test_unusable_tls_files_are_reported(tmp_path: Path) -> None:
     (tmp_path / "server.pem").write_text("no certificate")
     with (
         Gateway(tmp_path / "store") as gateway,

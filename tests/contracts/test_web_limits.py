@@ -34,7 +34,7 @@ def run(tmp_path: Path, scenario: Callable[[Server], Coroutine[Any, Any, None]])
 
 
 async def said_to(server: Server, *parts: bytes) -> bytes:
-    """What the server says to these bytes until it ends the connection."""
+    """The server's answer to these bytes, until it ends the connection."""
     reader, writer = await asyncio.open_connection(*server.socket.getsockname())
     try:
         for part in parts:
@@ -78,7 +78,7 @@ def test_every_handshake_works_however_busy_the_loop_is(tmp_path: Path) -> None:
         b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -5\r\n\r\n",
     ],
 )
-def test_what_is_no_request_ends_with_an_error_and_leaves_no_word_in_the_log(
+def test_a_malformed_request_gets_an_error_and_no_log_line(
     tmp_path: Path, request_text: bytes, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def scenario(server: Server) -> None:
@@ -116,7 +116,7 @@ def test_a_body_as_long_as_allowed_is_read(tmp_path: Path) -> None:
         assert httpx.post(url, content=spaces + b" ", headers=headers, timeout=PATIENCE_S).status_code == 413
 
 
-def test_beyond_the_places_the_answer_is_503_and_places_are_given_back(tmp_path: Path) -> None:
+def test_too_many_requests_get_503_and_places_are_freed_again(tmp_path: Path) -> None:
     async def scenario(server: Server) -> None:
         address = server.socket.getsockname()
         crowd = [await asyncio.open_connection(*address) for _ in range(CONNECTIONS)]
@@ -129,7 +129,7 @@ def test_beyond_the_places_the_answer_is_503_and_places_are_given_back(tmp_path:
     run(tmp_path, scenario)
 
 
-def test_many_requests_in_one_breath_are_answered(tmp_path: Path) -> None:
+def test_many_pipelined_requests_are_answered(tmp_path: Path) -> None:
     async def scenario(server: Server) -> None:
         reader, writer = await asyncio.open_connection(*server.socket.getsockname())
         writer.write(LIVE * 100)

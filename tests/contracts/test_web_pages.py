@@ -29,7 +29,7 @@ def client(tmp_path: Path) -> Iterator[Client]:
         yield Client(gateway.app)
 
 
-def test_nothing_foreign_and_nothing_inline_is_allowed(client: Client) -> None:
+def test_the_policy_forbids_foreign_and_inline_code(client: Client) -> None:
     for path in ("/", "/cab", "/api/v1/status", "/assets/dashboard/main.js", "/nothing"):
         policy = client.get(path).headers["content-security-policy"]
         assert "default-src 'none'" in policy
@@ -62,7 +62,7 @@ def test_the_page_holds_no_script_and_no_style_of_its_own(client: Client, path: 
         ("/teach", ("common", "teach")),
     ],
 )
-def test_every_word_stands_in_the_table_in_every_language(client: Client, path: str, tables: tuple[str, ...]) -> None:
+def test_every_phrase_is_translated(client: Client, path: str, tables: tuple[str, ...]) -> None:
     """A row per phrase; English and German have the same fields; what a page names has a row."""
     rows: dict[str, tuple[str, str]] = {}
     for table in tables:
@@ -87,7 +87,7 @@ def test_german_has_every_reason_source_and_remedy(client: Client) -> None:
 
 
 @pytest.mark.parametrize("path", ["/", "/engineer", "/cab"])
-def test_an_id_stands_once_in_a_page(client: Client, path: str) -> None:
+def test_ids_are_unique_in_a_page(client: Client, path: str) -> None:
     """Two parts of the dashboard had one, and a script filled the first that it found."""
     ids = re.findall(r'\sid="([^"]+)"', client.get(path).text)
     assert len(ids) > 10
@@ -95,7 +95,7 @@ def test_an_id_stands_once_in_a_page(client: Client, path: str) -> None:
 
 
 def loaded(client: Client, page: str) -> dict[str, bytes]:
-    """What a browser loads for a page, by path; module by module."""
+    """The files that a browser loads for a page, by path, with the modules that each imports."""
     found, waiting = {}, [page]
     while waiting:
         path = waiting.pop()
@@ -118,8 +118,8 @@ def loaded(client: Client, page: str) -> dict[str, bytes]:
         ("/docs", "/swagger/swagger-ui.css"),
     ],
 )
-def test_every_file_the_page_names_is_there(client: Client, path: str, one: str, prefix: str) -> None:
-    """Also below a path of a proxy, which cuts it off."""
+def test_every_file_that_a_page_names_exists(client: Client, path: str, one: str, prefix: str) -> None:
+    """They must also exist below the path of a proxy, which cuts it off."""
     behind = Client(below(prefix, client.app)) if prefix else client
     assert prefix + one in loaded(behind, prefix + path)
 
@@ -140,7 +140,7 @@ def test_the_cab_page_is_small_with_all_that_it_loads(client: Client) -> None:
     assert sum(map(len, files.values())) < 40_000
 
 
-def test_the_library_is_that_of_the_installed_package_packed_or_not(client: Client) -> None:
+def test_the_library_is_served_from_the_installed_package(client: Client) -> None:
     plain = client.get(LIBRARY_URL, headers={"accept-encoding": "identity"})
     packed = client.get(LIBRARY_URL, headers={"accept-encoding": "gzip"})
     assert plain.content == packed.content == LIBRARY.read_bytes()
@@ -157,7 +157,7 @@ def test_a_browser_keeps_the_library_and_asks_about_the_page(client: Client) -> 
     assert client.get("/assets/dashboard/main.js").headers["cache-control"] == "no-cache"
 
 
-def test_true_loads_are_told_where_they_are_known(tmp_path: Path) -> None:
+def test_known_true_loads_are_shown(tmp_path: Path) -> None:
     with Gateway(tmp_path, known_loads=lambda: TRUTH) as gateway:
         client = Client(gateway.app)
         assert 'data-known-loads="api/v1/known-loads"' in client.get("/").text
@@ -172,7 +172,7 @@ def test_a_service_on_the_road_has_no_true_loads(client: Client) -> None:
     assert client.get("/api/v1/known-loads").status_code == 404
 
 
-def test_every_reason_is_told_in_words(client: Client) -> None:
+def test_every_reason_has_a_sentence(client: Client) -> None:
     items = client.get("/api/v1/reasons").json()["items"]
     assert all(item["happened"] and item["advice"] for item in items)
     assert len({item["reason"] for item in items}) == len(items)

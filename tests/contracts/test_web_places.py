@@ -39,7 +39,7 @@ def gateway(tmp_path: Path) -> Gateway:
 
 
 def told(gateway: Gateway, tokens: TokenFile | None, text: str | None, *, forward: bool) -> set[str]:
-    """What of the history is told with a position."""
+    """The records of the history that hold a position."""
     app = create_app(
         gateway.board, gateway.store.reader(), lambda: gateway.status, tokens=tokens, are_places_read=forward
     )

@@ -47,7 +47,7 @@ def test_latest_is_the_estimate_with_its_age(gateway: Gateway, client: Client) -
     assert client.get("/api/v1/estimates/latest").json() == expected
 
 
-def test_latest_is_not_sent_twice_to_who_has_it(gateway: Gateway, client: Client) -> None:
+def test_an_unchanged_latest_is_not_sent_again(gateway: Gateway, client: Client) -> None:
     gateway.publish(make_estimate(5))
     etag = client.get("/api/v1/estimates/latest").headers["etag"]
     for named in (etag, f'"other", {etag}', etag.removeprefix("W/"), "*"):
@@ -70,7 +70,7 @@ def test_the_history_is_the_stored_text_page_by_page(gateway: Gateway, client: C
     assert tail["items"] == [make_record(9)]
 
 
-def test_the_history_can_be_asked_newest_first_and_without_spectra(gateway: Gateway, client: Client) -> None:
+def test_the_history_comes_newest_first_and_without_spectra_on_request(gateway: Gateway, client: Client) -> None:
     gateway.publish(make_estimate(0, with_spectra=True), make_estimate(1, with_spectra=True))
     answer = client.get("/api/v1/estimates", params={"order": "newest_first", "spectra": "false"}).json()
     assert answer["items"] == [make_record(1), make_record(0)]
@@ -98,9 +98,7 @@ def test_the_history_can_be_cut_by_time(gateway: Gateway, client: Client) -> Non
         ("sinc=2026-11-21T00:00:00Z", "query.sinc"),
     ],
 )
-def test_a_question_that_cannot_be_answered_is_a_problem_that_says_where(
-    client: Client, query: str, where: str
-) -> None:
+def test_an_invalid_parameter_is_a_problem_that_names_it(client: Client, query: str, where: str) -> None:
     answer = client.get(f"/api/v1/estimates?{query}")
     assert answer.status_code == 422
     assert answer.headers["content-type"] == "application/problem+json"
@@ -108,7 +106,7 @@ def test_a_question_that_cannot_be_answered_is_a_problem_that_says_where(
     assert where in answer.json()["detail"]
 
 
-def test_what_is_not_there_is_a_problem(client: Client) -> None:
+def test_a_missing_resource_is_a_problem(client: Client) -> None:
     for path in ("/api/v1/nothing", "/assets/nothing.js", "/assets/../app.py", "/swagger/%2e%2e/core.py", "/health"):
         answer = client.get(path)
         assert answer.status_code == 404, path
@@ -119,7 +117,7 @@ def test_what_is_not_there_is_a_problem(client: Client) -> None:
     assert answer.json()["title"] == "Method Not Allowed"
 
 
-def test_a_question_is_told_in_words_how_to_mend_it(client: Client) -> None:
+def test_a_problem_says_how_to_mend_the_query(client: Client) -> None:
     assert "send a next_cursor or last_cursor" in client.get("/api/v1/estimates?cursor=nonsense").json()["detail"]
     assert "query.sinc: unknown here" in client.get("/api/v1/estimates?sinc=x").json()["detail"]
     form = client.request("PUT", "/api/v1/learning", content=b"use=newest")
@@ -152,7 +150,7 @@ def test_head_is_answered_as_get_without_the_body(gateway: Gateway, client: Clie
     assert (head.status_code, head.headers) == (asked.status_code, asked.headers)
 
 
-def test_head_is_of_the_status_that_get_would_have(gateway: Gateway, client: Client) -> None:
+def test_head_has_the_status_of_get(gateway: Gateway, client: Client) -> None:
     gateway.publish(make_estimate(0))
     etag = client.get("/api/v1/estimates/latest").headers["etag"]
     known = client.request("HEAD", "/api/v1/estimates/latest", headers={"if-none-match": etag})
@@ -178,7 +176,7 @@ def test_a_store_that_cannot_be_read_is_503(gateway: Gateway, client: Client, tm
     assert "cannot be read" in answer.json()["detail"]
 
 
-def test_status_is_told_in_words_and_numbers(gateway: Gateway, client: Client) -> None:
+def test_status_has_sentences_and_numbers(gateway: Gateway, client: Client) -> None:
     now = Status(
         version="1.2.3",
         state=State.READER_FAULT,
@@ -243,7 +241,7 @@ def test_metrics_can_be_parsed_and_follow_the_status(gateway: Gateway, client: C
     assert samples["springscale_state", "stale"] == 0
 
 
-def test_no_metric_is_invented_for_what_is_unknown(client: Client) -> None:
+def test_unknown_quantities_have_no_metric(client: Client) -> None:
     text = client.get("/metrics").text
     for name in ("payload_kilograms", "estimate_age_seconds", "bus_last_frame_age_seconds"):
         assert f"springscale_{name}" not in text
@@ -292,7 +290,7 @@ def test_the_described_latest_fits_what_is_sent(gateway: Gateway, client: Client
     assert json.loads(client.get("/api/v1/estimates").content)["items"][0]["spectra"]["freq_hz"]
 
 
-def test_a_method_that_is_not_possible_is_told_without_making_the_description(tmp_path: Path) -> None:
+def test_a_405_does_not_build_the_openapi_document(tmp_path: Path) -> None:
     """The first 405 built the OpenAPI document in the event loop: nobody was answered for 0.9 s."""
     with Gateway(tmp_path) as gateway:
         answer = Client(gateway.app).request("DELETE", "/api/v1/statements")

@@ -104,7 +104,7 @@ NO_MODEL = {
 
 
 @pytest.mark.parametrize("case", NO_MODEL)
-def test_there_is_no_model_where_none_was_fitted(client: Client, board: Board, weighed: Estimate, case: str) -> None:
+def test_a_batch_without_a_fit_has_no_model(client: Client, board: Board, weighed: Estimate, case: str) -> None:
     board.publish(replace(weighed, **NO_MODEL[case]))
     answer = told(client)
     assert answer["model"] is None
@@ -121,7 +121,7 @@ def test_a_sensor_that_stands_still_has_no_model(
     assert set(answer["spectra"]["coherence"]) == {None}
 
 
-def test_fits_told_without_delays_take_that_of_the_mean_speed(client: Client, board: Board, weighed: Estimate) -> None:
+def test_fits_without_delays_use_the_delay_at_mean_speed(client: Client, board: Board, weighed: Estimate) -> None:
     """As batches tell that were weighed before delays were told."""
     board.publish(replace(weighed, diagnostics={"delay_s": 2.8 / SPEED_MPS}))
     with_delay = told(client)["model"]

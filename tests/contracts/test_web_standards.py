@@ -56,7 +56,7 @@ def to_the_left(n: int) -> Estimate:
     )
 
 
-def test_weights_are_told_with_deviation_limit_and_warning(gateway: Gateway) -> None:
+def test_weights_have_deviation_limit_and_warning(gateway: Gateway) -> None:
     gateway.publish(loaded(0))
     told = client(gateway).get("/api/v1/weights/latest").json()
     known = {"is_over_limit": False, "lacks": None, "is_unsprung_estimated": False}
@@ -81,7 +81,7 @@ def test_wheels_are_weighed_where_the_load_is_known_to_lie_sideways(gateway: Gat
     assert (told["load"]["left_m"], told["load"]["left_std_m"]) == (0.67, 0.065)
 
 
-def test_metrics_tell_each_wheel_that_is_known(gateway: Gateway) -> None:
+def test_each_known_wheel_has_a_metric(gateway: Gateway) -> None:
     ask = client(gateway)
     gateway.publish(loaded(0))
     before = ask.get("/metrics").text
@@ -112,7 +112,7 @@ def test_every_record_brings_its_weights_to_the_history(gateway: Gateway) -> Non
     assert (answer["cg_left_m"], answer["left_share_pct"]) == (0.05, 53.3333333)
 
 
-def test_an_overload_is_warned_of_until_it_is_clearly_over(gateway: Gateway) -> None:
+def test_the_overload_warning_stays_until_the_overload_is_clearly_gone(gateway: Gateway) -> None:
     ask = client(gateway)
     warned = []
     for n, payload_kg in enumerate([100.0, 106.0, 104.0, 59.0, 50.0, 104.0]):

@@ -66,7 +66,7 @@ def test_a_statement_comes_before_its_drive_and_waits_for_it(local: Client, benc
     assert one["load"]["payload_kg"] == 310.0
 
 
-def test_without_a_vehicle_a_statement_waits_and_says_what_for(local: Client) -> None:
+def test_a_statement_without_a_vehicle_waits_and_names_what_is_missing(local: Client) -> None:
     assert "vehicle is not stated" in post(local)["reason"]
     assert local.get(LEARNING).json()["lacks"] == ["vehicle", "drives"]
 
@@ -127,7 +127,7 @@ def test_drives_that_look_empty_are_proposed_and_never_taken(local: Client, benc
     assert answer["items"][0]["load"]["payload_kg"] == 0.0
 
 
-def test_a_no_is_remembered_and_those_drives_are_not_asked_about_again(local: Client, bench: LearnerBench) -> None:
+def test_a_denied_proposal_is_not_made_again(local: Client, bench: LearnerBench) -> None:
     """Another fit, a restart or another cut of the drive does not ask again; another drive is asked about."""
     local.request("PUT", VEHICLE, json=ANSWERS)
     bench.drive(0)
@@ -150,7 +150,7 @@ def test_a_no_is_remembered_and_those_drives_are_not_asked_about_again(local: Cl
     assert [one["from"] for one in question["propose"]] == [second]
 
 
-def test_a_table_says_what_became_of_each_row(local: Client, bench: LearnerBench) -> None:
+def test_the_import_reports_the_state_of_each_row(local: Client, bench: LearnerBench) -> None:
     local.request("PUT", VEHICLE, json=ANSWERS)
     bench.drive(0)
     bench.drive(3600)
@@ -199,14 +199,14 @@ def test_times_of_a_table_are_in_the_zone_that_is_named(local: Client) -> None:
         ({**NOTE, "kilograms": 3}, "kilograms"),
     ],
 )
-def test_a_statement_that_says_nothing_is_refused_in_words(local: Client, body: dict[str, Any], what: str) -> None:
+def test_an_empty_statement_is_refused_with_a_sentence(local: Client, body: dict[str, Any], what: str) -> None:
     answer = local.request("POST", STATEMENTS, json=body)
     assert answer.status_code == 422
     assert what in answer.json()["detail"]
     assert listed(local) == []
 
 
-def test_what_is_no_table_is_refused(local: Client) -> None:
+def test_text_that_is_no_table_is_refused(local: Client) -> None:
     answer = local.request("POST", STATEMENTS, content=b"hello", headers=CSV)
     assert (answer.status_code, answer.json()["reason"]) == (422, "unreadable")
     assert local.request("POST", STATEMENTS, content=b"x", headers={"content-type": "image/png"}).status_code == 415
@@ -325,7 +325,7 @@ def test_a_version_that_predicts_worse_is_kept_and_not_used(local: Client, bench
     assert "predicts the loads" in state["versions"][0]["text"]
 
 
-def test_where_learning_is_not_allowed_statements_are_taken_and_nothing_is_learnt(tmp_path: Path) -> None:
+def test_statements_are_kept_while_learning_is_off(tmp_path: Path) -> None:
     from dataclasses import replace
 
     from support.learner import VEHICLE as VAN

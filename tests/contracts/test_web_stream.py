@@ -115,7 +115,7 @@ def test_a_cursor_that_is_none_is_a_problem_before_the_stream_begins(tmp_path: P
         assert answer.json()["errors"][0]["where"] == "header.last-event-id"
 
 
-def test_one_client_and_all_together_have_so_many_streams_and_get_them_back(
+def test_streams_are_limited_per_client_and_in_all_and_freed_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Clients that open streams and read nothing took every connection from the others."""

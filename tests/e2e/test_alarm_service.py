@@ -1,4 +1,4 @@
-"""From the bus to who must know: an alarm in journal, API and webhook of the real service."""
+"""An alarm of the real service, from the bus to journal, API and webhook."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,7 +31,7 @@ def service(tmp_path: Path, receiver: Receiver, url: str) -> Iterator[ReplayedSe
         yield running
 
 
-def test_an_alarm_from_the_bus_to_who_must_know(service: ReplayedService, receiver: Receiver, url: str) -> None:
+def test_an_overload_on_the_bus_reaches_the_webhook(service: ReplayedService, receiver: Receiver, url: str) -> None:
     def told() -> dict[str, Any]:
         return receiver.taken[-1][1] if receiver.taken else {}
 

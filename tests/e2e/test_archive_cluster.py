@@ -30,7 +30,7 @@ def bucket() -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def scheduler(bucket: str) -> Iterator[str]:
-    """Its workers are processes of their own, which know the object store by their environment."""
+    """A Dask scheduler with worker processes, which know the object store by their environment."""
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as workers:
         yield workers.scheduler_address
 
@@ -85,7 +85,7 @@ def test_the_command_works_on_a_cluster(tmp_path: Path, bucket: str, scheduler: 
     assert told["jobs"]["done"] == 2
 
 
-def test_a_scheduler_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unreachable_scheduler_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gateway.archive.workers.CONNECT_WITHIN_S", 1)
     with pytest.raises(PlaceError, match=r"tcp://127\.0\.0\.1:9: no Dask scheduler answers within 1 s: start one with"):
         workers_of("tcp://127.0.0.1:9")

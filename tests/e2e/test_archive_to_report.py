@@ -1,4 +1,4 @@
-"""From an archive of logs to the fleet's pages, as a person calls it; and the pages in a browser."""
+"""An archive of logs becomes the fleet's pages by the commands, and a browser shows them."""
 
 import json
 from pathlib import Path

@@ -34,7 +34,7 @@ def test_a_fleet_is_shown_by_one_command() -> None:
     assert heavy["used_share"] > 1.0 > light["used_share"] > 0.0
 
 
-def test_a_fleet_wants_its_extra_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fleet_demo_names_the_missing_package(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in [name for name in sys.modules if name.startswith(("gateway.fleet", "gateway.cli.demo_fleet"))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "sqlalchemy", None)

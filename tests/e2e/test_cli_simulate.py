@@ -97,7 +97,7 @@ def test_the_speed_paces_the_replay(log: Path, monkeypatch: pytest.MonkeyPatch) 
         (["--speed", "nan"], 2, "neither a number above 0 nor max"),
     ],
 )
-def test_what_cannot_be_replayed_is_said_in_a_line(
+def test_a_log_that_cannot_be_replayed_is_reported_in_one_line(
     log: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], code: int, complaint: str
 ) -> None:
     assert exit_of("replay", str(log), "--interface", "virtual", "--channel", "cli-bad", *arguments) == code
@@ -142,7 +142,7 @@ def test_reproduce_drives_what_was_asked_for(
     assert json.loads(done.stdout)["report"] == str(tmp_path / "new" / "report.html")
 
 
-def test_progress_is_silent_where_nobody_watches(capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_progress_is_printed_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     with counted("working") as on_step:
         on_step(2, 2)
     with StatusLine() as status:

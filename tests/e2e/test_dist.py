@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(shutil.which("git") is None, reason="git is not 
 
 
 def made(folder: Path, umask: int, zone: str) -> Path:
-    """What a fresh clone makes of the last commit."""
+    """The files that a fresh clone builds from the last commit."""
     subprocess.run(["git", "clone", "--quiet", "--depth=1", ROOT.as_uri(), folder / "clone"], check=True, umask=umask)
     script = folder / "clone/deploy/dist/make_dist.py"
     environment = {**os.environ, "TZ": zone}

@@ -45,7 +45,7 @@ def config(tmp_path: Path) -> Path:
     return service_config(tmp_path, paper_van, **keys)
 
 
-def test_a_bus_that_sends_nothing_mapped_is_told_with_the_command_that_shows_what_it_sends(config: Path) -> None:
+def test_a_bus_without_mapped_frames_is_reported_with_the_look_command(config: Path) -> None:
     """The filters of the bus keep other identifiers out."""
     told: list[str] = []
 
@@ -73,7 +73,9 @@ def test_a_replayed_log_gives_byte_identical_batches_to_estimate(config: Path, s
     assert stored(config) == expected
 
 
-def test_the_last_window_of_a_drive_is_told_once_the_bus_sleeps(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_last_window_of_a_drive_is_published_once_the_bus_sleeps(
+    config: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """And not only when the next drive begins, tomorrow maybe."""
     monkeypatch.setenv("SPRINGSCALE_BATCH__SILENCE_S", "1.0")
     log = config.parent / "drive.log"
@@ -108,7 +110,7 @@ def test_the_process_tells_systemd_and_stops_with_exit_code_zero(config: Path, t
     assert process.returncode == 0, errors
 
 
-def test_a_taken_port_is_one_clear_line(config: Path) -> None:
+def test_a_taken_port_is_reported_in_one_line(config: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -164,7 +166,7 @@ def test_a_dead_pipeline_ends_the_service_with_its_reason(config: Path, monkeypa
         Gateway(settings, setup_of(settings), on_started=on_started).run()
 
 
-def test_a_service_whose_supervision_fails_stops_its_parts_and_says_why(
+def test_a_service_whose_supervision_fails_stops_its_parts_and_logs_why(
     config: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It left by a traceback, and what was accepted but not on disk yet was lost."""
@@ -215,7 +217,7 @@ PATHS = ("/health/live", "/health/ready", "/api/v1/estimates/latest")
 
 
 @pytest.mark.parametrize("content", [b"{", None], ids=["broken", "a link"])
-def test_a_broken_side_file_is_told_and_set_aside_while_the_weighing_begins(
+def test_a_broken_side_file_is_reported_and_set_aside_without_stopping_the_weighing(
     config: Path, content: bytes | None
 ) -> None:
     name = "learning.json"
@@ -244,7 +246,7 @@ def test_a_broken_side_file_is_told_and_set_aside_while_the_weighing_begins(
     assert (again, warnings) == (seen, ())
 
 
-def test_broken_tokens_are_told_and_let_nobody_in_while_the_weighing_begins(config: Path) -> None:
+def test_a_broken_token_file_is_reported_and_closes_access_without_stopping_the_weighing(config: Path) -> None:
     state = config.parent / "state"
     state.mkdir()
     (state / "tokens.json").write_bytes(b"{")
@@ -259,9 +261,7 @@ def test_broken_tokens_are_told_and_let_nobody_in_while_the_weighing_begins(conf
     assert (state / "tokens.json").read_bytes() == b"{"
 
 
-def test_it_runs_on_the_fast_loop_and_tells_its_status_where_no_file_can_be_opened(
-    config: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_status_is_answered_when_no_file_can_be_opened(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The benchmark's loop, which also outlives a flood that takes every file descriptor."""
     settings, seen = load_settings(config), []
 

@@ -23,7 +23,7 @@ def configuration(folder: Path, web_port: int, broker_port: int) -> Path:
     return service_config(folder, vehicle__id="van-17", web__port=web_port, **uplink)
 
 
-def test_the_service_forwards_its_history_and_tells_how_it_goes(tmp_path: Path) -> None:
+def test_the_service_forwards_its_history_and_reports_progress(tmp_path: Path) -> None:
     records = [make_record(n) for n in range(3)]
     store = Store.open(tmp_path / "state")
     for record in records:

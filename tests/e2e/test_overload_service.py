@@ -45,19 +45,19 @@ def config(tmp_path: Path) -> Path:
 
 
 def told(service: Running, path: str = "/api/v1/cab") -> Any:
-    """What the cab page shows on a phone."""
+    """The cab page as a phone shows it."""
     answer = first_answer(service.gateway.url + path)
     return answer.text if path == "/metrics" else answer.json()
 
 
 def after(service: Running, frames: Frames, log: Path) -> Any:
-    """The same once the service has worked through these frames."""
+    """The cab page once the service has worked through these frames."""
     write_candump(frames, "can0", log)
     service.play(log)
     return told(service)
 
 
-def test_an_overload_by_the_settings_is_told_everywhere(config: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_an_overload_by_the_settings_reaches_every_channel(config: Path, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, logger=LOGGER.name)
 
     def play(service: Running) -> None:
@@ -121,7 +121,7 @@ def test_a_stop_makes_the_load_unknown_until_it_is_weighed_again(config: Path) -
         (BatchLog, "log of batches failed"),
     ],
 )
-def test_what_listens_to_batches_fails_alone_and_weighing_goes_on(
+def test_a_failing_listener_does_not_stop_the_weighing(
     config: Path, monkeypatch: pytest.MonkeyPatch, broken: type, told_as: str
 ) -> None:
     def fail(listener: object, found: object) -> None:

@@ -53,7 +53,7 @@ def test_what_was_recorded_is_weighed_as_it_was_live(tmp_path: Path, log: Path) 
     assert estimated(config, kept) == estimated(config, log)
 
 
-def test_nothing_is_recorded_unless_wanted(tmp_path: Path, log: Path) -> None:
+def test_recording_is_off_by_default(tmp_path: Path, log: Path) -> None:
     def meet(service: Running) -> None:
         service.play(log)
         assert first_answer(f"{service.gateway.url}/api/v1/status").json()["record"] is None
@@ -80,7 +80,7 @@ def test_a_disk_that_takes_no_frames_costs_no_estimate(tmp_path: Path, log: Path
     assert len(counted(stored(config))) == 3
 
 
-def test_a_full_disk_is_told_of_and_gone_on_with(tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_and_recording_resumes(tmp_path: Path) -> None:
     run = subprocess.run(
         [sys.executable, "-c", FULL, str(tmp_path)],
         capture_output=True,

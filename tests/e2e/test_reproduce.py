@@ -35,7 +35,7 @@ def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return output
 
 
-def test_every_figure_stands_in_the_page_and_beside_it(reproduced: Path) -> None:
+def test_every_figure_is_in_the_page_and_a_file(reproduced: Path) -> None:
     page = (reproduced / "report.html").read_text(encoding="utf-8")
     assert page.count("<svg") == len(PLATES)
     for plate in PLATES:
@@ -44,7 +44,7 @@ def test_every_figure_stands_in_the_page_and_beside_it(reproduced: Path) -> None
         assert (reproduced / "figures" / f"{plate.name}.svg").read_text(encoding="utf-8").startswith("<?xml")
 
 
-def test_a_quick_try_signs_itself_as_one(reproduced: Path) -> None:
+def test_a_quick_trial_is_marked_as_one(reproduced: Path) -> None:
     for name in ("report.html", "accuracy.md"):
         assert "A quick try with a part of the driving" in (reproduced / name).read_text(encoding="utf-8")
     assert "--quick" in (reproduced / "accuracy.md").read_text(encoding="utf-8")
@@ -59,7 +59,7 @@ def test_the_page_needs_nothing_from_elsewhere(reproduced: Path) -> None:
     assert not re.search(r"<script|<link|src=\"http|url\(http", page)
 
 
-def test_the_papers_numbers_stand_beside_ours(reproduced: Path) -> None:
+def test_the_page_compares_the_papers_numbers_with_ours(reproduced: Path) -> None:
     accuracy = (reproduced / "accuracy.md").read_text(encoding="utf-8")
     for payload_pct, share_pct in PAPER_PCT.values():
         assert re.search(rf"the paper .*{payload_pct:.2f}.*{share_pct:.2f}", accuracy)
@@ -67,7 +67,7 @@ def test_the_papers_numbers_stand_beside_ours(reproduced: Path) -> None:
     assert len({line.count("|") for line in rows}) == 1
 
 
-def test_the_accuracy_page_says_what_the_results_say(reproduced: Path) -> None:
+def test_the_accuracy_page_agrees_with_the_results(reproduced: Path) -> None:
     results = json.loads((reproduced / "results.json").read_text(encoding="utf-8"))
     assert (reproduced / "accuracy.md").read_text(encoding="utf-8") == accuracy_page(results)
 
@@ -94,7 +94,7 @@ def test_the_ratio_index_works_where_it_was_calibrated_and_not_at_other_speeds(r
     assert abs(errors_kg["130kmh"]) > 3.0 * at_50_kmh_kg
 
 
-def test_the_numbers_can_be_made_again_from_what_lies_there(reproduced: Path) -> None:
+def test_the_numbers_follow_from_the_stored_results(reproduced: Path) -> None:
     for kind in CAMPAIGNS:
         assert (reproduced / "campaigns" / kind / "campaign.toml").is_file()
     calibration = load_calibration(reproduced / "vehicle_simulated.json")

@@ -1,4 +1,4 @@
-"""What the journal of a running service shows: read from the standard error of a process of its own."""
+"""The log lines of a running service, read from the standard error of its own process."""
 
 from collections.abc import Iterator
 from itertools import pairwise

@@ -30,7 +30,7 @@ OWN |= {"altitude", "accuracy", "hdop", "batt", "driverUniqueId", "charge"}
 
 @dataclass
 class Position:
-    """As Traccar keeps one."""
+    """A position as Traccar keeps it."""
 
     time_s: int
     attributes: dict[str, Any]

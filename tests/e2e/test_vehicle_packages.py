@@ -46,7 +46,7 @@ def absent() -> list[str]:
 
 @pytest.fixture(scope="module")
 def environment() -> dict[str, str]:
-    """Of a process that finds nothing but a vehicle's packages."""
+    """The environment of a process that finds a vehicle's packages alone."""
     missing = absent()
     assert {"numba", "plotly", "matplotlib", "pandas", "pytest"} <= set(missing)
     return {**os.environ, "ABSENT": json.dumps(missing)}
@@ -71,7 +71,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def calibrated(campaign: Path, vehicle: Command) -> Path:
-    """What `calibrate` makes of them in a vehicle."""
+    """The calibration file that `calibrate` makes with these packages."""
     output = campaign.parent / "vehicle.json"
     made = vehicle("calibrate", campaign, *WINDOW, "--output", output)
     assert made.returncode == 0, made.stderr
@@ -80,7 +80,7 @@ def calibrated(campaign: Path, vehicle: Command) -> Path:
 
 @pytest.fixture
 def port() -> int:
-    """Of the service's web."""
+    """The port of the service's web server."""
     return free_port()
 
 

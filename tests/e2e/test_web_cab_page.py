@@ -40,7 +40,7 @@ def gateway(tmp_path: Path) -> Iterator[Gateway]:
 
 @pytest.fixture
 def phone(browser: Any) -> Iterator[Watched]:
-    """By night."""
+    """A phone with the dark theme of the night."""
     made = Watched(browser, color_scheme="dark", **PHONE)
     made.page.add_init_script(HURRIED)
     yield made
@@ -71,7 +71,7 @@ def test_nothing_is_green_on_any_page_while_the_vehicle_learns(gateway: Gateway,
         page.close()  # with its stream
 
 
-def test_at_a_glance_it_says_what_can_be_loaded_and_the_rest_on_a_tap(gateway: Gateway, phone: Watched) -> None:
+def test_the_first_view_shows_the_room_and_a_tap_shows_the_rest(gateway: Gateway, phone: Watched) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     load_event(gateway, 300, 240.0)
     page = phone.page
@@ -103,7 +103,7 @@ def test_at_a_glance_it_says_what_can_be_loaded_and_the_rest_on_a_tap(gateway: G
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize(("payload_kg", "light"), [(300.0, "go"), (592.0, "near"), (620.0, "over")])
-def test_by_day_and_by_night_every_word_can_be_read(
+def test_text_has_enough_contrast_in_both_themes(
     gateway: Gateway, browser: Any, scheme: str, payload_kg: float, light: str
 ) -> None:
     gateway.publish(loaded(0, payload_kg, 50.0))
@@ -123,7 +123,7 @@ def test_by_day_and_by_night_every_word_can_be_read(
         watched.page.close()
 
 
-def test_too_heavy_says_what_must_come_out_by_the_same_logic(gateway: Gateway, cab: Look) -> None:
+def test_an_overload_shows_what_must_come_out(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 620.0, 50.0))
     page = cab()
     expect(page.locator("#light")).to_have_text("Too heavy")
@@ -137,7 +137,7 @@ def test_too_heavy_says_what_must_come_out_by_the_same_logic(gateway: Gateway, c
     expect(page.locator("#alarms")).to_have_text("Alarm: a sensor gives no valid sample.")  # the light says the other
 
 
-def test_alarms_that_stand_are_said_in_words(gateway: Gateway, cab: Look) -> None:
+def test_active_alarms_have_sentences(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     page = cab()
     expect(page.locator("#number")).to_have_text("210 kg")
@@ -188,7 +188,7 @@ def test_standing_the_driver_may_say_what_is_aboard(gateway: Gateway, cab: Look)
     expect(page.locator("#tell")).to_be_hidden()
 
 
-def test_standing_it_says_that_it_cannot_see_what_is_loaded_now(gateway: Gateway, cab: Look) -> None:
+def test_a_standing_vehicle_warns_that_new_loads_are_not_seen(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     readings = (
         OwnReading(signal="air_spring_pressure", number=412.35, unit="kPa", age_s=0.4),
@@ -225,7 +225,7 @@ def test_a_number_of_before_the_machine_was_started_is_old(gateway: Gateway, pho
     assert phone.complaints == []
 
 
-def test_an_old_number_is_crossed_through_and_said_loudly(gateway: Gateway, cab: Look) -> None:
+def test_an_old_number_is_crossed_through_and_announced(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     gateway.clock_s += 3.0 * 3600.0
     page = cab()
@@ -236,7 +236,7 @@ def test_an_old_number_is_crossed_through_and_said_loudly(gateway: Gateway, cab:
     assert crossed == "line-through"
 
 
-def test_a_gateway_that_is_gone_is_said_loudly_and_comes_back(gateway: Gateway, phone: Watched, cab: Look) -> None:
+def test_a_lost_gateway_is_announced_until_it_is_back(gateway: Gateway, phone: Watched, cab: Look) -> None:
     """The page's clocks run ahead, so that nobody has to wait."""
     gateway.publish(loaded(0, 300.0, 48.0))
     phone.page.clock.install()
@@ -257,7 +257,7 @@ def test_a_gateway_that_is_gone_is_said_loudly_and_comes_back(gateway: Gateway, 
     expect(page.locator("#main")).to_have_attribute("data-is", "current")
 
 
-def test_a_sensor_that_is_silent_is_said(gateway: Gateway, cab: Look) -> None:
+def test_a_silent_sensor_is_shown(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 0.0, 50.0).refused(Why.ACCELERATION_MISSING))
     gateway.status = BEFORE.model_copy(update={"state": State.SENSOR_FAULT})
     page = cab()
@@ -306,7 +306,7 @@ def test_before_the_first_estimate_and_without_limits_it_claims_nothing(tmp_path
         (REFUSED, "it refused to keep it on"),
     ],
 )
-def test_it_keeps_the_screen_on_or_says_that_it_cannot(phone: Watched, cab: Look, script: str, said: str) -> None:
+def test_the_page_keeps_the_screen_on_or_warns(phone: Watched, cab: Look, script: str, said: str) -> None:
     phone.page.add_init_script(script)
     page = cab()
     expect(page.locator("#awake")).to_contain_text(said)
@@ -318,7 +318,7 @@ def test_it_keeps_the_screen_on_or_says_that_it_cannot(phone: Watched, cab: Look
         expect(page.locator("#awake")).to_have_text("The screen stays on.")
 
 
-def test_where_tokens_are_asked_for_it_asks_and_shows_nothing_before(tmp_path: Path, phone: Watched) -> None:
+def test_the_page_shows_nothing_before_a_required_token_is_given(tmp_path: Path, phone: Watched) -> None:
     tokens = TokenFile(tmp_path / "tokens.json")
     token = tokens.create("driver", Scope.READ)
     page = phone.page
@@ -375,7 +375,7 @@ def test_in_german_on_a_phone_and_on_a_tablet(gateway: Gateway, browser: Any, wi
         page.close()
 
 
-def test_a_wheel_that_bears_too_much_asks_for_another_place_not_for_less(tmp_path: Path, phone: Watched) -> None:
+def test_an_overloaded_wheel_asks_to_move_the_load(tmp_path: Path, phone: Watched) -> None:
     """More goes in nowhere, but taking something out is not what is asked for."""
     answer = {"light": "over", "says": "uneven", "light_about": ["rear_left"], "over_limit_probability": 0.97}
     with cab_gateway(tmp_path) as gateway, serving(gateway.app) as server:

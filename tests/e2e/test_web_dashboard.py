@@ -21,7 +21,7 @@ from gateway.web.access.tokens import Scope, TokenFile
 
 @pytest.fixture(scope="module")
 def drawn(site: str, browser: Any) -> Iterator[Watched]:
-    """Its page with every chart drawn and every table opened: to look at, and to be left as it was."""
+    """The dashboard with every chart drawn and every table opened; tests must leave it as it was."""
     made = Watched(browser, color_scheme="light")
     made.page.goto(site)
     made.wait_for_charts()
@@ -82,7 +82,7 @@ def test_it_says_in_words_why_a_batch_was_not_weighed(site: str, watched: Watche
     expect(item).to_contain_text("Gap: frames of both sensors are missing")
 
 
-def test_it_shows_how_bus_sensors_and_calibration_are(site: str, watched: Watched) -> None:
+def test_the_page_shows_the_state_of_bus_sensors_and_calibration(site: str, watched: Watched) -> None:
     page = watched.page
     page.goto(f"{site}/engineer")
     rows = page.locator("#signals tr")
@@ -146,7 +146,7 @@ def test_the_spectra_stand_beside_the_model_on_the_page_for_engineers(site: str,
     page.close()
 
 
-def test_all_comes_from_the_gateway_and_the_numbers_come_first(site: str, drawn: Watched) -> None:
+def test_the_page_loads_from_the_gateway_alone_and_numbers_first(site: str, drawn: Watched) -> None:
     assert [address for address in drawn.addresses if not address.startswith(f"{site}/")] == []
     (library,) = [n for n, address in enumerate(drawn.addresses) if "plotly" in address]
     assert library > drawn.addresses.index(f"{site}/api/v1/estimates/latest")
@@ -228,7 +228,7 @@ def test_it_looks_further_back_when_asked(site: str, watched: Watched) -> None:
         page.get_by_label("7 days").check()
 
 
-def test_it_follows_what_happens(gateway: Gateway, dashboard: Look) -> None:
+def test_the_page_follows_the_stream(gateway: Gateway, dashboard: Look) -> None:
     page = dashboard()
     expect(page.locator("#payload")).to_have_text("unknown")
     expect(page.locator("#note")).to_have_text("Ready: weighs after the next five minutes of driving.")
@@ -250,7 +250,7 @@ def test_it_follows_what_happens(gateway: Gateway, dashboard: Look) -> None:
     expect(page.locator("#rejected")).to_contain_text("Gap: frames")
 
 
-def test_an_old_estimate_is_said_to_be_old(gateway: Gateway, dashboard: Look) -> None:
+def test_an_old_estimate_is_marked(gateway: Gateway, dashboard: Look) -> None:
     gateway.publish(make_estimate(0))
     gateway.clock_s += 7200.0
     page = dashboard()
@@ -292,7 +292,7 @@ def test_every_state_has_a_name_and_a_sentence(gateway: Gateway, watched: Watche
         gateway.board.close()
 
 
-def test_between_drives_a_silent_bus_alarms_nobody(gateway: Gateway, dashboard: Look) -> None:
+def test_a_silent_bus_between_drives_raises_no_alarm(gateway: Gateway, dashboard: Look) -> None:
     gateway.publish(make_estimate(0))
     gateway.status = STATUS.model_copy(update={"state": State.WAITING_FOR_BUS})
     page = dashboard()
@@ -346,7 +346,7 @@ def test_it_asks_for_a_token_where_one_is_needed(tmp_path: Path, watched: Watche
 
 
 @pytest.mark.parametrize("scheme", ["dark", "light"])
-def test_every_text_can_be_read_in_light_and_dark(drawn: Watched, scheme: str) -> None:
+def test_every_text_has_contrast_in_light_and_dark(drawn: Watched, scheme: str) -> None:
     drawn.page.emulate_media(color_scheme=scheme)
     drawn.wait_until(CHARTS_FOLLOW)
     seen = drawn.page.evaluate(CONTRASTS)
@@ -422,7 +422,7 @@ FOCUSED = """(() => { const e = document.activeElement;
 })()"""
 
 
-def test_the_first_key_leads_past_the_head(site: str, watched: Watched) -> None:
+def test_the_first_tab_skips_the_head(site: str, watched: Watched) -> None:
     watched.page.goto(site)
     watched.page.keyboard.press("Tab")
     watched.page.keyboard.press("Enter")

@@ -38,9 +38,7 @@ POSTERIOR = Posterior(
 )
 
 
-def test_why_an_estimate_is_uncertain_is_said_largest_source_first(
-    gateway: Gateway, watched: Watched, dashboard: Look
-) -> None:
+def test_error_sources_are_listed_largest_first(gateway: Gateway, watched: Watched, dashboard: Look) -> None:
     budget = budget_of(POSTERIOR, is_shape_said=False)
     of_grams = replace(budget[-1], payload_kg=0.2)
     gateway.publish(replace(make_estimate(0).answered(POSTERIOR), error_budget=(*budget, of_grams)))
@@ -61,6 +59,6 @@ def test_why_an_estimate_is_uncertain_is_said_largest_source_first(
 
 
 def helps(line: BudgetLine, std_kg: float) -> bool:
-    """What a remedy leaves is another number than what stands now, as the page rounds both."""
+    """Whether a remedy leaves another number than the present one, as the page rounds both."""
     then_kg = line.payload_with_remedy_kg
     return line.remedy is not None and round(1.96 * then_kg) != round(1.96 * std_kg)

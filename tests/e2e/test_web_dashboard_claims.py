@@ -1,4 +1,4 @@
-"""What the dashboard may not claim: an old number as new, "no batch" that nobody counted, a load of another batch."""
+"""The dashboard must not show an old number as new, "no batch" that nobody counted, or another batch's load."""
 
 import re
 from collections.abc import Iterator
@@ -75,7 +75,7 @@ def test_without_scripts_it_shows_where_the_numbers_are_and_claims_nothing(site:
     page.close()
 
 
-def test_where_all_was_refused_the_reason_stands_beside_the_missing_number(gateway: Gateway, dashboard: Look) -> None:
+def test_the_reason_is_shown_in_place_of_a_refused_number(gateway: Gateway, dashboard: Look) -> None:
     gateway.status = STATUS.model_copy(update={"state": State.COLLECTING})
     gateway.publish(make_estimate(0, Why.TOO_SLOW))
     page = dashboard()

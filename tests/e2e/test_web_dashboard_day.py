@@ -40,7 +40,7 @@ def told(tmp_path: Path) -> Iterator[Told]:
         yield Told(gateway)
 
 
-def test_a_day_is_drawn_and_told_in_words(told: Told, watched: Watched) -> None:
+def test_a_day_is_drawn_and_described(told: Told, watched: Watched) -> None:
     told.of(*DAY[:-1])
     page = watched.page
     with serving(told.gateway.app) as server:
@@ -59,7 +59,7 @@ def test_a_day_is_drawn_and_told_in_words(told: Told, watched: Watched) -> None:
         page.close()
 
 
-def test_before_the_first_trip_it_says_so(told: Told, watched: Watched) -> None:
+def test_a_day_without_trips_is_shown_as_such(told: Told, watched: Watched) -> None:
     with serving(told.gateway.app) as server:
         watched.page.goto(server.url)
         expect(watched.page.locator("#day-words")).to_have_text("No trip yet.")
@@ -67,7 +67,7 @@ def test_before_the_first_trip_it_says_so(told: Told, watched: Watched) -> None:
         watched.page.close()
 
 
-def test_a_busy_day_shows_ten_newest_first_and_no_label_over_another(told: Told, browser: Any) -> None:
+def test_a_busy_day_shows_the_ten_newest_without_overlapping_labels(told: Told, browser: Any) -> None:
     loads = [500.0 if n % 2 else 0.0 for n in range(12)]
     told.of(*day(*loads))
     for width in (390, 1240):

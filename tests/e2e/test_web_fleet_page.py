@@ -35,7 +35,7 @@ def url(book: Book) -> Iterator[str]:
         yield f"http://127.0.0.1:{port}"
 
 
-def test_those_with_alarms_come_first_and_a_word_finds_one_by_keyboard(url: str, book: Book, browser: Any) -> None:
+def test_vehicles_with_alarms_come_first_and_the_search_works_by_keyboard(url: str, book: Book, browser: Any) -> None:
     watched = Watched(browser)
     page = watched.page
     page.add_init_script(HURRIED)
@@ -88,7 +88,7 @@ def test_in_german_on_a_phone_and_on_a_desk(url: str, browser: Any, width: int, 
     page.close()
 
 
-def test_a_service_that_is_gone_is_said(browser: Any, book: Book) -> None:
+def test_a_lost_service_is_shown(browser: Any, book: Book) -> None:
     watched = Watched(browser)
     watched.page.add_init_script(HURRIED)
     with served(fleet_app(book), "127.0.0.1", 0) as port:

@@ -108,7 +108,7 @@ HARMLESS: Final[dict[str, tuple[str, Callable[[str], str]]]] = {
 
 
 @pytest.mark.parametrize("what", HARMLESS)
-def test_what_is_only_large_is_read(what: str, tmp_path: Path) -> None:
+def test_large_but_sound_databases_are_read(what: str, tmp_path: Path) -> None:
     kind, spoil = HARMLESS[what]
     path = tmp_path / f"a.{kind}"
     path.write_text(spoil(WHOLE[kind]))

@@ -46,7 +46,7 @@ def test_a_reserve_that_a_kill_left_half_made_is_made_whole(tmp_path: Path, monk
     assert file.stat().st_blocks * 512 >= RESERVE_BYTES
 
 
-def test_what_can_be_done_without_leaves_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dispensable_files_are_deleted_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reserve, "free_bytes", lambda directory: 20 << 20)
     require_room(tmp_path / "not made yet", 1 << 20)
     with pytest.raises(OSError, match="16 MB would be left"):
@@ -61,7 +61,7 @@ def test_what_can_be_done_without_leaves_room(tmp_path: Path, monkeypatch: pytes
         (make_estimate(1, is_provisional=True), False, None),
     ],
 )
-def test_the_latest_estimate_says_whether_it_is_stored(estimate: Any, is_on_disk: bool, told: bool | None) -> None:
+def test_the_latest_estimate_shows_whether_it_is_stored(estimate: Any, is_on_disk: bool, told: bool | None) -> None:
     board = Board(is_stored=lambda estimate_id: is_on_disk)
     assert json.loads(board.latest()[1])["is_stored"] is None
     board.publish(estimate)

@@ -267,7 +267,7 @@ class NoisyBus(ScriptedBus):
 
 
 @pytest.mark.parametrize("failure", [ValueError("x"), IndexError("x"), AttributeError("x"), TypeError("x")], ids=repr)
-def test_whatever_the_reader_of_an_adapter_raises_is_a_fault_and_the_bus_is_opened_again(failure: Exception) -> None:
+def test_any_exception_of_an_adapter_is_a_fault_and_the_bus_is_reopened(failure: Exception) -> None:
     """Any but two kinds of exception ended the service."""
     bus: Any = NoisyBus(failure)
     with listening(PythonCanReceiver(bus, 8), silence_s=30.0) as source:

@@ -196,7 +196,7 @@ def test_a_reader_of_the_journal_starts_where_it_stopped(
 
 
 def heard_by(notifications: socket.socket) -> Callable[[], list[str]]:
-    """What systemd was told since the last call."""
+    """The messages that systemd received since the last call."""
 
     def heard() -> list[str]:
         lines: list[str] = []

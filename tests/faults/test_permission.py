@@ -1,4 +1,4 @@
-"""Nothing leaves by any channel without the permission of this very moment."""
+"""No channel sends anything without a permission that holds at this moment."""
 
 import threading
 from collections.abc import Callable

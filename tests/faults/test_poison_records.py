@@ -1,4 +1,4 @@
-"""What cannot be read is set aside by itself: kept as it came, counted, and in nobody's way."""
+"""A record that cannot be read is set aside, kept and counted, and delays no other."""
 
 import json
 import sqlite3

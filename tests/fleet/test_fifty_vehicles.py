@@ -74,7 +74,7 @@ def strike(view: FleetView, blow: str) -> None:
 
 
 def wait_for_all(view: FleetView) -> None:
-    """As long as rows come; patience is for each new one."""
+    """Waits as long as rows come; the time limit begins anew with each."""
     n_rows, moved_s = -1, time.monotonic()
     while not view.has_all():
         n_now = view.count("estimate") + view.count("entry")

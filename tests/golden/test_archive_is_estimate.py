@@ -30,7 +30,7 @@ def reprocessed(folder: Path) -> list[dict[str, Any]]:
 
 
 def printed(calibration: Path, window_s: float, *logs: Path, options: Sequence[str] = ()) -> list[dict[str, Any]]:
-    """What `springscale estimate --json` prints, as rows."""
+    """The output of `springscale estimate --json`, as rows."""
     command = ["estimate", *map(str, logs), "--signals", "springscale:reference", "--calibration", str(calibration)]
     result = called(*command, "--window-s", window_s, "--json", *options)
     records = [json.loads(line) for line in result.stdout.splitlines()]
@@ -59,7 +59,7 @@ def test_logs_with_a_pause_between_them_are_drives_of_their_own(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("cut_s", [-7, 0, 5], ids=["in the month before", "at midnight", "in the month after"])
-def test_a_drive_goes_on_over_the_border_of_logs_and_months(tmp_path: Path, cut_s: int) -> None:
+def test_a_drive_may_span_logs_and_months(tmp_path: Path, cut_s: int) -> None:
     """Window, load epoch and drive are those of the whole recording, whichever job the log of a batch's end is in."""
     start_ns = MIDNIGHT_NS - 50 * S
     frames = write_cut_drive(tmp_path / "van", start_ns, 130.0, MIDNIGHT_NS + cut_s * S)

@@ -124,7 +124,7 @@ def text_of(page: str) -> str:
 
 
 def commands_of(page: str) -> list[str]:
-    """In indented lines, and between backticks."""
+    """The commands in a page's indented lines and between its backticks."""
     prose = re.sub(r"```.*?```", "", text_of(page), flags=re.DOTALL)
     told = re.findall(rf"^ {{4,}}({PROGRAMS} .*)$", prose, re.MULTILINE)
     told += re.findall(rf"`({PROGRAMS} [^`\n]*)`", prose)
@@ -136,7 +136,7 @@ OF_OTHERS = [each for each in COMMANDS if not each[1].startswith("springscale ")
 
 
 def of_beginning(command: str, table: dict[str, str]) -> str | None:
-    """What the table says of the first beginning that fits the command."""
+    """The table's answer for the first beginning that fits the command."""
     return next((said for beginning, said in table.items() if command.startswith(beginning)), None)
 
 
@@ -158,7 +158,7 @@ OUR_OWN = [
 
 
 @pytest.mark.parametrize(("page", "command"), OUR_OWN)
-def test_our_own_commands_have_the_options_that_are_told(page: str, command: str) -> None:
+def test_documented_options_of_our_commands_exist(page: str, command: str) -> None:
     words = command.removeprefix("python -m benchmarks.accuracy").removeprefix("springscale").split()
     found: click.Command = springscale if command.startswith("springscale") else studies
     while isinstance(found, click.Group) and words:
@@ -177,7 +177,7 @@ def test_a_test_runs_each_of_our_own_commands(command: str) -> None:
     assert all(word in text for word in command.split()[1:2])
 
 
-def test_every_line_of_the_tables_names_a_command_that_a_page_tells() -> None:
+def test_every_row_of_the_tables_names_a_documented_command() -> None:
     told = [command for _, command in COMMANDS]
     lines = (*RUN_BY, *OWN_RUN_BY, *SAID, *NOT_RUN)
     assert [beginning for beginning in lines if not any(one.startswith(beginning) for one in told)] == []

@@ -33,7 +33,7 @@ def findings(campaign: str) -> dict[int, list[str]]:
     return {one.number: [f"{finding.severity}:{finding.kind}" for finding in one.findings] for one in found.verdicts}
 
 
-def test_what_the_validation_part_holds_changes_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_validation_part_changes_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
     def spoiled_at_the_end(path: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]:
         motion, report = read_whole_log(path, signal_map)
         columns = motion.columns.copy()
@@ -106,7 +106,7 @@ def test_a_roll_rate_at_the_wrong_place_is_named(
     assert faults_with(spoiled, source, campaign, log, tmp_path) == expected
 
 
-def test_the_sign_of_the_roll_rate_is_told_by_the_sensors_place() -> None:
+def test_the_sensors_place_shows_the_sign_of_the_roll_rate() -> None:
     campaign = load_campaign(recordings() / "known_loads/campaign_roll.toml")
     split = offline_campaigns.split_runs(campaign, SETTINGS, numbers=[1, 10])
     runs = [one.identification for one in split]

@@ -34,13 +34,13 @@ def test_every_setting_is_described() -> None:
 
 
 @pytest.mark.parametrize("room", sorted(path.parent for path in (ROOT / "gateway").rglob("__init__.py")), ids=str)
-def test_a_room_says_what_it_is_for(room: Path) -> None:
+def test_every_package_has_a_docstring(room: Path) -> None:
     said = ast.get_docstring(ast.parse((room / "__init__.py").read_text(encoding="utf-8")))
     assert said
     assert "TODO" not in said
 
 
-def test_everybody_of_the_comparison_stands_in_performance() -> None:
+def test_every_compared_program_is_on_the_performance_page() -> None:
     found = json.loads(text_of("performance.json"))
     parts = {"decode", "formats", "day", "live", "service", "web", "weigh", "archive", "start", "simulator"}
     assert parts <= set(found)
@@ -48,7 +48,7 @@ def test_everybody_of_the_comparison_stands_in_performance() -> None:
 
 
 @of_each_page
-def test_every_relative_link_leads_somewhere(page: Path) -> None:
+def test_every_relative_link_has_a_target(page: Path) -> None:
     links = re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8"))
     missing = [link for link in links if "://" not in link and not (page.parent / link).exists()]
     assert not missing
@@ -62,7 +62,7 @@ def test_every_link_to_a_heading_finds_it(page: Path) -> None:
 
 
 def headings(page: Path) -> set[str]:
-    """Of a page, as links name them: small letters, no signs, hyphens for blanks."""
+    """The headings of a page as links name them: small letters, no signs, hyphens for blanks."""
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     words = (
         re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", found) for found in re.findall(r"^#+ +(.*?) *$", text, re.MULTILINE)
@@ -132,9 +132,7 @@ def test_in_no_counted_fleet_was_anything_lost_or_doubled() -> None:
         assert (counts["ids_doubled"], counts["records_missing"], counts["unreadable"]) == (0, 0, 0)
 
 
-def test_a_count_takes_the_place_of_the_last_with_as_many_vehicles(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_count_replaces_the_earlier_one_of_as_many_vehicles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measured, "COUNTS", tmp_path / "fleet_test.json")
     measured.COUNTS.write_text(json.dumps(FLEETS[:1]))
     for n, seconds in ((500, 9.0), (FLEETS[0]["vehicles"], 7.0), (500, 8.0)):

@@ -95,7 +95,7 @@ def test_three_known_loads_are_enough(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("trip", ["A", "B"])
-def test_a_real_drive_gives_one_line_per_batch_and_says_why_not(trip: str) -> None:
+def test_a_real_drive_gives_an_answer_or_reasons_per_batch(trip: str) -> None:
     folder = recordings() / "real_drive"
     text = printed("estimate", folder / f"candump_trip{trip}.log.gz", "--signals", folder / "signals.toml", "--json")
     records = [json.loads(line) for line in text.splitlines()]
@@ -144,7 +144,7 @@ def test_two_trips_of_a_real_car_weigh_alike_and_a_declared_load_moves_them(
     assert fmean(found[100.0]) - fmean(found[0.0]) == pytest.approx(100.0, abs=25.0)
 
 
-def test_the_file_says_what_to_expect(calibration: Path) -> None:
+def test_the_calibration_predicts_its_errors(calibration: Path) -> None:
     """Errors on runs left out of the fit, of both estimators, and the roads they were made over."""
     shown = json.loads(printed("calibration", "show", calibration, "--json"))
     assert set(shown["expected_errors"]) == {"cross_spectrum", "ratio_index"}

@@ -101,6 +101,6 @@ def _sister(calibration: Path, output: Path, name: str) -> dict[str, Any]:
 
 
 def _evaluated(calibration: Path, name: str) -> dict[str, Any]:
-    """On her drives with loads."""
+    """The errors of the calibration on the vehicle's drives with loads."""
     tests = recordings() / "siblings" / name / "test" / "campaign_roll.toml"
     return json.loads(printed("evaluate", tests, "--calibration", calibration, "--json", *CROSS))

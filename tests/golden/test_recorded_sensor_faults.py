@@ -65,7 +65,7 @@ def test_a_fault_is_refused_for_what_it_is(
     assert line["refused_by_reason"] == {str(why): line["n_batches"]}
 
 
-def test_what_was_weighed_before_is_not_weighed_again(
+def test_earlier_batches_are_not_weighed_again(
     drives: Drives, kept: Path, lines: dict[tuple[str, str], dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("benchmarks.accuracy.faults.estimates_of_logs", None)

@@ -26,19 +26,19 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_every_page_is_there(site: Path) -> None:
+def test_every_page_is_built(site: Path) -> None:
     pages = [page.relative_to(make_site.DOCS).with_suffix(".html") for page in make_site.DOCS.rglob("*.md")]
     assert [page for page in pages if not (site / page).is_file()] == []
     assert (site / "index.html").is_file()
 
 
-def test_a_reader_finds_every_page_behind_one_of_four_doors() -> None:
+def test_every_page_belongs_to_one_of_four_sections() -> None:
     nav = (make_site.ROOT / "mkdocs.yml").read_text(encoding="utf-8").partition("\nnav:\n")[2]
     assert re.findall(r"^  - ([^:\n]+):$", nav, re.MULTILINE) == ["Start", "Do", "Look up", "Understand"]
     assert len(re.findall(r"^ +- [^:\n]+: [\w-]+\.md$", nav, re.MULTILINE)) <= MOST_PAGES
 
 
-def test_a_link_to_a_heading_that_is_not_there_fails_the_site(
+def test_a_link_to_a_missing_heading_fails_the_build(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     gather = make_site.gather

@@ -22,5 +22,5 @@ def test_the_tutorial_does_what_it_says() -> None:
         ("payload 16.8 lb, id ab", False),
     ],
 )
-def test_only_the_last_digit_and_what_the_rule_names_may_differ(printed: str, is_same: bool) -> None:
+def test_only_the_last_digit_and_named_values_may_differ(printed: str, is_same: bool) -> None:
     assert make_tutorial.is_same("payload 16.8 kg, id ef", printed, r"id [a-f]+") is is_same

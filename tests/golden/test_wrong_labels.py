@@ -57,7 +57,7 @@ def held(campaign: Campaign, runs: Sequence[KnownRun], chosen: Sequence[int], la
         pytest.param(TEN, {2: (420.0, 2.8), 10: (120.0, 0.5)}, id="two exchanged"),
     ],
 )
-def test_what_was_labelled_wrong_is_held_and_nothing_else(
+def test_only_wrong_labels_are_held(
     campaign: Campaign, runs: list[KnownRun], chosen: tuple[int, ...], labels: dict[int, Label]
 ) -> None:
     assert held(campaign, runs, chosen, labels) == set(labels)

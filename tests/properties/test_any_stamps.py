@@ -113,7 +113,7 @@ def still(n: int, step_ns: int) -> Motion:
 
 @pytest.mark.parametrize("step_ns", [0, 2, 2_000])
 @pytest.mark.parametrize("chunk", [101, 2000])
-def test_stamps_that_stand_still_end_the_window_and_say_so(step_ns: int, chunk: int) -> None:
+def test_frozen_stamps_end_the_window_with_a_reason(step_ns: int, chunk: int) -> None:
     """A window whose time never passes once held every row that came."""
     rows = still(200_000, step_ns)
     scheduler = Scheduler(BatchSettings(window_s=20.0), {})

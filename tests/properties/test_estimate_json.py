@@ -87,7 +87,7 @@ def read_back(told: dict[str, Any]) -> Estimate:
 
 
 @given(estimates)
-def test_what_is_read_back_is_told_in_the_same_words(estimate: Estimate) -> None:
+def test_a_read_estimate_is_written_identically(estimate: Estimate) -> None:
     told = estimate_to_json(estimate)
     again = estimate_to_json(read_back(told))
     assert again.keys() == told.keys()
@@ -105,7 +105,7 @@ def test_instants_and_identity_are_exact(estimate: Estimate) -> None:
 
 
 @given(estimates)
-def test_what_an_early_version_stored_is_read_too(estimate: Estimate) -> None:
+def test_records_of_an_early_version_are_read(estimate: Estimate) -> None:
     told = estimate_to_json(estimate)
     early = {name: x for name, x in told.items() if name not in ("roughness_mps2", "diagnostics")}
     again = estimate_to_json(read_back(early))
@@ -153,7 +153,7 @@ def test_a_line_of_csv_has_the_columns_and_no_other(estimate: Estimate) -> None:
 
 
 @given(estimates, st.sampled_from(Why))
-def test_what_is_refused_tells_no_number_of_the_load(estimate: Estimate, why: Why) -> None:
+def test_a_refused_batch_has_no_numbers_of_the_load(estimate: Estimate, why: Why) -> None:
     told = estimate_to_json(estimate.refused(why))
     of_the_load = [one for one in FIELDS if one.path.split(".")[0] in OF_THE_LOAD]
     assert len(of_the_load) == 17

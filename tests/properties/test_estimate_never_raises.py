@@ -39,7 +39,7 @@ def calibration() -> VehicleModel:
 
 @pytest.fixture(scope="module")
 def credulous(calibration: VehicleModel) -> VehicleModel:
-    """The same without its gates: whatever moves, however badly it fits, is weighed to the end."""
+    """A weigher without gates: it weighs whatever moves to the end, however badly it fits."""
     return replace(calibration, acceleration_rms_mps2=1e-300, pitch_rate_rms_radps=1e-300, misfit_limit=math.inf)
 
 
@@ -61,7 +61,7 @@ def taught_on_two_tracks() -> VehicleModel:
 
 
 def rolled(calibration: VehicleModel) -> Estimate:
-    """What a good batch with a roll rate tells."""
+    """The answer to a good batch with a roll rate."""
     calibrated = CalibratedVehicle("sha256:ab", model_road.VAN, (0.0, 300.0), (40.0, 60.0), cross_spectrum=calibration)
     return estimate(over_two_tracks(Load(200.0, 48.0), seed=7), calibrated, "cross_spectrum")
 
@@ -97,7 +97,7 @@ def ugly(x: F64) -> st.SearchStrategy[F64]:
 
 @st.composite
 def ugly_batches(draw: st.DrawFn) -> Batch:
-    """As no gate would let it through; with a roll rate or without, some shorter than any segment."""
+    """Batches that no gate would let through; with a roll rate or without, some shorter than any segment."""
     n = draw(st.sampled_from([len(GOOD.speed_mps)] * 4 + [0, 1, 100, 700]))
     acceleration, pitch_rate = GOOD.vertical_acceleration_mps2[:n], GOOD.pitch_rate_radps[:n]
     sensed = draw(ugly(acceleration)), draw(st.one_of(ugly(pitch_rate), st.just(0.3 * acceleration)))
@@ -199,6 +199,6 @@ def test_a_lag_without_a_fixed_point_refuses_the_batch(rolling: VehicleModel, mo
     assert rolled(rolling).rejected == (Why.NO_SOLUTION,)
 
 
-def test_an_answer_that_is_no_number_in_one_place_is_none(rolling: VehicleModel) -> None:
+def test_an_answer_with_one_nan_is_refused(rolling: VehicleModel) -> None:
     """Payload and share are sound, the error of the lateral place is not: weights of wheels would be none."""
     assert rolled(replace(rolling, model_std=(*rolling.model_std[:2], math.nan))).rejected == (Why.NO_SOLUTION,)

@@ -35,7 +35,7 @@ HALF = ROLLING[:N]
 
 
 def spectra_of(reading: Reading, speeds_mps: tuple[float, ...] = (14.0,)) -> CrossSpectra:
-    """Of a vehicle about as far from ROLLING as a search starts."""
+    """Spectra of a vehicle about as far from ROLLING as a search starts."""
     theta = theta_of(with_roll=True, spring_rear_npm=95e3, **LEFT)
     batches = [
         batch_over_road(theta, Load(150.0, 49.0), 1, 0.04, 60.0, speed, shaken_mps2=0.05 * speed)
@@ -256,7 +256,7 @@ def test_a_load_that_calms_the_body_makes_no_road_smooth() -> None:
     assert np.all(loaded > 1.1 * empty)
 
 
-def test_where_springs_move_as_usual_nothing_is_told_of_friction() -> None:
+def test_ordinary_spring_travel_reports_no_friction() -> None:
     empty = Load(0.0, 52.0)
     front_mps, rear_mps = over_all(SPECTRA, log_stroke_speeds(SPECTRA, HALF, empty, GROUND)).tolist()
     usual = replace(SPECTRA, reading=replace(SPECTRA.reading, usual_stroke_mps=(front_mps, rear_mps)))

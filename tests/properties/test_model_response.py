@@ -53,7 +53,7 @@ def heavy_theta(slope_per_kn: float, **units: float) -> F64:
 
 
 def off(theta: F64, left_m: float, speed_mps: float = 14.0) -> float:
-    """How far the model is from four wheels: the largest difference over the largest reading of the same sensor."""
+    """The model's distance from four wheels: the largest difference over the largest reading of the same sensor."""
     wheels = FourWheels(theta, HEAVY_GROUND, PAYLOAD_KG, POSITION_M, left_m)
     expected = wheels.paths(FREQ_HZ, speed_mps)
     found = paths_of(theta, wheels.load, FREQ_HZ, 3, speed_mps, HEAVY_GROUND)
@@ -322,7 +322,7 @@ def test_a_gain_multiplies_what_the_accelerometer_reads() -> None:
     np.testing.assert_array_equal(louder[1], plain[1])
 
 
-def test_what_the_springs_push_is_what_the_body_weighs_times_its_acceleration() -> None:
+def test_spring_forces_equal_mass_times_acceleration() -> None:
     """Newton's law, both axles together: a firm payload, a sensor over the centre of gravity, no driveline."""
     share = 0.46
     theta = theta_of(sensor_position_m=(1.0 - share) * GROUND.wheelbase_m, **FIRM, **UNCOUPLED)

@@ -40,7 +40,7 @@ PER_CENT = np.array([1.0, 100.0])
 
 
 def expected_of(model: VehicleModel, load: tuple[float, float], cg_left_m: float = 0.0) -> CrossSpectra:
-    """What the vehicle of the model is expected to show, seen from the centre line, on a drive at two speeds."""
+    """The spectra that the model's vehicle is expected to show at the centre line, on a drive at two speeds."""
     batches = [
         drive_of(LOAD, seed, theta=model.parameters, with_roll=model.has_roll, duration_s=60.0, speed_mps=speed)
         for seed, speed in ((1, 11.0), (2, 17.0))
@@ -203,7 +203,7 @@ MASSES = ("_npm", "_nspm", "unsprung", "inertia", "driveline")
 
 
 def heavier(model: VehicleModel, by: float) -> VehicleModel:
-    """The same vehicle in another unit of mass: all its masses and forces so much larger."""
+    """The vehicle in another unit of mass: all its masses and forces so much larger."""
     theta, covariance = model.parameters.copy(), model.covariance.copy()
     for i, name in enumerate(model.names):
         if name.endswith("_per_kn"):
@@ -224,7 +224,7 @@ def heavier(model: VehicleModel, by: float) -> VehicleModel:
 
 @ROLL
 @pytest.mark.parametrize("by", [0.5, 3.0])
-def test_in_another_unit_of_mass_the_payload_is_another_number_and_nothing_else_changes(
+def test_another_unit_of_mass_scales_the_payload_alone(
     by: float, with_roll: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model, batch = as_if_taught(car(with_roll=with_roll), VAN if with_roll else FLAT_VAN), None
@@ -239,7 +239,7 @@ def test_in_another_unit_of_mass_the_payload_is_another_number_and_nothing_else_
 
 
 def longer(model: VehicleModel, batch: Batch, by: float) -> tuple[VehicleModel, Batch]:
-    """The same vehicle and drive in another unit of length, apart from the height of the road: it pitches less."""
+    """The vehicle and drive in another unit of length, apart from the height of the road: it pitches less."""
     theta = model.parameters.copy()
     for i, name in enumerate(model.names):
         if name.endswith("_m2") or name == "noise_pitch_rate_rad2ps":
@@ -318,7 +318,7 @@ class OneDrive:
         return found.gradient, found.information
 
 
-def test_to_weigh_is_to_fit_one_drive_of_which_nothing_is_said() -> None:
+def test_weighing_equals_fitting_one_drive_of_unknown_load() -> None:
     """The vehicle's prior is that of calibration and day, and the load's is flat."""
     model = taught()
     spectra = spectra_of(drive_of(LOAD, 12), model)
@@ -336,7 +336,7 @@ def test_to_weigh_is_to_fit_one_drive_of_which_nothing_is_said() -> None:
 
 
 @ROLL
-def test_what_the_sources_add_and_the_batch_s_own_are_the_whole_covariance(with_roll: bool) -> None:
+def test_sources_and_own_errors_add_up_to_the_covariance(with_roll: bool) -> None:
     model = replace(taught(with_roll=with_roll), model_std=(0.0, 0.0, 0.0), spread=(1.0, 1.0, 1.0))
     several = known(spectra_of(drive_of(LOAD, 13, with_roll=with_roll), model), model)
     one = replace(several, peaks=(several.best,), weights=np.ones(1))
@@ -349,7 +349,7 @@ def test_what_the_sources_add_and_the_batch_s_own_are_the_whole_covariance(with_
 
 
 @pytest.mark.parametrize("name", ["spring_rear_npm", "tyre_front_npm", "damper_rear_nspm", "sensor_position_m"])
-def test_a_parameter_that_is_off_moves_the_answer_as_its_column_says(name: str) -> None:
+def test_a_wrong_parameter_moves_the_answer_by_its_column(name: str) -> None:
     """The answer to what a vehicle shows that is off its calibration by half a standard deviation of the day."""
     theta = car(with_roll=True)
     model = as_if_taught(theta)
@@ -366,7 +366,7 @@ def test_a_parameter_that_is_off_moves_the_answer_as_its_column_says(name: str) 
     assert np.abs(moved) == pytest.approx(0.5 * np.abs(column), rel=0.15, abs=0.02)
 
 
-def test_payload_and_share_err_together_as_they_say() -> None:
+def test_errors_of_payload_and_share_correlate_as_stated() -> None:
     found = [weighed(drive_of(LOAD, 300 + i, duration_s=100.0), taught()).posterior for i in range(12)]
     told = float(np.mean([one.correlation(0, 1) for one in found]))
     seen = float(np.corrcoef([one.mean[:2] for one in found], rowvar=False)[0, 1])

@@ -55,7 +55,7 @@ def ns(t_s: F64) -> I64:
 
 
 def off_s(found_ns: I64, t_s: F64) -> F64:
-    """How far times lie off the truth, but for the least delay, which nobody can see."""
+    """The distance of times from the truth, apart from the least delay, which nobody can see."""
     off: F64 = (found_ns - ns(t_s)) * 1e-9
     return off - float(np.median(off))
 
@@ -96,7 +96,7 @@ def test_lost_frames_are_distinguished_from_late_ones(lost: float, mean_s: float
     assert float(np.mean(np.abs(off_s(timing.t_ns, t_s)) > 0.001)) < 0.01
 
 
-def test_a_counter_tells_lost_frames_where_stamps_come_in_heaps() -> None:
+def test_a_counter_shows_lost_frames_among_bunched_stamps() -> None:
     rng = np.random.default_rng(5)
     t_s, counter = taken(0.01), np.arange(round(DURATION_S / 0.01)) % 16
     kept = rng.random(len(t_s)) > 0.2

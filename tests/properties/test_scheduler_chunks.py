@@ -56,7 +56,7 @@ def batches_of(motion: Motion, cuts: list[int], provisional_every_s: float) -> t
 WHOLE = {(name, every_s): batches_of(motion, [], every_s) for name, motion in DRIVES.items() for every_s in (0.0, 7.0)}
 
 
-def test_a_silence_that_is_heard_ends_a_drive_as_the_next_row_would():
+def test_a_silence_ends_a_drive_like_the_next_row():
     motion = DRIVES["with_silence"]
     begin_s = (motion.t_ns - motion.t_ns[0]) / NS_PER_S
     before = int(np.searchsorted(begin_s, 40.0))

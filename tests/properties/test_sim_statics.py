@@ -69,7 +69,7 @@ def test_the_textbook_car_is_linear(seed, gain):
 
 
 @given(vehicle=vehicles, load=loads)
-def test_left_wheels_bear_what_moments_about_the_right_ones_demand(vehicle, load):
+def test_left_wheel_loads_follow_from_moments_about_the_right(vehicle, load):
     """Neither springs nor anti-roll bars move weight across the vehicle, only to and fro between its axles."""
     even = replace(vehicle, rear=replace(vehicle.rear, track_m=vehicle.front.track_m))
     front_left, front_right, rear_left, rear_right = wheel_loads_kg(even, load)

@@ -1,4 +1,4 @@
-"""What statements come to does not depend on the order in which they arrive, and a withdrawn one leaves no trace."""
+"""The result of statements does not depend on their order, and a withdrawn one leaves no trace."""
 
 import json
 from pathlib import Path
@@ -55,7 +55,7 @@ def bench_in(folder: str, told: list[Told]) -> LearnerBench:
 
 
 def job_of(bench: LearnerBench) -> str:
-    """What would be learnt from, as the process that learns is told it; without the folder of the files."""
+    """The job that the learning process would get, without the folder of the files."""
     bench.turn()
     assert bench.worker.job is not None
     job = bench.worker.job.model_dump_json(by_alias=True)
@@ -88,6 +88,6 @@ def test_withdrawing_undoes_everything(told: list[Told], wrong: Told, place: int
 
 
 @given(st.lists(SAID, min_size=1, max_size=6))
-def test_of_one_ref_the_last_stands(told: list[Told]) -> None:
+def test_the_last_statement_of_a_ref_counts(told: list[Told]) -> None:
     made = [one.model_copy(update={"ref": "LS-1", "id": f"s-{i}"}) for i, one in enumerate(records(told))]
     assert standing(made) == [made[-1]]

@@ -36,7 +36,7 @@ def weighing(n: int, gross_kg: float) -> Estimate:
 
 
 def wait_for_its_subscription(broker: Broker) -> None:
-    """It says that it is connected before the broker has its subscription: until then what is told is lost."""
+    """Waits for the broker's subscription: Node-RED says earlier that it is connected, and would miss messages."""
     told = json.dumps(estimate_to_json(replace(weighing(0, 2600.0), vehicle_id="probe")))
     listener = Listener(broker.port, "alarms/probe", "probe")
 

@@ -48,7 +48,7 @@ class Scraped:
         return told["data"]
 
     def values(self, expression: str) -> list[Any]:
-        """What a query gives now, for this instance."""
+        """The present values of a query for this instance."""
         return self.asked("query", query=expression.replace("$instance", self.instance))["result"]
 
 

@@ -22,7 +22,7 @@ def done(archive: Path) -> Summary:
 
 
 def rows_in(archive: Path) -> list[dict[str, Any]]:
-    """In order of time, without the job's name."""
+    """The rows in order of time, without the job's name."""
     dataset = place_of(archive / "dataset")
     rows = (row | {"job": None} for slot in slots_done(dataset) for row in rows_of(dataset, slot))
     return sorted(rows, key=lambda row: row["t_end_ns"])

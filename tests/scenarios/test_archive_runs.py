@@ -59,7 +59,7 @@ class Refusing(Here):
         return super().submit(fn, *args, **kwargs)
 
 
-def test_a_second_run_writes_nothing_anew(archive: Path) -> None:
+def test_a_second_run_writes_nothing(archive: Path) -> None:
     first = done(archive)
     before = files_of(archive)
     second = done(archive)
@@ -68,7 +68,7 @@ def test_a_second_run_writes_nothing_anew(archive: Path) -> None:
     assert files_of(archive) == before
 
 
-def test_a_poison_log_is_told_and_the_rest_goes_on(archive: Path) -> None:
+def test_a_poison_log_is_reported_and_the_others_are_processed(archive: Path) -> None:
     (archive / "van-1" / "0.log").write_bytes(b"\0\xff not a log \n" * 100)
     summary = done(archive)
     assert not summary.is_good
@@ -104,7 +104,7 @@ def test_a_log_cut_in_the_middle_counts_as_far_as_it_goes(archive: Path) -> None
     assert [one["ended_early"] is None for one in receipt["logs"]] == [True, False]
 
 
-def test_a_log_of_another_vehicle_s_frames_is_told(archive: Path) -> None:
+def test_a_log_of_another_vehicle_is_reported(archive: Path) -> None:
     lines = (archive / "van-1" / "0.log").read_text().splitlines()
     others = [line.partition(" can0 ")[0] + " can0 7A1#0102030405060708" for line in lines]
     (archive / "van-1" / "0.log").write_text("\n".join(others) + "\n")
@@ -144,7 +144,7 @@ def test_two_workers_at_one_job_agree_on_one_receipt(archive: Path, monkeypatch:
     assert files_of(archive) == before
 
 
-def test_a_job_that_kills_its_workers_is_told_as_failed(archive: Path) -> None:
+def test_a_job_that_kills_its_workers_is_reported_as_failed(archive: Path) -> None:
     summary = done(archive, Refusing("van-1", WorkerKilledError("3 processes died over it")))
     assert (summary.counts["done"], summary.counts["failed"]) == (1, 1)
     [told] = failures(archive / "dataset")
@@ -169,14 +169,14 @@ def test_a_library_that_is_missing_ends_the_run_and_blames_no_log(
     assert done(archive).counts["done"] == 2
 
 
-def test_what_a_store_refuses_is_left_for_the_next_run(archive: Path) -> None:
+def test_logs_that_the_store_refuses_are_left_for_the_next_run(archive: Path) -> None:
     summary = done(archive, Refusing("van-1", PlaceError("s3://x/y: timed out")))
     assert (summary.counts["done"], summary.counts["lost"], summary.is_good) == (1, 1, False)
     assert list(summary.lost.values()) == ["s3://x/y: timed out"]
     assert done(archive).counts["done"] == 1
 
 
-def test_another_springscale_on_a_worker_ends_the_run(archive: Path) -> None:
+def test_a_worker_with_another_version_ends_the_run(archive: Path) -> None:
     manifest = load_manifest(str(archive))
     done(archive)
     job = look(manifest, dataset_of(archive)).jobs()[0]
@@ -251,7 +251,7 @@ def test_a_folder_out_of_reach_takes_nothing_back(archive: Path, monkeypatch: py
     assert done(archive).counts["already"] == 2
 
 
-def test_an_archive_without_logs_is_told_with_where_they_were_looked_for(tmp_path: Path) -> None:
+def test_an_archive_without_logs_is_reported_with_the_searched_folders(tmp_path: Path) -> None:
     write_manifest(tmp_path, "van-1")
     with pytest.raises(ConfigurationError, match=r"not one log in the folders of its vehicles, .*van-1; see logs"):
         done(tmp_path)

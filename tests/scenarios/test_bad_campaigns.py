@@ -35,7 +35,7 @@ UNTOLD = "note:roll_rate_sign_untold"  # one run with a sensor 0.15 m off the ce
 
 
 def calibrate(campaign: Path, *options: str | Path) -> Result:
-    """What the command did; the message of a refusal is in ``exception``."""
+    """The command's result; the message of a refusal is in ``exception``."""
     done = called("calibrate", campaign, *WINDOW, *options)
     if done.exception is not None and not isinstance(done.exception, CalibrationImpossibleError):
         raise done.exception
@@ -49,7 +49,7 @@ def check(campaign: Path, *options: str) -> tuple[int, dict[str, Any]]:
 
 
 def kinds(found: dict[str, Any]) -> dict[int, list[str]]:
-    """By run number the findings' severities and kinds; 0 is of all runs together."""
+    """The severities and kinds of the findings by run number; 0 is of all runs together."""
     runs = {run["number"]: run["findings"] for run in found["runs"]} | {0: found["campaign_findings"]}
     return {number: [f"{one['severity']}:{one['kind']}" for one in findings] for number, findings in runs.items()}
 
@@ -92,7 +92,7 @@ def test_a_sound_campaign_passes_without_a_word(folder: Path) -> None:
     assert alone[-1].endswith(": 0 kg, 50.0 % in front")
 
 
-def test_what_would_tell_where_loads_lie_to_the_side_is_noted_where_it_is_missing(folder: Path) -> None:
+def test_a_missing_lateral_position_is_noted(folder: Path) -> None:
     text = (folder / "signals.toml").read_text(encoding="utf-8")
     (folder / "no-roll-signals.toml").write_text(re.sub(r"\[signals\.roll_rate\][^[]*", "", text), encoding="utf-8")
     head = head_with(folder, '"signals.toml"', '"no-roll-signals.toml"')
@@ -105,7 +105,7 @@ def test_what_would_tell_where_loads_lie_to_the_side_is_noted_where_it_is_missin
     assert unknown["text"] == "sensor_offset_left_m is 0 ± 0.59 m (95 %)"
 
 
-def test_one_load_only_is_a_zero_point_and_nothing_for_the_ratio_index(folder: Path, tmp_path: Path) -> None:
+def test_one_load_alone_calibrates_the_cross_spectrum_only(folder: Path, tmp_path: Path) -> None:
     campaign = altered(folder, "one-load", [1])
     exit_code, found = check(campaign)
     assert (exit_code, kinds(found)) == (0, {0: ["warning:one_load_only", UNTOLD], 1: []})
@@ -213,7 +213,7 @@ def test_two_loads_swapped_in_the_file_are_found(folder: Path) -> None:
     assert f"exchanged with drive {places[1]}, both fit far better" in json.dumps(found)
 
 
-def test_a_wrong_sensor_position_is_told(folder: Path) -> None:
+def test_a_wrong_sensor_position_is_reported(folder: Path) -> None:
     head = head_with(folder, "sensor_position_m = 3.2", "sensor_position_m = 0.0")
     _, found = check(altered(folder, "place", [1], head=head))
     assert kinds(found)[1] == ["fault:sensor_position"]

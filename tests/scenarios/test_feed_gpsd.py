@@ -79,7 +79,7 @@ def receiver(speeds: list[float | None]) -> Iterator[int]:
 
 
 @needs("gpsd")
-def test_what_the_receiver_says_is_on_the_bus(tmp_path: Path) -> None:
+def test_readings_of_the_receiver_are_sent_to_the_bus(tmp_path: Path) -> None:
     port = free_port()
     heard: list[can.Message] = []
     program = found("gpsd")

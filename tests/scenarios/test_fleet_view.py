@@ -100,7 +100,7 @@ def test_a_vehicle_writes_below_its_own_name_alone_and_reads_nothing(view: Fleet
     settled(view)
 
 
-def test_a_broker_that_lost_its_memory_gets_nothing_before_somebody_listens(view: FleetView) -> None:
+def test_nothing_is_sent_to_a_broker_without_the_fleets_session(view: FleetView) -> None:
     """A new disk: no session, no subscriber yet. What it would drop stays in the vehicles."""
     view.subscriber.stop()
     view.broker.kill()
@@ -132,7 +132,7 @@ def test_a_database_that_is_away_costs_nothing(view: FleetView) -> None:
     settled(view)
 
 
-def test_who_is_taken_from_the_table_is_refused(view: FleetView) -> None:
+def test_a_vehicle_removed_from_the_table_is_refused(view: FleetView) -> None:
     """provision.py again, without one of them: the others keep their passwords."""
     kept = {
         vehicle.id: (view.output / f"vehicles/{vehicle.id}/broker-password").read_text() for vehicle in view.vehicles

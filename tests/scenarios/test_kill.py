@@ -71,7 +71,7 @@ for n in itertools.count(1):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_kill_loses_no_frame_that_was_told_of(tmp_path: Path, seed: int) -> None:
+def test_a_kill_loses_no_acknowledged_frame(tmp_path: Path, seed: int) -> None:
     told = told_before_kill(RECORDER, tmp_path, after_s=random.Random(seed).uniform(0.0, 0.2))
 
     n_read = 0

@@ -124,7 +124,7 @@ def two_channels() -> bytes:
 
 
 def with_others() -> bytes:
-    """Before every hundredth frame a remote frame of its identifier and an error frame."""
+    """The log with a remote frame and an error frame before every hundredth frame."""
     lines = candump().decode().splitlines(keepends=True)
     for i in range(100 * (N // 100) - 1, 0, -100):
         stamp, channel, frame = lines[i].split()
@@ -219,7 +219,7 @@ def n_left_out_in(text: str) -> int:
 
 
 def all_said(result: Result) -> str:
-    """Everything that a person reads of a command."""
+    """All the output of a command that a person reads."""
     return f"{result.output}\n{result.exception if result.exit_code else ''}"
 
 

@@ -117,7 +117,7 @@ def a_broker_of_another_authority(folder: Path, patch: pytest.MonkeyPatch) -> It
 
 @contextmanager
 def a_password_file_that_is_gone(folder: Path, patch: pytest.MonkeyPatch) -> Iterator[Tried]:
-    """Each attempt left a descriptor behind."""
+    """An uplink whose password file does not exist: each attempt once left a descriptor behind."""
     with forwarding(folder, free_port(), username="van", password_file=folder / "gone") as tried:
         yield tried
 

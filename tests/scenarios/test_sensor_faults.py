@@ -131,7 +131,7 @@ class Shelf:
 
 
 @pytest.mark.parametrize(("from_s", "share"), [(0.0, 0.0), (30.0, 0.25), (117.0, 1.0)])
-def test_a_stuck_roll_rate_refuses_nothing_and_is_told(from_s: float, share: float, recording: Recording) -> None:
+def test_a_stuck_roll_rate_is_reported_without_refusals(from_s: float, share: float, recording: Recording) -> None:
     stuck = recording.gyro_radps.copy()
     stuck[recording.imu_t_ns >= START_NS + from_s * 1e9, 0] = 0.0
     signal_map = load_signal_map("springscale:reference")

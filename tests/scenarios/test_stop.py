@@ -70,7 +70,7 @@ def test_all_parts_together_may_take_no_longer_than_systemd_waits() -> None:
     assert first_s + CLOSE_WITHIN_S < STOP_WITHIN_S
 
 
-def test_parts_stop_in_the_reverse_of_their_start_and_one_that_hangs_holds_nobody(
+def test_parts_stop_in_reverse_order_and_a_hanging_one_does_not_block(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They stopped as they had started, and a lock held by a stalled disk held them all."""

@@ -54,7 +54,7 @@ def put(directory: Path, database: bytes, bit: int) -> None:
 
 
 def ask(store: Store) -> set[str]:
-    """Everything the history, the dashboard and the uplink would tell; where it is refused once, again."""
+    """Everything that history, dashboard and uplink would answer; a question that is refused is asked once more."""
     reader = store.reader()
     told: set[str] = set()
     for newest_first in (False, True):
@@ -95,7 +95,7 @@ def test_no_flipped_bit_stops_the_others_or_is_served_as_true(tmp_path: Path, da
     assert n_passed_over > N_FLIPS / 2
 
 
-def test_a_bad_record_is_set_aside_counted_told_and_no_loss_of_retention(
+def test_a_bad_record_is_set_aside_counted_and_reported(
     tmp_path: Path, database: bytes, caplog: pytest.LogCaptureFixture
 ) -> None:
     place = database.index(TEXTS[4].encode()) + TEXTS[4].index('"payload_kg":104') + len('"payload_kg":10')
@@ -129,7 +129,7 @@ def test_pages_are_full_and_lead_on_over_bad_records(tmp_path: Path, database: b
             assert len(bad) == (1 if newest_first else 4)
 
 
-def test_an_index_that_does_not_know_a_bad_row_is_made_anew(tmp_path: Path, database: bytes) -> None:
+def test_an_index_that_lacks_a_bad_row_is_rebuilt(tmp_path: Path, database: bytes) -> None:
     (tmp_path / "springscale.db").write_bytes(database)
     with closing(sqlite3.connect(tmp_path / "springscale.db")) as other:
         other.execute("PRAGMA writable_schema = ON")
@@ -148,9 +148,7 @@ def test_an_index_that_does_not_know_a_bad_row_is_made_anew(tmp_path: Path, data
         assert len(store.reader().estimates(since_ns=0).items) == N_RECORDS - 1
 
 
-def test_no_more_damaged_databases_are_kept_than_are_worth_looking_at(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_only_a_few_damaged_databases_are_kept(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     for n in range(6):
         (tmp_path / "springscale.db").write_bytes(b"no database %d " % n * 200)
         with closing(Store.open(tmp_path)) as store:

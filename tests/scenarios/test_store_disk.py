@@ -64,7 +64,7 @@ def test_a_directory_that_cannot_be_made_is_waited_for(tmp_path: Path) -> None:
     assert store.close() == 0
 
 
-def test_what_is_held_goes_behind_what_an_earlier_run_stored(tmp_path: Path) -> None:
+def test_held_records_are_stored_after_those_of_an_earlier_run(tmp_path: Path) -> None:
     earlier = Store.open(tmp_path / "volume")
     earlier.write_estimate(make_record(0))
     assert earlier.close() == 0
@@ -83,7 +83,7 @@ def test_what_is_held_goes_behind_what_an_earlier_run_stored(tmp_path: Path) -> 
     store.close()
 
 
-def test_memory_is_bounded_and_what_gives_way_is_counted(tmp_path: Path) -> None:
+def test_memory_is_bounded_and_dropped_records_are_counted(tmp_path: Path) -> None:
     store = Store.open(blocked_directory(tmp_path), Retention(max_held=3))
     for n in range(5):
         store.write_estimate(make_record(n))
@@ -92,7 +92,7 @@ def test_memory_is_bounded_and_what_gives_way_is_counted(tmp_path: Path) -> None
     assert store.close() == 3
 
 
-def test_a_database_deleted_under_the_running_store_begins_anew(tmp_path: Path) -> None:
+def test_a_database_deleted_under_the_running_store_is_recreated(tmp_path: Path) -> None:
     store = Store.open(tmp_path)
     cursor = store.write_estimate(make_record(0))
     assert store.flush(PATIENCE_S)
@@ -151,23 +151,24 @@ def test_damage_found_while_reading_sets_the_file_aside_and_keeps_the_numbering(
     store.close()
 
 
-@pytest.mark.parametrize("version", [6, 99])
-def test_another_schema_is_refused_and_untouched(tmp_path: Path, version: int) -> None:
-    Store.open(tmp_path).close()
+@pytest.mark.parametrize(
+    ("is_ours", "changed", "told"),
+    [
+        (True, "PRAGMA user_version = 6", "schema 6"),
+        (True, "PRAGMA user_version = 99", "schema 99"),
+        (False, "CREATE TABLE songs (title)", "another program"),
+    ],
+)
+def test_a_newer_schema_is_refused_and_left_unchanged(tmp_path: Path, is_ours: bool, changed: str, told: str) -> None:
     path = tmp_path / "springscale.db"
+    if is_ours:
+        Store.open(tmp_path).close()
     with closing(sqlite3.connect(path)) as database:
-        database.execute(f"PRAGMA user_version = {version}")
-    with pytest.raises(StoreError, match=f"schema {version}"):
+        database.execute(changed)
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match=told):
         Store.open(tmp_path)
-    with closing(sqlite3.connect(path)) as database:
-        assert database.execute("PRAGMA user_version").fetchone()[0] == version
-
-
-def test_another_programs_database_is_refused(tmp_path: Path) -> None:
-    with closing(sqlite3.connect(tmp_path / "springscale.db")) as database:
-        database.execute("CREATE TABLE songs (title)")
-    with pytest.raises(StoreError, match="another program"):
-        Store.open(tmp_path)
+    assert path.read_bytes() == before
 
 
 def test_a_directory_in_use_is_refused(tmp_path: Path) -> None:
@@ -189,9 +190,7 @@ def test_a_question_that_takes_too_long_is_ended(tmp_path: Path) -> None:
     store.close()
 
 
-def test_the_log_tells_when_the_disk_refuses_and_when_it_is_back(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_the_log_reports_a_failing_disk_and_its_recovery(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("INFO", "gateway")
     directory = blocked_directory(tmp_path)
     with closing(Store.open(directory)) as store:

@@ -139,7 +139,7 @@ def _deliverer(state: Path, port: int) -> "subprocess.Popen[str]":
     return process
 
 
-def test_a_message_says_what_it_is(tmp_path: Path) -> None:
+def test_a_message_has_its_content_type(tmp_path: Path) -> None:
     with running_broker(tmp_path) as broker:
         listener = Listener(broker.port, "springscale/van-17/#")
         store = Store.open(tmp_path / "state")
@@ -188,7 +188,7 @@ def test_over_tls_with_certificates_on_both_sides(tmp_path: Path) -> None:
     assert wary.report().n_delivered == 0
 
 
-def test_a_wrong_password_is_told_and_a_mended_one_is_taken_without_a_restart(tmp_path: Path) -> None:
+def test_a_wrong_password_is_reported_and_a_corrected_one_works_without_a_restart(tmp_path: Path) -> None:
     passwords = tmp_path / "passwords"
     subprocess.run(["mosquitto_passwd", "-b", "-c", str(passwords), "van", "right"], check=True, capture_output=True)
     secret = tmp_path / "password"

@@ -64,7 +64,7 @@ def test_starts_and_clocks_leave_no_gap(tmp_path: Path) -> None:
     assert len(back_end.ids) == 40
 
 
-def test_what_is_lost_on_the_way_or_refused_leaves_a_gap(tmp_path: Path) -> None:
+def test_a_lost_or_refused_record_leaves_a_gap(tmp_path: Path) -> None:
     dice = random.Random(3)
     lost = sorted(dice.sample(range(1, 99), 20))
     lost_ids = {make_record(n)["id"] for n in lost}
@@ -85,7 +85,7 @@ def test_the_first_ones_are_missed_too(tmp_path: Path) -> None:
     assert len(back_end.missing) == 1
 
 
-def test_what_retention_removes_before_it_is_delivered_leaves_a_gap(tmp_path: Path) -> None:
+def test_a_record_removed_before_delivery_leaves_a_gap(tmp_path: Path) -> None:
     back_end = BackEnd()
     with closing(Store.open(tmp_path, Retention(max_bytes=1_000_000))) as store:
         write(store, 0)
@@ -100,7 +100,7 @@ def test_what_retention_removes_before_it_is_delivered_leaves_a_gap(tmp_path: Pa
     assert len(back_end.ids) < 40
 
 
-def test_what_memory_had_to_drop_leaves_a_gap(tmp_path: Path) -> None:
+def test_a_record_dropped_from_memory_leaves_a_gap(tmp_path: Path) -> None:
     (tmp_path / "mount").write_text("no directory can be made here")
     back_end = BackEnd()
     with closing(Store.open(tmp_path / "mount" / "state", Retention(max_held=5))) as store:
@@ -113,7 +113,7 @@ def test_what_memory_had_to_drop_leaves_a_gap(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("is_flushed", [True, False])
-def test_a_batch_that_is_there_already_is_no_gap(tmp_path: Path, is_flushed: bool) -> None:
+def test_a_duplicate_batch_leaves_no_gap(tmp_path: Path, is_flushed: bool) -> None:
     back_end = BackEnd()
     with closing(Store.open(tmp_path)) as store:
         write(store, 0, 1)

@@ -41,7 +41,7 @@ def bench(tmp_path: Path) -> LearnerBench:
 
 
 def taking(bench: LearnerBench) -> TakeStatements:
-    """As the service hands a message on."""
+    """Hands a message on as the service does."""
     return partial(bench.learner.loads.import_all, where="the message", may_come_again=True)
 
 
@@ -109,7 +109,9 @@ BAD: Final = {
 
 
 @needs_mosquitto
-def test_a_bad_message_is_refused_counted_and_told_and_holds_up_none(tmp_path: Path, bench: LearnerBench) -> None:
+def test_a_bad_message_is_refused_counted_and_reported_without_delaying_others(
+    tmp_path: Path, bench: LearnerBench
+) -> None:
     """Records go out and later statements come in; a restart does not meet the bad ones again."""
     with running_broker(tmp_path) as broker, uplink(broker.port, tmp_path, taking(bench)) as part:
         for n, (content, kind, why) in enumerate(BAD.values(), 1):
@@ -128,7 +130,7 @@ def test_a_bad_message_is_refused_counted_and_told_and_holds_up_none(tmp_path: P
 
 
 @needs_mosquitto
-def test_a_bad_row_is_told_and_the_good_ones_are_taken(tmp_path: Path, bench: LearnerBench) -> None:
+def test_a_bad_row_is_reported_and_the_good_ones_are_taken(tmp_path: Path, bench: LearnerBench) -> None:
     with running_broker(tmp_path) as broker, uplink(broker.port, tmp_path, taking(bench)) as part:
         send(broker.port, TABLE + "soon;empty;;E-3\n")
         assert wait_until(lambda: heard(part).n_taken == 1), part.report()
@@ -138,7 +140,7 @@ def test_a_bad_row_is_told_and_the_good_ones_are_taken(tmp_path: Path, bench: Le
 
 
 @needs_mosquitto
-def test_what_comes_again_is_stated_once_and_brings_nothing_back(tmp_path: Path, bench: LearnerBench) -> None:
+def test_a_repeated_statement_counts_once_and_restores_nothing(tmp_path: Path, bench: LearnerBench) -> None:
     """A retained message comes with every connection, and after a withdrawal too."""
     with running_broker(tmp_path) as broker, CuttableLink(broker.port) as link:
         send(broker.port, [NOTE, EMPTY], retain=True)
@@ -155,7 +157,7 @@ def test_what_comes_again_is_stated_once_and_brings_nothing_back(tmp_path: Path,
 
 
 @needs_mosquitto
-def test_what_was_sent_to_a_vehicle_that_is_away_comes_when_it_is_back(tmp_path: Path, bench: LearnerBench) -> None:
+def test_statements_for_an_absent_vehicle_arrive_when_it_returns(tmp_path: Path, bench: LearnerBench) -> None:
     with running_broker(tmp_path) as broker:
         with uplink(broker.port, tmp_path, taking(bench)) as part:
             send(broker.port, NOTE)
@@ -220,7 +222,7 @@ def test_the_shipped_access_list_lets_the_dispatcher_state_and_no_other_vehicle(
     assert [ref for ref, _ in stated(bench)] == ["E"]
 
 
-def test_whatever_taking_a_message_raises_is_a_refusal() -> None:
+def test_any_exception_on_a_message_is_a_refusal() -> None:
     def take(content: bytes, by: str) -> str:
         raise ZeroDivisionError
 

@@ -98,7 +98,7 @@ async def ask_and_read_nothing(port: int, paths: list[str], cursor: str) -> list
 
 
 @pytest.mark.parametrize("kind", ASKED)
-def test_a_crowd_that_reads_nothing_is_bounded_and_keeps_nobody_from_the_scales(config: Path, kind: str) -> None:
+def test_clients_that_read_nothing_use_bounded_memory_and_delay_no_weighing(config: Path, kind: str) -> None:
     settings = load_settings(config)
     cursor = fill(settings.store.directory)
     log = config.parent / "drive.log"
@@ -129,6 +129,6 @@ def test_a_crowd_that_reads_nothing_is_bounded_and_keeps_nobody_from_the_scales(
 
 
 def stored(url: str) -> list[object]:
-    """What was weighed since the year the made-up history ends in."""
+    """The records stored since the year in which the made-up history ends."""
     asked = {"since": "2000-01-01T00:00:00Z", "limit": 1000, "spectra": "false"}
     return first_answer(f"{url}/api/v1/estimates?{urlencode(asked)}").json()["items"]

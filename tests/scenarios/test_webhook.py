@@ -107,7 +107,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
-def test_each_fault_is_tried_again_and_nothing_overtakes(tmp_path: Path, secret_file: Path, fault: Fault) -> None:
+def test_each_fault_is_retried_in_order(tmp_path: Path, secret_file: Path, fault: Fault) -> None:
     with Receiver([fault, status(200), fault, fault]) as receiver:
         with Sending(tmp_path / "state", receiver.port, secret_file) as sending:
             wanted = tell(sending.store, *range(9))
@@ -171,7 +171,7 @@ def _kill(process: "subprocess.Popen[str]") -> None:
     process.wait()
 
 
-def test_nobody_there_and_then_somebody(tmp_path: Path, secret_file: Path) -> None:
+def test_deliveries_start_when_the_receiver_appears(tmp_path: Path, secret_file: Path) -> None:
     port = free_port()
     with Sending(tmp_path / "state", port, secret_file) as sending:
         wanted = tell(sending.store, *range(6))
@@ -184,9 +184,7 @@ def test_nobody_there_and_then_somebody(tmp_path: Path, secret_file: Path) -> No
 
 
 @pytest.mark.parametrize("fault", [slow(2.0), trickle], ids=["slow", "trickle"])
-def test_one_that_does_not_answer_in_time_is_left_and_asked_again(
-    tmp_path: Path, secret_file: Path, fault: Fault
-) -> None:
+def test_a_request_that_times_out_is_retried(tmp_path: Path, secret_file: Path, fault: Fault) -> None:
     with (
         Receiver([fault]) as receiver,
         Sending(tmp_path / "state", receiver.port, secret_file, timeout_s=0.3) as sending,
@@ -197,7 +195,7 @@ def test_one_that_does_not_answer_in_time_is_left_and_asked_again(
         assert sending.webhook.report().n_failed == 1
 
 
-def test_a_letter_that_the_receiver_will_never_take_holds_nobody_up(tmp_path: Path, secret_file: Path) -> None:
+def test_a_permanently_refused_message_does_not_delay_others(tmp_path: Path, secret_file: Path) -> None:
     with (
         Receiver([status(413)]) as receiver,
         Sending(tmp_path / "state", receiver.port, secret_file) as sending,
@@ -274,7 +272,7 @@ def test_tls_is_checked(tmp_path: Path, secret_file: Path) -> None:
         assert receiver.wrong == []
 
 
-def test_a_secret_that_is_gone_is_told_and_taken_up_when_it_is_back(tmp_path: Path, secret_file: Path) -> None:
+def test_a_missing_secret_is_reported_until_it_is_back(tmp_path: Path, secret_file: Path) -> None:
     with Receiver() as receiver, Sending(tmp_path / "state", receiver.port, secret_file) as sending:
         secret_file.unlink()
         wanted = tell(sending.store, 0)
@@ -283,7 +281,7 @@ def test_a_secret_that_is_gone_is_told_and_taken_up_when_it_is_back(tmp_path: Pa
         assert wait_until(lambda: receiver.ids == wanted)
 
 
-def test_every_revision_of_an_alarm_that_is_told_in_time_comes(tmp_path: Path, secret_file: Path) -> None:
+def test_every_revision_of_an_alarm_is_delivered(tmp_path: Path, secret_file: Path) -> None:
     bench = AlarmBench(tmp_path / "state")
     with Receiver() as receiver:
         settings = WebhookSettings(f"http://127.0.0.1:{receiver.port}/hook", secret_file, ("alarm",))

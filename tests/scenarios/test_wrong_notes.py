@@ -32,7 +32,7 @@ def note(number: int, payload_kg: float) -> StatementRecord:
 
 
 def states(folder: str, notes: tuple[float, ...]) -> dict[str, tuple[str, str | None]]:
-    """What became of each note."""
+    """The state of each note."""
     logs = sorted(Path(folder).glob("*.log"))
     records = standing(note(number, kg) for number, kg in enumerate(notes, 1))
     drives = read_drives(logs, load_signal_map(SIGNALS), VAN, moments(records), SETTINGS)
@@ -56,7 +56,7 @@ def test_empty_with_a_load_aboard_is_held_and_asked_about(folder: str) -> None:
     assert set(found.values()) == {("used", None)}
 
 
-def test_a_note_of_another_tour_counts_less_and_is_asked_about(folder: str) -> None:
+def test_a_note_of_another_tour_counts_less_and_raises_a_question(folder: str) -> None:
     found = states(folder, (0.0, 300.0, 450.0, 400.0, 250.0))
     state, question = found.pop("LS-3")
     assert state in ("weak", "held")

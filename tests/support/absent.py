@@ -1,4 +1,4 @@
-"""What the web asks of a service without a calibration, where a test brings nothing of its own."""
+"""A service without a calibration, for web tests that bring none of their own."""
 
 from pathlib import Path
 from typing import Any

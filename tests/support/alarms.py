@@ -62,7 +62,7 @@ class AlarmBench:
         self.start()
 
     def start(self) -> None:
-        """As a new start of the service would."""
+        """Makes a new desk over the store, as a restart of the service does."""
         self.store, self.board = Store.open(self.directory), Board()
         self.desk = AlarmService(self.rules, SUBJECT, self.store, lambda: at(self.clock_s / 60.0), lambda: self.clock_s)
 
@@ -71,7 +71,7 @@ class AlarmBench:
         self.start()
 
     def weigh(self, found: Estimate) -> None:
-        """As the pipeline does."""
+        """Hands a batch to the desk as the pipeline does."""
         self.store.write_estimate(estimate_to_json(found))
         self.desk(found)
 

@@ -42,7 +42,7 @@ class Here(Workers):
     n_workers = 1
 
     def __init__(self) -> None:
-        """Nothing is started."""
+        """Remembers the arguments and starts nothing."""
 
     def submit(self, fn: Callable[..., Answer], /, *args: Any, **kwargs: Any) -> Future[Answer]:
         future: Future[Answer] = Future()
@@ -99,7 +99,7 @@ def uploaded(folder: Path, place: Location) -> None:
 
 
 def tables_of(dataset: Location) -> dict[str, bytes]:
-    """What receipts vouch for, byte by byte."""
+    """The tables that receipts name, byte by byte."""
     return {slot.table: dataset.read(slot.table) for slot in slots_done(dataset)}
 
 
@@ -128,7 +128,7 @@ def object_store() -> Iterator[str]:
 
 
 def die(reached: str) -> None:
-    """What a worker does that runs out of memory; the first time only, where ``reached`` names a file."""
+    """Ends the worker as if it ran out of memory; the first time only if ``reached`` names a file."""
     if reached and Path(reached).exists():
         return
     if reached:

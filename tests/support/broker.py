@@ -48,7 +48,7 @@ class Broker:
         return False
 
     def stop(self) -> None:
-        """As systemd would: it saves what its sessions still have to get."""
+        """Stops the broker as systemd would: it saves the messages that its sessions have yet to get."""
         if self._process is not None:
             self._process.terminate()
             self._process.wait(PATIENCE_S)
@@ -56,7 +56,7 @@ class Broker:
 
 
 class Listener:
-    """What a fleet's back-end hears: a session of its own that the broker keeps while it is away."""
+    """A fleet's back-end: the broker keeps its session while it is away."""
 
     def __init__(self, port: int, topic: str, client_id: str = "back-end") -> None:
         self.heard: list[mqtt.MQTTMessage] = []

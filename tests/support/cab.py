@@ -31,7 +31,7 @@ VAN = CalibratedVehicle(
 
 
 def cab_gateway(directory: Path) -> Gateway:
-    """Nothing published yet; it drives."""
+    """A driving service that has published nothing yet."""
     gateway = Gateway(directory, calibrated=VAN)
     gateway.status = BEFORE
     return gateway
@@ -43,7 +43,7 @@ def loaded(n: int, payload_kg: float, front_share_pct: float) -> Estimate:
 
 
 def vaguely_loaded(n: int, payload_kg: float, of_useful: float = 1.1) -> Estimate:
-    """The same with a 95 % interval of so many times one that is just of use."""
+    """A load whose 95 % interval is so many times as wide as one that is just of use."""
     assert VAN.vehicle is not None
     std_kg = of_useful * VAN.vehicle.useful_half_width_kg / Z95
     return make_estimate(n).answered(posterior_of(payload_kg, 50.0, std_kg, 0.2))

@@ -81,7 +81,7 @@ def calibration_file(payload_kg: float = 200.0, front_share_pct: float = 48.0) -
 
 
 def calibration_text(file: CalibrationFile | None = None, **vehicle: float | None) -> str:
-    """The same as a file, the vehicle's figures changed so."""
+    """The text of the calibration file, with these figures of the vehicle changed."""
     told: dict[str, Any] = json.loads((file or calibration_file()).to_json())
     told["vehicle"] |= vehicle
     return json.dumps(told)

@@ -6,17 +6,17 @@ from gateway.cli import springscale
 
 
 def called(*arguments: object) -> Result:
-    """How the command ended, well or not."""
+    """The result of a command, whether it ends well or not."""
     return CliRunner().invoke(springscale, [*map(str, arguments)])
 
 
 def run(*arguments: object) -> Result:
-    """Of a command that ends well."""
+    """The result of a command that must end well."""
     done = CliRunner().invoke(springscale, [*map(str, arguments)], catch_exceptions=False)
     assert done.exit_code == 0, done.output
     return done
 
 
 def printed(*arguments: object) -> str:
-    """What a command that ends well says on its standard output."""
+    """The standard output of a command that must end well."""
     return run(*arguments).stdout

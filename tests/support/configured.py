@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 def service_config(folder: Path, calibration: str | None = None, more: str = "", **keys: str | float) -> Path:
-    """Its path in ``folder``. ``calibration`` is the text of the file beside it.
+    """Writes a configuration into ``folder`` and returns its path; ``calibration`` is the text of the file beside it.
 
     Keys are named with __ for the dot, as batch__window_s; ``more`` is further TOML.
     """

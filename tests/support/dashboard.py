@@ -90,17 +90,17 @@ class Watched:
         self.page.on("console", lambda said: self.complaints.append(said.text) if said.type == "error" else None)
 
     def opened(self, url: str) -> Any:
-        """The page, showing what is there."""
+        """The page once it shows the stored records."""
         self.page.goto(url)
         return self.page
 
     def wait_for_charts(self) -> None:
-        """Until the last of them is drawn."""
+        """Waits until the last chart is drawn."""
         for chart in ("#payload-chart", "#share-chart"):
             self.page.wait_for_selector(f"{chart}[data-drawn]")
 
     def wait_until(self, condition: str) -> None:
-        """Until a JavaScript expression holds; playwright's own way would need eval, which the page forbids."""
+        """Waits until a JavaScript expression holds; playwright's own way needs eval, which the page forbids."""
         end_s = time.monotonic() + PATIENCE_S
         while not self.page.evaluate(condition):
             assert time.monotonic() < end_s, f"it did not come true that {condition}"

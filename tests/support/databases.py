@@ -33,7 +33,7 @@ class SomeMessage:
 
 
 def dbc(messages: Sequence[SomeMessage]) -> str:
-    """As Vector writes it."""
+    """The messages as Vector writes them."""
     lines = ['VERSION ""', "NS_ :", "BS_:", "BU_: A"]
     for m in messages:
         lines.append(f"BO_ {m.can_id | (m.is_extended << 31)} {m.name}: {m.n_bytes} A")
@@ -50,7 +50,7 @@ def dbc(messages: Sequence[SomeMessage]) -> str:
 
 
 def kcd(messages: Sequence[SomeMessage]) -> str:
-    """As Kayak writes it."""
+    """The messages as Kayak writes them."""
     return (
         '<?xml version="1.0" encoding="UTF-8"?>'
         '<NetworkDefinition xmlns="http://kayak.2codeornot2code.org/1.0"><Document name="d"/><Bus name="b">'
@@ -73,12 +73,12 @@ def _kcd_signal(s: SomeSignal) -> str:
 
 
 def _kcd_offset(s: SomeSignal) -> int:
-    """As cantools reads it: a big-endian signal by its first bit, bytes counted from their top."""
+    """The offset as cantools reads it: a big-endian signal by its first bit, bytes counted from their top."""
     return 8 * (s.start // 8) + 7 - s.start % 8 if s.is_big_endian else s.start
 
 
 def arxml(messages: Sequence[SomeMessage]) -> str:
-    """As AUTOSAR's tools write it, as little of it as a bus needs."""
+    """The messages as AUTOSAR's tools write them, as little of it as a bus needs."""
     elements = []
     triggerings = []
     for m in messages:

@@ -23,7 +23,7 @@ def at(minutes: float) -> int:
 
 
 def posterior(kg: float, share_pct: float = 50.0, own_kg: float = OWN_KG) -> Posterior:
-    """With an error of the day that is the same in every batch."""
+    """A posterior with an error of the day that is the same in every batch."""
     of_day = np.diag([SHARED_KG, SHARED_PCT])
     return Posterior(np.array([kg, share_pct]), np.diag([own_kg**2, OWN_PCT**2]), {Source.DAY: of_day})
 
@@ -61,7 +61,7 @@ def day(*kg_of_leg: float | None, batches: int = 1, door: bool | None = None) ->
 
 
 def told(estimates: list[Estimate], rules: Rules = RULES) -> dict[str, Entry]:
-    """The last revision of every entry, by id, in order."""
+    """The last revision of every entry, ordered by id."""
     ledger = Ledger(rules)
     return {entry.id: entry for one in estimates for entry in ledger.add(one)}
 

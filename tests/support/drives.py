@@ -13,7 +13,7 @@ Speed = Callable[[F64], F64]
 
 
 def steady(speed_mps: float) -> Speed:
-    """The same speed all the time."""
+    """Rows at one constant speed."""
     return lambda t_s: np.full(len(t_s), speed_mps)
 
 
@@ -41,7 +41,7 @@ def drive(duration_s: float, speed: Speed | None = None, rate_hz: float = 100.0,
 
 
 def with_roll(motion: Motion, rate_hz: float = 100.0, seed: int = 5) -> Motion:
-    """The same rows, and between them frames of nothing but a white roll rate, from 0.4 s before the first on."""
+    """The rows with frames of a white roll rate between them, from 0.4 s before the first on."""
     t_ns = np.arange(motion.t_ns.min() - 400_000_000, motion.t_ns.max() + 400_000_000, round(1e9 / rate_hz))
     columns = np.full((len(motion) + len(t_ns), len(motion.signals) + 1), np.nan)
     columns[: len(motion), :-1] = motion.columns
@@ -53,7 +53,7 @@ def with_roll(motion: Motion, rate_hz: float = 100.0, seed: int = 5) -> Motion:
 
 
 def with_journey(motion: Motion, seed: int = 6) -> Motion:
-    """The same rows, and between them frames aside: an odometer and a door, some of them saying nothing."""
+    """The rows with frames of an odometer and a door between them, some of which hold no value."""
     rng = np.random.default_rng(seed)
     t_ns = np.arange(motion.t_ns.min() - 2_000_000_000, motion.t_ns.max() + 30_000_000_000, 70_000_000)
     columns = np.full((len(motion) + len(t_ns), len(motion.signals) + 2), np.nan)
@@ -94,7 +94,7 @@ def joined(*parts: Motion) -> Motion:
 
 
 def later(motion: Motion, by_s: float) -> Motion:
-    """The same rows with other stamps."""
+    """The rows with other stamps."""
     return replace(motion, t_ns=motion.t_ns + round(by_s * 1e9))
 
 

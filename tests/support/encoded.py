@@ -11,7 +11,7 @@ from gateway.records import F64, I64, Frames, Signal
 
 
 def frames_of(rows: Iterable[tuple[int, int, bytes]], width: int = 8) -> Frames:
-    """Of time stamp (ns), identifier and payload; what a payload has beyond ``width`` shows in its length alone."""
+    """Frames of time stamp (ns), identifier and payload; bytes beyond ``width`` show in the length alone."""
     rows = list(rows)
     table = b"".join(payload[:width].ljust(width, b"\0") for _, _, payload in rows)
     return Frames(

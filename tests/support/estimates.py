@@ -18,7 +18,7 @@ WINDOW_NS = 300 * NS_PER_S
 def posterior_of(
     payload_kg: float, share_pct: float, std_kg: float, share_std_pct: float, cg_left_m: float | None = None
 ) -> Posterior:
-    """Half of each variance is the batch's own, half the error of the model; no correlations."""
+    """A posterior without correlations: half of each variance is the batch's own, half the model's error."""
     mean = np.array([payload_kg, share_pct, *([] if cg_left_m is None else [cg_left_m])])
     std = np.array([std_kg, share_std_pct, 0.004])[: len(mean)]
     return Posterior(mean, np.diag(0.5 * std**2), {Source.MODEL: np.diag(np.sqrt(0.5) * std)})

@@ -84,14 +84,14 @@ class FleetBroker:
         self._process.send_signal(signal.SIGHUP)
 
     def kill(self) -> None:
-        """As the kernel does when memory is short: nothing is saved any more."""
+        """Kills the process as the kernel does when memory is short: it saves nothing any more."""
         if self._process is not None:
             self._process.kill()
             self._process.wait(PATIENCE_S)
             self._process = None
 
     def forget(self) -> None:
-        """As after a new disk."""
+        """Deletes the files, as a new disk does."""
         (self._folder / "mosquitto.db").unlink(missing_ok=True)
 
 
@@ -115,7 +115,7 @@ class Subscriber:
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self, **other: str) -> None:
-        """With ``other`` settings than PostgreSQL's where some are given."""
+        """Starts the view, with ``other`` settings than PostgreSQL's if some are given."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
                 [sys.executable, "-m", "gateway.fleet.subscriber"], stderr=log, env={**self._environment, **other}
@@ -127,7 +127,7 @@ class Subscriber:
         return {line["vehicle_id"]: line for line in told["items"]} if told else {}
 
     def told(self) -> dict[str, Any] | None:
-        """What the page's API says; None while it does not answer."""
+        """The answer of the page's API; None while there is none."""
         try:
             with urllib.request.urlopen(f"{self.page}/api/v1/fleet") as answer:
                 return json.load(answer)
@@ -141,7 +141,7 @@ class Subscriber:
             self._process = None
 
     def stop(self) -> None:
-        """As systemd does; returns when it has gone."""
+        """Stops the process as systemd does, and waits for its end."""
         self._process.terminate()
         assert self._process.wait(PATIENCE_S) == 0
         self._process = None
@@ -192,7 +192,7 @@ class FleetView:
         )
 
     def compare(self) -> None:
-        """Nothing lost, nothing doubled, nothing of one vehicle under the name of another."""
+        """Checks that nothing was lost, doubled, or filed under another vehicle's name."""
         for vehicle, kept in zip(self.vehicles.state(), self.vehicles.kept(), strict=True):
             assert len(kept.estimates) == vehicle.n_estimates
             assert len(kept.entries) == vehicle.n_entries

@@ -53,7 +53,7 @@ CAR = theta_of(
 
 
 def as_if_fitted(theta: F64, std: F64, vehicle: Vehicle = VAN) -> VehicleModel:
-    """As if a fit had ended with these parameters and standard deviations (n,)."""
+    """A fitted vehicle with these parameters and standard deviations (n,)."""
     loads = tuple(Load(kg, share) for kg in (0.0, 420.0) for share in (40.0, 60.0))
     return model_road.model_of(theta, np.diag(std**2), loads, vehicle)
 
@@ -112,7 +112,7 @@ def calibrated_on_known_loads() -> VehicleModel:
 
 
 def weighed(batch: Batch, model: VehicleModel) -> Estimate:
-    """What the cross spectrum tells of the batch, whatever the loads seen."""
+    """The cross spectrum's answer to the batch, whatever loads calibration saw."""
     vehicle = replace(VAN, payload_range_kg=(0.0, 2000.0))
     calibrated = CalibratedVehicle("sha256:ab", vehicle, (0.0, 0.0), (0.0, 0.0), cross_spectrum=model)
     return estimate(batch, calibrated, "cross_spectrum")

@@ -8,7 +8,7 @@ from gateway.service.learner.learner import Learner
 
 
 def never(*_: Any) -> str:
-    """As behind a lock that a stalled disk holds."""
+    """Waits for ever, as if a stalled disk held a lock."""
     threading.Event().wait()
     return ""
 

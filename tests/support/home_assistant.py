@@ -50,7 +50,7 @@ class HomeAssistant:
         self._stop()
 
     def restart(self) -> None:
-        """As its owner would, with all that it keeps."""
+        """Restarts Home Assistant as its owner would; it keeps its data."""
         self._stop()
         self._start()
 

@@ -8,7 +8,7 @@ VOID = {"meta", "img", "br", "link", "input", "hr"}
 
 
 class Page(HTMLParser):
-    """What a reader finds: ids, links, pictures, tables as lists of cells, headings; every element closed in order."""
+    """The ids, links, pictures, tables and headings of a page; checks that elements are closed in order."""
 
     def __init__(self, text: str) -> None:
         super().__init__()

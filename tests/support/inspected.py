@@ -64,7 +64,7 @@ def stated(van: SimulatedVehicle, position_m: float) -> Vehicle:
 
 
 def scaled(motion: Motion, **factors: float) -> Motion:
-    """As if the map gave these signals in other units or with other signs: pitch_rate=-1.0."""
+    """The recording as if the map gave these signals in other units or with other signs: pitch_rate=-1.0."""
     columns = motion.columns.copy()
     for name, factor in factors.items():
         columns[:, motion.signals.index(Signal(name))] *= factor
@@ -72,7 +72,7 @@ def scaled(motion: Motion, **factors: float) -> Motion:
 
 
 def exchanged(motion: Motion, one: Signal, other: Signal, factor: float = 1.0) -> Motion:
-    """As if the map gave each of two signals where the other belongs; the second then times ``factor``."""
+    """The recording as if the map had exchanged two signals; the second is multiplied by ``factor``."""
     i, j = motion.signals.index(one), motion.signals.index(other)
     columns = motion.columns.copy()
     columns[:, [i, j]] = columns[:, [j, i]]
@@ -81,7 +81,7 @@ def exchanged(motion: Motion, one: Signal, other: Signal, factor: float = 1.0) -
 
 
 def without(motion: Motion, signal: Signal) -> Motion:
-    """As if the signal had never been valid."""
+    """The recording as if the signal had never been valid."""
     return scaled(motion, **{signal: np.nan})
 
 
@@ -92,7 +92,7 @@ def traits_of_reference() -> Traits:
 
 
 def with_resolution(traits: Traits, signal: Signal, resolution: float) -> Traits:
-    """The same, one signal in steps of ``resolution`` (SI)."""
+    """The recording with one signal in steps of ``resolution`` (SI)."""
     return {**traits, signal: replace(traits[signal], resolution=resolution)}
 
 

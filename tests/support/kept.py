@@ -1,4 +1,4 @@
-"""What is dear to make and the same for several tests: the first that asks makes it, whatever process it runs in.
+"""Results that are expensive to make and shared by tests: the first test that needs one makes it, in any process.
 
 It lasts as long as the run of the tests, so no change of the package can meet an older one.
 """

@@ -1,4 +1,4 @@
-"""What the lock files name: the packages of a vehicle, of a desk, of a developer."""
+"""The packages that the lock files name: those of a vehicle, of a desk and of a developer."""
 
 import re
 from pathlib import Path

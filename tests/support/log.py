@@ -1,4 +1,4 @@
-"""What was logged, as its events and fields."""
+"""The log lines of a test, as events and fields."""
 
 from typing import Any
 

@@ -51,7 +51,7 @@ def times(car: F64, **factors: float) -> F64:
 
 
 def model_of(theta: F64, covariance: F64, loads: tuple[Load, ...], vehicle: Vehicle) -> VehicleModel:
-    """As if a fit by these loads had ended with these parameters (n,) and their covariance (n, n)."""
+    """A fitted vehicle with these parameters (n,) and their covariance (n, n)."""
     return VehicleModel(
         empty_mass_kg=vehicle.empty_mass_kg,
         empty_front_share_pct=vehicle.empty_front_share_pct,

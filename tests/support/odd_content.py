@@ -42,7 +42,7 @@ def changed(good: dict[str, Any], path: tuple[Any, ...], odd: Any) -> dict[str, 
 
 
 def tried(good: dict[str, Any], path: Path, use: Callable[[Path], object]) -> tuple[int, list[str]]:
-    """How many of N_TRIALS changed contents could be used, and what was said of the others, which name the file."""
+    """The number of changed contents out of N_TRIALS that could be used, and the messages about the others."""
     dice, all_places = random.Random(58), list(places(good))
     n_used, refusals = 0, []
     for _ in range(N_TRIALS):

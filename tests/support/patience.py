@@ -1,4 +1,4 @@
-"""How long a test waits for what must come: a limit costs time only where a test fails, and machines are busy."""
+"""Time limits of tests: a limit costs time only when a test fails, and machines are busy."""
 
 import asyncio
 import time

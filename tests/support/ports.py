@@ -20,7 +20,7 @@ def free_port() -> int:
 
 
 def first_answer(url: str) -> httpx.Response:
-    """What ``url`` says as soon as anybody listens there. Raises httpx.TransportError when patience ends."""
+    """The first answer of ``url`` once a server listens. Raises httpx.TransportError when patience ends."""
     end_s = time.monotonic() + PATIENCE_S
     while True:
         try:

@@ -30,7 +30,7 @@ ADMINISTRATOR = {"user": "postgres", "dbname": "postgres"}
 
 
 class Postgres:
-    """Without a network, with a database and its owner as docs/fleet.md has them made; ``environment`` leads there.
+    """A PostgreSQL without a network, set up as docs/fleet.md says; ``environment`` has its address.
 
     ``stop`` and ``start`` as an administrator would.
     """
@@ -94,7 +94,7 @@ def _somebody() -> dict[str, object]:
 
 @contextlib.contextmanager
 def running_postgres() -> Iterator[Postgres]:
-    """In a folder that its own user may enter, which pytest's are not; the socket's path must be short, too."""
+    """Runs PostgreSQL in a folder that its own user may enter, unlike pytest's; the socket's path must be short."""
     directory = Path(tempfile.mkdtemp(prefix="springscale-"))
     try:
         if os.getuid() == 0:

@@ -51,7 +51,7 @@ def trickle(request: BaseHTTPRequestHandler) -> None:
 
 
 class Receiver:
-    """What came, in the order of its coming. ``faults`` are taken one for each attempt; without any it takes all.
+    """A webhook receiver that keeps its requests in order. Each attempt uses up one of ``faults``.
 
     What is answered with 2xx counts as ``taken``; ``seen`` are all attempts whose signature is right.
     """
@@ -88,7 +88,7 @@ class Receiver:
         self._thread.start()
 
     def close(self) -> None:
-        """As if killed: nobody listens there any more."""
+        """Stops listening, as if the process were killed."""
         self._server.shutdown()
         self._server.server_close()
         self._thread.join()
@@ -103,7 +103,7 @@ class Receiver:
 
     @property
     def ids(self) -> list[str]:
-        """Of what was taken, the first of each, in order."""
+        """The ids of the accepted messages, each once, in order."""
         return list(dict.fromkeys(letter_id for letter_id, _ in self.taken))
 
     def _receive(self, request: BaseHTTPRequestHandler) -> None:
@@ -133,7 +133,7 @@ class Receiver:
 
 
 def why_wrong(headers: Any, body: bytes, secret: bytes = SECRET) -> str | None:
-    """As the specification tells receivers to check; written apart from what signs."""
+    """The fault of a signature, checked as the specification tells receivers to, with code of its own."""
     stamp = headers["webhook-timestamp"]
     if abs(int(stamp) - time.time()) > TOLERANCE_S:
         return f"{stamp} is too old or too new"

@@ -50,7 +50,7 @@ class Running:
         return called(*arguments, "--url", self.gateway.url)
 
     def told(self, *arguments: str) -> dict[str, Any]:
-        """What it answers with --json."""
+        """The command's answer with --json."""
         found = self.ask(*arguments, "--json")
         assert found.exit_code == 0, (found.output, found.exception)
         return json.loads(found.stdout)
@@ -97,7 +97,7 @@ def stored(config: Path) -> list[str]:
 
 
 def events(config: Path) -> list[str]:
-    """What happened to the service, newest first."""
+    """The events of the service, newest first."""
     store = Store.open(load_settings(config).store.directory)
     try:
         return [event.partition("\n")[0] for event in store.reader().page((SERVICE,), newest_first=True).items]
@@ -110,7 +110,7 @@ def counted(texts: list[str]) -> list[str]:
 
 
 def estimated(config: Path, *logs: Path, options: tuple[str, ...] = ()) -> list[str]:
-    """Each log by itself: of several at once, every line would also say of which it is."""
+    """The estimates of each log by itself: of several at once, every line would also name its log."""
     lines: list[str] = []
     for log in logs:
         lines += printed("estimate", log, "--config", config, "--json", *options).splitlines()

@@ -25,7 +25,7 @@ class BackEnd:
 
 
 def without_sequence(text: str) -> str:
-    """What the store holds of a message."""
+    """The part of a message that the store holds."""
     record = json.loads(text)
     del record["sequence"]
     return json_line(record)

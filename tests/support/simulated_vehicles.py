@@ -27,7 +27,7 @@ from support.patience import PATIENCE_S
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """How much a vehicle has written, and what its uplink did."""
+    """The number of records that a vehicle has written, and the state of its uplink."""
 
     id: str
     n_estimates: int
@@ -38,7 +38,7 @@ class Told:
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What stands in a vehicle's store: estimates by their ids, oldest first; entries by id and revision."""
+    """The content of a vehicle's store: estimates by their ids, oldest first; entries by id and revision."""
 
     estimates: list[str]
     entries: list[tuple[str, int]]
@@ -136,7 +136,7 @@ class SimulatedVehicles(list[SimulatedVehicle]):
 
 
 class VehicleProcesses:
-    """The same of vehicles in ``n`` processes: in one, some hundred would wait for one another's turn at Python."""
+    """Vehicles in ``n`` processes: in one process, hundreds would wait for each other's turn at Python."""
 
     def __init__(self, folders: Sequence[Path], n: int) -> None:
         spawn = get_context("spawn")

@@ -48,7 +48,7 @@ class TookTooLongError(BaseException):
 
 
 def refusal_of(kind: type[Exception], use: Callable[[], object]) -> str | None:
-    """What is said where ``use`` refuses within the limits; None if it does not. Whatever else is raised is raised."""
+    """The message with which ``use`` refuses within the limits; None if it does not. Other exceptions pass through."""
     with limits():
         try:
             use()

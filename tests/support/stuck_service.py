@@ -15,7 +15,7 @@ N_THREADS = 3  # so that one of them is inside whenever the process ends
 
 
 def spin() -> None:
-    """Without end in code that lets go of Python's lock."""
+    """Loops without end in code that releases Python's lock."""
     samples = np.ones((64, 600))
     while True:
         scipy.fft.rfft(samples)

@@ -102,12 +102,12 @@ def known_drives(*, with_roll: bool = False, **road: float) -> list[TaughtDrive]
 
 @kept
 def taught(*, with_roll: bool = False, slack: float = USUAL_SLACK) -> VehicleModel:
-    """By the known loads."""
+    """A vehicle taught by the known loads."""
     return teach(known_drives(with_roll=with_roll, slack=slack), VAN if with_roll else FLAT_VAN).model
 
 
 def as_if_taught(theta: F64, vehicle: Vehicle = VAN) -> VehicleModel:
-    """As if a fit had ended with these parameters, all as sure as vehicles of one line are alike."""
+    """A fitted vehicle with these parameters, all as sure as vehicles of one line are alike."""
     rows = ROWS[: len(theta)]
     covariance = 0.01 * covariance_of(rows, "line") + 1e-10 * np.eye(len(rows))
     return replace(
@@ -124,7 +124,7 @@ def as_if_taught(theta: F64, vehicle: Vehicle = VAN) -> VehicleModel:
 
 
 def spectra_of(batch: Batch, model: VehicleModel) -> CrossSpectra:
-    """As this vehicle reads them."""
+    """The spectra as this vehicle reads them."""
     found = cross_spectra_of([batch], model.reading)
     assert found is not None
     return found

@@ -55,7 +55,7 @@ class Gateway:
         self.app = self._make_app()
 
     def publish(self, *estimates: Estimate) -> list[str]:
-        """As the pipeline does: onto the board, then into the journal."""
+        """Publishes a batch as the pipeline does: on the board, then in the journal."""
         cursors = []
         for estimate in estimates:
             self.board.publish(estimate)
@@ -63,7 +63,7 @@ class Gateway:
         return cursors
 
     def restart_board(self) -> None:
-        """As a new start of the service would: a new board and a new application over the same store."""
+        """Makes a new board and application over the same store, as a restart of the service does."""
         self.board = Board(stale_after_s=900.0, clock=lambda: self.clock_s)
         self.app = self._make_app()
 

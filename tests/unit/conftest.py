@@ -1,4 +1,4 @@
-"""What several files of unit tests begin with."""
+"""Fixtures that several unit tests share."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -109,7 +109,7 @@ def test_an_absurd_object_ends_a_blf(spoil: Callable[[bytearray], None], said: s
 
 
 def other_versions(content: bytearray) -> None:
-    """Both frames get headers that python-can passes over."""
+    """Writes other version numbers into both headers; python-can ignores them."""
     first, second = (found.start() for found in re.finditer(b"LOBJ", content) if found.start() > 150)
     content[first + 6], content[second + 6] = 3, 0
 

@@ -35,7 +35,7 @@ class FakeBus:
         return can.Message(timestamp=stamp_s, arbitration_id=0x120, is_extended_id=False, data=bytes(8))
 
     def shutdown(self) -> None:
-        """Nothing is open."""
+        """Does nothing: no device is open."""
 
 
 class Clock:

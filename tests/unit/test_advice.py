@@ -78,7 +78,7 @@ def test_the_front_share_has_the_same_limits(error_pp: float, grade: Grade) -> N
 
 
 @pytest.mark.parametrize(("n_missed", "grade"), [(0, Grade.FIT), (3, Grade.FIT), (5, Grade.RESERVED), (9, Grade.UNFIT)])
-def test_intervals_too_narrow_are_told_from_bad_luck(n_missed: int, grade: Grade) -> None:
+def test_narrow_intervals_are_distinguished_from_bad_luck(n_missed: int, grade: Grade) -> None:
     """30 of an interval of 20 kg is a miss; one batch a run, ten runs."""
     rows = [judged(run, error_kg=30.0 if run <= n_missed else 1.0) for run in range(1, 11)]
     assert grade_of(verdict(rows), "payload_coverage") is grade
@@ -92,7 +92,7 @@ def test_true_intervals_that_hold_nearly_every_load_are_of_no_use(half_kg: float
     assert f"{half_kg / 4.5:.1f} % (fit to 25 %, no use beyond 50 %)" in text
 
 
-def test_batches_of_one_run_say_no_more_of_coverage_than_the_run() -> None:
+def test_batches_of_one_run_count_once_for_coverage() -> None:
     """Two of five runs missed in every batch: forty batches make it no surer than ten."""
     rows = [judged(run, 30.0 if run <= 2 else 1.0) for run in range(1, 6)]
     once, often = verdict(rows * 2), verdict(rows * 8)
@@ -135,7 +135,7 @@ def test_runs_that_cannot_be_used_count(severities: tuple[Severity | None, ...],
 
 
 @pytest.mark.parametrize(("n_held", "grade"), [(0, None), (1, Grade.RESERVED), (2, Grade.RESERVED), (3, Grade.UNFIT)])
-def test_statements_that_were_held_reserve_and_most_of_them_make_unfit(n_held: int, grade: Grade | None) -> None:
+def test_held_statements_are_a_reservation_and_a_majority_makes_unfit(n_held: int, grade: Grade | None) -> None:
     file = calibration_file()
     (drive,) = file.provenance.drives
     found = FoundPart(

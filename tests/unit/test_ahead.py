@@ -1,4 +1,4 @@
-"""What driving on, or saying more, would gain: the prediction narrows, and teaching then really gives about that."""
+"""The prediction of what further driving or teaching would gain agrees with what they then do gain."""
 
 from dataclasses import replace
 from functools import cache
@@ -54,7 +54,7 @@ def test_every_candidate_narrows_or_leaves_the_answer() -> None:
     assert [step.then_kg for step in steps] == sorted(step.then_kg for step in steps)
 
 
-def test_who_drove_empty_alone_is_told_to_drive_a_known_load() -> None:
+def test_empty_drives_alone_lead_to_the_advice_to_drive_a_known_load() -> None:
     best, *_, worst = next_steps(after_one_empty_drive(), VAN)
     assert best.candidate.name.startswith("known_load")
     assert best.then_kg < 0.95 * worst.then_kg
@@ -77,7 +77,7 @@ def test_a_longer_drive_teaches_more() -> None:
 
 
 @pytest.mark.parametrize("load", [LOADED, EMPTY])
-def test_teaching_then_gives_about_what_was_predicted(load: Load) -> None:
+def test_teaching_gives_about_the_predicted_gain(load: Load) -> None:
     before = after_one_empty_drive()
     ahead = Ahead(before, VAN)
     predicted_kg, _ = ahead.stds(ahead.after(known(load), load, DRIVE_S))

@@ -30,7 +30,7 @@ def bench(tmp_path: Path) -> Iterator[AlarmBench]:
 
 
 def status(state: State) -> Status:
-    """Nothing is heard of the pitch rate; the interface was down."""
+    """A status in which the pitch rate is silent after the interface was down."""
     signals = (SignalHealth(signal="vertical_acceleration", last_age_s=0.1), SignalHealth(signal="pitch_rate"))
     bus = BusStatus(last_fault="can0 is down")
     return Status(version="1", state=state, uptime_s=1.0, signals=(*signals, SignalHealth(signal="door")), bus=bus)
@@ -53,7 +53,7 @@ def test_an_alarm_is_stored_shown_and_logged(bench: AlarmBench, caplog: pytest.L
     assert bench.desk.summary().n_raised == 1
 
 
-def test_a_restart_goes_on_where_it_was(bench: AlarmBench) -> None:
+def test_alarms_survive_a_restart(bench: AlarmBench) -> None:
     bench.weigh(of_load(1, OVER, n_batches=2))
     (before,) = bench.standing()
     bench.weigh(replace(batch(10.0, 15.0, None), rejected=(Why.PITCH_RATE_STUCK,)))
@@ -66,7 +66,7 @@ def test_a_restart_goes_on_where_it_was(bench: AlarmBench) -> None:
     assert [one["is_active"] for one in bench.history()] == [False, False]
 
 
-def test_what_is_switched_off_ends_with_the_next_start(bench: AlarmBench) -> None:
+def test_a_disabled_alarm_ends_at_the_next_start(bench: AlarmBench) -> None:
     bench.weigh(of_load(0, OVER, n_batches=2))
     bench.rules = AlarmRules(off=("overload",))
     bench.restart()
@@ -115,7 +115,7 @@ WRONG_LENGTH = "IMU_GYRO (121): 900 frames have 7 bytes, the database says 8"
         ),
     ],
 )
-def test_an_alarm_of_a_silent_sensor_says_why_it_is_silent(
+def test_an_alarm_of_a_silent_sensor_has_its_reason(
     last_age_s: float | None, counts: dict[str, int], causes: tuple[str, ...], sentence: str, bench: AlarmBench
 ) -> None:
     """It named the sensor alone, and whoever read it checked a sensor that was well."""

@@ -33,14 +33,14 @@ def reprocessed(archive: Path, *options: str) -> Result:
     return called("reprocess", archive, "--output", archive / "dataset", "--workers", 1, *options)
 
 
-def test_it_tells_what_was_done_and_that_nothing_is_left(archive: Path) -> None:
+def test_the_summary_reports_the_work_and_that_nothing_is_left(archive: Path) -> None:
     first, second = reprocessed(archive), reprocessed(archive, "--json")
     assert first.exit_code == second.exit_code == 0, first.output
     assert "done now: 1, 1 batches, 1 of them weighed; done before: 0" in first.stdout
     assert json.loads(second.stdout)["jobs"] == {"done": 0, "already": 1, "failed": 0, "failed_before": 0, "lost": 0}
 
 
-def test_what_failed_ends_it_with_1_and_its_reason(archive: Path) -> None:
+def test_a_failed_job_gives_exit_code_1_and_its_reason(archive: Path) -> None:
     (archive / "van-1" / "2.log").write_bytes(b"nothing\n")
     result = reprocessed(archive)
     assert result.exit_code == 1
@@ -57,7 +57,7 @@ def test_what_failed_ends_it_with_1_and_its_reason(archive: Path) -> None:
         (["/nowhere"], "Missing option '--output'"),
     ],
 )
-def test_a_mistake_ends_it_with_2_and_one_clear_line(
+def test_a_usage_error_gives_exit_code_2_and_one_line(
     arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as left:
@@ -77,7 +77,7 @@ def test_sizes_and_durations_are_in_units_that_suit() -> None:
     assert [duration(s) for s in (1, 99, 600, 7200, 200_000)] == ["1 s", "99 s", "10 min", "2.0 h", "2.3 days"]
 
 
-def test_the_summary_names_a_few_of_many_and_says_what_to_do_next() -> None:
+def test_the_summary_names_some_failures_and_the_next_step() -> None:
     summary = Summary(n_vehicles=2, n_logs=30, size=100, n_jobs=3, n_already=0, n_failed_before=1)
     summary.outcomes = [
         JobOutcome(SLOT, JobStatus.FAILED, failures=tuple(f"log {n}" for n in range(14)), n_failed_logs=14),
@@ -96,20 +96,20 @@ def _workers() -> Iterator[Workers]:
         yield workers
 
 
-def test_answers_come_from_other_processes_with_one_thread_of_numerics(workers: Workers) -> None:
+def test_tasks_run_in_processes_with_one_numeric_thread(workers: Workers) -> None:
     pids = {workers.submit(os.getpid).result() for _ in range(4)}
     assert os.getpid() not in pids
     assert len(pids) <= workers.n_workers == 2
     assert workers.submit(os.getenv, "OPENBLAS_NUM_THREADS").result() == "1"
 
 
-def test_a_fault_comes_back_and_the_process_goes_on(workers: Workers) -> None:
+def test_an_exception_is_returned_and_the_process_survives(workers: Workers) -> None:
     with pytest.raises(ZeroDivisionError):
         workers.submit(truediv, 1, 0).result()
     assert workers.submit(truediv, 6, 3).result() == 2.0
 
 
-def test_a_killed_process_costs_its_task_one_more_try(workers: Workers, tmp_path: Path) -> None:
+def test_a_task_is_retried_after_its_process_was_killed(workers: Workers, tmp_path: Path) -> None:
     others = [workers.submit(truediv, n, 1) for n in range(8)]
     assert workers.submit(die, str(tmp_path / "once")).result() is None
     assert [one.result() for one in others] == list(range(8))
@@ -143,7 +143,7 @@ def test_they_end_at_once_when_the_run_is_stopped(tmp_path: Path) -> None:
     assert not Path(f"/proc/{pid.read_text()}").exists()
 
 
-def test_no_more_tasks_than_workers_are_under_way() -> None:
+def test_only_as_many_tasks_run_as_there_are_workers() -> None:
     taken = 0
 
     def tasks() -> Iterator[float]:

@@ -73,7 +73,7 @@ def test_another_log_of_the_same_time_is_named(kind: str, tmp_path: Path) -> Non
     assert "van-1/2.log: begins before van-1/1.log ends" in summary_in_words(both, "both")
 
 
-def test_what_only_looks_alike_is_no_copy(tmp_path: Path) -> None:
+def test_similar_logs_are_no_copies(tmp_path: Path) -> None:
     """A cut copy, empty files, and one log in the folders of two vehicles."""
     write_drive(tmp_path / "van-1" / "1.log", MIDNIGHT_NS, 21.0)
     content = (tmp_path / "van-1" / "1.log").read_bytes()

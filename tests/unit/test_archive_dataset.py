@@ -97,7 +97,7 @@ def test_the_documented_queries_read_it(tmp_path: Path) -> None:
     assert found.rows() == [("van-17", "2026-03", 100.0, 2)]
 
 
-def test_what_a_vehicle_lacks_is_told_with_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_columns_of_a_vehicle_are_reported_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(ConfigurationError, match=r"pip install 'springscale\[archive\]'"):
         parquet_of([])

@@ -33,7 +33,7 @@ def _van(manifest: Manifest) -> Assignment:
 
 
 def jobs_of(van: Assignment, starts: Sequence[int | None], settings: BatchSettings | None = None) -> list[ArchiveJob]:
-    """Of logs 0.log, 1.log, ... that begin then; None: without a readable frame."""
+    """The jobs of logs 0.log, 1.log, ... that begin at these times; None: a log without a readable frame."""
     logs = [LogFile(van.logs, f"{n}.log", f"van/{n}.log", 100, "x") for n in range(len(starts))]
     facts = {
         log.key: SurveyedLog(f"sha{n}", f"sha{n}", starts[n], None if starts[n] else "bad")
@@ -97,14 +97,14 @@ def test_the_name_of_a_job_follows_from_its_inputs_alone(van: Assignment, tmp_pa
         'id = "van"\ngross_limit_kg = 1850.0',
     ],
 )
-def test_another_input_makes_another_job(van: Assignment, tmp_path: Path, entry: str) -> None:
+def test_a_changed_input_changes_the_job(van: Assignment, tmp_path: Path, entry: str) -> None:
     path = write_manifest(tmp_path / "changed", entry)
     (path.parent / "other.json").write_text(calibration_file(payload_kg=201.0).to_json())
     other = load_manifest(str(path)).assignments[0]
     assert jobs_of(other, [MIDNIGHT_NS])[0].slot.job != jobs_of(van, [MIDNIGHT_NS])[0].slot.job
 
 
-def test_settings_content_and_neighbours_make_another_job(van: Assignment) -> None:
+def test_changed_settings_content_or_neighbours_change_the_job(van: Assignment) -> None:
     jobs = [
         jobs_of(van, [MIDNIGHT_NS])[0],
         jobs_of(van, [MIDNIGHT_NS], BatchSettings(window_s=60.0))[0],
@@ -140,7 +140,7 @@ print(*(m.__file__ for name, m in sys.modules.items() if name.partition(".")[0] 
 
 
 @pytest.mark.parametrize("module", ["posterior", "budget", "quantity", "setup", "calibration/file/calibration_file"])
-def test_a_changed_module_makes_another_software(tmp_path: Path, module: str) -> None:
+def test_a_changed_module_changes_the_software_id(tmp_path: Path, module: str) -> None:
     assert software().endswith(f" code {code_id()}")
     copy = tmp_path / "gateway"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__", "assets"))

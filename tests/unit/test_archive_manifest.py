@@ -11,7 +11,7 @@ from gateway.archive.survey import is_log
 from gateway.errors import ConfigurationError
 
 
-def test_a_manifest_maps_folders_to_vehicles_and_shares_what_they_share(tmp_path: Path) -> None:
+def test_a_manifest_maps_folders_to_vehicles_with_common_settings(tmp_path: Path) -> None:
     path = write_manifest(tmp_path, "van-1", 'vin = "WF0XXXTTGXJK12345"', 'id = "van-3"\nlogs = "/elsewhere/3"')
     manifest = load_manifest(str(path))
     assert manifest.where == load_manifest(str(tmp_path)).where == str(path)
@@ -93,7 +93,7 @@ def test_a_manifest_lies_in_an_object_store_with_all_it_names(tmp_path: Path) ->
         ("vehicles = [", r"archive\.toml: not valid TOML"),
     ],
 )
-def test_a_fault_is_told_with_its_place_and_how_to_mend_it(tmp_path: Path, text: str, told: str) -> None:
+def test_a_fault_is_reported_with_its_place_and_remedy(tmp_path: Path, text: str, told: str) -> None:
     (tmp_path / "archive.toml").write_text(text)
     with pytest.raises(ConfigurationError, match=told):
         load_manifest(str(tmp_path))

@@ -133,7 +133,7 @@ def test_a_statement_holds_for_its_drives(records: list[StatementRecord], expect
         ),
     ],
 )
-def test_what_becomes_of_a_record_is_told(records: list[StatementRecord], fates: list[Fate], reason: str) -> None:
+def test_the_state_of_each_record_is_reported(records: list[StatementRecord], fates: list[Fate], reason: str) -> None:
     found = assign(records, MORNING, VAN)
     assert list(found.fates) == fates
     assert found.reasons[0].startswith(reason)
@@ -156,7 +156,7 @@ def test_what_becomes_of_a_record_is_told(records: list[StatementRecord], fates:
         ({"change_kg": -60.0}, "no statement of the load before it"),
     ],
 )
-def test_what_cannot_be_true_of_this_vehicle_is_told_with_what_was_meant(said: dict[str, Any], words: str) -> None:
+def test_impossible_statements_are_reported_with_the_probable_meaning(said: dict[str, Any], words: str) -> None:
     found = assign([told("07:40", **said)], MORNING, VAN)
     assert found.fates == (Fate.IMPOSSIBLE,)
     assert words in found.reasons[0]
@@ -193,7 +193,7 @@ def test_axle_weights_are_a_payload_and_a_front_share() -> None:
     assert said.placed_by == record.id
 
 
-def test_unsprung_masses_that_nobody_knows_are_an_error_of_every_weighing() -> None:
+def test_unknown_unsprung_masses_are_an_error_of_every_weighing() -> None:
     bare = replace(VAN, kerb_front_axle_kg=None, kerb_rear_axle_kg=None)
     (said, *_) = assign([told("07:40", source="scale", gross_kg=1720.0)], MORNING, bare).statements
     assert said.payload_kg == pytest.approx(1720.0 - 1240.0 - 2 * 0.065 * 1240.0)
@@ -225,7 +225,7 @@ def test_each_source_has_its_usual_doubt(source: str, payload_kg: float, plus_mi
     assert said.claims[0].stated_plus_minus_kg == pytest.approx(plus_minus_kg)
 
 
-def test_place_and_goods_are_said_of_the_load() -> None:
+def test_a_statement_of_a_load_has_place_and_goods() -> None:
     record = told("07:40", payload_kg=300.0, place={"behind_front_axle_m": 1.8, "plus_minus_m": 0.6, "left_m": -0.2})
     record = record.model_copy(update={"shape": record.model_validate(
         {**record.model_dump(by_alias=True), "shape": {"carries": "parcels"}}).shape})  # fmt: skip

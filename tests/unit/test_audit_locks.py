@@ -80,14 +80,14 @@ def audit(url: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
     )
 
 
-def test_all_that_is_shipped_or_builds_it_is_asked_for_by_its_locked_version(service: Service) -> None:
+def test_every_locked_package_is_checked_by_its_version(service: Service) -> None:
     run = audit(service.url)
     assert (run.returncode, run.stdout) == (0, f"audit: {len(set(NAMES))} packages checked, 0 weaknesses known\n")
     assert set(service.asked) == set(NAMES)
 
 
 @pytest.mark.parametrize(("arguments", "code"), [((), 1), (("--advisory",), 0)])
-def test_a_known_weakness_is_told_and_fails_only_where_asked_to(
+def test_a_known_vulnerability_is_reported_and_fails_only_on_request(
     service: Service, arguments: tuple[str, ...], code: int
 ) -> None:
     service.weak = {"numpy": "99.1", "fastapi": None}
@@ -103,7 +103,7 @@ def test_a_known_weakness_is_told_and_fails_only_where_asked_to(
 
 @pytest.mark.parametrize(("arguments", "code"), [((), 1), (("--advisory",), 0)])
 @pytest.mark.parametrize("status", [None, 503])
-def test_where_nobody_can_be_asked_nothing_counts_as_checked(
+def test_without_a_database_nothing_counts_as_checked(
     service: Service, status: int | None, arguments: tuple[str, ...], code: int
 ) -> None:
     service.status = status or 200

@@ -149,7 +149,7 @@ def test_without_a_trailer_a_batch_is_what_it_was(states: tuple[tuple[float, flo
     np.testing.assert_array_equal(alone.vertical_acceleration_mps2, whole.vertical_acceleration_mps2)
 
 
-def test_what_calibrates_knows_of_the_trailer_and_of_no_journey() -> None:
+def test_calibration_sees_the_trailer_and_no_journey() -> None:
     rows = with_trailer((50.0, 1.0)).weighing
     assert len(rows) == len(WHOLE) + 1
     assert batch_of(rows).rejected == (Why.TRAILER,)
@@ -163,7 +163,7 @@ def test_a_batch_knows_how_often_its_sensors_send(rate_hz: float) -> None:
     assert np.isnan(batch_of(changed(sampled, G, 0.0, LENGTH_S, silent)).sensor_rate_hz)
 
 
-def test_a_short_window_is_too_short_and_tells_what_ended_it() -> None:
+def test_a_short_window_is_refused_with_what_ended_it() -> None:
     short = replace(WINDOW, t_end_ns=T0_NS + 50_000_000_000, ended_by=Why.CLOCK_STEP)
     assert build_batch(WHOLE, short, SETTINGS, TRAITS).rejected == (Why.TOO_SHORT, Why.CLOCK_STEP)
     look = replace(short, ended_by=None, is_provisional=True)
@@ -198,7 +198,7 @@ def test_neither_order_nor_rows_outside_matter(seed: int) -> None:
     assert_same_batch(batch_of(shuffled), batch_of(WHOLE))
 
 
-def test_no_row_at_all_is_a_batch_of_nothing() -> None:
+def test_a_batch_without_rows_is_empty() -> None:
     batch = batch_of(WHOLE.part(0, 0))
     assert not batch.usable.any()
     assert batch.gap_share == 1.0
@@ -211,7 +211,7 @@ def roll_of(batch: Batch) -> F64:
     return batch.roll_rate_radps
 
 
-def test_without_a_roll_rate_in_the_map_there_is_none() -> None:
+def test_a_map_without_a_roll_rate_gives_none() -> None:
     batch = batch_of(WHOLE)
     assert batch.roll_rate_radps is None
     assert batch.roll_usable_share is None
@@ -247,7 +247,7 @@ def test_a_roll_rate_too_slow_for_the_grid_is_unknown() -> None:
 
 @settings(max_examples=10, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 1.0))
-def test_no_roll_rate_whatever_changes_another_number(seed: int, share: float) -> None:
+def test_a_roll_rate_changes_no_other_number(seed: int, share: float) -> None:
     rng = np.random.default_rng(seed)
     wild = [np.nan, np.inf, -np.inf, 0.0, 1e300]
 

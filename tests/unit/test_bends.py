@@ -71,7 +71,7 @@ def test_unusable_samples_are_not_counted() -> None:
     assert gyro_gain_of(bends, usable & (np.arange(len(usable)) % 900 > 20), RATE_HZ) is None  # pieces below 20 s
 
 
-def test_less_than_a_minute_and_silence_tell_nothing() -> None:
+def test_short_drives_and_silence_show_no_gain() -> None:
     assert gain_of(winding(seconds=50.0)) is None
     silent = winding()
     assert gain_of(replace(silent, roll_rate_radps=np.full_like(silent.speed_mps, np.nan))) is None
@@ -92,7 +92,7 @@ def test_a_gain_is_changed_beyond_chance_and_temperature() -> None:
     assert not is_changed(replace(batch, gyro_gain=(1.5, 0.006)), of_gain(None))
 
 
-def test_a_simulated_van_on_a_country_road_tells_its_gyros_gain() -> None:
+def test_bends_of_a_country_road_show_the_gyros_gain() -> None:
     """Through sensors, frames and map; a gyro whose three rates are 5 % too large is told as such."""
     van = next(iter(VANS.values()))
     driven = simulate_drive(van, (), iso_road("B"), rural(360.0, np.random.default_rng(4)), REFERENCE, 5)
@@ -122,6 +122,6 @@ def batch_of(rows: Motion) -> Batch:
     return build_batch(rows, BatchWindow(t_ns, t_ns + 360 * NS_PER_S, t_ns), settings, {})
 
 
-def test_without_the_signals_nothing_is_told_and_nothing_else_changes() -> None:
+def test_missing_signals_leave_the_gain_unknown() -> None:
     rows = drive(100.0)
     assert batch_of(rows).gyro_gain is None

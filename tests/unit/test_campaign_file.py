@@ -62,7 +62,7 @@ def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
     assert loaded(tmp_path, campaign_text('signals = "springscale:aceinna"')).signals == "springscale:aceinna"
 
 
-def test_axle_weights_stand_for_the_sprung_mass_as_where_a_vehicle_is_stated(tmp_path: Path) -> None:
+def test_axle_weights_give_the_sprung_mass(tmp_path: Path) -> None:
     weights = {"kerb_front_axle_kg": "713.0", "kerb_rear_axle_kg": "704.0"}
     text = campaign_text(vehicle=weights).replace("empty_mass_kg = 1240.0\n", "")
     vehicle = loaded(tmp_path, text).vehicle
@@ -83,7 +83,7 @@ def test_shares_follow_from_positions_unless_they_are_given(tmp_path: Path) -> N
     assert stated == 47.5
 
 
-def test_a_run_of_which_nothing_is_said_has_an_unknown_load(tmp_path: Path) -> None:
+def test_a_run_without_a_load_has_an_unknown_load(tmp_path: Path) -> None:
     campaign = loaded(tmp_path, campaign_text('signals = "s"', None, EMPTY_RUN, {"log": '"a.log"'}))
     run = campaign.known_run(2, campaign.runs[1], ())
     assert (run.has_payload, run.has_place, run.described) == (False, False, "an unknown load")
@@ -131,14 +131,14 @@ def test_no_place_of_a_sensor_is_known_to_less_than_a_millimetre(tmp_path: Path,
     assert "0.001" in fault
 
 
-def test_what_is_carried_reaches_the_vehicle(tmp_path: Path) -> None:
+def test_the_stated_goods_reach_the_vehicle(tmp_path: Path) -> None:
     said = {"carries": '"long_goods"', "payload_height_m": "0.6", "tow_bar": "true"}
     vehicle = loaded(tmp_path, campaign_text(vehicle=said)).vehicle
     assert (vehicle.carries, vehicle.payload_height_m, vehicle.payload_length_m) == ("long_goods", 0.6, None)
     assert (vehicle.roof_rack, vehicle.tow_bar) == (False, True)
 
 
-def test_a_payload_whose_place_to_the_side_nobody_noted_lies_about_the_middle(tmp_path: Path) -> None:
+def test_a_payload_without_a_lateral_place_is_near_the_middle(tmp_path: Path) -> None:
     noted = LOADED_RUN | {"payload_left_m": "-0.25"}
     campaign = loaded(tmp_path, campaign_text('signals = "s"', {"track_width_m": "1.5"}, LOADED_RUN, noted))
     somewhere, there = (KnownRun(1, "a.log", 270.0, 57.0, (), run.payload_left_m) for run in campaign.runs)
@@ -213,7 +213,7 @@ def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
     assert len(faults.splitlines()) == 3
 
 
-def test_a_fault_in_the_only_run_is_not_told_as_a_want_of_runs(tmp_path: Path) -> None:
+def test_a_fault_in_the_only_run_is_reported_as_itself(tmp_path: Path) -> None:
     assert fault_of(tmp_path, campaign_text('signals = "s"', None, EMPTY_RUN | {"end_s": "-1.0"})).count("\n") == 0
 
 

@@ -19,7 +19,7 @@ from gateway.workbench.simulate import bench_of, write_campaign
 
 
 def with_strangers(log: Path) -> None:
-    """The same log with frames that no map names, and with a position."""
+    """The log with frames that no map names, and with a position."""
     chunks, _ = open_whole_log(log)
     frames = merge_frames(list(chunks))
     stamps = frames.t_ns[::50]
@@ -131,7 +131,7 @@ def test_the_page_shows_the_template() -> None:
     assert f"```toml\n{TEMPLATE}```" in page
 
 
-def test_what_is_there_is_not_written_over(folder: Path, bundle: Path) -> None:
+def test_existing_files_are_not_overwritten(folder: Path, bundle: Path) -> None:
     before = bundle.read_bytes()
     with pytest.raises(ConfigurationError, match="is there already"):
         pack(folder, bundle)

@@ -28,7 +28,7 @@ def kinds(**said: object) -> tuple[ShapeHypothesis, ...]:
 
 
 def believed(**said: object) -> ShapeHypothesis:
-    """Of what the fitter stated, or of loads that are spread out."""
+    """The believed shape of loads that the fitter stated, or that are spread out."""
     return kinds(**said)[-1]
 
 
@@ -70,7 +70,7 @@ def test_s_of_a_box_by_hand() -> None:
     assert exp(believed(payload_length_m=2.0, payload_height_m=1.0).log_s) == pytest.approx(by_hand, rel=0.05)
 
 
-def test_what_is_stated_is_known_better_than_what_is_not() -> None:
+def test_stated_shapes_are_known_better_than_others() -> None:
     assert believed(payload_length_m=0.8, payload_height_m=0.5).std < 0.7 * believed().std
     assert (is_said(VAN), is_said(replace(VAN, payload_length_m=0.8))) == (False, True)
     assert (is_said(replace(VAN, carries=Carries.MIXED)), is_said(replace(VAN, carries=Carries.PARCELS))) == (
@@ -79,7 +79,7 @@ def test_what_is_stated_is_known_better_than_what_is_not() -> None:
     )
 
 
-def test_what_nobody_said_is_half_like_the_known_loads_and_half_longer() -> None:
+def test_unstated_shapes_are_half_like_known_loads_and_half_longer() -> None:
     compact, spread = kinds()
     assert (compact.probability, spread.probability) == (1.0 - SPREAD_PART, SPREAD_PART)
     assert exp(compact.log_s) == pytest.approx(KNOWN_S_M2)

@@ -30,7 +30,7 @@ def test_a_sound_configuration_is_good(tmp_path: Path) -> None:
     assert checked(tmp_path).exit_code == 0
 
 
-def test_it_says_by_what_is_weighed_where_no_calibration_is_configured(tmp_path: Path) -> None:
+def test_check_config_names_what_weighs_without_a_calibration(tmp_path: Path) -> None:
     assert "until one is learnt from drives (page /teach)" in checked(tmp_path).stdout
 
 
@@ -50,7 +50,7 @@ def test_it_says_by_what_is_weighed_where_no_calibration_is_configured(tmp_path:
         ),
     ],
 )
-def test_what_cannot_run_is_not_called_good(
+def test_a_configuration_that_cannot_run_is_refused(
     sections: dict[str, str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found_spec = importlib.util.find_spec

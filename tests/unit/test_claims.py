@@ -29,7 +29,7 @@ def together(prior: tuple[F64, F64], terms: Terms) -> tuple[F64, F64]:
 
 
 @given(KG, PLUS_MINUS, KG, PLUS_MINUS, KG, st.floats(5.0, 100.0), st.floats(0.0, 30.0))
-def test_what_is_left_without_a_claim_is_what_was_there_before_it(
+def test_removing_a_claim_restores_the_earlier_posterior(
     one_kg: float, one: float, other_kg: float, other: float, drive_kg: float, drive_std: float, shared: float
 ) -> None:
     claims = [claim("a", one_kg, one, note=shared), claim("b", other_kg, other, note=0.5 * shared)]
@@ -89,7 +89,7 @@ def test_a_common_cause_is_tested_as_a_claim_is(seen: float, std: float) -> None
     assert shared_disagreement(mean, variance) == pytest.approx(abs(seen) / np.hypot(std, 1.0), rel=1e-6, abs=1e-9)
 
 
-def test_truth_is_what_claims_say_without_their_common_error() -> None:
+def test_the_truth_is_the_claims_without_their_common_error() -> None:
     terms = Terms.of([claim("a", 270.0, 10.0, note=15.0), claim("b", 180.0, 10.0, note=10.0)], ("note",))
     one, other = (
         Terms(("x",), *(part[[i]] for part in (terms.said_kg, terms.own_kg, terms.shared_kg))) for i in (0, 1)
@@ -100,7 +100,7 @@ def test_truth_is_what_claims_say_without_their_common_error() -> None:
     assert one.truth(causes, np.array([[1.0]]))[1] == pytest.approx(np.hypot(10.0 / Z95, 15.0))
 
 
-def test_what_is_not_believed_leaves_the_rest() -> None:
+def test_disbelieved_claims_leave_the_others() -> None:
     both = Statement(position_m=1.2, placed_by="b").saying([claim("a", 300.0, 25.0), claim("b", 310.0, 12.0)])
     left = both.without("b")
     assert (left.payload_kg, left.position_m, [one.name for one in left.claims]) == (300.0, None, ["a"])
@@ -109,6 +109,6 @@ def test_what_is_not_believed_leaves_the_rest() -> None:
     assert load_prior_of(NOTHING_KNOWN, VAN).payload_std_kg > 100.0
 
 
-def test_a_claim_that_counts_less_keeps_what_it_shares() -> None:
+def test_a_claim_of_less_weight_keeps_its_shared_error() -> None:
     soft = claim("a", 300.0, 10.0, a=20.0, note=15.0).softened(2.0)
     assert (soft.plus_minus_kg, dict(soft.shared)) == (20.0, {"a": 40.0, "note": 15.0})

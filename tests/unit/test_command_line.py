@@ -16,7 +16,7 @@ from gateway.errors import BusError, SpringscaleError
 
 
 @pytest.mark.parametrize(("typed", "meant"), [("estmate", "estimate"), ("check_config", "check-config")])
-def test_a_mistyped_command_is_told_which_was_meant(typed: str, meant: str) -> None:
+def test_a_mistyped_command_gets_a_suggestion(typed: str, meant: str) -> None:
     said = called(typed)
     assert said.exit_code == 2
     assert f"No such command {typed!r}: did you mean {meant}?" in said.output
@@ -39,7 +39,7 @@ def test_ctrl_c_ends_quietly_with_the_code_of_an_interrupted_process(monkeypatch
     assert said.output == ""
 
 
-def test_its_version_is_told_by_either_name() -> None:
+def test_both_names_print_the_version() -> None:
     short, long = (called(name).output for name in ("-V", "--version"))
     assert short == long
     assert short.startswith("springscale, version ")
@@ -56,7 +56,7 @@ def test_its_version_is_told_by_either_name() -> None:
         ("simulate", "campaign", "paper", "somewhere", "--longest-s"),
     ],
 )
-def test_what_is_no_number_is_a_usage_error(command: tuple[str, ...], text: str) -> None:
+def test_text_in_place_of_a_number_is_a_usage_error(command: tuple[str, ...], text: str) -> None:
     said = called(*command, text)
     assert said.exit_code == 2
     assert f"Invalid value for '{command[-1]}'" in said.output
@@ -73,7 +73,7 @@ def test_what_is_no_number_is_a_usage_error(command: tuple[str, ...], text: str)
         (("check-config", "nul.toml"), "nul.toml: store.directory: contains a NUL character"),
     ],
 )
-def test_what_cannot_be_read_or_reached_is_said_in_one_line(
+def test_unreadable_and_unreachable_things_are_reported_in_one_line(
     command: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -85,7 +85,7 @@ def test_what_cannot_be_read_or_reached_is_said_in_one_line(
         run(*command)
 
 
-def test_a_drive_that_fails_ends_the_command_with_what_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_drive_ends_the_command_with_its_error(monkeypatch: pytest.MonkeyPatch) -> None:
     def drive(*_: object) -> None:
         raise BusError("springscale-demo: the bus has gone")
 
@@ -101,7 +101,7 @@ FITTING = ("gateway.calibration.ratio_index", "gateway.calibration.inspection", 
 
 
 def python(code: str) -> str:
-    """What the code prints in a process of its own."""
+    """The output of the code in a process of its own."""
     command = [sys.executable, "-c", code]
     return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=True).stdout
 

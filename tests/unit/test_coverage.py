@@ -24,7 +24,7 @@ def test_batches_of_different_runs_give_the_exact_binomial_limits() -> None:
 
 
 @pytest.mark.parametrize("n_covered", [1, 10, 18])
-def test_what_is_covered_and_what_is_not_have_mirrored_limits(n_covered: int) -> None:
+def test_limits_of_hits_and_misses_mirror_each_other(n_covered: int) -> None:
     covered = [True] * n_covered + [False] * (20 - n_covered)
     found, other = (coverage_of([one is held for one in covered], list(range(20))) for held in (True, False))
     assert (found.low, found.high) == pytest.approx((1.0 - other.high, 1.0 - other.low))
@@ -61,7 +61,7 @@ def test_the_limits_hold_the_true_share_when_runs_differ() -> None:
     assert n_naive < n_held
 
 
-def test_one_run_tells_nothing_of_how_runs_scatter() -> None:
+def test_one_run_has_no_scatter_between_runs() -> None:
     with pytest.raises(ValueError, match="at least two runs"):
         coverage_of([True, False], ["a", "a"])
 

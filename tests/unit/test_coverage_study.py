@@ -48,7 +48,7 @@ def test_vans_differ_and_come_back_with_their_seed() -> None:
     assert len({van(number).sprung_kg for number in range(6)}) == 6
 
 
-def test_what_is_stated_gives_the_simulated_share() -> None:
+def test_stated_payloads_give_the_simulated_share() -> None:
     for number in range(3):
         one = van(number)
         for loads in known_loads(one, 6, np.random.default_rng(1))[1:]:
@@ -130,7 +130,7 @@ def test_every_van_is_put_to_every_kind_of_drive(monkeypatch: pytest.MonkeyPatch
     assert done == [(0, 2), (1, 2), (2, 2)]
 
 
-def test_loads_stand_beside_the_centre_line_as_far_as_the_trip_says() -> None:
+def test_loads_have_the_lateral_offset_of_the_trip() -> None:
     loads = (Load(100.0, 1.0), Load(50.0, 2.0))
     for off_m in (NEAR_M, SIDEWAYS_M):
         lefts_m = [beside(loads, off_m, np.random.default_rng(seed))[0].left_m for seed in range(50)]

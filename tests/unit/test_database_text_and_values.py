@@ -76,7 +76,7 @@ def test_a_named_code_of_a_measured_signal_is_no_measurement(raw, tmp_path):
     assert (len(samples), dict(counts.rejected)) == (0, {"not_available": 1})
 
 
-def test_a_database_that_names_every_raw_value_is_told_of(tmp_path):
+def test_a_database_that_names_every_raw_value_is_reported(tmp_path):
     """The samples were left out without a word, and the time stamps blamed."""
     names = " ".join(f'{raw} "{raw / 1000} m/s^2"' for raw in RAWS[150:])
     (tmp_path / "a.dbc").write_text(DBC + f"VAL_ 512 Accel {names} ;\n")
@@ -91,7 +91,7 @@ def test_a_database_that_names_every_raw_value_is_told_of(tmp_path):
     assert report.causes()
 
 
-def test_messages_of_which_no_frame_came_are_told_of(tmp_path):
+def test_messages_without_frames_are_reported(tmp_path):
     (tmp_path / "a.dbc").write_text(DBC + 'BO_ 2147484161 GYRO: 8 A\n SG_ Rate : 0|16@1- (1,0) [0|0] "dps" A\n')
     (tmp_path / "a.toml").write_text(MAP.replace('"BOX"\nsignal = "Rate"', '"GYRO"\nsignal = "Rate"'))
     (tmp_path / "a.log").write_text("(1790000000.5) can0 200#0000000000000100\n(1790000000.5) can0 201#00\n")

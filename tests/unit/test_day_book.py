@@ -31,7 +31,7 @@ def run(directory: Path, estimates: list[Estimate]) -> dict[str, dict]:
 
 
 @pytest.mark.parametrize("cut", [0, 1, 3, 5, 8, len(WHOLE)])
-def test_what_is_stored_is_what_a_log_tells_whatever_the_restarts(tmp_path: Path, cut: int) -> None:
+def test_restarts_do_not_change_the_stored_events(tmp_path: Path, cut: int) -> None:
     run(tmp_path, WHOLE[:cut])
     stored = run(tmp_path, WHOLE[cut:])
     assert stored == {entry.id: entry.record for entry in told(WHOLE, Rules()).values()}

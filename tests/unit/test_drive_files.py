@@ -22,7 +22,7 @@ def begun(files: DriveFiles) -> list[int]:
     return [(one.t_start_ns - NOW_NS) // NS_PER_S for one in files.windows()]
 
 
-def test_windows_are_there_after_a_start(tmp_path: Path) -> None:
+def test_windows_survive_a_restart(tmp_path: Path) -> None:
     files = DriveFiles(tmp_path, 10 * BYTES)
     assert files.add(kept_window(0, 0), nothing)
     assert not files.add(kept_window(0, 0), nothing)
@@ -62,7 +62,7 @@ def test_of_a_long_drive_the_first_half_hour_is_kept(tmp_path: Path) -> None:
     assert begun(files) == [n * 300 for n in range(6)]
 
 
-def test_a_failing_disk_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_disk_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "drives").write_text("in the way")
     with pytest.raises(OSError, match="drives"):
         DriveFiles(tmp_path / "drives", 10 * BYTES).add(kept_window(0, 0), nothing)

@@ -29,7 +29,7 @@ DEMO = str(files("gateway") / "demo" / "paper_van.json")
 
 
 def said(monkeypatch: pytest.MonkeyPatch, log: Path, *batches: Estimate) -> SpringscaleError | None:
-    """What the command ends with where the log holds these batches; None: it ends well."""
+    """The error with which the command ends for these batches; None if it succeeds."""
 
     def weighed(*_: Any, **__: Any) -> Iterator[Estimate]:
         yield from batches
@@ -73,9 +73,7 @@ def test_without_a_calibration_the_advice_is_how_to_get_one(monkeypatch: pytest.
     assert len(run("estimate", log, "--signals", "springscale:reference", "--json").stdout.splitlines()) == 7
 
 
-def test_what_the_road_or_a_sensor_did_is_not_laid_on_the_calibration(
-    monkeypatch: pytest.MonkeyPatch, log: Path
-) -> None:
+def test_refusals_by_road_or_sensor_do_not_blame_the_calibration(monkeypatch: pytest.MonkeyPatch, log: Path) -> None:
     slow = (
         make_estimate(0, Why.TOO_SLOW),
         make_estimate(1, Why.ACCELERATION_STUCK),
@@ -108,18 +106,18 @@ def line(estimate: Estimate) -> str:
     return sentence(without_dates(estimate_to_json(estimate)))
 
 
-def test_a_line_says_when_how_much_and_how_sure() -> None:
+def test_a_line_has_time_payload_and_interval() -> None:
     assert line(ANSWER) == (
         "no date, 0:00:00  payload   100.0 kg ±  12.0 (95 %)   front share 50.50 % ± 0.40 (95 %)    50.4 km/h"
     )
 
 
-def test_a_line_says_the_date_where_the_log_has_one() -> None:
+def test_a_line_has_the_date_of_a_dated_log() -> None:
     assert line(make_estimate(5_000_000, Why.GAP)) == "2017-07-14T02:40:00Z  no estimate: gap"
     assert line(make_estimate(300, Why.GAP)) == "no date, 1 day, 1:00:00  no estimate: gap"
 
 
-def test_what_the_calibration_does_not_hold_is_said_to_be_unknown() -> None:
+def test_quantities_that_the_calibration_lacks_are_unknown() -> None:
     """Loads all at one place calibrate the ratio index for payload alone."""
     assert line(replace(ANSWER, front_share=UNKNOWN)) == (
         "no date, 0:00:00  payload   100.0 kg ±  12.0 (95 %)   front share unknown    50.4 km/h"
@@ -127,17 +125,17 @@ def test_what_the_calibration_does_not_hold_is_said_to_be_unknown() -> None:
     assert "payload unknown   front share 50.50 % ± 0.40 (95 %)" in line(replace(ANSWER, payload=UNKNOWN))
 
 
-def test_where_the_load_lies_sideways_is_said_where_something_tells() -> None:
+def test_the_lateral_place_is_printed_if_known() -> None:
     aside = replace(ANSWER, cg_left=Quantity(-0.035, 0.004, (-0.043, -0.027)))
     assert "(95 %)     -35 mm left ±   8 (95 %)    50.4 km/h" in line(aside)
     assert "mm" not in line(ANSWER)
 
 
-def test_a_refusal_says_why() -> None:
+def test_a_refusal_has_its_reason() -> None:
     assert line(make_estimate(0, Why.AMBIGUOUS)) == "no date, 0:00:00  no estimate: ambiguous"
 
 
-def test_too_much_is_said_last() -> None:
+def test_an_overload_is_printed_last() -> None:
     heavy = Weights(gross=Weight(2010.0, 6.0, 2000.0, None), rear_axle=Weight(1120.0, 5.0, 1100.0, None))
     assert line(replace(ANSWER, weights=heavy)).endswith(" 50.4 km/h   over the limit: gross, rear axle")
 
@@ -161,7 +159,7 @@ def remarks(path, channel=None):
     return list(report.remarks())
 
 
-def test_nothing_is_said_of_a_sound_log(log_of):
+def test_a_sound_log_prints_no_warnings(log_of):
     assert remarks(log_of(*(LINE.format(1_790_000_000 + i, "can0") for i in range(9)))) == []
 
 
@@ -173,7 +171,7 @@ def test_lines_left_out_are_counted_by_reason(log_of):
     }
 
 
-def test_frames_of_several_channels_are_told_unless_one_is_named(log_of):
+def test_frames_of_several_channels_are_reported_unless_one_is_named(log_of):
     path = log_of(*(LINE.format(1_790_000_000, name) for name in ("can0", "can1")))
     assert remarks(path) == [
         f"{path}: mapped frames are on can0, can1; if these are one bus twice, name one in the map"
@@ -181,7 +179,7 @@ def test_frames_of_several_channels_are_told_unless_one_is_named(log_of):
     assert remarks(path, "can0") == [f"{path}: left out: 1 frame of other channels"]
 
 
-def test_estimate_tells_them_on_standard_error(tmp_path):
+def test_estimate_reports_them_on_standard_error(tmp_path):
     packed = zstd.compress("".join(LINE.format(i / 100, "can0") for i in range(20_000)).encode())
     (tmp_path / "a.log.zst").write_bytes(packed[: len(packed) // 2])
     ran = called("estimate", tmp_path / "a.log.zst", "--signals", "springscale:reference")
@@ -272,7 +270,7 @@ def commands(log: Path) -> Iterator[list[str]]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_ends_with_an_answer_or_a_clear_error(logs: dict[str, Path], name: str) -> None:
+def test_every_log_gives_an_answer_or_a_clear_error(logs: dict[str, Path], name: str) -> None:
     for asked in commands(logs[name]):
         done = called(*asked)
         assert done.exception is None or isinstance(done.exception, SpringscaleError), (asked[0], done.exception)

@@ -101,7 +101,7 @@ def test_the_table_is_its_runs_weighed_by_their_batches(errors_kg: list[list[flo
     assert table["payload"]["max_abs_kg"] == max(run["payload"]["max_abs_kg"] for run in table["runs"])
 
 
-def test_nothing_answered_is_null_not_zero() -> None:
+def test_figures_without_answers_are_null() -> None:
     table = errors_of([judged(100.0, None)], VAN).payload.to_json()
     assert table.pop("mean_abs_pct_with_misses") == pytest.approx(25.0)
     assert set(table.values()) == {None}
@@ -134,7 +134,7 @@ def test_sideways_errors_by_hand() -> None:
     assert errors.wheels.max_abs_pct_of_gross == pytest.approx(100.0 * np.max(off_kg) / gross_kg)
 
 
-def test_the_table_is_shown_with_what_lies_sideways() -> None:
+def test_the_table_has_lateral_errors() -> None:
     shown = text_of(error_table([placed(0.05, 0.056), placed(-0.03, -0.05)], ROLLING, "x")).splitlines()
     assert shown[4:7] == [
         "c.g. left                           -7.0 mm  13.0 mm  20.0 mm     13.0 mm   50.00 %    10.0 mm 220.0 mm",
@@ -164,7 +164,7 @@ def test_without_a_place_that_was_noted_nothing_sideways_is_judged() -> None:
     assert (table["cg_left"], table["wheels"], table["batches"][0]["true_cg_left_m"]) == (None, None, None)
 
 
-def test_a_place_that_was_noted_and_not_told_is_null() -> None:
+def test_a_noted_place_without_an_answer_is_null() -> None:
     errors = errors_of([replace(judged(100.0, 100.0), cg_left_m=0.02)], ROLLING)
     assert errors.cg_left is not None
     assert set(asdict(errors.cg_left).values()) == {None}
@@ -239,7 +239,7 @@ def test_a_calibration_of_one_load_believes_what_the_vehicle_may_carry(
     assert one.is_out_of_range(payload95_kg, (1.0, 2.0)) is is_refused
 
 
-def test_an_interval_wider_than_the_believed_range_says_nothing() -> None:
+def test_an_interval_wider_than_the_believed_range_is_refused() -> None:
     calibrated = calibration_file().for_core()
     low, high = calibrated.payload_believed_kg
     assert not calibrated.is_out_of_range((low + 1.0, high), (47.0, 49.0))

@@ -126,7 +126,7 @@ def sentence(**changed: Any) -> str:
     return entry_sentence(Entry(EntryKind.EVENT, "event-1", 1, {**EVENT, **changed}))
 
 
-def test_what_was_unloaded_when_and_how_surely() -> None:
+def test_an_unloading_has_its_time_mass_and_interval() -> None:
     assert sentence() == "2026-01-01 00:14 to 00:31  180 kg unloaded (± 20 kg), 87% probable; 220 kg on board then"
 
 
@@ -137,5 +137,5 @@ def test_what_was_unloaded_when_and_how_surely() -> None:
         ("2026-01-08T00:00:02.000000Z", "2026-01-01 00:14 to 2026-01-08 00:00  "),
     ],
 )
-def test_the_day_is_said_again_where_it_is_another_one(t_end: str, span: str) -> None:
+def test_a_new_date_is_printed_once(t_end: str, span: str) -> None:
     assert sentence(t_end=t_end).startswith(span)

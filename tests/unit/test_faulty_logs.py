@@ -68,12 +68,12 @@ def test_a_gain_a_bias_and_a_sign(log: Log) -> None:
     np.testing.assert_allclose(over, -before, atol=step(log, PITCH_RATE))
 
 
-def test_what_is_late_is_what_was(log: Log) -> None:
+def test_delayed_values_are_the_earlier_ones(log: Log) -> None:
     before, late = both(log, PITCH_RATE, "pitch rate late by", "0.05 s")
     np.testing.assert_allclose(late[5:], before[:-5], atol=step(log, PITCH_RATE))
 
 
-def test_a_low_pass_keeps_what_is_slow_alone(log: Log) -> None:
+def test_a_low_pass_keeps_slow_movements_only(log: Log) -> None:
     before, slow = both(log, ACCELERATION, "acceleration low pass of", "1 Hz")
     assert slow.mean() == pytest.approx(before.mean(), abs=0.05)
     assert slow.std() < 0.3 * before.std()

@@ -35,7 +35,7 @@ def at_rest(i: int) -> Scan:
 
 @contextmanager
 def listening(channel: str) -> Iterator[list[can.Message]]:
-    """What arrives on an in-process channel."""
+    """The frames that arrive on an in-process channel."""
     heard: list[can.Message] = []
     with can.Bus(interface="virtual", channel=channel, preserve_timestamps=True) as bus:
         notifier = can.Notifier(bus, [heard.append])
@@ -186,7 +186,7 @@ def test_one_receiver_of_several_counts(case: str) -> None:
     assert gps.n_left_out == left_out
 
 
-def test_a_receiver_that_is_plugged_in_anew_takes_the_place_of_the_lost_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reconnected_receiver_replaces_the_lost_one(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [100.0]
     monkeypatch.setattr("gateway.bus.feed.time.monotonic", lambda: clock[0])
     gps = Gpsd("127.0.0.1", 1)
@@ -215,7 +215,7 @@ def test_another_receiver_is_named_once_and_counted() -> None:
     assert f"{OTHER} is left out: {ONE} counts; choose one by --gps-device" in naming[0]
 
 
-def test_no_gpsd_is_told_once_and_tried_again(tmp_path: Path) -> None:
+def test_a_missing_gpsd_is_reported_once_and_retried(tmp_path: Path) -> None:
     fake = FakeIio(tmp_path)
     device = IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
     with (
@@ -248,7 +248,7 @@ def test_a_device_that_is_gone_ends_the_feed(tmp_path: Path) -> None:
     assert "gone" in str(ended[0])
 
 
-def test_a_bus_that_is_absent_is_tried_again_and_what_was_dropped_is_counted(
+def test_an_absent_bus_is_retried_and_dropped_frames_are_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gateway.bus.feed.QUEUE", 20)
@@ -287,7 +287,7 @@ def test_mount_matrices_of_the_driver_are_applied_before_the_named_axes(tmp_path
 
 
 @pytest.mark.parametrize("text", ["1, 0; 0, 1", "a, b, c", "1, 0, 0; 0, 1, 0; 0, 0"])
-def test_a_mount_matrix_that_is_none_is_said_when_the_device_is_opened(text: str, tmp_path: Path) -> None:
+def test_an_invalid_mount_matrix_is_reported_when_the_device_is_opened(text: str, tmp_path: Path) -> None:
     fake = FakeIio(tmp_path)
     (fake.device / "in_mount_matrix").write_text(text)
     with pytest.raises(ConfigurationError, match=r"mount matrix is .* no 3 by 3 numbers"):
@@ -346,7 +346,7 @@ def test_axes_are_right_handed_and_one_line_is_refused() -> None:
                 assert np.linalg.det(turned(forward, up)) == pytest.approx(1.0)
 
 
-def test_devices_are_found_and_what_is_none_is_refused(tmp_path: Path) -> None:
+def test_devices_are_found_and_other_folders_refused(tmp_path: Path) -> None:
     fake = FakeIio(tmp_path)
     light = fake.sysfs / "iio:device1"
     light.mkdir()
@@ -356,7 +356,7 @@ def test_devices_are_found_and_what_is_none_is_refused(tmp_path: Path) -> None:
         IioDevice(light, LEVEL, 100.0, fake.nodes)
 
 
-def test_the_command_tells_what_it_did_and_that_the_wrong_axis_is_up(tmp_path: Path) -> None:
+def test_the_command_reports_its_work_and_a_wrong_vertical_axis(tmp_path: Path) -> None:
     fake = FakeIio(tmp_path)
     options = ["--interface", "virtual", "--channel", "feed-cli", "--gpsd", "", "--up", "y", "--forward", "x"]
     options += ["--sysfs", str(fake.sysfs), "--nodes", str(fake.nodes), "--for-s", "4", "--json"]

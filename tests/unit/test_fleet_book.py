@@ -77,7 +77,7 @@ def alarm(vehicle: str, revision: int, *, is_active: bool) -> Message:
     return message(vehicle, "alarms", id="alarm-1", revision=revision, is_active=is_active, **told)
 
 
-def test_a_line_is_of_the_newest_answer_however_late_an_older_one_comes(book: Book) -> None:
+def test_a_late_older_answer_does_not_replace_the_newest(book: Book) -> None:
     book.write([estimate("van-1", 55, 200.0), estimate("van-1", 50, 100.0), estimate("van-1", 58, 0.0, "too_slow")])
     (line,) = book.fleet().items
     assert (line.vehicle_id, line.estimate.payload_kg, line.estimate.weights["gross"].kg) == ("van-1", 200.0, 1700.0)
@@ -85,7 +85,7 @@ def test_a_line_is_of_the_newest_answer_however_late_an_older_one_comes(book: Bo
     assert line.age_s == 300.0
 
 
-def test_what_comes_twice_is_one_row_and_the_highest_revision_stays(book: Book, tmp_path: Path) -> None:
+def test_duplicates_become_one_row_with_the_highest_revision(book: Book, tmp_path: Path) -> None:
     book.write([estimate("van-1", 55, 600.0), alarm("van-1", 2, is_active=True)] * 2)
     book.write([alarm("van-1", 1, is_active=False), estimate("van-1", 55, 1.0)])
     (line,) = book.fleet().items
@@ -104,7 +104,7 @@ def test_a_vehicle_that_goes_offline_keeps_what_it_reported(book: Book) -> None:
     assert (line.estimate, line.age_s, line.used_share) == (None, None, None)
 
 
-def test_what_cannot_be_read_is_set_aside_and_holds_up_nothing(book: Book, tmp_path: Path) -> None:
+def test_unreadable_records_are_set_aside_without_delaying_others(book: Book, tmp_path: Path) -> None:
     poison = [Message(f"springscale/{topic}", payload) for topic, payload in UNREADABLE]
     told = book.write([*poison, estimate("van-2", 1, 5.0)])
     assert [topic for topic, _ in told] == [one.topic for one in poison]
@@ -140,7 +140,7 @@ def test_a_table_that_is_missing_is_made_again(book: Book, tmp_path: Path) -> No
     assert book.fleet().items[0].estimate.payload_kg == 6.0
 
 
-def test_a_database_that_is_away_is_told_to_the_caller_and_used_when_it_is_back(tmp_path: Path) -> None:
+def test_an_unreachable_database_raises_and_is_used_again_later(tmp_path: Path) -> None:
     book = Book(str(tmp_path / "absent" / "fleet.sqlite"), lambda: NOW_S)
     with pytest.raises(AWAY):
         book.write([estimate("van-1", 2, 5.0), Message("springscale/van-1/trips", b"no JSON")])

@@ -1,5 +1,6 @@
 """Drift of a vehicle is told from the seasons of the fleet and from chance, by Theil-Sen slopes."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,7 @@ def fleet_with(n_vehicles: int, per_year: float) -> dict[str, Series]:
     }
 
 
-def test_what_one_vehicle_does_alone_is_believed_and_what_all_do_is_not() -> None:
+def test_a_drift_of_one_vehicle_is_believed_and_a_common_one_is_not() -> None:
     drifts = drifts_of(fleet_with(LEAST_VEHICLES + 5, per_year=0.05))
     believed = [name for name, found in drifts.items() if found["damper_front_ratio"].is_believed]
     assert believed == ["van-0"]
@@ -63,7 +64,7 @@ def test_a_small_fleet_has_no_movement_in_common() -> None:
     assert common_movement([]) == {}
 
 
-def test_a_parameter_that_nobody_knows_has_no_drift() -> None:
+def test_an_unknown_parameter_has_no_drift() -> None:
     assert list(drifts_of(fleet_with(2, 0.0))["van-1"]) == ["damper_front_ratio"]
     few = {"van": series_of(np.ones(len(WEEKS)))}
     few["van"] = {**few["van"], "damper_front_ratio": (WEEKS[: LEAST_POINTS - 1], np.ones(LEAST_POINTS - 1))}
@@ -84,36 +85,38 @@ def test_a_slope_is_since_the_last_calibration(tmp_path: Path) -> None:
     assert len(vehicle.weeks.number) == 24
 
 
-def test_a_receipt_without_its_table_says_so(tmp_path: Path) -> None:
-    slot = write_table(tmp_path, "van", week(0))
-    (tmp_path / slot.table).unlink()
-    with pytest.raises(PlaceError, match=r"is missing, though a receipt vouches for it: remove receipts/vehicle=van"):
-        fleet_of(place_of(tmp_path))
-
-
-def test_a_table_that_is_cut_says_so(tmp_path: Path) -> None:
-    slot = write_table(tmp_path, "van", week(0))
-    (tmp_path / slot.table).write_bytes((tmp_path / slot.table).read_bytes()[:100])
-    with pytest.raises(PlaceError, match=r"is no Parquet file .*: remove it and receipts/"):
-        fleet_of(place_of(tmp_path))
+def with_schema(path: Path, version: str) -> None:
+    table = pq.read_table(path, partitioning=None)
+    pq.write_table(table.replace_schema_metadata({"springscale_schema": version}), path)
 
 
 @pytest.mark.parametrize(
-    ("version", "told"),
-    [(str(SCHEMA_VERSION + 1), f"has schema {SCHEMA_VERSION + 1}.*install a newer one"), ("", "is no table of")],
+    ("spoil", "error", "told"),
+    [
+        (Path.unlink, PlaceError, r"is missing, though a receipt vouches for it: remove receipts/vehicle=van"),
+        (lambda path: path.write_bytes(path.read_bytes()[:100]), PlaceError, r"is no Parquet file .*: remove it and"),
+        (lambda path: with_schema(path, str(SCHEMA_VERSION + 1)), ConfigurationError, "has schema .*install a newer"),
+        (lambda path: with_schema(path, ""), ConfigurationError, "is no table of"),
+        (
+            lambda path: write_table(path.parents[3], "van", week(0), month="2026-02"),
+            ConfigurationError,
+            "vouch for the same 10 batches",
+        ),
+    ],
 )
-def test_a_table_of_another_schema_says_so(tmp_path: Path, version: str, told: str) -> None:
-    slot = write_table(tmp_path, "van", week(0))
-    table = pq.read_table(tmp_path / slot.table, partitioning=None)
-    pq.write_table(table.replace_schema_metadata({"springscale_schema": version}), tmp_path / slot.table)
-    with pytest.raises(ConfigurationError, match=told):
+def test_a_faulty_table_is_reported(
+    tmp_path: Path, spoil: Callable[[Path], object], error: type[Exception], told: str
+) -> None:
+    spoil(tmp_path / write_table(tmp_path, "van", week(0)).table)
+    with pytest.raises(error, match=told):
         fleet_of(place_of(tmp_path))
 
 
-def test_batches_that_two_receipts_hold_are_not_counted_twice(tmp_path: Path) -> None:
-    write_table(tmp_path, "van", week(0))
-    write_table(tmp_path, "van", week(0), month="2026-02")
-    with pytest.raises(ConfigurationError, match="vouch for the same 10 batches"):
+@pytest.mark.parametrize(("is_there", "told"), [(False, "holds no receipt of"), (True, "hold no batch at all")])
+def test_an_empty_data_set_is_reported(tmp_path: Path, is_there: bool, told: str) -> None:
+    if is_there:
+        write_table(tmp_path, "van", [])
+    with pytest.raises(ConfigurationError, match=told):
         fleet_of(place_of(tmp_path))
 
 
@@ -122,14 +125,6 @@ def test_several_jobs_are_one_vehicle(tmp_path: Path) -> None:
     write_table(tmp_path, "van", [row(1_767_900_000.0)], month="2026-02")
     [vehicle] = fleet_of(place_of(tmp_path)).vehicles
     assert vehicle.n == 2
-
-
-def test_nothing_to_report_says_so(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match="holds no receipt of `springscale reprocess`"):
-        fleet_of(place_of(tmp_path))
-    write_table(tmp_path, "van", [])
-    with pytest.raises(ConfigurationError, match="hold no batch at all"):
-        fleet_of(place_of(tmp_path))
 
 
 X = np.arange(52.0) / 52.0
@@ -171,7 +166,7 @@ def test_independent_points_are_judged_as_by_kendall() -> None:
     assert trend.p == pytest.approx(expected, abs=0.01)
 
 
-def test_too_few_points_tell_nothing_and_equal_ones_no_slope() -> None:
+def test_too_few_points_have_no_slope_and_equal_ones_have_zero() -> None:
     assert trend_of(X[: LEAST_POINTS - 1], X[: LEAST_POINTS - 1]) is None
     level = trend_of(X, np.zeros(len(X)))
     assert (level.slope, level.low, level.high, level.p) == (0.0, 0.0, 0.0, 1.0)
@@ -185,7 +180,7 @@ def test_one_wild_week_moves_the_slope_little() -> None:
 
 
 @pytest.mark.parametrize("alike", [0.0, 0.3, 0.6])
-def test_the_interval_holds_a_slope_of_nothing_about_as_often_as_it_says(alike: float) -> None:
+def test_the_interval_covers_a_zero_slope_at_its_nominal_rate(alike: float) -> None:
     trends = [trend_of(X, y) for y in repeating(alike, 400, seed=3)]
     held = np.mean([trend is not None and trend.low <= 0.0 <= trend.high for trend in trends])
     assert 0.90 <= held <= 0.985

@@ -27,7 +27,7 @@ def test_the_compose_file_is_one_by_its_own_schema() -> None:
     assert done.returncode == 0, done.stdout
 
 
-def test_what_the_compose_file_mounts_and_builds_is_there() -> None:
+def test_files_that_the_compose_file_names_exist() -> None:
     mounts = [mount for service in COMPOSE["services"].values() for mount in service.get("volumes", [])]
     mounted = [mount.split(":")[0].removeprefix("./") for mount in mounts]
     named = set(COMPOSE["volumes"])
@@ -45,7 +45,7 @@ def test_images_are_pinned_and_every_variable_stands_in_the_example() -> None:
     assert asked == told - {line for line in told if line.startswith("#")}
 
 
-def test_the_subscriber_is_told_what_it_asks_for() -> None:
+def test_the_subscriber_gets_its_settings() -> None:
     asked = {name.upper(): field for name, field in SubscriberSettings.model_fields.items()}
     given = set(COMPOSE["services"]["subscriber"]["environment"])
     assert {name for name, field in asked.items() if field.is_required()} <= given
@@ -54,9 +54,7 @@ def test_the_subscriber_is_told_what_it_asks_for() -> None:
 
 @needs_openssl
 @pytest.mark.parametrize("name", ["broker.fleet.example", "192.0.2.7"])
-def test_the_brokers_certificate_is_signed_by_the_fleets_authority_and_made_anew_without_another(
-    name: str, tmp_path: Path
-) -> None:
+def test_the_brokers_certificate_is_renewed_by_the_same_authority(name: str, tmp_path: Path) -> None:
     authorities = []
     for _ in range(2):
         subprocess.run([FLEET / "make_certificates.sh", name, tmp_path / "pki"], check=True, capture_output=True)
@@ -95,7 +93,7 @@ def test_each_vehicle_gets_settings_that_the_service_takes(fleet: Path) -> None:
     assert listed == ["fleet-dispatcher", "fleet-subscriber", "van-1", "van-2", "van-3"]
 
 
-def test_running_it_again_changes_nothing_but_what_the_table_changes(fleet: Path) -> None:
+def test_a_second_run_changes_only_rows_changed_in_the_table(fleet: Path) -> None:
     provision(fleet, "broker.fleet.example")
     before = {path: path.read_bytes() for path in (fleet / "out").rglob("*") if path.is_file()}
     provision(fleet, "broker.fleet.example")
@@ -133,7 +131,7 @@ def test_a_vehicles_own_files_travel_with_it(fleet: Path) -> None:
         ("id,vin,calibration\nvan-1,,nowhere.json\n", "", "nowhere.json"),
     ],
 )
-def test_a_table_that_cannot_be_used_is_told_in_one_line(table: str, settings: str, words: str, fleet: Path) -> None:
+def test_an_unusable_table_is_reported_in_one_line(table: str, settings: str, words: str, fleet: Path) -> None:
     (fleet / "fleet.csv").write_text(table)
     (fleet / "settings.toml").write_text(settings)
     with pytest.raises(subprocess.CalledProcessError) as failed:

@@ -144,7 +144,7 @@ def test_every_page_is_well_formed_and_headings_descend_by_one(made: Path) -> No
         assert all(len(alt) > 40 for alt in page.alts)
 
 
-def test_all_that_pages_need_lies_beside_them(made: Path) -> None:
+def test_pages_link_only_to_files_beside_them(made: Path) -> None:
     for path in pages(made):
         assert_self_contained(path)
 
@@ -182,7 +182,7 @@ def test_a_band_does_not_span_weeks_that_are_unknown() -> None:
     assert list(runs_of(known, number)) == [slice(0, 3), slice(3, 4), slice(5, 6)]
 
 
-def test_a_data_set_that_is_none_ends_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_invalid_data_set_is_reported_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as left:
         main(["fleet-report", str(tmp_path), "--output", str(tmp_path / "report")])
     assert left.value.code == 2
@@ -235,13 +235,13 @@ def shown(number: int, names: dict[str, Any], replaced: dict[str, str]) -> dict[
     return names
 
 
-def test_duckdb_counts_what_the_report_counts(dataset: Path, fleet: FleetSummary) -> None:
+def test_duckdb_agrees_with_the_report(dataset: Path, fleet: FleetSummary) -> None:
     by_reason, by_week = (duckdb.sql(one.replace("DATASET", str(dataset))).fetchall() for one in SQL)
     assert {(vehicle, reason): n for vehicle, reason, n in by_reason} == refusals(fleet)
     assert {(vehicle, str(at)[:10]): (n, mean) for vehicle, at, n, mean in by_week} == loads(fleet)
 
 
-def test_polars_counts_what_the_report_counts(dataset: Path, fleet: FleetSummary) -> None:
+def test_polars_agrees_with_the_report(dataset: Path, fleet: FleetSummary) -> None:
     found = shown(0, {}, {"DATASET": str(dataset)})
     by_week = found["loads"].rows()
     assert {(vehicle, str(at)[:10]): (n, mean) for vehicle, at, n, mean in by_week} == loads(fleet)

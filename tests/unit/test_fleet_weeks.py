@@ -103,7 +103,7 @@ def test_weeks_are_counted_as_by_hand(rows: list[dict[str, Any]]) -> None:
         assert {cause: weeks.n_refused_by[cause][k] for cause in Cause} == told["causes"]
 
 
-def test_a_batch_that_tells_the_share_alone_takes_the_mean_from_no_week() -> None:
+def test_a_batch_without_a_payload_leaves_the_weekly_mean() -> None:
     told = row(MONDAY_S + 3600.0, payload_kg=200.0, payload_std_kg=10.0, payload_own_std_kg=None)
     share_alone = row(MONDAY_S + 7200.0, payload_kg=None, payload_std_kg=None, payload_own_std_kg=None)
     weeks = weeks_of(batches_of([told, share_alone]))
@@ -111,7 +111,7 @@ def test_a_batch_that_tells_the_share_alone_takes_the_mean_from_no_week() -> Non
     assert weeks.payload_high_kg[0] == pytest.approx(200.0 + Z95 * 10.0)
 
 
-def test_the_mean_of_many_is_no_surer_than_what_they_have_in_common() -> None:
+def test_a_mean_is_no_surer_than_its_common_error() -> None:
     [one], [many] = (weeks_of(batches_of(week(0, n))).payload_high_kg - 100.0 for n in (1, 200))
     assert one == pytest.approx(Z95 * 5.0)
     assert many == pytest.approx(Z95 * math.hypot(4.0, 3.0 / math.sqrt(200)))
@@ -152,7 +152,7 @@ def test_more_than_a_fifth_of_the_recent_days_for_sure_are_bad(n_bad: int, healt
     assert found.health is health
 
 
-def test_a_sensor_that_was_mended_is_told_apart_from_one_that_fails_now_and_then() -> None:
+def test_a_mended_sensor_is_distinguished_from_an_intermittent_one() -> None:
     [mended] = troubles_of(days(*[False] * 20, *[True] * 20, *[False] * 30))
     assert (mended.health, mended.since) == (Health.WAS_BAD, None)
     [seldom] = troubles_of(days(*([False] * 9 + [True]) * 5))

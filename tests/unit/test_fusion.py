@@ -43,7 +43,7 @@ def test_one_batch_is_its_own_epoch() -> None:
     assert (epoch.posterior, epoch.n_batches, epoch.is_change) == (batch(270.0).posterior, 1, False)
 
 
-def test_own_errors_average_out_and_what_batches_share_stays() -> None:
+def test_own_errors_average_out_and_shared_errors_stay() -> None:
     for n in (1, 2, 5, 100):
         std_kg = together(*[batch(270.0)] * n).posterior.std(PAYLOAD)
         assert std_kg == pytest.approx(np.hypot(8.0 / np.sqrt(n), SHARED_KG))
@@ -67,7 +67,7 @@ def test_a_change_is_detected_not_averaged() -> None:
     assert (epoch.is_change, epoch.t_start_ns, epoch.posterior.mean[PAYLOAD]) == (True, 7, 300.0)
 
 
-def test_what_batches_share_hides_no_change() -> None:
+def test_a_shared_error_hides_no_change() -> None:
     """60 kg are 2.5 standard deviations of two batches, and 5 of what is their own."""
     assert together(batch(200.0), batch(260.0)).is_change
     assert not together(batch(200.0), batch(260.0, own_kg=24.0)).is_change
@@ -151,7 +151,7 @@ def test_equal_loads_are_no_change(kg: float, share_pct: float, correlation: flo
 
 
 @pytest.mark.parametrize("prior", [0.0, 1.0])
-def test_what_is_certain_before_stays_certain(prior: float) -> None:
+def test_a_certain_prior_stays_certain(prior: float) -> None:
     assert (
         probability(load(300.0), load(900.0), prior, RULES)
         == probability(load(300.0), load(300.0), prior, RULES)

@@ -1,4 +1,4 @@
-"""MQTT discovery: what Home Assistant is told fits the records it is about."""
+"""The MQTT discovery messages for Home Assistant fit the records that they describe."""
 
 import json
 import math
@@ -38,7 +38,7 @@ RETAINED = {"springscale/van-17/latest", "springscale/van-17/status"}
 
 
 def states(estimate: Estimate) -> dict[str, str]:
-    """What each entity shows after a record, as Home Assistant renders templates: in a sandbox, JSON as value_json."""
+    """Each entity's state after a record, rendered as Home Assistant does: in a sandbox, JSON as value_json."""
     templates = SandboxedEnvironment()
     record = json.loads(json.dumps(estimate_to_json(estimate))) | {"state": "online"}
     components = told()["components"]
@@ -57,7 +57,7 @@ def test_an_estimate_is_shown_as_it_is() -> None:
     assert found["refused"] == ""
 
 
-def test_what_is_not_known_is_unknown_and_no_overload_is_none() -> None:
+def test_unknown_weights_are_unknown_and_no_overload_is_off() -> None:
     """Home Assistant takes the word None for "unknown"."""
     refused = states(make_estimate(3, Why.TOO_SLOW))
     assert {refused[key] for key in ("payload", "payload_std", "gross", "front_axle", "overload")} == {"None"}
@@ -120,7 +120,7 @@ def test_it_is_retained_at_a_real_broker_and_estimates_still_go_out(tmp_path: Pa
 
 
 @needs_mosquitto
-def test_the_last_weights_are_there_for_who_comes_later_though_the_last_batch_was_refused(tmp_path: Path) -> None:
+def test_a_late_subscriber_gets_the_last_weights_after_a_refusal(tmp_path: Path) -> None:
     """After its restart Home Assistant showed nothing until the next estimate."""
     with delivered(tmp_path, "ha", make_record(1), make_record(2), make_record(3, Why.TOO_SLOW)) as port:
         listener = Listener(port, "springscale/van-17/#")
@@ -132,7 +132,7 @@ def test_the_last_weights_are_there_for_who_comes_later_though_the_last_batch_wa
 
 
 @needs_mosquitto
-def test_a_broker_that_does_not_want_it_there_gets_the_estimates_all_the_same(tmp_path: Path) -> None:
+def test_a_refused_discovery_message_does_not_stop_estimates(tmp_path: Path) -> None:
     (tmp_path / "acl").write_text("topic read #\ntopic write springscale/#\n")
     # with an unlimited queue, which the other tests have, mosquitto 2.0.11 cuts who writes where it may not
     extra = f"allow_anonymous true\nacl_file {tmp_path}/acl\nmax_queued_messages 1000"
@@ -140,7 +140,7 @@ def test_a_broker_that_does_not_want_it_there_gets_the_estimates_all_the_same(tm
         pass
 
 
-def test_a_prefix_that_mqtt_forbids_is_told() -> None:
+def test_a_forbidden_prefix_is_reported() -> None:
     section = UplinkSection(host="fleet.example", home_assistant="home/#")
     with pytest.raises(ConfigurationError, match=r"home_assistant 'home/#'"):
         uplink_settings(section, VehicleSection(id="van-17"))

@@ -1,4 +1,4 @@
-"""What runs say of each other: loads that teach, speeds and roads that compare, labels that agree with the drives."""
+"""Runs are compared with each other: loads that teach, comparable speeds and roads, labels that agree."""
 
 from dataclasses import replace
 
@@ -70,7 +70,7 @@ def test_a_run_sampled_at_another_rate_calibrates_nothing(runs: list[KnownRun]) 
     assert Kind.RATE_DIFFERS in [finding.kind for finding in verdicts[-1].findings]
 
 
-def test_runs_whose_load_nobody_knows_are_inspected_and_compared_with_no_other(runs: list[KnownRun]) -> None:
+def test_runs_of_unknown_load_are_inspected_but_not_compared(runs: list[KnownRun]) -> None:
     unknown = [replace(run, payload_kg=float("nan"), front_share_pct=float("nan")) for run in runs[1:]]
     verdicts, findings = inspect_campaign([inspected(run) for run in (runs[0], *unknown)], VAN, SETTINGS)
     assert ([one.findings for one in verdicts], findings) == ([()] * 4, ())
@@ -105,7 +105,7 @@ def test_the_calibration_file_remembers_faults_of_runs_left_out_and_warnings_of_
     )
 
 
-def test_a_campaign_without_identification_says_so() -> None:
+def test_a_campaign_without_identification_is_reported() -> None:
     split = tuple(replace(one, has_identification=False) for one in campaign())
     verdicts = tuple(RunVerdict(n, "a.log") for n in range(1, 5))
     assert "identification_fraction" in str(Inspection(split, verdicts, ()).refusal)

@@ -96,7 +96,7 @@ WRONG_MAPS: dict[str, tuple[Callable[[Motion], Motion], list[str]]] = {
 
 
 @pytest.mark.parametrize("mistake", WRONG_MAPS)
-def test_a_mistake_gets_its_diagnosis_and_no_other(mistake: str, sound: Motion) -> None:
+def test_each_mistake_gets_only_its_own_diagnosis(mistake: str, sound: Motion) -> None:
     spoil, expected = WRONG_MAPS[mistake]
     verdict = verdict_on(spoil(sound), EMPTY, traits_of_reference())
     assert kinds(verdict) == expected
@@ -136,7 +136,7 @@ def test_a_slow_roll_rate_is_a_warning(sound: Motion) -> None:
 
 @pytest.mark.parametrize("place", [-0.1, 0.5, 1.15])
 @pytest.mark.parametrize("name", VANS)
-def test_sign_and_place_are_right_wherever_the_sensor_sits(name: str, place: float) -> None:
+def test_sign_and_place_are_right_for_every_sensor_position(name: str, place: float) -> None:
     van = VANS[name]
     position_m = place * van.wheelbase_m
     load = (0.8 * van.rated_payload_kg, 0.8 * van.wheelbase_m)
@@ -157,7 +157,7 @@ def test_a_sensor_amidships_in_town_is_believed() -> None:
 
 
 @pytest.mark.parametrize(("stated_m", "expected"), [(3.0, []), (2.4, ["warning"]), (0.0, ["fault"])])
-def test_a_wrong_sensor_position_is_told_with_the_right_one(
+def test_a_wrong_sensor_position_is_reported_with_the_right_one(
     stated_m: float, expected: list[str], sound: Motion
 ) -> None:
     verdict = verdict_on(sound, stated(PAPER_VAN, stated_m), traits_of_reference())
@@ -246,7 +246,7 @@ def test_facts_are_those_of_the_rows_in_any_order() -> None:
         assert other.streams[signal].mean == pytest.approx(stream.mean)
 
 
-def test_a_sound_drive_has_nothing_to_tell() -> None:
+def test_a_sound_drive_has_no_findings() -> None:
     motion = drive(30.0)
     assert rate_kinds(motion) == []
     assert gravity_in(row_facts(motion, TRAITS)).kind is None
@@ -320,7 +320,7 @@ UNLADEN, LOADED = (0.0, 50.0), (420.0, 58.0)
         (replace(SOUND, damage="the log ends early: the file is cut off"), [Kind.LOG_DAMAGED]),
     ],
 )
-def test_how_a_log_was_read_is_told(facts: LogFacts, kinds: list[Kind]) -> None:
+def test_the_report_says_how_a_log_was_read(facts: LogFacts, kinds: list[Kind]) -> None:
     of_log = (Kind.LOG_UNREADABLE, Kind.CUT_AWAY, Kind.LOG_DAMAGED)
     assert [finding.kind for finding in told_of(of_log, log=facts)] == kinds
 
@@ -350,7 +350,7 @@ def test_two_runs_on_one_drive_are_found(other: LogFacts, load: tuple[float, flo
     assert all("runs 1 and 2" in text for text in told.values())
 
 
-def test_a_run_without_a_readable_log_is_told_once_and_a_load_far_beyond_the_range_is_doubted() -> None:
+def test_an_unreadable_log_is_reported_once_and_a_load_beyond_the_range_is_doubted() -> None:
     nothing = KnownRun(1, "a.log", 4200.0, 60.0, ())
     unreadable = SplitRun(nothing, nothing, RowFacts(), log=LogFacts(unreadable="a.log: holds no CAN frame"))
     ((verdict,), _) = inspect_campaign([unreadable], VAN, BatchSettings())

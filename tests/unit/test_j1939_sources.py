@@ -50,7 +50,7 @@ def decoded(frames: Frames, signal_map: Path = J1939) -> Decoder:
 
 @pytest.mark.parametrize("signal", GROUPS)
 @pytest.mark.parametrize("says", [ALIKE, OTHERWISE, UNAVAILABLE])
-def test_a_group_of_two_devices_is_told_with_both_addresses(signal: Signal, says: str) -> None:
+def test_a_group_of_two_devices_is_reported_with_both_addresses(signal: Signal, says: str) -> None:
     causes = decoded(two_devices(signal, says, n_left_out=3)).causes()
     if says == UNAVAILABLE or (says == ALIKE and signal is Signal.SPEED):  # nothing is mixed, or nothing that differs
         assert causes == ()

@@ -24,7 +24,7 @@ def driven(duration_s: float) -> Motion:
 
 
 def kept_of(motion: Motion, settings: BatchSettings = SETTINGS) -> list[KeptBatch]:
-    """What a service of these settings would keep of the rows."""
+    """The batches that a service with these settings would keep of the rows."""
     found: list[KeptBatch] = []
     flow = Flow(settings, MAP.traits, None, "cross_spectrum", Identity("van-17"))
 
@@ -76,7 +76,7 @@ def test_facts_are_of_the_window_alone(three: list[KeptBatch]) -> None:
     assert three[0].facts == row_facts(window, MAP.traits)
 
 
-def test_one_flipped_bit_is_told(three: list[KeptBatch]) -> None:
+def test_one_flipped_bit_is_reported(three: list[KeptBatch]) -> None:
     content = bytearray(packed(three[0]))
     for at in (3, 400, len(content) // 2, len(content) - 1):
         damaged = content.copy()

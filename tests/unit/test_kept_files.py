@@ -24,7 +24,7 @@ def link(path: Path) -> None:
 
 
 @pytest.mark.parametrize("lay", [link, os.mkfifo, Path.mkdir, lambda path: path.symlink_to("nowhere")])
-def test_what_is_no_plain_file_is_not_read(tmp_path: Path, lay: Callable[[Path], None]) -> None:
+def test_only_plain_files_are_read(tmp_path: Path, lay: Callable[[Path], None]) -> None:
     lay(tmp_path / "kept")
     with pytest.raises(OSError, match=r"'kept'"):
         KeptFiles(tmp_path).read("kept")
@@ -40,7 +40,7 @@ def test_a_link_is_replaced_and_its_target_left_alone(tmp_path: Path, name: str)
     assert {entry.name for entry in tmp_path.iterdir()} == {"kept", "target"}
 
 
-def test_what_is_set_aside_keeps_its_bytes_each_under_a_name_of_its_own(tmp_path: Path) -> None:
+def test_files_set_aside_keep_their_bytes_under_unique_names(tmp_path: Path) -> None:
     files, asides = KeptFiles(tmp_path), []
     for n in range(3):
         files.write("kept", b"%d" % n)
@@ -48,9 +48,7 @@ def test_what_is_set_aside_keeps_its_bytes_each_under_a_name_of_its_own(tmp_path
     assert [files.read(aside) for aside in asides] == [b"0", b"1", b"2"]
 
 
-def test_a_lock_that_is_not_let_go_is_waited_for_no_longer_than_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_waiting_for_a_lock_has_a_time_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gateway.files.kept.LOCK_TIMEOUT_S", 0.05)
     with (
         KeptFiles(tmp_path).locked(),

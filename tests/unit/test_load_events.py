@@ -29,7 +29,7 @@ from gateway.estimate import Estimate, Place, Stop, Watched
 from gateway.posterior import Posterior, Source
 
 
-def test_a_delivery_is_told_with_its_weight_time_and_both_loads():
+def test_a_delivery_has_its_weight_time_and_both_loads():
     first, second = day(400.0, 220.0)
     (found,) = events([first, second])
     assert found["change_kg"] == pytest.approx(-180.0)
@@ -109,7 +109,7 @@ def test_two_stops_without_a_weighing_between_are_both_named():
     assert found["t_end"] == found["stops"][1]["t_end"]
 
 
-def test_the_open_door_tells_which_of_two_stops():
+def test_an_open_door_decides_between_two_stops():
     first, middle, last = day(400.0, None, 220.0)
     middle = replace(middle, way=replace(middle.way, before=Watched(False, None)))
     last = replace(last, way=replace(last.way, before=Watched(True, None)))
@@ -117,7 +117,7 @@ def test_the_open_door_tells_which_of_two_stops():
     assert [stop["door_opened"] for stop in found["stops"]] == [True]
 
 
-def test_a_stop_says_where_and_from_when():
+def test_a_stop_has_a_place_and_a_time():
     arrived = Stop(at(4.0), at(5.0), Watched(True, None), Place(47.1, 8.5))
     first = batch(0.0, 5.0, 400.0, stops=(arrived,))
     (found,) = events([first, batch(12.0, 17.0, 200.0)])
@@ -147,7 +147,7 @@ def test_batches_of_different_calibrations_are_not_compared():
     assert not events([first, replace(second, calibration_id="sha256:2")])
 
 
-def test_a_load_after_a_long_rest_is_told_and_the_trip_before_it_is_over():
+def test_a_load_after_a_long_rest_is_an_event_and_ends_the_trip():
     before, after = (
         day(0.0, 300.0, batches=2)[:2],
         [batch(days * 1440.0, days * 1440.0 + 5.0, 300.0) for days in (9.0, 9.01)],
@@ -158,7 +158,7 @@ def test_a_load_after_a_long_rest_is_told_and_the_trip_before_it_is_over():
     assert first["is_over"]
 
 
-def test_three_standard_deviations_at_a_stop_are_told_whatever_their_probability():
+def test_a_change_of_three_deviations_at_a_stop_is_an_event():
     """The prior of a quarter of the payload range makes small changes improbable that were measured well."""
     (likely,) = events(day(300.0, 262.0))
     assert abs(likely["change_kg"]) >= 3.0 * likely["change_std_kg"]
@@ -170,7 +170,7 @@ AHEAD_MIN = 3 * DAY_MIN + 7.0
 
 
 def moved(estimates: list[Estimate], minutes: float) -> list[Estimate]:
-    """The same batches by another clock; they have no stops of their own."""
+    """The batches by another clock; they have no stops of their own."""
     by_ns = round(minutes * 60e9)
     return [replace(one, t_start_ns=one.t_start_ns + by_ns, t_end_ns=one.t_end_ns + by_ns) for one in estimates]
 
@@ -191,20 +191,20 @@ def changes(estimates: list[Estimate]) -> list[dict]:
 
 
 @pytest.mark.parametrize("ahead_min", [18.0, 60.0, DAY_MIN, 3650 * DAY_MIN])
-def test_a_delivery_after_it_is_told_as_without_it(ahead_min):
+def test_a_clock_step_does_not_change_a_later_delivery(ahead_min):
     (expected,) = changes(day(400.0, 400.0, 220.0))
     (found,) = changes(put_right(400.0, 400.0, 220.0, ahead=1, ahead_min=ahead_min))
     assert found == expected
     assert found["stops"]
 
 
-def test_trips_before_and_after_it_are_told_and_all_but_the_last_are_over():
+def test_a_clock_step_separates_trips():
     found = trips(put_right(300.0, 300.0, 300.0, ahead=1))
     assert [trip["is_over"] for trip in found] == [True, True, False]
     assert all(trip["t_start"] < trip["t_end"] for trip in found)
 
 
-def test_a_load_while_it_was_put_right_is_told_at_the_right_time():
+def test_a_load_during_a_clock_step_has_the_right_time():
     whole = put_right(400.0, 400.0, 100.0, 100.0, ahead=2)
     (found,) = changes(whole)
     assert found["change_kg"] == pytest.approx(-300.0)
@@ -213,7 +213,7 @@ def test_a_load_while_it_was_put_right_is_told_at_the_right_time():
     assert found["t_end"] == right["t_end"]
 
 
-def test_a_load_in_the_minutes_before_it_is_told_in_order():
+def test_a_load_shortly_before_a_clock_step_keeps_its_order():
     """Two legs without a weighing, one by each clock: both stops are named that can have been long enough."""
     whole = put_right(400.0, None, None, 100.0, ahead=2)
     (found,) = changes(whole)
@@ -236,7 +236,7 @@ def test_a_restart_after_it_goes_on_as_if_it_had_not_been():
     assert_a_restart_changes_nothing(put_right(0.0, 500.0, 500.0, 320.0, 200.0, ahead=5, batches=2))
 
 
-def test_what_is_old_stays_as_it_was_told_whatever_the_clock_did(monkeypatch):
+def test_old_entries_do_not_change_with_the_clock(monkeypatch):
     monkeypatch.setattr(ledger, "HORIZON", 60)
     monkeypatch.setattr(ledger, "SETTLED", 30)
     whole = put_right(400.0, 300.0, *[300.0] * 80, ahead=3)
@@ -246,7 +246,7 @@ def test_what_is_old_stays_as_it_was_told_whatever_the_clock_did(monkeypatch):
     assert not revisions[-1][1].record["is_withdrawn"]
 
 
-def test_a_trip_adds_up_what_was_carried():
+def test_a_trip_adds_up_its_loads():
     first, second = trips(day(0.0, 500.0, batches=2))
     assert (first["distance_m"], first["payload_kg"], first["carried_tkm"]) == (6000.0, 0.0, 0.0)
     assert first["empty_share"] == 1.0

@@ -60,7 +60,7 @@ def found(weights: Weights, vehicle: Vehicle = VAN) -> LoadRoom:
         (Spare(), NOTHING),
     ],
 )
-def test_most_load_is_what_the_levers_of_both_halves_allow(spare: Spare, halves: Halves) -> None:
+def test_the_largest_load_follows_from_the_levers_of_both_halves(spare: Spare, halves: Halves) -> None:
     most = AREA.most(spare)
     assert (most.front_kg, most.rear_kg) == pytest.approx((halves.front_kg, halves.rear_kg))
 
@@ -83,7 +83,7 @@ def test_load_in_one_place_is_limited_by_the_tightest_axle_at_its_worst_place() 
         (Spare(gross_kg=100.0), NOTHING),
     ],
 )
-def test_least_to_take_out_is_what_the_levers_of_both_halves_need(spare: Spare, halves: Halves) -> None:
+def test_the_least_removal_follows_from_the_levers_of_both_halves(spare: Spare, halves: Halves) -> None:
     out = AREA.least_to_take_out(spare)
     assert out is not None
     assert out.kg == pytest.approx(halves.kg)
@@ -98,7 +98,7 @@ def test_no_unloading_helps_the_front_axle_if_the_whole_area_is_behind_the_rear_
 @given(
     SPARES, SPARES, SPARES, st.floats(-0.2, 0.9), st.floats(0.2, 1.5), st.lists(st.tuples(INSIDE, INSIDE), max_size=6)
 )
-def test_no_limit_is_passed_wherever_in_its_half_the_load_lies(
+def test_no_limit_is_passed_for_any_place_in_the_half(
     gross_kg: float, front_kg: float, rear_kg: float, begin: float, length: float, pieces: list[tuple[float, float]]
 ) -> None:
     """The load of each half is cut into pieces at any places in that half."""
@@ -137,7 +137,7 @@ def test_no_limit_is_passed_by_a_load_in_one_place(
 
 
 @given(st.floats(-300.0, 300.0), st.floats(-100.0, 300.0), st.floats(-100.0, 300.0), INSIDE, INSIDE)
-def test_after_what_must_come_out_is_out_no_limit_is_passed(
+def test_no_limit_is_passed_after_the_advised_removal(
     gross_kg: float, front_kg: float, rear_kg: float, one: float, other: float
 ) -> None:
     out = AREA.least_to_take_out(Spare(gross_kg, front_kg, rear_kg))
@@ -167,7 +167,7 @@ def test_room_is_safe_by_the_unfavourable_ends_and_has_an_interval() -> None:
     assert room.take_out == NOTHING
 
 
-def test_overload_leaves_less_than_nothing_and_says_what_comes_out() -> None:
+def test_an_overload_has_negative_room_and_a_removal() -> None:
     room = found(aboard(620.0, 50.0, std_kg=0.0))  # 2020 kg in all, 1010 on either axle
     assert room.most.number == pytest.approx(-20.0)
     assert room.safe == NOTHING

@@ -33,7 +33,7 @@ def test_the_level_holds_for_every_event_of_ours(
     assert all(line["event"] == "ready" and set(line) == {"t", "level", "event", "url"} for line in lines)
 
 
-def test_others_come_through_from_warning_on_whatever_our_level(capsys: pytest.CaptureFixture[str]) -> None:
+def test_warnings_of_other_libraries_are_logged_at_any_level(capsys: pytest.CaptureFixture[str]) -> None:
     set_up_log("error", under_journald=False)
     logging.getLogger("some.package").info("chatter")
     logging.getLogger("some.package").warning("careful")
@@ -75,7 +75,7 @@ def test_the_gate_is_for_our_events_alone() -> None:
     assert all(gate.filter(record_of("careful", "some.package")) for _ in range(5))
 
 
-def test_the_documents_tell_of_every_event_and_of_no_other() -> None:
+def test_the_documents_list_exactly_the_logged_events() -> None:
     _, _, section = DEPLOYMENT.read_text().partition("## What the journal shows")
     table = section.partition("\n## ")[0]
     rows = [row for row in table.splitlines() if row.startswith("| `")]

@@ -72,7 +72,7 @@ UNDATED = {
 
 
 @pytest.mark.parametrize("kind", UNDATED)
-def test_a_log_without_a_date_says_so(kind, tmp_path):
+def test_a_log_without_a_date_is_reported(kind, tmp_path):
     name, text, said = UNDATED[kind]
     frames, report = read(tmp_path / name, text)
     assert len(frames) == 1
@@ -133,7 +133,7 @@ def test_a_garbled_line_leaves_the_number_base_as_it_is(tmp_path):
     assert frames.can_id.tolist() == [10, 10]
 
 
-def test_a_first_frame_hours_after_its_header_is_told(tmp_path):
+def test_a_first_frame_hours_after_its_header_is_reported(tmp_path):
     _, report = read(tmp_path / "a.asc", asc("2023-03-10 15:06:12", "54372.5 1 123 Rx d 1 01\n"))
     assert any("15.1 h after the date of its header" in remark for remark in report.remarks())
 

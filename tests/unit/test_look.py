@@ -131,7 +131,7 @@ def test_a_lean_along_and_across_counts_both_where_they_read_alike(tmp_path: Pat
     assert seen(tmp_path / "a.log")["tilt_deg"] == pytest.approx(16.7, abs=0.05)  # atan(2 sqrt 2 / 9.4)
 
 
-def test_who_speaks_how_often_and_how_long(box: Path) -> None:
+def test_messages_are_listed_with_rate_and_length(box: Path) -> None:
     heard = {one["id"]: one for one in seen(box)["identifiers"]}
     assert {name: (one["lengths"], one["message"]) for name, one in heard.items()} == {
         "200": ([8], "BOX"), "201": ([6], "TURN"), "202": ([3], "GPS"), "7E8": ([8], None)
@@ -212,7 +212,7 @@ def test_a_disk_that_is_full_leaves_no_half_draft(shipped: bool, box: Path, tmp_
 
 
 @pytest.mark.parametrize("suffix", [".log", ".blf"])
-def test_a_shipped_map_that_fits_is_named_and_copied_whatever_the_kind_of_log(suffix: str, tmp_path: Path) -> None:
+def test_a_fitting_shipped_map_is_named_and_copied_for_every_log_format(suffix: str, tmp_path: Path) -> None:
     log, frames = tmp_path / f"drive{suffix}", bus_drive(30.0, seed=3)
     if suffix == ".log":
         write_candump(frames, "can0", log)
@@ -265,7 +265,7 @@ def of_reference(samples: dict[Signal, float], t_ns: np.ndarray) -> Frames:
         (9.8, 20.0, "comes 20 times a second; 40 are needed"),
     ],
 )
-def test_what_stands_in_the_way_is_said(mps2: float, rate_hz: float, words: str, tmp_path: Path) -> None:
+def test_obstacles_are_reported(mps2: float, rate_hz: float, words: str, tmp_path: Path) -> None:
     (tmp_path / "box.dbc").write_text(DBC)
     whole = box_on_its_side(mps2)
     is_kept = np.ones(len(whole), bool) if rate_hz == 100.0 else whole.t_ns % 50_000_000 < 2
@@ -285,7 +285,7 @@ def test_an_unknown_sensor_asks_for_its_database(tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
-def test_a_database_with_another_unit_is_told_of_the_known_ones(tmp_path: Path) -> None:
+def test_an_unknown_unit_is_reported_with_the_known_ones(tmp_path: Path) -> None:
     """It described the acceleration, and was asked for."""
     write_candump(packed(512, 8, T0_NS + np.arange(500) * 10_000_000), "can0", tmp_path / "drive.log")
     (tmp_path / "box.dbc").write_text(DBC.replace('"m/s^2"', '"m/s**2"'))
@@ -311,7 +311,7 @@ def test_a_database_of_another_device_is_no_certainty(tmp_path: Path) -> None:
         ("VerticalAcceleration", "z"), ("LateralAcceleration", "y"), ("RateY2", "y"), ("Energy", ""), ("Speed", ""),
     ],
 )  # fmt: skip
-def test_axes_are_told_by_their_names(name: str, axis: str) -> None:
+def test_axes_are_recognised_by_their_names(name: str, axis: str) -> None:
     assert axis_of(name) == axis
 
 
@@ -348,7 +348,7 @@ def cut_short(frames: Frames) -> Frames:
         (cut_short, "2000 frames of IMU_GYRO (121) came, none valid: 2000 wrong length"),
     ],
 )
-def test_a_silent_sensor_says_why(alter: Alter, words: str, tmp_path: Path) -> None:
+def test_a_silent_sensor_has_a_reason(alter: Alter, words: str, tmp_path: Path) -> None:
     log = tmp_path / "drive.log"
     write_candump(alter(bus_drive(20.0, seed=3)), "can0", log)
     silent = (Signal.PITCH_RATE, Signal.ROLL_RATE)  # both come in one message
@@ -371,7 +371,7 @@ def test_a_silent_sensor_says_why(alter: Alter, words: str, tmp_path: Path) -> N
         ({"ok": 900}, "Missing: pitch rate."),
     ],
 )
-def test_the_service_says_it_too(counts: dict[str, int], words: str) -> None:
+def test_the_service_reports_the_same_reason(counts: dict[str, int], words: str) -> None:
     status = Status(
         version="1",
         state=State.SENSOR_FAULT,

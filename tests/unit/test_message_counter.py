@@ -31,7 +31,7 @@ def road(seed: int) -> F64:
 
 
 def frames(stamped_s: F64, kept: Bool, counting: Counting) -> list[Frames]:
-    """Both inertial messages and the speed's, stamped as told, without the lost frames."""
+    """The frames of both inertial messages and of the speed, with these stamps, without the lost ones."""
     encoder, t_ns = Encoder(REFERENCE), T0_NS + np.rint(stamped_s * 1e9).astype(np.int64)
     speed_mps = 15.0 + 0.2 * np.sin(np.arange(500.0))
     counter = counting(np.arange(N)).astype(float)
@@ -105,7 +105,7 @@ NO_COUNTERS: dict[str, Counting] = {
 
 @pytest.mark.parametrize("counting", NO_COUNTERS)
 @pytest.mark.parametrize("stamped_s", [TAKEN_S, np.ceil(TAKEN_S / 0.016) * 0.016, HEAPS_40_MS])
-def test_what_counts_no_messages_makes_nothing_worse(counting: str, stamped_s: F64) -> None:
+def test_a_false_counter_does_no_harm(counting: str, stamped_s: F64) -> None:
     motion = seen(stamped_s, EVEN, NO_COUNTERS[counting])
     with_counter, without = batch_of(motion), batch_of(without_counters(motion))
     assert with_counter.rejected == without.rejected
@@ -162,7 +162,7 @@ MAP = '[signals.pitch_rate]\nmessage = "IMU_GYRO"\nsignal = "PitchRate"\n'
         ("AccelCounter", "message 'IMU_GYRO' has no signal 'AccelCounter'"),
     ],
 )
-def test_a_map_that_names_no_counter_says_so(counter: str, words: str, tmp_path) -> None:
+def test_a_map_without_a_counter_is_reported(counter: str, words: str, tmp_path) -> None:
     dbc = shipped_map("reference").with_name("springscale_reference.dbc")
     path = tmp_path / "signals.toml"
     path.write_text(f'dbc = ["{dbc}"]\n{MAP}counter = "{counter}"\n')

@@ -179,7 +179,7 @@ def shapes_of(model: VehicleModel, batch: Batch) -> Mixture:
 
 @ROLL
 @pytest.mark.parametrize("gyration_m2", [0.1, 1.0])
-def test_a_load_of_which_nobody_told_the_shape_is_held(gyration_m2: float, with_roll: bool) -> None:
+def test_a_load_of_unstated_shape_is_held(gyration_m2: float, with_roll: bool) -> None:
     model = taught(with_roll=with_roll)
     theta = car(with_roll=with_roll, payload_gyration_m2=gyration_m2)
     mixture = shapes_of(model, drive_of((350.0, 47.0), 51, with_roll=with_roll, theta=theta))
@@ -310,7 +310,7 @@ def test_quantiles_of_a_mixture_are_where_its_distribution_has_them(
     np.testing.assert_allclose(cumulated, [0.025, 0.5, 0.975], atol=3e-3)
 
 
-def test_what_the_day_s_tyres_have_in_common_hardly_moves_the_share() -> None:
+def test_the_days_tyre_error_hardly_moves_the_share() -> None:
     """Front and rear pull it to opposite sides: both firmer moves it by less than each firmer alone."""
     shares = [
         told((200.0, 50.0), 45, tyre_front_npm=front * 3.6e5, tyre_rear_npm=rear * 3.8e5).front_share.number

@@ -33,7 +33,7 @@ def holds(found: Estimate, load: tuple[float, float] = LOAD) -> bool:
 
 @ROLL
 @pytest.mark.parametrize("seed", range(60, 64))
-def test_sensors_that_nobody_touched_are_believed(seed: int, with_roll: bool) -> None:
+def test_untouched_sensors_are_believed(seed: int, with_roll: bool) -> None:
     found = weighed(drive_of(LOAD, seed, with_roll=with_roll), taught(with_roll=with_roll))
     assert disbelieved(found.signs) is None
     assert np.max(np.abs(found.signs.deviations)) < 4.0
@@ -91,12 +91,12 @@ def test_a_sensor_moved_along_the_vehicle_is_refused(moved_m: float, with_roll: 
         (0.2, True),
     ],
 )
-def test_of_clear_sensors_it_is_told_that_the_sensor_was_moved(moved_m: float, with_roll: bool) -> None:
+def test_clear_sensors_show_that_one_was_moved(moved_m: float, with_roll: bool) -> None:
     assert moved(moved_m, with_roll=with_roll, slack=CLEAN).rejected == (Why.SENSOR_CHANGED,)
 
 
 @pytest.mark.parametrize("changed", [{"sensor_left_m": 0.5}, {"sensor_left_m": 0.1}, {"gyro_yaw_rad": 0.15}], ids=str)
-def test_a_sensor_moved_sideways_or_turned_is_told_by_roll(changed: dict[str, float]) -> None:
+def test_roll_shows_a_sensor_moved_sideways_or_turned(changed: dict[str, float]) -> None:
     theta = car(with_roll=True, **changed)
     assert told(drive_of(LOAD, 62, with_roll=True, theta=theta), with_roll=True).rejected == (Why.SENSOR_CHANGED,)
 
@@ -125,7 +125,7 @@ def heard(std_mps2: float, *, with_roll: bool, slack: float) -> Batch:
         pytest.param(0.3, True, marks=lost("weighed, 182 +- 15 kg for 200")),
     ],
 )
-def test_what_does_not_come_through_the_springs_is_told_as_noise(std_mps2: float, with_roll: bool) -> None:
+def test_vibration_from_elsewhere_is_reported_as_noise(std_mps2: float, with_roll: bool) -> None:
     """As roll does where the sensor was moved sideways: a hundred times the accelerometer's noise."""
     batch = heard(std_mps2, with_roll=with_roll, slack=CLEAN)
     assert estimated(batch, taught(with_roll=with_roll, slack=CLEAN)).rejected == (Why.SENSOR_CHANGED,)
@@ -140,7 +140,7 @@ def test_a_noisier_accelerometer_has_more_noise(slack: float) -> None:
 
 
 def signs(**seen: object) -> Signs:
-    """Those of a healthy answer, but for what is said."""
+    """The signs of a healthy answer with these changes."""
     healthy = {
         "model": taught(),
         "misfit": 1.0,
@@ -208,7 +208,7 @@ def test_each_sign_refuses_with_its_reason(seen: dict[str, object], why: Why) ->
     ],
     ids=str,
 )
-def test_what_is_no_sign_of_a_fault_refuses_nothing(seen: dict[str, object]) -> None:
+def test_harmless_signs_refuse_nothing(seen: dict[str, object]) -> None:
     assert disbelieved(signs(**seen)) is None
 
 
@@ -250,7 +250,7 @@ SEEN_MPS = (10.0, 20.0)
         (20.0 * np.exp(0.5), np.exp(0.5), 0.25, 2.0),
     ],
 )
-def test_each_distance_from_what_taught_the_vehicle_adds_to_the_variance(
+def test_each_distance_from_the_teaching_drives_adds_to_the_variance(
     speed_mps: float, shaken: float, reach: float, factor: float
 ) -> None:
     model = replace(taught(), speed_seen_mps=SEEN_MPS)
@@ -302,7 +302,7 @@ def test_a_vehicle_that_does_not_know_its_gravity_has_no_fault() -> None:
 
 
 @pytest.mark.parametrize(("gain", "is_refused"), [(1.01, False), (1.05, True), (0.95, True), (None, False)])
-def test_a_gyro_whose_gain_in_bends_has_changed_is_told(gain: float | None, is_refused: bool) -> None:
+def test_a_changed_gyro_gain_in_bends_is_reported(gain: float | None, is_refused: bool) -> None:
     model = replace(taught(), gyro_gain=(1.0, 0.002))
     batch = replace(drive_of(LOAD, 63), gyro_gain=None if gain is None else (gain, 0.008))
     assert estimated(batch, model).rejected == ((Why.SENSOR_CHANGED,) if is_refused else ())
@@ -358,7 +358,7 @@ def late_by(lag_s: float, *, with_roll: bool, slack: float) -> Estimate:
         (0.05, True),
     ],
 )
-def test_of_clear_sensors_it_is_told_that_the_gyro_is_far_too_late(lag_s: float, with_roll: bool) -> None:
+def test_clear_sensors_show_a_far_too_late_gyro(lag_s: float, with_roll: bool) -> None:
     assert late_by(lag_s, with_roll=with_roll, slack=CLEAN).rejected == (Why.SENSOR_CHANGED,)
 
 
@@ -380,7 +380,7 @@ def noisy(density: float, *, with_roll: bool = False) -> Batch:
 
 
 @ROLL
-def test_a_noisy_gyro_is_weighed_and_says_less(with_roll: bool) -> None:
+def test_a_noisy_gyro_widens_the_interval(with_roll: bool) -> None:
     model = taught(with_roll=with_roll)
     quiet, loud = (estimated(noisy(density, with_roll=with_roll), model) for density in (0.0, 3.0 * DENSITY))
     assert loud.counted, loud.rejected

@@ -19,7 +19,7 @@ SENDING = {"send", "sendall", "sendto", "sendmsg", "send_periodic"}
 BUS = Path(gateway.__file__).parent / "bus"
 
 
-def test_only_the_sink_calls_what_sends_on_a_bus() -> None:
+def test_only_the_sink_calls_functions_that_send() -> None:
     senders = {
         path.relative_to(BUS)
         for path in BUS.rglob("*.py")

@@ -12,7 +12,7 @@ from gateway.model.table import UNSPRUNG_SHARE
 DAYS = [KnownRun(day, "tour", 0.0 if day % 5 == 0 else 100.0 + day, 55.0, (), 0.0) for day in range(1, 401)]
 
 
-def test_notes_are_low_and_some_are_of_another_tour() -> None:
+def test_simulated_notes_are_low_and_sometimes_swapped() -> None:
     told = study._notes(DAYS, np.random.SeedSequence(1))
     right = {
         day: study.EMPTY if not run.payload_kg else study.note(study.LOW * run.payload_kg)

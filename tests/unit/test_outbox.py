@@ -43,7 +43,7 @@ MIXED = ("event-1", "estimate", "trip-1", "estimate", "estimate", "alarm-1", "es
 
 @pytest.mark.parametrize("limit", [1, 2, 3, 100])
 @pytest.mark.parametrize("only", [("alarm",), ("alarm", "event"), ("event", "trip", "alarm"), ("trip",)])
-def test_what_is_wanted_comes_in_order_and_once(store: Store, only: tuple[str, ...], limit: int) -> None:
+def test_wanted_records_come_in_order_and_once(store: Store, only: tuple[str, ...], limit: int) -> None:
     tell(store, *MIXED)
     wanted = [f"{each}-1" for each in MIXED if each.partition("-")[0] in only]
     assert drained(outbox(store, *only), limit) == wanted
@@ -51,7 +51,7 @@ def test_what_is_wanted_comes_in_order_and_once(store: Store, only: tuple[str, .
     assert drained(outbox(store, *only), limit) == []  # as after a restart
 
 
-def test_what_nobody_wants_is_passed_over_on_disk_so_that_age_may_remove_it(store: Store) -> None:
+def test_unwanted_records_count_as_delivered_so_that_age_may_remove_them(store: Store) -> None:
     tell(store, *["estimate"] * 7, "trip-1")
     box = outbox(store, "alarm")
     assert box.next_messages(2) == []
@@ -66,7 +66,7 @@ def test_what_nobody_wants_is_passed_over_on_disk_so_that_age_may_remove_it(stor
     assert box.look().n_waiting == 0
 
 
-def test_what_was_handed_out_and_not_delivered_comes_again(store: Store) -> None:
+def test_undelivered_records_come_again(store: Store) -> None:
     tell(store, *MIXED)
     box = outbox(store, "alarm")
     assert [letter.id for letter in box.next_messages(10)] == ["alarm-1-1", "alarm-2-1"]
@@ -126,7 +126,7 @@ def delivered(outbox: Outbox, n: int, clock: Clock) -> list[str]:
     return said
 
 
-def test_what_was_delivered_lately_is_said_again(six: Store, clock: Clock) -> None:
+def test_recently_delivered_records_are_repeated(six: Store, clock: Clock) -> None:
     outbox = Outbox(six, "fleet", repeat_s=1.5)
     assert delivered(outbox, 4, clock) == IDS[:4]
     clock.now_s += 1000.0  # a dead link may be noticed late: what counts is the time before the last delivery

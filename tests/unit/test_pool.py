@@ -139,7 +139,7 @@ def test_crawling_alone_is_refused_as_too_slow() -> None:
     assert spans(told(motion), motion)[:2] == [(0, 150, "too_slow"), (150, 300, "too_slow")]
 
 
-def test_half_an_hour_without_a_batch_is_refused_and_the_pool_begins_anew() -> None:
+def test_half_an_hour_without_a_batch_is_refused_and_resets_the_pool() -> None:
     speed = driven_with_stops(*((t_s, t_s + 52.0) for t_s in np.arange(10.0, 3000.0, 60.0)))
     settings = replace(SETTINGS, usable_share_min=1.0, window_s=300.0)
     motion = drive(2110.0, speed)

@@ -94,7 +94,7 @@ def test_an_interval_is_as_skewed_as_the_error_of_the_shape() -> None:
     assert (50.0 - low, high - 50.0) == pytest.approx((np.hypot(Z95 * 0.1, 2.6 * 0.2), np.hypot(Z95 * 0.1, 1.2 * 0.2)))
 
 
-def test_skewed_intervals_hold_what_is_skewed() -> None:
+def test_skewed_intervals_cover_skewed_errors() -> None:
     """A shape's error that is log-normal, of unit standard deviation, beside a normal one half as large."""
     rng = np.random.default_rng(3)
     shape = np.exp(0.5 * rng.standard_normal(400_000))
@@ -177,14 +177,14 @@ def of_sources(payload_kg: float, own_kg: float, **columns: float) -> Posterior:
     return Posterior(np.array([payload_kg, 50.0]), np.diag([own_kg**2, 0.01]), by_source)
 
 
-def test_what_grows_with_the_load_stays_in_proportion_to_the_change() -> None:
+def test_errors_that_grow_with_the_load_stay_proportional_to_the_change() -> None:
     one, other = (of_sources(kg, 6.0, CALIBRATION=0.1 * kg) for kg in (200.0, 260.0))
     _, covariance = difference(one, other, is_one_load=False)
     assert covariance[0, 0] == pytest.approx(2.0 * 36.0 + 6.0**2)
 
 
 @pytest.mark.parametrize("name", sorted(ONE_LOAD))
-def test_what_lasts_for_one_load_is_common_as_far_as_the_loads_are(name: Source) -> None:
+def test_errors_of_one_load_are_shared_as_far_as_the_loads_are(name: Source) -> None:
     def variance(before_kg: float, after_kg: float, *, is_one_load: bool) -> float:
         pair = (of_sources(kg, 0.0, **{name.name: 10.0}) for kg in (before_kg, after_kg))
         return float(difference(*pair, is_one_load=is_one_load)[1][0, 0])
@@ -306,7 +306,7 @@ def test_a_remedy_that_was_applied_is_not_offered_again() -> None:
     assert {remedies(is_empty_weighed=True)[name] for name in (Source.DAY, Source.SENSOR)} == {None}
 
 
-def test_driving_on_leaves_a_third_of_what_is_the_batchs_own() -> None:
+def test_driving_on_leaves_a_third_of_the_batchs_own_error() -> None:
     (line,) = (line for line in budget_of(with_all(), is_shape_said=False) if line.source == OWN)
     assert line.payload_with_remedy_kg**2 == pytest.approx(with_all().covariance[0, 0] - 36.0 * 2.0 / 3.0)
 

@@ -37,7 +37,7 @@ def test_springscale_is_the_same_package_under_the_name_that_users_know() -> Non
     assert set(dir(springscale)) == set(dir(gateway))
 
 
-def test_every_public_name_is_there_and_told_in_the_page() -> None:
+def test_every_public_name_exists_and_is_documented() -> None:
     page = (Path(__file__).parents[2] / "docs/api.md").read_text()
     assert [name for name in gateway.__all__ if getattr(gateway, name, None) is None] == []
     assert [name for name in gateway.__all__ if f"`{name}" not in page] == []

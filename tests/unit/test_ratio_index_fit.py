@@ -61,7 +61,7 @@ def fit() -> RatioIndexFit:
     return fit_ratio_index(RUNS, VAN)
 
 
-def test_unseen_loads_are_told_within_the_stated_spread(fit: RatioIndexFit) -> None:
+def test_unseen_loads_are_estimated_within_the_stated_spread(fit: RatioIndexFit) -> None:
     assert (fit.table.n_runs, len(fit.table.run)) == (7, 14)
     model, shares = fit.calibration.payload, fit.calibration.front_share
     assert model.residual_std < 90.0  # the loads themselves spread by 160 kg
@@ -122,7 +122,7 @@ def test_the_order_of_runs_and_rejected_batches_change_no_bit(fit: RatioIndexFit
     np.testing.assert_array_equal(other.payload_errors_kg, fit.payload_errors_kg)
 
 
-def test_without_pitch_rate_the_payload_alone_is_told() -> None:
+def test_without_pitch_rate_only_the_payload_is_estimated() -> None:
     silent = [
         replace(run, batches=tuple(replace(b, pitch_rate_radps=np.full(N, np.nan)) for b in run.batches))
         for run in RUNS
@@ -157,7 +157,7 @@ def test_too_few_runs_for_nesting_still_calibrate() -> None:
     assert fit.front_share_errors_pct is None
 
 
-def test_what_cannot_carry_a_calibration_is_refused() -> None:
+def test_data_that_cannot_be_fitted_are_refused() -> None:
     with pytest.raises(CalibrationImpossibleError, match="different payloads"):
         fit_ratio_index(runs_of([(90.0, 50.0)] * 4), VAN)
     with pytest.raises(CalibrationImpossibleError, match="at least three runs"):
@@ -192,7 +192,7 @@ def table_of(roughness: F64) -> SpectrumTable:
     )
 
 
-def test_bands_are_taken_where_the_load_tells_whatever_the_road() -> None:
+def test_bands_are_chosen_where_the_load_shows_on_any_road() -> None:
     table = table_of(np.array([1.0, 3.0, 0.5, 2.0, 4.0, 1.5]))
     for sensor, over_hz, under_hz in ((0, 2.0, 4.0), (1, 3.0, 6.0)):
         best = candidate_pairs(table, sensor, 0.5, 5)[0]

@@ -26,7 +26,7 @@ DRIVE = white_noise(20.0, START_NS, seed=1)
 
 
 def recorded(log: Path, signals: str = "springscale:reference", for_s: float = 0.3) -> Result:
-    """By ``springscale record`` from a virtual bus named after the log's folder."""
+    """The log that ``springscale record`` makes from a virtual bus named after the log's folder."""
     return called(
         "record",
         log,
@@ -86,7 +86,7 @@ def test_remote_and_error_frames_are_counted(tmp_path: Path, monkeypatch: pytest
     assert f"{len(DRIVE)} frames, 0 lost\nleft out: 2 remote frames\nleft out: 3 error frames\n" in found.output
 
 
-def test_what_came_as_it_was_stopped_is_counted_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_frames_that_arrive_during_the_stop_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(LiveSource, "start", lambda _: None)
     monkeypatch.setattr(LiveSource, "stop", lambda source: source.inbox.put(DRIVE))
     assert recorded(tmp_path / "drive.log.gz").output.endswith(f"{len(DRIVE)} frames, 0 lost\n")
@@ -95,7 +95,7 @@ def test_what_came_as_it_was_stopped_is_counted_too(tmp_path: Path, monkeypatch:
 @pytest.mark.parametrize(
     ("name", "why"), [("taken.log.gz", "File exists"), ("fresh.log.gz", "no mapped frame came (the bus was silent)")]
 )
-def test_what_cannot_be_recorded_is_told(tmp_path: Path, name: str, why: str) -> None:
+def test_faults_of_recording_are_reported(tmp_path: Path, name: str, why: str) -> None:
     (tmp_path / "taken.log.gz").write_text("mine")
     found = recorded(tmp_path / name)
     assert isinstance(found.exception, SpringscaleError)
@@ -135,7 +135,7 @@ def test_frames_carry_the_channel_of_the_map_and_else_that_of_the_bus(
     assert sum(map(len, open_log(tmp_path / "drive.log.gz", load_signal_map(str(signals)))[0])) == len(DRIVE)
 
 
-def test_frames_that_the_kernel_lost_are_told_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_frames_that_the_kernel_lost_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def played(source: LiveSource) -> None:
         source.inbox.put(DRIVE)
 

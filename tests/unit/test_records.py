@@ -52,7 +52,7 @@ def test_any_number_is_json(payload_kg: float) -> None:
     assert again == pytest.approx(payload_kg, rel=1e-8) if np.isfinite(payload_kg) else again is None
 
 
-def test_the_id_tells_what_was_estimated_not_what_came_out() -> None:
+def test_the_id_depends_on_the_input_and_not_on_the_answer() -> None:
     assert replace(FULL, payload=Quantity(0.0), rejected=(Why.TOO_SLOW,)).id == FULL.id
     changes = [
         {"vehicle_id": "van-18"},

@@ -56,7 +56,7 @@ def as_sent(frames: Frames) -> Frames:
 
 @dataclass(frozen=True)
 class Case:
-    """How frames or database are spoiled, what is told, and of which signals."""
+    """One way to spoil frames or database, and the report that is expected of it."""
 
     told: str
     signals: frozenset[Signal]
@@ -117,7 +117,7 @@ def test_the_decoder_counts_them_for_every_signal(spoiled: tuple[Case, Path, Pat
     assert [remark for remark in report.remarks() if case.told in remark]
 
 
-def test_a_single_frame_is_told_but_not_blamed() -> None:
+def test_a_single_refused_frame_is_reported_but_not_blamed() -> None:
     decoder = Decoder(load_signal_map("springscale:reference"))
     frames = bus_drive(100.0, seed=3)
     length = frames.length.copy()
@@ -128,7 +128,7 @@ def test_a_single_frame_is_told_but_not_blamed() -> None:
     assert decoder.causes() == ()
 
 
-def test_estimate_tells_the_cause_and_blames_nothing_else(spoiled: tuple[Case, Path, Path]) -> None:
+def test_estimate_reports_only_the_true_cause(spoiled: tuple[Case, Path, Path]) -> None:
     case, log, signals = spoiled
     ended = called("estimate", log, "--signals", signals, "--calibration", DEMO)
     said = str(ended.exception)
@@ -137,7 +137,7 @@ def test_estimate_tells_the_cause_and_blames_nothing_else(spoiled: tuple[Case, P
     assert f"{log}: {case.told}" in ended.stderr
 
 
-def test_look_tells_the_cause_before_it_says_what_is_lacking(spoiled: tuple[Case, Path, Path]) -> None:
+def test_look_reports_the_cause_before_missing_signals(spoiled: tuple[Case, Path, Path]) -> None:
     case, log, _ = spoiled
     said, _, verdict = called("look", log).stdout.partition("\nThis can")
     assert case.told.partition(": ")[2] in said
@@ -165,7 +165,7 @@ def test_an_inspection_finds_the_refused_frames_and_no_silent_sensor(spoiled: tu
     assert "roll_rate" in case.signals or all("roll_rate" in other.text for other in others)
 
 
-def test_reprocess_tells_it_in_its_summary_and_in_the_receipt(spoiled: tuple[Case, Path, Path]) -> None:
+def test_reprocess_reports_refused_frames_in_summary_and_receipt(spoiled: tuple[Case, Path, Path]) -> None:
     case, log, _ = spoiled
     folder = log.parent.parent
     write_manifest(folder, "van")
@@ -178,7 +178,7 @@ def test_reprocess_tells_it_in_its_summary_and_in_the_receipt(spoiled: tuple[Cas
     assert [text for text in receipt["logs"][0]["remarks"] if case.told in text]
 
 
-def test_stamps_of_whole_seconds_are_told_and_not_the_road(tmp_path: Path) -> None:
+def test_stamps_of_whole_seconds_are_reported_and_the_road_is_not_blamed(tmp_path: Path) -> None:
     """As a spreadsheet leaves python-can's table that it has opened and saved."""
     log = tmp_path / "drive.csv"
     frames = bus_drive(60.0, seed=3)

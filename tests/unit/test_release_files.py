@@ -32,7 +32,7 @@ INSTRUCTIONS = re.findall(r"^([A-Z]+) ((?:.*\\\n)*.*)$", IMAGE, re.MULTILINE)
 
 
 def of(instruction: str) -> list[str]:
-    """What follows each of its occurrences in the image's definition, on one line."""
+    """The text after each occurrence in the image's definition, on one line."""
     return [re.sub(r"\\\n\s*", "", rest) for name, rest in INSTRUCTIONS if name == instruction]
 
 
@@ -51,7 +51,7 @@ def test_the_citation_is_valid() -> None:
     assert checked.returncode == 0, checked.stdout
 
 
-def test_hooks_before_a_commit_fetch_nothing_and_call_what_is_locked() -> None:
+def test_hooks_before_a_commit_call_locked_tools_offline() -> None:
     (repository,) = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"]
     assert repository["repo"] == "local"
     called = {Path(hook["entry"].split()[0]) for hook in repository["hooks"]}
@@ -61,7 +61,7 @@ def test_hooks_before_a_commit_fetch_nothing_and_call_what_is_locked() -> None:
     assert packages <= pins("requirements-dev.txt").keys()
 
 
-def test_the_image_copies_what_is_there_and_not_ignored() -> None:
+def test_the_image_copies_existing_files_that_are_not_ignored() -> None:
     kept = [line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if line.startswith("!")]
     copied = [source for copy in of("COPY") if "--from" not in copy for source in copy.split()[:-1]]
     assert len(copied) > 5
@@ -77,7 +77,7 @@ def test_the_image_installs_nothing_without_a_hash() -> None:
     assert {"--no-deps", "--no-build-isolation"} <= set(shlex.split(wheel))
 
 
-def test_the_image_runs_the_service_as_nobody_in_particular() -> None:
+def test_the_image_runs_the_service_as_an_unprivileged_user() -> None:
     names = [name for name, _ in INSTRUCTIONS]
     assert names.index("USER") < names.index("ENTRYPOINT")
     (user,) = of("USER")
@@ -123,7 +123,7 @@ def test_every_commented_key_of_the_shipped_configuration_is_a_setting(tmp_path:
     assert settings.web.tls_key == tmp_path / "web.key"
 
 
-def test_defaults_that_the_shipped_configuration_tells_are_the_defaults(tmp_path: Path) -> None:
+def test_the_shipped_configuration_shows_the_true_defaults(tmp_path: Path) -> None:
     examples = [
         "calibration",
         "calibrated_as",
@@ -179,7 +179,7 @@ def test_a_vehicle_does_without(name: str) -> None:
     assert name not in VEHICLE
 
 
-def test_what_the_service_loads_by_name_is_locked() -> None:
+def test_modules_that_the_service_loads_by_name_are_locked() -> None:
     assert {"h11", "uvloop"} <= VEHICLE.keys()
 
 
@@ -216,7 +216,7 @@ def test_the_demonstration_takes_a_port() -> None:
     assert "springscale demo --port 8000" in planned("demo")
 
 
-def test_an_installation_tells_how_far_it_is() -> None:
+def test_an_installation_reports_progress() -> None:
     commands = planned("test")
     assert commands.startswith('echo "Setting up .venv')
     assert commands.count("pip install") + commands.count("pip --disable-pip-version-check install") >= 4

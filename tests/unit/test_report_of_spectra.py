@@ -22,7 +22,7 @@ from gateway.model.table import INDEX, NAMES, ROWS, UPRIGHT, prior_of
 from gateway.model.vehicle import VehicleModel
 from gateway.records import Batch, Spectra, Why
 from gateway.reports.calibration.accuracy import accuracy_section
-from gateway.reports.calibration.fitted_vehicle import fits_of, knowledge_chart, knowledge_of, knowledge_table, told
+from gateway.reports.calibration.fitted_vehicle import fits_of, knowledge_of, knowledge_table, told
 from gateway.reports.calibration.spectra import ACCELERATION, N_SEGMENT, PITCH_RATE, density_of, spectra_section
 from gateway.reports.charts import LineMark, Ribbon, Span
 
@@ -78,7 +78,7 @@ def test_a_curve_for_every_load_and_the_bands_where_they_are() -> None:
     ]
 
 
-def test_the_fitted_half_car_shows_what_was_measured() -> None:
+def test_the_fitted_half_car_agrees_with_the_measured_spectra() -> None:
     """Drives of a half-car: the one fitted to them explains their spectra, phase and coherence."""
     runs = [
         KnownRun(i, f"{i}.log", kg, pct, (batch_over_road(kg, pct, i, 200.0),))
@@ -158,7 +158,7 @@ def test_another_load_lies_beside_them(
     assert amplitude_misfit(seen, modelled_spectra(seen, calibration, other)) > 1.1 * right
 
 
-def test_what_it_says_it_says_again_of_itself(seen: Spectra, calibration: VehicleModel) -> None:
+def test_spectra_of_the_fitted_model_give_the_same_figures(seen: Spectra, calibration: VehicleModel) -> None:
     """The level is a line through the model's own spectra: nothing is left to move."""
     once = modelled_spectra(seen, calibration, LOADED)
     twice = modelled_spectra(once, calibration, LOADED)
@@ -193,7 +193,7 @@ WIDE = replace(VAN, track_width_m=1.5, sensor_offset_left_m=0.3)
 ROLL_MEAN, ROLL_STD = prior_of(ROWS, WIDE)
 
 
-def test_what_the_drives_told_of_roll_is_in_the_report() -> None:
+def test_the_report_has_the_roll_of_the_drives() -> None:
     std = ROLL_STD.copy()
     std[-1] *= 0.25
     known = knowledge_of(as_if_fitted(ROLL_MEAN, std, WIDE), WIDE)
@@ -203,17 +203,15 @@ def test_what_the_drives_told_of_roll_is_in_the_report() -> None:
     assert all(one.left_over == pytest.approx(1.0) for one in known[:-1])
     assert "roll_inertia_kgm2" in told(known)
     assert "empty_left_m" not in told(known)
-    assert "roll" in [panel.title for panel in knowledge_chart(known).panels]
     rows = {row[0]: row for row in knowledge_table(known).rows}
     assert set(rows) == {name for name in NAMES if not name.startswith("slack_")}
     before = float(rows["roll_inertia_kgm2"][1])
     assert before == pytest.approx(1240.0 * (0.42 * 1.5) ** 2, rel=1e-3)  # in its unit, not its logarithm
 
 
-def test_a_calibration_without_a_roll_rate_says_nothing_of_roll() -> None:
+def test_a_report_without_a_roll_rate_does_not_mention_roll() -> None:
     known = knowledge_of(as_if_fitted(*prior_of(UPRIGHT, WIDE), WIDE), WIDE)
     assert [one.name for one in known] == [row.name for row in UPRIGHT]
-    assert "roll" not in [panel.title for panel in knowledge_chart(known).panels]
 
 
 def judged(cg_left: CgLeftErrors | None, wheels: WheelErrors | None) -> Judgement:
@@ -225,7 +223,7 @@ def judged(cg_left: CgLeftErrors | None, wheels: WheelErrors | None) -> Judgemen
     return Judgement("cross_spectrum", {BatchSet.VALIDATION: ErrorTable("cross_spectrum", batches, errors, ())})
 
 
-def test_how_well_places_to_the_side_were_told_stands_with_the_accuracy() -> None:
+def test_the_accuracy_section_has_the_lateral_errors() -> None:
     found = CgLeftErrors(mean_abs_m=0.0123, bias_m=0.0, std_m=0.02, max_abs_m=0.03, coverage95=0.9)
     (sentence,) = accuracy_section(judged(found, WheelErrors(1.26, 2.0))).paragraphs[1:]
     assert "12 mm on average over 1 answer " in sentence
@@ -235,7 +233,7 @@ def test_how_well_places_to_the_side_were_told_stands_with_the_accuracy() -> Non
     assert "gross weight" not in sentence
 
 
-def test_no_word_of_places_that_nobody_noted_or_told() -> None:
+def test_unknown_lateral_places_are_not_mentioned() -> None:
     assert len(accuracy_section(judged(None, None)).paragraphs) == 1
     untold = CgLeftErrors(None, None, None, None, None)
     assert len(accuracy_section(judged(untold, None)).paragraphs) == 1

@@ -61,7 +61,7 @@ def test_every_mark_is_drawn(mark: Mark) -> None:
     assert len(axes.lines) + len(axes.collections) + len(axes.patches) >= 1
 
 
-def test_a_label_stands_in_the_legend_once() -> None:
+def test_the_legend_has_each_label_once() -> None:
     (legend,) = draw(chart(panel(LineMark(X, X, "same")), panel(LineMark(X, -X, "same")))).legends
     assert [text.get_text() for text in legend.get_texts()] == ["same"]
 
@@ -82,7 +82,7 @@ def test_the_same_chart_gives_the_same_bytes(tmp_path: Path) -> None:
     assert one.read_bytes() == other.read_bytes()
 
 
-def test_named_positions_stand_on_the_chart() -> None:
+def test_named_positions_are_on_the_chart() -> None:
     weeks = Axis("week", ticks=((1.0, "2026-01"), (3.0, "2026-02")))
     named = chart(Panel(weeks, Axis("y"), (LineMark(X, X),)))
     [axes, *_] = draw(named).axes

@@ -51,7 +51,7 @@ def same(one: Frames, other: Frames) -> bool:
     return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in Frames.__slots__)
 
 
-def test_what_was_put_is_what_is_read(tmp_path: Path) -> None:
+def test_recorded_frames_are_read_back(tmp_path: Path) -> None:
     log = RingLog(tmp_path / "record", "can0", 10**9, 0)
     log.start()
     for begin in range(0, len(DRIVE), 97):
@@ -138,7 +138,7 @@ def test_a_disk_that_refuses_is_waited_for(tmp_path: Path) -> None:
     log.stop(PATIENCE_S)
 
 
-def test_what_waits_is_bounded_and_the_rest_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_queue_is_bounded_and_dropped_frames_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ring_log, "HELD_FRAMES", 3 * len(DRIVE))
     (tmp_path / "record").write_text("")
     log = RingLog(tmp_path / "record", "can0", 10**9, 0, write_s=0.01)
@@ -192,7 +192,7 @@ def test_any_channels_name_makes_a_line(tmp_path: Path, channel: str, written: b
     assert same(read(files(tmp_path)[0]), DRIVE)
 
 
-def test_what_kills_the_recorder_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_of_the_recorder_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> bytes:
         raise ZeroDivisionError
 
@@ -220,7 +220,7 @@ def test_no_thread_waits_for_the_disk(tmp_path: Path, release: threading.Event) 
     assert log.status().n_frames_written == 2 * len(DRIVE)
 
 
-def test_what_a_stop_leaves_behind_is_told(
+def test_frames_lost_at_a_stop_are_reported(
     tmp_path: Path, release: threading.Event, caplog: pytest.LogCaptureFixture
 ) -> None:
     """A disk that hangs holds the stop no longer than it may, and the frames went without a word."""

@@ -62,7 +62,7 @@ def told(vehicle: Vehicle, split: list[SplitRun]) -> int:
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("name", VANS)
 @pytest.mark.parametrize("sensor_left_m", [0.35, -0.35])
-def test_a_sensor_well_off_the_centre_line_tells_it(name: str, sensor_left_m: float, sign: int) -> None:
+def test_a_sensor_off_the_centre_line_shows_the_roll_sign(name: str, sensor_left_m: float, sign: int) -> None:
     vehicle = stated(VANS[name], REAR_M)
     placed = replace(vehicle, sensor_offset_left_m=sensor_left_m, sensor_offset_left_std_m=0.02)
     split = runs(placed, (0.0, None), sensor_left_m=sensor_left_m, roll_times=float(sign))
@@ -71,13 +71,13 @@ def test_a_sensor_well_off_the_centre_line_tells_it(name: str, sensor_left_m: fl
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_loads_noted_well_to_one_side_tell_it_wherever_the_sensor_sits(sign: int) -> None:
+def test_lateral_loads_show_the_roll_sign(sign: int) -> None:
     amidships = runs(SOMEWHERE, *LOADS, sensor_left_m=0.0, roll_times=float(sign))
     assert told(SOMEWHERE, amidships) == sign
     assert told(SOMEWHERE, runs(SOMEWHERE, *LOADS, roll_times=float(sign))) == sign
 
 
-def test_it_is_not_guessed() -> None:
+def test_an_undetermined_roll_sign_stays_open() -> None:
     amidships = replace(PLACED, sensor_offset_left_m=0.0)
     assert told(amidships, runs(amidships, (0.0, None), sensor_left_m=0.0)) == 0
     not_noted = runs(SOMEWHERE, *LOADS, sensor_left_m=0.0, are_places_noted=False)
@@ -91,20 +91,20 @@ def test_a_place_stated_on_the_wrong_side_contradicts_the_loads() -> None:
     assert "one of them is stated wrong" in found.why
 
 
-def test_every_run_of_a_campaign_is_told_that_the_sign_is_turned() -> None:
+def test_every_run_reports_a_reversed_roll_sign() -> None:
     verdicts, findings = inspect_campaign(runs(PLACED, *LOADS[:2], roll_times=-1.0), PLACED, SETTINGS)
     assert [kinds(verdict) for verdict in verdicts] == [["fault:roll_rate_sign"]] * 2
     assert "roll_rate_sign_untold" not in [finding.kind for finding in findings]
 
 
-def test_what_cannot_be_told_is_a_note_for_all_runs_together() -> None:
+def test_an_undetermined_roll_sign_is_one_note_for_all_runs() -> None:
     verdicts, findings = inspect_campaign(runs(SOMEWHERE, LOADS[0]), SOMEWHERE, SETTINGS)
     assert [kinds(verdict) for verdict in verdicts] == [[]]
     assert [f"{one.severity}:{one.kind}" for one in findings if "roll" in one.kind] == ["note:roll_rate_sign_untold"]
     assert "0 ± 0.59 m left of the centre line" in findings[-1].text
 
 
-def test_without_a_roll_rate_nothing_is_said() -> None:
+def test_without_a_roll_rate_there_are_no_roll_findings() -> None:
     (one,) = runs(SOMEWHERE, LOADS[0])
     batches = tuple(replace(batch, roll_rate_radps=None) for batch in one.identification.batches)
     assert roll_sign_of([replace(one.identification, batches=batches)], PLACED) is None

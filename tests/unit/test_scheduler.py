@@ -107,7 +107,7 @@ def test_provisional_looks_grow_with_the_window() -> None:
     assert [look.rejected for look in looks] == [()] * 4
 
 
-def test_wheel_speed_alone_tells_standstill_too() -> None:
+def test_wheel_speed_alone_shows_standstill() -> None:
     moving = drive(200.0, lambda t_s: np.where(t_s > 50.0, 0.0, 14.0), RATE_HZ)
     by_wheels = Motion((*moving.signals[:2], Signal.WHEEL_SPEED), moving.t_ns, moving.columns)
     assert spans_s(batches_of(by_wheels)) == [pytest.approx((0.0, 110.0), abs=0.2)]

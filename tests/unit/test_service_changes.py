@@ -47,7 +47,7 @@ def test_an_estimate_is_a_line_with_its_numbers(caplog: pytest.LogCaptureFixture
     ]
 
 
-def test_reasons_are_a_line_only_where_their_set_changes(caplog: pytest.LogCaptureFixture) -> None:
+def test_reasons_are_logged_when_their_set_changes(caplog: pytest.LogCaptureFixture) -> None:
     told = Told()
     told.hear(
         make_estimate(0, Why.TOO_SLOW, Why.GAP),
@@ -67,7 +67,7 @@ def test_reasons_are_a_line_only_where_their_set_changes(caplog: pytest.LogCaptu
     assert Event.REJECTED not in names(caplog)
 
 
-def test_whoever_looks_for_a_fault_reads_of_every_batch(caplog: pytest.LogCaptureFixture) -> None:
+def test_debug_level_logs_every_batch(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("DEBUG", "gateway")
     Told().hear(make_estimate(0, Why.GAP))
     assert names(caplog) == [Event.REJECTED, Event.REASONS_CHANGED]

@@ -97,7 +97,7 @@ def test_an_estimate_is_collected_shown_and_grows_old() -> None:
 VAN = paper_van(unsprung_front_kg=90.0, unsprung_rear_kg=110.0, gross_limit_kg=1500.0)
 
 
-def test_each_estimate_is_weighed_once_however_often_the_weights_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_repeated_requests_weigh_each_estimate_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each call weighed the last hundred anew."""
     board, scales = Board(), Scales(CalibratedVehicle("sha256:ab", VAN, (0.0, 420.0), (40.0, 60.0)))
     n_weighed = 0

@@ -37,7 +37,7 @@ def fault_of(tmp_path: Path, text: str) -> str:
     return str(caught.value)
 
 
-def test_a_signal_map_is_all_that_must_be_said(tmp_path: Path) -> None:
+def test_a_signal_map_is_the_only_required_setting(tmp_path: Path) -> None:
     settings = loaded(tmp_path)
     assert settings.signals == str(tmp_path / "signals.toml")
     assert settings.calibration is None
@@ -160,7 +160,7 @@ def test_units(quantity: str, unit: str, factor: float) -> None:
 
 
 @pytest.mark.parametrize(("unit", "said"), [(None, "no unit"), ("", "no unit"), ("furlong/fortnight", "not known")])
-def test_an_unknown_unit_is_an_error_that_says_which_are_known(unit: str | None, said: str) -> None:
+def test_an_unknown_unit_is_an_error_with_the_known_ones(unit: str | None, said: str) -> None:
     with pytest.raises(SignalMapError, match=said) as caught:
         si_factor("speed", unit)
     assert "km/h" in str(caught.value)
@@ -233,7 +233,7 @@ class Written(BaseModel):
         ({"bounds_m": [{"length_m": 2800}, {"length_m": 1}]}, "bounds_m[1].length_m: 2800 is above 20: millimetres?"),
     ],
 )
-def test_a_number_beyond_its_bounds_says_which_unit_it_may_be_in(tables: dict[str, object], said: str) -> None:
+def test_a_number_out_of_bounds_gets_a_suggested_unit(tables: dict[str, object], said: str) -> None:
     with pytest.raises(ConfigurationError) as caught:
         checked(tables, Path("van.toml"), Written)
     assert str(caught.value) == f"van.toml: {said}"

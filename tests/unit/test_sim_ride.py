@@ -265,7 +265,7 @@ def test_transfer_functions_equal_the_closed_form(vehicle: Vehicle, load: Load, 
         assert np.max(error / np.maximum(np.abs(closed_form), 0.05 * np.max(np.abs(closed_form)))) < 0.01
 
 
-def test_where_no_cache_can_be_written_it_compiles_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_integrator_compiles_without_a_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
     def njit_in_a_read_only_place(**options: object) -> Callable[[Callable[..., int]], Callable[..., int]]:
@@ -279,7 +279,7 @@ def test_where_no_cache_can_be_written_it_compiles_anew(monkeypatch: pytest.Monk
     assert asked == [True, False]
 
 
-def test_compiled_code_gives_what_python_gives() -> None:
+def test_compiled_code_agrees_with_python() -> None:
     def alternating(n: int) -> float:
         total = 0.0
         for k in range(n):

@@ -44,7 +44,7 @@ def test_a_moving_start_has_no_transient() -> None:
     assert 0.4 < np.std(vertical[:200]) / np.std(vertical) < 1.8
 
 
-def test_the_truth_is_told_step_by_step() -> None:
+def test_the_truth_has_every_load_step() -> None:
     steps = [LoadStep(0.0, ()), LoadStep(AT_REST_S, (Load(280.0, 2.1, 0.2), Load(20.0, 0.7)))]
     driven = simulate_drive(PAPER_VAN, steps, PaperRoad(), STOP_AND_GO, IDEAL, 1)
     truth = driven.truth
@@ -101,7 +101,7 @@ def test_the_same_seed_draws_the_same_van_and_another_seed_another() -> None:
     assert one != other
 
 
-def test_properties_scatter_as_much_as_is_said_and_each_axle_alone() -> None:
+def test_properties_of_each_axle_scatter_as_stated() -> None:
     rng = np.random.default_rng(3)
     vans = [scattered(PAPER_VAN, FROM_DAY_TO_DAY, rng) for _ in range(1500)]
     front = np.log([van.front.damper.rebound_nspm / PAPER_VAN.front.damper.rebound_nspm for van in vans])

@@ -173,7 +173,7 @@ def test_a_campaign_is_not_written_over(tmp_path: Path) -> None:
         ({"kind": "ident", "longest_s": 0.0}, "positive duration"),
     ],
 )
-def test_a_name_that_is_not_there_is_refused_with_those_that_are(names: dict[str, str], complaint: str) -> None:
+def test_an_unknown_name_is_refused_with_the_known_ones(names: dict[str, str], complaint: str) -> None:
     with pytest.raises(ConfigurationError, match=complaint):
         bench_of(**names)
 

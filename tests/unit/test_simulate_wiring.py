@@ -34,7 +34,7 @@ def recording() -> Recording:
 
 
 @pytest.mark.parametrize("name", WIRED_MAPS)
-def test_what_goes_onto_the_bus_comes_back(name: str, recording: Recording) -> None:
+def test_encoded_frames_decode_to_the_same_values(name: str, recording: Recording) -> None:
     signal_map = load_signal_map(f"springscale:{name}")
     motion = Decoder(signal_map).decode(Wiring(name).frames_of(recording))
     wanted = {

@@ -23,14 +23,14 @@ def sister() -> VehicleModel:
     return calibrated_on_loads(seed=1)
 
 
-def test_what_vehicles_of_a_line_share_is_the_sisters_widened_by_the_scatter(sister: VehicleModel) -> None:
+def test_parameters_shared_by_a_model_come_from_the_sister_with_more_scatter(sister: VehicleModel) -> None:
     prior = Prior.of_sister(sister, VAN, with_roll=False)
     variances = np.diag(sister.covariance) + SCATTER**2
     assert prior.mean[SHARED] == pytest.approx(sister.parameters[SHARED])
     assert np.diag(prior.covariance)[SHARED] == pytest.approx(variances[SHARED])
 
 
-def test_each_vehicles_own_keeps_the_prior_of_any_vehicle(sister: VehicleModel) -> None:
+def test_individual_parameters_keep_the_general_prior(sister: VehicleModel) -> None:
     other = replace(VAN, sensor_position_m=1.0)
     prior = Prior.of_sister(sister, other, with_roll=False)
     generic = Prior.of_any(other, with_roll=False)

@@ -58,7 +58,7 @@ def test_masked_samples_are_never_looked_at() -> None:
     np.testing.assert_array_equal(clean.vertical_acceleration, dirty.vertical_acceleration)
 
 
-def test_no_unbroken_stretch_is_no_spectrum() -> None:
+def test_without_an_unbroken_stretch_there_is_no_spectrum() -> None:
     usable = np.ones(15_000, bool)
     usable[::200] = False
     assert spectra_of(batch_of(noise(6), noise(7), usable)) is None
@@ -77,14 +77,14 @@ def test_at_the_reference_speed_it_is_the_root_mean_square_of_the_band() -> None
 
 
 @given(st.floats(3.0, 40.0), st.floats(1.1, 4.0))
-def test_a_faster_drive_over_the_same_road_tells_the_same(speed_mps: float, factor: float) -> None:
+def test_roughness_does_not_depend_on_speed(speed_mps: float, factor: float) -> None:
     """ISO 8608: the same road met ``factor`` times as fast has ``factor`` times the power at every frequency."""
     slow = roughness_mps2(spectra(0.3), speed_mps)
     assert roughness_mps2(spectra(0.3 * math.sqrt(factor)), factor * speed_mps) == pytest.approx(slow)
 
 
 @given(st.floats(0.01, 3.0), st.floats(1.0, 10.0))
-def test_it_grows_as_the_acceleration_does(amplitude: float, factor: float) -> None:
+def test_roughness_grows_with_the_acceleration(amplitude: float, factor: float) -> None:
     one = roughness_mps2(spectra(amplitude), 15.0)
     assert roughness_mps2(spectra(factor * amplitude), 15.0) == pytest.approx(factor * one)
 
@@ -95,7 +95,7 @@ def test_without_speed_or_spectra_it_is_unknown(speed_mps: float) -> None:
     assert math.isnan(roughness_mps2(None, 15.0))
 
 
-def test_every_estimate_tells_it_of_its_own_batch() -> None:
+def test_every_estimate_has_the_roughness_of_its_batch() -> None:
     """White acceleration of 0.5 m/s2 at 100 samples a second, at 15 m/s: 14 of its 50 Hz, brought to 80 km/h."""
     motion = drive(30.0)
     scheduler = Scheduler(BatchSettings(window_s=20.0), {})

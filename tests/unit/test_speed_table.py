@@ -29,12 +29,12 @@ def test_a_goal_is_met_or_missed():
 
 
 @pytest.mark.parametrize(("seconds", "is_told"), [(0.034, False), (0.036, True)])
-def test_what_holds_a_figure_is_told_where_its_goal_is_missed(seconds: float, is_told: bool):
+def test_a_missed_goal_is_explained(seconds: float, is_told: bool):
     batch, *_ = lines_of({"weigh": {"batch_s": {"cross_spectrum": seconds}, "calibration": {"cpu_s": 1.0}}})
     assert ("missed, held by" in batch.verdict) == is_told
 
 
-def test_who_is_not_installed_is_left_out_with_a_word():
+def test_missing_libraries_are_left_out_and_named():
     figures = {line.what: line.figure for line in lines_of({"decode": DECODE})}
     assert figures["hilspy, by DBC"] == "left out: hilspy is not installed"
     assert figures["python-can + cantools"] == "5,000 ns a frame, 125 x ours"
@@ -47,7 +47,7 @@ def test_a_large_ratio_is_a_whole_number():
     assert line.figure == "82 ns a frame, 225 MB, 122 x python-can's reader"
 
 
-def test_what_a_parked_vehicle_costs_is_told():
+def test_the_table_has_the_cost_of_a_parked_vehicle():
     idle = {"n_delivered": 1000, "processor_s_per_hour": 12.34, "disk_kb_per_hour": 1234.0}
     assert [line.figure for line in lines_of({"idle": idle})] == ["12.3 s an hour", "1,234 kB an hour"]
     (absent,) = lines_of({"idle": {"skipped": "mosquitto is not installed"}})
@@ -59,7 +59,7 @@ def test_parts_that_were_not_run_have_no_lines():
     assert {line.section for line in lines_of({"simulator": {"stage": 3.0}})} == {"simulator"}
 
 
-def test_a_run_without_its_library_says_which(capsys):
+def test_a_run_names_its_missing_library(capsys):
     def run():
         raise ModuleNotFoundError("No module named 'hilspy'", name="hilspy")
 

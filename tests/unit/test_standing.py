@@ -46,7 +46,7 @@ def batch(begun_s: int) -> Estimate:
 
 @pytest.mark.parametrize("signal", [Signal.SPEED, Signal.WHEEL_SPEED])
 @pytest.mark.parametrize("chunk_s", [1, 7, 1000])
-def test_a_stop_long_enough_to_load_makes_what_was_weighed_before_old(signal: Signal, chunk_s: int) -> None:
+def test_a_stop_long_enough_to_load_makes_earlier_weighings_old(signal: Signal, chunk_s: int) -> None:
     driven = Driven(signal, chunk_s)
     before = driven.at(10.0, 300)
     assert driven.knows(before)
@@ -76,7 +76,7 @@ def test_a_bus_that_slept_is_a_vehicle_that_stood() -> None:
     assert driven.watch.stood_s() is None
 
 
-def test_it_stands_after_ten_seconds_and_from_the_beginning() -> None:
+def test_a_vehicle_stands_after_ten_seconds_or_at_the_beginning() -> None:
     driven = Driven(chunk_s=1)
     assert driven.watch.stood_s() == 0.0
     driven.at(0.0, 5)
@@ -96,7 +96,7 @@ def test_in_a_replay_the_frames_own_time_counts() -> None:
     assert driven.watch.stood_s() == pytest.approx(30.0, abs=1.1)
 
 
-def test_what_an_earlier_run_weighed_may_have_been_unloaded_since() -> None:
+def test_a_load_of_an_earlier_run_may_have_been_unloaded() -> None:
     driven = Driven()
     assert not driven.knows(0)
     driven.at(10.0, 5)
@@ -104,7 +104,7 @@ def test_what_an_earlier_run_weighed_may_have_been_unloaded_since() -> None:
     assert driven.knows(1000)
 
 
-def test_after_a_clock_that_was_put_back_nobody_knows() -> None:
+def test_the_standing_time_is_unknown_after_a_clock_step() -> None:
     driven = Driven()
     before = driven.at(10.0, 300)
     driven.t_s -= 200

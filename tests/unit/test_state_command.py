@@ -55,7 +55,7 @@ def test_without_a_time_it_holds_from_now_on(url: str) -> None:
     assert told["from"] > "2026"
 
 
-def test_the_list_shows_what_was_found_and_what_is_asked(url: str, bench: LearnerBench) -> None:
+def test_the_list_shows_findings_and_questions(url: str, bench: LearnerBench) -> None:
     one = said(url, "note", "310", "--from", at(0), "--ref", "LS-1")
     bench.drive(0)
     bench.turn()
@@ -86,7 +86,7 @@ def test_drives_that_look_empty_and_were_not_are_not_asked_about_again(url: str,
     assert "no such drive is asked about" in str(refused.exception)
 
 
-def test_an_empty_list_says_what_to_do(url: str) -> None:
+def test_an_empty_list_gives_advice(url: str) -> None:
     assert "springscale state note 310" in called("state", "list", "--url", url).stdout
 
 
@@ -103,7 +103,7 @@ def test_a_table_is_tried_and_then_taken(url: str, tmp_path: Path) -> None:
     assert [one["from"] for one in said(url, "list")["items"]] == ["2026-09-21T18:00:00+02:00"]
 
 
-def test_what_is_no_time_is_refused_before_anything_is_sent(url: str) -> None:
+def test_an_invalid_time_is_refused_before_sending(url: str) -> None:
     refused = called("state", "empty", "--from", "this morning", "--url", url)
     assert refused.exit_code == 2
     assert "write it as 2026-11-26T07:40" in refused.output

@@ -78,7 +78,7 @@ def asked(sister: Vehicle | None, **changes: Any) -> tuple[Doubt, ...]:
         ({"payload_height_m": 4.0}, DoubtKind.LOAD_HEIGHT, {"payload_height_m": 0.4}),
     ],
 )
-def test_what_vehicles_are_not_like_is_asked_about(
+def test_unlikely_vehicle_figures_raise_questions(
     changes: dict[str, Any], kind: DoubtKind, meant: dict[str, Any]
 ) -> None:
     found = asked(None, **changes)
@@ -94,7 +94,7 @@ def test_what_vehicles_are_not_like_is_asked_about(
         ({"track_width_m": 1.7}, DoubtKind.SISTER_TRACK),
     ],
 )
-def test_what_its_sister_is_not_like_is_asked_about(changes: dict[str, Any], kind: DoubtKind) -> None:
+def test_figures_unlike_the_sisters_raise_questions(changes: dict[str, Any], kind: DoubtKind) -> None:
     of_gross = {"gross_limit_kg": None}
     assert [one.kind for one in asked(SISTER, **changes | of_gross)] == [kind]
     assert asked(None, **changes | of_gross) == ()
@@ -105,7 +105,7 @@ def test_what_its_sister_is_not_like_is_asked_about(changes: dict[str, Any], kin
     "changes",
     [{}, {"kerb_front_axle_kg": 740.0}, {"sensor_position_m": -0.6}, {"sensor_offset_left_m": -0.7}],
 )
-def test_a_van_as_it_is_passes(sister: Vehicle | None, changes: dict[str, Any]) -> None:
+def test_figures_of_a_real_van_raise_no_question(sister: Vehicle | None, changes: dict[str, Any]) -> None:
     assert asked(sister, **changes) == ()
 
 
@@ -210,6 +210,6 @@ def test_a_sensor_elsewhere_is_found(sister: VehicleModel, empty: KnownRun) -> N
         assert doubt.numbers["found_m"] == pytest.approx(VAN.sensor_position_m, abs=0.1)
 
 
-def test_another_model_is_told_from_its_sister(sister: VehicleModel) -> None:
+def test_another_model_is_distinguished_from_a_sister(sister: VehicleModel) -> None:
     found = kinds(doubted(known_run(1, 0.0, None, seed=9, car=OTHER_MODEL), sister))
     assert set(found) & {DoubtKind.DRIVEN_SISTER, DoubtKind.DRIVEN_WEIGHT}

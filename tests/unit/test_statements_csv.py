@@ -77,7 +77,7 @@ def test_numbers_have_a_decimal_point_or_comma(cell: str, kg: float) -> None:
     assert row.record.load.payload_kg == kg
 
 
-def test_a_thousand_and_a_fraction_are_told_apart_by_the_rest_of_the_file_and_never_guessed() -> None:
+def test_thousands_and_decimals_are_decided_by_the_whole_file() -> None:
     german = told("from;payload_kg;plus_minus_kg\n2026-11-26T07:40:00Z;1.240;12,5\n")
     assert german.rows[0].record.load.payload_kg == 1240.0
     english = told("from;payload_kg;plus_minus_kg\n2026-11-26T07:40:00Z;1.240;12.5\n")
@@ -97,7 +97,7 @@ def test_times_are_read_as_people_write_them_in_the_stated_zone(cell: str) -> No
     assert row.record.from_ == MORNING
 
 
-def test_times_without_a_zone_are_read_as_utc_and_said_so() -> None:
+def test_times_without_a_zone_are_read_as_utc_with_a_note() -> None:
     found = told("from;payload_kg\n2026-11-26 07:40;310\n")
     assert found.rows[0].record.from_ == MORNING
     assert found.notes == (
@@ -105,7 +105,7 @@ def test_times_without_a_zone_are_read_as_utc_and_said_so() -> None:
     )
 
 
-def test_a_day_as_the_end_is_the_whole_day() -> None:
+def test_an_end_date_includes_the_whole_day() -> None:
     (row,) = told("from;until;payload_kg\n26.11.2026;26.11.2026;310\n", BERLIN).rows
     assert row.record.until is not None
     assert (row.record.until - row.record.from_).total_seconds() == 86_400.0
@@ -159,7 +159,7 @@ def test_a_row_that_cannot_be_read_is_named_with_its_column_and_how_to_mend_it(
     assert fault in only_fault(found)
 
 
-def test_bad_rows_keep_no_good_one_from_being_read() -> None:
+def test_bad_rows_do_not_affect_good_ones() -> None:
     found = told("from;payload_kg\n2026-11-26T07:40Z;310\nnever;200\n2026-11-27T07:40Z;120\n")
     assert [row.number for row in found.rows] == [2, 4]
     assert list(found.faults) == [3]
@@ -190,7 +190,7 @@ def test_an_hour_that_summer_time_repeats_or_skips_is_asked_about(local: str, wh
         (b"[{]", "not valid JSON"),
     ],
 )
-def test_a_file_that_is_no_table_of_statements_is_refused_with_what_to_change(content: bytes, why: str) -> None:
+def test_a_file_that_is_no_table_of_statements_is_refused_with_a_remedy(content: bytes, why: str) -> None:
     with pytest.raises(StatementsFileError, match=r"notes\.csv: ") as refused:
         told(content)
     assert why in str(refused.value)
@@ -210,7 +210,7 @@ def test_the_same_row_has_the_same_id_in_every_file_and_another_row_another() ->
     assert first.id == again.id != other.id
 
 
-def test_what_a_service_lists_as_withdrawn_is_left_out() -> None:
+def test_withdrawn_statements_are_left_out() -> None:
     listed = [
         {"from": "2026-11-26T07:40:00Z", "source": "empty", "state": state, "ref": state}
         for state in ("used", "withdrawn")

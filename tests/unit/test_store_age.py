@@ -113,7 +113,7 @@ def test_a_vehicle_that_stood_for_two_years_keeps_its_records_a_month_longer(
     assert [event for event in names(caplog) if "clock" in event] == [Event.CLOCK_DOUBTED, Event.CLOCK_BELIEVED]
 
 
-def test_a_box_without_a_clock_battery_still_forgets_what_is_old(box: Box) -> None:
+def test_old_records_are_removed_without_a_clock_battery(box: Box) -> None:
     n = box.drive(3)
     for _ in range(25):
         today_ns = box.now_ns + 20 * DAY_NS
@@ -124,7 +124,7 @@ def test_a_box_without_a_clock_battery_still_forgets_what_is_old(box: Box) -> No
     assert n < 25
 
 
-def test_what_is_not_delivered_is_not_removed_for_its_age(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_undelivered_records_are_not_removed_for_their_age(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     box = Box(tmp_path, Retention(max_age_s=60.0, undelivered_to=("fleet",)), monkeypatch)
     assert box.drive(10, days_between=1) == 10
     with closing(Store.open(tmp_path, clock_ns=lambda: box.now_ns)) as store:

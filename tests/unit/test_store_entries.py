@@ -59,7 +59,7 @@ def test_a_revision_takes_the_place_of_the_one_before(store):
     assert revisions(store, newest_first=True, limit=1) == [("trip-3-abc", 1)]
 
 
-def test_following_the_cursor_shows_every_revision_that_comes(store):
+def test_the_cursor_shows_every_new_revision(store):
     write(store, entry(1))
     settled(store)
     page = store.reader().entries()
@@ -90,7 +90,7 @@ def test_estimates_are_linked_past_the_entries_between(tmp_path):
 
 
 @pytest.mark.parametrize("with_places", [False, True])
-def test_the_outbox_hands_out_both_in_order_and_positions_only_where_asked(tmp_path, with_places):
+def test_the_outbox_reads_both_kinds_in_order_and_positions_on_request(tmp_path, with_places):
     with closing(Store.open(tmp_path)) as store:
         way = {"start": {"latitude_deg": 1.0, "longitude_deg": 2.0}, "stops": [{"place": {"latitude_deg": 1.0}}]}
         store.write_estimate({**make_record(0), "way": way})

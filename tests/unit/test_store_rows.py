@@ -1,6 +1,7 @@
 """What goes into the store comes out of it, once, in order and unchanged."""
 
 import json
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,18 @@ def test_pages_follow_one_another_in_both_directions(store: Store) -> None:
         assert tuple(seen) == expected
 
 
-def test_the_last_cursor_of_a_page_waits_for_what_comes(store: Store) -> None:
+def test_a_cursor_outlives_its_store_and_one_of_another_database_begins_at_the_first_row(tmp_path: Path) -> None:
+    with closing(Store.open(tmp_path)) as first:
+        (before,) = write(first, make_record(0))
+    with closing(Store.open(tmp_path)) as second:
+        (after,) = write(second, make_record(1))
+        assert second.reader().estimates(cursor=before).items == texts(make_record(1))
+        assert len(second.reader().estimates(cursor="ffffffffffffffff-99").items) == 2
+    assert after.split("-")[0] == before.split("-")[0]
+    assert int(after.split("-")[1]) > int(before.split("-")[1])
+
+
+def test_the_last_cursor_continues_with_new_records(store: Store) -> None:
     write(store, make_record(0), make_record(1))
     for newest_first in (False, True):
         page = store.reader().estimates(newest_first=newest_first)
@@ -79,7 +91,7 @@ def test_spectra_can_be_left_out(store: Store) -> None:
     assert (item,) == texts(expected)
 
 
-def test_latest_tells_answer_and_rejection_apart(store: Store) -> None:
+def test_latest_distinguishes_answer_and_rejection(store: Store) -> None:
     assert store.reader().latest().estimate is None
     write(store, make_record(1), make_record(2), make_record(3, Why.TOO_SLOW))
     latest = store.reader().latest()
@@ -90,16 +102,12 @@ def test_latest_tells_answer_and_rejection_apart(store: Store) -> None:
     assert latest.age_s >= 0.0
 
 
-def test_events_and_calibrations_are_kept(store: Store) -> None:
+def test_events_of_the_service_are_kept(store: Store) -> None:
     store.write_event("started", {"version": "1"})
     store.write_event("bus_lost", {"channel": "can0"})
-    store.write_calibration("sha256:ab", '{"a":1}')
-    store.write_calibration("sha256:ab", '{"a":1}')
     assert store.flush(PATIENCE_S)
     events = store.reader().page((SERVICE,), newest_first=True).items
     assert [event.partition("\n")[0] for event in events] == ["bus_lost", "started"]
-    assert store.reader().calibration("sha256:ab") == '{"a":1}'
-    assert store.reader().calibration("sha256:cd") is None
 
 
 @pytest.mark.parametrize("cursor", ["", "x", "12", "abcd-", "abcd--5", "abcd-1e3", "ab cd-5", "abcd-" + "9" * 30])
@@ -108,33 +116,16 @@ def test_a_cursor_we_never_gave_is_refused(store: Store, cursor: str) -> None:
         store.reader().estimates(cursor=cursor)
 
 
-def test_a_cursor_of_another_database_begins_at_the_first_row(store: Store) -> None:
-    write(store, make_record(0))
-    assert len(store.reader().estimates(cursor="ffffffffffffffff-99").items) == 1
-
-
 def test_a_provisional_estimate_is_refused(store: Store) -> None:
     with pytest.raises(ValueError, match="provisional"):
         store.write_estimate({**make_record(1), "provisional": True})
-
-
-def test_numbers_go_on_after_a_restart(tmp_path: Path) -> None:
-    first = Store.open(tmp_path)
-    (before,) = write(first, make_record(0))
-    assert first.close() == 0
-    second = Store.open(tmp_path)
-    (after,) = write(second, make_record(1))
-    assert second.reader().estimates(cursor=before).items == texts(make_record(1))
-    assert after.split("-")[0] == before.split("-")[0]
-    assert int(after.split("-")[1]) > int(before.split("-")[1])
-    second.close()
 
 
 @pytest.mark.parametrize(
     ("first_s", "n_pruned"),
     [(1_790_000_000 - 61, 2), (7, 0)],  # a box without a clock battery wakes up in 1970: that is not old
 )
-def test_what_is_old_goes_and_is_counted(tmp_path: Path, first_s: int, n_pruned: int) -> None:
+def test_old_records_are_removed_and_counted(tmp_path: Path, first_s: int, n_pruned: int) -> None:
     clock = [first_s * NS_PER_S]
     store = Store.open(tmp_path, Retention(max_age_s=60.0), clock_ns=lambda: clock[0])
     write(store, make_record(0), make_record(1))

@@ -23,7 +23,7 @@ def run(*arguments: str) -> str:
 @pytest.mark.parametrize(
     ("n_missed", "verdict"), [(0, "agrees with 90 to 99 %"), (100, "too narrow, the limits lie below 90 to 99 %")]
 )
-def test_coverage_says_whether_it_falls_short(
+def test_the_coverage_study_reports_a_shortfall(
     n_missed: int, verdict: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     batches = [

@@ -50,7 +50,7 @@ def test_known_loads_teach_a_vehicle_that_weighs_others(load: tuple[float, float
     assert told.front_share.number == pytest.approx(load[1], abs=0.8)
 
 
-def test_an_unlabelled_drive_is_weighed_by_what_the_others_teach() -> None:
+def test_an_unlabelled_drive_is_weighed_by_the_other_drives() -> None:
     drives = [drive(i, stated(*load), load) for i, load in enumerate(KNOWN)]
     drives.append(drive(9, NOTHING_KNOWN, (180.0, 49.0)))
     found = teach(drives, VAN).loads[-1]
@@ -58,7 +58,7 @@ def test_an_unlabelled_drive_is_weighed_by_what_the_others_teach() -> None:
     assert np.isnan(found.without_kg)
 
 
-def test_one_empty_drive_and_drives_of_which_nothing_is_said_teach_a_vehicle() -> None:
+def test_one_empty_drive_and_unlabelled_drives_teach_a_vehicle() -> None:
     loads = ((0.0, 52.0), (300.0, 47.0), (150.0, 54.0), (400.0, 50.0))
     said = (empty(), NOTHING_KNOWN, NOTHING_KNOWN, NOTHING_KNOWN)
     speeds = (14.0, 11.0, 17.0, 20.0)
@@ -71,7 +71,7 @@ def test_one_empty_drive_and_drives_of_which_nothing_is_said_teach_a_vehicle() -
     assert told.payload.interval95[0] < 220.0 < told.payload.interval95[1]
 
 
-def test_a_statement_that_its_drive_contradicts_is_held_and_no_other() -> None:
+def test_only_the_statement_that_its_drive_contradicts_is_held() -> None:
     drives = [drive(i, stated(*load), load) for i, load in enumerate((*KNOWN, (120.0, 53.0)))]
     drives[2] = drive(2, stated(0.0, 52.0), KNOWN[2])
     found = teach(drives, VAN).loads
@@ -79,7 +79,7 @@ def test_a_statement_that_its_drive_contradicts_is_held_and_no_other() -> None:
     assert found[2].load.payload_kg == pytest.approx(KNOWN[2][0], abs=40.0)
 
 
-def test_each_statement_is_told_what_its_drive_says_without_it() -> None:
+def test_each_statement_is_compared_with_its_drive_weighed_without_it() -> None:
     """That is its test: the drive knows the load from the vehicle of the others alone."""
     for found, (payload_kg, _) in zip(known().loads, KNOWN, strict=True):
         assert abs(found.without_kg - payload_kg) < 3.0 * found.without_std_kg
@@ -145,6 +145,6 @@ def test_a_place_that_is_not_known_leaves_the_share_wide() -> None:
     assert unknown.front_share_std > 5.0 * placed.front_share_std
 
 
-def test_what_the_fitter_states_of_the_goods_leaves_one_kind_of_shape() -> None:
+def test_stated_goods_have_one_shape() -> None:
     assert [one.name for one in shape_hypotheses(VAN, 0.1, 0.3)] == ["compact", "spread"]
     assert [one.name for one in shape_hypotheses(replace(VAN, payload_length_m=2.0), 0.1, 0.3)] == ["stated"]

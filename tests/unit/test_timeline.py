@@ -65,7 +65,7 @@ def test_order_and_repeated_stamps_do_not_matter() -> None:
 
 
 @pytest.mark.parametrize("rate_hz", [50.0, 100.0])
-def test_a_gap_stays_unknown_and_what_lies_around_it_known(rate_hz: float) -> None:
+def test_a_gap_is_unknown_and_its_surroundings_are_known(rate_hz: float) -> None:
     t_s, t_ns = stamps(rate_hz)
     kept = (t_s < 10.0) | (t_s > 10.3)
     back = gridded(t_ns[kept], np.ones(int(kept.sum())))
@@ -103,7 +103,7 @@ def test_speed_is_linear_between_samples_and_held_no_longer_than_allowed() -> No
     assert np.isnan([at[5.0], at[9.0], at[15.1]]).all()  # six seconds apart, and past the hold
 
 
-def test_no_speed_sample_is_no_speed() -> None:
+def test_without_samples_the_speed_is_unknown() -> None:
     assert np.isnan(speed_onto_grid(np.empty(0, np.int64), np.empty(0), T0_NS, 10, RATE_HZ, 3.0)).all()
 
 
@@ -158,6 +158,6 @@ def test_a_tridiagonal_system_is_solved_as_scipy_does(n: int, seed: int) -> None
     np.testing.assert_allclose(solve_tridiagonal(below, diagonal, above, right), expected, rtol=1e-9, atol=1e-9)
 
 
-def test_what_is_no_number_is_an_error_and_no_curve() -> None:
+def test_nan_samples_are_an_error() -> None:
     with pytest.raises(ValueError, match="infs or NaNs"):
         smooth_slopes(np.arange(5.0), np.array([0.0, np.nan, 1.0, 2.0, 3.0]))

@@ -75,7 +75,7 @@ HARMLESS = {
 
 @pytest.mark.parametrize("kind", [*UNRELATED, *HARMLESS])
 @pytest.mark.parametrize("place", ["before", "behind"])
-def test_a_fault_elsewhere_leaves_what_is_mapped_as_it_is(kind: str, place: str, tmp_path: Path) -> None:
+def test_a_fault_elsewhere_does_not_affect_mapped_signals(kind: str, place: str, tmp_path: Path) -> None:
     sound = load_signal_map(write(tmp_path, HEAD + BOX + OTHER + TAIL))
     other = OTHER + {**UNRELATED, **HARMLESS}[kind]
     text = HEAD + (other + BOX + TAIL if place == "before" else BOX + TAIL + other)
@@ -187,7 +187,7 @@ AS_CANTOOLS = {
 
 
 @pytest.mark.parametrize("kind", AS_CANTOOLS)
-def test_message_by_message_a_database_is_what_cantools_reads_at_once(kind: str, tmp_path: Path) -> None:
+def test_reading_a_database_by_message_agrees_with_cantools(kind: str, tmp_path: Path) -> None:
     (tmp_path / "a.dbc").write_text(AS_CANTOOLS[kind])
     found, unsound = Databases(tmp_path, [tmp_path / "a.dbc"]).sound()
     assert unsound == []
@@ -204,7 +204,7 @@ def test_message_by_message_a_database_is_what_cantools_reads_at_once(kind: str,
             assert sum(map(len, signal.choices.values())) == len(theirs.conversion.choices or {})
 
 
-def test_check_config_names_what_it_leaves_out_and_look_too(tmp_path: Path) -> None:
+def test_check_config_and_look_name_ignored_parts_of_a_database(tmp_path: Path) -> None:
     write(tmp_path, HEAD + BOX + OTHER + UNRELATED["a billion bits"] + TAIL)
     for name, message, signal in (("pitch_rate", "BOX", "State"), ("speed", "BOX", "Spare")):
         unit = {"pitch_rate": "rad/s", "speed": "m/s"}[name]

@@ -93,7 +93,7 @@ def test_a_later_start_goes_on_where_the_last_one_ended(store: Store) -> None:
     assert [message.id for message in broker.taken] == [new["id"]]
 
 
-def test_after_a_break_only_the_letter_under_way_comes_again(store: Store) -> None:
+def test_after_a_break_only_the_message_in_flight_is_repeated(store: Store) -> None:
     ids = fill(store, 40)
     breaks = {7, 8, 23}
 
@@ -112,7 +112,7 @@ def test_after_a_break_only_the_letter_under_way_comes_again(store: Store) -> No
     assert broker.n_connections == 1 + len(breaks)
 
 
-def test_what_the_broker_may_take_later_is_tried_again(store: Store) -> None:
+def test_a_temporary_refusal_is_retried(store: Store) -> None:
     ids = fill(store, 3)
     answers = iter(["Quota exceeded", "Not authorized"])
 
@@ -126,9 +126,7 @@ def test_what_the_broker_may_take_later_is_tried_again(store: Store) -> None:
     assert uplink.report().n_refused == 0
 
 
-def test_what_the_broker_will_never_take_is_counted_and_holds_nothing_up(
-    store: Store, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_permanent_refusal_is_counted_without_delaying_others(store: Store, caplog: pytest.LogCaptureFixture) -> None:
     ids = fill(store, 6)
 
     def answer(n: int, message: OutboxMessage) -> BrokerAnswer:
@@ -143,7 +141,7 @@ def test_what_the_broker_will_never_take_is_counted_and_holds_nothing_up(
     assert fields_of(caplog, Event.UPLINK_REFUSED)["id"] == ids[2]
 
 
-def test_nothing_leaves_before_the_letter_ahead_is_answered(store: Store) -> None:
+def test_one_message_is_in_flight_at_a_time(store: Store) -> None:
     fill(store, 3)
     sent: list[OutboxMessage] = []
 
@@ -156,7 +154,7 @@ def test_nothing_leaves_before_the_letter_ahead_is_answered(store: Store) -> Non
     assert store.reader().delivery("fleet").n_waiting == 3
 
 
-def test_what_waits_is_counted_while_there_is_no_link(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_waiting_records_are_counted_without_a_link(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gateway.uplink.forwarder.LOOK_S", 0.01)
     fill(store, 3)
 
@@ -174,7 +172,7 @@ def test_what_waits_is_counted_while_there_is_no_link(store: Store, monkeypatch:
     assert (uplink.report().n_connections, uplink.report().n_cuts) == (0, 0)
 
 
-def test_the_age_of_what_waits_is_that_of_the_oldest(tmp_path: Path) -> None:
+def test_the_waiting_age_is_that_of_the_oldest_record(tmp_path: Path) -> None:
     now_ns = [1_790_000_000 * 10**9]
     store = Store.open(tmp_path, clock_ns=lambda: now_ns[0])
     cursors: list[str | None] = [None]
@@ -191,14 +189,14 @@ def test_the_age_of_what_waits_is_that_of_the_oldest(tmp_path: Path) -> None:
     store.close()
 
 
-def test_spectra_stay_at_home(store: Store) -> None:
+def test_spectra_are_not_sent(store: Store) -> None:
     store.write_estimate(make_record(1, with_spectra=True))
     broker = FakeBroker(accepted)
     deliver(store, broker, lambda uplink: uplink.report().n_delivered == 1)
     assert "spectra" not in broker.taken[0].text
 
 
-def test_what_retention_removes_undelivered_is_counted(tmp_path: Path) -> None:
+def test_undelivered_records_that_retention_removes_are_counted(tmp_path: Path) -> None:
     now_ns = [1_790_000_000 * 10**9]
     store = Store.open(tmp_path, Retention(max_age_s=60.0), clock_ns=lambda: now_ns[0])
     fill(store, 2)
@@ -237,7 +235,7 @@ def test_a_cursor_of_another_database_is_not_remembered(store: Store) -> None:
     assert store.reader().delivery("fleet").cursor is None
 
 
-def test_the_back_off_grows_to_its_ceiling_and_begins_anew() -> None:
+def test_the_back_off_grows_to_its_ceiling_and_resets() -> None:
     back_off = BackOff(1.0, 8.0, random.Random(1))
     pauses = [back_off.next_s() for _ in range(2000)]
     assert max(pauses[5:]) > 7.5
@@ -261,7 +259,7 @@ def test_settings_name_the_vehicle(tmp_path: Path) -> None:
         ({"host": "b", "username": "van", "password_file": "absent"}, "cannot be read"),
     ],
 )
-def test_a_setting_that_cannot_work_is_told_at_the_start(section: dict[str, Any], said: str) -> None:
+def test_an_unusable_setting_is_reported_at_the_start(section: dict[str, Any], said: str) -> None:
     with pytest.raises(ConfigurationError, match=said):
         uplink_settings(UplinkSection(**section), VehicleSection(id="van-17"))
 
@@ -285,7 +283,7 @@ def test_settings_that_contradict_each_other_are_refused(section: dict[str, Any]
         UplinkSection(**section)
 
 
-def test_the_log_tells_of_a_link_when_it_comes_and_when_it_goes(store: Store, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_log_reports_connects_and_disconnects(store: Store, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("INFO", "gateway")
     fill(store, 3)
     faults = iter(["no route", "no route", "no name", None, None])

@@ -61,9 +61,7 @@ def test_without_payload_the_share_is_the_empty_one(van: Vehicle) -> None:
 
 
 @given(van=vehicles, load_kg=loads_kg, left_m=st.floats(-0.7, 0.7), empty_left_m=st.floats(-0.05, 0.05))
-def test_the_wheels_of_a_side_carry_what_the_moments_say(
-    van: Vehicle, load_kg: float, left_m: float, empty_left_m: float
-) -> None:
+def test_wheel_loads_follow_from_the_moments(van: Vehicle, load_kg: float, left_m: float, empty_left_m: float) -> None:
     van = replace(van, empty_cg_left_m=empty_left_m)
     track_m, total_kg = 1.5, van.empty_mass_kg + load_kg
     left_kg = left_share_pct(cg_left_m(van, load_kg, left_m), track_m) / 100.0 * total_kg
@@ -97,7 +95,7 @@ def test_given_unsprung_masses_lead_back_to_the_body(mass_kg: float, share: floa
 
 
 @given(mass_kg=masses_kg, share=shares)
-def test_an_unsprung_mass_nobody_gives_is_the_documented_share(mass_kg: float, share: float) -> None:
+def test_an_unstated_unsprung_mass_is_the_documented_share(mass_kg: float, share: float) -> None:
     kg = UNSPRUNG_SHARE * mass_kg
     weights = (share * mass_kg + kg, (1.0 - share) * mass_kg + kg)
     for known in ((None, None), (kg, None), (None, kg)):
@@ -107,7 +105,7 @@ def test_an_unsprung_mass_nobody_gives_is_the_documented_share(mass_kg: float, s
 
 
 def moved(body: Sprung, **change: float) -> tuple[float, float]:
-    """What mass and share become by a small change of one reading, per unit of it."""
+    """The changes of mass and share by a small change of one reading, per unit of it."""
     one = AxleWeights(body.weights.front_kg, body.weights.rear_kg, body.unsprung_front_kg, body.unsprung_rear_kg)
     changed = sprung_of(AxleWeights(**{name: getattr(one, name) + change.get(name, 0.0) for name in one.__slots__}))
     (step,) = change.values()
@@ -125,7 +123,7 @@ def test_standard_deviations_are_those_of_the_readings_carried_through() -> None
     assert body.front_share_std_pct == pytest.approx(math.hypot(*by_share), rel=1e-4)
 
 
-def test_who_knows_the_unsprung_masses_is_surer() -> None:
+def test_known_unsprung_masses_narrow_the_errors() -> None:
     guessed, known = sprung_of(AxleWeights(700.0, 700.0)), sprung_of(AxleWeights(700.0, 700.0, 80.0, 80.0))
     assert guessed.mass_std_kg > known.mass_std_kg
     assert guessed.front_share_std_pct > known.front_share_std_pct
@@ -141,7 +139,7 @@ def test_the_block_is_a_vehicle_that_a_campaign_takes(unsprung: tuple[str, ...])
     assert unsprung_kg(vehicle) == pytest.approx((body["unsprung_front_kg"], body["unsprung_rear_kg"]), abs=0.2)
 
 
-def test_the_block_says_what_is_estimated_and_how_sure_it_is() -> None:
+def test_the_block_marks_estimated_figures_with_their_deviation() -> None:
     text = run("--front-axle-kg", "760", "--rear-axle-kg", "640", "--unsprung-front-kg", "90").output
     assert "front 90.0 kg (as given)" in text
     assert "(estimated, 6.5 % of the sprung mass)" in text

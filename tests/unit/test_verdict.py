@@ -72,7 +72,7 @@ def test_green_never_stands_beside_an_active_overload_alarm(
     ("weight", "says"),
     [(LIGHT, Says.VAGUE), (NEAR, Says.NEAR), (HEAVY, Says.OVER), (UNKNOWN, Says.WEIGHT_UNKNOWN)],
 )
-def test_a_weighing_that_is_of_no_use_warns_and_never_says_go(weight: Weight, says: Says) -> None:
+def test_a_useless_weighing_warns_and_is_never_green(weight: Weight, says: Says) -> None:
     found = verdict_of(Weights(gross=weight), is_calibrated=True, is_weighed=True, is_doubted=False, is_vague=True)
     assert found.says is says
     assert found.light is not Light.GO

@@ -58,7 +58,7 @@ def test_a_log_that_has_not_begun_is_empty(tmp_path: Path) -> None:
     assert entries_of(tmp_path / "log") == []
 
 
-def test_what_was_flushed_stays_and_what_was_not_is_kept_lost_or_torn(tmp_path: Path) -> None:
+def test_flushed_writes_stay_and_others_are_kept_lost_or_torn(tmp_path: Path) -> None:
     assert disks(tmp_path, write(0, "ab"), FLUSH, mark("here"), write(4, "cd")) == {
         "ab......",
         "ab..c...",

@@ -40,7 +40,7 @@ def latest(board: Board) -> dict[str, Any]:
     return told
 
 
-def test_before_any_estimate_all_is_null_and_says_why(board: Board) -> None:
+def test_before_any_estimate_all_is_null_with_a_reason(board: Board) -> None:
     told = latest(board)
     assert told["rejected"] == ["no_estimate_yet"]
     assert told["age_s"] is None
@@ -50,7 +50,7 @@ def test_before_any_estimate_all_is_null_and_says_why(board: Board) -> None:
     assert set(make_record(0)) - {"posterior"} <= set(told)
 
 
-def test_before_any_estimate_a_calibrated_vehicle_is_told_to_lack_only_that(clock: Clock) -> None:
+def test_before_any_estimate_a_calibrated_vehicle_lacks_only_an_estimate(clock: Clock) -> None:
     gross = Weight(limit_kg=2000.0, lacks=Lack.ESTIMATE)
     board = Board(stale_after_s=900.0, clock=clock, unweighed=Weights(gross=gross))
     board.publish(make_estimate(1, Why.GAP))
@@ -81,7 +81,7 @@ def test_it_becomes_stale_after_the_time_set(board: Board, clock: Clock) -> None
     assert latest(board)["is_stale"] is True
 
 
-def test_a_rejection_stands_beside_the_estimate_and_does_not_renew_it(board: Board, clock: Clock) -> None:
+def test_a_rejection_is_shown_beside_the_estimate_without_renewing_it(board: Board, clock: Clock) -> None:
     board.publish(make_estimate(3))
     clock.now_s += 300.0
     board.publish(make_estimate(4, Why.TOO_SLOW, with_spectra=True))
@@ -126,14 +126,14 @@ def test_an_early_look_without_an_answer_is_not_shown(board: Board) -> None:
     assert told["last_rejection"] is None
 
 
-def test_what_an_earlier_run_stored_is_shown_as_old_as_it_is(board: Board) -> None:
+def test_an_estimate_of_an_earlier_run_is_shown_with_its_age(board: Board) -> None:
     board.restore(json.dumps(make_record(2)), json.dumps(make_record(3, Why.GAP)), age_s=3600.0)
     told = latest(board)
     assert (told["payload_kg"], told["age_s"], told["is_stale"]) == (102.0, 3600.0, True)
     assert told["last_rejection"] is not None
 
 
-def test_nothing_restored_is_nothing_yet(board: Board) -> None:
+def test_without_a_stored_estimate_latest_is_empty(board: Board) -> None:
     board.restore(None, None, None)
     assert latest(board)["rejected"] == ["no_estimate_yet"]
 
@@ -157,7 +157,7 @@ def test_the_tag_changes_with_all_but_the_age(board: Board, clock: Clock) -> Non
     assert is_new()
 
 
-def test_what_is_shown_is_the_same_before_and_after_a_restart(board: Board, clock: Clock) -> None:
+def test_latest_is_the_same_before_and_after_a_restart(board: Board, clock: Clock) -> None:
     thirds = replace(make_estimate(3), payload=Quantity(1000.0 / 3.0, 20.0 / 3.0), t_start_ns=3 * WINDOW_NS + 333)
     board.publish(thirds)
     clock.now_s += 12.34
@@ -170,7 +170,7 @@ def test_what_is_shown_is_the_same_before_and_after_a_restart(board: Board, cloc
     assert again.latest() == board.latest()
 
 
-def test_a_record_that_another_version_wrote_is_no_estimate_and_nothing_of_it_is_shown(board: Board) -> None:
+def test_a_record_of_another_version_is_not_shown(board: Board) -> None:
     strange = make_record(3, Why.GAP) | {"rejected": ["a_reason_of_tomorrow"]}
     with pytest.raises(ValueError, match="a_reason_of_tomorrow"):
         board.restore(json.dumps(make_record(2)), json.dumps(strange), age_s=1.0)
@@ -181,7 +181,7 @@ US_LAST = 253_402_300_799_999_999  # the end of 9999
 
 
 @given(st.integers(0, US_LAST))
-def test_what_we_write_we_read(t_us: int) -> None:
+def test_written_times_are_read_back(t_us: int) -> None:
     assert parse_instant(iso_utc(t_us * 1000)) == t_us * 1000
 
 

@@ -41,12 +41,12 @@ def test_a_token_is_recognised_and_its_secret_is_not_kept(path: Path) -> None:
     assert [entry.name for entry in path.parent.iterdir()] == ["tokens.json"]
 
 
-def test_every_token_is_another(path: Path) -> None:
+def test_every_token_is_unique(path: Path) -> None:
     tokens = TokenFile(path)
     assert len({tokens.create(f"n{i}", Scope.READ) for i in range(20)}) == 20
 
 
-def test_what_another_process_revokes_is_refused_at_once(path: Path) -> None:
+def test_a_token_revoked_by_another_process_is_refused_at_once(path: Path) -> None:
     service, command_line = TokenFile(path), TokenFile(path)
     first, second = command_line.create("first", Scope.READ), command_line.create("second", Scope.OPERATE)
     assert service.verify(first) is not None
@@ -86,7 +86,7 @@ def test_a_token_changed_in_any_place_is_no_token(path: Path) -> None:
     assert tokens.verify(text) is not None
 
 
-def test_names_are_unique_and_unknown_ones_are_said(path: Path) -> None:
+def test_names_are_unique_and_unknown_ones_are_reported(path: Path) -> None:
     tokens = TokenFile(path)
     tokens.create("fleet", Scope.READ)
     with pytest.raises(ConfigurationError, match="already"):
@@ -98,7 +98,7 @@ def test_names_are_unique_and_unknown_ones_are_said(path: Path) -> None:
 @pytest.mark.parametrize(
     "content", ["", "{", "[]", "[" * 5000, '{"note": "\\ud83d"}', '{"format": "other", "version": 1}']
 )
-def test_a_file_that_cannot_be_read_lets_nobody_in(path: Path, content: str) -> None:
+def test_an_unreadable_token_file_closes_access(path: Path, content: str) -> None:
     tokens = TokenFile(path)
     text = tokens.create("fleet", Scope.READ)
     assert tokens.verify(text) is not None
@@ -145,7 +145,7 @@ def test_a_name_that_cannot_be_shown_is_refused_and_destroys_nothing(path: Path,
 
 
 @given(name=st.text(st.characters(codec=None), max_size=70))
-def test_whatever_the_name_the_file_stays_good(tmp_path_factory: pytest.TempPathFactory, name: str) -> None:
+def test_any_name_leaves_the_file_readable(tmp_path_factory: pytest.TempPathFactory, name: str) -> None:
     path = tmp_path_factory.mktemp("tokens") / "tokens.json"
     tokens = TokenFile(path)
     first = tokens.create("first", Scope.READ)
@@ -188,7 +188,7 @@ def test_an_edited_scope_must_be_a_scope(path: Path) -> None:
         TokenFile(path).tokens()
 
 
-def test_who_may_operate_may_read() -> None:
+def test_the_operate_scope_includes_read() -> None:
     allowed = {(held, wanted) for held in Scope for wanted in Scope if held.allows(wanted)}
     assert allowed == {(Scope.READ, Scope.READ), (Scope.OPERATE, Scope.READ), (Scope.OPERATE, Scope.OPERATE)}
 
@@ -218,7 +218,7 @@ def test_a_token_is_made_listed_and_revoked(config: Path) -> None:
     assert run(config, "list").output == ""
 
 
-def test_mistakes_are_said(config: Path) -> None:
+def test_usage_errors_are_reported(config: Path) -> None:
     assert run(config, "create", "fleet", "--scope", "everything").exit_code == 2
     assert run(config, "create", "fleet", "--days", "0").exit_code == 2
     assert run(config, "create", "fleet", "--days", "nan").exit_code == 2

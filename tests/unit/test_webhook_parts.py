@@ -41,12 +41,12 @@ def test_an_older_secret_signs_too() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "whsec_", "whsec_not base64", base64.b64encode(b"short").decode(), "ü"])
-def test_what_is_no_secret_is_refused(text: str) -> None:
+def test_an_invalid_secret_is_refused(text: str) -> None:
     with pytest.raises(SecretError):
         secrets_of(text)
 
 
-def test_the_body_says_what_it_is_and_when_it_happened() -> None:
+def test_the_body_has_type_and_time() -> None:
     record = {"id": "event-5-a", "revision": 2, "t_end": "2026-11-22T08:00:00.000000Z"}
     message = OutboxMessage("e-1", "event-5-a-2", json_line(record), "events", kind="event")
     assert json.loads(body_of(message)) == {"type": "event", "timestamp": record["t_end"], "data": record}
@@ -92,12 +92,12 @@ def test_addresses_that_cannot_be_meant(url: str, secret_file: Path) -> None:
         WebhookSection(url=url, secret_file=secret_file)
 
 
-def test_what_goes_out_is_signed() -> None:
+def test_every_request_is_signed() -> None:
     with pytest.raises(ValidationError, match="url needs secret_file"):
         WebhookSection(url="https://fleet.example/")
 
 
-def test_a_secret_that_cannot_be_used_is_told_at_the_start(tmp_path: Path, secret_file: Path) -> None:
+def test_an_unusable_secret_is_reported_at_the_start(tmp_path: Path, secret_file: Path) -> None:
     section = WebhookSection(url="https://fleet.example/", secret_file=tmp_path / "none")
     with pytest.raises(ConfigurationError, match=r"secret_file .* cannot be used: .*openssl rand"):
         webhook_settings(section, VAN)

@@ -128,5 +128,5 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """How long it took, for the log of continuous integration."""
+    """Writes the duration of the tests for the log of continuous integration."""
     terminalreporter.write_line(f"the machine's tests took {time.monotonic() - _BEGUN_S:.0f} s")

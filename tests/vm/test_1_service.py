@@ -9,7 +9,7 @@ import pytest
 from vm.harness.vehicle import CONFIG, HEARD, Vehicle
 
 
-def test_it_is_ready_and_answers_who_shows_a_token(vehicle: Vehicle) -> None:
+def test_the_service_is_ready_and_answers_with_a_token(vehicle: Vehicle) -> None:
     assert vehicle.status()["vehicle_id"] == "van-17"
     anonymous = httpx.get(f"{vehicle.url}/api/v1/status", verify=vehicle.trust, timeout=10.0)
     assert anonymous.status_code == 401
@@ -33,7 +33,7 @@ def test_it_runs_as_its_own_user_and_writes_to_its_state_only(vehicle: Vehicle) 
     assert vehicle.run(f"grep CapEff /proc/{vehicle.pid()}/status").split()[1].strip("0") == ""
 
 
-def test_its_firewall_lets_in_whom_it_was_told_to_and_this_machine(vehicle: Vehicle) -> None:
+def test_the_firewall_admits_allowed_addresses_and_this_machine(vehicle: Vehicle) -> None:
     live = f"{vehicle.url}/health/live"
     assert httpx.get(live, verify=vehicle.trust, timeout=10.0).status_code == 200  # the tests' drop-in lets it in
     change = "systemctl set-property --runtime springscale"
@@ -73,7 +73,7 @@ def test_a_token_revoked_by_root_is_refused_at_once(vehicle: Vehicle) -> None:
     assert httpx.get(url, headers=header, verify=vehicle.trust, timeout=10.0).status_code == 401
 
 
-def test_it_sends_nothing_and_its_socket_takes_nothing_it_did_not_ask_for(vehicle: Vehicle) -> None:
+def test_the_service_sends_no_frame_and_receives_filtered_frames_only(vehicle: Vehicle) -> None:
     """A whole life of the service, from start to stop, while candump looks on: no frame but the tester's own."""
     vehicle.run("systemctl stop springscale")
     vehicle.listen()

@@ -50,7 +50,7 @@ def of_guests_estimate(vehicle: Vehicle, log: str) -> list[Answer]:
 
 
 def of_own_estimate(log: Path, signals: str, folder: Path) -> list[Answer]:
-    """Every batch, by the sources of this checkout on the log as it was before it met a kernel."""
+    """The batches that this checkout's code finds in the log as it was before a kernel replayed it."""
     calibration = Path(__file__).parents[2] / "gateway/demo/paper_van.json"
     config = folder / "springscale.toml"
     config.write_text(
@@ -68,12 +68,12 @@ def furthest_apart(told: list[Answer], others: list[Answer]) -> tuple[float, flo
 
 
 def whole_batches(records: list[Answer]) -> list[Answer]:
-    """Those that span a whole window; the rest of a drive is told once the bus sleeps."""
+    """The batches that span a whole window; the rest of a drive is published once the bus sleeps."""
     return [record for record in records if abs(length_s(record) - WINDOW_S) < 0.001]
 
 
 def length_s(record: Answer) -> float:
-    """From its first moment to its last."""
+    """The length of a batch from its first moment to its last."""
     begin, end = (datetime.fromisoformat(record[key]) for key in ("t_start", "t_end"))
     return (end - begin).total_seconds()
 
@@ -85,14 +85,14 @@ def stamps_ns(log: Path) -> I64:
 
 
 def lateness_ms(log: Path, heard: Path) -> tuple[float, float]:
-    """How much later than the log says frames were sent, after the promptest: 99 of 100 of them, and the latest."""
+    """The lateness of frames against the log, after the promptest: of 99 in 100 frames, and of the latest."""
     delay_ns = stamps_ns(heard) - stamps_ns(log)
     late, latest = np.quantile(delay_ns - delay_ns.min(), (0.99, 1.0)) / 1e6
     return float(late), float(latest)
 
 
 @pytest.mark.parametrize(("signals", "n_batches"), [("reference", 2), ("j1939", 1)])
-def test_http_tells_what_estimate_tells_of_the_same_frames(
+def test_http_and_estimate_agree_on_the_same_frames(
     signals: str, n_batches: int, vehicle: Vehicle, tmp_path: Path, measured: Callable[..., None]
 ) -> None:
     """A drive is held to what `springscale estimate` makes of candump's recording of it, and of the log it came from.

@@ -1,4 +1,4 @@
-"""What a real interface does to the service, and how soon it is itself again."""
+"""Faults of a real interface, and how soon the service recovers from them."""
 
 import time
 from collections.abc import Callable
@@ -91,7 +91,7 @@ def test_a_sensor_set_to_another_identifier_is_silent_and_the_status_says_how_to
         vehicle.run("systemctl stop stranger")
 
 
-def test_bus_off_is_told_and_passes(vehicle: Vehicle, drive: str, recovered: Recovered) -> None:
+def test_bus_off_is_reported_and_recovered_from(vehicle: Vehicle, drive: str, recovered: Recovered) -> None:
     vehicle.machine.write("/root/odd_frames.py", (GUEST / "odd_frames.py").read_bytes())
     vehicle.run("python3 /root/odd_frames.py 1 bus_off")
     in_reader_fault(vehicle, "bus-off")

@@ -1,4 +1,4 @@
-"""What happens to the process itself: killed, hung, starved, flooded, badly configured."""
+"""Faults of the process itself: it is killed, hung, starved, flooded or badly configured."""
 
 import os
 import random
@@ -40,11 +40,11 @@ def ids(records: list[Answer]) -> list[str]:
 
 
 def wait_for_another(vehicle: Vehicle, n_known: int) -> None:
-    """Until it has stored more records than these."""
+    """Waits until the service has stored more records than these."""
     vehicle.wait_for(lambda: len(vehicle.stored()) > n_known)
 
 
-def test_killed_again_and_again_it_loses_and_doubles_nothing(
+def test_repeated_kills_lose_and_double_nothing(
     many_records: Vehicle, recovered: Recovered, measured: Callable[..., None]
 ) -> None:
     vehicle, moments = many_records, random.Random(4)
@@ -73,7 +73,7 @@ def test_killed_again_and_again_it_loses_and_doubles_nothing(
     measured(kills=N_KILLS, records_after_kills=n_committed)
 
 
-def test_a_hung_pipeline_is_ended_and_begun_anew(vehicle: Vehicle, recovered: Recovered) -> None:
+def test_a_hung_pipeline_is_restarted(vehicle: Vehicle, recovered: Recovered) -> None:
     pid, n_restarts = vehicle.pid(), vehicle.n_restarts()
     vehicle.machine.write("/root/freeze_thread.py", (GUEST / "freeze_thread.py").read_bytes())
     vehicle.run(f"systemd-run --quiet --collect --unit freezer python3 /root/freeze_thread.py {pid} pipeline")
@@ -85,7 +85,7 @@ def test_a_hung_pipeline_is_ended_and_begun_anew(vehicle: Vehicle, recovered: Re
     assert "pipeline.py" in journal
 
 
-def test_the_memory_limit_ends_it_and_it_begins_anew(vehicle: Vehicle, recovered: Recovered) -> None:
+def test_the_service_restarts_after_the_memory_limit(vehicle: Vehicle, recovered: Recovered) -> None:
     pid, before = vehicle.pid(), ids(vehicle.stored())
     vehicle.run("systemctl set-property --runtime springscale MemoryMax=20M")
     vehicle.wait_for(lambda: vehicle.pid() != pid)
@@ -157,7 +157,7 @@ def set_schema(vehicle: Vehicle, version: int) -> int:
 
 
 @pytest.mark.parametrize("fault", [unknown_key, cut_calibration, newer_database])
-def test_a_fault_for_a_person_ends_the_start_once_and_says_which(
+def test_a_configuration_fault_ends_the_start_without_a_retry(
     fault: Callable[[Vehicle], str], vehicle: Vehicle
 ) -> None:
     vehicle.run("systemctl stop springscale; systemctl reset-failed springscale 2>/dev/null || true")

@@ -68,7 +68,7 @@ def test_a_read_only_disk_is_bridged_from_memory(small_disk: Vehicle, recovered:
     recovered(on_disk_again(small_disk))
 
 
-def test_a_damaged_database_is_set_aside_and_a_new_one_begun(small_disk: Vehicle, recovered: Recovered) -> None:
+def test_a_damaged_database_is_replaced(small_disk: Vehicle, recovered: Recovered) -> None:
     small_disk.run(
         f"systemctl stop springscale; dd if=/dev/urandom of={STATE}/springscale.db bs=4k count=4 conv=notrunc"
     )

@@ -8,7 +8,7 @@ from vm.harness.vehicle import CONFIG, STATE, Vehicle
 
 
 def newer(package: Path, folder: Path) -> Path:
-    """The same package under a higher version."""
+    """The package under a higher version."""
     root, made = folder / "root", folder / "newer.deb"
     subprocess.run(["dpkg-deb", "-R", str(package), str(root)], check=True)
     control = root / "DEBIAN/control"

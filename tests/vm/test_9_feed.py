@@ -36,7 +36,7 @@ def feed(vehicle: Vehicle) -> Iterator[Vehicle]:
     vehicle.run("systemctl daemon-reload", timeout_s=90.0)
 
 
-def test_what_the_unit_measures_reaches_the_service_over_vcan0(feed: Vehicle) -> None:
+def test_measurements_of_the_unit_reach_the_service_over_vcan0(feed: Vehicle) -> None:
     before = n_samples(feed)
     feed.wait_for(lambda: n_samples(feed) > before + 100)
     told = feed.run(f"journalctl --unit {UNIT} --no-pager --output cat")
@@ -45,7 +45,7 @@ def test_what_the_unit_measures_reaches_the_service_over_vcan0(feed: Vehicle) ->
     assert float(feed.run(f"systemctl show --property NRestarts --value {UNIT}")) == 0
 
 
-def test_a_unit_that_is_gone_is_taken_up_again_when_it_is_back(feed: Vehicle) -> None:
+def test_a_reconnected_unit_is_used_again(feed: Vehicle) -> None:
     feed.wait_for(lambda: n_samples(feed) > 0)
     feed.run("systemctl stop sensor")
     feed.wait_for(lambda: "the device is gone" in feed.run(f"journalctl --unit {UNIT} --no-pager --output cat"))

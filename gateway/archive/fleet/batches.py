@@ -92,7 +92,12 @@ def read_batches(dataset: Location, jobs: Sequence[Slot]) -> Batches:
         t_end_ns[order],
         tuple(ids[n] for n in order),
         {name: np.concatenate([part.numbers[name] for part in parts])[order] for name in _NUMBERS},
-        {reason: np.concatenate([_refused_for(part, reason) for part in parts])[order] for reason in reasons},
+        {
+            reason: np.concatenate([part.rejected.get(reason, np.zeros(len(part), dtype=bool)) for part in parts])[
+                order
+            ]
+            for reason in reasons
+        },
         np.concatenate([part.is_over_limit for part in parts])[order],
     )
 
@@ -106,10 +111,6 @@ def _require_once(t_end_ns: I64, job: I64, jobs: Sequence[Slot]) -> None:
             f"{one} and {other} vouch for the same {again.size} batches, which would count twice: remove the receipt "
             "whose inputs are no longer those of the archive"
         )
-
-
-def _refused_for(part: Batches, reason: str) -> Bool:
-    return part.rejected.get(reason, np.zeros(len(part), dtype=bool))
 
 
 def _read(dataset: Location, slot: Slot) -> Batches:
@@ -157,7 +158,7 @@ def _lengths(lists: Any) -> I64:
 
 
 def _reasons(lists: Any) -> dict[str, Bool]:
-    """For each text in a column of lists, the rows that contain it."""
+    """Finds, for each text in a column of lists, the rows that contain it."""
     row = np.repeat(np.arange(len(lists)), _lengths(lists))
     told = lists.flatten().dictionary_encode()
     code = np.asarray(told.indices)

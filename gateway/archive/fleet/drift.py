@@ -47,7 +47,9 @@ def pair_slopes(x: F64, y: F64) -> F64:
 
 def variance_of_s(x: F64, y: F64) -> float:
     """Variance of Kendall's S without a trend, with its correction for ties; below 0 with hardly anything but ties."""
-    return (_pairs(len(x)) - sum(map(_pairs, _ties(x))) - sum(map(_pairs, _ties(y)))) / 18.0
+    ties = [int(n) for values in (x, y) for n in np.unique(values, return_counts=True)[1]]
+    free, *tied = (n * (n - 1) * (2 * n + 5) for n in (len(x), *ties))
+    return (free - sum(tied)) / 18.0
 
 
 def around_the_median(slopes: F64, reach: float) -> tuple[float, float]:
@@ -55,15 +57,6 @@ def around_the_median(slopes: F64, reach: float) -> tuple[float, float]:
     low = max(round((len(slopes) - reach) / 2.0) - 1, 0)
     high = min(round((len(slopes) + reach) / 2.0), len(slopes) - 1)
     return float(slopes[low]), float(slopes[high])
-
-
-def _pairs(n: int) -> int:
-    return n * (n - 1) * (2 * n + 5)
-
-
-def _ties(values: F64) -> list[int]:
-    """How often each value occurs."""
-    return [int(n) for n in np.unique(values, return_counts=True)[1]]
 
 
 def trend_of(x: F64, y: F64) -> DriftTrend | None:
@@ -75,7 +68,9 @@ def trend_of(x: F64, y: F64) -> DriftTrend | None:
     slope = float(np.median(slopes))
     std = math.sqrt(variance_of_s(x, y) * _repeated(y - slope * x))
     low, high = around_the_median(slopes, Z95 * std)
-    return DriftTrend(slope, low, high, _chance(float(np.sign(slopes).sum()), std), n)
+    excess = max(0.0, abs(float(np.sign(slopes).sum())) - 1.0)  # of S, with continuity correction
+    p = 1.0 if std == 0.0 else min(1.0, 2.0 * float(ndtr(-excess / std)))
+    return DriftTrend(slope, low, high, p, n)
 
 
 def believed(p: Sequence[float]) -> Bool:
@@ -110,11 +105,6 @@ def _repeated(left: F64) -> float:
     lags = np.arange(1, n - 2)
     counts = (n - lags) * (n - lags - 1.0) * (n - lags - 2.0) * alike**lags
     return 1.0 + 2.0 / (n * (n - 1.0) * (n - 2.0)) * float(np.sum(counts))
-
-
-def _chance(s: float, std: float) -> float:
-    """Two-sided p-value, by the normal distribution with continuity correction."""
-    return 1.0 if std == 0.0 else min(1.0, 2.0 * float(ndtr(-max(0.0, abs(s) - 1.0) / std)))
 
 
 LEAST_IN_WEEK: Final = 5  # chosen: batches with a number for the median of a week

@@ -18,7 +18,6 @@ from gateway.archive.fleet.weeks import DAY_NS, Weeks, date_of, weeks_of
 from gateway.archive.places import Location
 from gateway.archive.receipts import failures, slots_done
 from gateway.errors import ConfigurationError
-from gateway.records import Bool
 
 OnVehicle = Callable[[int, int], None]  # (vehicles done, vehicles in all)
 
@@ -109,7 +108,10 @@ def fleet_of(dataset: Location, on_vehicle: OnVehicle = lambda done, of: None) -
     if not found:
         raise ConfigurationError(f"{dataset}: its tables hold no batch at all: were the drives long enough for one?")
     drifts = drifts_of(series)
-    failed = _failures(dataset)
+    failed = tuple(
+        Failure(str(one.get("vehicle")), str(one.get("month")), one.get("log"), str(one.get("reason")))
+        for one in failures(dataset)
+    )
     vehicles = tuple(replace(one, drifts=drifts[one.name]) for one in found)
     named = {name for name, _ in jobs} | {failure.vehicle for failure in failed}
     return FleetSummary(vehicles, tuple(sorted(named - series.keys())), failed)
@@ -117,7 +119,10 @@ def fleet_of(dataset: Location, on_vehicle: OnVehicle = lambda done, of: None) -
 
 def _vehicle(name: str, batches: Batches) -> tuple[FleetVehicle, Series]:
     """The summary of a vehicle with its drifts still to be judged, and the series for that."""
-    answered, since = batches.is_answered, weeks_of(batches.rows(_by_last_calibration(batches)))
+    answered, ids = batches.is_answered, batches.calibration_id
+    since = weeks_of(
+        batches.rows(np.array([one == ids[-1] for one in ids]))
+    )  # parameters are relative to a calibration
     first, last = (date_of(t // DAY_NS) for t in batches.t_end_ns[[0, -1]])
     vehicle = FleetVehicle(
         name,
@@ -129,21 +134,8 @@ def _vehicle(name: str, batches: Batches) -> tuple[FleetVehicle, Series]:
         weeks_of(batches),
         {reason: int(refused.sum()) for reason, refused in batches.rejected.items()},
         troubles_of(batches),
-        tuple(dict.fromkeys(one for one in batches.calibration_id if one)),
+        tuple(dict.fromkeys(one for one in ids if one)),
         int(since.number[0]),
         {},
     )
     return vehicle, series_of(since)
-
-
-def _by_last_calibration(batches: Batches) -> Bool:
-    """Batches of the last calibration: parameters are relative to a calibration and comparable only within it."""
-    last = batches.calibration_id[-1]
-    return np.array([one == last for one in batches.calibration_id], dtype=bool)
-
-
-def _failures(dataset: Location) -> tuple[Failure, ...]:
-    return tuple(
-        Failure(str(one.get("vehicle")), str(one.get("month")), one.get("log"), str(one.get("reason")))
-        for one in failures(dataset)
-    )

@@ -83,17 +83,11 @@ def _troubles(batches: Batches) -> Iterator[Trouble]:
 
 def _trouble(reason: str, n_batches: int, days: I64, is_bad: Bool, met: tuple[date, date]) -> Trouble:
     recent = Share(int(is_bad[-RECENT_DAYS:].sum()), len(is_bad[-RECENT_DAYS:]))
-    health = Health.BAD if recent.is_surely_bad else Health.WAS_BAD if _was_bad(is_bad) else Health.SOME
+    n_bad = np.convolve(is_bad, np.ones(RECENT_DAYS, dtype=np.int64))[RECENT_DAYS - 1 :]  # from each day on
+    was_bad = len(is_bad) >= RECENT_DAYS and Share(int(n_bad.max()), RECENT_DAYS).is_surely_bad
+    health = Health.BAD if recent.is_surely_bad else Health.WAS_BAD if was_bad else Health.SOME
     since = date_of(days[_first_of_the_bad(is_bad)]) if health is Health.BAD else None
     return Trouble(reason, n_batches, Share(int(is_bad.sum()), len(is_bad)), recent, health, *met, since)
-
-
-def _was_bad(is_bad: Bool) -> bool:
-    """Whether any stretch of RECENT_DAYS would have counted as bad."""
-    if len(is_bad) < RECENT_DAYS:
-        return False
-    most = int(np.convolve(is_bad, np.ones(RECENT_DAYS, dtype=np.int64), "valid").max())
-    return Share(most, RECENT_DAYS).is_surely_bad
 
 
 def _first_of_the_bad(is_bad: Bool) -> int:

@@ -67,7 +67,7 @@ def weeks_of(batches: Batches) -> Weeks:
         n,
         _sums(answered, first),
         _sums(batches.is_over_limit & answered, first),
-        {cause: _sums(refused_by(batches, cause), first) for cause in Cause},
+        {cause: _sums(_refused_by(batches, cause), first) for cause in Cause},
         mean,
         low,
         high,
@@ -78,7 +78,7 @@ def weeks_of(batches: Batches) -> Weeks:
     )
 
 
-def refused_by(batches: Batches, cause: Cause) -> Bool:
+def _refused_by(batches: Batches, cause: Cause) -> Bool:
     """Batches (n,) refused by one of the cause's reasons, possibly with others."""
     of_cause = [rows for reason, rows in batches.rejected.items() if CAUSES.get(reason) is cause]
     found: Bool = np.any([np.zeros(len(batches), dtype=bool), *of_cause], axis=0)
@@ -86,7 +86,7 @@ def refused_by(batches: Batches, cause: Cause) -> Bool:
 
 
 def known_reason(reason: str) -> Why | None:
-    """None for a reason of a newer version."""
+    """The reason of this name; None if a newer version wrote it."""
     return Why(reason) if reason in CAUSES else None
 
 

@@ -16,7 +16,7 @@ ENTRY_KIND: Final = "alarm"
 
 
 class AlarmKind(StrEnum):
-    """What the alarm is about."""
+    """The subject of an alarm."""
 
     OVERLOAD = "overload"
     SENSOR_FAULT = "sensor_fault"
@@ -24,7 +24,7 @@ class AlarmKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class AlarmCause:
-    """What an alarm is about: its kind, and the place or the part concerned. At most one alarm of a cause is active."""
+    """The cause of an alarm: its kind, and the place or the part concerned. At most one alarm of a cause is active."""
 
     kind: AlarmKind
     where: str
@@ -33,10 +33,6 @@ class AlarmCause:
     def name(self) -> str:
         """The name in settings and topics: ``overload.gross``, ``sensor_fault.silent``."""
         return f"{self.kind}.{self.where}"
-
-    def is_named_in(self, names: tuple[str, ...]) -> bool:
-        """Whether ``names`` has this cause's name, or the kind's name, which means all causes of the kind."""
-        return self.name in names or self.kind.value in names
 
 
 SILENT: Final = AlarmCause(AlarmKind.SENSOR_FAULT, "silent")
@@ -142,16 +138,15 @@ _PLACES: Final = {"gross": "The vehicle", "front_axle": "The front axle", "rear_
 
 def sentence(alarm: Alarm) -> str:
     """The condition that raised the alarm, as a sentence."""
-    return f"{_said(alarm.cause, alarm.figure)}{'' if alarm.is_active else ' (ended)'}"
-
-
-def _said(cause: AlarmCause, figure: AlarmFigure) -> str:
-    if cause.kind is AlarmKind.OVERLOAD:
-        subject = _PLACES.get(cause.where, f"The wheel at the {cause.where.replace('_', ' ')}")
+    figure, detail = alarm.figure, alarm.figure.detail
+    if alarm.cause.kind is AlarmKind.OVERLOAD:
+        where = alarm.cause.where
+        subject = _PLACES.get(where, f"The wheel at the {where.replace('_', ' ')}")
         take = "" if math.isnan(figure.std_kg) else f" +- {Z95 * figure.std_kg:.0f}"
-        return f"{subject} weighs {figure.found_kg:.0f}{take} kg, limit {figure.limit_kg:.0f} kg"
-    if cause == SILENT:
-        return f"No signal: {figure.detail}" if figure.detail else "No signal"
-    said = "Batches are refused because of a sensor"
-    reasons = (_HAPPENED.get(code, code) for code in figure.detail.split(", ")) if figure.detail else ()
-    return f"{said}: {'; '.join(reasons)}" if figure.detail else said
+        said = f"{subject} weighs {figure.found_kg:.0f}{take} kg, limit {figure.limit_kg:.0f} kg"
+    elif alarm.cause == SILENT:
+        said = f"No signal: {detail}" if detail else "No signal"
+    else:
+        reasons = "; ".join(_HAPPENED.get(code, code) for code in (detail or "").split(", "))
+        said = "Batches are refused because of a sensor" + (f": {reasons}" if detail else "")
+    return said if alarm.is_active else f"{said} (ended)"

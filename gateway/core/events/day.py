@@ -165,18 +165,11 @@ def _load_of_each(day: Day) -> list[FusedLoad | None]:
     for i in reversed(range(len(whole))):
         goes_on = i + 1 < len(whole) and follows(whole[i], whole[i + 1])
         back[i] = of_weighing.get(i, back[i + 1] if goes_on else None)
-    between = _between_weighings(len(whole), of_weighing)
+    between: list[FusedLoad | None] = [None] * len(whole)
+    for one_at, other_at in pairwise(sorted(of_weighing)):
+        if of_weighing[one_at] is of_weighing[other_at]:
+            between[one_at:other_at] = [of_weighing[one_at]] * (other_at - one_at)
     return [one or other or both for one, other, both in zip(ahead, back, between, strict=True)]
-
-
-def _between_weighings(n: int, of_weighing: dict[int, FusedLoad]) -> list[FusedLoad | None]:
-    """The load of the batches between two weighings of the same load."""
-    found: list[FusedLoad | None] = [None] * n
-    known = sorted(of_weighing)
-    for one, other in pairwise(known):
-        if of_weighing[one] is of_weighing[other]:
-            found[one:other] = [of_weighing[one]] * (other - one)
-    return found
 
 
 def _trip(day: Day, first: int, last: int, loads: Sequence[FusedLoad | None]) -> Entry | None:

@@ -1,7 +1,7 @@
 """Permitted weights: the probability of exceeding them, the warning, and how much more a vehicle may carry."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from typing import Any, Final, Self
@@ -104,15 +104,13 @@ def rooms_of(weights: Weights) -> tuple[Room, ...]:
     holds if all of the added load acts on it; between the axles more is possible. So the least room holds for any place
     between the axles. Limits of wheels concern the place of a load more than its size, and are left out.
     """
-    return tuple(sorted(_rooms(weights), key=lambda room: room.surely_kg))
-
-
-def _rooms(weights: Weights) -> Iterator[Room]:
+    rooms = []
     for place, weight in weights.items():
         if place in LOADED_PLACES and weight.limit_kg is not None and weight.is_known:
             low_kg, high_kg = weight.interval95_kg
             left_kg = (weight.limit_kg - high_kg, weight.limit_kg - low_kg)
-            yield Room(place, weight.limit_kg, Quantity(weight.limit_kg - weight.kg, weight.std_kg, left_kg))
+            rooms.append(Room(place, weight.limit_kg, Quantity(weight.limit_kg - weight.kg, weight.std_kg, left_kg)))
+    return tuple(sorted(rooms, key=lambda room: room.surely_kg))
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,17 +47,15 @@ NOT_CALIBRATED: Final = Unsprung()
 
 def unsprung_kg(vehicle: Vehicle) -> tuple[float, float]:
     """Unsprung mass at the front and the rear axle; NaN if neither it nor the kerb weight is stated."""
-    share = vehicle.empty_front_share
-    return (
-        _unsprung(vehicle.unsprung_front_kg, vehicle.kerb_front_axle_kg, share * vehicle.empty_mass_kg),
-        _unsprung(vehicle.unsprung_rear_kg, vehicle.kerb_rear_axle_kg, (1.0 - share) * vehicle.empty_mass_kg),
-    )
-
-
-def _unsprung(stated_kg: float | None, kerb_kg: float | None, sprung_kg: float) -> float:
-    if stated_kg is not None:
-        return stated_kg
-    return math.nan if kerb_kg is None else kerb_kg - sprung_kg
+    front = vehicle.empty_front_share
+    found = []
+    for stated_kg, kerb_kg, share in (
+        (vehicle.unsprung_front_kg, vehicle.kerb_front_axle_kg, front),
+        (vehicle.unsprung_rear_kg, vehicle.kerb_rear_axle_kg, 1.0 - front),
+    ):
+        by_kerb_kg = math.nan if kerb_kg is None else kerb_kg - share * vehicle.empty_mass_kg
+        found.append(by_kerb_kg if stated_kg is None else stated_kg)
+    return found[0], found[1]
 
 
 ROLL_UNKNOWN: Final = Quantity()
@@ -68,15 +66,13 @@ def weighed(estimate: Estimate, vehicle: Vehicle | None, unsprung: Unsprung = NO
     if vehicle is None:
         return replace(estimate, weights=Weights(), left_share=UNKNOWN)
     roll_share = Quantity(estimate.roll_share_front, estimate.roll_share_front_std)
-    weights = weights_of(vehicle, estimate.posterior, roll_share, unsprung)
-    return replace(estimate, weights=weights, left_share=_left_share(vehicle, estimate.posterior))
-
-
-def _left_share(vehicle: Vehicle, posterior: Posterior | None) -> Quantity:
-    if posterior is None or posterior.size <= CG_LEFT or vehicle.track_width_m is None:
-        return UNKNOWN
-    share_pct = left_share_pct(float(posterior.mean[CG_LEFT]), vehicle.track_width_m)
-    return posterior.linear(share_pct, [0.0, 0.0, 100.0 / vehicle.track_width_m])
+    posterior, track_m = estimate.posterior, vehicle.track_width_m
+    left_share = UNKNOWN
+    if posterior is not None and posterior.size > CG_LEFT and track_m is not None:
+        share_pct = left_share_pct(float(posterior.mean[CG_LEFT]), track_m)
+        left_share = posterior.linear(share_pct, [0.0, 0.0, 100.0 / track_m])
+    weights = weights_of(vehicle, posterior, roll_share, unsprung)
+    return replace(estimate, weights=weights, left_share=left_share)
 
 
 def weights_of(
@@ -104,109 +100,67 @@ def weights_of(
     missing input is unknown and says which (``Weight.lacks``).
     """
     below = unsprung.unless_stated(vehicle)
-    known = _Known.of(vehicle, posterior, roll_share)
-    front = _Axle(known, share=known.share, sign=1.0, roll_share=roll_share.number, unsprung=below.front)
-    rear = _Axle(known, share=1.0 - known.share, sign=-1.0, roll_share=1.0 - roll_share.number, unsprung=below.rear)
-    gross_kg = known.sprung_kg + below.front.number + below.rear.number
-    is_estimated = below.is_estimated
-    return Weights(
-        gross=known.weight(gross_kg, [1.0], below.both.std, vehicle.gross_limit_kg, is_estimated=is_estimated),
-        front_axle=front.whole(vehicle.front_axle_limit_kg),
-        rear_axle=rear.whole(vehicle.rear_axle_limit_kg),
-        front_left=front.wheel(1.0, vehicle.front_wheel_limit_kg),
-        front_right=front.wheel(-1.0, vehicle.front_wheel_limit_kg),
-        rear_left=rear.wheel(1.0, vehicle.rear_wheel_limit_kg),
-        rear_right=rear.wheel(-1.0, vehicle.rear_wheel_limit_kg),
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _Known:
-    """The inputs from an estimate and a vehicle; NaN where unknown. ``share`` is 0..1."""
-
-    posterior: Posterior | None
-    sprung_kg: float
-    share: float
-    cg_left_m: float
-    track_m: float
-    roll_share: Quantity
-
-    @classmethod
-    def of(cls, vehicle: Vehicle, posterior: Posterior | None, roll_share: Quantity) -> "_Known":
-        mean = np.full(3, np.nan)
-        if posterior is not None:
-            mean[: posterior.size] = posterior.mean
-        payload_kg, share_pct, cg_left_m = mean.tolist()
-        track_m = math.nan if vehicle.track_width_m is None else vehicle.track_width_m
-        return cls(posterior, vehicle.empty_mass_kg + payload_kg, share_pct / 100.0, cg_left_m, track_m, roll_share)
-
-    def weight(
-        self,
-        kg: float,
-        slopes: Sequence[float],
-        independent_std_kg: float,
-        limit_kg: float | None,
-        *,
-        is_estimated: bool,
-    ) -> Weight:
-        """A weight with its error; ``slopes`` are its derivatives by payload (kg), front share (0..1) and place (m).
-
-        ``is_estimated`` is of the unsprung mass: errors of both axles may cancel in the weight, and yet it was not
-        stated.
-        """
-        if math.isnan(kg) or self.posterior is None:
-            return Weight(limit_kg=limit_kg, lacks=self._lack(len(slopes)))
-        per_percent = [slope / (100.0 if i == FRONT_SHARE else 1.0) for i, slope in enumerate(slopes)]
-        found = self.posterior.linear(kg, per_percent, independent_std_kg)
-        return Weight(kg, found.std, limit_kg, None, is_estimated, found.interval95)
-
-    def _lack(self, n_slopes: int) -> Lack:
-        """The first missing input of a weight that depends on the first ``n_slopes`` quantities."""
-        is_wheel = n_slopes > CG_LEFT
-        if not math.isfinite(self.sprung_kg) or (n_slopes > FRONT_SHARE and not math.isfinite(self.share)):
-            return Lack.ESTIMATE
-        if is_wheel and math.isnan(self.track_m):
-            return Lack.TRACK_WIDTH
-        is_sideways = math.isfinite(self.cg_left_m) and math.isfinite(self.roll_share.number)
-        return Lack.ROLL_RATE if is_wheel and not is_sideways else Lack.UNSPRUNG_MASS
-
-
-@dataclass(frozen=True, slots=True)
-class _Axle:
-    """An axle with ``share`` of the sprung mass and ``roll_share`` of its roll moment.
-
-    ``sign`` is the slope of both by the front's estimated values: 1 for the front axle, -1 for the rear.
-    """
-
-    known: _Known
-    share: float
-    sign: float
-    roll_share: float
-    unsprung: Quantity
-
-    def whole(self, limit_kg: float | None) -> Weight:
-        """The load of both wheels."""
-        sprung_kg = self.known.sprung_kg
-        kg = self.share * sprung_kg + self.unsprung.number
-        slopes = [self.share, self.sign * sprung_kg]
-        return self.known.weight(kg, slopes, self.unsprung.std, limit_kg, is_estimated=self.unsprung.std > 0.0)
-
-    def wheel(self, side: float, limit_kg: float | None) -> Weight:
-        """The load of one wheel; ``side`` is 1 for the left, -1 for the right."""
-        sprung_kg, per_track = self.known.sprung_kg, side / self.known.track_m
-        moment = per_track * self.known.cg_left_m  # in sprung masses
-        by_roll_share_kg = sprung_kg * moment * self.known.roll_share.std
-        return self.known.weight(
-            0.5 * (self.share * sprung_kg + self.unsprung.number) + self.roll_share * sprung_kg * moment,
-            [
-                0.5 * self.share + self.roll_share * moment,
-                0.5 * self.sign * sprung_kg,
-                self.roll_share * sprung_kg * per_track,
-            ],
-            math.hypot(0.5 * self.unsprung.std, by_roll_share_kg),
-            limit_kg,
-            is_estimated=self.unsprung.std > 0.0,
+    mean = np.full(3, np.nan)
+    if posterior is not None:
+        mean[: posterior.size] = posterior.mean
+    payload_kg, share_pct, left_m = mean.tolist()
+    sprung_kg, share = vehicle.empty_mass_kg + payload_kg, share_pct / 100.0
+    track_m = math.nan if vehicle.track_width_m is None else vehicle.track_width_m
+    gross_kg = sprung_kg + below.front.number + below.rear.number
+    is_placed = math.isfinite(left_m) and math.isfinite(roll_share.number)
+    lack = Lack.UNSPRUNG_MASS if math.isfinite(sprung_kg) else Lack.ESTIMATE
+    lack_of_axle = lack if math.isfinite(share) else Lack.ESTIMATE
+    lack_of_wheel = lack_of_axle
+    if lack_of_axle is not Lack.ESTIMATE:
+        lack_of_wheel = Lack.TRACK_WIDTH if math.isnan(track_m) else lack_of_axle if is_placed else Lack.ROLL_RATE
+    found = {
+        "gross": _weight(
+            posterior, gross_kg, [1.0], below.both.std, vehicle.gross_limit_kg, lack, is_estimated=below.is_estimated
         )
+    }
+    for axle, part, sign, phi, own in (
+        ("front", share, 1.0, roll_share.number, below.front),
+        ("rear", 1.0 - share, -1.0, 1.0 - roll_share.number, below.rear),
+    ):
+        kg, is_estimated = part * sprung_kg + own.number, own.std > 0.0
+        limit_kg: float | None = getattr(vehicle, f"{axle}_axle_limit_kg")
+        slopes = [part, sign * sprung_kg]
+        found[f"{axle}_axle"] = _weight(
+            posterior, kg, slopes, own.std, limit_kg, lack_of_axle, is_estimated=is_estimated
+        )
+        limit_kg = getattr(vehicle, f"{axle}_wheel_limit_kg")
+        for side, place in ((1.0, "left"), (-1.0, "right")):
+            per_track = side / track_m
+            moment = per_track * left_m  # in sprung masses
+            slopes = [0.5 * part + phi * moment, 0.5 * sign * sprung_kg, phi * sprung_kg * per_track]
+            std_kg = math.hypot(0.5 * own.std, sprung_kg * moment * roll_share.std)
+            wheel_kg = 0.5 * kg + phi * sprung_kg * moment
+            found[f"{axle}_{place}"] = _weight(
+                posterior, wheel_kg, slopes, std_kg, limit_kg, lack_of_wheel, is_estimated=is_estimated
+            )
+    return Weights(**found)
+
+
+def _weight(
+    posterior: Posterior | None,
+    kg: float,
+    slopes: Sequence[float],
+    independent_std_kg: float,
+    limit_kg: float | None,
+    lack: Lack,
+    *,
+    is_estimated: bool,
+) -> Weight:
+    """A weight with its error; ``slopes`` are its derivatives by payload (kg), front share (0..1) and place (m).
+
+    ``lack`` is the missing input if the weight is unknown. ``is_estimated`` is of the unsprung mass: errors of both
+    axles may cancel in the weight, and yet it was not stated.
+    """
+    if math.isnan(kg) or posterior is None:
+        return Weight(limit_kg=limit_kg, lacks=lack)
+    per_percent = [slope / (100.0 if i == FRONT_SHARE else 1.0) for i, slope in enumerate(slopes)]
+    found = posterior.linear(kg, per_percent, independent_std_kg)
+    return Weight(kg, found.std, limit_kg, None, is_estimated, found.interval95)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""How much more may be loaded, and into which half of the loading area, so that no axle and no gross limit is passed.
+"""The payload that may still be loaded, and where, so that no axle and no gross limit is passed.
 
     room = room_of(weights, vehicle)      # None: a limited weight is unknown, or nothing is limited
 
@@ -42,7 +42,7 @@ NOTHING: Final = Halves(0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Spare:
-    """What gross weight and axles may still bear (kg); negative: they bear too much; infinite: no limit."""
+    """The weight (kg) that the vehicle and its axles may still bear; negative: too much; infinite: no limit."""
 
     gross_kg: float = math.inf
     front_axle_kg: float = math.inf
@@ -130,7 +130,7 @@ class LoadingArea:
         return min(enough, key=lambda halves: (halves.kg, abs(halves.front_kg - halves.rear_kg)), default=None)
 
     def _borne(self, spare: Spare) -> Iterator[tuple[float, float, float]]:
-        """Of each limit: the largest share of a load in the front half and of one in the rear half, and the room."""
+        """The largest share of a load in each half that a limit bears, and the room."""
         yield 1.0, 1.0, spare.gross_kg
         yield _clipped(1.0 - self.begin), _clipped(1.0 - self.middle), spare.front_axle_kg
         yield _clipped(self.middle), _clipped(self.end), spare.rear_axle_kg
@@ -150,7 +150,7 @@ def _crossings(lines: list[tuple[float, float, float]]) -> Iterator[tuple[float,
 
 @dataclass(frozen=True, slots=True)
 class LoadRoom:
-    """What may still go in.
+    """The payload that may still go in.
 
     ``most`` is the best estimate with its 95 % interval, negative if something is too heavy. ``safe`` and
     ``take_out`` hold at the unfavourable ends of all the weights' intervals. ``is_anywhere``: ``safe`` may lie anywhere
@@ -171,11 +171,13 @@ def room_of(weights: Weights, vehicle: Vehicle) -> LoadRoom | None:
         return None
     area = LoadingArea.of(vehicle)
     worst, best, well = (
-        Spare(*(_spare_kg(one, kg) for one, kg in zip(places, ends, strict=True)))
+        Spare(*(math.inf if one.limit_kg is None else one.limit_kg - kg for one, kg in zip(places, ends, strict=True)))
         for ends in zip(*map(_ends, places), strict=True)
     )
     safe = area.most(worst)
-    low_kg, most_kg, high_kg = sorted(_most_kg(area, spare) for spare in (worst, best, well))
+    low_kg, most_kg, high_kg = sorted(
+        spare.least_kg if spare.least_kg <= 0.0 else area.most(spare).kg for spare in (worst, best, well)
+    )
     return LoadRoom(
         Quantity(most_kg, (high_kg - low_kg) / (2.0 * Z95), (low_kg, high_kg)),
         safe,
@@ -188,12 +190,3 @@ def _ends(weight: Weight) -> tuple[float, float, float]:
     """The upper end of its interval, the weight, the lower end; the weight alone if its error is unknown."""
     low_kg, high_kg = (weight.kg if math.isnan(kg) else kg for kg in weight.interval95_kg)
     return high_kg, weight.kg, low_kg
-
-
-def _spare_kg(weight: Weight, kg: float) -> float:
-    return math.inf if weight.limit_kg is None else weight.limit_kg - kg
-
-
-def _most_kg(area: LoadingArea, spare: Spare) -> float:
-    """Negative if something is too heavy."""
-    return spare.least_kg if spare.least_kg <= 0.0 else area.most(spare).kg

@@ -252,7 +252,7 @@ class Refused:
 def refused_in(
     messages: Sequence[Described], readings: Sequence[SignalReading], sources: Collection[Path]
 ) -> Iterator[Refused]:
-    """What a map by these databases would refuse of the messages with a known unit."""
+    """The messages with a known unit that a map by these databases would refuse."""
     for one in messages:
         quantities = frozenset(filter(None, map(_quantity_of, one.message.signals.values())))
         counts, n_all = dict(one.heard.lengths), len(one.heard.kept)

@@ -19,7 +19,7 @@ from gateway.model.table import LOG, ROWS, UPRIGHT, prior_of
 from gateway.model.vehicle import VehicleModel
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64, Spectra
-from gateway.reports.charts import Axis, Chart, LineMark, Panel, Points, Rule, Section, Table
+from gateway.reports.charts import Axis, Chart, LineMark, Panel, Section, Table
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,7 +99,7 @@ def fitted_vehicle_section(
             "Misfit is the likelihood ratio over what chance gives: about 1 if the model explains everything.",
             told(known),
         ),
-        (*charts[:1], knowledge_chart(known)),
+        tuple(charts[:1]),
         (_misfit_table(fits, taught.model), knowledge_table(known)),
         tuple((fit.title, (chart,)) for fit, chart in zip(fits[1:], charts[1:], strict=True)),
     )
@@ -131,7 +131,7 @@ def _fit_chart(fit: RunFit) -> Chart:
 
 
 def _unbroken_deg(phase_rad: F64) -> F64:
-    """In degrees, with a gap where it wraps around."""
+    """A phase in degrees, with a gap where it wraps around."""
     degrees = np.degrees(phase_rad)
     leaps = np.abs(np.diff(degrees, append=degrees[-1])) > 180.0
     return np.where(leaps, np.nan, degrees)
@@ -146,10 +146,7 @@ def _misfit_table(fits: Sequence[RunFit], model: VehicleModel) -> Table:
     return Table(caption, ("Run", "payload", "front share", "misfit"), rows)
 
 
-OF_ROLL: Final = frozenset(row.name for row in ROWS if row.needs_roll)
-UNTOLD_SHARE: Final = (
-    0.9  # chosen: of the prior's standard deviation; with more remaining the data had little information
-)
+UNTOLD_SHARE: Final = 0.9  # chosen: of the prior's standard deviation; with more remaining the data told little
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,46 +187,6 @@ def told(known: Sequence[Known]) -> str:
         f"than {100.0 * UNTOLD_SHARE:.0f} % of their prior's spread): {', '.join(untold)}. These stay at what "
         "vehicles usually have; loads that depend on them are weighed with that uncertainty."
     )
-
-
-def knowledge_chart(known: Sequence[Known]) -> Chart:
-    """Remaining standard deviations, parameter by parameter."""
-    plain = [one for one in known if not one.is_slack and "_bend_" not in one.name]
-    groups = (
-        ("vehicle", [one for one in plain if one.name not in OF_ROLL]),
-        ("roll", [one for one in plain if one.name in OF_ROLL]),
-        ("bends of spring rates", [one for one in known if "_bend_" in one.name]),
-        ("slack", [one for one in known if one.is_slack]),
-    )
-    panels = tuple(_panel(title, members) for title, members in groups if members)
-    return Chart(
-        "identifiability",
-        "Standard deviation of every parameter after calibration, in percent of what it was before. Left: the data "
-        "told it; at 100 % they said nothing and the prior stands. Slack: power of a "
-        "sensor (acceleration a, pitch rate g, roll rate r) that does not come through the modelled path.",
-        "Identifiability: share of the prior standard deviation left over after calibration, parameter by parameter.",
-        panels,
-        most_columns=2 if len(panels) == 4 else 3,
-        row_height_px=560,
-    )
-
-
-def _panel(title: str, members: Sequence[Known]) -> Panel:
-    left_over = 100.0 * np.array([one.left_over for one in members])[::-1]
-    places = tuple(_short(one.name) for one in members)[::-1]
-    marks = (Rule(100.0, is_vertical=True), Points(left_over, np.arange(len(members), dtype=float)))
-    return Panel(Axis("left over [%]", limits=(0.0, 105.0)), Axis("", places=places), marks, title)
-
-
-def _short(name: str) -> str:
-    stem, _, unit = name.rpartition("_")
-    plain = (stem if unit in _UNITS else name).replace("spring_bend_", "").replace("_per", "").replace("slack_", "")
-    for sensor, letter in (("acceleration_", "a "), ("pitch_rate_", "g "), ("roll_rate_", "r ")):
-        plain = plain.replace(sensor, letter)
-    return plain.replace("_", " ")
-
-
-_UNITS: Final = {"npm", "nspm", "kg", "kgm2", "m2", "m", "kn", "s", "rad"}
 
 
 def knowledge_table(known: Sequence[Known]) -> Table:

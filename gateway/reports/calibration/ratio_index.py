@@ -7,7 +7,6 @@ import numpy as np
 
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.fit import RatioIndexFit
-from gateway.calibration.ratio_index.regression import FittedRegression
 from gateway.calibration.ratio_index.table import IndexRows, index_rows
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
@@ -16,9 +15,6 @@ from gateway.reports.charts import Axis, Chart, LineMark, Mark, Marker, Panel, P
 from gateway.words import NONE
 
 N_ALONG: Final = 60  # chosen: points of a curve
-INTERVAL: Final = "95 % interval of a new batch"
-MIDDLE: Final = "model, the other index at its median"
-QUARTILES: Final = "model, the other index at its quartiles"
 
 
 def ratio_index_section(
@@ -40,65 +36,50 @@ def ratio_index_section(
         f"Ratio indexes over load and share. {len(fitted.run)} batches for fitting, {len(later.run)} for validation.",
         tuple(panels),
     )
-    return Section(
-        "ratio-index",
-        "Ratio index",
-        (),
-        (chart,),
-        (_bands_table(calibration), *_model_tables(fit)),
-    )
+    return Section("ratio-index", "Ratio index", (), (chart,), (_bands_table(calibration), *_model_tables(fit)))
 
 
 def _panels(name: str, fitted: IndexRows, later: IndexRows, model: RegressionModel | None) -> list[Panel]:
     """The index over payload and over share, with the model of its own target."""
     is_a = name == "R_a"
-    curves = _curves(name, fitted, model) if model is not None else []
-    over_payload = (*(curves if is_a else ()), *_points(name, fitted, later, of_payload=True))
-    over_share = (*(() if is_a else curves), *_points(name, fitted, later, of_payload=False))
-    return [
-        Panel(Axis(name), Axis("payload [kg]"), over_payload),
-        Panel(Axis(name), Axis("front share [%]"), over_share),
-    ]
-
-
-def _points(name: str, fitted: IndexRows, later: IndexRows, *, of_payload: bool) -> list[Points]:
     sets: list[tuple[IndexRows, str, int, Marker]] = [
         (fitted, "identification", 3, "circle"),
         (later, "validation", 1, "diamond"),
     ]
-    return [
-        Points(
-            rows.ra if name == "R_a" else rows.rg,
-            rows.payload_kg if of_payload else rows.front_share_pct,
-            label,
-            colour,
-            marker,
-        )
-        for rows, label, colour, marker in sets
-        if len(rows.run)
-    ]
+    panels = []
+    for title, own, target in (("payload [kg]", is_a, "payload_kg"), ("front share [%]", not is_a, "front_share_pct")):
+        points = [
+            Points(rows.ra if is_a else rows.rg, getattr(rows, target), label, colour, marker)
+            for rows, label, colour, marker in sets
+            if len(rows.run)
+        ]
+        curves = _curves(is_a, fitted, model) if own and model is not None else []
+        panels.append(Panel(Axis(name), Axis(title), (*curves, *points)))
+    return panels
 
 
-def _curves(name: str, rows: IndexRows, model: RegressionModel) -> list[Mark]:
+def _curves(is_a: bool, rows: IndexRows, model: RegressionModel) -> list[Mark]:
     """The model along one index, with the other at its median and, if that matters, at its quartiles."""
-    own, other = (rows.ra, rows.rg) if name == "R_a" else (rows.rg, rows.ra)
+    own, other = (rows.ra, rows.rg) if is_a else (rows.rg, rows.ra)
     along = np.linspace(own.min(), own.max(), N_ALONG)
     lower, middle, upper = (
-        _predicted(name, model, along, held) for held in np.quantile(other, (0.25, 0.5, 0.75)).tolist()
+        _predicted(model, [(x, held) if is_a else (held, x) for x in along.tolist()])
+        for held in np.quantile(other, (0.25, 0.5, 0.75)).tolist()
     )
     marks: list[Mark] = [
-        Ribbon(along, middle[:, 1], middle[:, 2], INTERVAL, 2),
-        LineMark(along, middle[:, 0], MIDDLE, 2),
+        Ribbon(along, middle[:, 1], middle[:, 2], "95 % interval of a new batch", 2),
+        LineMark(along, middle[:, 0], "model, the other index at its median", 2),
     ]
     if np.isfinite(lower).all() and not np.allclose(lower, upper):
-        marks += [LineMark(along, each[:, 0], QUARTILES, 2, "dot") for each in (lower, upper)]
+        quartiles = "model, the other index at its quartiles"
+        marks += [LineMark(along, each[:, 0], quartiles, 2, "dot") for each in (lower, upper)]
     return marks
 
 
-def _predicted(name: str, model: RegressionModel, along: F64, held: float) -> F64:
+def _predicted(model: RegressionModel, indexes: list[tuple[float, float]]) -> F64:
     """Answer and 95 % limits (n, 3)."""
-    rows = [model.predict(x, held) if name == "R_a" else model.predict(held, x) for x in along.tolist()]
-    return np.array([(centre, *interval) for centre, _, interval in rows])
+    predictions = (model.predict(a, g) for a, g in indexes)
+    return np.array([(centre, *interval) for centre, _, interval in predictions])
 
 
 def _bands_table(calibration: RatioIndexCalibration) -> Table:
@@ -111,23 +92,21 @@ def _bands_table(calibration: RatioIndexCalibration) -> Table:
 
 
 def _model_tables(fit: RatioIndexFit) -> Iterator[Table]:
-    choice, models = fit.choice, (fit.calibration.payload, fit.calibration.front_share)
-    rows = zip(("payload [kg]", "front share [%]"), choice.regressions, models, strict=True)
-    for target, regression, model in rows:
-        if regression is not None and model is not None:
-            yield _model_table(target, regression, model.residual_std, model.dof)
-
-
-def _model_table(target: str, regression: FittedRegression, residual_std: float, dof: float) -> Table:
     """Coefficients with their jackknife standard deviations over runs."""
-    model, stds = regression.model, np.sqrt(np.diag(regression.covariance))
-    rows = tuple(
-        (term, f"{coefficient:.4g}", f"{std:.3g}", f"{coefficient / std:.1f}" if std > 0.0 else NONE)
-        for term, coefficient, std in zip(("constant", *model.terms), model.coefficients, stds, strict=True)
-    )
-    return Table(
-        f"Regression of {target}: terms scaled to -1..1 over what was seen, standard deviations by leaving runs out. "
-        f"An answer scatters by {residual_std:.3g} and more ({dof:g} degrees of freedom)",
-        ("Term", "coefficient", "standard deviation", "ratio"),
-        rows,
-    )
+    models = (fit.calibration.payload, fit.calibration.front_share)
+    for target, regression, held in zip(
+        ("payload [kg]", "front share [%]"), fit.choice.regressions, models, strict=True
+    ):
+        if regression is None or held is None:
+            continue
+        model, stds = regression.model, np.sqrt(np.diag(regression.covariance))
+        rows = tuple(
+            (term, f"{coefficient:.4g}", f"{std:.3g}", f"{coefficient / std:.1f}" if std > 0.0 else NONE)
+            for term, coefficient, std in zip(("constant", *model.terms), model.coefficients, stds, strict=True)
+        )
+        yield Table(
+            f"Regression of {target}: terms scaled to -1..1 over what was seen, standard deviations by leaving runs "
+            f"out. An answer scatters by {held.residual_std:.3g} and more ({held.dof:g} degrees of freedom)",
+            ("Term", "coefficient", "standard deviation", "ratio"),
+            rows,
+        )

@@ -33,7 +33,7 @@ from gateway.words import counted, estimator_name, span
 
 
 def write_report_of(directory: Path, assessment: Assessment, on_chart: OnChart = lambda done, of: None) -> Path:
-    """How a calibration weighs, and how it came about if this is known; the path of report.html."""
+    """Writes how a calibration weighs, and how it was made if this is known; returns the path of report.html."""
     made = list(_calibration_sections(assessment.outcome)) if assessment.outcome else []
     accuracy = [accuracy_section(one, stated_budget(one)) for one in assessment.judgements]
     return _write(directory, assessment, [*made, *accuracy, provenance_section(assessment)], on_chart)

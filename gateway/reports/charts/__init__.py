@@ -8,25 +8,6 @@ from typing import Final, Literal
 
 from gateway.records import F64
 
-__all__ = [
-    "GREY",
-    "Axis",
-    "Cell",
-    "Chart",
-    "ChartLink",
-    "LineMark",
-    "Mark",
-    "Marker",
-    "Panel",
-    "Points",
-    "Ribbon",
-    "Rule",
-    "Section",
-    "Span",
-    "Table",
-]
-
-
 Dash = Literal["solid", "dash", "dot"]
 Marker = Literal["circle", "square", "diamond", "x"]
 

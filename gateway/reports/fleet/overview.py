@@ -1,7 +1,7 @@
 """The overview page of the fleet: what needs attention, a row per vehicle, and the fleet by week."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Final
@@ -11,7 +11,6 @@ import numpy as np
 from gateway.archive.fleet.batches import DRIFTING, OF_VEHICLE
 from gateway.archive.fleet.drift import FALSE_SHARE, Drift
 from gateway.archive.fleet.fleet import FleetSummary, FleetVehicle
-from gateway.reasons import Cause
 from gateway.reports.charts import Axis, Chart, ChartLink, LineMark, Mark, Panel, Points, Ribbon, Section, Table
 from gateway.reports.fleet.text import (
     NAMES,
@@ -26,7 +25,7 @@ from gateway.reports.fleet.text import (
     trouble_told,
     whole,
 )
-from gateway.reports.fleet.vehicle import reason_told, runs_of
+from gateway.reports.fleet.vehicle import reason_told, refusals_section, runs_of
 
 SILENT_DAYS: Final = 28  # chosen: without a batch, before the last of the fleet's
 LITTLE_ANSWERED: Final = 0.5  # chosen: of a vehicle's batches
@@ -47,31 +46,33 @@ class Look:
 
 def looks_of(fleet: FleetSummary) -> list[Look]:
     """The findings in order of urgency: bad sensors, drift, no data, few estimates, failed logs."""
+    drifts = [_drifting(one, name, drift) for one in fleet.vehicles for name, drift in one.believed_drifts.items()]
+    silent_since = fleet.last - timedelta(days=SILENT_DAYS)
+    n_failed = sorted(Counter(failure.vehicle for failure in fleet.failures).items())
+    with_page = {vehicle.name for vehicle in fleet.vehicles}
     return [
-        *(_bad(vehicle, n) for vehicle in fleet.vehicles for n in range(len(vehicle.bad_sensors))),
-        *sorted(_drifts(fleet), key=lambda look: look.what),
+        *(Look(one.name, f"sensor: {bad.reason}", trouble_told(bad), reason_told(bad.reason)[1])
+          for one in fleet.vehicles for bad in one.bad_sensors),
+        *sorted(drifts, key=lambda look: look.what),
         *(Look(name, "no batch", "the data set has no batch of it", "see the logs that failed", False)
           for name in fleet.without_batches),
-        *_silent(fleet),
-        *_little_answered(fleet),
-        *_failing(fleet),
+        *(Look(one.name, "silent", f"its last batch is of {one.last}", "is it parked, or its logs lost?")
+          for one in fleet.vehicles if one.last < silent_since),
+        *(_little_answered(one) for one in fleet.vehicles if one.n_answered < LITTLE_ANSWERED * one.n),
+        *(Look(name, "logs failed", f"{whole(n)}, listed below", "mend or remove them", name in with_page)
+          for name, n in n_failed),
     ]  # fmt: skip
 
 
 def fleet_sections(fleet: FleetSummary, looks: Sequence[Look]) -> list[Section]:
+    refusals = refusals_section(
+        "refused",
+        [vehicle.weeks for vehicle in fleet.vehicles],
+        [vehicle.n_refused for vehicle in fleet.vehicles],
+        fleet.n_answered,
+    )
     failed = [_failed(fleet)] if fleet.failures else []
-    return [_look_section(looks), _vehicles(fleet), _loads(fleet), _refusals(fleet), _drift(fleet), *failed, _how()]
-
-
-def _bad(vehicle: FleetVehicle, n: int) -> Look:
-    trouble = vehicle.bad_sensors[n]
-    return Look(vehicle.name, f"sensor: {trouble.reason}", trouble_told(trouble), reason_told(trouble.reason)[1])
-
-
-def _drifts(fleet: FleetSummary) -> Iterator[Look]:
-    for vehicle in fleet.vehicles:
-        for name, drift in vehicle.believed_drifts.items():
-            yield _drifting(vehicle, name, drift)
+    return [_look_section(looks), _vehicles(fleet), _loads(fleet), refusals, _drift(fleet), *failed, _how()]
 
 
 def _drifting(vehicle: FleetVehicle, name: str, drift: Drift) -> Look:
@@ -83,27 +84,10 @@ def _drifting(vehicle: FleetVehicle, name: str, drift: Drift) -> Look:
     return Look(vehicle.name, f"drift: {NAMES[name]}", drift_told(drift), advice)
 
 
-def _silent(fleet: FleetSummary) -> Iterator[Look]:
-    since = fleet.last - timedelta(days=SILENT_DAYS)
-    for vehicle in fleet.vehicles:
-        if vehicle.last < since:
-            yield Look(
-                vehicle.name, "silent", f"its last batch is of {vehicle.last}", "is it parked, or its logs lost?"
-            )
-
-
-def _little_answered(fleet: FleetSummary) -> Iterator[Look]:
-    for vehicle in fleet.vehicles:
-        if vehicle.n_answered < LITTLE_ANSWERED * vehicle.n:
-            reason, n = max(vehicle.n_refused.items(), key=lambda one: one[1])
-            told = f"{percent(vehicle.n_answered, vehicle.n)} of {whole(vehicle.n)} batches; {whole(n)} were {reason}"
-            yield Look(vehicle.name, "few answers", told, reason_told(reason)[1])
-
-
-def _failing(fleet: FleetSummary) -> Iterator[Look]:
-    with_page = {vehicle.name for vehicle in fleet.vehicles}
-    for name, n in sorted(Counter(failure.vehicle for failure in fleet.failures).items()):
-        yield Look(name, "logs failed", f"{whole(n)}, listed below", "mend or remove them", name in with_page)
+def _little_answered(vehicle: FleetVehicle) -> Look:
+    reason, n = max(vehicle.n_refused.items(), key=lambda one: one[1])
+    told = f"{percent(vehicle.n_answered, vehicle.n)} of {whole(vehicle.n)} batches; {whole(n)} were {reason}"
+    return Look(vehicle.name, "few answers", told, reason_told(reason)[1])
 
 
 def _look_section(looks: Sequence[Look]) -> Section:
@@ -162,7 +146,7 @@ def _loads(fleet: FleetSummary) -> Section:
     low, middle, high = np.array([np.quantile(means[week], [0.25, 0.5, 0.75]) for week in number.tolist()]).T
     counts = [len(means[week]) for week in number.tolist()]
     axis, x = time_axis(number.tolist()), number.astype(float)
-    runs = list(runs_of(np.isfinite(middle), number))
+    runs = runs_of(np.isfinite(middle), number)
     marks: tuple[Mark, ...] = (
         *(Ribbon(x[run], low[run], high[run], "middle half of the vehicles") for run in runs),
         *(LineMark(x[run], middle[run], "median of the vehicles") for run in runs),
@@ -180,47 +164,6 @@ def _loads(fleet: FleetSummary) -> Section:
         ),
     )
     return Section("loads", "Loads over time", (), (chart,))
-
-
-def _refusals(fleet: FleetSummary) -> Section:
-    by_week: dict[int, Counter[str]] = {}
-    for vehicle in fleet.vehicles:
-        weeks = vehicle.weeks
-        for k, week in enumerate(weeks.number.tolist()):
-            counts = by_week.setdefault(week, Counter())
-            counts["n"] += int(weeks.n[k])
-            counts.update({str(cause): int(refused[k]) for cause, refused in weeks.n_refused_by.items()})
-    number = sorted(by_week)
-    x, n = np.array(number, dtype=float), np.array([by_week[week]["n"] for week in number])
-    lines = tuple(
-        Points(x, 100.0 * np.array([by_week[week][cause] for week in number]) / n, str(cause), k)
-        for k, cause in enumerate(Cause)
-        if any(by_week[week][cause] for week in number)
-    )
-    chart = Chart(
-        "refused",
-        f"Share of each week's batches that were refused, by where the reason lies; {whole(fleet.n)} batches.",
-        "Share of all batches refused in each week, by cause; the table below holds the sums.",
-        (Panel(time_axis(number), Axis("refused [%]"), lines),),
-        1,
-    )
-    total: Counter[str] = Counter()
-    vehicles: Counter[str] = Counter()
-    for vehicle in fleet.vehicles:
-        total.update(vehicle.n_refused)
-        vehicles.update(reason for reason, times in vehicle.n_refused.items() if times)
-    rows = tuple(
-        (reason, whole(times), percent(times, fleet.n), whole(vehicles[reason]), *reason_told(reason))
-        for reason, times in total.most_common()
-    )
-    columns = ("Reason", "batches", "share", "vehicles", "what happened", "what to do")
-    n_refused = fleet.n - fleet.n_answered
-    text = (
-        f"{whole(n_refused)} of {whole(fleet.n)} batches were refused ({percent(n_refused, fleet.n)}). A batch with "
-        "several reasons stands with each of them."
-    )
-    table = (Table("Refused batches by reason", columns, rows),) if rows else ()
-    return Section("refused", "Refusals", (text,), (chart,) if lines else (), table)
 
 
 def _drift(fleet: FleetSummary) -> Section:

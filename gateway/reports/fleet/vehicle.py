@@ -1,13 +1,14 @@
 """The page of one vehicle: its loads, rejections, parameters and sensors by week."""
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
 from gateway.archive.fleet.batches import DRIFTING
 from gateway.archive.fleet.fleet import FleetVehicle
-from gateway.archive.fleet.weeks import known_reason
+from gateway.archive.fleet.weeks import Weeks, known_reason
 from gateway.reasons import EXPLANATIONS, Cause
 from gateway.records import I64, Bool
 from gateway.reports.charts import Axis, Chart, LineMark, Mark, Panel, Points, Ribbon, Rule, Section, Table
@@ -33,7 +34,8 @@ _SHOWN: Final = 250  # px a row of panels
 
 def vehicle_sections(vehicle: FleetVehicle) -> list[Section]:
     """All sections of the page; every figure states its number of batches."""
-    return [_loads(vehicle), _refusals(vehicle), _parameters(vehicle), _sensors(vehicle)]
+    refusals = refusals_section(_named(vehicle, "refused"), [vehicle.weeks], [vehicle.n_refused], vehicle.n_answered)
+    return [_loads(vehicle), refusals, _parameters(vehicle), _sensors(vehicle)]
 
 
 def _named(vehicle: FleetVehicle, what: str) -> str:
@@ -43,30 +45,20 @@ def _named(vehicle: FleetVehicle, what: str) -> str:
 
 def _loads(vehicle: FleetVehicle) -> Section:
     weeks = vehicle.weeks
-    x = weeks.number.astype(float)
-    known = np.isfinite(weeks.payload_mean_kg)
+    x, known = weeks.number.astype(float), np.isfinite(weeks.payload_mean_kg)
+    mean, low, high = weeks.payload_mean_kg, weeks.payload_low_kg, weeks.payload_high_kg
+    lower, upper = weeks.payload_lower_quartile_kg, weeks.payload_upper_quartile_kg
     marks: list[Mark] = [
-        *(
-            Ribbon(x[run], weeks.payload_lower_quartile_kg[run], weeks.payload_upper_quartile_kg[run], "middle half")
-            for run in runs_of(known, weeks.number)
-        ),
-        Points(
-            x[known],
-            weeks.payload_mean_kg[known],
-            "mean, 95 %",
-            0,
-            "circle",
-            weeks.payload_low_kg[known],
-            weeks.payload_high_kg[known],
-        ),
+        *(Ribbon(x[run], lower[run], upper[run], "middle half") for run in runs_of(known, weeks.number)),
+        Points(x[known], mean[known], "mean, 95 %", 0, "circle", low[known], high[known]),
     ]
     rows = tuple(
         (
             day(monday),
             whole(int(weeks.n[k])),
             whole(int(weeks.n_answered[k])),
-            kg(weeks.payload_mean_kg[k], weeks.payload_low_kg[k], weeks.payload_high_kg[k]),
-            _span(weeks.payload_lower_quartile_kg[k], weeks.payload_upper_quartile_kg[k]),
+            kg(mean[k], low[k], high[k]),
+            f"{lower[k]:.0f} to {upper[k]:.0f} kg" if np.isfinite(lower[k]) else NONE,
             over_limit(int(weeks.n_over_limit[k]), int(weeks.n_answered[k])),
         )
         for k, monday in enumerate(weeks.mondays)
@@ -90,31 +82,54 @@ def _loads(vehicle: FleetVehicle) -> Section:
     return Section("loads", "Loads over time", (text,), (chart,), (), (("The numbers", (table,)),))
 
 
-def _refusals(vehicle: FleetVehicle) -> Section:
-    weeks = vehicle.weeks
-    x, causes = weeks.number.astype(float), [cause for cause in Cause if weeks.n_refused_by[cause].any()]
-    lines = tuple(
-        Points(x, 100.0 * weeks.n_refused_by[cause] / weeks.n, str(cause), k) for k, cause in enumerate(causes)
-    )
+def refusals_section(
+    name: str,
+    all_weeks: Sequence[Weeks],
+    totals: Sequence[Mapping[str, int]],
+    n_answered: int,
+) -> Section:
+    """The refused batches of one vehicle or of several, by week and cause, and by reason. ``name`` is the chart's."""
+    by_week: dict[int, Counter[str]] = {}
+    for weeks in all_weeks:
+        for k, week in enumerate(weeks.number.tolist()):
+            of_cause = {str(cause): int(numbers[k]) for cause, numbers in weeks.n_refused_by.items()}
+            by_week.setdefault(week, Counter()).update(of_cause, n=int(weeks.n[k]))
+    number = sorted(by_week)
+    x, n = np.array(number, dtype=float), np.array([by_week[week]["n"] for week in number])
+    share = {cause: 100.0 * np.array([by_week[week][cause] for week in number]) / n for cause in Cause}
+    lines = tuple(Points(x, share[cause], str(cause), k) for k, cause in enumerate(Cause) if share[cause].any())
+    n_batches = int(n.sum())
     chart = Chart(
-        _named(vehicle, "refused"),
-        f"Share of each week's batches that were refused, by where the reason lies; {whole(vehicle.n)} batches.",
-        "Share of batches refused in each week by cause; the table below holds the sums.",
-        (Panel(time_axis(weeks.number.tolist()), Axis("refused [%]", limits=(0.0, 105.0)), lines),),
+        name,
+        f"Share of each week's batches that were refused, by where the reason lies; {whole(n_batches)} batches.",
+        "Share of all batches refused in each week, by cause; the table below holds the sums.",
+        (Panel(time_axis(number), Axis("refused [%]"), lines),),
         1,
         _SHOWN,
     )
+    total, vehicles = Counter[str](), Counter[str]()
+    for refused in totals:
+        total.update(refused)
+        vehicles.update(reason for reason, times in refused.items() if times)
+    has_several = len(totals) > 1
     rows = tuple(
-        (reason, whole(n), percent(n, vehicle.n), *reason_told(reason))
-        for reason, n in sorted(vehicle.n_refused.items(), key=lambda one: -one[1])
+        (
+            reason,
+            whole(times),
+            percent(times, n_batches),
+            *([whole(vehicles[reason])] if has_several else []),
+            *reason_told(reason),
+        )
+        for reason, times in total.most_common()
     )
-    n_refused = vehicle.n - vehicle.n_answered
+    columns = ("Reason", "batches", "share", *(["vehicles"] if has_several else []), "what happened", "what to do")
+    n_refused = n_batches - n_answered
     text = (
-        f"{whole(n_refused)} of {whole(vehicle.n)} batches were refused ({percent(n_refused, vehicle.n)}). A batch "
+        f"{whole(n_refused)} of {whole(n_batches)} batches were refused ({percent(n_refused, n_batches)}). A batch "
         "with several reasons stands with each of them."
     )
-    table = Table("Refused batches by reason", ("Reason", "batches", "share", "what happened", "what to do"), rows)
-    return Section("refused", "Refusals", (text,), (chart,) if causes else (), (table,) if rows else ())
+    table = (Table("Refused batches by reason", columns, rows),) if rows else ()
+    return Section("refused", "Refusals", (text,), (chart,) if lines else (), table)
 
 
 def _parameters(vehicle: FleetVehicle) -> Section:
@@ -198,17 +213,8 @@ def reason_told(reason: str) -> tuple[str, str]:
     return EXPLANATIONS[why].happened.replace("`", ""), EXPLANATIONS[why].advice.replace("`", "")
 
 
-def runs_of(known: Bool, number: I64) -> Iterator[slice]:
+def runs_of(known: Bool, number: I64) -> list[slice]:
     """Runs of consecutive weeks with known values, so that a band does not span gaps."""
-    begin = None
-    for k in range(len(known) + 1):
-        goes_on = k < len(known) and known[k] and (begin is None or number[k] == number[k - 1] + 1)
-        if begin is not None and not goes_on:
-            yield slice(begin, k)
-            begin = None
-        if begin is None and k < len(known) and known[k]:
-            begin = k
-
-
-def _span(low: float, high: float) -> str:
-    return f"{low:.0f} to {high:.0f} kg" if np.isfinite(low) else NONE
+    at = np.flatnonzero(known)
+    runs = np.split(at, np.flatnonzero(np.diff(at) + np.diff(number[at]) > 2) + 1)
+    return [slice(int(run[0]), int(run[-1]) + 1) for run in runs if run.size]

@@ -145,7 +145,7 @@ def _methods(driven: DrivenCampaign, extent: Extent, path: Path) -> tuple[Method
 
 
 def with_paper_bands(calibrated: CalibratedVehicle, driven: DrivenCampaign) -> CalibratedVehicle:
-    """The same vehicle with the bands of Table 2 and regressions (11) fitted to them."""
+    """The vehicle with the bands of Table 2 and regressions (11) fitted to them."""
     own = calibrated.ratio_index
     if own is None:
         return calibrated

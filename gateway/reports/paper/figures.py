@@ -195,44 +195,49 @@ def mean_errors(run: KnownRun, method: Method) -> tuple[float, float]:
 
 def figure_test(experiments: Experiments, kind: str) -> Figure:
     """Payload and share over time: the truth as a line, and each method's batches with 95 % intervals."""
-    figure, (top, bottom) = panels(2, 1, height_in=2.4)
+    figure, axes_of = panels(2, 1, height_in=2.4)
     runs = experiments.driven[kind].runs
     start_ns = runs[0].batches[0].t_start_ns
     for n, method in enumerate(experiments.simulated):
-        colour = COLOURS[n]
-        counted = [one for one in method.judge(runs) if one.estimate.counted]
-        _with_intervals(top, counted, start_ns, colour, method.label, is_payload=True)
-        _with_intervals(bottom, counted, start_ns, colour, method.label, is_payload=False)
-    for run in runs:
-        when_min = [(t - start_ns) / NS_PER_S / 60.0 for t in (run.batches[0].t_start_ns, run.batches[-1].t_end_ns)]
-        top.plot(when_min, [run.payload_kg] * 2, color="black", linewidth=2.0)
-        bottom.plot(when_min, [run.front_share_pct] * 2, color="black", linewidth=2.0)
-    _label(top, "", LOAD)
-    _label(bottom, "time [min]", SHARE)
+        told = [one.estimate for one in method.judge(runs) if one.estimate.counted]
+        middle_min = [np.mean(_minutes(e.t_start_ns, e.t_end_ns, start_ns)) for e in told]
+        for axes, quantities in zip(axes_of, ([e.payload for e in told], [e.front_share for e in told]), strict=True):
+            centre = np.array([one.number for one in quantities])
+            reach = np.abs(np.array([one.interval95 for one in quantities]).reshape(-1, 2) - centre[:, None]).T
+            axes.errorbar(middle_min, centre, yerr=reach, fmt="o", color=COLOURS[n], label=method.label,
+                          markersize=3.5, linewidth=0.8)  # fmt: skip
+    _with_truth(axes_of, runs, start_ns)
     return figure
 
 
 def figure_drive(experiments: Experiments, kind: str, method: Method) -> Figure:
     """One method's estimates over a drive with changing loads: its 95 % band and the truth."""
-    figure, (top, bottom) = panels(2, 1, height_in=2.2)
+    figure, axes_of = panels(2, 1, height_in=2.2)
     runs = experiments.driven[kind].runs
     start_ns = runs[0].batches[0].t_start_ns
+    told = [one.estimate for one in method.judge(runs) if one.estimate.counted]
+    for k, e in enumerate(told):
+        when = _minutes(e.t_start_ns, e.t_end_ns, start_ns)
+        for axes, quantity in zip(axes_of, (e.payload, e.front_share), strict=True):
+            label = "" if k else "estimate, 95 % interval"
+            axes.fill_between(when, *quantity.interval95, color=COLOURS[0], alpha=0.25, linewidth=0.0, label=label)
+            axes.plot(when, [quantity.number] * 2, color=COLOURS[0], linewidth=1.5)
+    _with_truth(axes_of, runs, start_ns, "truth")
+    return figure
+
+
+def _minutes(begin_ns: int, end_ns: int, start_ns: int) -> list[float]:
+    return [(t - start_ns) / NS_PER_S / 60.0 for t in (begin_ns, end_ns)]
+
+
+def _with_truth(axes_of: Sequence[Axes], runs: Sequence[KnownRun], start_ns: int, label: str = "") -> None:
+    top, bottom = axes_of
     for n, run in enumerate(runs):
-        counted = [one.estimate for one in method.judge([run]) if one.estimate.counted]
+        when = _minutes(run.batches[0].t_start_ns, run.batches[-1].t_end_ns, start_ns)
         for axes, truth in ((top, run.payload_kg), (bottom, run.front_share_pct)):
-            is_payload = axes is top
-            edges = [(t - start_ns) / NS_PER_S / 60.0 for t in (run.batches[0].t_start_ns, run.batches[-1].t_end_ns)]
-            axes.plot(edges, [truth] * 2, color="black", linewidth=2.5, label="truth" if n == 0 else None)
-            for k, e in enumerate(counted):
-                when = [(t - start_ns) / NS_PER_S / 60.0 for t in (e.t_start_ns, e.t_end_ns)]
-                quantity = e.payload if is_payload else e.front_share
-                is_first = n == 0 and k == 0
-                axes.fill_between(when, *quantity.interval95, color=COLOURS[0], alpha=0.25, linewidth=0.0,
-                                  label="estimate, 95 % interval" if is_first else None)  # fmt: skip
-                axes.plot(when, [quantity.number] * 2, color=COLOURS[0], linewidth=1.5)
+            axes.plot(when, [truth] * 2, color="black", linewidth=2.0, label="" if n else label)
     _label(top, "", LOAD)
     _label(bottom, "time [min]", SHARE)
-    return figure
 
 
 def figure_13(experiments: Experiments) -> Figure:
@@ -269,17 +274,6 @@ def _estimated_over_true(series: Sequence[tuple[str, list[Judged], str]]) -> Fig
         axes.plot(ends, ends, color="black", linewidth=0.6)
         _label(axes, f"true {name}", f"estimated {name}")
     return figure
-
-
-def _with_intervals(
-    axes: Axes, counted: Sequence[Judged], start_ns: int, colour: str, label: str, *, is_payload: bool
-) -> None:
-    estimates = [one.estimate for one in counted]
-    middle_min = [((e.t_start_ns + e.t_end_ns) / 2.0 - start_ns) / NS_PER_S / 60.0 for e in estimates]
-    quantities = [e.payload if is_payload else e.front_share for e in estimates]
-    centre = np.array([one.number for one in quantities])
-    reach = np.abs(np.array([one.interval95 for one in quantities]).reshape(-1, 2) - centre[:, None]).T
-    axes.errorbar(middle_min, centre, yerr=reach, fmt="o", color=colour, label=label, markersize=3.5, linewidth=0.8)
 
 
 def _label(axes: Axes, x: str, y: str) -> None:

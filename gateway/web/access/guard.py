@@ -89,7 +89,7 @@ def _encryption(request: Request) -> Encryption:
 
 
 def _refuse_strangers(request: Request, encryption: Encryption) -> None:
-    """Without tokens: only from this machine, and only under a local name (else a web page could ask by DNS tricks)."""
+    """Answers without tokens only this machine, and only under a local name (else a web page could use DNS tricks)."""
     if not may_leave(Kind.RECORD, encryption, Holder.MACHINE):  # a proxy is local, its clients are not
         raise HTTPException(
             403, f"without tokens only this machine is answered, and through no proxy: {HOW_TO_MAKE_ONE} makes one"

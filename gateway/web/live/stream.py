@@ -36,7 +36,7 @@ _CLOSING: Final = ServerSentEvent(event="closing", data={"detail": "the service 
 
 
 class TooManyStreamsError(Exception):
-    """There are as many streams as there may be, of this client or of all."""
+    """The client, or all clients together, have as many streams open as they may."""
 
 
 class Subscription:
@@ -59,7 +59,7 @@ class Subscription:
         self._follower = reader.follow(tuple(KINDS), behind or reader.head(), self.hear)
 
     def hear(self, passing: ServerSentEvent | None = None) -> None:
-        """There is a new record, or an event that is not stored; from any thread."""
+        """Takes a new record, or an event that is not stored; may be called from any thread."""
         self._in_loop(self._note, None if passing is None else (_number(self._head()), passing))
 
     def end(self) -> None:

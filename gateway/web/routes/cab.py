@@ -43,7 +43,7 @@ class HalvesTold(BaseModel):
 
 
 class RoomTold(BaseModel):
-    """How much more may go in so that neither the gross weight nor an axle passes its limit, and where."""
+    """The payload that may still go in so that neither gross weight nor an axle passes its limit, and its place."""
 
     kg: float = Field(description="best estimate; negative: too heavy", examples=[262.0])
     plus_minus_kg: float = Field(description="half its 95 % interval", examples=[12.0])
@@ -57,7 +57,7 @@ class RoomTold(BaseModel):
 
 
 class SpareLeft(BaseModel):
-    """What one place may bear more before it reaches its limit; negative: it bears too much."""
+    """The weight that one place may still bear before it reaches its limit; negative: it bears too much."""
 
     place: RoomPlace
     kg: float = Field(examples=[288.7])
@@ -79,7 +79,7 @@ class CabEvent(BaseModel):
 
 
 class Cab(VerdictTold):
-    """By all batches of the present load together. Unknown is null."""
+    """The present load, weighed by all its batches together. Unknown is null."""
 
     vehicle_id: str | None
     state: State
@@ -118,7 +118,7 @@ def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
 
     @router.get("/cab", responses=problem_responses(503))
     async def cab() -> Cab:
-        """How much can still be loaded, whether it is too much, how old that is, and what was loaded last."""
+        """The payload that can still be loaded, the verdict on the load, its age, and the last load event."""
         now, shown = status(), board.shown()
         found = present_load(board, scales.weigh, now, scales.vehicle)
         load, weights = found.load, found.weights
@@ -193,7 +193,7 @@ def _last_event(reader: StoreReader) -> CabEvent | None:
 
 
 def _cab_event(text: str) -> CabEvent | None:
-    """None for one that was withdrawn."""
+    """The load event for the cab; None for one that was withdrawn."""
     told = json.loads(text)
     return None if told["is_withdrawn"] else CabEvent(**told | {"payload_kg": told["after"]["payload_kg"]})
 

@@ -65,7 +65,7 @@ async def answered(ask: Callable[P, str], *args: P.args, **named: P.kwargs) -> R
 
 
 async def created(ask: Callable[P, str], *args: P.args, **named: P.kwargs) -> Response:
-    """The same with the status of something new."""
+    """The answer with the status of something new."""
     return Response(await asyncio.to_thread(ask, *args, **named), 201, media_type="application/json")
 
 

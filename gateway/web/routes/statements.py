@@ -73,7 +73,7 @@ class LearningChange(Body):
 
 
 class ImportQuery(BaseModel):
-    """How a table or a list is read."""
+    """How to read a table or a list."""
 
     model_config = ConfigDict(extra="forbid")
 

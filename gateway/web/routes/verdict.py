@@ -70,7 +70,7 @@ class PresentLoad:
 def present_load(
     board: Board, weigh: Callable[[Estimate | None], Weights], now: Status, vehicle: Vehicle | None
 ) -> PresentLoad:
-    """What is known of the present load."""
+    """The present load as far as it is known."""
     shown = board.shown().estimate
     load = None if shown is None else as_of_load(shown)
     weights, rejected = weigh(load), _rejected(board.heard(), shown, now)

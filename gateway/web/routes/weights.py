@@ -64,11 +64,12 @@ class Scales:
         self._known: dict[int, tuple[Estimate, Weights]] = {}  # by identity: the estimates are kept with them
 
     def weigh(self, estimate: Estimate | None) -> Weights:
-        """By this vehicle's present figures, not those that the estimate was stored with; None: before the first."""
+        """Weighs an estimate by the vehicle's present figures, not by those it was stored with; None: nothing was
+        weighed yet."""
         return weighed(estimate or _NONE, self.vehicle, self._unsprung).weights
 
     def weigh_each(self, estimates: Sequence[Estimate]) -> list[Weights]:
-        """The same for many, each computed once however often it is requested. From any thread."""
+        """Weighs many estimates, each once however often it is requested. May be called from any thread."""
         known, found = self._known, dict[int, tuple[Estimate, Weights]]()
         for one in estimates:
             if id(one) not in found:
@@ -84,7 +85,7 @@ class Scales:
 
 
 class JudgedWeights(LatestWeights):
-    """The same with the verdict on the present load: all its batches together, and the alarms."""
+    """The weights with the verdict on the present load, which counts all its batches and the alarms."""
 
     verdict: VerdictTold
 
@@ -202,7 +203,7 @@ KNOWN_LOADS_PATH: Final = "/api/v1/known-loads"
 
 
 class KnownLoadTold(BaseModel):
-    """From ``t_start`` on, until the next."""
+    """A known load: it is aboard from ``t_start`` on, until the next."""
 
     t_start: Instant
     payload_kg: float
@@ -213,7 +214,7 @@ KnownLoads = Callable[[], Sequence[KnownLoadTold]]
 
 
 class KnownLoadsTold(BaseModel):
-    """In order of time. They are for comparison only: no estimate uses them."""
+    """Known loads in order of time, for comparison only: no estimate uses them."""
 
     items: list[KnownLoadTold]
 

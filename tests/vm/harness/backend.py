@@ -1,4 +1,4 @@
-"""How the test machine is run: User Mode Linux, or QEMU. Both need root, /dev/net/tun and the tools named here."""
+"""Ways to run the test machine: User Mode Linux, or QEMU. Both need root, /dev/net/tun and the tools named here."""
 
 import os
 import shutil
@@ -16,7 +16,7 @@ MEMORY_MB: Final = 1024
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """What a start needs to know: the kept image, this run's own disk, its network."""
+    """The parts of a start: the kept image, this run's own disk, its network."""
 
     image: Path
     disk: Path

@@ -27,12 +27,12 @@ def loaded_drive(duration_s: float, seed: int, map_name: str = "reference") -> F
 
 @cache
 def empty_drive(duration_s: float, seed: int) -> Frames:
-    """The same van without a load."""
+    """The van without a load."""
     return _drive(duration_s, seed, "reference", ())
 
 
 def driven_with(duration_s: float, seed: int, loads: tuple[Load, ...]) -> Frames:
-    """The same van with these loads."""
+    """The van with these loads."""
     return _drive(duration_s, seed, "reference", loads)
 
 
@@ -43,7 +43,7 @@ def _drive(duration_s: float, seed: int, map_name: str, loads: tuple[Load, ...])
 
 
 def faster(frames: Frames, times: float) -> Frames:
-    """The same frames with their stamps closer together, in whole microseconds: canplayer reads no finer ones."""
+    """The frames with their stamps closer together, in whole microseconds: canplayer reads no finer ones."""
     t_ns = START_NS + ((frames.t_ns - START_NS) / times / 1000).astype(np.int64) * 1000
     return Frames(t_ns, frames.can_id, frames.length, frames.payload)
 

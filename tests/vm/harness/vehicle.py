@@ -60,7 +60,7 @@ class Vehicle:
         return self.machine.succeeds("dpkg-query --show --showformat '${Status}' springscale | grep -q 'ok installed'")
 
     def install(self, package: Path) -> None:
-        """As docs/deployment.md tells: package, virtual bus, configuration, token, start."""
+        """Installs the service as docs/deployment.md says: package, virtual bus, configuration, token, start."""
         self.machine.write(f"/root/{package.name}", package.read_bytes())
         self.run(f"dpkg --install /root/{package.name}", timeout_s=300.0)
         self.run("cp /usr/share/springscale/network/vcan0.* /etc/systemd/network/ && networkctl reload")
@@ -89,7 +89,8 @@ class Vehicle:
         self.run("systemctl daemon-reload")
 
     def restore(self) -> None:
-        """As every test finds it: nothing playing, bus up, settings and unit as after the installation, running.
+        """Restores the state that every test starts from: silent bus up, settings and unit as installed, service
+        running.
 
         A start costs seconds of an emulated processor, so only what was changed is begun anew.
         """
@@ -183,7 +184,7 @@ class Vehicle:
         return int(self.run("systemctl show --property MainPID --value springscale"))
 
     def n_restarts(self) -> int:
-        """How often systemd had to start it again."""
+        """The number of times that systemd had to restart the service."""
         return int(self.run("systemctl show --property NRestarts --value springscale"))
 
     def put_log(self, log: Path) -> str:

@@ -1,4 +1,4 @@
-"""What device-mapper's log-writes target recorded of a disk, and the disk as a power cut might have left it.
+"""The writes that device-mapper's log-writes target recorded, and the disk as a power cut might leave it.
 
 The target writes down every write once it is known to be stable: the writes that a flush covers, then that flush; a
 write that bypasses the disk's cache (FUA) as soon as it is done. What stands behind the last flush was still in the
@@ -45,7 +45,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """What a power cut did to the writes that no flush had covered, in sectors."""
+    """The damage that a power cut did to the writes that no flush had covered, in sectors."""
 
     n_lost: int
     n_kept: int
@@ -103,7 +103,7 @@ def _moments(entries: Sequence[Entry], since: str) -> list[int]:
 
 
 def _n_flushed(entries: Sequence[Entry], moment: int) -> int:
-    """How many of the first ``moment`` entries the last flush among them covers."""
+    """The number of entries among the first ``moment`` that a flush covers."""
     return max((i + 1 for i, entry in enumerate(entries[:moment]) if entry.flags & Flag.FLUSH), default=0)
 
 
