@@ -25,10 +25,12 @@ from benchmarks.accuracy.markdown import table
 from benchmarks.accuracy.taught import line_of, runs_of, weighed, whole
 from gateway.calibration.assigned import Assigned, Fate, Piece, assign
 from gateway.calibration.campaign import load_campaign
+from gateway.calibration.found import ClaimState, FoundClaim, Taught
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.questions import common_errors, question
+from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import Statement
-from gateway.calibration.vehicle import ClaimState, FoundClaim, Taught, TaughtDrive, teach
+from gateway.calibration.teach import teach
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.model.table import UNSPRUNG_SHARE

@@ -19,7 +19,8 @@ from benchmarks.accuracy.scatter import Scatter, scattered
 from benchmarks.accuracy.study import Study
 from benchmarks.accuracy.taught import SHARE_SPAN_PCT, taught, weighed
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.vehicle import TaughtDrive, teach
+from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.teach import teach
 from gateway.model.vehicle import VehicleModel
 
 SEED: Final = 20281  # arbitrary, of this study alone

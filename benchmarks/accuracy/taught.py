@@ -21,8 +21,9 @@ import numpy as np
 
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.known_run import KnownRun
+from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import NOTHING_KNOWN, Statement, StatementSource, empty
-from gateway.calibration.vehicle import TaughtDrive, teach
+from gateway.calibration.teach import teach
 from gateway.core.cargo import shape_hypotheses
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle

@@ -16,8 +16,8 @@ from typing import Final
 
 import numpy as np
 
+from gateway.calibration.fit_of_drives import information_of
 from gateway.calibration.statements import Statement, StatementSource, empty
-from gateway.calibration.vehicle import information_of
 from gateway.core.cargo import shape_hypotheses
 from gateway.core.spectrum import frequencies_hz
 from gateway.core.vehicle import Load, Vehicle, front_share_pct

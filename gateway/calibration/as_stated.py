@@ -11,7 +11,8 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.vehicle import BAND_HZ, EVIDENCE, N_SEGMENT
+from gateway.calibration.read_drive import EVIDENCE
+from gateway.calibration.teach import BAND_HZ, N_SEGMENT
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model import fit
 from gateway.model.car import Ground

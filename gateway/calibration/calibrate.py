@@ -12,14 +12,16 @@ from gateway.calibration.campaign import Campaign, file_sha256
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.file.calibration_file import CalibrationFile
 from gateway.calibration.file.parts import DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
+from gateway.calibration.found import ClaimState, FoundClaim, FoundLoad, Taught
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
+from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.sister import require_alike, sister_in
-from gateway.calibration.vehicle import ClaimState, FoundClaim, FoundLoad, Taught, TaughtDrive, examined, teach
+from gateway.calibration.teach import examined, teach
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.core.vehicle import Load, Vehicle
 from gateway.errors import CalibrationImpossibleError

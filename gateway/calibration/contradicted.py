@@ -23,7 +23,7 @@ import numpy as np
 
 from gateway.calibration.as_stated import StatedRun, fitted, stated_runs
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.vehicle import Prior
+from gateway.calibration.prior import Prior
 from gateway.core.late import special
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import unsprung_kg

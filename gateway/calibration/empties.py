@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.vehicle import FoundLoad
+from gateway.calibration.found import FoundLoad
 from gateway.core.vehicle import Vehicle
 from gateway.quantity import Z95
 

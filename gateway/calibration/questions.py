@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.assigned import BIAS
-from gateway.calibration.vehicle import FoundClaim
+from gateway.calibration.found import FoundClaim
 from gateway.core.vehicle import Vehicle
 from gateway.quantity import Z95
 from gateway.stated.statement import StatementRecord, StatementSource

@@ -8,8 +8,10 @@ from support.recordings import recordings
 
 from gateway.calibration.calibrate import drive_name
 from gateway.calibration.campaign import Campaign, load_campaign
+from gateway.calibration.found import ClaimState
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.vehicle import ClaimState, TaughtDrive, examined
+from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.teach import examined
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import front_share_pct
 from gateway.offline.campaigns import split_runs

@@ -19,7 +19,7 @@ from support.taught_van import (
     weighed,
 )
 
-from gateway.calibration.vehicle import teach
+from gateway.calibration.teach import teach
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.core.vehicle import Load
 from gateway.model import car as equations

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.vehicle import TaughtDrive, teach
+from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.teach import teach
 from gateway.core.vehicle import Load, Vehicle
 from gateway.estimate import Estimate
 from gateway.model.car import Ground

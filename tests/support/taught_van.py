@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import Statement, StatementSource
-from gateway.calibration.vehicle import TaughtDrive, teach
+from gateway.calibration.teach import teach
 from gateway.core.cargo import known_shape
 from gateway.core.vehicle import Load, Vehicle
 from gateway.estimate import Estimate

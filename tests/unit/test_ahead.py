@@ -9,8 +9,9 @@ from support.half_car_road import VAN, batch_over_road
 
 from gateway.calibration.ahead import CANDIDATES, Ahead, next_steps, steady_drive
 from gateway.calibration.known_run import KnownRun
+from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import NOTHING_KNOWN, Statement, StatementSource
-from gateway.calibration.vehicle import TaughtDrive, teach
+from gateway.calibration.teach import teach
 from gateway.core.vehicle import Load
 from gateway.model.vehicle import VehicleModel
 from gateway.model.whittle import Point, Whittle

@@ -12,7 +12,8 @@ from gateway.calibration.calibrate import drive_name
 from gateway.calibration.judgement.assessment import BatchSet, Judgement
 from gateway.calibration.judgement.evaluation import CgLeftErrors, Errors, ErrorTable, Judged, TargetErrors, WheelErrors
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.vehicle import TaughtDrive, teach
+from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.teach import teach
 from gateway.core.ratio_index.index import Band
 from gateway.core.spectrum import spectra_of
 from gateway.estimate import Quantity

@@ -8,8 +8,11 @@ from support.calibrated import calibration_file
 from support.half_car_road import VAN, taught_by
 from support.known_runs import SIBLING, calibrated_on_loads, known_run
 
+from gateway.calibration.fit_of_drives import SPRINGS_FROM_PRIORS
+from gateway.calibration.prior import Prior
+from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.sister import require_alike, sister_in
-from gateway.calibration.vehicle import SPRINGS_FROM_PRIORS, Prior, TaughtDrive, teach
+from gateway.calibration.teach import teach
 from gateway.errors import NoSisterError
 from gateway.model.table import INDEX, UPRIGHT
 from gateway.model.vehicle import VehicleModel

@@ -12,8 +12,9 @@ from support.model_road import times
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.answers import doubts_of
+from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import Statement
-from gateway.calibration.vehicle import TaughtDrive, teach
+from gateway.calibration.teach import teach
 from gateway.core.vehicle import Vehicle
 from gateway.model.vehicle import VehicleModel
 from gateway.stated.doubt import Doubt, DoubtKind, meant_by

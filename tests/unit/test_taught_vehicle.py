@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from support.half_car_road import KNOWN, VAN, batch_over_road
 
+from gateway.calibration.found import Taught
+from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import NOTHING_KNOWN, Statement, StatementSource, empty, load_prior_of
-from gateway.calibration.vehicle import Taught, TaughtDrive, teach
+from gateway.calibration.teach import teach
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimate import Estimate

@@ -5,8 +5,8 @@ from typing import Self
 
 from pydantic import Field
 
+from gateway.calibration.found import FoundLoad
 from gateway.calibration.statements import Statement
-from gateway.calibration.vehicle import FoundLoad
 from gateway.stated.facts import Part
 
 

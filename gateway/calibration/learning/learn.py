@@ -14,6 +14,7 @@ from gateway.calibration.calibrate import OnFit, Outcome, calibrate_inspected, d
 from gateway.calibration.campaign import Campaign, DraftTable
 from gateway.calibration.empties import looking_empty
 from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.found import FoundClaim, FoundLoad
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.log import LogFacts, SplitRun
@@ -22,7 +23,6 @@ from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.drives import Driven, chosen
 from gateway.calibration.statements import Statement
-from gateway.calibration.vehicle import FoundClaim, FoundLoad
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.errors import CalibrationImpossibleError

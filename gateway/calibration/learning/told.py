@@ -6,12 +6,12 @@ from typing import Any
 
 from gateway.calibration.ahead import Step
 from gateway.calibration.assigned import Assigned
+from gateway.calibration.found import ClaimState
 from gateway.calibration.judgement.advice import WORTH_SAYING, Verdict
 from gateway.calibration.learning.learn import Learnt
 from gateway.calibration.learning.spans import STATES
 from gateway.calibration.questions import common_errors, question
 from gateway.calibration.statements import Statement
-from gateway.calibration.vehicle import ClaimState
 from gateway.quantity import Z95
 from gateway.records import iso_utc, rounded
 from gateway.stated.statement import StatementRecord

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.calibrate import drive_name
+from gateway.calibration.found import Taught
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.vehicle import Taught
 from gateway.core.spectrum import spectra_of
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model.displayed import Fitted, modelled_spectra
