@@ -81,7 +81,7 @@ def recorded(vehicle: Vehicle, folder: Path) -> list[Path]:
     """The service's own recording of what it heard, a log for each drive."""
     lines = vehicle.run(f"cat {STATE}/record/*.log").splitlines(keepends=True)
     stamps = [stamp_of(line) for line in lines]
-    bounds = [0, *(i for i in range(1, len(lines)) if stamps[i] - stamps[i - 1] > STANDS_S / 2), len(lines)]
+    bounds = [0, *(i for i in range(1, len(lines)) if stamps[i] - stamps[i - 1] > 0.9 * STANDS_S), len(lines)]
     logs = []
     for number, (begin, end) in enumerate(pairwise(bounds), 1):
         logs.append(folder / f"drive-{number}.log")
