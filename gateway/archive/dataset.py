@@ -53,7 +53,7 @@ PROVENANCE: Final[Mapping[str, str]] = {
     "log": "the log in which the batch ended: its path in the archive",
     "log_sha256": "hash of that file as stored",
     "signals_id": "hash of the signal map, its databases resolved",
-    "software": "the version of springscale and the hash of the code that weighs",
+    "software": "the version of springscale and the hash of its code",
     "job": "hash of all inputs of the row; also the name of its file and receipt",
 }
 """Columns that no estimate has; `calibration_id` is among the estimate's own."""
