@@ -53,7 +53,7 @@ PROVENANCE: Final[Mapping[str, str]] = {
     "log": "the log in which the batch ended: its path in the archive",
     "log_sha256": "hash of that file as stored",
     "signals_id": "hash of the signal map, its databases resolved",
-    "software": "the version of springscale and the hash of the code that weighs",
+    "software": "the version of springscale and the hash of its code",
     "job": "hash of all inputs of the row; also the name of its file and receipt",
 }
 """Columns that no estimate has; `calibration_id` is among the estimate's own."""
@@ -83,7 +83,8 @@ def row_of(record: Mapping[str, Any]) -> dict[str, Any]:
     row: dict[str, Any] = {}
     for one in FIELDS:
         if one.name not in _LEFT_OUT:
-            row |= _cells_of(one, record.get(one.name))
+            names, told = _columns_of(one), record.get(one.name)
+            row |= dict.fromkeys(names) if told is None else dict(zip(names, _cells(one, told), strict=True))
     return row
 
 
@@ -126,17 +127,18 @@ def _columns_of(one: EstimateField) -> dict[str, str]:
         return dict.fromkeys(OWN_STD, "number")
     if one.kind is WEIGHTS:
         return dict.fromkeys(one.columns, "number") | {OVER_LIMIT: "texts"}
-    return dict.fromkeys(one.columns or (one.name,), _kind_name(one.kind))
+    kind = next((name for of, name in _KINDS if one.kind is of), "number")
+    return dict.fromkeys(one.columns or (one.name,), kind)
 
 
-def _kind_name(kind: FieldKind) -> str:
-    named = ((TEXT, "text"), (WHOLE, "whole"), (COUNT, "whole"), (INSTANT, "instant"), (REASONS, "texts"))
-    return next((name for of, name in named if kind is of), "numbers by name" if kind is NUMBERS_BY_NAME else "number")
-
-
-def _cells_of(one: EstimateField, told: Any) -> dict[str, Any]:
-    names = _columns_of(one)
-    return dict.fromkeys(names) if told is None else dict(zip(names, _cells(one, told), strict=True))
+_KINDS: Final = (
+    (TEXT, "text"),
+    (WHOLE, "whole"),
+    (COUNT, "whole"),
+    (INSTANT, "instant"),
+    (REASONS, "texts"),
+    (NUMBERS_BY_NAME, "numbers by name"),
+)
 
 
 def _cells(one: EstimateField, told: Any) -> Sequence[Any]:

@@ -69,7 +69,11 @@ class Inventory:
         """
         copies = self.copies()
         pairs = list(zip(self.manifest.assignments, self.logs, strict=True))
-        in_part = {assignment.vehicle for assignment, group in pairs if not self._is_known(assignment, group)}
+        in_part = {
+            assignment.vehicle
+            for assignment, group in pairs
+            if str(assignment.logs) in self.lost or any(log.key not in self.facts[assignment.vehicle] for log in group)
+        }
         found: list[ArchiveJob] = []
         for assignment, group in pairs:
             if assignment.vehicle not in in_part:
@@ -77,10 +81,6 @@ class Inventory:
                 own = [log for log in group if log.name not in copies]
                 found += plan(self.dataset, assignment, own, facts, self.manifest.settings)
         return sorted(found, key=lambda job: (-job.size, job.slot))
-
-    def _is_known(self, assignment: Assignment, group: list[LogFile]) -> bool:
-        facts = self.facts[assignment.vehicle]
-        return str(assignment.logs) not in self.lost and all(log.key in facts for log in group)
 
 
 def look(manifest: Manifest, dataset: Location) -> Inventory:

@@ -4,7 +4,6 @@ If a log continues the one before it, the drive continues with its window and lo
 pipeline at the end of the logs before it (``lead_in``), and may leave a window open for the next job.
 """
 
-import ast
 import functools
 import hashlib
 import json
@@ -37,42 +36,12 @@ def software() -> str:
 
 
 def code_id(package: Path = PACKAGE) -> str:
-    """Hash of every module of the package that a job imports, directly or not, as installed."""
+    """Hash of every module of the package, as installed."""
     digest = hashlib.sha256()
-    for path in sorted(_imported(package, "archive.run")):
+    for path in sorted(package.rglob("*.py")):
         digest.update(f"{path.relative_to(package).as_posix()}\0".encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
-
-
-def _imported(package: Path, *names: str) -> set[Path]:
-    """The files of these modules, of the packages they are in, and of all that they import of this package.
-
-    Read from the source, because what is loaded in a process depends on what it did before.
-    """
-    found: set[Path] = set()
-    waiting = list(names)
-    while waiting:
-        parts = waiting.pop().split(".")
-        for n in range(len(parts) + 1):  # to import a.b.c runs those of a and a.b too
-            path = package.joinpath(*parts[:n])
-            path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-            if path.is_file() and path not in found:
-                found.add(path)
-                waiting += _names_imported(path, package.name)
-    return found
-
-
-def _names_imported(path: Path, package: str) -> Iterator[str]:
-    """The modules of this package that a file imports, inside functions too; `from a import b` may mean a module b."""
-    for node in ast.walk(ast.parse(path.read_bytes())):
-        if isinstance(node, ast.Import):
-            names = [one.name for one in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            names = [f"{node.module}.{one.name}" for one in node.names]
-        else:
-            continue
-        yield from (name.removeprefix(f"{package}.") for name in names if name.startswith(f"{package}."))
 
 
 LEAD_IN_NS: Final = 25 * 3600 * NS_PER_S

@@ -59,7 +59,11 @@ class JobOutcome:
 def run(job: ArchiveJob) -> JobOutcome:
     """Run a job unless it is done. Raises PlaceError if logs or data set cannot be reached now."""
     keep_freed_memory()
-    _require_same_software(job)
+    if job.inputs["software"] != software():
+        raise ConfigurationError(
+            f"{platform.node()}: runs {software()}, the job is for {job.inputs['software']}: "
+            "install the same springscale on every computer of the cluster"
+        )
     if _is_done(job):
         return JobOutcome(job.slot, JobStatus.ALREADY, job.size)
     begun_s = time.monotonic()
@@ -108,14 +112,6 @@ def fail(job: ArchiveJob, reason: str) -> JobOutcome:
     """Record in the data set that a job failed, and why."""
     _keep_failure(job, None, reason)
     return JobOutcome(job.slot, JobStatus.FAILED, job.size, failures=(reason,))
-
-
-def _require_same_software(job: ArchiveJob) -> None:
-    if job.inputs["software"] != software():
-        raise ConfigurationError(
-            f"{platform.node()}: runs {software()}, the job is for {job.inputs['software']}: "
-            "install the same springscale on every computer of the cluster"
-        )
 
 
 def _is_done(job: ArchiveJob) -> bool:

@@ -19,5 +19,4 @@ class Late:
 
 
 special: Final = Late("scipy.special")
-linalg: Final = Late("scipy.linalg")
 stats: Final = Late("scipy.stats")

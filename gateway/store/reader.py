@@ -183,10 +183,7 @@ class StoreReader:
     def _explained(self, error: sqlite3.Error) -> Exception:
         if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
             return TimeoutError(f"the question took longer than {self._limit_s:g} s: ask for less at a time")
-        if is_damaged(error):
-            self._store.suspect_damage()
-        else:
-            self._store.suspect_loss()
+        self._store.suspect_file(is_damaged=is_damaged(error))
         return StoreError(f"{self._store.path} cannot be read: {error}")
 
 

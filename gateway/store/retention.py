@@ -54,7 +54,10 @@ def remove_old(connection: sqlite3.Connection, kept: Retention, now_ns: int) -> 
         "SELECT seq FROM journal WHERE received_ns >= ? ORDER BY seq LIMIT 1", (cut_ns,)
     ).fetchone()
     seq = _LAST if first_kept is None else first_kept[0]
-    last = _last_delivered(connection, kept.undelivered_to)
+    delivered = [
+        connection.execute("SELECT seq FROM uplinks WHERE name = ?", (name,)).fetchone() for name in kept.undelivered_to
+    ]
+    last = min((-1 if row is None else int(row[0]) for row in delivered), default=_LAST)  # by every uplink
     condition = f"journal.seq < ? AND received_ns >= {CLOCK_UNSET_NS} AND (journal.seq <= ? OR kind = '{SERVICE}')"
     return _remove(connection, condition, (seq, last))
 
@@ -75,12 +78,6 @@ def _remove(connection: sqlite3.Connection, condition: str, asked: tuple[int, ..
     return connection.execute(f"DELETE FROM journal WHERE {condition}", asked).rowcount
 
 
-def _last_delivered(connection: sqlite3.Connection, uplinks: tuple[str, ...]) -> int:
-    """Number of the last record that every uplink has delivered."""
-    known = (connection.execute("SELECT seq FROM uplinks WHERE name = ?", (name,)).fetchone() for name in uplinks)
-    return min((-1 if row is None else int(row[0]) for row in known), default=_LAST)
-
-
 CLOCK_UNSET_NS: Final = 1_577_836_800 * NS_PER_S  # chosen: 2020; an earlier clock was never set (no RTC battery)
 LEAP_NS: Final = 30 * NS_PER_DAY  # chosen: further ahead the wall clock is doubted
 BELIEVED_AFTER_NS: Final = 30 * NS_PER_DAY  # chosen: time without another leap after which it is believed again
@@ -95,10 +92,12 @@ class AgeClock:
     """Decides for one open database whether the wall clock is plausible; the table ``clock`` stores the distrust."""
 
     def __init__(self, connection: sqlite3.Connection) -> None:
-        """Reads the newest stamp; create the clock before any row is added."""
+        """Reads the newest stamp by a clock that was set; create the clock before any row is added."""
         self._connection = connection
         self._read_ns = boot_ns()
-        self._newest_ns = _newest_stamp_ns(connection)
+        sql = "SELECT received_ns FROM journal WHERE received_ns >= ? ORDER BY seq DESC LIMIT 1"
+        newest = connection.execute(sql, (CLOCK_UNSET_NS,)).fetchone()
+        self._newest_ns: int | None = None if newest is None else newest[0]
         found = connection.execute("SELECT doubted_since_ns FROM clock").fetchone()
         self._doubted_since_ns: int | None = None if found is None else found[0]
 
@@ -124,10 +123,3 @@ class AgeClock:
     def _keep(self, since_ns: int | None) -> None:
         self._connection.execute("INSERT OR REPLACE INTO clock (one, doubted_since_ns) VALUES (1, ?)", (since_ns,))
         self._doubted_since_ns = since_ns
-
-
-def _newest_stamp_ns(connection: sqlite3.Connection) -> int | None:
-    """Time of receipt of the newest record that was received while the clock was set."""
-    sql = "SELECT received_ns FROM journal WHERE received_ns >= ? ORDER BY seq DESC LIMIT 1"
-    found = connection.execute(sql, (CLOCK_UNSET_NS,)).fetchone()
-    return None if found is None else int(found[0])

@@ -176,14 +176,9 @@ class Store(ServicePart):
         """Identifier of the machine's boot, and the nanoseconds since then, including sleep."""
         return self._boot_id, boot_ns()
 
-    def suspect_damage(self) -> None:
-        """A reader found the file damaged."""
-        self._suspect.set()
-        self._buffer.wake()
-
-    def suspect_loss(self) -> None:
-        """A reader could not use the file: the next attempt checks whether it is still the same file, and whole."""
-        self._lost.set()
+    def suspect_file(self, *, is_damaged: bool) -> None:
+        """A reader found the file damaged, or could not use it: the next attempt checks it."""
+        (self._suspect if is_damaged else self._lost).set()
         self._buffer.wake()
 
     def suspect_records(self, seqs: Sequence[int]) -> None:

@@ -191,7 +191,7 @@ def test_a_database_that_lacks_a_table_is_set_aside(table: str, when: str, tmp_p
             store.write_estimate(make_record(0))
             assert store.flush(PATIENCE_S)
             drop()
-            store.suspect_loss()
+            store.suspect_file(is_damaged=False)
         store.write_estimate(make_record(1))
         assert wait_until(lambda: store.flush(0.0) and store.health().state is StoreState.OK)
         assert store.health().set_aside is not None

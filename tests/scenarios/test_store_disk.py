@@ -65,17 +65,15 @@ def test_a_directory_that_cannot_be_made_is_waited_for(tmp_path: Path) -> None:
 
 
 def test_held_records_are_stored_after_those_of_an_earlier_run(tmp_path: Path) -> None:
-    earlier = Store.open(tmp_path / "volume")
+    earlier = Store.open(tmp_path / "volume" / "springscale")
     earlier.write_estimate(make_record(0))
     assert earlier.close() == 0
 
     directory = blocked_directory(tmp_path)
     store = Store.open(directory)
     cursor = store.write_estimate(make_record(1))
-    (tmp_path / "mount").unlink()
-    (tmp_path / "volume").rename(tmp_path / "arrived")
-    directory.parent.mkdir()
-    (tmp_path / "arrived").rename(directory)
+    directory.parent.unlink()
+    (tmp_path / "volume").rename(directory.parent)  # in one step: the store looks at any moment
     assert store.flush(PATIENCE_S)
     assert store.reader().estimates().items == texts(make_record(0), make_record(1))
     # the cursor was of the memory alone: rather all again than a row missed

@@ -33,11 +33,12 @@ class Page:
 def document(page: Page) -> str:
     """The complete document; it loads nothing from other hosts."""
     anchor, words = page.skip_to
+    style = files("gateway.reports").joinpath("assets", "report.css").read_text(encoding="utf-8")
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         '<meta name="color-scheme" content="light dark">'
-        f"<title>{escape(page.title)}</title><style>{_asset('report.css')}</style></head><body>"
+        f"<title>{escape(page.title)}</title><style>{style}</style></head><body>"
         f'<a class="skip" href="#{anchor}">{escape(words)}</a>'
         f"<header><h1>{escape(page.title)}</h1>{page.header}</header>"
         f"<main>{page.main}</main></body></html>\n"
@@ -93,10 +94,6 @@ def sections_html(sections: Sequence[Section]) -> str:
 def prose(text: str) -> str:
     """Escape text, with a non-breaking space between a number and its unit."""
     return re.sub(r"(?<=\d) (?=(?:%|kg|pp|Hz|m|km/h|m/s²)(?:\W|$))", "\u00a0", escape(text)).replace("± ", "±\u00a0")
-
-
-def _asset(name: str) -> str:
-    return files("gateway.reports").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 def section_html(section: Section) -> str:

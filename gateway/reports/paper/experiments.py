@@ -67,10 +67,6 @@ class DrivenCampaign:
     def runs(self) -> list[KnownRun]:
         return [*self.identification, *self.validation]
 
-    def run_named(self, part: str) -> KnownRun:
-        """The first run whose log's name contains ``part``."""
-        return next(run for run in self.runs if part in run.name)
-
 
 @dataclass(frozen=True, slots=True)
 class Method:
@@ -95,22 +91,17 @@ class Experiments:
 
     @property
     def ratio_index(self) -> RatioIndexCalibration:
-        """The ratio index calibrated on the simulated grid."""
-        return ratio_index_of(self.simulated[0])
+        """The ratio index calibrated on the simulated grid. Raises ValueError if there is none."""
+        method = self.simulated[0]
+        if method.calibrated.ratio_index is None:
+            raise ValueError(f"{method.label}: holds no ratio index")
+        return method.calibrated.ratio_index
 
     def errors(self, kind: str, split: str, method: Method) -> Errors:
         """The errors (12) of one method over one split of a campaign."""
         driven = self.driven[kind]
         runs = driven.identification if split == "identification" else driven.validation
         return errors_of(method.judge(runs), driven.campaign.vehicle)
-
-
-def ratio_index_of(method: Method) -> RatioIndexCalibration:
-    """The method's ratio index calibration, which every campaign here has."""
-    calibration = method.calibrated.ratio_index
-    if calibration is None:
-        raise ValueError(f"{method.label}: holds no ratio index")
-    return calibration
 
 
 def gather(output: Path, extent: Extent, on_step: OnStep = lambda what, done, of: None) -> Experiments:

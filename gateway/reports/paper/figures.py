@@ -134,7 +134,7 @@ def figure_8_9(experiments: Experiments) -> Figure:
     """Spectra for two roughnesses; the road's low-pass (1) at several speeds, with and without the wheelbase filter."""
     figure, (left, right) = panels(1, 2)
     for iri in ("iri2", "iri8"):
-        run = experiments.driven["sensitivity"].run_named(iri)
+        run = next(run for run in experiments.driven["sensitivity"].runs if iri in run.name)
         left.plot(*spectrum_of(run, ACCELERATION), label=f"IRI {iri[3:]}", linewidth=1.0)
     _label(left, "frequency [Hz]", f"{NAME[ACCELERATION]} [{UNIT[ACCELERATION]}]")
     freq_hz = np.linspace(0.05, 10.0, 800)
