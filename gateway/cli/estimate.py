@@ -77,7 +77,8 @@ def estimate(
         click.echo(line)
     is_for_spectra = as_json and setup.calibration is None
     if not reasons.pop(None, 0) and not is_for_spectra:
-        is_unlike = 2 * unlike.total() > reasons.total()
+        # where the model fits, and only the load lies beyond those that taught, it is this vehicle
+        is_unlike = 2 * unlike.total() > reasons.total() and unlike.keys() != {Why.OUT_OF_RANGE}
         other = [_other_vehicle(setup.calibration.vehicle)] if setup.calibration is not None and is_unlike else []
         raise NothingWeighedError("\n".join([_in_words(reasons, refused), *other]))
 

@@ -59,6 +59,14 @@ def test_another_vehicles_calibration_is_named_as_the_likely_cause(monkeypatch: 
     assert likely in str(fault)
 
 
+def test_loads_beyond_those_that_taught_are_no_sign_of_another_vehicle(
+    monkeypatch: pytest.MonkeyPatch, log: Path
+) -> None:
+    fault = said(monkeypatch, log, *(make_estimate(n, Why.OUT_OF_RANGE) for n in range(3)))
+    assert "out_of_range (3 batches)" in str(fault)
+    assert "The likely cause" not in str(fault)
+
+
 def test_without_a_calibration_the_advice_is_how_to_get_one(monkeypatch: pytest.MonkeyPatch, log: Path) -> None:
     """Seven refusals were printed and the command ended with 0; --json gives the spectra, and ends with 0."""
 
