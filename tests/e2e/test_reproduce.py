@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.errors import ConfigurationError
 from gateway.reports.paper.experiments import CAMPAIGNS, Extent
 from gateway.reports.paper.reproduce import PAPER_PCT, PLATES, accuracy_page, reproduce

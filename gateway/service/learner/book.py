@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 
 from pydantic import Field
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.calibration.learning.spans import standing
 from gateway.errors import NOT_STORED, CalibrationFileError, RefusedError
 from gateway.files.kept import KeptFiles
