@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import GenerateJsonSchema
 
 from gateway.archive.dataset import DIAGNOSTICS
-from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file import CalibrationFile
 from gateway.config import Settings
 from gateway.estimate import Lack
 from gateway.estimate_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, SPECTRA, WEIGHTS, EstimateField

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+    from gateway.calibration.file import CalibrationFile, load_calibration
     from gateway.core.settings import BatchSettings
     from gateway.core.weights.limits import Limits
     from gateway.errors import SpringscaleError
@@ -37,7 +37,7 @@ __all__ = (
 
 _HOMES = {
     "BatchSettings": "gateway.core.settings",
-    "CalibrationFile": "gateway.calibration.file.calibration_file",
+    "CalibrationFile": "gateway.calibration.file",
     "Estimate": "gateway.estimate",
     "Limits": "gateway.core.weights.limits",
     "Quantity": "gateway.estimate",
@@ -48,7 +48,7 @@ _HOMES = {
     "estimate_arrays": "gateway.offline.estimates",
     "estimate_to_json": "gateway.estimate_json",
     "estimates_of_logs": "gateway.offline.estimates",
-    "load_calibration": "gateway.calibration.file.calibration_file",
+    "load_calibration": "gateway.calibration.file",
     "load_setup": "gateway.setup",
     "table_row": "gateway.estimate_json",
 }

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gateway.bus.signals import SignalMap, load_signal_map
-from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.config import Settings
 from gateway.core.settings import BatchSettings
 from gateway.core.weights.limits import Limits

@@ -10,8 +10,7 @@ import numpy as np
 
 from gateway.calibration.campaign import Campaign, file_sha256
 from gateway.calibration.contradicted import contradictions
-from gateway.calibration.file.calibration_file import CalibrationFile
-from gateway.calibration.file.parts import DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
+from gateway.calibration.file import CalibrationFile, DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
 from gateway.calibration.found import ClaimState, FoundClaim, FoundLoad, Taught
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
@@ -281,9 +280,21 @@ def _provenance(campaign_sha256: str, split: Sequence[SplitRun], taught: Taught 
                 t_end=iso_utc(one.log.span_ns[1]) if one.log.span_ns else None,
                 n_batches=len([batch for batch in run.batches if not batch.rejected]),
                 statement=run.statement,
-                found=FoundPart.of(found[run.number]) if run.number in found else None,
+                found=_found_part(found[run.number]) if run.number in found else None,
             )
             for one in split
             if (run := one.identification)
         ),
+    )
+
+
+def _found_part(found: FoundLoad) -> FoundPart:
+    is_stated = math.isfinite(found.without_kg)
+    return FoundPart(
+        payload_kg=found.load.payload_kg,
+        payload_std_kg=found.payload_std_kg,
+        front_share_pct=found.load.front_share_pct,
+        without_statement_kg=found.without_kg if is_stated else None,
+        without_statement_std_kg=found.without_std_kg if is_stated else None,
+        is_held=found.is_held,
     )

@@ -5,7 +5,7 @@ By how much vehicles of one model differ is a column of the table of parameters 
 
 from typing import Final
 
-from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file import CalibrationFile
 from gateway.core.vehicle import Vehicle
 from gateway.errors import NoSisterError
 from gateway.model.vehicle import VehicleModel

@@ -9,7 +9,7 @@ import click
 
 from gateway.calibration.calibrate import Outcome, calibrate_inspected, with_statements_tested
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
 from gateway.calibration.inspection.log import SplitRun

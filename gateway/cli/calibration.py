@@ -9,8 +9,7 @@ import click
 import numpy as np
 
 from gateway.calibration.axle_weights import UNSPRUNG_SHARE, AxleWeights, Sprung, sprung_of
-from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
-from gateway.calibration.file.parts import ExpectedErrorsPart
+from gateway.calibration.file import CalibrationFile, ExpectedErrorsPart, load_calibration
 from gateway.cli.options import FILE, NumberRange, Told, prints
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.model.table import LOG, ROWS

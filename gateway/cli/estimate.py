@@ -13,7 +13,7 @@ from typing import Any, Final
 import click
 
 from gateway.bus.logs import LogReport
-from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file import CalibrationFile
 from gateway.cli import options
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
 from gateway.config import load_settings

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.calibration.judgement.advice import verdicts_of
 from gateway.calibration.judgement.assessment import Assessment, BatchSet, assess_evaluation
 from gateway.calibration.judgement.evaluation import Errors, ErrorTable, Judged, TargetErrors, error_table

@@ -10,7 +10,7 @@ import click
 from gateway.bus.signals import load_signal_map
 from gateway.calibration.assigned import Assigned, moments
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.calibration.judgement.advice import Verdict
 from gateway.calibration.learning.learn import Learnt, matched
 from gateway.calibration.learning.learn import learn as learnt_from

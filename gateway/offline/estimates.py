@@ -10,7 +10,7 @@ import numpy as np
 from gateway.bus.logs import LogReport, motion_of_log
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import SignalMap
-from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file import CalibrationFile
 from gateway.core.change import Rules
 from gateway.core.events.entry import Entry
 from gateway.core.events.ledger import Ledger

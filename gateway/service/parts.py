@@ -7,7 +7,7 @@ from pathlib import Path
 
 from gateway.bus.live.source import LiveSource, OpenReceiver
 from gateway.bus.ring_log import RingLog
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.config import BusSection, Settings, StoreSection
 from gateway.errors import CalibrationFileError
 from gateway.estimate_json import read_estimate

@@ -11,7 +11,7 @@ import pytest
 from support.half_car_road import batch_over_road
 from support.web import Client, Gateway
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.core.spectrum import spectra_of
 from gateway.estimate import Estimate, Quantity
 from gateway.estimate_json import spectra_from_json

@@ -10,7 +10,7 @@ import pytest
 from support.learner import ANSWERS, LearnerBench, at, found
 from support.web import Client, Gateway
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.stated.learning import SisterTold
 from gateway.web.access.tokens import Scope, TokenFile
 

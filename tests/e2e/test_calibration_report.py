@@ -11,7 +11,7 @@ from support.commands import run
 from support.html_page import Page, assert_self_contained, assert_well_formed
 from support.known_load_logs import write_known_loads
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.calibration.judgement.advice import GRADE_TEXT
 from gateway.cli import main
 from gateway.words import decimal, percent

@@ -9,7 +9,7 @@ import pytest
 from support.commands import called, printed
 from support.known_load_logs import write_known_loads
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.calibration.judgement.advice import Grade
 from gateway.calibration.statements_csv import StatementsFileError
 from gateway.quantity import Z95

@@ -19,7 +19,7 @@ from support.ports import first_answer, free_port
 from support.process import running_service
 from support.running_service import Running, serve
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.records import iso_utc
 from gateway.service.learner import learner
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.html_page import Page
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.errors import ConfigurationError
 from gateway.reports.paper.experiments import CAMPAIGNS, Extent
 from gateway.reports.paper.reproduce import PAPER_PCT, PLATES, reproduce, rows_of

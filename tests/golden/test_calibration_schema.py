@@ -11,7 +11,7 @@ import pytest
 from reference import DIALECT
 from support.calibrated import calibration_file
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 
 ROOT = Path(__file__).parents[2]
 PUBLISHED = (ROOT / "docs" / "calibration.schema.json").read_text(encoding="utf-8")

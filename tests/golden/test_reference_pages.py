@@ -16,7 +16,7 @@ from gateway.archive.manifest import ManifestFile, VehicleEntry
 from gateway.bus.signals import SignalMapFile, load_signal_map
 from gateway.bus.signals.signal_map import SignalEntry, shipped_maps
 from gateway.calibration.campaign import CampaignTable, RunTable, load_campaign
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.core.vehicle import Vehicle
 from gateway.estimate import Estimate
 from gateway.estimate_json import FIELDS

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from support.odd_content import N_TRIALS, tried
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.errors import CalibrationFileError
 
 GOOD = json.loads((Path(__file__).parents[2] / "gateway" / "demo" / "paper_van.json").read_text())

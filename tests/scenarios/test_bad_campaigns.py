@@ -14,7 +14,7 @@ from support.commands import called
 from gateway.bus.frames import message_of
 from gateway.bus.logs import open_whole_log
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.errors import CalibrationImpossibleError
 from gateway.workbench.simulate import bench_of, write_campaign
 

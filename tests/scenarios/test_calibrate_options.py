@@ -16,7 +16,7 @@ from support.known_load_logs import SIGNALS, write_known_loads
 
 from gateway.calibration.calibrate import calibrate_inspected
 from gateway.calibration.campaign import load_campaign
-from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.ratio_index.index import PAPER_BANDS

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file import CalibrationFile
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 

@@ -7,7 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.core.fusion import epoch_of
 from gateway.core.spectrum import spectra_of
 from gateway.estimate import Estimate

@@ -9,7 +9,7 @@ from support.calibrated import calibration_file
 from support.paper_van import paper_van
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.file.parts import FoundPart
+from gateway.calibration.file import FoundPart
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.judgement.advice import Grade, Verdict, verdicts_of

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.calibrated import calibration_file
 
-from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.cli.calibration import calibration as calibration_commands
 from gateway.cli.calibration import figures_of
 from gateway.core.ratio_index.regression import term_columns

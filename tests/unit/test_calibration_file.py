@@ -11,7 +11,7 @@ import pytest
 from support.calibrated import calibration_file
 
 import gateway
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.errors import CalibrationFileError
 
 SHIPPED = Path(gateway.__file__).parent / "demo" / "paper_van.json"

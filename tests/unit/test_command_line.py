@@ -112,7 +112,7 @@ def python(code: str) -> str:
         ("gateway", ("gateway.", "numpy")),  # the Python API
         ("gateway.service.gateway", HEAVY),
         ("gateway.cli, gateway.bus.logs", ("asammdf",)),  # python-can takes it, and pandas: two seconds of every start
-        ("gateway.calibration.file.calibration_file", FITTING),  # these take the others
+        ("gateway.calibration.file", FITTING),  # these take the others
     ],
 )
 def test_nothing_is_imported_that_is_not_needed(modules: str, unneeded: tuple[str, ...]) -> None:

@@ -11,7 +11,7 @@ from support.known_runs import campaign as known_campaign
 
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, DraftTable
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Kind, RunVerdict
 from gateway.calibration.inspection.log import SplitRun

@@ -15,7 +15,7 @@ from support.known_load_logs import van_toml
 from vm.harness.drives import driven_with, log_of
 from vm.harness.vehicle import SETTINGS, STATE, Answer, Vehicle
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.records import Frames
 from gateway.sim.vehicle import Load
 

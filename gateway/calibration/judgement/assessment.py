@@ -6,7 +6,7 @@ from enum import StrEnum
 
 from gateway.budget import BudgetLine, typical_budget
 from gateway.calibration.calibrate import Outcome, drive_name
-from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file import CalibrationFile
 from gateway.calibration.judgement.evaluation import ErrorTable, Judged, Target, error_table, judge
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.vehicle import Vehicle

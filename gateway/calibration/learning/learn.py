@@ -13,7 +13,7 @@ from gateway.calibration.assigned import Assigned, assign
 from gateway.calibration.calibrate import OnFit, Outcome, calibrate_inspected, drive_name
 from gateway.calibration.campaign import Campaign, DraftTable
 from gateway.calibration.empties import looking_empty
-from gateway.calibration.file.calibration_file import CalibrationFile
+from gateway.calibration.file import CalibrationFile
 from gateway.calibration.found import FoundClaim, FoundLoad
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity

@@ -17,7 +17,7 @@ import numpy as np
 
 from gateway.calibration.assigned import moments
 from gateway.calibration.calibrate import drive_name
-from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.judgement.advice import verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
 from gateway.calibration.kept.batch_file import KeptBatch, unpacked

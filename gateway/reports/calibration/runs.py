@@ -1,7 +1,7 @@
 """The runs and their findings, and the provenance of every number."""
 
 from gateway.calibration.calibrate import Outcome
-from gateway.calibration.file.parts import DrivePart
+from gateway.calibration.file import DrivePart
 from gateway.calibration.inspection.finding import Finding, RunVerdict
 from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.judgement.assessment import Assessment

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 
 from pydantic import Field
 
-from gateway.calibration.file.calibration_file import CalibrationFile, load_calibration
+from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.learning.spans import standing
 from gateway.core.vehicle import Vehicle
 from gateway.errors import NOT_STORED, CalibrationFileError, RefusedError

@@ -4,7 +4,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from gateway.calibration.file.calibration_file import load_calibration
+from gateway.calibration.file import load_calibration
 from gateway.calibration.learning.answers import doubts_of, vehicle_table
 from gateway.calibration.sister import require_alike, sister_in
 from gateway.core.vehicle import Vehicle
