@@ -112,7 +112,7 @@ def test_changed_settings_content_or_neighbours_change_the_job(van: Assignment) 
     assert len({job.slot.job for job in jobs}) == len(jobs)
 
 
-@pytest.mark.parametrize("module", ["posterior", "calibration/file/calibration_file"])
+@pytest.mark.parametrize("module", ["posterior", "calibration/file"])
 def test_a_changed_module_changes_the_software_id(tmp_path: Path, module: str) -> None:
     assert software().endswith(f" code {code_id()}")
     copy = tmp_path / "gateway"
