@@ -410,8 +410,11 @@ def _datetime(cell: str, order: str | None) -> tuple[datetime, bool]:
     found = _DATE.fullmatch(cell)
     if found is None:
         is_serial = re.fullmatch(r"\d{4,}([.,]\d+)?", cell)
-        why = "a bare number: format the column as date and time" if is_serial else "no time"
-        raise _CellError(f"{cell}: {why}; write it as 2026-11-26 07:40")
+        raise _CellError(
+            f"{cell}: a bare number: format the column as date and time; write it as 2026-11-26 07:40"
+            if is_serial
+            else f"{cell}: no time; write it as 2026-11-26 07:40"
+        )
     a, b, c = (int(found[name]) for name in "abc")
     if len(found["a"]) == 4:
         year, month, day = a, b, c
@@ -437,8 +440,11 @@ def _require_one_moment(when: datetime, cell: str) -> None:
     if when.utcoffset() == when.replace(fold=1).utcoffset():
         return
     is_skipped = when.astimezone(UTC).astimezone(when.tzinfo).replace(tzinfo=None) != when.replace(tzinfo=None)
-    happens = "does not exist" if is_skipped else "occurs twice"
-    raise _CellError(f"{cell}: {happens} when clocks change: write it with its offset, such as 2026-10-25T02:30+01:00")
+    raise _CellError(
+        f"{cell}: does not exist when clocks change: write it with its offset, such as 2026-10-25T02:30+01:00"
+        if is_skipped
+        else f"{cell}: occurs twice when clocks change: write it with its offset, such as 2026-10-25T02:30+01:00"
+    )
 
 
 def _sentences(number: int, fault: ValidationError) -> tuple[str, ...]:

@@ -369,12 +369,12 @@ class Learner(ThreadPart):
         for one in told:
             if one.question and one.state in ("held", "weak"):
                 kind = "held" if one.state == "held" else "weak"
-                named = one.ref or f"the statement from {one.from_:%Y-%m-%d %H:%M}Z"
+                named = one.ref or f"the statement from {iso_utc(one.from_ns)[:16]}Z"
                 yield Question(kind=kind, text=f"{named}: {one.question}", statement_id=one.id)
         drives = self._looking_empty(last)
         if not drives:
             return
-        begun = ", ".join(str(one["t_start"])[:16].replace("T", " ") for one in drives)
+        begun = ", ".join(f"{str(one['t_start'])[:16]}Z" for one in drives)
         which = f"The drive of {begun} looks" if len(drives) == 1 else f"These {len(drives)} drives look"
         listed = "" if len(drives) == 1 else f" ({begun})"
         source = str(StatementSource.EMPTY)

@@ -201,13 +201,15 @@ function rowsText({ n_rows: nRows, n_match: nMatch, problems }) {
   return `${phrase("rows", { n: nRows })}: ${[phrase("rows.match", { n: nMatch }), ...told].join(", ")}`;
 }
 
+const problem = ({ row, text }) => phrase("row_problem", { row, what: translated(text) });
+
 async function importNotes(isDryRun) {
   const [file] = element("import-file").files;
   const told = await send("POST", `${STATEMENTS}?${timezone()}&dry_run=${isDryRun}`, await file.text(), "text/csv");
   element("import-sure").hidden = told === null || !isDryRun;
   if (told === null) return;
   say("import-told", isDryRun ? rowsText(told) : phrase("taken", { text: rowsText(told) }));
-  element("import-problems").replaceChildren(...[...told.notes, ...told.problems.map((one) => translated(one.text))].map((text) => made("li", text)));
+  element("import-problems").replaceChildren(...[...told.notes.map(translated), ...told.problems.map(problem)].map((text) => made("li", text)));
   if (!isDryRun) element("import").reset();
 }
 

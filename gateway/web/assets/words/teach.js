@@ -50,6 +50,7 @@ export const TEACH = {
   "rows.unknown_vehicle": ["{n} unknown vehicle (row {rows})|{n} unknown vehicle (rows {rows})", "{n} von einem anderen Fahrzeug (Zeile {rows})|{n} von anderen Fahrzeugen (Zeilen {rows})"],
   "rows.bad": ["{n} bad (row {rows})|{n} bad (rows {rows})", "{n} fehlerhaft (Zeile {rows})|{n} fehlerhaft (Zeilen {rows})"],
   left_out: ["some drives are left out: {advice}", "Einige Fahrten sind ausgelassen. Zu tun: {advice}"],
+  row_problem: ["row {row}: {what}", "Zeile {row}: {what}"],
   taken: ["Taken: {text}", "Übernommen: {text}"],
 
   statements: ["Stated so far", "Bisherige Angaben"],
