@@ -115,13 +115,47 @@ def test_from_no_configuration_to_the_calibration_that_the_logs_give(config: Pat
     states = {one["ref"]: one["state"] for one in said["statements"]["items"]}
     assert states == {"E": "used", "N": "used"}
     assert "found without it" in said["listed"]
-    (tmp_path / "said.json").write_text(json.dumps(said["statements"]))
     file = learnt_file(tmp_path, version["id"])
-    van = van_toml(tmp_path, load_calibration(file).vehicle)
-    options = ["--vehicle", van, "--statements", tmp_path / "said.json", "--signals", "springscale:reference"]
-    options += ["--window-s", "100", "--output", tmp_path / "desk.json", "--json"]
+    assert learnt_at_a_desk(drives, file, said["statements"]) == file.read_bytes()
+
+
+def learnt_at_a_desk(drives: list[Path], file: Path, statements: Any, *more: object) -> bytes:
+    """What `springscale learn` makes of the logs and statements for the vehicle of this file."""
+    folder = drives[0].parent
+    (folder / "said.json").write_text(json.dumps(statements))
+    van = van_toml(folder, load_calibration(file).vehicle)
+    options = ["--vehicle", van, "--statements", folder / "said.json", "--signals", "springscale:reference"]
+    options += ["--window-s", "100", "--output", folder / "desk.json", "--json", *more]
     subprocess.run([sys.executable, "-m", "gateway", "learn", *drives, *options], check=True, capture_output=True)
-    assert (tmp_path / "desk.json").read_bytes() == file.read_bytes()
+    return (folder / "desk.json").read_bytes()
+
+
+def test_with_a_sister_handed_in_it_learns_the_calibration_that_the_logs_give(config: Path, tmp_path: Path) -> None:
+    """Its own first calibration serves as that of a vehicle of the same model. Taken back, it leaves no trace."""
+    drives = logs(tmp_path, LOADS[:2])
+    said: dict[str, Any] = {}
+
+    def meet(running: Running) -> None:
+        running.told("state", "empty", "--from", begun(1))
+        for log in drives:
+            running.play(log)
+        running.http("/api/v1/vehicle", ANSWERS, "PUT")
+        said["alone"] = settle(running)["versions"][0]["id"]
+        sister = learnt_file(tmp_path, said["alone"]).read_bytes()
+        (tmp_path / "sister.json").write_bytes(sister)
+        httpx.put(f"{running.gateway.url}/api/v1/vehicle/sister", content=sister).raise_for_status()
+        said["like"] = settle(running)["versions"][0]["id"]
+        said["statements"] = running.http(STATEMENTS)
+        running.http("/api/v1/vehicle/sister", method="DELETE")
+        said["taken back"] = settle(running)["versions"][0]["id"]
+
+    serve(config, meet)
+
+    file = learnt_file(tmp_path, said["like"])
+    like = ("--like", tmp_path / "sister.json")
+    assert learnt_at_a_desk(drives, file, said["statements"], *like) == file.read_bytes()
+    assert said["like"] != said["alone"]
+    assert said["taken back"] == said["alone"]
 
 
 def test_a_withdrawn_statement_leaves_no_trace(config: Path, tmp_path: Path) -> None:
