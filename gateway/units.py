@@ -54,12 +54,12 @@ def zone_of(name: str) -> ZoneInfo:
     """The time zone of this name (IANA). Raises ValueError for a name that this computer does not know, and for one
     that means another zone elsewhere.
     """
+    if name in _NO_ZONES:
+        raise ValueError(f"{name} is another zone on every computer; write one as Europe/Berlin, or UTC")
     try:
-        if name not in _NO_ZONES:
-            return ZoneInfo(name)
+        return ZoneInfo(name)
     except (ZoneInfoNotFoundError, ValueError, OSError):
-        pass
-    raise ValueError(f"no zone is called {name!r} on this computer; write one as Europe/Berlin, or UTC") from None
+        raise ValueError(f"no zone is called {name!r} on this computer; write one as Europe/Berlin, or UTC") from None
 
 
 def si_factor(quantity: str, unit: str | None) -> float:

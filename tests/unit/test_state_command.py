@@ -103,6 +103,13 @@ def test_a_table_is_tried_and_then_taken(url: str, tmp_path: Path) -> None:
     assert [one["from"] for one in said(url, "list")["items"]] == ["2026-09-21T18:00:00+02:00"]
 
 
+@pytest.mark.parametrize("command", [("state", "import"), ("learn", "any.log", "--vehicle", "van.toml")])
+def test_a_zone_that_differs_between_computers_is_refused(command: tuple[str, ...]) -> None:
+    refused = called(*command, "notes.csv", "--timezone", "localtime")
+    assert refused.exit_code == 2
+    assert "localtime is another zone on every computer; write one as Europe/Berlin, or UTC" in refused.output
+
+
 def test_an_invalid_time_is_refused_before_sending(url: str) -> None:
     refused = called("state", "empty", "--from", "this morning", "--url", url)
     assert refused.exit_code == 2
