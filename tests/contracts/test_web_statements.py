@@ -287,7 +287,7 @@ def test_learning_begins_with_the_file_of_a_vehicle_of_the_same_model(local: Cli
 def test_a_file_that_is_no_calibration_of_this_model_is_refused(local: Client) -> None:
     for content in (b"", b"[]", b"{}", b'{"format": "springscale-calibration", "version": 99}', b"\xff"):
         answer = local.request("PUT", SISTER, content=content)
-        assert (answer.status_code, answer.json()["reason"]) == (409, "no_calibration_file")
+        assert (answer.status_code, answer.json()["reason"]) == (422, "unreadable")
     local.request("PUT", VEHICLE, json={**ANSWERS, "wheelbase_m": 3.4})
     answer = local.request("PUT", SISTER, content=DEMO.read_bytes())
     assert (answer.status_code, answer.json()["reason"]) == (409, "not_its_sister")

@@ -69,13 +69,15 @@ def test_a_statement_that_cannot_be_true_is_refused_before_any_fit(recorded: Rec
 
 
 def test_the_table_counts_states_and_names_true_statements_that_were_accused() -> None:
-    line = {"title": "two | exchanged", "payload": {"error": 2.25, "held": 100.0, "half": 10.9}}
+    line = {"title": "exchanged", "payload": {"error": 2.25, "held": 100.0, "half": 10.9}}
+    worse = {"title": "half", "payload": {"error": 4.0, "held": 100.0, "half": 12.0}}
     one = {
         "states": {"false": ["held", "used", "held"], "true": ["used", "weak"]},
-        "asked": ["is it | gross?"],
+        "asked": ["is it gross?"],
         "weighs": line,
     }
+    other = {"states": {"false": ["used"], "true": ["used"]}, "asked": [], "weighs": worse}
     every = {"title": "all", "states": {"false": [], "true": ["used"]}, "asked": [], "error_kg": 12.4, "held_pct": 87.5}
-    found = section({"kinds": [one], "all": [every]}).splitlines()
-    assert found[2] == "| two / exchanged | 2 held, 1 used | 1 weak | is it / gross? | 2.2 | 100.0 | 10.9 |"
-    assert found[-1] == "| all | – | – | – | 12 | 88 |"
+    found = section({"kinds": [one, other], "all": [every]}).splitlines()
+    assert found[2] == "| used | exchanged; half | 1 weak | 2.2 to 4.0 | 10.9 to 12.0 |"
+    assert found[-1] == "| all | – | – | 12 | 88 |"

@@ -133,7 +133,7 @@ class StatedVan:
                     replace(self.given, sister=held.vehicle).stated(stated.figures)
                 self._keep_sister(self._book.write_sister(content, held, by), by)
         except CalibrationFileError as fault:
-            raise RefusedError("no_calibration_file", str(fault)) from None
+            raise RefusedError("unreadable", str(fault)) from None
         except (NoSisterError, CampaignError) as fault:
             raise RefusedError("not_its_sister", str(fault)) from None
 

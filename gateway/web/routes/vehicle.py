@@ -66,7 +66,7 @@ def vehicle_router(
 ) -> APIRouter:
     """The routes about the vehicle itself; ``calibrated`` is the calibration that the service uses."""
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
-    of_sister = problem_responses(400, 403, 409, 413, 503)
+    of_sister = problem_responses(400, 403, 409, 413, 422, 503)
 
     def described() -> VehicleDescription:
         now = status()
