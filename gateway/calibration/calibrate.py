@@ -12,8 +12,8 @@ from gateway.calibration.campaign import Campaign, file_sha256
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.file import CalibrationFile, DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
 from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
-from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index

@@ -15,9 +15,8 @@ from gateway.calibration.campaign import Campaign, DraftTable
 from gateway.calibration.empties import looking_empty
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.drive import LogFacts, RowFacts, SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
-from gateway.calibration.inspection.log import LogFacts, SplitRun
-from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.drives import Driven, chosen

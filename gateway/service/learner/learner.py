@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 
 from gateway.bus.signals import SignalMap
 from gateway.calibration.assigned import Assigned, Fate, Piece, assign, moments
-from gateway.calibration.kept.batch_file import kept_batch_of
+from gateway.calibration.kept import kept_batch_of
 from gateway.calibration.learning.answers import doubts_of, vehicle_table
 from gateway.calibration.learning.job import LearnJob, LearnResult
 from gateway.calibration.learning.spans import (
