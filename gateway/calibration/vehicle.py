@@ -355,6 +355,10 @@ class Taught:
     claims: tuple[FoundClaim, ...] = ()
     causes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
+    def load_of(self, name: str) -> FoundLoad | None:
+        """What was found of a drive's load; None if the drive taught nothing."""
+        return next((one for one in self.loads if one.name == name), None)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:

@@ -54,9 +54,8 @@ class Learnt:
     def loads(self) -> dict[int, FoundLoad]:
         """What was found of each drive's load, by its number."""
         taught = self.outcome.cross_spectrum
-        by_name = {one.name: one for one in taught.loads} if taught else {}
-        numbers = range(1, len(self.drives) + 1)
-        return {number: by_name[drive_name(number)] for number in numbers if drive_name(number) in by_name}
+        found = {n: taught.load_of(drive_name(n)) for n in range(1, len(self.drives) + 1)} if taught else {}
+        return {number: one for number, one in found.items() if one}
 
     def claims_of(self, number: int) -> list[FoundClaim]:
         """What became of the statements about a drive."""
