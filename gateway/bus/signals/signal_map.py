@@ -205,7 +205,7 @@ SHIPPED_PREFIX: Final = "springscale:"
 class SignalMapFile(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    dbc: list[str] = Field(min_length=1, description="databases (DBC, KCD, ARXML, SYM), relative to this file")
+    dbc: list[str] = Field(min_length=1, description="DBC files, relative to this file")
     channel: str | None = Field(None, description="read only frames of this channel from log files")
     time_zone: str | None = Field(
         None, description="zone of logs whose date states none, such as Europe/Berlin; without it UTC"
