@@ -1,13 +1,11 @@
-"""One suite over every way in: the same frames as .log, .log.zst, .asc, .blf, .mf4, .trc, .csv, .db or on a bus."""
+"""One suite over every way in: the same frames as .log, .log.zst, .asc, .blf, .mf4, .trc or on a bus."""
 
 import gzip
 import itertools
 import lzma
 import os
-import sqlite3
 import sys
 import time
-from contextlib import closing
 from dataclasses import replace
 
 import can
@@ -18,7 +16,7 @@ from support.encoded import encode_signals
 from support.patience import PATIENCE_S
 
 from gateway.bus.frames import join, merge_frames, message_of
-from gateway.bus.live.source import LiveSource
+from gateway.bus.listen import LiveSource
 from gateway.bus.logs import mf4, write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.logs.packed import zstd
@@ -30,9 +28,9 @@ from gateway.records import EXTENDED_ID, Frames, Motion, Signal, joined
 
 START_NS = 1_760_146_908_000_000_000
 CHANNELS = itertools.count()
-TEXT_FORMATS = (".asc", ".csv", ".trc")
+TEXT_FORMATS = (".asc", ".trc")
 PACK = {".gz": gzip.compress, ".zst": zstd.compress, ".xz": lzma.compress}
-WRITERS = {".asc": can.ASCWriter, ".blf": can.BLFWriter, ".trc": can.TRCWriter, ".csv": can.CSVWriter}
+WRITERS = {".asc": can.ASCWriter, ".blf": can.BLFWriter, ".trc": can.TRCWriter}
 
 
 @pytest.fixture(autouse=True)
@@ -94,27 +92,12 @@ def write_log(frames, path):
         write_log(frames, path.with_suffix(""))
         path.write_bytes(PACK[path.suffix](path.with_suffix("").read_bytes()))
         return
-    if suffix == ".db":
-        write_database(frames, path)
-        return
     with WRITERS[path.suffix](path) as writer:
         for row in range(len(frames)):
             message = message_of(frames, row)
             message.channel = 0
             message.timestamp = float(message.timestamp)
             writer.on_message_received(message)
-
-
-def write_database(frames, path):
-    """python-can's own layout; its writer loses what it holds beyond 500 messages when it is stopped."""
-    columns = "ts REAL, arbitration_id INTEGER, extended INTEGER, remote INTEGER, error INTEGER, dlc INTEGER, data BLOB"
-    messages = [message_of(frames, row) for row in range(len(frames))]
-    with closing(sqlite3.connect(path)) as database, database:
-        database.execute(f"CREATE TABLE messages ({columns})")
-        database.executemany(
-            "INSERT INTO messages VALUES (?, ?, ?, 0, 0, ?, ?)",
-            [(float(m.timestamp), m.arbitration_id, m.is_extended_id, m.dlc, bytes(m.data)) for m in messages],
-        )
 
 
 def read(path, signal_map):
@@ -130,9 +113,7 @@ def assert_same(motion: Motion, truth: Motion, *, stamp_tolerance_ns: int = 0) -
     assert np.abs(motion.t_ns - truth.t_ns).max() <= stamp_tolerance_ns
 
 
-@pytest.mark.parametrize(
-    "suffix", [*(kind + packing for kind in (".log", ".asc", ".blf", ".csv") for packing in ("", *PACK)), ".db"]
-)
+@pytest.mark.parametrize("suffix", [kind + packing for kind in (".log", ".asc", ".blf") for packing in ("", *PACK)])
 def test_every_log_format_gives_the_same_motion(suffix, tmp_path, drive, truth, signal_map):
     path = tmp_path / f"drive{suffix}"
     write_log(drive, path)

@@ -132,7 +132,7 @@ def with_asammdf(path: Path) -> None:
 WRITERS: Final[dict[str, Callable[[Path], None]]] = {
     ".log": lambda path: write_candump(DRIVE, "can0", path),
     ".log.gz": lambda path: write_candump(DRIVE, "can0", path),
-    **{suffix: with_can(suffix) for suffix in (".asc", ".trc", ".csv", ".blf", ".db")},
+    **{suffix: with_can(suffix) for suffix in (".asc", ".trc", ".blf")},
     "_stored.blf": stored,
     ".mf4": with_asammdf,
 }

@@ -61,7 +61,7 @@ _KNOWN_LINES: Final = (
     (r"\S.*\(\d+\.\d+\) \S+ [0-9A-F]{3,8}#", "something is written before the stamp, as in a system's log: cut it off"),
     (r"date \S|\d+\.\d+\s+\d+\s+[0-9A-F]+x?\s+[RT]x\b", "this is the text of an .asc log: name it so"),
     (r";|\d+\)\s+\d", "this is the text of a .trc log: name it so"),
-    (r"[^,;]+([,;][^,;]*){3,}", "this is a table: only python-can's own can be read, as .csv"),
+    (r"[^,;]+([,;][^,;]*){3,}", "this is a table: save it as a candump log, .asc or .trc"),
     (r"\d+\.\d+\s+\S+\s+\w+\s+[RT]x\b", "messages have names instead of identifiers: export the log with numbers"),
 )  # fmt: skip
 """Lines that other tools and settings write, and what to do: the first that fits is told."""
@@ -172,7 +172,7 @@ class LogReport:
 
     @property
     def _suffix(self) -> str:
-        return next((end for end in self.path.suffixes if end.lower() in (".asc", ".trc", ".csv")), "-").lower()
+        return next((end for end in self.path.suffixes if end.lower() in (".asc", ".trc")), "-").lower()
 
     @property
     def is_dated(self) -> bool:
@@ -331,7 +331,7 @@ def is_same_channel(recorded: object, wanted: str | None) -> bool:
     """Whether a recorded channel is the wanted one.
 
     A number, as python-can counts channels, matches a name that ends in it (1 and "can1"). A format that
-    keeps no channel (.csv, .db) matches every name.
+    keeps no channel matches every name.
     """
     if wanted is None or recorded is None or str(recorded) == wanted:
         return True
