@@ -133,11 +133,6 @@ def test_a_garbled_line_leaves_the_number_base_as_it_is(tmp_path):
     assert frames.can_id.tolist() == [10, 10]
 
 
-def test_a_first_frame_hours_after_its_header_is_told(tmp_path):
-    _, report = read(tmp_path / "a.asc", asc("2023-03-10 15:06:12", "54372.5 1 123 Rx d 1 01\n"))
-    assert any("15.1 h after the date of its header" in remark for remark in report.remarks())
-
-
 N = 2000
 REFUSED = {
     "pauses": ("a.log", "".join(f"(0.{i * 7919 % 9999:06d}) can0 123#01\n" for i in range(N)), "pauses between frames"),

@@ -182,7 +182,7 @@ def test_stamps_of_whole_seconds_are_told_and_not_the_road(tmp_path: Path) -> No
     write_candump(replace(frames, t_ns=frames.t_ns // 10**9 * 10**9), "can0", log)
     for command in (["estimate", log, "--signals", "springscale:reference"], ["look", log]):
         ended = called(*command)
-        assert "stamps are whole seconds: a spreadsheet has cut them off?" in str(ended.exception)
+        assert "stamps are whole seconds: has a tool cut their fractions off?" in str(ended.exception)
         assert ended.stdout == ""
 
 
