@@ -11,13 +11,7 @@ import numpy as np
 
 from gateway.calibration.claims import LEAST_PRECISION, Terms, shared_disagreement
 from gateway.calibration.found import ClaimState, FoundClaim, FoundLoad
-from gateway.calibration.left_out import (
-    USUAL_FRONT_SHARE_PCT,
-    USUAL_PAYLOAD_SHARE,
-    LeftOut,
-    Limits,
-    most_misfit,
-)
+from gateway.calibration.left_out import USUAL_FRONT_SHARE_PCT, USUAL_PAYLOAD_SHARE, LeftOut, Limits, most_misfit
 from gateway.calibration.prior import MODE, Prior, own_prior
 from gateway.calibration.read_drive import EVIDENCE, OfVehicle, ReadDrive, RollingDrive
 from gateway.calibration.statements import Statement, load_prior_of
@@ -197,8 +191,8 @@ class FitOfDrives:
         return replace(self, seen=drives, own_priors=priors, half_car=min(tried, key=lambda found: found.cost))
 
     def _model_error(self, i: int) -> tuple[float, float]:
-        """Standard deviations of what drive i says of payload (kg) and front share (0..1) by the model's own error, and
-        without a roll rate by the load's unknown place across (gateway.model.weigh says how).
+        """Standard deviations of payload (kg) and front share (0..1) of drive i that the model's own error causes, and
+        without a roll rate the load's unknown place across (gateway.model.weigh says how).
         """
         one, own = self.seen[i], self.half_car.own[i]
         usual = USUAL_PAYLOAD_SHARE * one.vehicle.empty_mass_kg, USUAL_FRONT_SHARE_PCT / 100.0

@@ -18,10 +18,10 @@ from gateway.model.vehicle import VehicleModel
 class FoundLoad:
     """What a fit found of one drive: its load with what is stated of it, and what the drive says without.
 
-    own_std_kg is of the payload if the vehicle were known: of what tells the drives' loads apart. without and its
-    standard deviation (kg) are NaN if nothing was stated of the payload. stated (kg) is what the statements say once
-    their common errors are known, NaN if nothing is believed. ``is_held``: a statement disagrees beyond chance and
-    taught nothing.
+    own_std_kg is the standard deviation that the payload would have if the vehicle were known: it tells the drives'
+    loads apart. without and its standard deviation (kg) are NaN if nothing was stated of the payload. stated (kg) is
+    what the statements say once their common errors are known, NaN if nothing is believed. ``is_held``: a statement
+    disagrees beyond chance and taught nothing.
     """
 
     name: str

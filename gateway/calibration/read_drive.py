@@ -19,6 +19,8 @@ from gateway.model.weigh import MOST_LOAD_SHARE
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64, Batch
 
+BAND_HZ: Final = (1.1, 14.0)  # chosen: body and wheel resonances
+N_SEGMENT: Final = 256  # chosen: 5 s at 50 Hz, short enough for town traffic
 EVIDENCE: Final = 0.2  # chosen: weight of a drive's evidence; minutes of driving repeat the same model error
 MOST_OFFSET_STD_M: Final = 0.1  # chosen: of the sensor's lateral place; with a worse one roll is not used
 UNKNOWN_SHARE: Final = 0.1  # chosen: of the empty mass; a payload stated no better than that has several starts

@@ -28,25 +28,20 @@ from gateway.calibration.fit_of_drives import (
     weighed_left_out,
 )
 from gateway.calibration.found import ClaimState, FoundClaim, Taught
-from gateway.calibration.left_out import (
-    LeftOut,
-    Limits,
-    limits_shown_by,
-)
+from gateway.calibration.left_out import LeftOut, Limits, limits_shown_by
 from gateway.calibration.prior import Prior
-from gateway.calibration.read_drive import ReadDrive, TaughtDrive, can_roll
+from gateway.calibration.read_drive import BAND_HZ, N_SEGMENT, ReadDrive, TaughtDrive, can_roll
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.model.spectra import Reading, Segments, grouped, segments_of
 from gateway.model.vehicle import VehicleModel
 
-BAND_HZ: Final = (1.1, 14.0)  # chosen: body and wheel resonances
-N_SEGMENT: Final = 256  # chosen: 5 s at 50 Hz, short enough for town traffic
 MOST_DISAGREEMENT: Final = 3.7  # chosen: standard deviations; chance exceeds it for one statement in five thousand
 MOST_SUSPECTS: Final = 4  # chosen: statements compared before one is held
 MOST_PAIRS: Final = 2  # chosen: statements that may have been exchanged; each pair costs a rough fit
 LEAST_WITNESSES: Final = 3  # chosen: two drives must remain for a scale
 UNTESTED: Final = "intervals_untested"
+
 Progress = Callable[[int, int], None]
 """Called with the steps done and the steps in all."""
 

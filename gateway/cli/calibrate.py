@@ -188,7 +188,7 @@ def _command(
 
 
 def _say_payload_range(campaign: Campaign) -> None:
-    """Prints the payload range, of which errors are percentages: a van of 3.5 t carries far more than the default."""
+    """Prints the payload range to which percentages refer: a van of 3.5 t carries far more than the default."""
     if not campaign.states_payload_range:
         low_kg, high_kg = campaign.vehicle.payload_range_kg
         click.echo(

@@ -130,16 +130,21 @@ def learnt_at_a_desk(drives: list[Path], file: Path, statements: Any, *more: obj
     return (folder / "desk.json").read_bytes()
 
 
+def state_and_drive(running: Running, drives: list[Path], *more: str) -> None:
+    """The first drive is said to be empty, all are driven, and the vehicle is stated."""
+    running.told("state", "empty", "--from", begun(1), *more)
+    for log in drives:
+        running.play(log)
+    running.http("/api/v1/vehicle", ANSWERS, "PUT")
+
+
 def test_with_a_sister_handed_in_it_learns_the_calibration_that_the_logs_give(config: Path, tmp_path: Path) -> None:
     """Its own first calibration serves as that of a vehicle of the same model. Taken back, it leaves no trace."""
     drives = logs(tmp_path, LOADS[:2])
     said: dict[str, Any] = {}
 
     def meet(running: Running) -> None:
-        running.told("state", "empty", "--from", begun(1))
-        for log in drives:
-            running.play(log)
-        running.http("/api/v1/vehicle", ANSWERS, "PUT")
+        state_and_drive(running, drives)
         said["alone"] = settle(running)["versions"][0]["id"]
         sister = learnt_file(tmp_path, said["alone"]).read_bytes()
         (tmp_path / "sister.json").write_bytes(sister)
@@ -163,10 +168,7 @@ def test_a_withdrawn_statement_leaves_no_trace(config: Path, tmp_path: Path) -> 
     said: dict[str, Any] = {}
 
     def meet(running: Running) -> None:
-        running.told("state", "empty", "--from", begun(1), "--ref", "E")
-        for log in drives:
-            running.play(log)
-        running.http("/api/v1/vehicle", ANSWERS, "PUT")
+        state_and_drive(running, drives, "--ref", "E")
         said["before"] = settle(running)["versions"][0]["id"]
         said["file"] = learnt_file(tmp_path, said["before"]).read_bytes()
         running.told("state", "note", "300", "--from", begun(2), "--ref", "N")
@@ -240,10 +242,7 @@ def test_half_a_character_in_the_file_costs_no_weighing(config: Path, tmp_path: 
     def meet(running: Running) -> None:
         said["learning"] = running.http(LEARNING)
         said["status"] = running.http("/api/v1/status")
-        running.told("state", "empty", "--from", begun(1))
-        for log in drives:
-            running.play(log)
-        running.http("/api/v1/vehicle", ANSWERS, "PUT")
+        state_and_drive(running, drives)
         said["after"] = settle(running)
 
     serve(config, meet)
@@ -264,10 +263,7 @@ def test_a_kill_during_learning_loses_nothing(config: Path, tmp_path: Path) -> N
     said: dict[str, Any] = {}
 
     def meet(running: Running) -> None:
-        running.told("state", "empty", "--from", begun(1))
-        for log in drives:
-            running.play(log)
-        running.http("/api/v1/vehicle", ANSWERS, "PUT")
+        state_and_drive(running, drives)
         worker = running.gateway.learner._worker
         assert wait_until(lambda: worker.pid is not None)
         pid = worker.pid

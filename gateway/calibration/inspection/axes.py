@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from gateway.calibration.as_stated import StatedRun, fitted
-from gateway.calibration.teach import BAND_HZ, N_SEGMENT
+from gateway.calibration.read_drive import BAND_HZ, N_SEGMENT
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model import fit
 from gateway.model.car import Ground

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from datetime import tzinfo
 from typing import Any, Final
 
-from gateway.calibration.assigned import Assigned, Fate, assign, moments
+from gateway.calibration.assigned import Fate, assign, moments
 from gateway.calibration.learning.spans import STATES, rows_record, rows_told, spans_of, standing
 from gateway.calibration.statements_csv import StatementsFileError, ToldRow, ToldRows, read_statements
-from gateway.core.vehicle import Vehicle
 from gateway.errors import RefusedError
 from gateway.log import Event
 from gateway.service.learner.book import MOST_STATEMENTS, Book, LearningRecord, Outcome, Said
@@ -111,11 +110,9 @@ class StatedLoads:
         vehicle = self._van.known
         if vehicle is None:
             return {one.id: (Fate.WAITING, NO_VEHICLE) for one in records}
-        assigned = self._assigned(records, vehicle)
+        pieces = spans_of([one.span for one in self._files.windows()], moments(records))
+        assigned = assign(records, pieces, vehicle)
         return {one.id: (assigned.fates[i], assigned.reasons[i]) for i, one in enumerate(records)}
-
-    def _assigned(self, records: Sequence[StatementRecord], vehicle: Vehicle) -> Assigned:
-        return assign(records, spans_of([one.span for one in self._files.windows()], moments(records)), vehicle)
 
     def page(
         self, *, since_ns: int | None = None, state: str | None = None, limit: int = 500, cursor: str | None = None
