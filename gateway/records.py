@@ -22,6 +22,7 @@ _START: Final = datetime(1970, 1, 1, tzinfo=UTC)
 FIRST_DATED_NS: Final = 504_921_600 * NS_PER_S  # 1986, the year of CAN: earlier stamps count from something else
 
 F64 = Annotated[NDArray[np.float64], AsLists]
+F32 = NDArray[np.float32]
 I64 = NDArray[np.int64]
 U32 = NDArray[np.uint32]
 U8 = NDArray[np.uint8]

@@ -6,7 +6,7 @@ nothing in common this is an ordinary search.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 import numpy as np
@@ -19,6 +19,7 @@ DISAPPOINTING: Final = 0.25  # chosen: of the gain to first order; a step that g
 LEAST_STEPS: Final = 4  # chosen: before a search may be given up; far from a peak a parabola tells little of it
 HOPE: Final = 3.0  # chosen: times the expected gain
 SHORTEST: Final = 0.05  # chosen: part of a step
+MET: Final = 2.0  # chosen: in log posterior; a step that ends nearer to a known maximum leads to it
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,7 @@ class Found:
 
     across (n, k) of a drive is the covariance of its vector with the common one. cost is minus the log posterior, and
     log_volume half the logarithm of the determinant of the information. ``is_converged`` is false if the steps ran out
-    or none lowered a cost that could still fall.
+    or none lowered a cost that could still fall, ``is_known`` true if the search was on its way to a known maximum.
     """
 
     common: F64
@@ -79,6 +80,7 @@ class Found:
     cost: float
     log_volume: float
     is_converged: bool
+    is_known: bool = False
 
 
 @dataclass(slots=True)
@@ -114,18 +116,31 @@ NOTHING: Final = Gaussian(np.empty(0), np.empty((0, 0)))
 """The prior of an empty common vector."""
 
 
-def climb(likelihood: Likelihood, prior: Gaussian, start: F64, tolerance: float = 1e-2, worth: float = np.inf) -> Found:
+def climb(
+    likelihood: Likelihood,
+    prior: Gaussian,
+    start: F64,
+    tolerance: float = 1e-2,
+    worth: float = np.inf,
+    known: Sequence[Gaussian] = (),
+) -> Found:
     """The maximum of one drive's own vector, reached from ``start`` (k,); see :func:`most_probable`."""
-    return most_probable(NOTHING.mean, NOTHING, [Drive(likelihood, prior, start)], tolerance, worth)
+    return most_probable(NOTHING.mean, NOTHING, [Drive(likelihood, prior, start)], tolerance, worth, known)
 
 
 def most_probable(
-    start: F64, prior: Gaussian, drives: Sequence[Drive], tolerance: float = 1e-2, worth: float = np.inf
+    start: F64,
+    prior: Gaussian,
+    drives: Sequence[Drive],
+    tolerance: float = 1e-2,
+    worth: float = np.inf,
+    known: Sequence[Gaussian] = (),
 ) -> Found:
     """The maximum reached from ``start`` (n,) and each drive's own start.
 
     Ends where an undamped step would gain less than ``tolerance``, in units of log posterior. It is given up where
-    twice the expected gain would leave the cost above ``worth``.
+    HOPE times the expected gain would leave the cost above ``worth``, and where an undamped step of the first drive
+    ends at a maximum that is ``known``, here as the parabola about it.
     """
 
     def total(common: F64, own: Sequence[F64]) -> float:
@@ -136,7 +151,7 @@ def most_probable(
 
     common, own = np.asarray(start, float), [np.asarray(drive.start, float) for drive in drives]
     arrow = _arrow(common, own, prior, drives)
-    best, damping, is_converged = total(common, own), 1e-3, False
+    best, damping, is_converged, is_known = total(common, own), 1e-3, False, False
     for taken in range(MOST_STEPS):
         whole, parts = arrow.step(0.0)
         expected = -0.5 * arrow.slope(whole, parts)  # what an undamped step gains if the cost is a parabola
@@ -148,6 +163,9 @@ def most_probable(
                 True,
             )
             break
+        if any(one.cost(own[0] + parts[0]) < MET for one in known):
+            is_known = True
+            break
         if taken >= LEAST_STEPS and best - HOPE * max(expected, 0.0) > worth:
             break
         moved = _damped(arrow, common, own, damping, best, total)
@@ -157,7 +175,8 @@ def most_probable(
         common, own, best, damping = moved
         damping = max(damping / 6.0, 1e-7)
         arrow = _arrow(common, own, prior, drives)
-    return _found(arrow, common, own, best, is_converged=is_converged)
+    found = _found(arrow, common, own, best, is_converged=is_converged)
+    return replace(found, is_known=is_known)
 
 
 def _damped(

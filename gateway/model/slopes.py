@@ -137,8 +137,8 @@ class _Chain:
         planes = buffer("planes", (levels, q, s, 2, p, m))
         by_level = slopes.transpose(3, 0, 2, 1, 4)
         planes[:, :, :, 0], planes[:, :, :, 1] = by_level.real, by_level.imag
-        weights, r = self._g.weights, by_number.shape[-1]
-        by_number = np.ascontiguousarray(by_number[:, moving])
+        weights, r = self._g.weights.astype(np.float32), by_number.shape[-1]
+        by_number = np.ascontiguousarray(by_number[:, moving], np.float32)
         moved = buffer("by_level", (levels, 2 * p * s * m, r))
         np.matmul(planes.reshape(levels, q, 2 * p * s * m).swapaxes(1, 2), by_number, out=moved)
         found = buffer("of_responses", (len(weights), 2 * p * s * m * r))
@@ -164,7 +164,7 @@ class _Chain:
         whole *= self._g.road
         if self._twist is not None:
             whole[:, :, 2:] *= self._twist
-        planes = np.array([whole.real, whole.imag]).reshape(4 * p * s, -1)
+        planes = np.array([whole.real, whole.imag], np.float32).reshape(4 * p * s, -1)
         return (planes.T @ _of_planes(p, s)).reshape(*self._phase.shape, p * p, 2 * p * s)
 
     def by_road(self, entry: int) -> F64:
@@ -227,6 +227,6 @@ def _of_planes(p: int, s: int) -> F64:
         for one, other, sign in ((i, j, 1.0), (j, i, -1.0)):
             beside_re[other, re, 0, one] = beside_im[other, re, 1, one] = 1.0
             beside_im[other, im, 0, one], beside_re[other, im, 1, one] = -sign, sign
-    every = np.zeros((4 * p, s, p * p, s, 2 * p))
+    every = np.zeros((4 * p, s, p * p, s, 2 * p), np.float32)
     every[:, range(s), :, range(s)] = found.reshape(4 * p, p * p, 2 * p)
     return every.reshape(4 * p * s, -1)

@@ -54,8 +54,8 @@ START_PAYLOADS_N: Final = 6  # chosen: from 0 to the largest load seen, or a thi
 LEAST_START_SHARE: Final = 0.33  # chosen: of the empty mass
 START_PLACES: Final = (0.25, 0.5, 0.9)  # chosen: of the wheelbase
 APART_SHARE: Final = 0.15  # chosen: of the largest starting load; starts nearer to a peak lead to it
-COARSE: Final = 0.2  # chosen: tolerance in log posterior, enough to distinguish peaks
-FINE: Final = 1e-2  # chosen: tolerance of the final search
+COARSE: Final = 1.0  # chosen: tolerance in log posterior, enough to distinguish peaks
+FINE: Final = 0.05  # chosen: tolerance of the final search
 HOPELESS: Final = 12.0  # chosen: a peak that is less probable by so many logarithms is not climbed to its end
 SAME_PEAK: Final = 0.3  # chosen: of a standard deviation; peaks of one hypothesis nearer than that are one
 MOST_LOAD_SHARE: Final = 4.0  # chosen: of the empty mass; bound of the search
@@ -233,7 +233,7 @@ def mixture_of(
     roll = np.empty(0) if with_roll else model.parameters[N:]
     own = _Own(Whittle(flat, model.ground, weight), roll, 0.0, most_kg)
     coarse = _coarse(own, first, model)
-    best = max(coarse, key=lambda one: one.log_evidence)
+    best = coarse[0]
     rolling = sideways = None
     if with_roll:
         roll = level(model.parameters)[N:]
@@ -247,7 +247,7 @@ def mixture_of(
         hypothesis = other.soft() if best.hypothesis.is_soft else other
         start = best.x.copy()
         start[_GYRATION] = 0.5 * (start[_GYRATION] + other.mean[_GYRATION])
-        peaks.append(_climb(own, hypothesis, start, FINE, best))
+        peaks.append(_climb(own, hypothesis, start, FINE, peaks))
     if np.max(np.abs(best.deviations[_DAMPERS])) > LEAST_WEAR:
         peaks.append(_climb(own, best.hypothesis.worn(), best.x, FINE))
     distinct = _distinct(peaks)
@@ -262,36 +262,44 @@ def mixture_of(
 
 
 def _coarse(own: _Own, first: Hypothesis, model: VehicleModel) -> list[Peak]:
-    """Peaks reached from the best of a few starting loads, from another one far from it, and on a soft mount."""
-    starts = np.array(_starting_loads(model))
-    apart_kg = APART_SHARE * float(starts[:, 0].max())
+    """Distinct peaks, the likeliest first: on a soft and on a firm mount from the best of a few starting loads, and on
+    the likelier of them from a load far from both.
 
-    def in_order(hypothesis: Hypothesis) -> list[int]:
-        costs = own.whittle.costs([own.point(np.r_[hypothesis.mean, load]) for load in starts])
-        return [int(i) for i in np.argsort(costs, kind="stable")]
+    The soft mount is first: a search on a firm one follows a long valley if the load stands on a soft one.
+    """
+    loads = np.array(_starting_loads(model))
+    apart_kg = APART_SHARE * float(loads[:, 0].max())
+    found: list[Peak] = []
+    order: dict[str, list[int]] = {}
+    for hypothesis in (first.soft(), first):
+        costs = own.whittle.costs([own.point(np.r_[hypothesis.mean, load]) for load in loads])
+        order[hypothesis.name] = np.argsort(costs, kind="stable").tolist()
+        start = np.r_[hypothesis.mean, loads[order[hypothesis.name][0]]]
+        found.append(_climb(own, hypothesis, start, COARSE, found))
+    best = max(found, key=lambda one: one.log_evidence)
+    ordered = order[best.hypothesis.name]
+    near_kg = np.array([loads[ordered[0], 0], best.x[N]])
+    far = next((i for i in ordered if np.min(np.abs(loads[i, 0] - near_kg)) > apart_kg), None)
+    if far is not None:
+        found.append(_climb(own, best.hypothesis, np.r_[best.hypothesis.mean, loads[far]], COARSE, found))
+    return _distinct(found)
 
-    order = in_order(first)
-    found = [_climb(own, first, np.r_[first.mean, starts[order[0]]], COARSE)]
-    near_kg = np.array([starts[order[0], 0], found[0].x[N]])
-    far = [i for i in order if np.min(np.abs(starts[i, 0] - near_kg)) > apart_kg]
-    if far:
-        found.append(_climb(own, first, np.r_[first.mean, starts[far[0]]], COARSE, found[0]))
-    soft = first.soft()
-    found.append(_climb(own, soft, np.r_[soft.mean, starts[in_order(soft)[0]]], COARSE, found[0]))
-    return found
 
-
-def _climb(own: _Own, hypothesis: Hypothesis, start: F64, tolerance: float, rival: Peak | None = None) -> Peak:
-    """The peak reached from ``start``; given up where it must stay far less probable than a ``rival``."""
+def _climb(own: _Own, hypothesis: Hypothesis, start: F64, tolerance: float, rivals: Sequence[Peak] = ()) -> Peak:
+    """The peak reached from ``start``; given up where it must stay far less probable than a rival, or leads to one."""
     prior = hypothesis.prior
     _, log_determinant = np.linalg.slogdet(hypothesis.covariance)
     worth = np.inf
-    if rival is not None:
+    if rivals:
+        rival = max(rivals, key=lambda one: one.log_evidence)
         of_rival = float(np.linalg.slogdet(rival.covariance)[1])
         worth = HOPELESS - rival.log_evidence + 0.5 * of_rival
         worth -= 0.5 * float(log_determinant) + hypothesis.cost
-    found = fit.climb(own, prior, start, tolerance, worth)
+    known = [fit.Gaussian.of(one.x, one.covariance) for one in rivals if one.hypothesis.name == hypothesis.name]
+    found = fit.climb(own, prior, start, tolerance, worth, known)
     log_evidence = -found.cost - found.log_volume - 0.5 * float(log_determinant) - hypothesis.cost
+    if found.is_known:
+        log_evidence = -np.inf
     return Peak(hypothesis, found.own[0], found.own_covariances[0], log_evidence, found.is_converged)
 
 

@@ -81,7 +81,7 @@ class Whittle:
         self._each_n = np.broadcast_to(self._n, shape).ravel()
         self._each_root_level_weight = np.broadcast_to(self._root_level_weight, shape).ravel()
         self._sloping = (self._root_level_weight * self._slope).ravel()
-        self._level_functionals = np.stack([np.ones_like(self._slope), self._slope])
+        self._level_functionals = np.stack([np.ones_like(self._slope), self._slope]).astype(np.float32)
         self._last: tuple[tuple[float, ...], Expected, _Whitening] | None = None
 
     def showing(self, spectra: CrossSpectra) -> "Whittle":
@@ -166,7 +166,7 @@ class Whittle:
         # Of each group, for all columns: of the level its sum and its line, of all rows their products with the noise
         # and with the residuals.
         of_level = self._level_functionals @ rows[p * p - 1]
-        of_rows = (np.stack([noisy, residual], axis=2) @ rows[: p * p]).sum(axis=0)
+        of_rows = (np.stack([noisy, residual], axis=2).astype(np.float32) @ rows[: p * p]).sum(axis=0)
         of_own = np.empty((p, b, 4, m))
         of_own[:, :, 0] = own[-1]
         of_own[:, :, 1] = own[-1] * self._slope
@@ -304,7 +304,7 @@ def _times(by_part: F64, dense: F64) -> F64:
     mixes with weights 1:4:1.
     """
     q, parts, b, m = by_part.shape
-    mixed = np.ascontiguousarray(by_part.reshape(q * parts, b * m).T).reshape(-1, parts) @ _hann(parts)
+    mixed = np.ascontiguousarray(by_part.reshape(q * parts, b * m).T, np.float32).reshape(-1, parts) @ _hann(parts)
     found = buffer("rows", (q, b, m, dense.shape[-1]))
     np.matmul(mixed.reshape(b, m, q, 3 * parts), _window(dense), out=found.transpose(1, 2, 0, 3))
     return found
@@ -312,7 +312,7 @@ def _times(by_part: F64, dense: F64) -> F64:
 
 @cache
 def _hann(parts: int) -> F64:
-    return np.asarray(np.kron([[1.0, 4.0, 1.0]], np.eye(parts)), float)
+    return np.asarray(np.kron([[1.0, 4.0, 1.0]], np.eye(parts)), np.float32)
 
 
 def _information(rows: F64, between: F64, local: F64) -> F64:
@@ -323,9 +323,10 @@ def _information(rows: F64, between: F64, local: F64) -> F64:
     r = rows.shape[-1]
     flat, beside = rows[: p * p].reshape(p * p * b * m, r), rows[p * p :].reshape(p, b * m, r)
     columns = local.reshape(p, k, b * m)
+    narrow = columns.astype(np.float32)
     found = np.empty((r + p * k, r + p * k))
     found[:r, :r] = flat.T @ flat
-    found[r:, :r] = (columns @ beside).reshape(p * k, r)
+    found[r:, :r] = (narrow @ beside).reshape(p * k, r)
     found[:r, r:] = found[r:, :r].T
     each = columns[:, None] * between.reshape(p, p, 1, b * m)
     for j in range(p):
@@ -343,7 +344,7 @@ def _growth(dense: F64, grows: F64) -> F64:
     """(b, r) relative growth of the noise with each dense column."""
     taken = np.full(dense.shape[1], 6.0)
     taken[[0, 1, -2, -1]] = 1.0, 5.0, 5.0, 1.0
-    weights = grows[:, :, None] * taken
+    weights = (grows[:, :, None] * taken).astype(np.float32)
     return np.asarray((weights[:, :, None] @ np.moveaxis(dense[:, :, :2], 2, 0)).sum(axis=0))[:, 0]
 
 
