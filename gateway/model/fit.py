@@ -6,7 +6,7 @@ nothing in common this is an ordinary search.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 import numpy as np
@@ -19,6 +19,7 @@ DISAPPOINTING: Final = 0.25  # chosen: of the gain to first order; a step that g
 LEAST_STEPS: Final = 4  # chosen: before a search may be given up; far from a peak a parabola tells little of it
 HOPE: Final = 3.0  # chosen: times the expected gain
 SHORTEST: Final = 0.05  # chosen: part of a step
+ROUNDING: Final = 1e-4  # chosen: of an information, beyond that of its products in four bytes
 MET: Final = 2.0  # chosen: in log posterior; a step that ends nearer to a known maximum leads to it
 
 
@@ -69,7 +70,7 @@ class Found:
 
     across (n, k) of a drive is the covariance of its vector with the common one. cost is minus the log posterior, and
     log_volume half the logarithm of the determinant of the information. ``is_converged`` is false if the steps ran out
-    or none lowered a cost that could still fall, ``is_known`` true if the search was on its way to a known maximum.
+    or none lowered a cost that could still fall; the cost is infinite if the search was on its way to a known maximum.
     """
 
     common: F64
@@ -80,7 +81,6 @@ class Found:
     cost: float
     log_volume: float
     is_converged: bool
-    is_known: bool = False
 
 
 @dataclass(slots=True)
@@ -151,7 +151,7 @@ def most_probable(
 
     common, own = np.asarray(start, float), [np.asarray(drive.start, float) for drive in drives]
     arrow = _arrow(common, own, prior, drives)
-    best, damping, is_converged, is_known = total(common, own), 1e-3, False, False
+    best, damping, is_converged = total(common, own), 1e-3, False
     for taken in range(MOST_STEPS):
         whole, parts = arrow.step(0.0)
         expected = -0.5 * arrow.slope(whole, parts)  # what an undamped step gains if the cost is a parabola
@@ -164,7 +164,7 @@ def most_probable(
             )
             break
         if any(one.cost(own[0] + parts[0]) < MET for one in known):
-            is_known = True
+            best = np.inf
             break
         if taken >= LEAST_STEPS and best - HOPE * max(expected, 0.0) > worth:
             break
@@ -175,8 +175,7 @@ def most_probable(
         common, own, best, damping = moved
         damping = max(damping / 6.0, 1e-7)
         arrow = _arrow(common, own, prior, drives)
-    found = _found(arrow, common, own, best, is_converged=is_converged)
-    return replace(found, is_known=is_known)
+    return _found(arrow, common, own, best, is_converged=is_converged)
 
 
 def _damped(
@@ -225,7 +224,7 @@ def _found(arrow: _Arrow, common: F64, own: Sequence[F64], cost: float, *, is_co
     schur, log_determinant = arrow.information.copy(), 0.0
     by_own = []
     for information, across in zip(arrow.own_informations, arrow.across, strict=True):
-        inverse = np.linalg.inv(information)
+        inverse = _inverse(information)
         log_determinant += float(np.linalg.slogdet(information)[1])
         by_own.append((inverse, across @ inverse))
         schur -= across @ inverse @ across.T
@@ -243,3 +242,11 @@ def _found(arrow: _Arrow, common: F64, own: Sequence[F64], cost: float, *, is_co
         log_volume=0.5 * log_determinant,
         is_converged=is_converged,
     )
+
+
+def _inverse(information: F64) -> F64:
+    """The inverse; with what is hardly determined, and negative by rounding, as undetermined as rounding allows."""
+    inverse = np.asarray(np.linalg.inv(information), float)
+    if (np.diag(inverse) > 0.0).all():
+        return inverse
+    return np.asarray(np.linalg.inv(information + ROUNDING * np.diag(np.diag(information))), float)

@@ -1,8 +1,9 @@
 """Derivatives of the expected spectral matrix of one vehicle with its load, by its parameters and its load.
 
 The chain rule leads from parameters to the numbers in the equations of motion (car), to the responses (response), to
-the spectra, in closed forms and real matrix products. Left out is what other parameters than the driveline's own change
-of the difference that a group's speed makes to it; the costs have it. Shapes are those of expected.
+the spectra, in closed forms and real matrix products. These take four bytes a number: a step of a search, and the width
+of a peak, need no more than their six digits. Left out is what other parameters than the driveline's own change of the
+difference that a group's speed makes to it; the costs have it. Shapes are those of expected.
 """
 
 from collections.abc import Sequence
@@ -28,7 +29,7 @@ from gateway.model.expected import (
 from gateway.model.spectra import PAIRS
 from gateway.model.table import INDEX
 from gateway.model.tracks import coherence_of, coherence_slope_of
-from gateway.records import F64
+from gateway.records import F32, F64
 
 _DRIVELINES: Final = [INDEX["driveline_front_kg"], INDEX["driveline_rear_kg"]]
 _OF_ROAD: Final = (DELAY_SCALE, REAR_LAG, TRACK_OFFSET, TRACKS_APART, TWIST_LEVEL)
@@ -44,7 +45,7 @@ class Slopes:
     parameter is the sum of these columns, the dense ones first, times its column of ``by`` (r + 11 p, e).
     """
 
-    dense: F64
+    dense: F32
     local: F64
     by: F64
 
@@ -124,7 +125,7 @@ class _Chain:
         self._twist = None if e.twist is None else e.twist[0]
         self._pairs = [(self._p + 2 * pair, i, j) for pair, (i, j) in enumerate(PAIRS[: self._p * (self._p - 1) // 2])]
 
-    def of_responses(self, by_number: F64) -> F64:
+    def of_responses(self, by_number: F64) -> F32:
         """(b, 2 p s, m + 2, r) changes of the responses with each column of by_number (5, q, r): by way, real or
         imaginary part, and sensor.
         """
@@ -145,7 +146,7 @@ class _Chain:
         np.matmul(weights, moved.reshape(levels, 2 * p * s * m * r), out=found)
         return found.reshape(len(weights), 2 * p * s, m, r)
 
-    def by_response(self) -> F64:
+    def by_response(self) -> F32:
         """Derivatives of the parts by the responses, in the order of ``of_responses``: (b, m + 2, p^2, 2 p s).
 
         An auto-spectrum is F^* (slack F + phase R) plus terms without F, so a change d of the response F moves it by 2
@@ -212,7 +213,7 @@ class _Chain:
 
 
 @cache
-def _of_planes(p: int, s: int) -> F64:
+def _of_planes(p: int, s: int) -> F32:
     """The matrix (4 p s, p^2 2 p s) of _Chain.by_response, which turns factors into slopes by each response.
 
     Its rows are the real parts of the factors that stand beside a response in the cross-spectra, those of the factors

@@ -298,8 +298,6 @@ def _climb(own: _Own, hypothesis: Hypothesis, start: F64, tolerance: float, riva
     known = [fit.Gaussian.of(one.x, one.covariance) for one in rivals if one.hypothesis.name == hypothesis.name]
     found = fit.climb(own, prior, start, tolerance, worth, known)
     log_evidence = -found.cost - found.log_volume - 0.5 * float(log_determinant) - hypothesis.cost
-    if found.is_known:
-        log_evidence = -np.inf
     return Peak(hypothesis, found.own[0], found.own_covariances[0], log_evidence, found.is_converged)
 
 

@@ -26,7 +26,7 @@ from gateway.model.car import Ground, has_roll
 from gateway.model.expected import Expected, Groups
 from gateway.model.slopes import Slopes, slopes_of
 from gateway.model.spectra import PAIRS, CrossSpectra
-from gateway.records import C128, F64
+from gateway.records import C128, F32, F64
 
 EFFECTIVE_SHARE: Final = 0.5  # chosen: neighbouring Hann bins and half-overlapping segments are correlated
 ROAD_RIPPLE: Final = 0.3  # standard deviation of log s about its line; chosen (`benchmarks.accuracy sensitivity`)
@@ -299,7 +299,7 @@ def _matrices(parts: F64) -> C128:
     return found
 
 
-def _times(by_part: F64, dense: F64) -> F64:
+def _times(by_part: F64, dense: F32) -> F32:
     """(q, b, m, r) of by_part (q, p^2, b, m) and dense (b, m + 2, p^2, r), whose neighbouring frequencies a Hann taper
     mixes with weights 1:4:1.
     """
@@ -311,11 +311,11 @@ def _times(by_part: F64, dense: F64) -> F64:
 
 
 @cache
-def _hann(parts: int) -> F64:
-    return np.asarray(np.kron([[1.0, 4.0, 1.0]], np.eye(parts)), np.float32)
+def _hann(parts: int) -> F32:
+    return np.kron([[1.0, 4.0, 1.0]], np.eye(parts)).astype(np.float32)
 
 
-def _information(rows: F64, between: F64, local: F64) -> F64:
+def _information(rows: F32, between: F64, local: F64) -> F64:
     """(c, c) products of all columns' rows: rows (p^2 + p, b, m, r) of the dense ones, the last p their products with
     those of each sensor's own power, which are local (p, 11, b, m) with products ``between`` (p, p, b, m).
     """
@@ -323,10 +323,9 @@ def _information(rows: F64, between: F64, local: F64) -> F64:
     r = rows.shape[-1]
     flat, beside = rows[: p * p].reshape(p * p * b * m, r), rows[p * p :].reshape(p, b * m, r)
     columns = local.reshape(p, k, b * m)
-    narrow = columns.astype(np.float32)
     found = np.empty((r + p * k, r + p * k))
     found[:r, :r] = flat.T @ flat
-    found[r:, :r] = (narrow @ beside).reshape(p * k, r)
+    found[r:, :r] = (columns.astype(np.float32) @ beside).reshape(p * k, r)
     found[:r, r:] = found[r:, :r].T
     each = columns[:, None] * between.reshape(p, p, 1, b * m)
     for j in range(p):
@@ -334,13 +333,13 @@ def _information(rows: F64, between: F64, local: F64) -> F64:
     return found
 
 
-def _window(dense: F64) -> F64:
+def _window(dense: F32) -> F32:
     """(b, m, 3 p^2, r) view of (b, m + 2, p^2, r): each frequency with its neighbours."""
     b, m, parts, r = dense.shape
     return as_strided(dense, (b, m - 2, 3 * parts, r), dense.strides, writeable=False)
 
 
-def _growth(dense: F64, grows: F64) -> F64:
+def _growth(dense: F32, grows: F64) -> F64:
     """(b, r) relative growth of the noise with each dense column."""
     taken = np.full(dense.shape[1], 6.0)
     taken[[0, 1, -2, -1]] = 1.0, 5.0, 5.0, 1.0
