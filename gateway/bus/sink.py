@@ -12,9 +12,9 @@ from typing import Any, Final
 import can
 
 from gateway.bus.frames import Speed, message_of, take
-from gateway.bus.live.python_can import require_usable_interface
-from gateway.bus.live.source import system_reason
+from gateway.bus.listen import system_reason
 from gateway.bus.logs import LogReport, open_whole_log
+from gateway.bus.receiver import require_usable_interface
 from gateway.errors import BusError
 from gateway.records import Frames
 from gateway.units import NS_PER_S

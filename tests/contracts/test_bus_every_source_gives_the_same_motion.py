@@ -18,7 +18,7 @@ from support.encoded import encode_signals
 from support.patience import PATIENCE_S
 
 from gateway.bus.frames import join, merge_frames, message_of
-from gateway.bus.live.source import LiveSource
+from gateway.bus.listen import LiveSource
 from gateway.bus.logs import mf4, write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.logs.packed import zstd

@@ -6,13 +6,10 @@ from pathlib import Path
 from typing import Final
 
 import can
-import cantools
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
-from hypothesis import strategies as st
 from support.bus_drive import bus_drive
-from support.databases import SomeMessage, SomeSignal, arxml
 from support.spoiled import Change, changed, changes, limits, refusal_of
 
 from gateway.bus.frames import message_of, take
@@ -85,43 +82,6 @@ def test_a_dbc_of_any_content_is_read_or_refused_in_words(where: list[Change], t
     refused = refusal_of(SignalMapError, lambda: decode(tmp_path / "signals.toml"))
     assert refused is None or refused.startswith(str(tmp_path / "signals.toml"))
     assert refusal_of(SignalMapError, lambda: read_whole(path)) is None or refused is not None
-
-
-_PARSED: Final = cantools.database.load_file(REFERENCE.with_name("springscale_reference.dbc"), strict=False)
-_AXIS: Final = SomeSignal("AccelZ", 7, 16, "m/s^2", 0.001, is_signed=True, is_big_endian=True, minimum=-30.0)
-OTHERS: Final[dict[str, tuple[str, list[bytes]]]] = {
-    "kcd": (
-        _PARSED.as_kcd_string(),
-        [b'endianess="big"', b'type="double"', b'length="auto"', b'<MuxGroup count="4294967295">', b"&a;", b"<Value/>"],
-    ),
-    "sym": (
-        _PARSED.as_sym_string(),
-        [*b"Type=Extended Len=8 Mux=a -m /e:FixE string float double 7FFh-0h".split(), b'Enum=A(0="a")', b"raw 9999"],
-    ),
-    "arxml": (
-        arxml((SomeMessage("IMU", 0x120, 8, [_AXIS]),)),
-        [b"<LENGTH>1000000000</LENGTH>", b"<X/>", b"MOST-SIGNIFICANT-BYTE-FIRST", b"OPAQUE", b"</LENGTH>"],
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", OTHERS)
-@many
-@given(data=st.data())
-def test_another_database_of_any_content_is_read_or_refused_in_words(
-    kind: str, data: st.DataObject, tmp_path: Path
-) -> None:
-    content, words = OTHERS[kind]
-    path = tmp_path / f"a.{kind}"
-    path.write_bytes(changed(content.encode(), data.draw(changes(words))))
-    refused = refusal_of(SignalMapError, lambda: read_other(path))
-    assert refused is None or (refused.startswith(str(path)) and len(refused) < 1000)
-    assert "allocate" not in (refused or "")
-
-
-def read_other(path: Path) -> None:
-    found, _ = Databases(path, [path]).sound()
-    assert all(signal.limits for message in found for signal in message.signals.values())
 
 
 def read_whole(path: Path) -> None:

@@ -6,7 +6,7 @@ from collections import deque
 import can
 import pytest
 
-from gateway.bus.live.python_can import open_python_can
+from gateway.bus.receiver import open_channel
 from gateway.bus.signals import IdFilter
 
 
@@ -28,7 +28,7 @@ def test_a_frame_that_came_before_the_filters_is_not_taken_for_one_of_ours(monke
     """The status would say that the bus fell silent, where no sensor was ever heard."""
     bus = OpenedSocket()
     monkeypatch.setattr(can, "Bus", lambda **_: bus)
-    receiver = open_python_can("socketcan", "vcan0", [IdFilter(0x130, 0x7FF)], 8, {})
+    receiver = open_channel("socketcan", "vcan0", [IdFilter(0x130, 0x7FF)], 8, {})
     try:
         assert len(receiver.receive(0.0).frames) == 0
         bus.queue.append(can.Message(arbitration_id=0x130, is_extended_id=False, data=bytes(8), timestamp=1.79e9))

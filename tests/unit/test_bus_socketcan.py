@@ -11,7 +11,7 @@ import pytest
 from can.interfaces.socketcan import socketcan
 from support.patience import PATIENCE_S
 
-from gateway.bus.live.python_can import PythonCanReceiver, open_python_can, packets_received, with_enough_room
+from gateway.bus.receiver import Receiver, open_channel, packets_received
 from gateway.bus.signals.mapping import exact_filter, j1939_filter
 from gateway.records import EXTENDED_ID
 
@@ -44,8 +44,8 @@ class Wire:
     def _apply(self, filters):
         self.filters = socketcan.pack_filters(filters)
 
-    def receiver(self, width=8) -> PythonCanReceiver:
-        self._opened.append(open_python_can("socketcan", "can9", FILTERS, width, {}))
+    def receiver(self, width=8) -> Receiver:
+        self._opened.append(open_channel("socketcan", "can9", FILTERS, width, {}))
         self._opened[-1]._bus._is_filtered = True
         return self._opened[-1]
 
@@ -155,7 +155,7 @@ def test_filters_ask_for_frames_of_one_format(wire):
 
 def test_the_receive_buffer_is_never_made_smaller(wire):
     before = wire.receiving.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
-    with_enough_room(wire.receiving)
+    wire.receiver()
     assert wire.receiving.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) >= before
 
 
@@ -166,4 +166,4 @@ def test_an_interface_that_is_not_there_has_no_statistics():
 
 def test_opening_a_missing_interface_is_an_os_error():
     with pytest.raises(OSError, match=r"No such device|not supported"):
-        open_python_can("socketcan", "nocan9", FILTERS, 8, {})
+        open_channel("socketcan", "nocan9", FILTERS, 8, {})

@@ -248,10 +248,7 @@ def test_a_device_that_is_gone_ends_the_feed(tmp_path: Path) -> None:
     assert "gone" in str(ended[0])
 
 
-def test_an_absent_bus_is_retried_and_dropped_frames_are_counted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("gateway.bus.feed.QUEUE", 20)
+def test_an_absent_bus_is_retried_and_dropped_frames_are_counted(tmp_path: Path) -> None:
     fake = FakeIio(tmp_path)
     device = IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
     said: list[str] = []
@@ -297,7 +294,7 @@ def test_an_invalid_mount_matrix_is_reported_when_the_device_is_opened(text: str
 @pytest.mark.parametrize("host", ["x..y", "a" * 300])
 def test_a_host_that_no_name_service_can_know_is_a_fault_of_gpsd(host: str) -> None:
     with pytest.raises(BusError, match="gpsd"):
-        Gpsd(host, 2947).read(0.1)
+        Gpsd(host, 2947).read()
 
 
 def test_a_line_that_no_parser_takes_is_no_fix() -> None:

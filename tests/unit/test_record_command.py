@@ -14,7 +14,7 @@ from support.bus_drive import START_NS, white_noise
 from support.commands import called
 from support.patience import PATIENCE_S, wait_until
 
-from gateway.bus.live.source import LiveSource, SourceCounts
+from gateway.bus.listen import LiveSource, SourceCounts
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import load_signal_map
 from gateway.bus.sink import BusSink
@@ -110,7 +110,7 @@ def test_the_reason_of_the_source_is_given_where_nothing_came(
     def no_bus() -> None:
         raise failure("the adapter was unplugged")
 
-    monkeypatch.setattr("gateway.bus.live.source.opener_of", lambda *_: no_bus)
+    monkeypatch.setattr("gateway.bus.listen.open_channel", lambda *_: no_bus())
     found = recorded(tmp_path / "drive.log.gz")
     assert "the adapter was unplugged" in str(found.exception)
 

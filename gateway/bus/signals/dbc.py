@@ -6,12 +6,12 @@ gets the statements of one message, once their numbers are known to be sane; com
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
 MOST_DIGITS: Final = 4  # chosen: of a bit or a byte count; no message has ten thousand
-MOST_NESTED: Final = 100  # chosen: multiplexers of a message
 MOST_SELECTED: Final = 65_536  # chosen: multiplexer values of a message: cantools takes some seconds for them
 
 _KEYWORD: Final = (
@@ -32,8 +32,8 @@ _WORD: Final = re.compile(r"\w+")
 _LONG_NAME: Final = re.compile(
     r'\s*BA_\s+"(?:SystemMessageLongSymbol"\s+BO_\s+(\d+)|SystemSignalLongSymbol"\s+SG_\s+(\d+)\s+(\w+))\s+"([^"\n]+)"\s*;'
 )
-_SELECTS: Final = re.compile(r"\s*SG_MUL_VAL_\s+\d+\s+(\w+)\s+(\w+)")
-_RANGE: Final = re.compile(r"\b(\d+)\s*-\s*(\d+)")
+_SELECTS: Final = re.compile(r"\s*SG_MUL_VAL_\s+\d+\s+\w+\s+(\w+)")
+_RANGE: Final = re.compile(r"\b0*(\d+)\s*-\s*0*(\d+)")
 _LAST: Final = 'CM_ "";\n'  # cantools passes over a fault in the very last statement of a file
 _DEFINED: Final = 'BA_DEF_ SG_ "SystemSignalLongSymbol" STRING;\n'
 _NOT_SENT: Final = "VECTOR__INDEPENDENT_SIG_MSG"  # CANdb++ keeps signals of no message there
@@ -132,25 +132,11 @@ def _is_absurd(digits: str) -> bool:
 
 def _n_selected(statements: Iterable[str]) -> float:
     """How many combinations of multiplexer values the SG_MUL_VAL_ statements of a message name, at most."""
-    under: dict[str, dict[str, float]] = {}
+    of_selector: Counter[str] = Counter()
     for statement in statements:
         if found := _SELECTS.match(statement):
-            ends = _RANGE.findall(statement, found.end())
-            under.setdefault(found[2], {})[found[1]] = sum(_n_between(*each) for each in ends)
-    return max((_n_below(selector, under, {}) for selector in under), default=0)
-
-
-def _n_between(low: str, high: str) -> float:
-    if max(len(low.lstrip("0")), len(high.lstrip("0"))) > 10:
-        return math.inf
-    return max(0, int(high.lstrip("0") or 0) - int(low.lstrip("0") or 0) + 1)
-
-
-def _n_below(selector: str, under: Mapping[str, Mapping[str, float]], known: dict[str, float]) -> float:
-    """Of this multiplexer and those that it selects; without end if it selects itself."""
-    if selector not in known:
-        known[selector] = math.inf
-        if len(known) <= MOST_NESTED:
-            selected = under.get(selector, {}).items()
-            known[selector] = sum(n * max(1.0, _n_below(name, under, known)) for name, n in selected if n)
-    return known[selector]
+            for low, high in _RANGE.findall(statement, found.end()):
+                if len(low) > 10 or len(high) > 10:
+                    return math.inf
+                of_selector[found[1]] += max(0, int(high) - int(low) + 1)
+    return math.prod(max(1, n) for n in of_selector.values())

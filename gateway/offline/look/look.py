@@ -47,7 +47,6 @@ FIRST_FRAMES: Final = 200  # chosen: the few
 MOST_IDENTIFIERS: Final = 4096  # chosen: of one channel; a bus has some hundreds
 LEAST_RATE_HZ: Final = RATE_MIN_SHARE * BatchSettings().rate_hz
 MOST_TILT_DEG: Final = 15.0  # chosen: 3 % of gravity; beyond it the horizontal axes mix in noticeably
-KINDS: Final = (".dbc", ".kcd", ".arxml", ".sym")  # databases by their suffix
 QUANTITIES: Final = ("acceleration", "angular_rate", "speed")
 
 
@@ -413,7 +412,7 @@ def _messages_of(
 def _near(log: Path) -> list[Path]:
     """Databases beside a log or else in the parent folder, as campaigns have a folder per drive."""
     folder = log.resolve().parent
-    each = (sorted(path for path in place.glob("*") if path.suffix in KINDS) for place in (folder, folder.parent))
+    each = (sorted(path for path in place.glob("*") if path.suffix == ".dbc") for place in (folder, folder.parent))
     return next((found for found in each if found), [])
 
 
