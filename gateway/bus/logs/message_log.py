@@ -33,6 +33,8 @@ TRC_VERSIONS: Final = ("1.0", "1.1", "1.3", "2.0", "2.1")
 _BLF_FRAMES: Final = (blf.CAN_MESSAGE, blf.CAN_MESSAGE2, blf.CAN_FD_MESSAGE, blf.CAN_FD_MESSAGE_64)
 _BLF_ERROR: Final = 2  # an error frame without its details, which python-can passes over
 _BLF_VERSIONS: Final = (1, 2)  # of the object headers that python-can reads
+# Perhaps an object of no length, of another version, or an error frame; most containers have none and need no walk.
+_BLF_ODD: Final = re.compile(rb"LOBJ(?:.{4}[\0-\x0f]\0{3}|..(?![\x01\x02]\0)|.{8}\x02\0{3})", re.DOTALL)
 
 
 Found = tuple[can.Message, int, int | None]  # with the nanoseconds from 1970 to the zero of its stamp, and its line
@@ -269,6 +271,8 @@ class _BlfReader(can.BLFReader):
     def _check_objects(self, content: bytes) -> None:
         """Count the frames among whole objects that python-can passes over; raise BLFParseError for absurd lengths."""
         head, at = blf.OBJ_HEADER_BASE_STRUCT, 0
+        if _BLF_ODD.search(content) is None:
+            return
         while (at := content.find(b"LOBJ", at, at + 8)) >= 0 and at + head.size <= len(content):
             _, _, version, n_bytes, kind = head.unpack_from(content, at)
             if n_bytes < head.size:
