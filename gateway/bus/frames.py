@@ -104,6 +104,12 @@ def message_id(message: can.Message) -> int:
     return message.arbitration_id | (EXTENDED_ID if message.is_extended_id else 0)
 
 
+def has_possible_id(message: can.Message) -> bool:
+    """Whether a CAN bus can carry its identifier. python-can passes on whatever a file or an adapter says."""
+    last = LAST_EXTENDED if message.is_extended_id else LAST_STANDARD
+    return isinstance(message.arbitration_id, int) and 0 <= message.arbitration_id <= last
+
+
 def frames_of(messages: Sequence[can.Message], width: int) -> Frames:
     """Data messages as columns, in the order given. Bytes beyond ``width`` are cut off; the length stays true."""
     if not messages:

@@ -17,8 +17,8 @@ from typing import Any, Final
 
 import can
 
-from gateway.bus.frames import LAST_EXTENDED, LAST_SECOND, LAST_STANDARD, ExactStamp, frames_of
-from gateway.bus.signals import IdFilter
+from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of, has_possible_id
+from gateway.bus.signals import CAN_FD_BYTES, IdFilter
 from gateway.errors import BusError
 from gateway.records import EXTENDED_ID, FIRST_DATED_NS, Frames
 from gateway.units import NS_PER_S
@@ -26,7 +26,6 @@ from gateway.units import NS_PER_S
 BURST_FRAMES: Final = 4096  # chosen: taken before they are handed on
 GATHER_S: Final = 0.05  # chosen: frames are left to gather in the kernel this long: few wake-ups
 RECEIVE_BUFFER_BYTES: Final = 4 << 20  # chosen: for what comes while this process does not get the processor
-LONGEST: Final = 64  # bytes of a CAN FD frame, ISO 11898-1
 VIRTUAL_QUEUE_FRAMES: Final = 4096  # chosen: an in-process sender waits when it is full
 PAUSE_S: Final = 5.0  # chosen: between two stamps: longer than any message's period, shorter than what ends a drive
 MOST_OFF_S: Final = 10.0  # chosen: more than an adapter drifts in a day (50 ppm: 4 s) and than a computer stalls
@@ -155,7 +154,7 @@ class Receiver:
             if message.is_error_frame:
                 n_errors += 1
                 is_bus_off |= self._has_error_classes and bool(message.arbitration_id & _BUS_OFF)
-            elif not _is_possible(message):
+            elif not has_possible_id(message) or len(message.data) > CAN_FD_BYTES:  # read in noise
                 n_errors += 1
             elif message.is_remote_frame:
                 n_remote += 1
@@ -183,13 +182,6 @@ class Receiver:
 
     def close(self) -> None:
         self._bus.shutdown()
-
-
-def _is_possible(message: can.Message) -> bool:
-    """Whether a CAN bus can carry it. python-can's code for most adapters passes on what it has read in noise."""
-    last = LAST_EXTENDED if message.is_extended_id else LAST_STANDARD
-    is_number = isinstance(message.arbitration_id, int)
-    return is_number and 0 <= message.arbitration_id <= last and len(message.data) <= LONGEST
 
 
 def open_channel(

@@ -100,6 +100,10 @@ MAPPED = {
     "a name of a value that is no number": ("VAL_ 512 State 1", "VAL_ 512 State x", "syntax"),
     "a billion bits": ("48|8@", "48|1000000000@", "'State' is longer than any message"),
     "33 bits": ("BO_ 512 BOX", "BO_ 4294967296 BOX", "no identifier"),
+    "65 bytes": ("BO_ 512 BOX: 8", "BO_ 512 BOX: 65", "'BOX', which has 65 bytes"),
+    "a place before the first bit": ("State : 48|", "State : -1|", "'State' begins at bit -1"),
+    "an infinite scale": ("16@1- (0.001,0)", "16@1- (1e999,0)", "'Accel' has scale inf and offset"),
+    "an infinite offset": ("16@1- (0.001,0)", "16@1- (1,-1e999)", "'Accel' has scale .* and offset -inf"),
     "the same name twice": (OTHER, OTHER.replace("OTHER", "BOX"), "'BOX' is twice in a.dbc"),
     "a wide range": (
         TAIL, f"{TAIL}SG_MUL_VAL_ 512 Accel State 0-65536;\n", "more than 65,536 multiplexer values"
@@ -126,7 +130,7 @@ def test_a_fault_of_a_mapped_message_is_refused_with_its_place(kind: str, tmp_pa
     with pytest.raises(SignalMapError, match=said) as refusal:
         load_signal_map(write(tmp_path, text.replace(old, new)))
     assert str(refusal.value).startswith(f"{tmp_path / 'a.toml'}: ")
-    assert re.search("line 9|twice|itself", str(refusal.value))
+    assert re.search(r"line 9|twice|itself|correct a\.dbc", str(refusal.value))
 
 
 SOUND = HEAD + BOX + TAIL + 'CM_ "the rest is of no message";\n'

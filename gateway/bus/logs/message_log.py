@@ -15,7 +15,7 @@ from typing import Any, BinaryIO, ClassVar, Final
 import can
 from can.io import blf
 
-from gateway.bus.frames import LAST_EXTENDED, LAST_SECOND, LAST_STANDARD, ExactStamp, frames_of, message_id, stamp_to_ns
+from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of, has_possible_id, message_id, stamp_to_ns
 from gateway.bus.logs.packed import is_packed, open_log_file, unpacked_path, unpacked_suffix
 from gateway.bus.logs.report import SHOWN_CHARS, LogReject, LogReport, Selection
 from gateway.bus.logs.wall_clock import date_in, days_since_1899
@@ -61,8 +61,7 @@ def _ours(found: Iterator[Found], selection: Selection) -> Iterator[can.Message]
             report.error_frames += 1
             continue
         report.frames += 1
-        last = LAST_EXTENDED if message.is_extended_id else LAST_STANDARD
-        if not isinstance(message.arbitration_id, int) or not 0 <= message.arbitration_id <= last:
+        if not has_possible_id(message):
             report.reject(LogReject.BAD_ID, line)
             continue
         can_id = message_id(message)
