@@ -158,15 +158,12 @@ class IioDevice:
                 [self._text(f"in_{kind}_{axis}_{what}", f"in_{kind}_{what}") or default for axis in "xyz"], float
             )
 
-        return told("offset", "0"), self._turn @ self._mount(kind) * told("scale", "1")
-
-    def _mount(self, kind: str) -> F64:
-        """The mount matrix (3, 3); the identity if the driver has none. Raises ConfigurationError."""
         text = self._text(f"in_{kind}_mount_matrix", "in_mount_matrix") or "1,0,0;0,1,0;0,0,1"
         try:
-            return np.array([float(x) for row in text.split(";") for x in row.split(",")]).reshape(3, 3)
+            mount = np.array([float(x) for row in text.split(";") for x in row.split(",")]).reshape(3, 3)
         except ValueError:
             raise ConfigurationError(f"{self.folder}: mount matrix is {text!r}, which is no 3 by 3 numbers") from None
+        return told("offset", "0"), self._turn @ mount * told("scale", "1")
 
     def _lay_out(self, enabled: Iterable[str]) -> None:
         """The scan as an aligned structure: every enabled channel in the order of its index."""

@@ -6,7 +6,7 @@ from typing import Final, Literal
 import can
 import numpy as np
 
-from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
+from gateway.records import EXTENDED_ID, I64, Bool, Frames
 from gateway.units import NS_PER_S
 
 LAST_STANDARD: Final = 0x7FF  # ISO 11898-1: 11 bits
@@ -121,14 +121,6 @@ def frames_of(messages: Sequence[can.Message], width: int) -> Frames:
         np.array([len(message.data) for message in messages], np.uint8),
         np.frombuffer(rows, np.uint8).reshape(-1, width),
     )
-
-
-def payload_rows(content: U8, n_bytes: I64 | U8, width: int) -> U8:
-    """Rows of ``width`` bytes of contents (n, m): the first ``n_bytes`` (n,) of each, and zeros."""
-    rows = np.zeros((len(content), width), np.uint8)
-    kept = min(width, content.shape[1])
-    np.copyto(rows[:, :kept], content[:, :kept], where=np.arange(kept) < n_bytes[:, None])
-    return rows
 
 
 def message_of(frames: Frames, row: int) -> can.Message:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from gateway.bus.frames import LAST_SECOND, join, payload_rows, take
+from gateway.bus.frames import LAST_SECOND, join, take
 from gateway.bus.logs.packed import unpacked_path
 from gateway.bus.logs.report import LogReject, Selection
 from gateway.errors import LogUnreadableError, ReaderMissingError
@@ -109,7 +109,9 @@ def _frames(
             columns["DataLength"][rows] if "DataLength" in columns else _LENGTHS[np.minimum(columns["DLC"][rows], 15)]
         )
         length = np.minimum(length, data.shape[1]).astype(np.uint8)
-        yield Frames(t_ns, can_id[rows], length, payload_rows(data, length, selection.width))
+        payload, kept = np.zeros((len(rows), selection.width), np.uint8), min(selection.width, data.shape[1])
+        np.copyto(payload[:, :kept], data[:, :kept], where=np.arange(kept) < length[:, None])
+        yield Frames(t_ns, can_id[rows], length, payload)
 
 
 def _in_order_of_time(tables: Sequence[Iterator[Frames]], width: int) -> Iterator[Frames]:

@@ -27,6 +27,7 @@ CHUNK_FRAMES: Final = 32_768  # chosen: given out at once: large enough that the
 SHOWN_CHARS: Final = 60  # chosen: of a line that cannot be read
 AS_CANDUMP: Final = "candump logs are recorded with candump -L"
 JUDGED_FRAMES: Final = 1000  # chosen: least number whose stamps are judged
+JUDGED_SECONDS: Final = 3.0  # chosen: likewise, before the end of the log is reached
 WHOLE_PER_S: Final = 10.0  # chosen: more frames a second all on whole seconds are no coincidence
 STEP_BACK_S: Final = 1.0  # chosen: further than frames of several buffers are out of order
 LEAP_S: Final = 43_200.0  # chosen: a longer pause within a log gets a remark
@@ -256,7 +257,7 @@ class LogReport:
             late = f"{late_h:.1f} h after the date of its header, {iso_utc(self.start_ns or 0)}"
             yield f"{self.path}: its first frame comes {late}: do its stamps count from another instant?"
 
-    def _why_no_times(self) -> str | None:
+    def why_no_times(self) -> str | None:
         """Why the stamps of the wanted frames cannot be their times; None if they can."""
         if self.wanted < JUDGED_FRAMES:
             return None
@@ -293,7 +294,7 @@ class LogReport:
 
     def _why_unusable(self) -> str | None:
         if self.wanted:
-            return self._why_no_times()
+            return self.why_no_times()
         if self.other_channel:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
             return f"the mapped frames are on {seen} only; correct channel in the signal map"
@@ -310,18 +311,6 @@ class LogReport:
         else:
             what = "no CAN frame" + (f" ({self.ended_early})" if self.ended_early else "")
         return f"holds {what}"
-
-
-def is_same_channel(recorded: object, wanted: str | None) -> bool:
-    """Whether a recorded channel is the wanted one.
-
-    A number, as python-can counts channels, matches a name that ends in it (1 and "can1"). A format that
-    keeps no channel (.csv, .db) matches every name.
-    """
-    if wanted is None or recorded is None or str(recorded) == wanted:
-        return True
-    digits = re.search(r"\d+$", wanted)
-    return isinstance(recorded, int) and digits is not None and int(digits[0]) == recorded
 
 
 @dataclass(frozen=True, slots=True)
@@ -349,18 +338,29 @@ class Selection:
         return passes
 
     def has(self, channel: object, n_frames: int) -> bool:
-        """Whether frames of this channel are wanted; if not, they are counted. None: the format keeps no channel."""
+        """Whether frames of this channel are wanted; if not, they are counted.
+
+        A number, as python-can counts channels, is also that of a name that ends in it (1 and "can1"). None, of a
+        format that keeps no channel (.csv, .db), has every name.
+        """
         if channel is not None and n_frames and len(self.report.channels) < KEPT_CHANNELS:
             self.report.channels.add(str(channel))
-        if is_same_channel(channel, self.channel):
+        if channel is None or self.channel in (None, str(channel)):
             return True
-        self.report.other_channel += n_frames
-        return False
+        digits = re.search(r"\d+$", self.channel or "") if isinstance(channel, int) else None
+        is_wanted = digits is not None and int(digits[0]) == channel
+        self.report.other_channel += 0 if is_wanted else n_frames
+        return is_wanted
 
     def given_out(self, parts: Iterable[Frames], n: int = CHUNK_FRAMES) -> Iterator[Frames]:
-        """The frames in chunks of at least ``n``, each counted as it is given out."""
+        """The frames in chunks of at least ``n``, each counted as it is given out.
+
+        Raises LogUnreadableError once their stamps turn out to be no times, before they mislead anyone.
+        """
         for frames in gathered(parts, n, self.width):
             self.report.count_wanted(frames.t_ns)
+            if self.report.span_s >= JUDGED_SECONDS and (why := self.report.why_no_times()) is not None:
+                raise LogUnreadableError(f"{self.path}: {why}")
             yield frames
 
     def rows(self, can_id: U32, channel: I64 | None, is_remote: Bool | None = None) -> I64:
