@@ -9,6 +9,7 @@ import can
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
 from support.bus_drive import bus_drive
 from support.spoiled import Change, changed, changes, limits, refusal_of
 
@@ -194,6 +195,36 @@ def read(path: Path) -> None:
     require_all_counted(report)
     assert n_mapped == report.wanted <= n_all
     report.require_frames()
+
+
+ROWS: Final = {  # of a text log: what stands before its lines, between their cells, and a sound line
+    ".csv": ("timestamp,arbitration_id,extended,remote,error,dlc,data\n", ",", "1790000000.5,0x123,0,0,0,2,AQI="),
+    ".trc": (";$FILEVERSION=1.1\n", "  ", "     1)      500.0  Rx  0123  2  01 02"),
+}
+WORDS: Final = (
+    b'0 1 -1 1790000000.5 1) nan inf 1e400 0x123 FFFFFFFFFF AQI= = " 1,5 Rx DT 64 99999999999999999999'.split()
+)
+CELLS: Final = st.sampled_from([word.decode() for word in WORDS]) | st.text(
+    st.characters(exclude_categories=["Cs", "Zl", "Zp"], exclude_characters="\r\n;"), max_size=8
+)
+
+
+@pytest.mark.parametrize("kind", ROWS)
+@many
+@given(rows=st.lists(st.none() | st.lists(CELLS, max_size=9), max_size=20), end=st.sampled_from(["\n", "\r\n"]))
+def test_each_line_of_a_text_log_is_a_frame_or_counted(
+    kind: str, rows: list[list[str] | None], end: str, tmp_path: Path
+) -> None:
+    """None is a sound line: none is lost, whatever stands before and behind it."""
+    head, between, sound_line = ROWS[kind]
+    lines = [sound_line if row is None else between.join(row) for row in rows]
+    path = tmp_path / f"rows{kind}"
+    path.write_bytes((head + end.join(lines) + end).encode())
+    chunks, report = open_whole_log(path)
+    n_given = sum(map(len, chunks))
+    assert n_given >= rows.count(None)
+    assert n_given + sum(report.left_out.values()) == sum(bool(line.strip()) for line in lines)
+    require_all_counted(report)
 
 
 @pytest.mark.parametrize("kind", [".log", ".asc"])
