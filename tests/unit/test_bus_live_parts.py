@@ -1,4 +1,4 @@
-"""Around the live source: its inbox, adapters that send what their driver cannot read, and the survey of a bus."""
+"""Around the live source: its inbox, and adapters that send what their driver cannot read."""
 
 import threading
 

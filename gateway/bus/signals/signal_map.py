@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from importlib.resources import files
+from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Final, Literal
 from zoneinfo import ZoneInfo
@@ -296,11 +297,10 @@ def _mapped_message(
 
 
 def _require_distinct(messages: tuple[MappedMessage, ...], path: Path) -> None:
-    for i, one in enumerate(messages):
-        for other in messages[i + 1 :]:
-            common = one.id_filter.mask & other.id_filter.mask
-            if (one.id_filter.can_id ^ other.id_filter.can_id) & common == 0:
-                raise SignalMapError(
-                    f"{path}: messages {one.name!r} and {other.name!r} are the same frames on the bus; "
-                    "map all their signals from one of them, each or none with a source_address"
-                )
+    for one, other in combinations(messages, 2):
+        common = one.id_filter.mask & other.id_filter.mask
+        if (one.id_filter.can_id ^ other.id_filter.can_id) & common == 0:
+            raise SignalMapError(
+                f"{path}: messages {one.name!r} and {other.name!r} are the same frames on the bus; "
+                "map all their signals from one of them, each or none with a source_address"
+            )
