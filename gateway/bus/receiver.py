@@ -18,7 +18,7 @@ from typing import Any, Final
 import can
 
 from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of, has_possible_id
-from gateway.bus.signals import CAN_FD_BYTES, IdFilter
+from gateway.bus.signals.mapping import CAN_FD_BYTES, IdFilter
 from gateway.errors import BusError
 from gateway.records import EXTENDED_ID, FIRST_DATED_NS, Frames
 from gateway.units import NS_PER_S

@@ -15,8 +15,7 @@ from gateway.bus.logs import LogReport, write_candump
 from gateway.bus.logs.candump import _Finder, read_candump
 from gateway.bus.logs.candump_line import read_line
 from gateway.bus.logs.report import LogReject, Selection
-from gateway.bus.signals import EVERY_IDENTIFIER
-from gateway.bus.signals.mapping import exact_filter
+from gateway.bus.signals.mapping import EVERY_IDENTIFIER, exact_filter
 from gateway.records import EXTENDED_ID, Frames
 
 identifiers = st.one_of(st.integers(0, 0x7FF), st.integers(0, 0x1FFF_FFFF).map(lambda i: i | EXTENDED_ID))

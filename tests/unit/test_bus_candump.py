@@ -14,8 +14,7 @@ from gateway.bus.logs.candump import read_candump
 from gateway.bus.logs.open import open_whole_log
 from gateway.bus.logs.packed import open_log_file, unpacked_suffix, zstd
 from gateway.bus.logs.report import LogReject, Selection
-from gateway.bus.signals import IdFilter
-from gateway.bus.signals.mapping import exact_filter, j1939_filter
+from gateway.bus.signals.mapping import IdFilter, exact_filter, j1939_filter
 from gateway.errors import LogUnreadableError
 from gateway.records import EXTENDED_ID, Frames
 

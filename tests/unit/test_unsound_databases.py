@@ -11,7 +11,9 @@ from support.commands import called
 from support.paper_van import paper_van_config
 from support.ports import free_port
 
-from gateway.bus.signals import Databases, load_signal_map, shipped_databases, unsound_messages
+from gateway.bus.signals import load_signal_map
+from gateway.bus.signals.database import Databases
+from gateway.bus.signals.signal_map import shipped_databases, unsound_messages
 from gateway.errors import SignalMapError
 from gateway.records import Signal
 

@@ -15,7 +15,7 @@ from gateway.bus.frames import frames_of, in_order, take
 from gateway.bus.logs.candump_line import LineShape, learn_shape, read_line
 from gateway.bus.logs.packed import BLOCK_BYTES, LineBlock, line_blocks
 from gateway.bus.logs.report import SHOWN_CHARS, LogReject, LogReport, Selection
-from gateway.bus.signals import EVERY_IDENTIFIER, IdFilter
+from gateway.bus.signals.mapping import EVERY_IDENTIFIER, IdFilter
 from gateway.bus.text import OR_CP1252
 from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 

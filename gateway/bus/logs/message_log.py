@@ -19,7 +19,7 @@ from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of, has_possible_
 from gateway.bus.logs.packed import is_packed, open_log_file, unpacked_path, unpacked_suffix
 from gateway.bus.logs.report import SHOWN_CHARS, LogReject, LogReport, Selection
 from gateway.bus.logs.wall_clock import date_in, days_since_1899
-from gateway.bus.signals import CAN_FD_BYTES
+from gateway.bus.signals.mapping import CAN_FD_BYTES
 from gateway.bus.text import OR_CP1252
 from gateway.errors import LogUnreadableError
 from gateway.records import FIRST_DATED_NS, Frames

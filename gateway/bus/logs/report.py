@@ -13,8 +13,9 @@ import numpy as np
 
 from gateway.bus.frames import gathered
 from gateway.bus.logs.wall_clock import ns_since_1970
-from gateway.bus.signals import Decoder, IdFilter
+from gateway.bus.signals import Decoder
 from gateway.bus.signals.decode import TELLING_SHARE, Remark
+from gateway.bus.signals.mapping import IdFilter
 from gateway.errors import LogUnreadableError
 from gateway.records import FIRST_DATED_NS, I64, U32, Bool, Frames, iso_utc
 from gateway.units import NS_PER_S
