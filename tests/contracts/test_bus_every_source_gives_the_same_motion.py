@@ -13,7 +13,6 @@ from dataclasses import replace
 import can
 import numpy as np
 import pytest
-from support.databases import SomeMessage, SomeSignal, dbc
 from support.encoded import encode_signals
 from support.patience import PATIENCE_S
 
@@ -150,8 +149,9 @@ def test_every_log_format_gives_the_same_motion(suffix, tmp_path, drive, truth, 
 
 @pytest.mark.parametrize("suffix", [".log", ".log.xz", ".asc", ".blf", ".mf4"])
 def test_can_fd_frames_give_the_same_motion(suffix, tmp_path):
-    signals = [SomeSignal("Accel", 320, 16, "m/s^2", 0.001, is_signed=True, minimum=-30.0, maximum=30.0)]
-    (tmp_path / "wide.dbc").write_text(dbc([SomeMessage("WIDE", 0x300, 64, signals)]))
+    (tmp_path / "wide.dbc").write_text(
+        'VERSION ""\nBU_: A\nBO_ 768 WIDE: 64 A\n SG_ Accel : 320|16@1- (0.001,0) [-30|30] "m/s^2" A\n'
+    )
     (tmp_path / "map.toml").write_text(
         'dbc = ["wide.dbc"]\n[signals.vertical_acceleration]\nmessage = "WIDE"\nsignal = "Accel"\n'
     )

@@ -174,7 +174,7 @@ class _CsvLog(_TextLog):
     """python-can's table. Its first line names the columns."""
 
     reader = can.CSVReader
-    header_form = re.compile("(?!)")
+    header_form = re.compile("(?!)")  # none but the first, which is read as it comes
     COLUMNS: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 
     def frame_in(self, line: str) -> str | None:
@@ -183,7 +183,7 @@ class _CsvLog(_TextLog):
         if line.strip().lower() != self.COLUMNS:
             raise LogUnreadableError(
                 f"{self.report.path}: line {self.report.lines}: the table is not python-can's, whose columns are "
-                f"{self.COLUMNS}; it has {line.strip()[:SHOWN_CHARS]!r}: save it there as a candump log"
+                f"{self.COLUMNS}; it has {line.strip()[:SHOWN_CHARS]!r}: save it as a candump log"
             )
         self.header["columns"] = line
         return None
