@@ -140,8 +140,7 @@ class _MessageReader:
         self.n_frames += len(ours)
         has_length = length == self.mapped.length
         if not has_length.all():
-            n_of_length = np.bincount(length[~has_length])
-            self._wrong_lengths.update({int(n): int(n_of_length[n]) for n in n_of_length.nonzero()[0]})
+            self._wrong_lengths.update(length[~has_length].tolist())
             payload, ours, can_id = payload[has_length], ours[has_length], can_id[has_length]
             for reader in self.readers:
                 reader.rejected[Rejected.WRONG_LENGTH] += int(np.count_nonzero(~has_length))
