@@ -56,7 +56,6 @@ class BusStatus(_Told):
     n_clock_sets: int = Field(
         0, description="times the system's clock dated the stamps of an adapter that counts from its own start"
     )
-    n_clock_wraps: int = Field(0, description="times such an adapter's 32-bit counter began again and was continued")
     last_frame_age_s: float | None = None
     last_fault: str | None = None
 

@@ -13,7 +13,6 @@ import numpy as np
 from scipy import signal as filters
 
 from gateway.bus.signals import SignalMap
-from gateway.bus.signals.encode import physical_bits, put_bits
 from gateway.bus.signals.mapping import MappedSignal
 from gateway.records import F64, I64, Frames, Signal
 from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
@@ -54,14 +53,14 @@ class Log:
     def showing(self, signal: Signal, samples: F64) -> "Log":
         """The same drive with these samples (k,), clipped to the range of the bits."""
         mapped, _ = self.mapped(signal)
-        return self.sending(signal, physical_bits(mapped.field, samples / mapped.to_si))
+        return self.sending(signal, mapped.field.bits_of(samples / mapped.to_si))
 
     def sending(self, signal: Signal, bits: np.ndarray) -> "Log":
         """The same drive with these raw bits (k,)."""
         mapped, rows = self.mapped(signal)
         payload = self.frames.payload.copy()
         touched = payload[rows]
-        put_bits(touched, mapped.field, bits)
+        mapped.field.put(touched, bits)
         payload[rows] = touched
         return replace(self, frames=replace(self.frames, payload=payload))
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from gateway.bus.frames import empty_frames, take
-from gateway.bus.live.receiver import Burst
+from gateway.bus.receiver import Burst
 from gateway.records import Frames
 from gateway.units import NS_PER_S
 

@@ -12,12 +12,14 @@ import subprocess
 import threading
 import time
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from can.interfaces.socketcan import socketcan
 
 from benchmarks.speed.meter import command_of, in_own_process, peak_mb
-from gateway.bus.live.source import LiveSource, opener_of
+from gateway.bus.listen import LiveSource
+from gateway.bus.receiver import open_channel
 from gateway.bus.signals import Decoder, load_signal_map
 
 OURS_SHARE = 0.084  # of the frames on the bus: two IMU messages at 100 Hz, GNSS at 10 Hz
@@ -65,7 +67,9 @@ def listening_socket() -> socket.socket:
 def receive(is_over: threading.Event) -> dict[str, Any]:
     """LiveSource and the decoder, as the service runs them, until the event is set."""
     signal_map = load_signal_map("springscale:reference")
-    source = LiveSource("socketcan", "bench", signal_map, open_receiver=opener_of("socketcan", "bench", (), 8, {}))
+    source = LiveSource(
+        "socketcan", "bench", signal_map, open_receiver=partial(open_channel, "socketcan", "bench", (), 8, {})
+    )
     decoder = Decoder(signal_map)
     source.start()
     n_rows = 0

@@ -14,6 +14,7 @@ import subprocess
 import tempfile
 import time
 import urllib.request
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,7 +22,7 @@ from benchmarks.speed.live import listening_socket
 from benchmarks.speed.meter import CALIBRATION, ENVIRONMENT, command_of, cpu_of_s, in_own_process, peak_mb
 from benchmarks.speed.start import SETTINGS
 from gateway.allocator import keep_freed_memory
-from gateway.bus.live.source import opener_of
+from gateway.bus.receiver import open_channel
 from gateway.config import load_settings
 from gateway.service.gateway import Gateway
 from gateway.setup import setup_of
@@ -39,7 +40,7 @@ def serve(folder: str) -> None:
     def on_started(gateway: Gateway) -> None:
         print(json.dumps({"port": wire.getsockname()[1], "url": gateway.url}), flush=True)
 
-    opener = opener_of("socketcan", "bench", (), 8, {})
+    opener = partial(open_channel, "socketcan", "bench", (), 8, {})
     Gateway(settings, setup_of(settings), on_started=on_started, open_receiver=opener).run()
 
 

@@ -16,7 +16,7 @@ import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from benchmarks.speed.endless_drive import EndlessDrive
 from benchmarks.speed.meter import CALIBRATION, print_and_write
@@ -126,7 +126,7 @@ def soak(hours_a_day: float, n_days: int) -> list[dict[str, float]]:
                 faults.append(fault)
             service.stop()
 
-        while live(settings, on_started=on_started, open_receiver=lambda: week):
+        while live(settings, on_started=on_started, open_receiver=lambda: cast(Any, week)):
             pass
     if faults:
         raise faults[0]

@@ -24,7 +24,8 @@ import uvloop
 
 from benchmarks.speed import live
 from benchmarks.speed.meter import command_of, free_port
-from gateway.bus.live.source import LiveSource, opener_of
+from gateway.bus.listen import LiveSource
+from gateway.bus.receiver import open_channel
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.core.settings import BatchSettings
 from gateway.estimate import Estimate, Quantity
@@ -67,7 +68,9 @@ def serve(directory: str, port: int) -> None:
     store, board = Store.open(Path(directory)), Board()
     signal_map = load_signal_map("springscale:reference")
     wire = live.listening_socket()
-    source = LiveSource("socketcan", "bench", signal_map, open_receiver=opener_of("socketcan", "bench", (), 8, {}))
+    source = LiveSource(
+        "socketcan", "bench", signal_map, open_receiver=partial(open_channel, "socketcan", "bench", (), 8, {})
+    )
     flow = Flow(BatchSettings(), signal_map.traits, None, "cross_spectrum", Identity())
     pipeline = Pipeline(source.inbox, Decoder(signal_map), flow, store, board)
     source.start()

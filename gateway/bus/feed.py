@@ -1,7 +1,8 @@
 """Sends the readings of an inertial unit of Linux IIO and of a receiver behind gpsd as CAN frames.
 
-The frames are those of dbc/springscale_reference.dbc, so the pipeline behind the bus is the same. A thread reads each
-sensor, another sends, with a bounded queue between them.
+The frames are those of dbc/springscale_reference.dbc, so the pipeline behind the bus is the same. One loop waits for
+the sensors and sends; the kernel's buffers hold the samples meanwhile. What comes while there is no bus is dropped and
+counted: a kernel bus stamps at arrival, and old samples would have wrong times.
 
 Kernel, Documentation/ABI/testing/sysfs-bus-iio and driver-api/iio/buffers.rst: scan_elements say which channels a scan
 contains, in which order (_index) and how ([be|le]:[s|u]bits/storagebits[>>shift], _type); each is aligned to its own
@@ -12,8 +13,8 @@ have ``device``, the receiver's path.
 
 import contextlib
 import json
+import math
 import os
-import queue
 import re
 import select
 import socket
@@ -39,9 +40,8 @@ BUFFER_SCANS: Final = 512  # chosen: five seconds at 100 Hz: longer than a compu
 MOST_SCANS: Final = 256  # chosen: of one read
 READ_S: Final = 0.5  # chosen: longest wait for a sensor: how soon a stop takes effect
 HEAP_S: Final = 0.04  # chosen: length of a burst: a fifth of the work; the counter restores the samples' times
-QUEUE: Final = 500  # chosen: bursts: ten seconds of two sensors
 RETRY_S: Final = 2.0  # chosen: pause after a fault of the bus or of gpsd
-CONNECT_S: Final = 3.0  # chosen: gpsd is on this computer or near
+CONNECT_S: Final = 1.0  # chosen: gpsd is on this computer or near
 RECEIVER_LOST_S: Final = 60.0
 """Chosen: without a speed, longer than in a tunnel. A receiver that is unplugged and plugged in has another path."""
 LONGEST_LINE: Final = 1 << 16  # chosen: far longer than a report of gpsd
@@ -117,18 +117,19 @@ class IioDevice:
         with contextlib.suppress(OSError):
             self._write({"buffer/enable": "0"})
 
-    def read(self, timeout_s: float) -> Samples | None:
-        """The samples since the last read; None if there are none. Raises BusError at the device's end."""
-        if not select.select([self._file], [], [], timeout_s)[0]:
-            return None
+    def fileno(self) -> int:
+        return self._file
+
+    def read(self) -> Samples | None:
+        """The samples since the last read; None if there are none. Raises DeviceGoneError."""
         try:
             got = os.read(self._file, self._scan.itemsize * MOST_SCANS)
         except BlockingIOError:
             return None
         except OSError as fault:
-            raise BusError(f"{self._node}: {fault.strerror or fault}") from None
+            raise DeviceGoneError(f"{self._node}: {fault.strerror or fault}") from None
         if not got:
-            raise BusError(f"{self._node}: the device is gone")
+            raise DeviceGoneError(f"{self._node}: the device is gone")
         whole = self._rest + got
         n_bytes = len(whole) // self._scan.itemsize * self._scan.itemsize
         self._rest = whole[n_bytes:]
@@ -157,15 +158,12 @@ class IioDevice:
                 [self._text(f"in_{kind}_{axis}_{what}", f"in_{kind}_{what}") or default for axis in "xyz"], float
             )
 
-        return told("offset", "0"), self._turn @ self._mount(kind) * told("scale", "1")
-
-    def _mount(self, kind: str) -> F64:
-        """The mount matrix (3, 3); the identity if the driver has none. Raises ConfigurationError."""
         text = self._text(f"in_{kind}_mount_matrix", "in_mount_matrix") or "1,0,0;0,1,0;0,0,1"
         try:
-            return np.array([float(x) for row in text.split(";") for x in row.split(",")]).reshape(3, 3)
+            mount = np.array([float(x) for row in text.split(";") for x in row.split(",")]).reshape(3, 3)
         except ValueError:
             raise ConfigurationError(f"{self.folder}: mount matrix is {text!r}, which is no 3 by 3 numbers") from None
+        return told("offset", "0"), self._turn @ mount * told("scale", "1")
 
     def _lay_out(self, enabled: Iterable[str]) -> None:
         """The scan as an aligned structure: every enabled channel in the order of its index."""
@@ -224,24 +222,24 @@ class Gpsd:
         self.name = f"gpsd {host}:{port}"
         self.device = device  # the receiver that counts; None: none yet
         self.n_left_out: Counter[str] = Counter()
-        self._is_chosen, self._last_speed_s = device is not None, 0.0
+        self._is_chosen, self._last_speed_s = device is not None, -math.inf
         self._address = (host, port)
         self._socket: socket.socket | None = None
         self._rest = b""
         self._n_satellites = 0
 
-    def read(self, timeout_s: float) -> list[Rows]:
-        """Fixes that came within ``timeout_s``. Raises BusError if gpsd does not answer or hangs up."""
+    def fileno(self) -> int:
+        """That of the connection; -1 while there is none."""
+        return -1 if self._socket is None else self._socket.fileno()
+
+    def read(self) -> list[Rows]:
+        """The fixes that have come; of a new connection none. Raises BusError if gpsd does not answer or hangs up."""
         try:
             if self._socket is None:
                 self._socket = socket.create_connection(self._address, CONNECT_S)
                 self._socket.sendall(b'?WATCH={"enable":true,"json":true}\n')
-            self._socket.settimeout(timeout_s)
+                return []
             got = self._socket.recv(65_536)
-        except TimeoutError:
-            if self._socket is None:
-                raise BusError(f"{self.name}: does not answer") from None
-            return []
         except (OSError, UnicodeError) as fault:  # UnicodeError: a name that the domain name system cannot have
             self.close()
             raise BusError(f"{self.name}: {getattr(fault, 'strerror', None) or fault}") from None
@@ -281,10 +279,9 @@ class Gpsd:
     def _counts(self, device: str, *, has_speed: bool) -> bool:
         """Whether the reports of this receiver count; if not, this one is counted as left out."""
         now_s = time.monotonic()
-        is_lost = not self._is_chosen and now_s - self._last_speed_s > RECEIVER_LOST_S
-        if has_speed and (self.device is None or is_lost):
+        if has_speed and not self._is_chosen and now_s - self._last_speed_s > RECEIVER_LOST_S:
             self.device = device
-        if device == self.device and has_speed:
+        if has_speed and device == self.device:
             self._last_speed_s = now_s
         if self.device not in (None, device):
             self.n_left_out[device] += 1
@@ -297,17 +294,25 @@ def _within(told: Any, least: float, most: float) -> float | None:
 
 @dataclass
 class FeedState:
-    """Counts since the start, each written by one thread; faults by sensor."""
+    """Counts since the start; faults of the bus and of gpsd."""
 
     n_samples: dict[str, int] = field(default_factory=dict)
     n_lost: dict[str, int] = field(default_factory=dict)
     n_fixes: int = 0
     n_left_out: dict[str, int] = field(default_factory=dict)  # reports of other receivers, by device
+    n_read: int = 0  # frames
     n_sent: int = 0
-    n_dropped: int = 0
     last_sample_s: float = 0.0
     gravity_mps2: float = float("nan")
     faults: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def n_dropped(self) -> int:
+        return self.n_read - self.n_sent
+
+
+class DeviceGoneError(BusError):
+    """A device has disappeared."""
 
 
 class Numbering:
@@ -333,7 +338,7 @@ class Numbering:
 
 
 class Feeder:
-    """Feeds until :meth:`stop`. A failing bus or gpsd is retried; a device that disappears ends the feeding."""
+    """Feeds until :meth:`stop`. A failing bus or gpsd is tried again; a device that disappears ends the feeding."""
 
     def __init__(
         self, interface: str, channel: str, devices: Sequence[IioDevice], gps: Gpsd | None,
@@ -342,63 +347,54 @@ class Feeder:
         self.state = FeedState()
         self._place, self._devices, self._gps, self._say = (interface, channel), devices, gps, say
         self._encoder = Encoder(load_signal_map(f"{SHIPPED_PREFIX}reference"))
-        self._queue: queue.Queue[Frames] = queue.Queue(QUEUE)
+        self._numbering: dict[str, Numbering] = {}
+        self._next_try_s: dict[str, float] = {}
         self._stopping = threading.Event()
-        self._ended: BusError | None = None
 
     def stop(self) -> None:
         self._stopping.set()
 
     def run(self, on_tick: Callable[[FeedState], None] = lambda state: None) -> None:
-        """Feed; on_tick about twice a second. Raises BusError if a device cannot be opened or has gone."""
-        threads = [threading.Thread(target=self._read_imu, args=(each,), name=each.name) for each in self._devices]
-        threads += [threading.Thread(target=self._read_gps, args=(self._gps,), name="gpsd")] if self._gps else []
+        """Feed; on_tick at least twice a second. Raises BusError if a device cannot be opened or has gone."""
         with contextlib.ExitStack() as at_the_end:
+            at_the_end.enter_context(contextlib.closing(self._gps) if self._gps else contextlib.nullcontext())
             for device in self._devices:
                 at_the_end.callback(device.close)
                 device.open()
-            for thread in threads:
-                at_the_end.callback(thread.join)
-                thread.start()
-            at_the_end.callback(self._stopping.set)
+                self._numbering[device.name] = Numbering(device.rate_hz)
             while not self._stopping.is_set():
-                on_tick(self.state)
                 try:
                     with BusSink(*self._place) as sink:
                         while not self._stopping.is_set():
-                            self._send(sink)
                             on_tick(self.state)
+                            for frames in self._readings():
+                                sink.send(frames)
+                                self.state.n_sent += len(frames)
+                                self._note("bus", None)
+                except DeviceGoneError:
+                    raise
                 except BusError as fault:
                     self._note("bus", str(fault))
-                    self._stopping.wait(RETRY_S)
-        if self._ended is not None:
-            raise self._ended
+                while not self._may_try("bus") and not self._stopping.is_set():
+                    on_tick(self.state)
+                    for _ in self._readings():
+                        """What nobody can take is read, and dropped."""
 
-    def _send(self, sink: BusSink) -> None:
-        """Send queued frames for READ_S. Raises BusError if the bus fails."""
-        until_s = time.monotonic() + READ_S
-        with contextlib.suppress(queue.Empty):
-            while not self._stopping.is_set() and (left_s := until_s - time.monotonic()) > 0.0:
-                frames = self._queue.get(timeout=left_s)
-                sink.send(frames)
-                self.state.n_sent += len(frames)
-                self._note("bus", None)
+    def _readings(self) -> Iterator[Frames]:
+        """What the sensors have to say, waiting for it for READ_S at most."""
+        sources = [one for one in (*self._devices, self._gps) if one is not None and one.fileno() >= 0]
+        ready = select.select(sources, [], [], min(READ_S, RETRY_S))[0]
+        for device in self._devices:
+            if device in ready and (samples := device.read()) is not None:
+                yield self._inertial(device, samples)
+        if self._gps is not None and (self._gps in ready or (self._gps.fileno() < 0 and self._may_try(self._gps.name))):
+            yield from self._fixes(self._gps)
+        self._stopping.wait(HEAP_S if ready else 0.0)
 
-    def _read_imu(self, device: IioDevice) -> None:
-        numbering = Numbering(device.rate_hz)
-        try:
-            while not self._stopping.is_set():
-                if (samples := device.read(READ_S)) is not None:
-                    self._hand_on(self._inertial(device, samples, numbering))
-                    self._stopping.wait(HEAP_S)
-        except BusError as fault:
-            self._ended = fault
-            self._stopping.set()
-
-    def _inertial(self, device: IioDevice, samples: Samples, numbering: Numbering) -> Frames:
+    def _inertial(self, device: IioDevice, samples: Samples) -> Frames:
         """Frames of samples, and their counts. Without stamps of the kernel they are numbered one by one."""
         (t_ns, vectors_of), begun = samples, self.state.n_samples.get(device.name, 0)
-        n = len(t_ns)
+        n, numbering = len(t_ns), self._numbering[device.name]
         numbers = numbering.of(t_ns) if device.has_stamps else begun + np.arange(n)
         rows = {}
         for kind, vectors in vectors_of.items():
@@ -413,36 +409,38 @@ class Feeder:
         self.state.last_sample_s = time.monotonic()
         return self._encoded(t_ns, rows)
 
-    def _read_gps(self, gps: Gpsd) -> None:
-        while not self._stopping.is_set():
-            try:
-                for rows in gps.read(READ_S):
-                    columns = {name: {k: np.array([x]) for k, x in row.items()} for name, row in rows.items()}
-                    self._hand_on(self._encoded(np.array([time.time_ns()], np.int64), columns))
-                    self.state.n_fixes += rows["GPS_SPEED"]["Fix"] > 0.0
-                for other in gps.n_left_out.keys() - self.state.n_left_out.keys():
-                    self._say(f"{gps.name}: {other} is left out: {gps.device} counts; choose one by --gps-device")
-                self.state.n_left_out = dict(gps.n_left_out)
-                self._note(gps.name, None)
-            except BusError as fault:
-                self._note(gps.name, str(fault))
-                self._stopping.wait(RETRY_S)
-        gps.close()
+    def _fixes(self, gps: Gpsd) -> Iterator[Frames]:
+        was_open = gps.fileno() >= 0
+        try:
+            fixes = gps.read()
+        except BusError as fault:
+            self._note(gps.name, str(fault))
+            return
+        if was_open:
+            self._note(gps.name, None)
+        for rows in fixes:
+            columns = {name: {k: np.array([x]) for k, x in row.items()} for name, row in rows.items()}
+            self.state.n_fixes += rows["GPS_SPEED"]["Fix"] > 0.0
+            yield self._encoded(np.array([time.time_ns()], np.int64), columns)
+        for other in gps.n_left_out.keys() - self.state.n_left_out.keys():
+            self._say(f"{gps.name}: {other} is left out: {gps.device} counts; choose one by --gps-device")
+        self.state.n_left_out = dict(gps.n_left_out)
 
     def _encoded(self, t_ns: I64, rows: dict[str, dict[str, F64]]) -> Frames:
-        return merge_frames([self._encoder.encode(name, t_ns, columns) for name, columns in rows.items()])
+        frames = merge_frames([self._encoder.encode(name, t_ns, columns) for name, columns in rows.items()])
+        self.state.n_read += len(frames)
+        return frames
 
-    def _hand_on(self, frames: Frames) -> None:
-        try:
-            self._queue.put_nowait(frames)
-        except queue.Full:
-            self.state.n_dropped += len(frames)
+    def _may_try(self, what: str) -> bool:
+        """Whether the pause after the last fault is over."""
+        return time.monotonic() >= self._next_try_s.get(what, 0.0)
 
     def _note(self, what: str, fault: str | None) -> None:
-        """Log a fault, and its end, once."""
+        """Log a fault, and its end, once; after a fault a pause begins."""
         if fault != self.state.faults.get(what):
             self._say(fault or f"{what}: works again")
         if fault is None:
             self.state.faults.pop(what, None)
         else:
             self.state.faults[what] = fault
+            self._next_try_s[what] = time.monotonic() + RETRY_S

@@ -6,7 +6,7 @@ from typing import Final, Literal
 import can
 import numpy as np
 
-from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
+from gateway.records import EXTENDED_ID, I64, Bool, Frames
 from gateway.units import NS_PER_S
 
 LAST_STANDARD: Final = 0x7FF  # ISO 11898-1: 11 bits
@@ -104,6 +104,12 @@ def message_id(message: can.Message) -> int:
     return message.arbitration_id | (EXTENDED_ID if message.is_extended_id else 0)
 
 
+def has_possible_id(message: can.Message) -> bool:
+    """Whether a CAN bus can carry its identifier. python-can passes on whatever a file or an adapter says."""
+    last = LAST_EXTENDED if message.is_extended_id else LAST_STANDARD
+    return isinstance(message.arbitration_id, int) and 0 <= message.arbitration_id <= last
+
+
 def frames_of(messages: Sequence[can.Message], width: int) -> Frames:
     """Data messages as columns, in the order given. Bytes beyond ``width`` are cut off; the length stays true."""
     if not messages:
@@ -115,14 +121,6 @@ def frames_of(messages: Sequence[can.Message], width: int) -> Frames:
         np.array([len(message.data) for message in messages], np.uint8),
         np.frombuffer(rows, np.uint8).reshape(-1, width),
     )
-
-
-def payload_rows(content: U8, n_bytes: I64 | U8, width: int) -> U8:
-    """Rows of ``width`` bytes of contents (n, m): the first ``n_bytes`` (n,) of each, and zeros."""
-    rows = np.zeros((len(content), width), np.uint8)
-    kept = min(width, content.shape[1])
-    np.copyto(rows[:, :kept], content[:, :kept], where=np.arange(kept) < n_bytes[:, None])
-    return rows
 
 
 def message_of(frames: Frames, row: int) -> can.Message:

@@ -6,15 +6,14 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final
 
 import can
 
 from gateway.bus.frames import Speed, message_of, take
-from gateway.bus.live.python_can import require_usable_interface
-from gateway.bus.live.source import system_reason
+from gateway.bus.listen import system_reason
 from gateway.bus.logs import LogReport, open_whole_log
+from gateway.bus.receiver import require_usable_interface
 from gateway.errors import BusError
 from gateway.records import Frames
 from gateway.units import NS_PER_S
@@ -47,9 +46,7 @@ class BusSink(AbstractContextManager["BusSink"]):
         except (OSError, can.CanError) as fault:
             raise BusError(f"cannot send on {self._name}: {system_reason(fault, self._channel)}") from fault
 
-    def __exit__(
-        self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._bus.shutdown()
 
 
@@ -102,8 +99,9 @@ def replay_frames(
     for piece in _pieces(chunks):
         first_ns = int(piece.t_ns[0]) if first_ns is None else first_ns
         recorded_s = (int(piece.t_ns[0]) - first_ns) / NS_PER_S
-        if speed != "max":
-            _wait_until(begun_s + recorded_s / speed, stop)
+        due_s = begun_s if speed == "max" else begun_s + recorded_s / speed
+        while not stop.is_set() and (left_s := due_s - time.monotonic()) > 0:
+            stop.wait(min(left_s, LONGEST_SLEEP_S))
         if stop.is_set():
             break
         sink.send(piece)
@@ -122,8 +120,3 @@ def _pieces(chunks: Iterable[Frames]) -> Iterator[Frames]:
             if end == len(chunk) or millisecond[end] != millisecond[begin] or end - begin == PIECE_FRAMES:
                 yield take(chunk, slice(begin, end))
                 begin = end
-
-
-def _wait_until(due_s: float, stop: threading.Event) -> None:
-    while not stop.is_set() and (left_s := due_s - time.monotonic()) > 0:
-        stop.wait(min(left_s, LONGEST_SLEEP_S))

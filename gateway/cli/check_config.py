@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from gateway.bus.signals import unsound_messages
+from gateway.bus.signals.signal_map import unsound_messages
 from gateway.cli.options import FILE, Told, prints
 from gateway.config import Settings, load_settings
 from gateway.core.weights.limits import Limits

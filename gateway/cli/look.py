@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from gateway.bus.signals import DatabaseMessage
+from gateway.bus.signals.database import DatabaseMessage
 from gateway.cli.options import FILE, Told, prints
 from gateway.offline.look.draft import write_draft
 from gateway.offline.look.look import Described, Heard, Look, MapFit

@@ -10,7 +10,6 @@ from typing import Any
 import click
 
 from gateway.bus.frames import Speed
-from gateway.bus.live.python_can import usable_interfaces
 from gateway.config import ESTIMATOR_NAMES, BatchSection
 from gateway.core.settings import BatchSettings
 from gateway.records import json_line
@@ -110,7 +109,7 @@ def require_output_place(output: Path) -> None:
 interface = click.option(
     "--interface",
     required=True,
-    help=f"python-can's name; on this computer {', '.join(usable_interfaces())} (an adapter's wants its driver)",
+    help="python-can's name, such as socketcan, slcan or pcan",
 )
 channel = click.option("--channel", required=True, help="of that interface: can0, vcan0, ...")
 

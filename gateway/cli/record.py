@@ -12,7 +12,7 @@ from typing import BinaryIO, Final, cast
 import click
 
 from gateway.bus.frames import widened
-from gateway.bus.live.source import LiveSource
+from gateway.bus.listen import LiveSource
 from gateway.bus.logs.candump_write import append_candump
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.cli import options

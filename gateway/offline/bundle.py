@@ -26,7 +26,8 @@ from pydantic import Field
 from gateway.bus.frames import join, take
 from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
-from gateway.bus.signals import SHIPPED_PREFIX, Decoder, MappedMessage, SignalMap, load_signal_map
+from gateway.bus.signals import SHIPPED_PREFIX, Decoder, SignalMap, load_signal_map
+from gateway.bus.signals.mapping import MappedMessage
 from gateway.calibration.campaign import Campaign, RunTable, file_sha256, load_campaign
 from gateway.errors import CampaignError, ConfigurationError
 from gateway.files.whole import refusal_told, written_whole

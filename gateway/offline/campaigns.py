@@ -8,8 +8,9 @@ from typing import Final, Literal
 import numpy as np
 
 from gateway.bus.logs import LogReport, motion_of_log
-from gateway.bus.signals import Decoder, MappedMessage, SignalMap, id_name, load_signal_map
+from gateway.bus.signals import Decoder, SignalMap, load_signal_map
 from gateway.bus.signals.decode import SignalCounts
+from gateway.bus.signals.mapping import MappedMessage, id_name
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, OnRun, RunTable, chosen_runs, file_sha256
 from gateway.calibration.inspection.campaign import Inspection, inspect_drives

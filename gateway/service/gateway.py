@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from gateway.bus.live.source import OpenReceiver, SourceState
+from gateway.bus.listen import OpenReceiver, SourceState
 from gateway.bus.signals import Decoder
 from gateway.config import Settings
 from gateway.errors import SpringscaleError

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from gateway.bus.live.python_can import what_lacks
-from gateway.bus.live.source import OpenReceiver
+from gateway.bus.listen import OpenReceiver
+from gateway.bus.receiver import what_lacks
 from gateway.bus.signals.mapping import SignalMap
 from gateway.config import Settings
 from gateway.errors import ConfigurationError

@@ -5,7 +5,7 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
-from gateway.bus.live.source import LiveSource, OpenReceiver
+from gateway.bus.listen import LiveSource, OpenReceiver
 from gateway.bus.ring_log import RingLog
 from gateway.calibration.file import load_calibration
 from gateway.config import BusSection, Settings, StoreSection

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Final, ParamSpec
 
-from gateway.bus.live.receiver import Inbox
+from gateway.bus.listen import Inbox
 from gateway.bus.signals import Decoder
 from gateway.estimate import Estimate
 from gateway.log import Event, log_event

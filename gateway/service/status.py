@@ -7,7 +7,7 @@ from functools import partial
 from importlib.metadata import version
 from typing import Final
 
-from gateway.bus.live.source import LiveSource, SourceState
+from gateway.bus.listen import LiveSource, SourceState
 from gateway.bus.ring_log import RingLog
 from gateway.config import Settings
 from gateway.records import Signal
@@ -127,7 +127,6 @@ class StatusReport:
             n_inbox_dropped=counts.dropped_inbox,
             n_kernel_dropped=counts.dropped_kernel,
             n_clock_sets=counts.clock_sets,
-            n_clock_wraps=counts.clock_wraps,
             last_frame_age_s=min(ages, default=None),
             last_fault=self.source.reason,
         )

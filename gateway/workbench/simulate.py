@@ -17,7 +17,8 @@ import numpy as np
 
 from gateway.bus.frames import Speed, merge_frames
 from gateway.bus.logs import write_candump
-from gateway.bus.signals import SignalMapFile, shipped_map
+from gateway.bus.signals import shipped_map
+from gateway.bus.signals.signal_map import SignalMapFile
 from gateway.bus.sink import BusSink, OnProgress, replay_frames
 from gateway.errors import ConfigurationError, SignalMapError
 from gateway.records import F64, Frames

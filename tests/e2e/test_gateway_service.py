@@ -21,7 +21,7 @@ from support.ports import first_answer, free_port
 from support.process import running_service
 from support.running_service import Running, serve, stored
 
-from gateway.bus.live.source import SourceState
+from gateway.bus.listen import SourceState
 from gateway.bus.logs import write_candump
 from gateway.bus.sink import replay
 from gateway.cli import main

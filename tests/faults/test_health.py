@@ -15,9 +15,9 @@ from support.estimates import make_record
 from support.patience import PATIENCE_S, wait_until
 from support.small_broker import SmallBroker
 
-from gateway.bus.live import source as live_source
-from gateway.bus.live.python_can import PythonCanReceiver
-from gateway.bus.live.source import LiveSource, SourceState
+from gateway.bus import listen as live_source
+from gateway.bus.listen import LiveSource, SourceState
+from gateway.bus.receiver import Receiver
 from gateway.bus.signals import load_signal_map
 from gateway.part import BackOff
 from gateway.status import (
@@ -185,7 +185,7 @@ def test_a_burst_is_judged_by_the_order_of_its_frames_and_errors(what: str, inte
     with closing(near), closing(far):
         kernel_socket = near if interface == "socketcan" else None
         bus: Any = ScriptedBus(*messages)
-        with listening(PythonCanReceiver(bus, 8, kernel_socket, has_error_classes=True)) as source:
+        with listening(Receiver(bus, 8, kernel_socket, has_error_classes=True)) as source:
             assert wait_until(lambda: source.state is state)
             assert source.counts().error_frames == sum(message.is_error_frame for message in messages)
 
@@ -213,7 +213,7 @@ OTHERS: dict[str, tuple[list[can.Message | None], str]] = {  # None ends a burst
 def test_every_message_is_counted_and_a_bus_without_data_frames_says_what_it_carries(what: str) -> None:
     bursts, reason = OTHERS[what]
     messages, bus = [one for one in bursts if one], cast(Any, ScriptedBus(*bursts))
-    with listening(PythonCanReceiver(bus, 8)) as source:
+    with listening(Receiver(bus, 8)) as source:
         assert wait_until(lambda: source.state is SourceState.BUS_SILENT)
         counts = source.counts()
         assert (source.reason or "").endswith(reason)
@@ -238,7 +238,7 @@ IMPOSSIBLE: dict[str, dict[str, Any]] = {
 def test_a_message_that_no_bus_can_carry_is_counted_as_an_error(what: str) -> None:
     """python-can passes on what an adapter has read in noise; an identifier of 33 bits ended the service."""
     bus: Any = ScriptedBus(frame(), can.Message(timestamp=time.time(), **IMPOSSIBLE[what]), frame())
-    with listening(PythonCanReceiver(bus, 8)) as source:
+    with listening(Receiver(bus, 8)) as source:
         assert wait_until(lambda: source.counts().frames == 2)
         assert source.counts().error_frames == 1
 
@@ -248,7 +248,7 @@ def test_a_stamp_that_is_no_time_is_dated_by_the_system(stamp: Any) -> None:
     message = frame()
     message.timestamp = stamp
     bus: Any = ScriptedBus(message)
-    with listening(PythonCanReceiver(bus, 8)) as source:
+    with listening(Receiver(bus, 8)) as source:
         (t_ns,) = source.inbox.drain(PATIENCE_S).t_ns.tolist()
     assert abs(t_ns / 1e9 - time.time()) < PATIENCE_S
 
@@ -270,7 +270,7 @@ class NoisyBus(ScriptedBus):
 def test_any_exception_of_an_adapter_is_a_fault_and_the_bus_is_reopened(failure: Exception) -> None:
     """Any but two kinds of exception ended the service."""
     bus: Any = NoisyBus(failure)
-    with listening(PythonCanReceiver(bus, 8), silence_s=30.0) as source:
+    with listening(Receiver(bus, 8), silence_s=30.0) as source:
         assert wait_until(lambda: source.state is SourceState.READER_FAULT)
         assert "what the adapter sends cannot be read" in source.reason
         assert source.counts().frames == 1

@@ -13,8 +13,8 @@ from support.half_car_road import batch_over_road, weighed
 
 from gateway.archive.dataset import columns
 from gateway.archive.manifest import ManifestFile, VehicleEntry
-from gateway.bus.signals import SignalMapFile, load_signal_map
-from gateway.bus.signals.signal_map import SignalEntry, shipped_maps
+from gateway.bus.signals import load_signal_map
+from gateway.bus.signals.signal_map import SignalEntry, SignalMapFile, shipped_maps
 from gateway.calibration.campaign import CampaignTable, RunTable, load_campaign
 from gateway.calibration.file import load_calibration
 from gateway.core.vehicle import Vehicle

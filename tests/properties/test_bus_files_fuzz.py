@@ -6,19 +6,19 @@ from pathlib import Path
 from typing import Final
 
 import can
-import cantools
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from support.bus_drive import bus_drive
-from support.databases import SomeMessage, SomeSignal, arxml
 from support.spoiled import Change, changed, changes, limits, refusal_of
 
 from gateway.bus.frames import message_of, take
 from gateway.bus.logs import motion_of_log, open_whole_log, write_candump
 from gateway.bus.logs.report import LogReport
-from gateway.bus.signals import Databases, Decoder, load_signal_map, shipped_map, unsound_messages
+from gateway.bus.signals import Decoder, load_signal_map, shipped_map
+from gateway.bus.signals.database import Databases
+from gateway.bus.signals.signal_map import unsound_messages
 from gateway.cli.look import look_json, look_text
 from gateway.errors import ConfigurationError, LogUnreadableError, SignalMapError
 from gateway.offline.look.look import look
@@ -85,43 +85,6 @@ def test_a_dbc_of_any_content_is_read_or_refused_in_words(where: list[Change], t
     refused = refusal_of(SignalMapError, lambda: decode(tmp_path / "signals.toml"))
     assert refused is None or refused.startswith(str(tmp_path / "signals.toml"))
     assert refusal_of(SignalMapError, lambda: read_whole(path)) is None or refused is not None
-
-
-_PARSED: Final = cantools.database.load_file(REFERENCE.with_name("springscale_reference.dbc"), strict=False)
-_AXIS: Final = SomeSignal("AccelZ", 7, 16, "m/s^2", 0.001, is_signed=True, is_big_endian=True, minimum=-30.0)
-OTHERS: Final[dict[str, tuple[str, list[bytes]]]] = {
-    "kcd": (
-        _PARSED.as_kcd_string(),
-        [b'endianess="big"', b'type="double"', b'length="auto"', b'<MuxGroup count="4294967295">', b"&a;", b"<Value/>"],
-    ),
-    "sym": (
-        _PARSED.as_sym_string(),
-        [*b"Type=Extended Len=8 Mux=a -m /e:FixE string float double 7FFh-0h".split(), b'Enum=A(0="a")', b"raw 9999"],
-    ),
-    "arxml": (
-        arxml((SomeMessage("IMU", 0x120, 8, [_AXIS]),)),
-        [b"<LENGTH>1000000000</LENGTH>", b"<X/>", b"MOST-SIGNIFICANT-BYTE-FIRST", b"OPAQUE", b"</LENGTH>"],
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", OTHERS)
-@many
-@given(data=st.data())
-def test_another_database_of_any_content_is_read_or_refused_in_words(
-    kind: str, data: st.DataObject, tmp_path: Path
-) -> None:
-    content, words = OTHERS[kind]
-    path = tmp_path / f"a.{kind}"
-    path.write_bytes(changed(content.encode(), data.draw(changes(words))))
-    refused = refusal_of(SignalMapError, lambda: read_other(path))
-    assert refused is None or (refused.startswith(str(path)) and len(refused) < 1000)
-    assert "allocate" not in (refused or "")
-
-
-def read_other(path: Path) -> None:
-    found, _ = Databases(path, [path]).sound()
-    assert all(signal.limits for message in found for signal in message.signals.values())
 
 
 def read_whole(path: Path) -> None:
@@ -234,6 +197,36 @@ def read(path: Path) -> None:
     require_all_counted(report)
     assert n_mapped == report.wanted <= n_all
     report.require_frames()
+
+
+ROWS: Final = {  # of a text log: what stands before its lines, between their cells, and a sound line
+    ".csv": ("timestamp,arbitration_id,extended,remote,error,dlc,data\n", ",", "1790000000.5,0x123,0,0,0,2,AQI="),
+    ".trc": (";$FILEVERSION=1.1\n", "  ", "     1)      500.0  Rx  0123  2  01 02"),
+}
+WORDS: Final = (
+    b'0 1 -1 1790000000.5 1) nan inf 1e400 0x123 FFFFFFFFFF AQI= = " 1,5 Rx DT 64 99999999999999999999'.split()
+)
+CELLS: Final = st.sampled_from([word.decode() for word in WORDS]) | st.text(
+    st.characters(exclude_categories=["Cs", "Zl", "Zp"], exclude_characters="\r\n;"), max_size=8
+)
+
+
+@pytest.mark.parametrize("kind", ROWS)
+@many
+@given(rows=st.lists(st.none() | st.lists(CELLS, max_size=9), max_size=20), end=st.sampled_from(["\n", "\r\n"]))
+def test_each_line_of_a_text_log_is_a_frame_or_counted(
+    kind: str, rows: list[list[str] | None], end: str, tmp_path: Path
+) -> None:
+    """None is a sound line: none is lost, whatever stands before and behind it."""
+    head, between, sound_line = ROWS[kind]
+    lines = [sound_line if row is None else between.join(row) for row in rows]
+    path = tmp_path / f"rows{kind}"
+    path.write_bytes((head + end.join(lines) + end).encode())
+    chunks, report = open_whole_log(path)
+    n_given = sum(map(len, chunks))
+    assert n_given >= rows.count(None)
+    assert n_given + sum(report.left_out.values()) == sum(bool(line.strip()) for line in lines)
+    require_all_counted(report)
 
 
 @pytest.mark.parametrize("kind", [".log", ".asc"])

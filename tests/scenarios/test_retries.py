@@ -19,9 +19,9 @@ from support.ports import free_port
 from support.receiver import SECRET_TEXT, Receiver, cut, status
 
 from gateway.bus import feed
+from gateway.bus import listen as live
 from gateway.bus.feed import Feeder, Gpsd
-from gateway.bus.live import source as live
-from gateway.bus.live.source import LiveSource
+from gateway.bus.listen import LiveSource
 from gateway.bus.ring_log import RingLog
 from gateway.bus.signals import load_signal_map
 from gateway.log import LOGGER

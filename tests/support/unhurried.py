@@ -6,8 +6,7 @@ A stop that gives a thread one second, a sender that gives a full queue five: ri
 
 import pytest
 
-from gateway.bus import sink
-from gateway.bus.live import source
+from gateway.bus import listen, sink
 from gateway.bus.ring_log import RingLog
 from gateway.cli import main
 from gateway.cli import service as asked_service
@@ -18,12 +17,12 @@ from gateway.uplink.uplink import Uplink
 from support.patience import PATIENCE_S
 
 CONSTANTS = (
-    (source, "START_WAIT_S"),
+    (listen, "START_WAIT_S"),
     (sink, "SEND_TIMEOUT_S"),
     (asked_service, "TIMEOUT_S"),
     (link, "CONNECT_TIMEOUT_S"),
 )
-ONLY_DEFAULT = (source.LiveSource.stop, Pipeline.stop, RingLog.stop, Uplink.stop, Store.close, StoreReader.__init__)
+ONLY_DEFAULT = (listen.LiveSource.stop, Pipeline.stop, RingLog.stop, Uplink.stop, Store.close, StoreReader.__init__)
 
 
 def unhurry(patch: pytest.MonkeyPatch) -> None:

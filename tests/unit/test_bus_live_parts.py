@@ -1,4 +1,4 @@
-"""Around the live source: its inbox, adapters that send what their driver cannot read, and the survey of a bus."""
+"""Around the live source: its inbox, and adapters that send what their driver cannot read."""
 
 import threading
 
@@ -8,10 +8,9 @@ import pytest
 from support.encoded import frames_of
 from support.patience import PATIENCE_S, wait_until
 
-from gateway.bus.live import source as source_module
-from gateway.bus.live.python_can import PythonCanReceiver
-from gateway.bus.live.receiver import DRAINED_FRAMES, Inbox
-from gateway.bus.live.source import LiveSource, SourceState
+from gateway.bus import listen as source_module
+from gateway.bus.listen import DRAINED_FRAMES, Inbox, LiveSource, SourceState
+from gateway.bus.receiver import Receiver
 from gateway.bus.signals import load_signal_map
 
 
@@ -129,7 +128,7 @@ def message(number: int) -> can.Message:
 
 @pytest.mark.parametrize("fault", GARBLED, ids=lambda fault: type(fault).__name__)
 def test_what_came_before_a_fault_is_given_first(fault: Exception) -> None:
-    receiver = PythonCanReceiver(FakeBus(message(0), message(1), fault), 8)  # type: ignore[arg-type] # as much as is asked
+    receiver = Receiver(FakeBus(message(0), message(1), fault), 8)  # type: ignore[arg-type] # as much as is asked
     assert receiver.receive(0.0).frames.can_id.tolist() == [0x120, 0x121]
     with pytest.raises((can.CanError, OSError)):
         receiver.receive(0.0)
@@ -146,7 +145,7 @@ def test_an_adapter_that_garbles_a_line_is_opened_anew(fault: Exception, monkeyp
         "virtual",
         "garbled",
         signal_map,
-        open_receiver=lambda: PythonCanReceiver(next(opened), 8),  # type: ignore[arg-type] # as above
+        open_receiver=lambda: Receiver(next(opened), 8),  # type: ignore[arg-type] # as above
     )
     source.start()
     assert wait_until(lambda: source.counts().frames == 2)

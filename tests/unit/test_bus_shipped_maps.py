@@ -6,7 +6,8 @@ import struct
 import pytest
 from support.encoded import frames_of
 
-from gateway.bus.signals import CLASSIC_BYTES, Decoder, load_signal_map, shipped_map
+from gateway.bus.signals import Decoder, load_signal_map, shipped_map
+from gateway.bus.signals.mapping import CLASSIC_BYTES
 from gateway.bus.signals.signal_map import shipped_maps
 from gateway.records import EXTENDED_ID, Signal
 

@@ -10,10 +10,10 @@ from support.encoded import frames_of
 from support.log import logged, names
 from support.patience import PATIENCE_S, wait_until
 
+from gateway.bus import listen as source_module
 from gateway.bus.frames import empty_frames
-from gateway.bus.live import source as source_module
-from gateway.bus.live.receiver import Burst
-from gateway.bus.live.source import LiveSource, SourceState
+from gateway.bus.listen import LiveSource, SourceState
+from gateway.bus.receiver import Burst
 from gateway.bus.signals import load_signal_map
 from gateway.errors import BusError
 from gateway.log import Event
@@ -250,7 +250,7 @@ def test_an_unknown_interface_names_the_known():
 
 def test_a_missing_driver_package_is_named_before_anything_starts(monkeypatch):
     """The receive thread died of it, and with it the service, some time after the start."""
-    monkeypatch.setattr("gateway.bus.live.python_can.importlib.util.find_spec", lambda name: None)
+    monkeypatch.setattr("gateway.bus.receiver.importlib.util.find_spec", lambda name: None)
     with pytest.raises(BusError, match="'gs_usb' needs the Python package gs-usb: pip install gs-usb"):
         LiveSource("gs_usb", "0", MAP)
 

@@ -3,7 +3,6 @@
 import importlib.util
 import re
 import sqlite3
-import sys
 from pathlib import Path
 from typing import NoReturn
 
@@ -11,7 +10,6 @@ import pytest
 from click.testing import Result
 from support.commands import called
 
-from gateway.bus.live.python_can import usable_interfaces, what_lacks
 from gateway.bus.signals.signal_map import shipped_map
 from gateway.errors import ConfigurationError
 from gateway.web.access.tokens import Scope, TokenFile
@@ -128,16 +126,6 @@ def test_an_open_address_needs_a_token_and_tls(tmp_path: Path) -> None:
     web = 'host = "0.0.0.0"'
     assert "needs TLS" in str(checked(tmp_path, web=web).exception)  # the token would cross the network in the clear
     assert checked(tmp_path, web=f'{web}\ntls_certificate = "a.pem"\ntls_key = "a.pem"').exit_code == 0
-
-
-def test_the_help_offers_only_interfaces_that_work() -> None:
-    told = " ".join(called("replay", "--help").output.split())
-    usable = usable_interfaces()
-    assert f"on this computer {', '.join(usable)}" in told
-    assert ("udp_multicast" in usable) is (importlib.util.find_spec("msgpack") is not None)
-    assert "virtual" not in usable  # it leads to no other program
-    assert all(what_lacks(name) is None for name in usable)
-    assert ("socketcan" in usable) is (sys.platform == "linux")
 
 
 def test_messages_that_ask_for_a_token_say_which_service_it_is_for(tmp_path: Path) -> None:

@@ -29,6 +29,11 @@ BEGIN_NS = 1_800_000_000 * NS_PER_S
 LEVEL = turned("x", "z")
 
 
+def level_device(folder: Path) -> tuple[FakeIio, IioDevice]:
+    fake = FakeIio(folder)
+    return fake, IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
+
+
 def at_rest(i: int) -> Scan:
     return (0, 0, round(9.81 / ACCEL_SCALE)), (0, 0, 0), BEGIN_NS + i * 10_000_000
 
@@ -104,8 +109,7 @@ def test_samples_arrive_in_vehicle_axes_and_si(tmp_path: Path) -> None:
 
 
 def test_frames_carry_the_kernels_stamps_and_counters_that_skip_what_was_lost(tmp_path: Path) -> None:
-    fake = FakeIio(tmp_path)
-    device = IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
+    fake, device = level_device(tmp_path)
     with (
         listening("feed-lost") as heard,
         fake.sampling(400.0, lambda i: None if 150 <= i < 157 else at_rest(i)),
@@ -123,8 +127,7 @@ def test_frames_carry_the_kernels_stamps_and_counters_that_skip_what_was_lost(tm
 
 def test_the_receiver_restores_the_sensors_clock_from_late_stamps(tmp_path: Path) -> None:
     """A kernel bus stamps at arrival: the counter brings the steady clock back."""
-    fake = FakeIio(tmp_path)
-    device = IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
+    fake, device = level_device(tmp_path)
     with listening("feed-clock") as heard, fake.sampling(400.0, at_rest), feeding("feed-clock", [device]):
         assert wait_until(lambda: len(heard) >= 1000)
     gyro = frames_of([message for message in heard if message.arbitration_id == 0x121], 8)
@@ -216,8 +219,7 @@ def test_another_receiver_is_named_once_and_counted() -> None:
 
 
 def test_a_missing_gpsd_is_reported_once_and_retried(tmp_path: Path) -> None:
-    fake = FakeIio(tmp_path)
-    device = IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
+    fake, device = level_device(tmp_path)
     with (
         listening("feed-none") as heard,
         fake.sampling(100.0, at_rest),
@@ -229,8 +231,7 @@ def test_a_missing_gpsd_is_reported_once_and_retried(tmp_path: Path) -> None:
 
 
 def test_a_device_that_is_gone_ends_the_feed(tmp_path: Path) -> None:
-    fake = FakeIio(tmp_path)
-    device = IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
+    fake, device = level_device(tmp_path)
     feeder = Feeder("virtual", "feed-gone", [device], None)
     ended: list[BusError] = []
 
@@ -248,12 +249,8 @@ def test_a_device_that_is_gone_ends_the_feed(tmp_path: Path) -> None:
     assert "gone" in str(ended[0])
 
 
-def test_an_absent_bus_is_retried_and_dropped_frames_are_counted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("gateway.bus.feed.QUEUE", 20)
-    fake = FakeIio(tmp_path)
-    device = IioDevice(fake.sysfs / "iio:device0", LEVEL, 100.0, fake.nodes)
+def test_an_absent_bus_is_retried_and_dropped_frames_are_counted(tmp_path: Path) -> None:
+    fake, device = level_device(tmp_path)
     said: list[str] = []
     feeder = Feeder("socketcan", "no-such-can", [device], None, said.append)
     with fake.sampling(1000.0, at_rest):
@@ -297,7 +294,7 @@ def test_an_invalid_mount_matrix_is_reported_when_the_device_is_opened(text: str
 @pytest.mark.parametrize("host", ["x..y", "a" * 300])
 def test_a_host_that_no_name_service_can_know_is_a_fault_of_gpsd(host: str) -> None:
     with pytest.raises(BusError, match="gpsd"):
-        Gpsd(host, 2947).read(0.1)
+        Gpsd(host, 2947).read()
 
 
 def test_a_line_that_no_parser_takes_is_no_fix() -> None:

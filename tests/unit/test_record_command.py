@@ -14,7 +14,7 @@ from support.bus_drive import START_NS, white_noise
 from support.commands import called
 from support.patience import PATIENCE_S, wait_until
 
-from gateway.bus.live.source import LiveSource, SourceCounts
+from gateway.bus.listen import LiveSource, SourceCounts
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import load_signal_map
 from gateway.bus.sink import BusSink
@@ -41,30 +41,11 @@ def recorded(log: Path, signals: str = "springscale:reference", for_s: float = 0
     )
 
 
-def test_every_mapped_frame_is_in_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_mapped_frame_is_in_the_log_and_remote_and_error_frames_are_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Remote frames of other identifiers than the mapped ones are the filter's affair, error frames are not."""
     monkeypatch.setattr(record, "FLUSH_S", 0.0)
-    source = LiveSource("virtual", tmp_path.name, SIGNAL_MAP, silence_s=0.05)
-    monkeypatch.setattr(record, "LiveSource", lambda *_: source)
-
-    def play() -> None:
-        assert wait_until(lambda: source.state == "bus_silent")  # it is open, then
-        with BusSink("virtual", tmp_path.name) as sink:
-            sink.send(DRIVE)
-        wait_until(lambda: source.counts().frames == len(DRIVE))
-        os.kill(os.getpid(), signal.SIGTERM)
-
-    player = threading.Thread(target=play)
-    player.start()
-    found = recorded(tmp_path / "drive.log.gz", for_s=PATIENCE_S)
-    player.join()
-    assert found.output.endswith(f"{len(DRIVE)} frames, 0 lost\n")
-    chunks, report = open_log(tmp_path / "drive.log.gz", SIGNAL_MAP)
-    assert sum(map(len, chunks)) == len(DRIVE)
-    assert report.ended_early is None
-
-
-def test_remote_and_error_frames_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those of other identifiers than the mapped ones are the filter's affair, error frames are not."""
     source = LiveSource("virtual", tmp_path.name, SIGNAL_MAP, silence_s=0.05)
     monkeypatch.setattr(record, "LiveSource", lambda *_: source)
     remote = [can.Message(arbitration_id=n, is_extended_id=False, is_remote_frame=True) for n in (0x120, 0x121, 0x7FF)]
@@ -84,6 +65,9 @@ def test_remote_and_error_frames_are_counted(tmp_path: Path, monkeypatch: pytest
     found = recorded(tmp_path / "drive.log.gz", for_s=PATIENCE_S)
     player.join()
     assert f"{len(DRIVE)} frames, 0 lost\nleft out: 2 remote frames\nleft out: 3 error frames\n" in found.output
+    chunks, report = open_log(tmp_path / "drive.log.gz", SIGNAL_MAP)
+    assert sum(map(len, chunks)) == len(DRIVE)
+    assert report.ended_early is None
 
 
 def test_frames_that_arrive_during_the_stop_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,7 +94,7 @@ def test_the_reason_of_the_source_is_given_where_nothing_came(
     def no_bus() -> None:
         raise failure("the adapter was unplugged")
 
-    monkeypatch.setattr("gateway.bus.live.source.opener_of", lambda *_: no_bus)
+    monkeypatch.setattr("gateway.bus.listen.open_channel", lambda *_: no_bus())
     found = recorded(tmp_path / "drive.log.gz")
     assert "the adapter was unplugged" in str(found.exception)
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final, cast
 
-import can
 import numpy as np
 import pytest
 from support.archive import Here, write_manifest
@@ -18,7 +17,6 @@ from support.half_car_road import VAN
 from gateway.archive import place_of, receipts
 from gateway.archive.manifest import load_manifest
 from gateway.archive.reprocess import reprocess
-from gateway.bus.frames import message_of
 from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
@@ -176,21 +174,6 @@ def test_reprocess_reports_refused_frames_in_summary_and_receipt(spoiled: tuple[
     assert [text for text in summary.to_json()["refused"] if case.told in text]
     (receipt,) = receipts(folder / "dataset")
     assert [text for text in receipt["logs"][0]["remarks"] if case.told in text]
-
-
-def test_stamps_of_whole_seconds_are_reported_and_the_road_is_not_blamed(tmp_path: Path) -> None:
-    """As a spreadsheet leaves python-can's table that it has opened and saved."""
-    log = tmp_path / "drive.csv"
-    frames = bus_drive(60.0, seed=3)
-    with can.CSVWriter(log) as writer:
-        for row in range(len(frames)):
-            writer.on_message_received(message_of(frames, row))
-    lines = log.read_text().splitlines()
-    log.write_text("\n".join([lines[0], *(f"{line[:10]}{line[line.index(',') :]}" for line in lines[1:])]))
-    for command in (["estimate", log, "--signals", "springscale:reference"], ["look", log]):
-        ended = called(*command)
-        assert "stamps are whole seconds: a spreadsheet has cut them off?" in str(ended.exception)
-        assert ended.stdout == ""
 
 
 def test_the_service_warns_of_it(spoiled: tuple[Case, Path, Path]) -> None:

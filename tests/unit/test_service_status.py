@@ -14,7 +14,7 @@ from support.estimates import make_estimate
 from support.paper_van import paper_van, paper_van_config
 from support.ports import free_port
 
-from gateway.bus.live.source import SourceState
+from gateway.bus.listen import SourceState
 from gateway.config import load_settings
 from gateway.estimate import Estimate, Quantity, Weights
 from gateway.records import Signal

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.patience import wait_until
 
-from gateway.bus.live.source import LiveSource
+from gateway.bus.listen import LiveSource
 from gateway.bus.signals import load_signal_map
 from gateway.calibration.campaign import load_campaign
 from gateway.core.settings import BatchSettings

@@ -11,11 +11,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.bus.frames import in_order, payload_rows, take
-from gateway.bus.logs.candump_line import LineFrame, LineShape, NotData, learn_shape, read_line
+from gateway.bus.frames import frames_of, in_order, take
+from gateway.bus.logs.candump_line import LineShape, learn_shape, read_line
 from gateway.bus.logs.packed import BLOCK_BYTES, LineBlock, line_blocks
 from gateway.bus.logs.report import SHOWN_CHARS, LogReject, LogReport, Selection
-from gateway.bus.signals import EVERY_IDENTIFIER, IdFilter
+from gateway.bus.signals.mapping import EVERY_IDENTIFIER, IdFilter
 from gateway.bus.text import OR_CP1252
 from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 
@@ -159,14 +159,14 @@ class _CandumpReader:
                 n_before = int(np.count_nonzero(block.text[block.start : hit] == ord("\n")))
                 line_number = self._report.lines + n_before + 1
             self._report.reject(content, line_number, shown(line))
-        elif content is NotData.REMOTE_FRAME:
-            self._report.remote_frames += 1
-        elif content is NotData.ERROR_FRAME:  # of classes that do not exist; the others are never read
+        elif content.is_error_frame:  # of classes that do not exist; the others are never read
             self._report.error_frames += 1
             self._report.frames -= 1
-        elif isinstance(content, LineFrame) and self._selection.has(content.channel.decode(), 1):
+        elif content.is_remote_frame:
+            self._report.remote_frames += 1
+        elif self._selection.has(content.channel, 1):
             places.append(np.array([hit]))
-            parts.append(_one_frame(content, self._selection.width))
+            parts.append(frames_of([content], self._selection.width))
 
     def _report_frameless(self, block: LineBlock, hashes: I64) -> None:
         """Count the non-empty lines without ``#``."""
@@ -228,9 +228,3 @@ def _line_around(block: LineBlock, at: int) -> bytes:
 def shown(line: bytes) -> str:
     """The beginning of a line for people."""
     return line.strip(b"\0 \t\r\n")[: 2 * SHOWN_CHARS].decode("utf-8", OR_CP1252)
-
-
-def _one_frame(line: LineFrame, width: int) -> Frames:
-    length = np.array([len(line.payload)], np.uint8)
-    payload = payload_rows(np.frombuffer(line.payload, np.uint8)[None], length, width)
-    return Frames(np.array([line.t_ns]), np.array([line.can_id], np.uint32), length, payload)

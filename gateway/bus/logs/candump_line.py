@@ -2,15 +2,16 @@
 
 import re
 from dataclasses import dataclass
-from enum import Enum, auto
 from functools import cached_property
 from typing import Final
 
+import can
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.bus.frames import LAST_EXTENDED, LAST_SECOND, LAST_STANDARD
+from gateway.bus.frames import LAST_EXTENDED, LAST_SECOND, LAST_STANDARD, ExactStamp
 from gateway.bus.logs.report import LogReject
+from gateway.bus.signals.mapping import CAN_FD_BYTES, CLASSIC_BYTES
 from gateway.records import EXTENDED_ID, F64, I64, U8, U32, Bool, Frames
 from gateway.units import NS_PER_S
 
@@ -23,54 +24,37 @@ _REMOTE = re.compile(rb"[Rr][0-9A-Fa-f]?")
 _ERROR_FLAG: Final = 0x2000_0000  # CAN_ERR_FLAG of linux/can.h
 
 
-class NotData(Enum):
-    """A sound line that carries no payload."""
-
-    REMOTE_FRAME = auto()
-    ERROR_FRAME = auto()
-
-
-@dataclass(frozen=True, slots=True)
-class LineFrame:
-    """A data frame as one line states it."""
-
-    t_ns: int
-    channel: bytes
-    can_id: int
-    payload: bytes
-
-
-def read_line(line: bytes) -> LineFrame | NotData | LogReject:
+def read_line(line: bytes) -> can.Message | LogReject:
     """The frame of a line such as ``(1627274455.012500) can1 009#0011223344556677``, or why there is none.
 
     Hexadecimal digits of either case, stamps of any width, R/T suffixes, CAN FD (``##`` and a flags
     digit) and the ``_`` length code of 8-byte frames are understood. An identifier is a 29-bit one
-    when it has 8 digits.
+    when it has 8 digits. Remote and error frames are given without their payload.
     """
     line = line.strip(b"\0 \t\r\n")  # a file hole leaves NULs before a sound line
     match = _LINE.fullmatch(line)
     if match is None:
         return _why_not(line)
-    seconds = int(match["seconds"])
+    seconds, can_id, is_extended = int(match["seconds"]), int(match["id"], 16), len(match["id"]) == 8
     if seconds > LAST_SECOND:
         return LogReject.BAD_TIME
-    t_ns = seconds * NS_PER_S + int(match["fraction"].ljust(9, b"0"))
-    can_id = _identifier(match["id"])
-    if not isinstance(can_id, int):
-        return can_id
-    if _REMOTE.fullmatch(match["payload"]):
-        return NotData.REMOTE_FRAME
-    payload = _payload(match["payload"], is_fd=match["fd"] is not None)
-    return LineFrame(t_ns, match["channel"], can_id, payload) if isinstance(payload, bytes) else payload
-
-
-def _identifier(digits: bytes) -> int | NotData | LogReject:
-    can_id = int(digits, 16)
-    if len(digits) == 8:
-        if can_id & _ERROR_FLAG and can_id < 2 * _ERROR_FLAG:
-            return NotData.ERROR_FRAME
-        return can_id | EXTENDED_ID if can_id <= LAST_EXTENDED else LogReject.BAD_ID
-    return can_id if len(digits) == 3 and can_id <= LAST_STANDARD else LogReject.BAD_ID
+    is_error = is_extended and _ERROR_FLAG <= can_id < 2 * _ERROR_FLAG
+    if not is_error and (can_id > (LAST_EXTENDED if is_extended else LAST_STANDARD) or len(match["id"]) not in (3, 8)):
+        return LogReject.BAD_ID
+    is_remote = _REMOTE.fullmatch(match["payload"]) is not None
+    payload = b"" if is_error or is_remote else _payload(match["payload"], is_fd=match["fd"] is not None)
+    if isinstance(payload, LogReject):
+        return payload
+    return can.Message(
+        timestamp=ExactStamp(seconds * NS_PER_S + int(match["fraction"].ljust(9, b"0"))),
+        channel=match["channel"].decode(),
+        arbitration_id=can_id,
+        is_extended_id=is_extended,
+        is_error_frame=is_error,
+        is_remote_frame=is_remote,
+        is_fd=len(payload) > CLASSIC_BYTES,
+        data=payload,
+    )
 
 
 def _payload(digits: bytes, *, is_fd: bool) -> bytes | LogReject:
@@ -81,7 +65,7 @@ def _payload(digits: bytes, *, is_fd: bool) -> bytes | LogReject:
     except ValueError:
         is_hex = re.fullmatch(rb"[0-9A-Fa-f]*", digits)
         return LogReject.HALF_BYTE if is_hex else LogReject.BAD_PAYLOAD
-    return payload if len(payload) <= (64 if is_fd else 8) else LogReject.TOO_LONG
+    return payload if len(payload) <= (CAN_FD_BYTES if is_fd else CLASSIC_BYTES) else LogReject.TOO_LONG
 
 
 def _why_not(line: bytes) -> LogReject:

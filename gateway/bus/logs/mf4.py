@@ -5,12 +5,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, suppress
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gateway.bus.frames import LAST_SECOND, join, payload_rows, take
+from gateway.bus.frames import LAST_SECOND, join, take
 from gateway.bus.logs.packed import unpacked_path
 from gateway.bus.logs.report import LogReject, Selection
 from gateway.errors import LogUnreadableError, ReaderMissingError
@@ -106,14 +105,13 @@ def _frames(
             continue
         rows, t_ns = rows[is_sound], start_ns + np.round(seconds[is_sound] * 1e6).astype(np.int64) * 1000
         data = columns["DataBytes"][rows].reshape(len(rows), -1)
-        length = np.minimum(_n_bytes(columns, rows), data.shape[1]).astype(np.uint8)
-        yield Frames(t_ns, can_id[rows], length, payload_rows(data, length, selection.width))
-
-
-def _n_bytes(columns: dict[str, NDArray[Any]], rows: NDArray[np.int64]) -> NDArray[Any]:
-    lengths = columns.get("DataLength")
-    counted: NDArray[Any] = _LENGTHS[np.minimum(columns["DLC"][rows], 15)] if lengths is None else lengths[rows]
-    return counted
+        length = (
+            columns["DataLength"][rows] if "DataLength" in columns else _LENGTHS[np.minimum(columns["DLC"][rows], 15)]
+        )
+        length = np.minimum(length, data.shape[1]).astype(np.uint8)
+        payload, kept = np.zeros((len(rows), selection.width), np.uint8), min(selection.width, data.shape[1])
+        np.copyto(payload[:, :kept], data[:, :kept], where=np.arange(kept) < length[:, None])
+        yield Frames(t_ns, can_id[rows], length, payload)
 
 
 def _in_order_of_time(tables: Sequence[Iterator[Frames]], width: int) -> Iterator[Frames]:

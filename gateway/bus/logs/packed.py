@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Final, Protocol, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, cast
 
 import numpy as np
 from isal import igzip_lib
@@ -37,36 +37,14 @@ BUFFER_BYTES: Final = 2 << 20  # measured best; reading a file whole costs three
 PACKED_SUFFIXES: Final = (".gz", ".zst", ".xz")
 
 
-class Inflater(Protocol):
-    """One member of a packed stream, as the standard library's decompressors read it."""
-
-    @property
-    def eof(self) -> bool:
-        """Whether the end of the member is reached."""
-
-    @property
-    def needs_input(self) -> bool:
-        """Whether more output needs more packed bytes."""
-
-    @property
-    def unused_data(self) -> bytes:
-        """Bytes read beyond the end of the member."""
-
-    def decompress(self, data: bytes, max_length: int = -1) -> bytes:
-        """Decompress at most ``max_length`` further bytes."""
-
-
 @dataclass(frozen=True, slots=True)
 class Packing:
     """One compression format: the first bytes of its members, its decompressor, and the exceptions of that."""
 
     name: str
     magics: tuple[bytes, ...]
-    new_inflater: Callable[[], Inflater]
+    new_inflater: Callable[[], Any]  # as the standard library's decompressors are
     fault: type[Exception]
-
-    def begins(self, content: bytes) -> bool:
-        return content.startswith(self.magics)
 
 
 _ZSTD_SKIPPABLE: Final = tuple(bytes([0x50 + i]) + b"\x2a\x4d\x18" for i in range(16))  # RFC 8878, 3.1.2
@@ -127,7 +105,7 @@ class InflatedStream(io.RawIOBase):
         self._packed = self._inflater.unused_data
         if len(self._packed) < _LONGEST_MAGIC:
             self._packed += self._file.read(PACKED_BYTES)
-        if not self._packing.begins(self._packed):
+        if not self._packed.startswith(self._packing.magics):
             return False
         self._inflater = self._packing.new_inflater()
         return True
@@ -140,7 +118,7 @@ def open_log_file(path: Path) -> AbstractContextManager[BinaryIO]:
     except OSError as fault:
         raise LogUnreadableError(f"{path}: cannot be read: {fault.strerror or fault}") from None
     first = file.peek(_LONGEST_MAGIC)
-    packing = next((packing for packing in PACKINGS if packing.begins(first)), None)
+    packing = next((packing for packing in PACKINGS if first.startswith(packing.magics)), None)
     return file if packing is None else io.BufferedReader(InflatedStream(file, packing), BUFFER_BYTES)
 
 

@@ -12,9 +12,10 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.bus.frames import gathered
-from gateway.bus.logs.wall_clock import LATE_START_S, ns_since_1970
-from gateway.bus.signals import Decoder, IdFilter
+from gateway.bus.logs.wall_clock import ns_since_1970
+from gateway.bus.signals import Decoder
 from gateway.bus.signals.decode import TELLING_SHARE, Remark
+from gateway.bus.signals.mapping import IdFilter
 from gateway.errors import LogUnreadableError
 from gateway.records import FIRST_DATED_NS, I64, U32, Bool, Frames, iso_utc
 from gateway.units import NS_PER_S
@@ -27,10 +28,11 @@ CHUNK_FRAMES: Final = 32_768  # chosen: given out at once: large enough that the
 SHOWN_CHARS: Final = 60  # chosen: of a line that cannot be read
 AS_CANDUMP: Final = "candump logs are recorded with candump -L"
 JUDGED_FRAMES: Final = 1000  # chosen: least number whose stamps are judged
-JUDGED_SECONDS: Final = 3.0  # chosen: least time in which stamps of whole seconds are
+JUDGED_SECONDS: Final = 3.0  # chosen: likewise, before the end of the log is reached
 WHOLE_PER_S: Final = 10.0  # chosen: more frames a second all on whole seconds are no coincidence
 STEP_BACK_S: Final = 1.0  # chosen: further than frames of several buffers are out of order
 LEAP_S: Final = 43_200.0  # chosen: a longer pause within a log gets a remark
+LATE_START_H: Final = 1.0  # chosen: a first frame so long after the date of its header gets a remark
 MOST_PER_S: Final = 100_000.0  # chosen: several times what a bus of 1 Mbit/s can carry (ISO 11898-1: 21,000 frames)
 
 
@@ -54,13 +56,11 @@ _KNOWN_LINES: Final = (
     (r"(?:.\0){4}|(?:\0.){4}", "this is UTF-16: save it as UTF-8"),
     (r"\(\d{4}-\d\d-\d\d", "stamps are dates (candump -tA): record with candump -L alone"),
     (r"\(-?\d+,\d+\)|(\d+\)\s+)?-?\d+,\d+\s", "stamps have a decimal comma: write a point"),
-    (r"\(\d{11,}[.)]|\d{11,}\.?\d*,", "stamps are not seconds since 1970, but a fraction of it such as milliseconds"),
     (r"\(-|\s*-\d", "the stamp is negative"),
     (r"\(?\d+(\.\d+)?\)?\s+\S+\s+[0-9A-F]{3,8}\s+\[\d+\]|\w+\s+[0-9A-F]{3,8}\s+\[\d+\]",
      "this is candump's output for the screen: record with candump -L"),
     (r"\S.*\(\d+\.\d+\) \S+ [0-9A-F]{3,8}#", "something is written before the stamp, as in a system's log: cut it off"),
-    (r"date \S|\d+\.\d+\s+\d+\s+[0-9A-F]+x?\s+[RT]x\b", "this is the text of an .asc log: name it so"),
-    (r";|\d+\)\s+\d", "this is the text of a .trc log: name it so"),
+    (r"date \S|;|\d+\)\s+\d", "this is the text of an .asc or a .trc log: name it so"),
     (r"[^,;]+([,;][^,;]*){3,}", "this is a table: only python-can's own can be read, as .csv"),
     (r"\d+\.\d+\s+\S+\s+\w+\s+[RT]x\b", "messages have names instead of identifiers: export the log with numbers"),
 )  # fmt: skip
@@ -75,15 +75,15 @@ class RejectedLines:
     first_lines: list[int] = field(default_factory=list)
     text: str = ""
 
-    def told(self, reason: LogReject, suffix: str) -> str:
-        """ "1000, first in line 1: stamps have a decimal comma: write a point: '(1627274455,0125) can0 120#00'" """
+    def told(self, reason: LogReject, path: Path) -> str:
+        """ "left out, bad time: 9, first in line 1: stamps have a decimal comma: write a point: '(1,5) can0'" """
         where = f", first in line {self.first_lines[0]}" if self.first_lines else ""
         fitting = (what for form, what in _KNOWN_LINES if re.match(form, self.text, re.IGNORECASE))
-        known = next((what for what in fitting if f" {suffix} " not in f"{what} "), None)
+        known = next((what for what in fitting if not set(path.suffixes) & set(what.split())), None)
         if known is None and reason is LogReject.BAD_TIME:
-            known = "stamps are not seconds since 1970"
-        what = f": {known}" if known else ""
-        return f"{self.count}{where}{what}" + (f": {self.text[:SHOWN_CHARS]!r}" if self.text else "")
+            known = "stamps are not seconds since 1970, but perhaps a fraction of it such as milliseconds"
+        what = (f": {known}" if known else "") + (f": {self.text[:SHOWN_CHARS]!r}" if self.text else "")
+        return f"left out, {str(reason).replace('_', ' ')}: {self.count}{where}{what}"
 
 
 @dataclass(slots=True)
@@ -171,10 +171,6 @@ class LogReport:
         return (self.span_ns[1] - self.span_ns[0]) / NS_PER_S
 
     @property
-    def _suffix(self) -> str:
-        return next((end for end in self.path.suffixes if end.lower() in (".asc", ".trc", ".csv")), "-").lower()
-
-    @property
     def is_dated(self) -> bool:
         """Whether its stamps are dates; those of a log without frames are not."""
         return self.first_ns is not None and self.first_ns >= FIRST_DATED_NS
@@ -226,7 +222,7 @@ class LogReport:
         if others := self.told_others():
             yield f"{self.path}: left out: {others}"
         for reason, lines in self.rejects.items():
-            yield f"{self.path}: left out, {str(reason).replace('_', ' ')}: {lines.told(reason, self._suffix)}"
+            yield f"{self.path}: {lines.told(reason, self.path)}"
         if len(self.channels) > 1 and not self.other_channel:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
             yield f"{self.path}: mapped frames are on {seen}; if these are one bus twice, name one in the map"
@@ -257,29 +253,22 @@ class LogReport:
             yield f"{self.path}: its stamps step back {times}, by up to {timedelta(seconds=back_s)}: {what}"
         if leap_s > LEAP_S:
             yield f"{self.path}: its stamps leap forward by {timedelta(seconds=leap_s)}: a pause, or was the clock set?"
-        late_s = 0.0 if self.start_ns is None else (self.first_ns - self.start_ns) / NS_PER_S
-        if late_s > LATE_START_S:
-            yield (
-                f"{self.path}: its first frame comes {late_s / 3600.0:.1f} h after the date of its header, "
-                f"{iso_utc(self.start_ns or 0)}: do its stamps count from another instant?"
-            )
+        late_h = 0.0 if self.start_ns is None else (self.first_ns - self.start_ns) / NS_PER_S / 3600.0
+        if late_h > LATE_START_H:
+            late = f"{late_h:.1f} h after the date of its header, {iso_utc(self.start_ns or 0)}"
+            yield f"{self.path}: its first frame comes {late}: do its stamps count from another instant?"
 
-    def _why_no_times(self) -> str | None:
+    def why_no_times(self) -> str | None:
         """Why the stamps of the wanted frames cannot be their times; None if they can."""
         if self.wanted < JUDGED_FRAMES:
             return None
-        if (why := self.why_whole_seconds(0.0)) is not None:
-            return why
+        if self._n_whole_seconds == self.wanted > WHOLE_PER_S * self.span_s:
+            return f"its {self.wanted} stamps are whole seconds: has a tool cut their fractions off?"
         if not self.is_dated and 8 * self.out_of_order > self.wanted:
             return "its stamps are the pauses between frames (candump -td): record with candump -L alone"
         if self.wanted > MOST_PER_S * self.span_s:
             return f"it has {self.wanted} frames in {self.span_s:.3g} s by its stamps, which no bus carries"
         return None
-
-    def why_whole_seconds(self, least_s: float = JUDGED_SECONDS) -> str | None:
-        """The same of stamps whose fractions are gone; None too before so many seconds are read."""
-        is_cut = self._n_whole_seconds == self.wanted > WHOLE_PER_S * self.span_s and self.span_s >= least_s
-        return f"its {self.wanted} stamps are whole seconds: a spreadsheet has cut them off?" if is_cut else None
 
     @contextmanager
     def until_damage(self, kind: str) -> Iterator[None]:
@@ -306,14 +295,13 @@ class LogReport:
 
     def _why_unusable(self) -> str | None:
         if self.wanted:
-            return self._why_no_times()
+            return self.why_no_times()
         if self.other_channel:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
             return f"the mapped frames are on {seen} only; correct channel in the signal map"
         if self.n_rejected > TELLING_SHARE * self.frames:
             reason, lines = max(self.rejects.items(), key=lambda each: each[1].count)
-            why = f"left out, {str(reason).replace('_', ' ')}: {lines.told(reason, self._suffix)}"
-            return f"holds no CAN frame that can be read; {why}" + ("" if self._suffix != "-" else f"; {AS_CANDUMP}")
+            return f"holds no CAN frame that can be read; {lines.told(reason, self.path)}; {AS_CANDUMP}"
         if self.remote_frames:
             return f"of the mapped identifiers it has only remote frames ({self.remote_frames}), which carry no data"
         if self.frames:
@@ -323,20 +311,7 @@ class LogReport:
             what = f"error frames only ({self.error_frames}): check the bit rate and the wiring of the recorder"
         else:
             what = "no CAN frame" + (f" ({self.ended_early})" if self.ended_early else "")
-            what += f"; {AS_CANDUMP}" if self._suffix == "-" else ""
         return f"holds {what}"
-
-
-def is_same_channel(recorded: object, wanted: str | None) -> bool:
-    """Whether a recorded channel is the wanted one.
-
-    A number, as python-can counts channels, matches a name that ends in it (1 and "can1"). A format that
-    keeps no channel (.csv, .db) matches every name.
-    """
-    if wanted is None or recorded is None or str(recorded) == wanted:
-        return True
-    digits = re.search(r"\d+$", wanted)
-    return isinstance(recorded, int) and digits is not None and int(digits[0]) == recorded
 
 
 @dataclass(frozen=True, slots=True)
@@ -364,22 +339,28 @@ class Selection:
         return passes
 
     def has(self, channel: object, n_frames: int) -> bool:
-        """Whether frames of this channel are wanted; if not, they are counted. None: the format keeps no channel."""
+        """Whether frames of this channel are wanted; if not, they are counted.
+
+        A number, as python-can counts channels, is also that of a name that ends in it (1 and "can1"). None, of a
+        format that keeps no channel (.csv, .db), has every name.
+        """
         if channel is not None and n_frames and len(self.report.channels) < KEPT_CHANNELS:
             self.report.channels.add(str(channel))
-        if is_same_channel(channel, self.channel):
+        if channel is None or self.channel in (None, str(channel)):
             return True
-        self.report.other_channel += n_frames
-        return False
+        digits = re.search(r"\d+$", self.channel or "") if isinstance(channel, int) else None
+        is_wanted = digits is not None and int(digits[0]) == channel
+        self.report.other_channel += 0 if is_wanted else n_frames
+        return is_wanted
 
     def given_out(self, parts: Iterable[Frames], n: int = CHUNK_FRAMES) -> Iterator[Frames]:
         """The frames in chunks of at least ``n``, each counted as it is given out.
 
-        Raises LogUnreadableError once their stamps turn out to be whole seconds, before they mislead anyone.
+        Raises LogUnreadableError once their stamps turn out to be no times, before they mislead anyone.
         """
         for frames in gathered(parts, n, self.width):
             self.report.count_wanted(frames.t_ns)
-            if (why := self.report.why_whole_seconds()) is not None:
+            if self.report.span_s >= JUDGED_SECONDS and (why := self.report.why_no_times()) is not None:
                 raise LogUnreadableError(f"{self.path}: {why}")
             yield frames
 

@@ -5,7 +5,6 @@ from datetime import UTC, datetime, timedelta, tzinfo
 from typing import Final
 
 LONGEST_DATE: Final = 200  # chosen: characters of a line that states one
-LATE_START_S: Final = 3600.0  # chosen: a first frame so long after the date of its header gets a remark
 
 # Short names as CANoe writes them with Windows in English, German, French, Italian, Spanish, Polish, Portuguese, Dutch,
 # Swedish and Czech. Longer forms (mars, marzo, marzec) begin with one of them.

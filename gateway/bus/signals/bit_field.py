@@ -1,6 +1,4 @@
-"""The position of a signal in a payload, and the conversion of its bits to a number: for whole columns of frames at
-once.
-"""
+"""The position of a signal in a payload, and the conversion of its bits to a number and back: whole columns at once."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -70,6 +68,14 @@ class BitField:
             raw |= column << np.uint64(shift) if shift >= 0 else column >> np.uint64(-shift)
         return raw & np.uint64((1 << self.length) - 1)
 
+    def put(self, payload: U8, bits: U64) -> None:
+        """Write raw bits (n,) into payload rows (n, width), in place."""
+        n_ones = (1 << self.length) - 1
+        for byte, shift in self.bytes_and_shifts:
+            kept = np.uint8(~(n_ones >> shift if shift >= 0 else n_ones << -shift) & 0xFF)
+            moved = bits >> np.uint64(shift) if shift >= 0 else bits << np.uint64(-shift)
+            payload[:, byte] = (payload[:, byte] & kept) | moved.astype(np.uint8) & ~kept
+
     def numbers(self, bits: U64) -> F64:
         """Bits (n,) as numbers, before scale and offset."""
         if self.coding is Coding.FLOAT:
@@ -85,6 +91,18 @@ class BitField:
         """Bits (n,) in the unit of the DBC: number x scale + offset, in that order, as cantools does it."""
         with np.errstate(over="ignore", invalid="ignore"):  # floats beyond a double become inf or NaN, as in cantools
             return self.numbers(bits) * self.scale + self.offset
+
+    def bits_of(self, physical: F64) -> U64:
+        """Raw bits (n,) closest to ``physical`` (n,), in the unit of the DBC."""
+        numbers = (np.asarray(physical, np.float64) - self.offset) / self.scale
+        if self.coding is Coding.FLOAT:
+            as_integer, as_float = _FLOATS[self.length]
+            return numbers.astype(as_float).view(as_integer).astype(np.uint64)
+        low, high = self.raw_range
+        greatest = np.floor(np.nextafter(high + 1.0, 0.0))  # the greatest double that the bits can carry
+        steps = np.clip(np.rint(numbers), low, greatest)
+        raw = steps.astype(np.int64).view(np.uint64) if self.coding is Coding.SIGNED else steps.astype(np.uint64)
+        return raw & np.uint64((1 << self.length) - 1)
 
     @property
     def physical_range(self) -> tuple[float, float]:

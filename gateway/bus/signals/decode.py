@@ -4,9 +4,10 @@ cantools is the reference for the bits: a property test compares every number wi
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -16,7 +17,6 @@ from gateway.bus.signals.mapping import (
     QUANTITIES,
     SOURCE_ADDRESS,
     Condition,
-    IdFilter,
     MappedMessage,
     MappedSignal,
     SignalMap,
@@ -44,75 +44,217 @@ class Rejected(StrEnum):
     OUT_OF_RANGE = "out_of_range"
 
 
-class SampleReader:
-    """Reads one mapped signal. Impossible faults (an integer that is not a number) are not checked."""
+@dataclass(frozen=True, slots=True)
+class SignalCounts:
+    """Outcomes of the frames that can carry one signal."""
 
-    def __init__(self, mapped: MappedSignal) -> None:
-        self._mapped = mapped
-        self._named_codes = np.array(mapped.named_codes, np.uint64)
-        self._is_float = mapped.field.coding is Coding.FLOAT
-        slack = 0.0 if self._is_float else RANGE_TOLERANCE_STEPS * mapped.resolution
-        self._low = mapped.minimum - slack if np.isfinite(mapped.minimum) else -np.inf
-        self._high = mapped.maximum + slack if np.isfinite(mapped.maximum) else np.inf
-        reach = sorted(end * mapped.to_si for end in mapped.field.physical_range)
-        self._can_leave_range = reach[0] < self._low or reach[1] > self._high
-        self._beyond = np.inf, -np.inf  # least and greatest sample out of range
+    samples: int
+    rejected: Mapping[Rejected, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """Why frames of a message give no sample or the wrong one: a sentence for people, the share of its frames, and the
+    signals that suffer.
+    """
+
+    text: str
+    share: float
+    signals: frozenset[Signal]
+
+
+class Decoder:
+    """Turns frames into motion by one signal map. The counts are its only memory: chunking leaves no trace."""
+
+    def __init__(self, signal_map: SignalMap) -> None:
+        self.signals = signal_map.signals
+        self._messages = [_MessageReader(message, self.signals) for message in signal_map.messages]
+        self._is_aside = np.array([all(m.signal in ASIDE for m in one.signals) for one in signal_map.messages])
+        self._counted = tuple(s for s in self.signals if signal_map.traits[s].counter_modulus)
+
+    def decode(self, frames: Frames) -> Motion:
+        """One row for every frame of a mapped message, in order of arrival; other frames are passed over.
+
+        All signals of a frame share its row. NaN if a frame does not validly carry a sample.
+        """
+        message_of = np.full(len(frames), -1, np.int16)
+        for i, message in enumerate(self._messages):
+            message_of[message.mapped.id_filter.matches(frames.can_id)] = i
+        rows = np.flatnonzero(message_of >= 0)
+        message_of = message_of[rows]
+        columns = np.full((len(rows), len(self.signals)), np.nan)
+        counters = {signal: np.full(len(rows), np.nan) for signal in self._counted}
+        for i, message in enumerate(self._messages):
+            ours = np.flatnonzero(message_of == i)
+            if len(ours):
+                at = rows[ours]
+                payload = frames.payload.take(at, axis=0)
+                message.read(columns, counters, ours, payload, frames.length[at], frames.can_id[at])
+        aside = self._is_aside[message_of] if self._is_aside.any() else None
+        return Motion(self.signals, frames.t_ns[rows], columns, counters, aside)
 
     @property
-    def has_named_codes(self) -> bool:
-        """Whether names of the database alone make a raw value no measurement."""
-        return bool(self._mapped.named_codes) and not self._mapped.rejects_j1939_codes
+    def counts(self) -> dict[Signal, SignalCounts]:
+        return {
+            one.mapped.signal: SignalCounts(message.n_frames - one.rejected.total(), dict(one.rejected))
+            for message in self._messages
+            for one in message.readers
+        }
 
-    def told_range(self) -> str:
-        """The samples out of range, and the range."""
-        return told_range(self._beyond, (self._mapped.minimum, self._mapped.maximum), self._mapped.unit)
-
-    def read(self, payload: U8) -> tuple[F64, dict[Rejected, int]]:
-        """Samples (n,) of payloads (n, width), NaN if rejected, and how many for each reason.
-
-        A sample with several faults counts for the first of them.
+    def remarks(self) -> tuple[Remark, ...]:
+        """Frames of another length than the database says, values out of range or with names, and signals of several
+        devices.
         """
-        field = self._mapped.field
-        bits = field.bits(payload)
+        return tuple(remark for message in self._messages for remark in message.remarks())
+
+    def causes(self) -> tuple[Remark, ...]:
+        """Those that explain why nothing is weighed: they concern a good part of a signal that weighing needs."""
+        return tuple(one for one in self.remarks() if one.share >= TELLING_SHARE and one.signals & NEEDED)
+
+    def silent(self) -> tuple[str, ...]:
+        """Messages of which no frame came, each with the signals that weighing needs; none for other messages."""
+        needed = ((one, sorted(NEEDED.intersection(one.signals))) for one in self._messages if not one.n_frames)
+        return tuple(f"{message.name} for {', '.join(signals)}" for message, signals in needed if signals)
+
+
+class _MessageReader:
+    """Reads the mapped signals of one message, and counts."""
+
+    def __init__(self, mapped: MappedMessage, signals: tuple[Signal, ...]) -> None:
+        self.mapped = mapped
+        self.name = f"{mapped.name} ({id_name(mapped.frame_id)})"
+        self.readers = [_SignalReader(one, signals.index(one.signal)) for one in mapped.signals]
+        self.signals = frozenset(one.signal for one in mapped.signals)
+        self.n_frames = 0
+        self._wrong_lengths: Counter[int] = Counter()
+
+    def read(
+        self, columns: F64, counters: Mapping[Signal, F64], ours: I64, payload: U8, length: U8, can_id: U32
+    ) -> None:
+        """Decode payloads (m, width), their lengths and identifiers (m,), all of this message, into the rows ``ours``
+        (m,) of ``columns`` and ``counters``. A frame too short for its counter gives no sample either.
+        """
+        for one in self.mapped.signals:
+            if one.counter is not None:
+                counters[one.signal][ours] = one.counter.bits(payload)
+        self.n_frames += len(ours)
+        has_length = length == self.mapped.length
+        if not has_length.all():
+            self._wrong_lengths.update(length[~has_length].tolist())
+            payload, ours, can_id = payload[has_length], ours[has_length], can_id[has_length]
+            for reader in self.readers:
+                reader.rejected[Rejected.WRONG_LENGTH] += int(np.count_nonzero(~has_length))
+        if len(ours):
+            sources = (can_id & np.uint32(SOURCE_ADDRESS)) if self.mapped.id_filter.is_of_any_source else None
+            for reader in self.readers:
+                columns[ours, reader.column] = reader.read(payload, sources)
+
+    def remarks(self) -> Iterator[Remark]:
+        if lengths := dict(self._wrong_lengths):
+            text = f"{self.name}: {told_lengths(lengths, self.n_frames, self.mapped.length)}"
+            yield Remark(text, sum(lengths.values()) / self.n_frames, self.signals)
+        if mixed := {one.mapped.signal: one.of_source[0] for one in self.readers if one.is_mixed()}:
+            n_of_source = next(iter(mixed.values()))
+            addresses = np.argsort(-n_of_source, kind="stable")[: np.count_nonzero(n_of_source)]
+            each = [f"{address:#04x} ({n_of_source[address]:,.0f})" for address in addresses[:NAMED_SOURCES]]
+            text = (
+                f"{self.mapped.name}: {len(addresses)} devices send {', '.join(mixed)}, with the source addresses "
+                f"{', '.join(each)}: state the source_address of one in the signal map"
+            )
+            yield Remark(text, float(1.0 - n_of_source.max() / n_of_source.sum()), frozenset(mixed))
+        for one in self.readers:
+            said = f"{one.mapped.signal} ({self.mapped.name})"
+            if n := one.rejected[Rejected.OUT_OF_RANGE]:
+                limits = one.mapped.minimum, one.mapped.maximum
+                text = f"{told_share(n, self.n_frames)} values read {told_range(one.beyond, limits, one.mapped.unit)}"
+                yield Remark(f"{said}: {text}", n / self.n_frames, frozenset({one.mapped.signal}))
+            has_names = one.mapped.named_codes and not one.mapped.rejects_j1939_codes
+            if has_names and (n := one.rejected[Rejected.NOT_AVAILABLE]) > TELLING_SHARE * self.n_frames:
+                text = (
+                    f"{told_share(n, self.n_frames)} raw values have a name in the database, which means that they "
+                    "are no measurement; if they are, remove the names there"
+                )
+                yield Remark(f"{said}: {text}", n / self.n_frames, frozenset({one.mapped.signal}))
+
+
+class _SignalReader:
+    """Reads one mapped signal into its column, and counts what it refuses."""
+
+    def __init__(self, mapped: MappedSignal, column: int) -> None:
+        self.mapped, self.column = mapped, column
+        self.rejected: Counter[Rejected] = Counter()
+        self.beyond = np.inf, -np.inf  # least and greatest sample out of range
+        self.of_source = np.zeros((2, SOURCE_ADDRESS + 1))  # number and sum of the samples of each J1939 device
+        self._checks = tuple(_checks(mapped))
+
+    def read(self, payload: U8, sources: U32 | None) -> F64:
+        """Samples (n,) of payloads (n, width), NaN if rejected. One with several faults counts for the first of them.
+
+        ``sources`` (n,) are the J1939 devices of the frames, if frames of any device count.
+        """
+        bits = self.mapped.field.bits(payload)
         with np.errstate(over="ignore", invalid="ignore"):  # what is no finite number is rejected below
-            samples = field.physical(bits) * self._mapped.to_si
-        counts: dict[Rejected, int] = {}
+            samples = self.mapped.field.physical(bits) * self.mapped.to_si
         is_rejected = np.zeros(len(bits), np.bool_)
-        for reason, applies in self._verdicts(payload, bits, samples):
-            if applies.any():
-                is_first = applies & ~is_rejected
-                counts[reason] = counts.get(reason, 0) + int(np.count_nonzero(is_first))
+        for reason, applies_to in self._checks:
+            applies = applies_to(payload, bits, samples)
+            if applies.any() and (applies := applies & ~is_rejected).any():
                 is_rejected |= applies
-                if reason is Rejected.OUT_OF_RANGE and is_first.any():
-                    beyond = samples[is_first]
-                    self._beyond = min(self._beyond[0], beyond.min()), max(self._beyond[1], beyond.max())
-        if counts:
+                self.rejected[reason] += int(np.count_nonzero(applies))
+                if reason is Rejected.OUT_OF_RANGE:
+                    beyond = samples[applies]
+                    self.beyond = min(self.beyond[0], beyond.min()), max(self.beyond[1], beyond.max())
+        if is_rejected.any():
             samples[is_rejected] = np.nan
-        return samples, {reason: n for reason, n in counts.items() if n}
+        if sources is not None:
+            for source in [sources[0]] if (sources == sources[0]).all() else np.unique(sources):
+                known = samples[(sources == source) & ~is_rejected]
+                self.of_source[:, source] += len(known), known.sum()
+        return samples
 
-    def _verdicts(self, payload: U8, bits: U64, samples: F64) -> Iterator[tuple[Rejected, Bool]]:
-        """Each reason that can apply, with the rows (n,) it applies to."""
-        for condition in self._mapped.multiplexed_by:
-            yield Rejected.MULTIPLEXED_OUT, _fails(condition, payload)
-        if self._mapped.rejects_j1939_codes:
-            yield Rejected.NOT_AVAILABLE, is_j1939_code(self._mapped.field, bits)
-        if self._mapped.named_codes:
-            yield Rejected.NOT_AVAILABLE, np.isin(bits, self._named_codes)
-        for condition in self._mapped.valid_when:
-            yield Rejected.INVALID, _fails(condition, payload)
-        if self._is_float:
-            yield Rejected.NOT_A_NUMBER, ~np.isfinite(samples)
-        if self._can_leave_range:
-            yield Rejected.OUT_OF_RANGE, (samples < self._low) | (samples > self._high)
+    def is_mixed(self) -> bool:
+        """Whether several devices send the signal; speeds that agree are one."""
+        n, sums = self.of_source[:, self.of_source[0] > 0]
+        if len(n) < 2:
+            return False
+        means = sums / n
+        is_one = QUANTITIES[self.mapped.signal] == "speed" and np.ptp(means) <= SAME_SPEED_SHARE * np.abs(means).max()
+        return not is_one
 
 
-def _fails(condition: Condition, payload: U8) -> Bool:
-    bits = condition.field.bits(payload)
+Check = Callable[[U8, U64, F64], Bool]  # payloads (n, width), raw bits (n,) and samples (n,) -> rows (n,) it applies to
+
+
+def _checks(mapped: MappedSignal) -> Iterator[tuple[Rejected, Check]]:
+    """Each reason that can apply to a signal, in order. What cannot be, as an integer that is no number, has none."""
+    for condition in mapped.multiplexed_by:
+        yield Rejected.MULTIPLEXED_OUT, partial(_fails, condition)
+    if mapped.rejects_j1939_codes:
+        yield Rejected.NOT_AVAILABLE, lambda payload, bits, samples: is_j1939_code(mapped.field, bits)
+    if mapped.named_codes:
+        codes = np.array(mapped.named_codes, np.uint64)
+        yield Rejected.NOT_AVAILABLE, lambda payload, bits, samples: np.isin(bits, codes)
+    for condition in mapped.valid_when:
+        yield Rejected.INVALID, partial(_fails, condition)
+    is_float = mapped.field.coding is Coding.FLOAT
+    if is_float:
+        yield Rejected.NOT_A_NUMBER, lambda payload, bits, samples: ~np.isfinite(samples)
+    slack = 0.0 if is_float else RANGE_TOLERANCE_STEPS * mapped.resolution
+    low = -np.inf if np.isnan(mapped.minimum) else mapped.minimum - slack
+    high = np.inf if np.isnan(mapped.maximum) else mapped.maximum + slack
+    reach = sorted(end * mapped.to_si for end in mapped.field.physical_range)
+    if reach[0] < low or reach[1] > high:
+        yield Rejected.OUT_OF_RANGE, lambda payload, bits, samples: (samples < low) | (samples > high)
+
+
+def _fails(condition: Condition, payload: U8, bits: U64, samples: F64) -> Bool:
+    """Which frames (n,) do not meet a condition on a field of their own."""
+    found = condition.field.bits(payload)
     if len(condition.allowed_bits) > MOST_COMPARED:
-        return ~np.isin(bits, np.array(condition.allowed_bits, np.uint64))
-    fails: Bool = bits != np.uint64(condition.allowed_bits[0])
+        return ~np.isin(found, np.array(condition.allowed_bits, np.uint64))
+    fails: Bool = found != np.uint64(condition.allowed_bits[0])
     for allowed in condition.allowed_bits[1:]:
-        fails &= bits != np.uint64(allowed)
+        fails &= found != np.uint64(allowed)
     return fails
 
 
@@ -127,29 +269,6 @@ def is_j1939_code(field: BitField, bits: U64) -> Bool:
         return np.asarray(bits >> np.uint64(field.length - 8) > J1939_LAST_VALID_BYTE)
     n_codes = 2 if field.length > 1 else 0
     return np.asarray(bits >= np.uint64((1 << field.length) - n_codes))
-
-
-@dataclass(frozen=True, slots=True)
-class SignalCounts:
-    """Outcomes of the frames that can carry one signal."""
-
-    samples: int
-    rejected: Mapping[Rejected, int]
-
-
-def _rows_of_sources(can_id: U32) -> list[tuple[int, Bool | slice]]:
-    """Each J1939 source address among the identifiers (n,), at least one, with its rows."""
-    sources = can_id & np.uint32(SOURCE_ADDRESS)
-    if (sources == sources[0]).all():
-        return [(int(sources[0]), slice(None))]
-    return [(int(source), sources == source) for source in np.unique(sources)]
-
-
-def _is_mixed(signal: Signal, n: F64, sums: F64) -> bool:
-    """Whether several devices send a signal, by the number and sum of samples of each; speeds that agree are one."""
-    means = sums[n > 0] / n[n > 0]
-    is_one = QUANTITIES[signal] == "speed" and len(means) and np.ptp(means) <= SAME_SPEED_SHARE * np.abs(means).max()
-    return len(means) > 1 and not is_one
 
 
 def told_lengths(counts: Mapping[int, int], n_frames: int, length: int) -> str:
@@ -175,155 +294,3 @@ def told_range(read: tuple[float, float], limits: tuple[float, float], unit: str
 def told_share(n: int, n_all: int) -> str:
     """ "1,708", or "1,708 of 1,720"."""
     return f"{n:,}" if n == n_all else f"{n:,} of {n_all:,}"
-
-
-@dataclass(frozen=True, slots=True)
-class Remark:
-    """Why frames of a message give no sample or the wrong one: a sentence for people, the share of its frames, and the
-    signals that suffer.
-    """
-
-    text: str
-    share: float
-    signals: frozenset[Signal]
-
-
-class Decoder:
-    """Turns frames into motion by one signal map. The counts are its only memory: chunking leaves no trace."""
-
-    def __init__(self, signal_map: SignalMap) -> None:
-        self.signals = signal_map.signals
-        self._messages = [_MessageReader(message, self.signals) for message in signal_map.messages]
-        self._is_aside = np.array([message.is_aside for message in self._messages])
-        self._counted = tuple(s for s in self.signals if signal_map.traits[s].counter_modulus)
-
-    @property
-    def counts(self) -> dict[Signal, SignalCounts]:
-        return {signal: counts for message in self._messages for signal, counts in message.counts()}
-
-    def remarks(self) -> tuple[Remark, ...]:
-        """Frames of another length than the database says, values out of range or with names, and signals of several
-        devices.
-        """
-        return tuple(remark for message in self._messages for remark in message.remarks())
-
-    def causes(self) -> tuple[Remark, ...]:
-        """Those that explain why nothing is weighed: they concern a good part of a signal that weighing needs."""
-        return tuple(one for one in self.remarks() if one.share >= TELLING_SHARE and one.signals & NEEDED)
-
-    def silent(self) -> tuple[str, ...]:
-        """Messages of which no frame came, each with the signals that weighing needs; none for other messages."""
-        return tuple(text for message in self._messages if (text := message.told_silence()))
-
-    def decode(self, frames: Frames) -> Motion:
-        """One row for every frame of a mapped message, in order of arrival; other frames are passed over.
-
-        All signals of a frame share its row. NaN if a frame does not validly carry a sample.
-        """
-        message_of = np.full(len(frames), -1, np.int16)
-        for i, message in enumerate(self._messages):
-            message_of[message.id_filter.matches(frames.can_id)] = i
-        rows = np.flatnonzero(message_of >= 0)
-        message_of = message_of[rows]
-        columns = np.full((len(rows), len(self.signals)), np.nan)
-        counters = {signal: np.full(len(rows), np.nan) for signal in self._counted}
-        for i, message in enumerate(self._messages):
-            ours = np.flatnonzero(message_of == i)
-            if len(ours):
-                payload = frames.payload.take(rows[ours], axis=0)
-                message.count(counters, ours, payload)
-                message.fill(columns, ours, payload, frames.length[rows[ours]], frames.can_id[rows[ours]])
-        aside = self._is_aside[message_of] if self._is_aside.any() else None
-        return Motion(self.signals, frames.t_ns[rows], columns, counters, aside)
-
-
-class _MessageReader:
-    """Reads the mapped signals of one message, and counts."""
-
-    def __init__(self, message: MappedMessage, signals: tuple[Signal, ...]) -> None:
-        self.id_filter: IdFilter = message.id_filter
-        self.is_aside = all(m.signal in ASIDE for m in message.signals)
-        self._name = message.name
-        self._frame_id = message.frame_id
-        self._length = message.length
-        self._wrong_lengths: Counter[int] = Counter()
-        self._readers = [(m.signal, signals.index(m.signal), SampleReader(m)) for m in message.signals]
-        counters = [(m.counter, m.signal) for m in message.signals if m.counter is not None]
-        self._counters = {field: [signal for of, signal in counters if of == field] for field, _ in counters}
-        self._n_frames = 0
-        sent = [m.signal for m in message.signals] if message.id_filter.is_of_any_source else []
-        self._of_source = {signal: np.zeros((2, SOURCE_ADDRESS + 1)) for signal in sent}  # number and sum of samples
-        self._rejected: dict[Signal, Counter[Rejected]] = {m.signal: Counter() for m in message.signals}
-
-    def counts(self) -> list[tuple[Signal, SignalCounts]]:
-        rejected = self._rejected.items()
-        return [(signal, SignalCounts(self._n_frames - n.total(), dict(n))) for signal, n in rejected]
-
-    def told_silence(self) -> str | None:
-        """Its name and the needed signals, if no frame of it came."""
-        needed = sorted(NEEDED.intersection(self._rejected))
-        return (
-            None
-            if self._n_frames or not needed
-            else f"{self._name} ({id_name(self._frame_id)}) for {', '.join(needed)}"
-        )
-
-    def remarks(self) -> Iterator[Remark]:
-        """Those of this message."""
-        if lengths := dict(self._wrong_lengths):
-            text = f"{self._name} ({id_name(self._frame_id)}): {told_lengths(lengths, self._n_frames, self._length)}"
-            yield Remark(text, sum(lengths.values()) / self._n_frames, frozenset(self._rejected))
-        mixed = {signal: n_and_sum[0] for signal, n_and_sum in self._of_source.items() if _is_mixed(signal, *n_and_sum)}
-        if mixed:
-            n_of_source = next(iter(mixed.values()))
-            addresses = np.argsort(-n_of_source, kind="stable")[: np.count_nonzero(n_of_source)]
-            each = [f"{address:#04x} ({n_of_source[address]:,.0f})" for address in addresses[:NAMED_SOURCES]]
-            text = (
-                f"{self._name}: {len(addresses)} devices send {', '.join(mixed)}, with the source addresses "
-                f"{', '.join(each)}: state the source_address of one in the signal map"
-            )
-            yield Remark(text, float(1.0 - n_of_source.max() / n_of_source.sum()), frozenset(mixed))
-        for signal, _, reader in self._readers:
-            if n := self._rejected[signal][Rejected.OUT_OF_RANGE]:
-                text = f"{signal} ({self._name}): {told_share(n, self._n_frames)} values read {reader.told_range()}"
-                yield Remark(text, n / self._n_frames, frozenset({signal}))
-            n = self._rejected[signal][Rejected.NOT_AVAILABLE] if reader.has_named_codes else 0
-            if n > TELLING_SHARE * self._n_frames:
-                text = (
-                    f"{signal} ({self._name}): {told_share(n, self._n_frames)} raw values have a name in the database, "
-                    "which means that they are no measurement; if they are, remove the names there"
-                )
-                yield Remark(text, n / self._n_frames, frozenset({signal}))
-
-    def fill(self, columns: F64, ours: I64, payload: U8, length: U8, can_id: U32) -> None:
-        """Decode payloads (m, width), their lengths and identifiers (m,), all of this message, into the rows ``ours``
-        (m,) of ``columns``.
-        """
-        self._n_frames += len(ours)
-        has_length = length == self._length
-        n_wrong = len(ours) - int(np.count_nonzero(has_length))
-        if n_wrong:
-            of_length = np.bincount(length[~has_length])
-            self._wrong_lengths.update({int(n_bytes): int(of_length[n_bytes]) for n_bytes in of_length.nonzero()[0]})
-            payload, ours, can_id = payload[has_length], ours[has_length], can_id[has_length]
-            for rejected in self._rejected.values():
-                rejected[Rejected.WRONG_LENGTH] += n_wrong
-        if not len(ours):
-            return
-        by_source = _rows_of_sources(can_id) if self._of_source else []
-        for signal, column, reader in self._readers:
-            samples, refused = reader.read(payload)
-            columns[ours, column] = samples
-            self._rejected[signal].update(refused)
-            for source, rows in by_source:
-                known = samples[rows][np.isfinite(samples[rows])] if refused else samples[rows]
-                self._of_source[signal][:, source] += len(known), known.sum()
-
-    def count(self, counters: Mapping[Signal, F64], ours: I64, payload: U8) -> None:
-        """Message counters of the same frames into the same rows; a frame too short for its counter gives no sample
-        either.
-        """
-        for field, signals in self._counters.items():
-            bits = field.bits(payload)
-            for signal in signals:
-                counters[signal][ours] = bits

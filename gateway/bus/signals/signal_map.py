@@ -1,7 +1,9 @@
 """Signal maps: the TOML file that names our signals in a DBC, each entry checked and resolved against its databases."""
 
 import math
+from collections.abc import Iterator
 from importlib.resources import files
+from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Final, Literal
 from zoneinfo import ZoneInfo
@@ -62,10 +64,13 @@ def resolve_signal(
     where: str, signal: Signal, entry: SignalEntry, message: DatabaseMessage, j1939: bool
 ) -> MappedSignal:
     """Resolve an entry of the map against its message. ``where`` begins every SignalMapError."""
-    named = _find(f"{where}.signal", entry.signal, message)
-    _require_decodable(f"{where}.signal", named, message)
-    to_si = entry.sign * _unit_factor(f"{where}.unit", signal, entry, named)
+    named = _decodable(f"{where}.signal", entry.signal, message)
+    try:
+        to_si = entry.sign * si_factor(QUANTITIES[signal], named.unit if entry.unit is None else entry.unit)
+    except SignalMapError as fault:
+        raise SignalMapError(f"{where}.unit: {fault}") from None
     minimum, maximum = _valid_range(where, entry, named, to_si)
+    is_state, names = QUANTITIES[signal] == "state", named.choices.values()
     return MappedSignal(
         signal=signal,
         dbc_signal=named.name,
@@ -77,20 +82,15 @@ def resolve_signal(
         multiplexed_by=_multiplexers(where, named, message),
         valid_when=tuple(_condition(where, name, allowed, message) for name, allowed in entry.valid_when.items()),
         rejects_j1939_codes=(j1939 and bool(message.frame_id & EXTENDED_ID) and named.field.coding is Coding.UNSIGNED),
-        named_codes=() if QUANTITIES[signal] == "state" else _named_codes(named),
+        # raw bits that the database gives a name, such as Error: a measured signal has numbers, a name is none
+        named_codes=() if is_state else tuple(sorted({_bits_of(raw, named.field) for raws in names for raw in raws})),
         counter=None if entry.counter is None else _counter(f"{where}.counter", entry.counter, message),
     )
 
 
-def _named_codes(signal: DatabaseSignal) -> tuple[int, ...]:
-    """Raw bits that the database gives a name, such as Error: a measured signal has numbers, a name is none."""
-    return tuple(sorted({_bits_of(raw, signal.field) for raws in signal.choices.values() for raw in raws}))
-
-
 def _counter(where: str, name: str, message: DatabaseMessage) -> BitField:
     """The field that counts the frames of the message."""
-    counter = _find(where, name, message)
-    _require_decodable(where, counter, message)
+    counter = _decodable(where, name, message)
     field = counter.field
     if field.coding is Coding.FLOAT or not FEWEST_COUNTER_BITS <= field.length <= MOST_COUNTER_BITS:
         kind = "a float" if field.coding is Coding.FLOAT else "an integer"
@@ -114,39 +114,31 @@ def _find(where: str, name: str, message: DatabaseMessage) -> DatabaseSignal:
     raise SignalMapError(f"{where}: message {message.name!r} has no signal {name!r}; {closest(name, message.signals)}")
 
 
-def _require_decodable(where: str, signal: DatabaseSignal, message: DatabaseMessage) -> None:
-    field = signal.field
+def _decodable(where: str, name: str, message: DatabaseMessage) -> DatabaseSignal:
+    """The signal of this name, if the decoder can read it. Raises SignalMapError."""
+    signal = _find(where, name, message)
+    if (fault := next(_faults_of(signal.field, message), None)) is not None:
+        raise SignalMapError(f"{where}: {name!r} {fault}; correct {message.source.name}")
+    return signal
+
+
+def _faults_of(field: BitField, message: DatabaseMessage) -> Iterator[str]:
+    """Why the decoder cannot read a field, the first fault first."""
     if field.coding is Coding.FLOAT and field.length not in (16, 32, 64):
-        raise SignalMapError(f"{where}: {signal.name!r} is a float of {field.length} bits; 16, 32 or 64 are possible")
+        yield f"is a float of {field.length} bits; 16, 32 or 64 are possible"
     if not 1 <= field.length <= 64:
-        raise SignalMapError(f"{where}: {signal.name!r} has {field.length} bits; 1 to 64 are possible")
+        yield f"has {field.length} bits; 1 to 64 are possible"
     if not 0 <= message.length <= CAN_FD_BYTES:
-        raise SignalMapError(f"{where}: {message.name!r} has {message.length} bytes; a CAN frame carries at most 64")
+        yield f"is in {message.name!r}, which has {message.length} bytes; a CAN frame carries at most 64"
     if field.start < 0:
-        raise SignalMapError(f"{where}: {signal.name!r} begins at bit {field.start}; correct {message.source.name}")
-    if not (math.isfinite(field.scale) and math.isfinite(field.offset)):
-        raise SignalMapError(f"{where}: {signal.name!r} has no finite scale and offset; correct {message.source.name}")
+        yield f"begins at bit {field.start}"
     if field.n_bytes > message.length:
-        raise SignalMapError(
-            f"{where}: {signal.name!r} ends in byte {field.n_bytes}, but {message.name!r} has {message.length}; "
-            f"correct {message.source.name}"
-        )
-    if field.scale == 0.0:
-        raise SignalMapError(f"{where}: {signal.name!r} has scale 0; correct {message.source.name}")
-    if _loses_integers(field):
-        raise SignalMapError(f"{where}: {signal.name!r} counts beyond 2^53, which a double cannot hold exactly")
-
-
-def _loses_integers(field: BitField) -> bool:
+        yield f"ends in byte {field.n_bytes}, but {message.name!r} has {message.length}"
+    if not (math.isfinite(field.scale) and math.isfinite(field.offset)) or field.scale == 0.0:
+        yield f"has scale {field.scale:g} and offset {field.offset:g}"
     is_integer = field.coding is not Coding.FLOAT and field.scale.is_integer() and field.offset.is_integer()
-    return is_integer and max(map(abs, (*field.raw_range, *field.physical_range))) > _EXACT_INTEGERS
-
-
-def _unit_factor(where: str, signal: Signal, entry: SignalEntry, named: DatabaseSignal) -> float:
-    try:
-        return si_factor(QUANTITIES[signal], named.unit if entry.unit is None else entry.unit)
-    except SignalMapError as fault:
-        raise SignalMapError(f"{where}: {fault}") from None
+    if is_integer and max(map(abs, (*field.raw_range, *field.physical_range))) > _EXACT_INTEGERS:
+        yield "counts beyond 2^53, which a double cannot hold exactly"
 
 
 def _valid_range(where: str, entry: SignalEntry, named: DatabaseSignal, to_si: float) -> tuple[float, float]:
@@ -161,17 +153,20 @@ def _valid_range(where: str, entry: SignalEntry, named: DatabaseSignal, to_si: f
 
 def _multiplexers(where: str, signal: DatabaseSignal, message: DatabaseMessage) -> tuple[Condition, ...]:
     """The chain of multiplexers that put ``signal`` into a frame, outermost last."""
-    if signal.multiplexer is None:
-        return ()
-    selector = _find(where, signal.multiplexer, message)
-    selected = Condition(selector.field, tuple(_bits_of(raw, selector.field) for raw in signal.multiplexer_ids))
-    return (selected, *_multiplexers(where, selector, message))
+    chain: dict[str, Condition] = {}
+    while signal.multiplexer is not None:
+        if signal.multiplexer in chain:
+            raise SignalMapError(f"{where}: {signal.name!r} selects itself; correct {message.source.name}")
+        selector = _find(where, signal.multiplexer, message)
+        bits = tuple(_bits_of(raw, selector.field) for raw in signal.multiplexer_ids)
+        chain[selector.name] = Condition(selector.field, bits)
+        signal = selector
+    return tuple(chain.values())
 
 
 def _condition(where: str, name: str, allowed: Accepted | list[Accepted], message: DatabaseMessage) -> Condition:
     key = f"{where}.valid_when"
-    judged = _find(key, name, message)
-    _require_decodable(key, judged, message)
+    judged = _decodable(key, name, message)
     choices = allowed if isinstance(allowed, list) else [allowed]
     if not choices:
         raise SignalMapError(f"{key}.{name}: an empty list allows no frame; name the values under which this counts")
@@ -205,7 +200,7 @@ SHIPPED_PREFIX: Final = "springscale:"
 class SignalMapFile(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    dbc: list[str] = Field(min_length=1, description="databases (DBC, KCD, ARXML, SYM), relative to this file")
+    dbc: list[str] = Field(min_length=1, description="DBC files, relative to this file")
     channel: str | None = Field(None, description="read only frames of this channel from log files")
     time_zone: str | None = Field(
         None, description="zone of logs whose date states none, such as Europe/Berlin; without it UTC"
@@ -292,9 +287,9 @@ def shipped_map(name: str) -> Path:
 def _mapped_message(
     message: DatabaseMessage, source_address: int | None, signals: tuple[MappedSignal, ...], j1939: bool
 ) -> MappedMessage:
-    by_group = j1939 and bool(message.frame_id & EXTENDED_ID)
     name, frame_id = message.name, message.frame_id
-    id_filter = j1939_filter(frame_id, source_address) if by_group else exact_filter(frame_id)
+    is_group = j1939 and bool(frame_id & EXTENDED_ID)
+    id_filter = j1939_filter(frame_id, source_address) if is_group else exact_filter(frame_id)
     if source_address is not None:
         name, frame_id = f"{name} of {source_address:#04x}", frame_id & ~SOURCE_ADDRESS | source_address
     fields = {name: signal.field for name, signal in message.signals.items()}
@@ -302,11 +297,10 @@ def _mapped_message(
 
 
 def _require_distinct(messages: tuple[MappedMessage, ...], path: Path) -> None:
-    for i, one in enumerate(messages):
-        for other in messages[i + 1 :]:
-            common = one.id_filter.mask & other.id_filter.mask
-            if (one.id_filter.can_id ^ other.id_filter.can_id) & common == 0:
-                raise SignalMapError(
-                    f"{path}: messages {one.name!r} and {other.name!r} are the same frames on the bus; "
-                    "map all their signals from one of them, each or none with a source_address"
-                )
+    for one, other in combinations(messages, 2):
+        common = one.id_filter.mask & other.id_filter.mask
+        if (one.id_filter.can_id ^ other.id_filter.can_id) & common == 0:
+            raise SignalMapError(
+                f"{path}: messages {one.name!r} and {other.name!r} are the same frames on the bus; "
+                "map all their signals from one of them, each or none with a source_address"
+            )

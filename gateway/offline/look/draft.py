@@ -9,7 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from gateway.bus.signals import Coding, DatabaseSignal, load_signal_map, shipped_databases, shipped_map
+from gateway.bus.signals import load_signal_map, shipped_map
+from gateway.bus.signals.bit_field import Coding
+from gateway.bus.signals.database import DatabaseSignal
+from gateway.bus.signals.signal_map import shipped_databases
 from gateway.errors import ConfigurationError, SpringscaleError
 from gateway.files.whole import refusal_told, write_whole, written_whole
 from gateway.offline.look.look import Described, Look

@@ -10,30 +10,20 @@ import numpy as np
 
 from gateway.bus.frames import join, merge_frames, take, widened
 from gateway.bus.logs import LogReport, open_whole_log
-from gateway.bus.signals import (
-    CAN_FD_BYTES,
-    CLASSIC_BYTES,
-    Coding,
-    DatabaseMessage,
-    Databases,
-    DatabaseSignal,
-    Decoder,
-    id_name,
-    is_j1939_code,
-    j1939_filter,
-    load_signal_map,
-    shipped_databases,
-    shipped_maps,
-)
+from gateway.bus.signals import Decoder, load_signal_map
+from gateway.bus.signals.bit_field import Coding
+from gateway.bus.signals.database import DatabaseMessage, Databases, DatabaseSignal
 from gateway.bus.signals.decode import (
     RANGE_TOLERANCE_STEPS,
     SAME_SPEED_SHARE,
     TELLING_SHARE,
+    is_j1939_code,
     told_lengths,
     told_range,
     told_share,
 )
-from gateway.bus.signals.mapping import SOURCE_ADDRESS
+from gateway.bus.signals.mapping import CAN_FD_BYTES, CLASSIC_BYTES, SOURCE_ADDRESS, id_name, j1939_filter
+from gateway.bus.signals.signal_map import shipped_databases, shipped_maps
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE
 from gateway.core.settings import BatchSettings
 from gateway.errors import SignalMapError
@@ -47,7 +37,6 @@ FIRST_FRAMES: Final = 200  # chosen: the few
 MOST_IDENTIFIERS: Final = 4096  # chosen: of one channel; a bus has some hundreds
 LEAST_RATE_HZ: Final = RATE_MIN_SHARE * BatchSettings().rate_hz
 MOST_TILT_DEG: Final = 15.0  # chosen: 3 % of gravity; beyond it the horizontal axes mix in noticeably
-KINDS: Final = (".dbc", ".kcd", ".arxml", ".sym")  # databases by their suffix
 QUANTITIES: Final = ("acceleration", "angular_rate", "speed")
 
 
@@ -413,7 +402,7 @@ def _messages_of(
 def _near(log: Path) -> list[Path]:
     """Databases beside a log or else in the parent folder, as campaigns have a folder per drive."""
     folder = log.resolve().parent
-    each = (sorted(path for path in place.glob("*") if path.suffix in KINDS) for place in (folder, folder.parent))
+    each = (sorted(path for path in place.glob("*") if path.suffix == ".dbc") for place in (folder, folder.parent))
     return next((found for found in each if found), [])
 
 

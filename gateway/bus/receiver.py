@@ -1,4 +1,4 @@
-"""Any interface of python-can (SocketCAN, slcan, pcan, virtual, ...), only listened to.
+"""An open channel of any interface of python-can (SocketCAN, slcan, pcan, virtual, ...), only listened to.
 
 Whether a SocketCAN controller itself stays silent on the wire (not even acknowledging) is the interface's setting:
 ``ip link set can0 type can bitrate 500000 listen-only on``.
@@ -11,23 +11,24 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import can
 
-from gateway.bus.frames import LAST_EXTENDED, LAST_SECOND, LAST_STANDARD, ExactStamp, frames_of
-from gateway.bus.live.adapter_clock import AdapterClock
-from gateway.bus.live.receiver import Burst
-from gateway.bus.signals import IdFilter
+from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of, has_possible_id
+from gateway.bus.signals.mapping import CAN_FD_BYTES, IdFilter
 from gateway.errors import BusError
-from gateway.records import EXTENDED_ID
+from gateway.records import EXTENDED_ID, FIRST_DATED_NS, Frames
+from gateway.units import NS_PER_S
 
 BURST_FRAMES: Final = 4096  # chosen: taken before they are handed on
 GATHER_S: Final = 0.05  # chosen: frames are left to gather in the kernel this long: few wake-ups
 RECEIVE_BUFFER_BYTES: Final = 4 << 20  # chosen: for what comes while this process does not get the processor
-LONGEST: Final = 64  # bytes of a CAN FD frame, ISO 11898-1
 VIRTUAL_QUEUE_FRAMES: Final = 4096  # chosen: an in-process sender waits when it is full
+PAUSE_S: Final = 5.0  # chosen: between two stamps: longer than any message's period, shorter than what ends a drive
+MOST_OFF_S: Final = 10.0  # chosen: more than an adapter drifts in a day (50 ppm: 4 s) and than a computer stalls
 
 _BUS_OFF: Final = 0x40  # CAN_ERR_BUSOFF of linux/can/error.h, in the identifier of an error frame
 _SO_RCVBUFFORCE: Final = 33  # linux/asm-generic/socket.h, as the next; the socket module names neither
@@ -59,30 +60,47 @@ _PACKAGES: Final[Mapping[str, tuple[str, str]]] = {
 _WINDOWS_ONLY: Final = frozenset({"etas", "ixxat", "nican", "nixnet", "systec", "usb2can", "vector"})
 
 
-class PythonCanReceiver:
-    """Messages of an open python-can bus as bursts of frames."""
+@dataclass(frozen=True, slots=True)
+class Burst:
+    """Data frames that came together in order, the numbers of others, and whether bus-off came behind all frames.
+
+    ``clock_sets`` tells how often the adapter's own clock was dated.
+    """
+
+    frames: Frames
+    error_frames: int = 0
+    is_bus_off: bool = False
+    remote_frames: int = 0
+    clock_sets: int = 0
+
+
+class Receiver:
+    """Messages of an open python-can bus as bursts of frames.
+
+    A stamp before 1986 counts from the adapter's own start, as with gs_usb, canalystii, serial and systec, or with pcan
+    without the package uptime. The system's clock at the first of these dates it; from there on the adapter's clock
+    counts, until a pause of the bus, a new start of the adapter or its counter, or a step of the system's clock.
+    """
 
     def __init__(
         self,
         bus: can.BusABC,
         width: int,
         kernel_socket: socket.socket | None = None,
-        interface: str = "",
         *,
-        has_error_classes: bool | None = None,
+        has_error_classes: bool = False,
     ) -> None:
         """``kernel_socket`` is the bus's own, if the kernel receives into it (SocketCAN). ``has_error_classes`` is
-        whether identifiers of error frames are the kernel's error classes; None: if there is a kernel socket.
+        whether identifiers of error frames are the kernel's error classes.
         """
-        self._bus = bus
-        self._width = width
-        self._socket = kernel_socket
-        self._clock = AdapterClock(interface)
-        self._has_error_classes = kernel_socket is not None if has_error_classes is None else has_error_classes
+        self._bus, self._width, self._socket = bus, width, kernel_socket
+        self._has_error_classes = has_error_classes
         streams = (one for one in vars(bus).values() if isinstance(one, socket.socket))
         self._stream = next((one for one in streams if one.type == socket.SOCK_STREAM), None)
         self._n_dropped = 0
         self._fault: Exception | None = None
+        self._adapter_start_s = self._last_stamp_s = 0.0
+        self._n_clock_sets = 0
 
     @property
     def dropped_kernel(self) -> int:
@@ -130,89 +148,79 @@ class PythonCanReceiver:
 
     def _burst(self, messages: Sequence[can.Message], now_s: float) -> Burst:
         """``now_s`` is the system's clock at the first of them."""
-        n_set, n_wraps = self._clock.n_set, self._clock.n_wraps
-        data: list[can.Message] = []
+        n_sets_before, data = self._n_clock_sets, list[can.Message]()
         n_errors, n_remote, is_bus_off = 0, 0, False
         for message in messages:
             if message.is_error_frame:
                 n_errors += 1
                 is_bus_off |= self._has_error_classes and bool(message.arbitration_id & _BUS_OFF)
-            elif not _is_possible(message):
+            elif not has_possible_id(message) or len(message.data) > CAN_FD_BYTES:  # read in noise
                 n_errors += 1
             elif message.is_remote_frame:
                 n_remote += 1
             else:
                 is_bus_off = False
-                self._date(message, now_s)
+                message.timestamp = self._dated(message.timestamp, now_s)
                 data.append(message)
-        n_set, n_wraps = self._clock.n_set - n_set, self._clock.n_wraps - n_wraps
-        return Burst(frames_of(data, self._width), n_errors, is_bus_off, n_remote, n_set, n_wraps)
+        frames = frames_of(data, self._width)
+        return Burst(frames, n_errors, is_bus_off, n_remote, self._n_clock_sets - n_sets_before)
 
-    def _date(self, message: can.Message, now_s: float) -> None:
-        """Make the stamp a time since 1970, unless it is the kernel's or the recorded one of a replay."""
-        if isinstance(message.timestamp, ExactStamp):
-            return
-        if not isinstance(message.timestamp, int | float) or not 0.0 < message.timestamp <= LAST_SECOND:
-            message.timestamp = ExactStamp(time.time_ns())
-        elif self._socket is None:
-            message.timestamp = self._clock.dated_s(message.timestamp, now_s)
+    def _dated(self, stamp_s: Any, now_s: float) -> float:
+        """Seconds since 1970 of a stamp, unless it is the kernel's or the recorded one of a replay."""
+        if isinstance(stamp_s, ExactStamp):
+            return stamp_s
+        if not isinstance(stamp_s, int | float) or not 0.0 < stamp_s <= LAST_SECOND:
+            return ExactStamp(time.time_ns())
+        if self._socket is not None or stamp_s * NS_PER_S >= FIRST_DATED_NS:
+            return stamp_s
+        is_off = abs(self._adapter_start_s + stamp_s - now_s) > MOST_OFF_S
+        if is_off or abs(stamp_s - self._last_stamp_s) > PAUSE_S:
+            self._adapter_start_s = now_s - stamp_s
+            self._n_clock_sets += 1
+        self._last_stamp_s = stamp_s
+        return self._adapter_start_s + stamp_s
 
     def close(self) -> None:
         self._bus.shutdown()
 
 
-def _is_possible(message: can.Message) -> bool:
-    """Whether a CAN bus can carry it. python-can's code for most adapters passes on what it has read in noise."""
-    last = LAST_EXTENDED if message.is_extended_id else LAST_STANDARD
-    is_number = isinstance(message.arbitration_id, int)
-    return is_number and 0 <= message.arbitration_id <= last and len(message.data) <= LONGEST
-
-
-def open_python_can(
+def open_channel(
     interface: str, channel: str, filters: Sequence[IdFilter], width: int, options: Mapping[str, Any]
-) -> PythonCanReceiver:
+) -> Receiver:
     """Open a bus for listening, filtered as far as the interface can; SocketCAN filters in the kernel.
 
     Raises BusError if its driver is missing or an option is wrong, can.CanError or OSError if the device is absent or
     busy.
     """
     arguments = {**_LISTEN_ONLY.get(interface, {}), **options}
+    can_filters = [
+        {
+            "can_id": one.can_id & ~EXTENDED_ID,
+            "can_mask": one.mask & ~EXTENDED_ID,
+            "extended": bool(one.can_id & EXTENDED_ID),
+        }
+        for one in filters
+    ]
     try:
-        bus = can.Bus(
-            interface=interface, channel=channel, can_filters=_can_filters(filters), ignore_config=True, **arguments
-        )
+        bus = can.Bus(interface=interface, channel=channel, can_filters=can_filters, ignore_config=True, **arguments)
     except can.CanInterfaceNotImplementedError as fault:
         raise BusError(f"interface {interface!r} cannot be used here: {fault}; is its driver installed?") from fault
     except (TypeError, ValueError) as fault:
         raise BusError(f"interface {interface!r} does not take these options: {fault}") from fault
     if interface != "socketcan":
-        _let_error_frames_pass(bus)
-        return PythonCanReceiver(bus, width, interface=interface, has_error_classes=interface == "socketcand")
+        # Where python-can itself filters, it drops error frames too: their identifiers are none of the mapped ones.
+        is_wanted = bus._matches_filters
+        bus._matches_filters = lambda msg: msg.is_error_frame or is_wanted(msg)  # type: ignore[method-assign]
+        return Receiver(bus, width, has_error_classes=interface == "socketcand")
     kernel_socket: socket.socket = bus.socket  # type: ignore[attr-defined] # of SocketcanBus
-    with_enough_room(kernel_socket)
-    _discard_unfiltered(bus)
-    return PythonCanReceiver(bus, width, kernel_socket)
-
-
-def _let_error_frames_pass(bus: can.BusABC) -> None:
-    """Where python-can itself filters, it drops error frames too: their identifiers are none of the mapped ones."""
-    is_wanted = bus._matches_filters
-    bus._matches_filters = lambda msg: msg.is_error_frame or is_wanted(msg)  # type: ignore[method-assign]
-
-
-def _discard_unfiltered(bus: can.BusABC) -> None:
-    """Discard what came before python-can had set the filters of the socket that it had opened."""
-    for _ in range(BURST_FRAMES):
-        if bus.recv(0.0) is None:
-            return
-
-
-def with_enough_room(kernel_socket: socket.socket) -> None:
-    """Ask the kernel for a large buffer; without CAP_NET_ADMIN the system's limit holds."""
     try:
         kernel_socket.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, RECEIVE_BUFFER_BYTES)
-    except PermissionError:
+    except PermissionError:  # without CAP_NET_ADMIN the system's limit holds
         kernel_socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+    for _ in range(BURST_FRAMES):  # what came before python-can had set the filters of the socket that it had opened
+        if bus.recv(0.0) is None:
+            break
+    return Receiver(bus, width, kernel_socket, has_error_classes=True)
 
 
 def packets_received(channel: str) -> int:
@@ -245,19 +253,3 @@ def what_lacks(interface: str) -> str | None:
     if importlib.util.find_spec(module) is None:
         return f"interface {interface!r} needs the Python package {package}: pip install {package}"
     return None
-
-
-def usable_interfaces() -> tuple[str, ...]:
-    """The usable interfaces, except the in-process one, which reaches no other program."""
-    return tuple(sorted(name for name in can.VALID_INTERFACES if name != "virtual" and what_lacks(name) is None))
-
-
-def _can_filters(filters: Sequence[IdFilter]) -> list[dict[str, Any]]:
-    return [
-        {
-            "can_id": f.can_id & ~EXTENDED_ID,
-            "can_mask": f.mask & ~EXTENDED_ID,
-            "extended": bool(f.can_id & EXTENDED_ID),
-        }
-        for f in filters
-    ]

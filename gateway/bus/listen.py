@@ -1,7 +1,7 @@
 """The live source: a thread that listens to a CAN channel, survives its faults, and fills an inbox.
 
 Time is each frame's own: the kernel's stamp on SocketCAN, the driver's elsewhere, the recorded one on an
-in-process bus. An adapter that counts from its own start is dated by the system's clock (``adapter_clock``); a frame
+in-process bus. An adapter that counts from its own start is dated by the system's clock (``receiver``); a frame
 without any stamp is stamped on receipt.
 """
 
@@ -10,27 +10,32 @@ import logging
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from typing import Any, Final
 
 import can
 
-from gateway.bus.live.python_can import open_python_can, packets_received, require_usable_interface
-from gateway.bus.live.receiver import Burst, Inbox, Receiver
-from gateway.bus.signals import IdFilter, SignalMap
+from gateway.bus.frames import join, take
+from gateway.bus.receiver import Receiver, open_channel, packets_received, require_usable_interface
+from gateway.bus.signals import SignalMap
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ThreadPart
-from gateway.records import iso_utc
+from gateway.records import Frames, iso_utc
 from gateway.words import counted
 
 POLL_S: Final = 0.3  # chosen: longest wait inside a receiver: how soon a stop takes effect
 ASLEEP_POLL_S: Final = 1.0  # chosen: likewise while the bus is silent; a frame ends the wait at once
 FIRST_PAUSE_S: Final = 0.25  # chosen: before a channel that failed is opened again; doubles up to the longest
 LONGEST_PAUSE_S: Final = 5.0  # chosen: how late a channel that came back is noticed
+TALLIED: Final = ("frames", "error_frames", "remote_frames", "reconnects", "clock_sets")
 START_WAIT_S: Final = 2.0  # chosen: for the first attempt to open the channel
+DRAINED_FRAMES: Final = 4096
+"""Chosen: at once. Stamps that jump at random end a window with every row, which costs up to 1 ms a frame: this bounds
+one turn of the pipeline to 4 s, of the 20 s that the watchdog waits."""
 
 OpenReceiver = Callable[[], Receiver]
 
@@ -73,7 +78,71 @@ class SourceCounts:
     remote_frames: int
     reconnects: int
     clock_sets: int = 0
-    clock_wraps: int = 0
+
+
+class Inbox:
+    """Frames in order of arrival; one thread puts, one drains.
+
+    When it is full, new frames are dropped and counted. With ``waits_for_room`` the putting thread waits instead: right
+    for an in-process bus, whose sender can wait, wrong for a real one.
+    """
+
+    def __init__(self, capacity_frames: int, width: int, *, waits_for_room: bool = False) -> None:
+        self._capacity = capacity_frames
+        self._width = width
+        self._waits_for_room = waits_for_room
+        self._bursts: list[Frames] = []
+        self._n_waiting = 0
+        self._n_dropped = 0
+        self._is_closed = False
+        self._changed = threading.Condition()
+
+    @property
+    def dropped(self) -> int:
+        """Frames lost because the pipeline did not keep up."""
+        return self._n_dropped
+
+    def __len__(self) -> int:
+        return self._n_waiting
+
+    def put(self, frames: Frames) -> None:
+        """Add a burst; frames without room are dropped and counted."""
+        with self._changed:
+            if self._waits_for_room:
+                self._changed.wait_for(lambda: self._n_waiting < self._capacity or self._is_closed)
+            elif len(frames) > self._capacity - self._n_waiting:
+                room = self._capacity - self._n_waiting
+                self._n_dropped += len(frames) - room
+                frames = take(frames, slice(room))
+            if len(frames):
+                self._bursts.append(frames)
+                self._n_waiting += len(frames)
+                self._changed.notify_all()
+
+    def drain(self, timeout_s: float) -> Frames | None:
+        """The waiting frames, at most DRAINED_FRAMES of them; None if there are none within ``timeout_s``."""
+        deadline = time.monotonic() + timeout_s
+        with self._changed:
+            while not self._bursts and not self._is_closed:
+                left_s = deadline - time.monotonic()
+                if left_s <= 0 or not self._changed.wait(left_s):
+                    break
+            room, n_bursts = DRAINED_FRAMES, 0
+            while n_bursts < len(self._bursts) and (room := room - len(self._bursts[n_bursts])) >= 0:
+                n_bursts += 1
+            bursts, self._bursts = self._bursts[:n_bursts], self._bursts[n_bursts:]
+            if self._bursts and not bursts:
+                bursts = [take(self._bursts[0], slice(DRAINED_FRAMES))]
+                self._bursts[0] = take(self._bursts[0], slice(DRAINED_FRAMES, None))
+            self._n_waiting -= sum(map(len, bursts))
+            self._changed.notify_all()
+        return join(bursts, self._width) if bursts else None
+
+    def close(self) -> None:
+        """Close for new frames and wake the waiting thread. The frames inside can still be drained."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()
 
 
 class LiveSource(ThreadPart):
@@ -103,7 +172,9 @@ class LiveSource(ThreadPart):
         self._interface, self._channel = interface, channel
         self._silence_s = silence_s
         width = signal_map.payload_width
-        self._open = open_receiver or opener_of(interface, channel, signal_map.filters, width, options or {})
+        self._open = open_receiver or partial(
+            open_channel, interface, channel, signal_map.filters, width, options or {}
+        )
         self.inbox = Inbox(inbox_frames, width, waits_for_room=interface == "virtual")
         self._packets_received = packets_received if interface == "socketcan" else lambda channel: 0
         self._tally: Counter[str] = Counter()
@@ -137,14 +208,9 @@ class LiveSource(ThreadPart):
     def counts(self) -> SourceCounts:
         receiver = self._receiver
         return SourceCounts(
-            frames=self._tally["frames"],
             dropped_inbox=self.inbox.dropped,
             dropped_kernel=self._dropped_before + (receiver.dropped_kernel if receiver else 0),
-            error_frames=self._tally["error_frames"],
-            remote_frames=self._tally["remote_frames"],
-            reconnects=self._tally["reconnects"],
-            clock_sets=self._tally["clock_sets"],
-            clock_wraps=self._tally["clock_wraps"],
+            **{name: self._tally[name] for name in TALLIED},
         )
 
     def _work(self) -> None:
@@ -185,10 +251,21 @@ class LiveSource(ThreadPart):
         try:
             while not self._stopping.is_set():
                 burst = receiver.receive(ASLEEP_POLL_S if self._state is SourceState.BUS_SILENT else POLL_S)
-                self._tally["frames"] += len(burst.frames)
                 others.update(error=burst.error_frames, remote=burst.remote_frames)
-                self._tally.update(error_frames=burst.error_frames, remote_frames=burst.remote_frames)
-                self._note_clock(burst)
+                self._tally.update(
+                    frames=len(burst.frames),
+                    error_frames=burst.error_frames,
+                    remote_frames=burst.remote_frames,
+                    clock_sets=burst.clock_sets,
+                )
+                if burst.clock_sets:
+                    log_event(
+                        Event.ADAPTER_CLOCK,
+                        interface=self._interface,
+                        channel=self._channel,
+                        n_sets=burst.clock_sets,
+                        first_frame=iso_utc(int(burst.frames.t_ns[0])),
+                    )
                 is_bus_off = burst.is_bus_off or (is_bus_off and not len(burst.frames))
                 if len(burst.frames):
                     heard_s = time.monotonic()
@@ -209,19 +286,6 @@ class LiveSource(ThreadPart):
             self._dropped_before += receiver.dropped_kernel
             self._receiver = None
 
-    def _note_clock(self, burst: Burst) -> None:
-        self._tally["clock_sets"] += burst.n_clock_sets
-        self._tally["clock_wraps"] += burst.n_clock_wraps
-        if burst.n_clock_sets or burst.n_clock_wraps:
-            log_event(
-                Event.ADAPTER_CLOCK,
-                interface=self._interface,
-                channel=self._channel,
-                n_sets=burst.n_clock_sets,
-                n_wraps=burst.n_clock_wraps,
-                first_frame=iso_utc(int(burst.frames.t_ns[0])),
-            )
-
     def _enter(self, state: SourceState, reason: str | None) -> None:
         is_new_fault = state is SourceState.READER_FAULT and reason != self._reason
         if (state is not self._state or is_new_fault) and state in _EVENTS:
@@ -241,13 +305,6 @@ class LiveSource(ThreadPart):
         if n_seen > self._seen_at_silence:
             return f"the bus is awake ({n_seen - self._seen_at_silence} frames), none has a mapped identifier"
         return f"no frame for {self._silence_s:g} s: the vehicle is asleep or the channel is not connected"
-
-
-def opener_of(
-    interface: str, channel: str, filters: Sequence[IdFilter], width: int, options: Mapping[str, Any]
-) -> OpenReceiver:
-    """Opens the channel with these filters."""
-    return lambda: open_python_can(interface, channel, filters, width, options)
 
 
 def system_reason(fault: Exception, channel: str) -> str:
