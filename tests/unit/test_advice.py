@@ -126,7 +126,7 @@ def test_warnings_reserve_but_not_those_about_the_other_estimator() -> None:
 )
 def test_runs_that_cannot_be_used_count(severities: tuple[Severity | None, ...], grade: Grade | None) -> None:
     runs = tuple(
-        RunVerdict(number, "a.log", () if severity is None else (Finding(Kind.GAPS, severity, "gaps", "drive again"),))
+        RunVerdict(number, "a.log", () if severity is None else (Finding(Kind.GAPS, severity, "gaps"),))
         for number, severity in enumerate(severities, 1)
     )
     rows = [judged(run) for run in range(1, 5)]

@@ -23,10 +23,9 @@ from support.inspected import (
     without,
 )
 
-from gateway.calibration.inspection.campaign import inspect_campaign
+from gateway.calibration.inspection.campaign import inspect_drives
+from gateway.calibration.inspection.drive import LogFacts, RowFacts, SplitRun, row_facts
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
-from gateway.calibration.inspection.log import LogFacts, SplitRun
-from gateway.calibration.inspection.rows import RowFacts, gravity_in, row_facts
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.scheduler import Scheduler
@@ -249,7 +248,8 @@ def test_facts_are_those_of_the_rows_in_any_order() -> None:
 def test_a_sound_drive_has_no_findings() -> None:
     motion = drive(30.0)
     assert rate_kinds(motion) == []
-    assert gravity_in(row_facts(motion, TRAITS)).kind is None
+    gravity = tuple(kind for kind in Kind if kind.startswith("acceleration"))
+    assert told_of(gravity, facts=row_facts(motion, TRAITS)) == ()
 
 
 def test_a_slow_sensor_is_named() -> None:
@@ -344,7 +344,7 @@ def test_a_piece_beyond_the_end_says_where_the_log_ends() -> None:
 def test_two_runs_on_one_drive_are_found(other: LogFacts, load: tuple[float, float], numbers: list[int]) -> None:
     runs = [KnownRun(1, "a.log", *UNLADEN, ()), KnownRun(2, "b.log", *load, ())]
     split = [SplitRun(run, run, log=log) for run, log in zip(runs, (SOUND, other), strict=True)]
-    verdicts, _ = inspect_campaign(split, VAN, BatchSettings())
+    verdicts = inspect_drives(split, VAN, BatchSettings()).verdicts
     told = {one.number: f.text for one in verdicts for f in one.findings if f.kind is Kind.SAME_DRIVE}
     assert list(told) == numbers
     assert all("runs 1 and 2" in text for text in told.values())
@@ -353,6 +353,6 @@ def test_two_runs_on_one_drive_are_found(other: LogFacts, load: tuple[float, flo
 def test_an_unreadable_log_is_reported_once_and_a_load_beyond_the_range_is_doubted() -> None:
     nothing = KnownRun(1, "a.log", 4200.0, 60.0, ())
     unreadable = SplitRun(nothing, nothing, RowFacts(), log=LogFacts(unreadable="a.log: holds no CAN frame"))
-    ((verdict,), _) = inspect_campaign([unreadable], VAN, BatchSettings())
+    (verdict,) = inspect_drives([unreadable], VAN, BatchSettings()).verdicts
     assert [finding.kind for finding in verdict.findings] == [Kind.LOG_UNREADABLE, Kind.LOAD_BEYOND_RANGE]
     assert not verdict.is_usable

@@ -16,9 +16,8 @@ from gateway.calibration.empties import looking_empty
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.found import FoundClaim, FoundLoad
 from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.drive import LogFacts, RowFacts, SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
-from gateway.calibration.inspection.log import LogFacts, SplitRun
-from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.drives import Driven, chosen
@@ -55,9 +54,8 @@ class Learnt:
     def loads(self) -> dict[int, FoundLoad]:
         """What was found of each drive's load, by its number."""
         taught = self.outcome.cross_spectrum
-        by_name = {one.name: one for one in taught.loads} if taught else {}
-        numbers = range(1, len(self.drives) + 1)
-        return {number: by_name[drive_name(number)] for number in numbers if drive_name(number) in by_name}
+        found = {n: taught.load_of(drive_name(n)) for n in range(1, len(self.drives) + 1)} if taught else {}
+        return {number: one for number, one in found.items() if one}
 
     def claims_of(self, number: int) -> list[FoundClaim]:
         """What became of the statements about a drive."""

@@ -20,7 +20,7 @@ from gateway.calibration.calibrate import drive_name
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.judgement.advice import verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
-from gateway.calibration.kept.batch_file import KeptBatch, unpacked
+from gateway.calibration.kept import KeptBatch, unpacked
 from gateway.calibration.learning.drives import pieces
 from gateway.calibration.learning.job import JOB, RESULT, LearnJob, LearnResult
 from gateway.calibration.learning.learn import Learnt, learn, matched
