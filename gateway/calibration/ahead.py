@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.fit_of_drives import information_of
-from gateway.calibration.statements import Statement, StatementSource, empty
+from gateway.calibration.statements import Statement, empty
 from gateway.core.cargo import shape_hypotheses
 from gateway.core.spectrum import frequencies_hz
 from gateway.core.vehicle import Load, Vehicle, front_share_pct
@@ -29,6 +29,7 @@ from gateway.model.weigh import mixture_of, posterior_of
 from gateway.model.whittle import Point, Whittle
 from gateway.quantity import Z95
 from gateway.records import F64
+from gateway.stated.statement import StatementSource
 
 RATE_HZ: Final = 50.0  # of the grid, BatchSettings.rate_hz
 BATCH_S: Final = 300.0  # BatchSettings.window_s

@@ -7,12 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import isfinite, nan
 from pathlib import Path
+from statistics import median
 from typing import Final
+
+import numpy as np
 
 from gateway.calibration.assigned import Assigned, assign
 from gateway.calibration.calibrate import OnFit, Outcome, calibrate_inspected, drive_name
 from gateway.calibration.campaign import Campaign, DraftTable
-from gateway.calibration.empties import looking_empty
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.found import FoundClaim, FoundLoad
 from gateway.calibration.inspection.campaign import Inspection
@@ -25,6 +27,7 @@ from gateway.calibration.statements import Statement
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.errors import CalibrationImpossibleError
+from gateway.quantity import Z95
 from gateway.records import Batch
 from gateway.stated.statement import StatementRecord
 
@@ -33,6 +36,11 @@ OF_CAMPAIGNS: Final = frozenset(
 )
 """Kinds of findings about drives that were meant to be alike; ordinary ones are not."""
 LOOKED_FOR: Final = frozenset(Kind) - OF_CAMPAIGNS
+SCATTER_KG: Final = 5.0  # chosen: standard deviation of driver, tank and loose items
+ALIKE: Final = 2.5  # chosen: standard deviations from the mode
+LEAST_MEMBERS: Final = 2
+SURE_SHARE: Final = 0.1  # chosen: of the largest payload; with a narrower interval about zero one drive is enough
+STEP_KG: Final = 2.0  # chosen: of the search for the mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +78,34 @@ class Learnt:
             if not self.statements[number - 1].is_of_payload
             and not any(self.drives[number - 1].piece.meets(*span) for span in laden)
         }
-        members = looking_empty(list(unknown.values()), self.outcome.file.vehicle)
+        members = _near_zero(list(unknown.values()), self.outcome.file.vehicle)
         return tuple(number for number, one in unknown.items() if any(one is member for member in members))
+
+
+def _near_zero(loads: Sequence[FoundLoad], vehicle: Vehicle) -> tuple[FoundLoad, ...]:
+    """Those of these drives of unknown load that look empty: the lowest mode of their payloads, if it is near zero.
+
+    The least payload of many is too low by chance; but empty drives are many, and their payloads alike. What drives do
+    not share of their error tells them apart, even if the zero is not known well.
+    """
+    if not loads:
+        return ()
+    payload_kg = np.array([one.load.payload_kg for one in loads])
+    std_kg = np.hypot([one.own_std_kg for one in loads], SCATTER_KG)
+    at_kg = np.arange(payload_kg.min() - STEP_KG, payload_kg.max() + 2.0 * STEP_KG, STEP_KG)
+    density = np.sum(np.exp(-0.5 * ((at_kg[:, None] - payload_kg) / std_kg) ** 2) / std_kg, axis=1)
+    modes = at_kg[1:-1][(density[1:-1] >= density[:-2]) & (density[1:-1] > density[2:])]
+    for mode_kg in modes.tolist():
+        members = [one for one, x, std in zip(loads, payload_kg, std_kg, strict=True) if abs(x - mode_kg) < ALIKE * std]
+        if not members:
+            continue
+        half_kg = Z95 * float(np.hypot(median(one.payload_std_kg for one in members), SCATTER_KG))
+        if mode_kg - half_kg > 0.0:
+            return ()
+        is_sure = abs(mode_kg) + half_kg < SURE_SHARE * vehicle.largest_payload_kg
+        if len(members) >= LEAST_MEMBERS or is_sure:
+            return tuple(members)
+    return ()
 
 
 def matched(records: Sequence[StatementRecord], driven: Sequence[Driven], vehicle: Vehicle) -> Assigned:

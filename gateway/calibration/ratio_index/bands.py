@@ -47,11 +47,6 @@ class BandPair:
 Pairs = tuple[BandPair | None, BandPair | None]  # of acceleration and of pitch rate; None without the sensor
 
 
-def indexes(table: SpectrumTable, pairs: Pairs) -> tuple[F64, F64]:
-    """R_a and R_g (n,) of every batch; NaN without the sensor."""
-    return ratios(table, 0, pairs[0]), ratios(table, 1, pairs[1])
-
-
 def ratios(table: SpectrumTable, sensor: int, pair: BandPair | None) -> F64:
     """One sensor's index (n,), the integrals of the spectra through both band-passes (6), one over the other."""
     spectra = table.spectra[sensor]
