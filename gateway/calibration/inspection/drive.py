@@ -69,34 +69,31 @@ def _stream(motion: Motion, signal: Signal, trait: SensorTraits) -> Stream:
 
 
 def joined_facts(parts: Sequence[RowFacts]) -> RowFacts:
-    """Facts of several stretches (at least one) as of one drive; quantiles of the whole are taken from those of the
-    parts.
+    """Facts of several stretches (at least one) as of one drive: scatter by the law of total variance, the widest range
+    of all parts.
     """
-    signals = dict.fromkeys(signal for part in parts for signal in part.streams)
-    streams = {
-        signal: _joined_stream([part.streams[signal] for part in parts if signal in part.streams]) for signal in signals
-    }
+    streams = {}
+    for signal in dict.fromkeys(signal for part in parts for signal in part.streams):
+        each = [part.streams[signal] for part in parts if signal in part.streams]
+        spoke = [stream for stream in each if stream.n >= 2]
+        streams[signal] = _joined(spoke) if len(spoke) > 1 else (spoke or each)[0]
     return RowFacts(sum(part.duration_s for part in parts), streams)
 
 
-def _joined_stream(streams: Sequence[Stream]) -> Stream:
-    """Scatter by the law of total variance; the widest range of all parts."""
-    spoke = [stream for stream in streams if stream.n >= 2]
-    if len(spoke) < 2:
-        return spoke[0] if spoke else streams[0]
-    n = np.array([stream.n for stream in spoke], float)
-    means = np.array([stream.mean for stream in spoke])
+def _joined(streams: Sequence[Stream]) -> Stream:
+    n = np.array([stream.n for stream in streams], float)
+    means = np.array([stream.mean for stream in streams])
     mean = float(np.average(means, weights=n))
-    variances = np.array([stream.std for stream in spoke]) ** 2 + (means - mean) ** 2
+    variances = np.array([stream.std for stream in streams]) ** 2 + (means - mean) ** 2
     return Stream(
         n=int(n.sum()),
-        rate_hz=float(np.average([stream.rate_hz for stream in spoke], weights=n)),
-        jitter_share=float(np.average([stream.jitter_share for stream in spoke], weights=n)),
+        rate_hz=float(np.average([stream.rate_hz for stream in streams], weights=n)),
+        jitter_share=float(np.average([stream.jitter_share for stream in streams], weights=n)),
         mean=mean,
         std=float(np.sqrt(np.average(variances, weights=n))),
-        low=min(stream.low for stream in spoke),
-        high=max(stream.high for stream in spoke),
-        resolution=spoke[0].resolution,
+        low=min(stream.low for stream in streams),
+        high=max(stream.high for stream in streams),
+        resolution=streams[0].resolution,
     )
 
 

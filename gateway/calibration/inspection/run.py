@@ -6,21 +6,22 @@ Axes, units and signs of the sensors, the speed's unit and the sensor's place ar
 needs the cross-spectra, and a vertical acceleration that shows gravity.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from functools import cached_property
 from math import isfinite, pi, sqrt
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from gateway.calibration.as_stated import stated_load, stated_run
-from gateway.calibration.inspection.axes import Phases, fitted_position_m, mean_coherence, phases, reading_of
-from gateway.calibration.inspection.drive import RowFacts, SplitRun, Stream
+from gateway.calibration.inspection.axes import Phases, fitted_position_m, phases, reading_of
+from gateway.calibration.inspection.drive import SplitRun, Stream
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
-from gateway.calibration.inspection.roll import exchanged, over_pitch, pitch_coherence
+from gateway.calibration.inspection.roll import EXCHANGED, over_pitch, pitch_coherence
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE, REASON_SHARE_MIN
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
+from gateway.model.checks import COHERENCE_BAND_HZ
 from gateway.model.spectra import LEAST_SEGMENTS, CrossSpectra, cross_spectra_of
 from gateway.quantity import Z95
 from gateway.records import Batch, Signal, Why
@@ -88,23 +89,30 @@ _DEGREES: Final = 180.0 / pi  # per radian
 def inspect_run(
     drive: SplitRun, vehicle: Vehicle, settings: BatchSettings, only: Collection[Kind] = frozenset(Kind)
 ) -> RunVerdict:
-    """Every finding of one run, of these kinds, faults first."""
-    found = [one for one in _findings(_Seen(drive, vehicle, settings)) if one.kind in only]
+    """Every finding of one run, of these kinds, faults first. Without rows there are none but why."""
+    seen, run = _Seen(drive, vehicle, settings), drive.identification
+    for check in (_unread,) if drive.log.unreadable or drive.log.span_ns is None else CHECKS:
+        seen.found += list(check(seen))
     order = list(Severity)
-    run = drive.identification
-    return RunVerdict(run.number, run.name, tuple(sorted(found, key=lambda one: order.index(one.severity))))
+    found = sorted(seen.found, key=lambda one: order.index(one.severity))
+    return RunVerdict(run.number, run.name, tuple(one for one in found if one.kind in only))
 
 
 class _Seen:
-    """A drive as its checks see it; what several of them need is computed once."""
+    """A drive as its checks see it: what several of them need, computed once, and what those before have found."""
 
     def __init__(self, drive: SplitRun, vehicle: Vehicle, settings: BatchSettings) -> None:
         self.drive, self.vehicle, self.settings = drive, vehicle, settings
         self.facts, self.streams, self.batches = drive.facts, drive.facts.streams, drive.run.batches
-        self.gravity = gravity_in(self.facts)
         self.needed_s = settings.last_batch_share_min * settings.window_s
         self.is_too_short = all(batch.duration_s < self.needed_s for batch in self.batches)
         self.is_lost = all(batch.rejected for batch in self.batches)
+        self.mends_gravity = 1.0  # what the vertical acceleration is to be multiplied by; 0 if no factor mends it
+        self.found: list[Finding] = []
+
+    def has(self, *kinds: Kind) -> bool:
+        """Whether one of these was found."""
+        return any(one.kind in kinds for one in self.found)
 
     @cached_property
     def measured(self) -> CrossSpectra | None:
@@ -139,68 +147,41 @@ class _Seen:
         """How many batches these are, and why they were rejected."""
         names = [str(why) for batch in batches for why in batch.rejected]
         told = ", ".join(f"{name} ({names.count(name)})" for name in dict.fromkeys(names))
-        of_all = "" if self.is_lost else f" of {len(self.batches)}"
-        return f"{len(batches)}{of_all} batches: {told}"
+        return f"{len(batches)}{'' if self.is_lost else f' of {len(self.batches)}'} batches: {told}"
 
 
-def _findings(seen: _Seen) -> list[Finding]:
-    """All findings; without rows there are none but why."""
+# -- the log, the rows and the batches --
+
+
+def _unread(seen: _Seen) -> Iterator[Finding]:
+    """A log that cannot be read, or has nothing of the run."""
     log = seen.drive.log
-    if log.unreadable:
-        return [Finding.of(Kind.LOG_UNREADABLE, log.unreadable)]
-    if log.span_ns is None:
-        text = f"the log lasts {log.duration_s:.0f} s, and the run begins at {log.start_s:g} s"
-        return [Finding.of(Kind.CUT_AWAY, text)]
-    found = [] if seen.gravity.kind is None else [Finding.of(seen.gravity.kind, seen.gravity.text)]
-    found += [*_of_map(seen), *_of_stamps(seen), *_of_speed(seen), *_of_masks(seen)]
-    kinds = {one.kind for one in found}
-    if not kinds & {Kind.SENSOR_SILENT, Kind.RATE_LOW}:
-        found += _roll_lost(seen)
-    if seen.measured is None and not seen.is_lost and all(signal in seen.streams for signal in INERTIAL):
-        found.append(Finding.of(Kind.UNSTEADY, f"fewer than {LEAST_SEGMENTS} unbroken stretches of 5 s at even speed"))
-    if seen.measured is not None and seen.gravity.factor != 0.0:
-        found += _of_spectra(seen, seen.measured.with_acceleration_times(seen.gravity.factor))
-    kinds = {one.kind for one in found}
-    bias = seen.facts.mean(Signal.PITCH_RATE)
-    if abs(bias) > BIAS_MAX_RADPS and not kinds & {Kind.CHANNELS_SWAPPED, Kind.PITCH_RATE_UNIT}:
-        found.append(Finding.of(Kind.PITCH_RATE_BIAS, f"pitch_rate has mean {np.degrees(bias):.3g} deg/s"))
-    if seen.drive.has_identification:
-        found += _of_batches(seen, has_fault=any(one.severity is Severity.FAULT for one in found))
-    return found
+    text = f"the log lasts {log.duration_s:.0f} s, and the run begins at {log.start_s:g} s"
+    yield Finding.of(Kind.LOG_UNREADABLE, log.unreadable) if log.unreadable else Finding.of(Kind.CUT_AWAY, text)
 
 
-# -- gravity --
-
-
-class Gravity(NamedTuple):
-    """Whether the vertical acceleration shows +9.81 m/s2: what is wrong if it does not, and the factor that mends it;
-    0 if no factor does.
-    """
-
-    kind: Kind | None = None
-    text: str = ""
-    factor: float = 1.0
-
-
-def gravity_in(facts: RowFacts) -> Gravity:
-    """What the mean of the vertical acceleration shows."""
-    stream = facts.streams.get(Signal.VERTICAL_ACCELERATION)
+def _of_gravity(seen: _Seen) -> Iterator[Finding]:
+    """A vertical acceleration whose mean is not +9.81 m/s2."""
+    stream, rate = (seen.streams.get(signal) for signal in INERTIAL)
     if stream is None or stream.n < 2 or _is_gravity(stream.mean):
-        return Gravity()
-    rate = facts.streams.get(Signal.PITCH_RATE)
-    if rate is not None and any(_is_misread(rate, to_si) for to_si in (1.0, pi / 180.0)):  # whatever unit the map says
-        text = f"vertical_acceleration has mean {stream.mean:.3g}, pitch_rate has {rate.mean:.3g}"
-        return Gravity(Kind.CHANNELS_SWAPPED, text, 0.0)
+        return
     reads = f"vertical_acceleration has mean {stream.mean:.3g} m/s2"
-    if _is_gravity(-stream.mean):
-        return Gravity(Kind.ACCELERATION_SIGN, reads, -1.0)
-    for misread, ratio in MISREAD_AS_MPS2.items():
-        if _is_misread(stream, ratio):
-            turned = "" if stream.mean > 0.0 else ", and its axis points down"
-            return Gravity(Kind.ACCELERATION_UNIT, f"{reads}: {misread}{turned}", float(np.sign(stream.mean)) / ratio)
-    along = facts.mean(Signal.LONGITUDINAL_ACCELERATION)
-    elsewhere = f", longitudinal_acceleration has {along:.3g}: exchange the two" if _is_gravity(abs(along)) else ""
-    return Gravity(Kind.ACCELERATION_AXIS, reads + elsewhere, 0.0)
+    misread = next((one for one, ratio in MISREAD_AS_MPS2.items() if _is_misread(stream, ratio)), None)
+    seen.mends_gravity = 0.0
+    if rate is not None and any(_is_misread(rate, to_si) for to_si in (1.0, 1.0 / _DEGREES)):  # whatever the map says
+        text = f"vertical_acceleration has mean {stream.mean:.3g}, pitch_rate has {rate.mean:.3g}"
+        yield Finding.of(Kind.CHANNELS_SWAPPED, text)
+    elif _is_gravity(-stream.mean):
+        seen.mends_gravity = -1.0
+        yield Finding.of(Kind.ACCELERATION_SIGN, reads)
+    elif misread:
+        seen.mends_gravity = float(np.sign(stream.mean)) / MISREAD_AS_MPS2[misread]
+        turned = "" if stream.mean > 0.0 else ", and its axis points down"
+        yield Finding.of(Kind.ACCELERATION_UNIT, f"{reads}: {misread}{turned}")
+    else:
+        along = seen.facts.mean(Signal.LONGITUDINAL_ACCELERATION)
+        elsewhere = f", longitudinal_acceleration has {along:.3g}: exchange the two" if _is_gravity(abs(along)) else ""
+        yield Finding.of(Kind.ACCELERATION_AXIS, reads + elsewhere)
 
 
 def _is_gravity(mean_mps2: float) -> bool:
@@ -211,9 +192,6 @@ def _is_misread(stream: Stream, ratio: float) -> bool:
     """Whether its mean is gravity times ``ratio``, of either sign."""
     of_gravity = abs(stream.mean) / STANDARD_GRAVITY_MPS2 / ratio
     return abs(of_gravity - 1.0) <= UNIT_TOLERANCE and stream.std < STEADY_SHARE * abs(stream.mean)
-
-
-# -- the log, the rows and the batches --
 
 
 def _of_map(seen: _Seen) -> Iterator[Finding]:
@@ -232,25 +210,22 @@ def _of_map(seen: _Seen) -> Iterator[Finding]:
         yield Finding.of(Kind.MAP_MISMATCH, text, Severity.FAULT if is_ruinous else Severity.WARNING)
 
 
-def _of_stamps(seen: _Seen) -> list[Finding]:
+def _of_stamps(seen: _Seen) -> Iterator[Finding]:
     """Sensors that are silent, send too rarely, or are stamped unevenly. A vehicle is weighed without a roll rate."""
-    silent, slow, uneven = [], [], []
     least_hz = RATE_MIN_SHARE * seen.settings.rate_hz
-    for signal in (*INERTIAL, Signal.ROLL_RATE):
-        stream, severity = seen.streams.get(signal), Severity.FAULT if signal in INERTIAL else Severity.WARNING
-        if stream is None:
-            continue
+    for signal in (one for one in (*INERTIAL, Signal.ROLL_RATE) if one in seen.streams):
+        stream, severity = seen.streams[signal], Severity.FAULT if signal in INERTIAL else Severity.WARNING
         if stream.n < 2:
             why = seen.drive.log.silent.get(signal)
             text = f"{signal} has {stream.n} samples in the whole run" + (f": {why}" if why else "")
-            silent += [] if seen.is_refused(signal, 1.0) else [Finding.of(Kind.SENSOR_SILENT, text, severity)]
+            if not seen.is_refused(signal, 1.0):
+                yield Finding.of(Kind.SENSOR_SILENT, text, severity)
         elif stream.rate_hz < least_hz:
             text = f"{signal} comes at {stream.rate_hz:.3g} Hz, at least {least_hz:g} are needed"
-            slow.append(Finding.of(Kind.RATE_LOW, text, severity))
+            yield Finding.of(Kind.RATE_LOW, text, severity)
         elif not (share := stream.jitter_share) <= JITTER_SHARE_MAX:
             much = f"{100.0 * share:.0f} %" if isfinite(share) else "more than a whole one"
-            uneven.append(Finding.of(Kind.JITTER, f"intervals of {signal} are off by {much} of their length"))
-    return [*silent, *slow, *uneven]
+            yield Finding.of(Kind.JITTER, f"intervals of {signal} are off by {much} of their length")
 
 
 def _of_speed(seen: _Seen) -> Iterator[Finding]:
@@ -287,23 +262,32 @@ def _of_masks(seen: _Seen) -> Iterator[Finding]:
 
 def _roll_lost(seen: _Seen) -> Iterator[Finding]:
     """A roll rate that is mapped, and unknown for a good part of the time that can be used."""
-    weights = [(batch.roll_usable_share, np.count_nonzero(batch.usable)) for batch in seen.batches]
-    known = [(share, n) for share, n in weights if share is not None and n > 0]
+    usable = [(batch.roll_usable_share, np.count_nonzero(batch.usable)) for batch in seen.batches]
+    known = [(share, n) for share, n in usable if share is not None and n > 0]
     lost = sum((1.0 - share) * n for share, n in known) / max(sum(n for _, n in known), 1)
-    if lost > MASKED_SHARE_NOTED:
+    if lost > MASKED_SHARE_NOTED and not seen.has(Kind.SENSOR_SILENT, Kind.RATE_LOW):
         yield Finding.of(Kind.ROLL_RATE_LOST, f"{lost:.1%} of the time that can be used")
 
 
-def _of_batches(seen: _Seen, *, has_fault: bool) -> Iterator[Finding]:
+def _bias(seen: _Seen) -> Iterator[Finding]:
+    """A gyroscope that turns while the vehicle does not."""
+    bias = seen.facts.mean(Signal.PITCH_RATE)
+    if abs(bias) > BIAS_MAX_RADPS and not seen.has(Kind.CHANNELS_SWAPPED, Kind.PITCH_RATE_UNIT):
+        yield Finding.of(Kind.PITCH_RATE_BIAS, f"pitch_rate has mean {np.degrees(bias):.3g} deg/s")
+
+
+def _of_batches(seen: _Seen) -> Iterator[Finding]:
     """No stretch that makes a batch; no batch that can be used, if nothing else says why; or fewer than there are."""
+    if not seen.drive.has_identification:
+        return
+    lost = [one for one in seen.batches if one.rejected and Why.TOO_SHORT not in one.rejected]  # ends are no loss
     if seen.is_too_short:
         if not seen.is_standing:
             longest_s = max((batch.duration_s for batch in seen.batches), default=0.0)
             text = f"the longest unbroken identification stretch lasts {longest_s:.0f} of {seen.facts.duration_s:.0f} s"
             yield Finding.of(Kind.TOO_SHORT, f"{text}; a batch needs {seen.needed_s:.0f} s")
-    elif seen.is_lost and not has_fault:
+    elif seen.is_lost and not any(one.severity is Severity.FAULT for one in seen.found):
         yield Finding.of(Kind.NO_USABLE_BATCH, seen.reasons(seen.batches))
-    lost = [one for one in seen.batches if one.rejected and Why.TOO_SHORT not in one.rejected]  # ends are no loss
     if lost and not seen.is_lost:
         yield Finding.of(Kind.BATCHES_LOST, seen.reasons(lost))
 
@@ -311,22 +295,28 @@ def _of_batches(seen: _Seen, *, has_fault: bool) -> Iterator[Finding]:
 # -- the cross-spectra --
 
 
-def _of_spectra(seen: _Seen, spectra: CrossSpectra) -> Iterator[Finding]:
+def _of_spectra(seen: _Seen) -> Iterator[Finding]:
     """Axes first; units and signs mean something of the right axes alone, and the sensor's place if these are right."""
+    if seen.measured is None:
+        if not seen.is_lost and all(signal in seen.streams for signal in INERTIAL):
+            text = f"fewer than {LEAST_SEGMENTS} unbroken stretches of 5 s at even speed"
+            yield Finding.of(Kind.UNSTEADY, text)
+        return
+    if seen.mends_gravity == 0.0:
+        return
+    spectra = seen.measured.with_acceleration_times(seen.mends_gravity)
     as_read = seen.phases(spectra)
-    misread = _misread(seen, as_read)
-    corrected = misread[1] if misread else as_read
-    swapped = _rates_swapped(seen, spectra, as_read, corrected) if spectra.has_roll else None
-    apart = None if swapped else _apart(spectra, as_read)
-    if swapped:
+    misread, corrected = _misread(seen, as_read) or ("", as_read)
+    size = _wrong_size(corrected)
+    if swapped := _rates_swapped(seen, spectra, as_read, corrected):
         yield Finding.of(Kind.RATES_SWAPPED, swapped)
-    elif apart:
+    elif apart := _apart(spectra, as_read):
         yield Finding.of(Kind.PITCH_RATE_AXIS, apart)
     else:
         if misread:
-            text = f"the phases agree with the vehicle's by {corrected.best:.2f} if {misread[0]}"
+            text = f"the phases agree with the vehicle's by {corrected.best:.2f} if {misread}"
             yield Finding.of(Kind.SPEED_UNIT, f"{text}, and by far less otherwise")
-        if size := _wrong_size(corrected):
+        if size:
             yield Finding.of(Kind.PITCH_RATE_UNIT, size)
         if corrected.is_turned:
             text = f"the phases agree with the vehicle's by {corrected.turned.best:.2f} with the opposite sign"
@@ -335,7 +325,7 @@ def _of_spectra(seen: _Seen, spectra: CrossSpectra) -> Iterator[Finding]:
             yield from _of_roll(spectra)
         if not (misread or size or corrected.is_turned):
             yield from _position(seen, spectra)
-    if (rms_mps2 := spectra.acceleration_rms_mps2 * abs(seen.gravity.factor)) < SMOOTH_MPS2:
+    if (rms_mps2 := spectra.acceleration_rms_mps2 * abs(seen.mends_gravity)) < SMOOTH_MPS2:
         yield Finding.of(Kind.SMOOTH_ROAD, f"vertical acceleration is {rms_mps2:.2g} m/s2 (root mean square)")
     yield from _coarse(seen, spectra)
 
@@ -346,7 +336,7 @@ def _misread(seen: _Seen, as_read: Phases) -> tuple[str, Phases] | None:
     for what, factor in SPEED_MISREAD.items() if as_read.best < BELIEVED_AGREEMENT else ():
         spectra = cross_spectra_of(seen.batches, reading_of(seen.vehicle, factor))
         if spectra is not None:
-            tried[what] = seen.phases(spectra.with_acceleration_times(seen.gravity.factor))
+            tried[what] = seen.phases(spectra.with_acceleration_times(seen.mends_gravity))
     best = max(tried.items(), key=lambda one: one[1].best, default=None)
     return best if best is not None and best[1].best > as_read.best + UNIT_GAIN else None
 
@@ -357,7 +347,9 @@ def _apart(spectra: CrossSpectra, read: Phases) -> str | None:
     Amidships heave and pitch are nearly independent if the speed varies, so a low coherence alone proves nothing: there
     the phases and the size must at least match a vehicle's.
     """
-    coherence, likely = mean_coherence(spectra), read.likely
+    freq_hz, likely = spectra.freq_hz[1:-1], read.likely
+    moves = (freq_hz >= COHERENCE_BAND_HZ[0]) & (freq_hz <= COHERENCE_BAND_HZ[1])
+    coherence = float(np.mean(spectra.coherence[moves]))
     is_vehicle = likely.best >= LEAST_AGREEMENT and USUAL_SCALE[0] <= likely.scale <= USUAL_SCALE[1]
     if coherence >= LEAST_COHERENCE or is_vehicle:
         return None
@@ -384,9 +376,9 @@ def _slip(ratio: float, within: tuple[float, float]) -> str:
 
 def _rates_swapped(seen: _Seen, spectra: CrossSpectra, as_read: Phases, corrected: Phases) -> str | None:
     """Pitch rate is none, but the roll rate is a sound pitch rate, and the pitch rate then a sound roll rate."""
-    if not (_apart(spectra, as_read) or _wrong_size(corrected)):
+    if not spectra.has_roll or not (_apart(spectra, as_read) or _wrong_size(corrected)):
         return None
-    other = exchanged(spectra)
+    other = spectra.showing(spectra.parts[EXCHANGED])
     read = seen.phases(other)
     is_roll = pitch_coherence(other) <= ALIKE and ROLL_RANGE[0] <= over_pitch(other) <= ROLL_RANGE[1]
     if not is_roll or _apart(other, read) or _wrong_size(read):
@@ -435,3 +427,17 @@ def _coarse(seen: _Seen, spectra: CrossSpectra) -> Iterator[Finding]:
             if (share := (steps / max(moved, np.finfo(float).tiny)) ** 2) > STEPS_SHARE_MAX:
                 text = f"{min(share, 1.0):.0%} of the power of {signal} comes from its steps of {stream.resolution:.3g}"
                 yield Finding.of(Kind.COARSE_RESOLUTION, text)
+
+
+CHECKS: Final[tuple[Callable[[_Seen], Iterator[Finding]], ...]] = (
+    _of_gravity,
+    _of_map,
+    _of_stamps,
+    _of_speed,
+    _of_masks,
+    _roll_lost,
+    _of_spectra,
+    _bias,
+    _of_batches,
+)
+"""Every check of a run that was read, in this order: some ask what those before have found."""
