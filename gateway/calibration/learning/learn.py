@@ -151,7 +151,7 @@ def learn(
         estimators=("cross_spectrum",),
         like=like,
         command=command_of(like, settings.window_s),
-        campaign_sha256=_sha256(vehicle),
+        campaign_sha256=hashlib.sha256(json.dumps(asdict(vehicle), sort_keys=True).encode()).hexdigest(),
         on_fit=on_fit,
     )
     return Learnt(
@@ -169,10 +169,6 @@ def _nothing(faults: Mapping[str, Sequence[Finding]]) -> str:
         return "nothing to learn from yet: a drive teaches from a minute of steady driving with both sensors on"
     told = dict.fromkeys(f"{one.kind}: {one.text}: {one.advice}" for found in faults.values() for one in found)
     return "nothing to learn from: every drive has a fault: " + "; ".join(told)
-
-
-def _sha256(vehicle: Vehicle) -> str:
-    return hashlib.sha256(json.dumps(asdict(vehicle), sort_keys=True).encode()).hexdigest()
 
 
 def _facts(one: Driven) -> LogFacts:
