@@ -27,7 +27,7 @@ from gateway.calibration.assigned import Assigned, Fate, Piece, assign
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.found import ClaimState, FoundClaim, Taught
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.questions import common_errors, question
+from gateway.calibration.learning.told import common_errors, question
 from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import Statement
 from gateway.calibration.teach import teach

@@ -22,7 +22,7 @@ import numpy as np
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.read_drive import TaughtDrive
-from gateway.calibration.statements import NOTHING_KNOWN, Statement, StatementSource, empty
+from gateway.calibration.statements import NOTHING_KNOWN, Statement, empty
 from gateway.calibration.teach import teach
 from gateway.core.cargo import shape_hypotheses
 from gateway.core.settings import BatchSettings
@@ -33,6 +33,7 @@ from gateway.model.weigh import by_cross_spectrum
 from gateway.offline.campaigns import split_runs
 from gateway.quantity import Z95
 from gateway.records import F64
+from gateway.stated.statement import StatementSource
 
 KNOWN_AND_TESTS: Final = {
     "known_loads": ("mixed", "speeds", "sideways", "shapes"),

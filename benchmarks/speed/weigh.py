@@ -19,7 +19,7 @@ from typing import Any, Final
 from benchmarks.speed.meter import CALIBRATION, ENVIRONMENT, best_of, cpu_s, springscale
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.campaign import CampaignTable, load_campaign
-from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of, packed
+from gateway.calibration.kept import KeptBatch, kept_batch_of, packed
 from gateway.calibration.learning.job import JOB, RESULT, LearnJob, LearnResult
 from gateway.config import ESTIMATOR_NAMES
 from gateway.config.sections import LearningSection

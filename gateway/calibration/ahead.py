@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.fit_of_drives import information_of
-from gateway.calibration.statements import Statement, StatementSource, empty
+from gateway.calibration.statements import KNOWN_PLUS_MINUS_KG, Statement, empty
 from gateway.core.cargo import shape_hypotheses
 from gateway.core.spectrum import frequencies_hz
 from gateway.core.vehicle import Load, Vehicle, front_share_pct
@@ -29,6 +29,7 @@ from gateway.model.weigh import mixture_of, posterior_of
 from gateway.model.whittle import Point, Whittle
 from gateway.quantity import Z95
 from gateway.records import F64
+from gateway.stated.statement import StatementSource
 
 RATE_HZ: Final = 50.0  # of the grid, BatchSettings.rate_hz
 BATCH_S: Final = 300.0  # BatchSettings.window_s
@@ -104,32 +105,26 @@ def _placed(vehicle: Vehicle, part: float, place: float) -> Load:
     return Load(payload_kg, front_share_pct(vehicle, payload_kg, place * vehicle.wheelbase_m))
 
 
+def _said(load: Load, source: StatementSource, plus_minus_kg: float) -> Statement:
+    return Statement(source=source, payload_kg=load.payload_kg, payload_plus_minus_kg=plus_minus_kg)
+
+
 def _note(load: Load) -> Statement:
-    source = StatementSource.DELIVERY_NOTE
-    return Statement(source=source, payload_kg=load.payload_kg, payload_plus_minus_kg=max(0.05 * load.payload_kg, 10.0))
+    return _said(load, StatementSource.DELIVERY_NOTE, max(0.05 * load.payload_kg, 10.0))
 
 
 def _scale(load: Load) -> Statement:
-    return Statement(source=StatementSource.SCALE, payload_kg=load.payload_kg, payload_plus_minus_kg=12.0)
+    return _said(load, StatementSource.SCALE, 12.0)
 
 
 def _axle_scales(load: Load) -> Statement:
-    return Statement(
-        source=StatementSource.AXLE_SCALES,
-        payload_kg=load.payload_kg,
-        payload_plus_minus_kg=12.0,
-        front_share_pct=load.front_share_pct,
-        front_share_plus_minus_pct=0.7,
-    )
+    said = _said(load, StatementSource.AXLE_SCALES, 12.0)
+    return replace(said, front_share_pct=load.front_share_pct, front_share_plus_minus_pct=0.7)
 
 
 def _known(load: Load) -> Statement:
-    return Statement(
-        source=StatementSource.KNOWN,
-        payload_kg=load.payload_kg,
-        front_share_pct=load.front_share_pct,
-        is_compact=True,
-    )
+    said = _said(load, StatementSource.KNOWN, KNOWN_PLUS_MINUS_KG)
+    return replace(said, front_share_pct=load.front_share_pct, is_compact=True)
 
 
 @dataclass(frozen=True, slots=True)

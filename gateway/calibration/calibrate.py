@@ -13,8 +13,8 @@ from gateway.calibration.contradicted import contradictions
 from gateway.calibration.file import CalibrationFile, DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
 from gateway.calibration.found import ClaimState, FoundClaim, FoundLoad, Taught
 from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
-from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
@@ -26,7 +26,7 @@ from gateway.core.vehicle import Load, Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.model.vehicle import VehicleModel
 from gateway.quantity import Z95
-from gateway.records import F64, Batch, iso_utc
+from gateway.records import F64, iso_utc
 from gateway.stated.doubt import Doubt
 
 OnFit = Callable[[str, int, int], None]  # (estimator, steps done, steps in all)
@@ -72,7 +72,14 @@ def calibrate_inspected(
     is left, or if the faults of the runs leave no valid calibration.
     """
     if inspection.refusal is not None:
-        raise CalibrationImpossibleError(_refused(campaign, inspection, inspection.refusal))
+        faults = [
+            f"run {verdict.number}: {one.kind}: {one.text}: {one.advice}"
+            for verdict in inspection.verdicts
+            for one in verdict.findings
+            if one.severity is Severity.FAULT
+        ]
+        refusal = f"{campaign.path}: {inspection.refusal}"
+        raise CalibrationImpossibleError("\n".join([refusal, *dict.fromkeys(faults)]))
     sister = None
     if like is not None:
         sister = sister_in(like)
@@ -80,7 +87,6 @@ def calibrate_inspected(
         inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)
     split = inspection.usable
     runs = [one.identification for one in split]
-    counted = [batch for run in runs for batch in run.batches if not batch.rejected]
     ratio_index, cross_spectrum, claims, warnings = _fit(estimators, runs, campaign, sister, bands, on_fit)
     inspection = _with_disagreements(inspection, claims)
     inspection = _as_believed(inspection, claims, cross_spectrum)
@@ -89,7 +95,7 @@ def calibrate_inspected(
     warnings += [f"{one.kind}: {one.sentence}" for one in doubts]
     file = CalibrationFile(
         vehicle=campaign.vehicle,
-        seen=_seen(runs, counted, cross_spectrum),
+        seen=_seen(runs, cross_spectrum),
         cross_spectrum=cross_spectrum.model if cross_spectrum else None,
         ratio_index=ratio_index.calibration if ratio_index else None,
         sister_id=like.id if like and cross_spectrum else None,
@@ -147,60 +153,39 @@ def with_statements_tested(inspection: Inspection, vehicle: Vehicle, like: Calib
     return _with_disagreements(inspection, examined(_drives(runs), vehicle, sister))
 
 
-def _refused(campaign: Campaign, inspection: Inspection, why: str) -> str:
-    """The refusal with every fault that led to it."""
-    faults = [
-        f"run {verdict.number}: {finding.kind}: {finding.text}: {finding.advice}"
-        for verdict in inspection.verdicts
-        for finding in verdict.findings
-        if finding.severity is Severity.FAULT
-    ]
-    return "\n".join([f"{campaign.path}: {why}", *dict.fromkeys(faults)])
-
-
 def drive_name(number: int) -> str:
     """The name by which a fit knows a run."""
     return f"drive {number}"
 
 
-def _found(runs: Sequence[KnownRun], taught: Taught | None) -> dict[int, FoundLoad]:
-    """What the fit found of each run's load, by number."""
-    by_name = {one.name: one for one in taught.loads} if taught else {}
-    return {run.number: by_name[name] for run in runs if (name := drive_name(run.number)) in by_name}
-
-
 def _with_disagreements(inspection: Inspection, claims: Sequence[FoundClaim]) -> Inspection:
     """With a warning for each run whose statement was held, because the drives contradict it beyond chance."""
     runs = {drive_name(one.run.number): one.run for one in inspection.split}
-    held = {one.drive: one for one in claims if one.state is ClaimState.HELD}
-    verdicts = []
-    for verdict in inspection.verdicts:
-        claim = held.get(drive_name(verdict.number))
-        if claim is not None:
-            shown = f"the drive shows {claim.without_kg:.0f} ± {Z95 * claim.without_std_kg:.0f} kg"
-            shown += " at another place" if claim.is_of_place else ""
-            text = f"the campaign says {runs[claim.drive].described}, {shown}; the statement taught nothing"
-            kind = Kind.LOAD_DISAGREES
-            if claim.exchanged_with is not None:
-                kind, text = Kind.LOADS_SWAPPED, f"{text}; exchanged with {claim.exchanged_with}, both fit far better"
-            verdict = replace(verdict, findings=(*verdict.findings, Finding.of(kind, text)))  # noqa: PLW2901
-        verdicts.append(verdict)
-    return replace(inspection, verdicts=tuple(verdicts))
+    verdicts = {drive_name(one.number): one for one in inspection.verdicts}
+    for claim in {one.drive: one for one in claims if one.state is ClaimState.HELD}.values():
+        shown = f"the drive shows {claim.without_kg:.0f} ± {Z95 * claim.without_std_kg:.0f} kg"
+        shown += " at another place" if claim.is_of_place else ""
+        text = f"the campaign says {runs[claim.drive].described}, {shown}; the statement taught nothing"
+        kind = Kind.LOAD_DISAGREES
+        if claim.exchanged_with is not None:
+            kind, text = Kind.LOADS_SWAPPED, f"{text}; exchanged with {claim.exchanged_with}, both fit far better"
+        found = verdicts[claim.drive]
+        verdicts[claim.drive] = replace(found, findings=(*found.findings, Finding.of(kind, text)))
+    return replace(inspection, verdicts=tuple(verdicts.values()))
 
 
 def _as_believed(inspection: Inspection, claims: Sequence[FoundClaim], taught: Taught | None) -> Inspection:
     """With the loads as the fit believes them: without statements that were held and errors that all of them share."""
     held = {one.drive for one in claims if one.state is ClaimState.HELD}
-    stated = {one.name: (one.stated_kg, one.stated_std_kg) for one in taught.loads} if taught else {}
 
     def believed(run: KnownRun) -> KnownRun:
         name = drive_name(run.number)
-        if name in held and not math.isfinite(stated.get(name, (math.nan,))[0]):
+        found = taught.load_of(name) if taught else None
+        if name in held and not (found and math.isfinite(found.stated_kg)):
             return replace(run, payload_kg=math.nan, front_share_pct=math.nan)
-        if run.said is None or name not in stated:
+        if run.said is None or not found:
             return run
-        payload_kg, std_kg = stated[name]
-        return replace(run, payload_kg=payload_kg, payload_plus_minus_kg=Z95 * std_kg)
+        return replace(run, payload_kg=found.stated_kg, payload_plus_minus_kg=Z95 * found.stated_std_kg)
 
     split = [
         replace(one, identification=believed(one.identification), validation=believed(one.validation))
@@ -209,29 +194,27 @@ def _as_believed(inspection: Inspection, claims: Sequence[FoundClaim], taught: T
     return replace(inspection, split=tuple(split))
 
 
-def _seen(runs: Sequence[KnownRun], counted: Sequence[Batch], taught: Taught | None) -> SeenPart:
+def _seen(runs: Sequence[KnownRun], taught: Taught | None) -> SeenPart:
     """The ranges covered by the runs with a batch, and by those of its sister; unknown loads as the fit found them."""
-    driven = [run for run in runs if any(not batch.rejected for batch in run.batches)]
-    loads = [run.load for run in driven]
+    counted = [batch for run in runs for batch in run.batches if not batch.rejected]
     speeds_mps = [batch.mean_speed_mps for batch in counted]
+    roughness = [roughness_mps2(spectra_of(batch), batch.mean_speed_mps) for batch in counted]
+    loads: list[Load] = []
     if taught is not None:
-        found = _found(driven, taught)
-        of_sister = taught.model.taught_loads[: -len(taught.loads)]
-        loads = [*of_sister, *(_known_or_found(run, found.get(run.number)) for run in driven)]
-        speeds_mps = [*speeds_mps, *taught.model.speed_seen_mps]
+        loads += taught.model.taught_loads[: -len(taught.loads)]
+        speeds_mps += taught.model.speed_seen_mps
+    for run in runs:
+        if any(not batch.rejected for batch in run.batches):
+            found = taught.load_of(drive_name(run.number)) if taught else None
+            is_stated = run.has_payload and run.has_place and not (found and found.is_held)
+            loads.append(run.load if found is None or is_stated else found.load)
     return SeenPart(
         payload_kg=_span([load.payload_kg for load in loads]),
         front_share_pct=_span([load.front_share_pct for load in loads]),
         speed_mps=_span(speeds_mps),
-        roughness_mps2=_roughness_span(counted),
+        roughness_mps2=_span(roughness) if any(math.isfinite(one) for one in roughness) else None,
         sensor_rate_hz=sensor_rate_seen_hz(runs),
     )
-
-
-def _known_or_found(run: KnownRun, found: FoundLoad | None) -> Load:
-    if found is None or (run.has_payload and run.has_place and not found.is_held):
-        return run.load
-    return found.load
 
 
 def _span(numbers: Sequence[float]) -> tuple[float, float]:
@@ -240,24 +223,17 @@ def _span(numbers: Sequence[float]) -> tuple[float, float]:
     return min(known), max(known)
 
 
-def _roughness_span(batches: Sequence[Batch]) -> tuple[float, float] | None:
-    """None if no batch has an unbroken stretch for a spectrum."""
-    roughness = [roughness_mps2(spectra_of(batch), batch.mean_speed_mps) for batch in batches]
-    return _span(roughness) if any(math.isfinite(one) for one in roughness) else None
-
-
 def _expected_errors(ratio_index: RatioIndexFit | None, taught: Taught | None) -> dict[str, ExpectedErrorsPart]:
-    errors: dict[str, ExpectedErrorsPart] = {}
+    errors: dict[str, tuple[F64 | None, F64 | None]] = {}
     if ratio_index is not None:
-        errors["ratio_index"] = _rms_of(ratio_index.payload_errors_kg, ratio_index.front_share_errors_pct)
+        errors["ratio_index"] = ratio_index.payload_errors_kg, ratio_index.front_share_errors_pct
     if taught is not None:
         rows = np.array([one.error[:2] for one in taught.errors]).reshape(-1, 2)
-        errors["cross_spectrum"] = _rms_of(rows[:, 0], rows[:, 1])
-    return errors
-
-
-def _rms_of(payload_kg: F64 | None, front_share_pct: F64 | None) -> ExpectedErrorsPart:
-    return ExpectedErrorsPart(payload_rms_kg=_rms(payload_kg), front_share_rms_pct=_rms(front_share_pct))
+        errors["cross_spectrum"] = rows[:, 0], rows[:, 1]
+    return {
+        name: ExpectedErrorsPart(payload_rms_kg=_rms(payload_kg), front_share_rms_pct=_rms(share_pct))
+        for name, (payload_kg, share_pct) in errors.items()
+    }
 
 
 def _rms(errors: F64 | None) -> float | None:
@@ -266,25 +242,27 @@ def _rms(errors: F64 | None) -> float | None:
 
 
 def _provenance(campaign_sha256: str, split: Sequence[SplitRun], taught: Taught | None, command: str) -> ProvenancePart:
-    found = _found([one.identification for one in split], taught)
-    return ProvenancePart(
-        software=f"springscale {version('springscale')}",
-        command=command,
-        campaign_sha256=campaign_sha256,
-        drives=tuple(
+    drives = []
+    for one in split:
+        run, span_ns = one.identification, one.log.span_ns
+        found = taught.load_of(drive_name(run.number)) if taught else None
+        drives.append(
             DrivePart(
                 number=run.number,
                 log=run.name,
                 sha256=one.log.sha256,
-                t_start=iso_utc(one.log.span_ns[0]) if one.log.span_ns else None,
-                t_end=iso_utc(one.log.span_ns[1]) if one.log.span_ns else None,
-                n_batches=len([batch for batch in run.batches if not batch.rejected]),
+                t_start=iso_utc(span_ns[0]) if span_ns else None,
+                t_end=iso_utc(span_ns[1]) if span_ns else None,
+                n_batches=sum(not batch.rejected for batch in run.batches),
                 statement=run.statement,
-                found=_found_part(found[run.number]) if run.number in found else None,
+                found=_found_part(found) if found else None,
             )
-            for one in split
-            if (run := one.identification)
-        ),
+        )
+    return ProvenancePart(
+        software=f"springscale {version('springscale')}",
+        command=command,
+        campaign_sha256=campaign_sha256,
+        drives=tuple(drives),
     )
 
 

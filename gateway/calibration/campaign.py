@@ -223,18 +223,14 @@ def _faults(campaign: Campaign, run: RunTable) -> Iterator[str]:
             f"payload_position_m: {run.payload_kg:g} kg at {run.payload_position_m:g} m would put {share_pct:.0f} % of "
             "the weight on the front axle and lift the other; it is measured from the front axle rearwards"
         )
-    if run.payload_left_m is not None and campaign.vehicle.track_width_m is not None:
-        yield from _sideways_faults(campaign.vehicle, run.payload_kg, run.payload_left_m)
-
-
-def _sideways_faults(vehicle: Vehicle, payload_kg: float, left_m: float) -> Iterator[str]:
-    track_m = vehicle.track_width_m or math.nan
-    share_pct = left_share_pct(cg_left_m(vehicle, payload_kg, left_m), track_m)
-    if not 0.0 < share_pct < 100.0:
-        yield (
-            f"payload_left_m: {payload_kg:g} kg at {left_m:g} m would put {share_pct:.0f} % of the "
-            "weight on the left wheels and lift the others; it is measured from the centre line to the left"
-        )
+    left_m, track_m = run.payload_left_m, campaign.vehicle.track_width_m
+    if left_m is not None and track_m is not None:
+        share_pct = left_share_pct(cg_left_m(campaign.vehicle, run.payload_kg, left_m), track_m)
+        if not 0.0 < share_pct < 100.0:
+            yield (
+                f"payload_left_m: {run.payload_kg:g} kg at {left_m:g} m would put {share_pct:.0f} % of the weight on "
+                "the left wheels and lift the others; it is measured from the centre line to the left"
+            )
 
 
 def chosen_runs(campaign: Campaign, numbers: Sequence[int] | None) -> list[tuple[int, RunTable]]:

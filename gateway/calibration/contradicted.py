@@ -85,7 +85,11 @@ def contradictions(
         return ()
     whole = Prior.of_sister(sister, vehicle, with_roll=False) if sister else Prior.of_any(vehicle, with_roll=False)
     fit = _fit(known, Gaussian.of(whole.mean, whole.covariance), model.parameters[:N])
-    found = list(_sensor(fit, vehicle))
+    found = []
+    found_m, std_m, stds_off = fit.alone(_SENSOR)
+    if abs(stds_off) > DOUBTED_STDS:
+        numbers = {"found_m": found_m, "within_m": Z95 * std_m, "said_m": vehicle.sensor_position_m}
+        found.append(Doubt.of(DoubtKind.DRIVEN_SENSOR, **numbers))
     if abs(fit.alone(_DELAY)[2]) > LOOKED_STDS:
         precision = fit.prior.precision.copy()  # the time between the axles is free: a wrong wheelbase bends much else
         precision[_DELAY, _DELAY] = FREE_SCALE_STD**-2.0
@@ -107,12 +111,6 @@ def _wheelbase(free: _Fitted, vehicle: Vehicle) -> Iterator[Doubt]:
     if abs(scale) > max(DOUBTED_STDS * std, LEAST_SCALE):
         found_m, said_m = vehicle.wheelbase_m * (1.0 + scale), vehicle.wheelbase_m
         yield Doubt.of(DoubtKind.DRIVEN_WHEELBASE, found_m=found_m, within_m=Z95 * said_m * std, said_m=said_m)
-
-
-def _sensor(fit: _Fitted, vehicle: Vehicle) -> Iterator[Doubt]:
-    found_m, std_m, stds_off = fit.alone(_SENSOR)
-    if abs(stds_off) > DOUBTED_STDS:
-        yield Doubt.of(DoubtKind.DRIVEN_SENSOR, found_m=found_m, within_m=Z95 * std_m, said_m=vehicle.sensor_position_m)
 
 
 def _weight(fit: _Fitted, vehicle: Vehicle) -> Iterator[Doubt]:

@@ -9,12 +9,11 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.claims import LEAST_PRECISION, Terms, shared_disagreement
 from gateway.calibration.found import ClaimState, FoundClaim, FoundLoad
 from gateway.calibration.left_out import USUAL_FRONT_SHARE_PCT, USUAL_PAYLOAD_SHARE, LeftOut, Limits, most_misfit
 from gateway.calibration.prior import MODE, Prior, own_prior
 from gateway.calibration.read_drive import EVIDENCE, OfVehicle, ReadDrive, RollingDrive
-from gateway.calibration.statements import Statement, load_prior_of
+from gateway.calibration.statements import LEAST_PRECISION, Statement, Terms, load_prior_of, shared_disagreement
 from gateway.core.bends import joined_gains
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.core.vehicle import Load, Vehicle

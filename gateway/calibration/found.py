@@ -87,3 +87,7 @@ class Taught:
     errors: tuple[LeftOut, ...] = ()
     claims: tuple[FoundClaim, ...] = ()
     causes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def load_of(self, name: str) -> FoundLoad | None:
+        """What was found of a drive's load; None if the drive taught nothing."""
+        return next((one for one in self.loads if one.name == name), None)

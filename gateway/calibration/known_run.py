@@ -4,14 +4,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gateway.calibration.statements import (
-    KNOWN_PLUS_MINUS_KG,
-    KNOWN_SHARE_PLUS_MINUS_PCT,
-    Statement,
-    StatementSource,
-)
+from gateway.calibration.statements import KNOWN_PLUS_MINUS_KG, KNOWN_SHARE_PLUS_MINUS_PCT, Statement
 from gateway.core.vehicle import PAYLOAD_LEFT_NOTED_STD_M, PAYLOAD_LEFT_STD_M, Load
 from gateway.records import Batch
+from gateway.stated.statement import StatementSource
 
 
 @dataclass(frozen=True, slots=True)

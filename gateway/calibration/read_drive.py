@@ -7,8 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.claims import Terms
-from gateway.calibration.statements import Claim, Statement, load_prior_of
+from gateway.calibration.statements import Claim, Statement, Terms, load_prior_of
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model.car import Ground
 from gateway.model.expected import log_stroke_speeds, with_strokes
@@ -48,8 +47,8 @@ def can_roll(vehicle: Vehicle) -> bool:
 class ReadDrive:
     """One drive's likelihood, as a function of the common vector (N + m,) and of its own.
 
-    The common vector has the vehicle's parameters and the errors that claims share (gateway.calibration.claims), the
-    own vector (N_OWN + 2,) the drive's deviations from the vehicle, its payload and its front share.
+    The common vector has the vehicle's parameters and the errors that claims share (gateway.calibration.statements),
+    the own vector (N_OWN + 2,) the drive's deviations from the vehicle, its payload and its front share.
     """
 
     def __init__(self, drive: TaughtDrive, vehicle: Vehicle, segments: Segments, reading: Reading) -> None:

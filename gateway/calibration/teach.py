@@ -4,9 +4,9 @@
 
 A drive is driven by a vehicle that nearly is the one that is sought; by how much it deviates is in the table. Its load
 is what somebody stated of it, with that doubt, or unknown; errors that statements have in common are found too
-(gateway.calibration.claims). Heave and pitch are fitted to what the sensors would measure on the centre line, roll to
-all three sensors with the half-car as found; they take turns (docs/architecture.md). Drives left out, weighed
-as the service weighs, show the model's error.
+(gateway.calibration.statements). Heave and pitch are fitted to what the sensors would measure on the centre line, roll
+to all three sensors with the half-car as found; they take turns (docs/architecture.md). Drives left out, weighed as the
+service weighs, show the model's error.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,7 +18,6 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.claims import common_causes
 from gateway.calibration.fit_of_drives import (
     STARTS,
     WEAK_DISAGREEMENT,
@@ -31,6 +30,7 @@ from gateway.calibration.found import ClaimState, FoundClaim, Taught
 from gateway.calibration.left_out import LeftOut, Limits, limits_shown_by
 from gateway.calibration.prior import Prior
 from gateway.calibration.read_drive import BAND_HZ, N_SEGMENT, ReadDrive, TaughtDrive, can_roll
+from gateway.calibration.statements import common_causes
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.model.spectra import Reading, Segments, grouped, segments_of

@@ -11,8 +11,8 @@ from gateway.calibration.calibrate import Outcome, calibrate_inspected, with_sta
 from gateway.calibration.campaign import Campaign, load_campaign
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
-from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.judgement.advice import Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
 from gateway.calibration.ratio_index.bands import BandChoice

@@ -14,8 +14,7 @@ from gateway.bus.signals.mapping import MappedMessage, id_name
 from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, OnRun, RunTable, chosen_runs, file_sha256
 from gateway.calibration.inspection.campaign import Inspection, inspect_drives
-from gateway.calibration.inspection.log import LogFacts, SplitRun
-from gateway.calibration.inspection.rows import row_facts
+from gateway.calibration.inspection.drive import LogFacts, SplitRun, row_facts
 from gateway.calibration.judgement.evaluation import Judged, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import BandChoice

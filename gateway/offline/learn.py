@@ -11,10 +11,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gateway.bus.signals import SignalMap
+from gateway.calibration.inspection.drive import LogFacts, row_facts
 from gateway.calibration.inspection.finding import Finding, Severity
-from gateway.calibration.inspection.log import LogFacts
-from gateway.calibration.inspection.rows import row_facts
-from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of
+from gateway.calibration.kept import KeptBatch, kept_batch_of
 from gateway.calibration.learning.drives import Driven, Pieces, pieces
 from gateway.calibration.learning.learn import inspected
 from gateway.calibration.learning.spans import can_teach

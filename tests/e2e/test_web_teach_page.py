@@ -17,7 +17,7 @@ from support.web import Gateway, serving
 
 from gateway.calibration.inspection.finding import Kind, Severity
 from gateway.calibration.learning.learn import LOOKED_FOR, _nothing
-from gateway.calibration.questions import SLIPS
+from gateway.calibration.learning.told import SLIPS
 from gateway.calibration.statements_csv import read_statements
 from gateway.service.learner.loads import NEXT_FIT, NO_VEHICLE
 from gateway.stated.doubt import DoubtKind

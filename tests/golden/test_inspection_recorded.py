@@ -13,9 +13,8 @@ from gateway.bus.logs import LogReport
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.campaign import load_campaign
 from gateway.calibration.inspection.campaign import Inspection
-from gateway.calibration.inspection.log import SplitRun
+from gateway.calibration.inspection.drive import SplitRun, row_facts
 from gateway.calibration.inspection.roll import roll_sign_of
-from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings

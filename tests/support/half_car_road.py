@@ -101,9 +101,10 @@ def run_over_road(number: int, payload_kg: float, share_pct: float) -> KnownRun:
     return KnownRun(number, f"run {number}", payload_kg, share_pct, batches)
 
 
-def taught_by(runs: list[KnownRun], vehicle: Vehicle = VAN) -> VehicleModel:
+def taught_by(runs: list[KnownRun], vehicle: Vehicle = VAN, sister: VehicleModel | None = None) -> VehicleModel:
     """The vehicle that these runs teach."""
-    return teach([TaughtDrive(f"run {one.number}", one.batches, one.statement) for one in runs], vehicle).model
+    drives = [TaughtDrive(f"run {one.number}", one.batches, one.statement) for one in runs]
+    return teach(drives, vehicle, sister).model
 
 
 @kept

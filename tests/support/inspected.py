@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from gateway.bus.signals import Decoder, SignalMap, load_signal_map
+from gateway.calibration.inspection.drive import SplitRun, row_facts
 from gateway.calibration.inspection.finding import RunVerdict
-from gateway.calibration.inspection.log import SplitRun
-from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.batch import Traits

@@ -1,6 +1,6 @@
 """Known-load drives of the half-car of support.half_car_road, as calibration reads them."""
 
-from gateway.calibration.inspection.log import LogFacts, SplitRun
+from gateway.calibration.inspection.drive import LogFacts, SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import front_share_pct
 from gateway.model.vehicle import VehicleModel

@@ -6,8 +6,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gateway.calibration.inspection.rows import RowFacts
-from gateway.calibration.kept.batch_file import KeptBatch
+from gateway.calibration.inspection.drive import RowFacts
+from gateway.calibration.kept import KeptBatch
 from gateway.calibration.learning.job import LearnJob, LearnResult
 from gateway.config.sections import LearningSection
 from gateway.core.settings import BatchSettings

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from gateway.calibration.read_drive import TaughtDrive
-from gateway.calibration.statements import Statement, StatementSource
+from gateway.calibration.statements import Statement
 from gateway.calibration.teach import teach
 from gateway.core.cargo import known_shape
 from gateway.core.vehicle import Load, Vehicle
@@ -16,6 +16,7 @@ from gateway.model.table import ROWS, covariance_of
 from gateway.model.vehicle import VehicleModel
 from gateway.model.weigh import Weighed, by_cross_spectrum, weigh
 from gateway.records import F64, Batch, Why
+from gateway.stated.statement import StatementSource
 from support.kept import kept
 from support.model_road import VAN, batch_over_road, model_of, theta_of
 

@@ -10,11 +10,12 @@ from support.half_car_road import VAN, batch_over_road
 from gateway.calibration.ahead import CANDIDATES, Ahead, next_steps, steady_drive
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.read_drive import TaughtDrive
-from gateway.calibration.statements import NOTHING_KNOWN, Statement, StatementSource
+from gateway.calibration.statements import NOTHING_KNOWN, Statement
 from gateway.calibration.teach import teach
 from gateway.core.vehicle import Load
 from gateway.model.vehicle import VehicleModel
 from gateway.model.whittle import Point, Whittle
+from gateway.stated.statement import StatementSource
 
 EMPTY = Load(0.0, 52.0)
 LOADED = Load(330.0, 54.0)

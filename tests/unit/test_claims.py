@@ -6,8 +6,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.half_car_road import VAN
 
-from gateway.calibration.claims import Terms, common_causes, shared_disagreement
-from gateway.calibration.statements import NOTHING_KNOWN, Claim, Statement, load_prior_of
+from gateway.calibration.statements import (
+    NOTHING_KNOWN,
+    Claim,
+    Statement,
+    Terms,
+    common_causes,
+    load_prior_of,
+    shared_disagreement,
+)
 from gateway.quantity import Z95
 from gateway.records import F64
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from support.learner import NOW_NS, kept_window
 
-from gateway.calibration.kept.batch_file import packed, unpacked
+from gateway.calibration.kept import packed, unpacked
 from gateway.service.learner.drives import DriveFiles
 from gateway.units import NS_PER_S
 

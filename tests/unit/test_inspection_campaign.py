@@ -6,10 +6,9 @@ import pytest
 from support.half_car_road import VAN, batch_over_road
 from support.known_runs import LOADS, campaign, known_run
 
-from gateway.calibration.inspection.campaign import Inspection, inspect_campaign, load_findings
+from gateway.calibration.inspection.campaign import Inspection, inspect_drives, load_findings
+from gateway.calibration.inspection.drive import RowFacts, SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
-from gateway.calibration.inspection.log import SplitRun
-from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings
 
@@ -56,24 +55,24 @@ def test_a_run_at_another_speed_is_noted_and_one_on_a_far_smoother_road_warned_o
         pitch_rate_radps=batch.pitch_rate_radps / 6.0,
     )
     smooth = replace(runs[0], number=6, batches=(quiet,))
-    verdicts, findings = inspect_campaign([inspected(run) for run in (*runs, fast, smooth)], VAN, SETTINGS)
-    assert findings == ()
-    told = {verdict.number: [finding.kind for finding in verdict.findings] for verdict in verdicts}
+    found_in = inspect_drives([inspected(run) for run in (*runs, fast, smooth)], VAN, SETTINGS)
+    assert found_in.findings == ()
+    told = {verdict.number: [finding.kind for finding in verdict.findings] for verdict in found_in.verdicts}
     assert told == {1: [], 2: [], 3: [], 4: [], 5: [Kind.SPEED_DIFFERS], 6: [Kind.SMOOTH_ROAD]}
 
 
 def test_a_run_sampled_at_another_rate_calibrates_nothing(runs: list[KnownRun]) -> None:
     at_100_hz = [replace(run, batches=tuple(replace(b, sensor_rate_hz=100.0) for b in run.batches)) for run in runs]
     slower = replace(runs[0], number=5, batches=tuple(replace(b, sensor_rate_hz=50.0) for b in runs[0].batches))
-    verdicts, _ = inspect_campaign([inspected(run) for run in (*at_100_hz, slower)], VAN, SETTINGS)
+    verdicts = inspect_drives([inspected(run) for run in (*at_100_hz, slower)], VAN, SETTINGS).verdicts
     assert [one.number for one in verdicts if not one.is_usable] == [5]
     assert Kind.RATE_DIFFERS in [finding.kind for finding in verdicts[-1].findings]
 
 
 def test_runs_of_unknown_load_are_inspected_but_not_compared(runs: list[KnownRun]) -> None:
     unknown = [replace(run, payload_kg=float("nan"), front_share_pct=float("nan")) for run in runs[1:]]
-    verdicts, findings = inspect_campaign([inspected(run) for run in (runs[0], *unknown)], VAN, SETTINGS)
-    assert ([one.findings for one in verdicts], findings) == ([()] * 4, ())
+    found_in = inspect_drives([inspected(run) for run in (runs[0], *unknown)], VAN, SETTINGS)
+    assert ([one.findings for one in found_in.verdicts], found_in.findings) == ([()] * 4, ())
     faulty = tuple(RunVerdict(n, "a.log", (FAULT,) if n == 1 else ()) for n in range(1, 5))
     assert Inspection(tuple(inspected(run) for run in (runs[0], *unknown)), faulty, ()).refusal is None
 

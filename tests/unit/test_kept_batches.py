@@ -7,8 +7,8 @@ import pytest
 from support.bus_drive import bus_drive
 
 from gateway.bus.signals import Decoder, load_signal_map
-from gateway.calibration.inspection.rows import row_facts
-from gateway.calibration.kept.batch_file import KeptBatch, kept_batch_of, packed, unpacked
+from gateway.calibration.inspection.drive import row_facts
+from gateway.calibration.kept import KeptBatch, kept_batch_of, packed, unpacked
 from gateway.core.settings import BatchSettings
 from gateway.errors import KeptBatchError
 from gateway.records import Batch, Motion, Why

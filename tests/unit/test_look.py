@@ -18,9 +18,8 @@ from support.spoiled import limits
 from gateway.bus.frames import merge_frames, message_of
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import load_signal_map
+from gateway.calibration.inspection.drive import LogFacts, SplitRun, row_facts
 from gateway.calibration.inspection.finding import Kind, Severity
-from gateway.calibration.inspection.log import LogFacts, SplitRun
-from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings

@@ -20,9 +20,8 @@ from gateway.archive.reprocess import reprocess
 from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
+from gateway.calibration.inspection.drive import LogFacts, SplitRun, row_facts
 from gateway.calibration.inspection.finding import Kind, Severity
-from gateway.calibration.inspection.log import LogFacts, SplitRun
-from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.settings import BatchSettings

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from support.inspected import driven, kinds, scaled, stated, traits_of_reference
 
-from gateway.calibration.inspection.campaign import inspect_campaign
-from gateway.calibration.inspection.log import SplitRun
+from gateway.calibration.inspection.campaign import inspect_drives
+from gateway.calibration.inspection.drive import SplitRun, row_facts
 from gateway.calibration.inspection.roll import roll_sign_of
-from gateway.calibration.inspection.rows import row_facts
 from gateway.calibration.known_run import KnownRun
 from gateway.core.scheduler import Scheduler
 from gateway.core.settings import BatchSettings
@@ -92,16 +91,18 @@ def test_a_place_stated_on_the_wrong_side_contradicts_the_loads() -> None:
 
 
 def test_every_run_reports_a_reversed_roll_sign() -> None:
-    verdicts, findings = inspect_campaign(runs(PLACED, *LOADS[:2], roll_times=-1.0), PLACED, SETTINGS)
-    assert [kinds(verdict) for verdict in verdicts] == [["fault:roll_rate_sign"]] * 2
-    assert "roll_rate_sign_untold" not in [finding.kind for finding in findings]
+    inspection = inspect_drives(runs(PLACED, *LOADS[:2], roll_times=-1.0), PLACED, SETTINGS)
+    assert [kinds(verdict) for verdict in inspection.verdicts] == [["fault:roll_rate_sign"]] * 2
+    assert "roll_rate_sign_untold" not in [finding.kind for finding in inspection.findings]
 
 
 def test_an_undetermined_roll_sign_is_one_note_for_all_runs() -> None:
-    verdicts, findings = inspect_campaign(runs(SOMEWHERE, LOADS[0]), SOMEWHERE, SETTINGS)
-    assert [kinds(verdict) for verdict in verdicts] == [[]]
-    assert [f"{one.severity}:{one.kind}" for one in findings if "roll" in one.kind] == ["note:roll_rate_sign_untold"]
-    assert "0 ± 0.59 m left of the centre line" in findings[-1].text
+    inspection = inspect_drives(runs(SOMEWHERE, LOADS[0]), SOMEWHERE, SETTINGS)
+    assert [kinds(verdict) for verdict in inspection.verdicts] == [[]]
+    assert [f"{one.severity}:{one.kind}" for one in inspection.findings if "roll" in one.kind] == [
+        "note:roll_rate_sign_untold"
+    ]
+    assert "0 ± 0.59 m left of the centre line" in str(inspection.findings)
 
 
 def test_without_a_roll_rate_there_are_no_roll_findings() -> None:

@@ -10,9 +10,7 @@ from support.known_runs import SIBLING, calibrated_on_loads, known_run
 
 from gateway.calibration.fit_of_drives import SPRINGS_FROM_PRIORS
 from gateway.calibration.prior import Prior
-from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.sister import require_alike, sister_in
-from gateway.calibration.teach import teach
 from gateway.errors import NoSisterError
 from gateway.model.table import INDEX, UPRIGHT
 from gateway.model.vehicle import VehicleModel
@@ -43,8 +41,7 @@ def test_individual_parameters_keep_the_general_prior(sister: VehicleModel) -> N
 
 def test_one_empty_drive_weighs_like_the_sister(sister: VehicleModel) -> None:
     empty = known_run(1, 0.0, None, seed=7, car=SIBLING)
-    fitted = teach([TaughtDrive("empty", empty.batches, empty.statement)], VAN, sister).model
-    alone = taught_by([empty])
+    fitted, alone = taught_by([empty], VAN, sister), taught_by([empty])
     springs = [INDEX[f"spring_{end}_npm"] for end in ("front", "rear")]
     std, std_alone = np.sqrt(np.diag(fitted.covariance)), np.sqrt(np.diag(alone.covariance))
     assert np.all(std[springs] < 0.6 * std_alone[springs])

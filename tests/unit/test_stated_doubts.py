@@ -1,20 +1,16 @@
 """Answers that are unlikely, or that a drive contradicts: asked about, with what was probably meant."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import pytest
-from support.half_car_road import CAR, VAN
+from support.half_car_road import CAR, VAN, taught_by
 from support.known_runs import LOADS, SIBLING, known_run
 from support.model_road import times
 
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.answers import doubts_of
-from gateway.calibration.read_drive import TaughtDrive
-from gateway.calibration.statements import Statement
-from gateway.calibration.teach import teach
 from gateway.core.vehicle import Vehicle
 from gateway.model.vehicle import VehicleModel
 from gateway.stated.doubt import Doubt, DoubtKind, meant_by
@@ -143,19 +139,6 @@ def test_every_kind_has_words() -> None:
 OTHER_MODEL = times(CAR, spring_front_npm=0.7, damper_front_nspm=0.8, spring_rear_npm=1.4, tyre_rear_npm=0.8)
 
 
-def taught_by(runs: Sequence[KnownRun], vehicle: Vehicle, sister: VehicleModel | None = None) -> VehicleModel:
-    """The vehicle that these runs teach, their loads as stated."""
-    drives = [
-        TaughtDrive(
-            str(run.number),
-            run.batches,
-            Statement(payload_kg=run.payload_kg, front_share_pct=run.front_share_pct, is_compact=True),
-        )
-        for run in runs
-    ]
-    return teach(drives, vehicle, sister).model
-
-
 @pytest.fixture(scope="module")
 def sister() -> VehicleModel:
     return taught_by([known_run(i, *load, seed=1) for i, load in enumerate(LOADS)], VAN)
@@ -166,18 +149,11 @@ def empty() -> KnownRun:
     return known_run(1, 0.0, None, seed=7, car=SIBLING)
 
 
-def said_empty(run: KnownRun, vehicle: Vehicle) -> KnownRun:
-    return replace(run, payload_kg=0.0, front_share_pct=vehicle.empty_front_share_pct)
-
-
 def doubted(run: KnownRun, sister: VehicleModel | None, **false: Any) -> tuple[Doubt, ...]:
+    """What contradicts these facts after a drive that is said to be empty."""
     vehicle = replace(VAN, **false)
-    claimed = said_empty(run, vehicle)
+    claimed = replace(run, payload_kg=0.0, front_share_pct=vehicle.empty_front_share_pct)
     return contradictions([claimed], vehicle, taught_by([claimed], vehicle, sister), sister)
-
-
-def kinds(doubts: tuple[Doubt, ...]) -> list[DoubtKind]:
-    return [one.kind for one in doubts]
 
 
 def test_true_facts_are_not_doubted(sister: VehicleModel, empty: KnownRun) -> None:
@@ -192,25 +168,29 @@ def test_a_load_aboard_is_weighed_by_the_sister(sister: VehicleModel) -> None:
     assert gross_kg == pytest.approx(VAN.empty_mass_kg + 300.0, abs=90.0)
 
 
-def test_weights_of_another_vehicle_are_doubted(sister: VehicleModel, empty: KnownRun) -> None:
-    assert kinds(doubted(empty, sister, empty_front_share_pct=40.0)) == [DoubtKind.DRIVEN_WEIGHT]
-    assert kinds(doubted(empty, sister, empty_mass_kg=1000.0)) == [DoubtKind.DRIVEN_WEIGHT]
+NEAR_WHEELBASE = pytest.approx(VAN.wheelbase_m, abs=0.06)
+NEAR_SENSOR = pytest.approx(VAN.sensor_position_m, abs=0.1)
 
 
-@pytest.mark.parametrize("factor", [0.93, 1.07])
-def test_a_wrong_wheelbase_is_measured(sister: VehicleModel, empty: KnownRun, factor: float) -> None:
-    found = {one.kind: one for one in doubted(empty, sister, wheelbase_m=factor * VAN.wheelbase_m)}
-    measured = found[DoubtKind.DRIVEN_WHEELBASE].numbers
-    assert measured["found_m"] == pytest.approx(VAN.wheelbase_m, abs=0.06)
-
-
-def test_a_sensor_elsewhere_is_found(sister: VehicleModel, empty: KnownRun) -> None:
-    for known in (sister, None):
-        (doubt,) = doubted(empty, known, sensor_position_m=2.4)
-        assert doubt.kind is DoubtKind.DRIVEN_SENSOR
-        assert doubt.numbers["found_m"] == pytest.approx(VAN.sensor_position_m, abs=0.1)
+@pytest.mark.parametrize(
+    ("false", "kind", "found_m", "has_sister"),
+    [
+        ({"empty_front_share_pct": 40.0}, DoubtKind.DRIVEN_WEIGHT, None, True),
+        ({"empty_mass_kg": 1000.0}, DoubtKind.DRIVEN_WEIGHT, None, True),
+        ({"wheelbase_m": 0.93 * VAN.wheelbase_m}, DoubtKind.DRIVEN_WHEELBASE, NEAR_WHEELBASE, True),
+        ({"wheelbase_m": 1.07 * VAN.wheelbase_m}, DoubtKind.DRIVEN_WHEELBASE, NEAR_WHEELBASE, True),
+        ({"sensor_position_m": 2.4}, DoubtKind.DRIVEN_SENSOR, NEAR_SENSOR, True),
+        ({"sensor_position_m": 2.4}, DoubtKind.DRIVEN_SENSOR, NEAR_SENSOR, False),
+    ],
+)
+def test_false_facts_are_doubted_and_places_measured(
+    sister: VehicleModel, empty: KnownRun, false: dict[str, float], kind: DoubtKind, found_m: Any, has_sister: bool
+) -> None:
+    found = {one.kind: one for one in doubted(empty, sister if has_sister else None, **false)}
+    assert found[kind].numbers.get("found_m") == found_m
+    assert list(found) == [kind] or kind is DoubtKind.DRIVEN_WHEELBASE  # a wrong wheelbase bends much else
 
 
 def test_another_model_is_distinguished_from_a_sister(sister: VehicleModel) -> None:
-    found = kinds(doubted(known_run(1, 0.0, None, seed=9, car=OTHER_MODEL), sister))
-    assert set(found) & {DoubtKind.DRIVEN_SISTER, DoubtKind.DRIVEN_WEIGHT}
+    found = {one.kind for one in doubted(known_run(1, 0.0, None, seed=9, car=OTHER_MODEL), sister)}
+    assert found & {DoubtKind.DRIVEN_SISTER, DoubtKind.DRIVEN_WEIGHT}

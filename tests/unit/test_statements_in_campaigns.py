@@ -13,8 +13,8 @@ from gateway.calibration.calibrate import Outcome, calibrate_inspected
 from gateway.calibration.campaign import Campaign, DraftTable
 from gateway.calibration.file import load_calibration
 from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Kind, RunVerdict
-from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.judgement.advice import Grade, verdicts_of
 from gateway.calibration.judgement.assessment import BatchSet, assess_calibration
 

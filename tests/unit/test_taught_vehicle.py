@@ -9,7 +9,7 @@ from support.half_car_road import KNOWN, VAN, batch_over_road
 
 from gateway.calibration.found import Taught
 from gateway.calibration.read_drive import TaughtDrive
-from gateway.calibration.statements import NOTHING_KNOWN, Statement, StatementSource, empty, load_prior_of
+from gateway.calibration.statements import NOTHING_KNOWN, Statement, empty, load_prior_of
 from gateway.calibration.teach import teach
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.errors import CalibrationImpossibleError
@@ -17,6 +17,7 @@ from gateway.estimate import Estimate
 from gateway.model.spectra import cross_spectra_of
 from gateway.model.weigh import by_cross_spectrum, mixture_of, posterior_of, weigh
 from gateway.records import Batch, Why
+from gateway.stated.statement import StatementSource
 
 
 def stated(payload_kg: float, share_pct: float) -> Statement:

@@ -11,7 +11,6 @@ phases, -1 for opposite ones. The rear axle follows the front, so a sensor turne
 one at the front.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
@@ -22,7 +21,6 @@ from gateway.calibration.read_drive import BAND_HZ, N_SEGMENT
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model import fit
 from gateway.model.car import Ground
-from gateway.model.checks import COHERENCE_BAND_HZ
 from gateway.model.expected import Expected, Groups
 from gateway.model.spectra import CrossSpectra, Reading
 from gateway.model.table import INDEX, UPRIGHT, prior_of
@@ -38,13 +36,6 @@ _SENSOR: Final = INDEX["sensor_position_m"]
 def reading_of(vehicle: Vehicle, speed_misread: float = 1.0) -> Reading:
     """Settings of the spectra; a speed that reads ``speed_misread`` times too high has its delays corrected."""
     return Reading(vehicle.wheelbase_m * speed_misread, BAND_HZ, N_SEGMENT, with_roll=True)
-
-
-def mean_coherence(spectra: CrossSpectra) -> float:
-    """Of pitch rate and acceleration, over the band in which body and pitch move."""
-    freq_hz = spectra.freq_hz[1:-1]
-    seen = (freq_hz >= COHERENCE_BAND_HZ[0]) & (freq_hz <= COHERENCE_BAND_HZ[1])
-    return float(np.mean(spectra.coherence[seen]))
 
 
 class Agreement(NamedTuple):
@@ -86,14 +77,11 @@ def phases(spectra: CrossSpectra, load: Load, vehicle: Vehicle) -> Phases:
     It carries the stated load or none, whichever explains more: a wrongly stated load must not look like a wrong axis.
     """
     loads = dict.fromkeys([load, Load(0.0, vehicle.empty_front_share_pct)])
-    upright, turned = zip(*(agreements(spectra, one, vehicle) for one in loads), strict=True)
-    return Phases(_likeliest(upright), _likeliest(turned))
-
-
-def _likeliest(each: Sequence[Agreement]) -> Agreement:
-    """The best agreement, with the most usual of the scales."""
-    best = max(each, key=lambda one: one.best)
-    return best._replace(scale=min((one.scale for one in each), key=lambda scale: abs(np.log(scale))))
+    likeliest = []
+    for each in zip(*(agreements(spectra, one, vehicle) for one in loads), strict=True):
+        usual = min((one.scale for one in each), key=lambda scale: abs(np.log(scale)))
+        likeliest.append(max(each, key=lambda one: one.best)._replace(scale=usual))
+    return Phases(*likeliest)
 
 
 def agreements(spectra: CrossSpectra, load: Load, vehicle: Vehicle) -> tuple[Agreement, Agreement]:

@@ -1,6 +1,6 @@
 """Findings about all runs of a campaign: whether loads suffice, and whether speeds and roads are comparable."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import isfinite
@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
+from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
-from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
@@ -75,51 +75,40 @@ class Inspection:
         return tuple(warnings)
 
 
-def inspect_campaign(
-    drives: Sequence[SplitRun], vehicle: Vehicle, settings: BatchSettings
-) -> tuple[tuple[RunVerdict, ...], tuple[Finding, ...]]:
+def inspect_drives(
+    drives: Sequence[SplitRun], vehicle: Vehicle, settings: BatchSettings, *, has_roll_rate: bool = True
+) -> Inspection:
     """A verdict for every run in the order given, and the findings about the campaign as a whole."""
-    verdicts = {one.identification.number: inspect_run(one, vehicle, settings) for one in drives}
-
-    def usable() -> list[KnownRun]:
-        runs = [one.identification for one in drives if one.has_identification]
-        return [run for run in runs if verdicts[run.number].is_usable]
-
-    def tell(found: OfRun) -> None:
-        for number, finding in found:
-            verdicts[number] = replace(verdicts[number], findings=(*verdicts[number].findings, finding))
-
-    for check in (_same_drive, _beyond_range, _beside_the_others):
-        tell(check(drives, vehicle))
-    roll_sign = roll_sign_of(usable(), vehicle)
+    found = {one.run.number: list(inspect_run(one, vehicle, settings).findings) for one in drives}
+    for number, finding in (*_same_drive(drives), *_beyond_range(drives, vehicle), *_beside_the_others(drives)):
+        found[number].append(finding)
+    roll_sign = roll_sign_of(_usable(drives, found), vehicle)
     if roll_sign is not None and roll_sign.sign < 0:
-        tell((run.number, Finding.of(Kind.ROLL_RATE_SIGN, roll_sign.why)) for run in usable())
-    findings = list(load_findings(usable(), vehicle))
+        for run in _usable(drives, found):
+            found[run.number].append(Finding.of(Kind.ROLL_RATE_SIGN, roll_sign.why))
+    findings = list(load_findings(_usable(drives, found), vehicle))
     if roll_sign is not None and roll_sign.sign == 0:
         findings.append(Finding.of(Kind.ROLL_RATE_SIGN_UNTOLD, roll_sign.why))
-    return tuple(verdicts.values()), tuple(findings)
-
-
-def inspect_drives(
-    drives: Sequence[SplitRun], vehicle: Vehicle, settings: BatchSettings, *, has_roll_rate: bool
-) -> Inspection:
-    """The same, with findings about missing data for lateral places."""
-    verdicts, found = inspect_campaign(drives, vehicle, settings)
-    findings = list(found)
     if not has_roll_rate:
         findings.append(Finding.of(Kind.ROLL_RATE_UNMAPPED, "springscale look shows what a log holds"))
     if (std_m := vehicle.sensor_left_std_m) > HARDLY_KNOWN_M:
         text = f"sensor_offset_left_m is {vehicle.sensor_left_m:g} ± {Z95 * std_m:.2g} m (95 %)"
         findings.append(Finding.of(Kind.SENSOR_OFFSET_UNKNOWN, text))
-    return Inspection(tuple(drives), verdicts, tuple(findings))
+    verdicts = (RunVerdict(one.run.number, one.run.name, tuple(found[one.run.number])) for one in drives)
+    return Inspection(tuple(drives), tuple(verdicts), tuple(findings))
 
 
-def _same_drive(drives: Sequence[SplitRun], vehicle: Vehicle) -> OfRun:
+def _usable(drives: Sequence[SplitRun], found: Mapping[int, Sequence[Finding]]) -> list[KnownRun]:
+    """The identification parts of the runs in which no fault was found so far."""
+    runs = [one.identification for one in drives if one.has_identification]
+    return [run for run in runs if not any(one.severity is Severity.FAULT for one in found[run.number])]
+
+
+def _same_drive(drives: Sequence[SplitRun]) -> OfRun:
     """Runs that are the same piece of the same log: all but the first; all of them if loads differ."""
     for one, other in combinations(drives, 2):
         if one.log.is_of_same_drive(other.log):
-            numbers = (one.identification.number, other.identification.number)
-            is_same_load = one.run.load == other.run.load
+            numbers, is_same_load = (one.run.number, other.run.number), one.run.load == other.run.load
             text = f"runs {numbers[0]} and {numbers[1]} are the same drive"
             for number in numbers[1:] if is_same_load else numbers:
                 yield number, Finding.of(Kind.SAME_DRIVE, text if is_same_load else f"{text} with two different loads")
@@ -127,30 +116,28 @@ def _same_drive(drives: Sequence[SplitRun], vehicle: Vehicle) -> OfRun:
 
 def _beyond_range(drives: Sequence[SplitRun], vehicle: Vehicle) -> OfRun:
     low_kg, high_kg = vehicle.payload_range_kg
-    for one in drives:
-        payload_kg = one.identification.payload_kg
-        if payload_kg > high_kg + BEYOND_RANGE_BY * (high_kg - low_kg):
-            text = f"{payload_kg:g} kg, payload_range_kg ends at {high_kg:g} kg"
-            yield one.identification.number, Finding.of(Kind.LOAD_BEYOND_RANGE, text)
+    for run in (one.run for one in drives):
+        if run.payload_kg > high_kg + BEYOND_RANGE_BY * (high_kg - low_kg):
+            text = f"{run.payload_kg:g} kg, payload_range_kg ends at {high_kg:g} kg"
+            yield run.number, Finding.of(Kind.LOAD_BEYOND_RANGE, text)
 
 
-def _beside_the_others(drives: Sequence[SplitRun], vehicle: Vehicle) -> OfRun:
+def _beside_the_others(drives: Sequence[SplitRun]) -> OfRun:
     """Runs at another speed, on a far smoother road, or sampled at another rate than the median run."""
-    counted = [(one.identification.number, [b for b in one.batches if not b.rejected]) for one in drives]
     rows = [
         (
-            number,
             float(np.mean([b.mean_speed_mps for b in batches])),
             float(np.mean([np.std(b.vertical_acceleration_mps2[b.usable]) for b in batches])),
             float(np.median([b.sensor_rate_hz for b in batches])),
+            one.run.number,
         )
-        for number, batches in counted
-        if batches
+        for one in drives
+        if (batches := [b for b in one.run.batches if not b.rejected])
     ]
     if len(rows) < 3:
         return
-    _, usual_mps, usual_mps2, usual_hz = np.median(np.array(rows), axis=0).tolist()
-    for number, speed_mps, shakes_mps2, rate_hz in rows:
+    usual_mps, usual_mps2, usual_hz, _ = np.median(np.array(rows), axis=0).tolist()
+    for speed_mps, shakes_mps2, rate_hz, number in rows:
         if is_other_rate(rate_hz, usual_hz, usual_hz):
             text = f"the sensors send {rate_hz:.3g} times a second, those of the median run {usual_hz:.3g} times"
             yield number, Finding.of(Kind.RATE_DIFFERS, text)

@@ -130,17 +130,21 @@ class Finding:
     kind: Kind
     severity: Severity
     text: str
-    advice: str
 
     @classmethod
     def of(cls, kind: Kind, text: str, severity: Severity | None = None) -> Self:
-        """A finding with the advice of its kind, and the kind's gravest severity unless another one is given. Raises
-        ValueError for a severity that the kind cannot have.
+        """A finding of the kind's gravest severity unless another one is given. Raises ValueError for a severity that
+        the kind cannot have.
         """
         severity = severity or kind.severities[0]
         if severity not in kind.severities:
             raise ValueError(f"{kind} is never a {severity}: the table of kinds says otherwise")
-        return cls(kind, severity, text, kind.advice)
+        return cls(kind, severity, text)
+
+    @property
+    def advice(self) -> str:
+        """What a fitter should do."""
+        return self.kind.advice
 
     def to_json(self) -> dict[str, str]:
         """As in ``calibrate --json`` and the report's numbers."""

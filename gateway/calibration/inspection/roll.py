@@ -35,12 +35,7 @@ LEVER_STD_M: Final = 0.05  # the measured scatter from run to run (above)
 LEVER_SHARE: Final = 0.25  # half the measured spread of the lever arm over the sensor's place (above)
 LEAST_SCORE: Final = 5.0  # chosen: root of the difference of chi-squared between the two signs, e^12.5 in odds
 SELDOM: Final = 1e-3  # chosen: probability of doubting what is stated
-_EXCHANGED: Final = [0, 2, 1, 5, 6, 3, 4, 7, 8]  # parts of spectra; the conjugate of the last is not needed
-
-
-def exchanged(spectra: CrossSpectra) -> CrossSpectra:
-    """Spectra of three sensors as if the map exchanged pitch and roll rate."""
-    return spectra.showing(spectra.parts[_EXCHANGED])
+EXCHANGED: Final = [0, 2, 1, 5, 6, 3, 4, 7, 8]  # parts of spectra, pitch and roll rate exchanged; conjugates need none
 
 
 def over_pitch(spectra: CrossSpectra, band_hz: tuple[float, float] = ABOVE_BODY_HZ) -> float:

@@ -192,11 +192,14 @@ class ErrorTable:
 
     def to_json(self) -> dict[str, Any]:
         """The object that ``evaluate --json`` prints."""
+        batches = [{**_truth(one), **estimate_to_json(one.estimate)} for one in self.judged]
+        for record in batches:
+            record.pop("spectra", None)
         return {
             "estimator": self.estimator,
             **self.errors.to_json(),
             "runs": [{**_truth(first), **errors.to_json()} for first, errors in self.runs],
-            "batches": [_batch_record(one) for one in self.judged],
+            "batches": batches,
         }
 
 
@@ -216,19 +219,18 @@ def errors_of(judged: Sequence[Judged], vehicle: Vehicle) -> Errors:
     payload = np.array([one.compared("payload") for one in whole], dtype=float).reshape(-1, 4)
     share = np.array([one.compared("front_share") for one in whole], dtype=float).reshape(-1, 4)
     cg_left = np.array([one.cg_left for one in whole], dtype=float).reshape(-1, 4)
+    wheels_pct = np.array([one.wheels_off_pct(vehicle) for one in whole]).reshape(-1, len(WHEELS))
+    wheels_pct = np.abs(wheels_pct[np.isfinite(wheels_pct).all(axis=1)])
+    unloaded_kg = vehicle.empty_mass_kg + (vehicle.unsprung_front_kg or 0.0) + (vehicle.unsprung_rear_kg or 0.0)
     return Errors(
         n_batches=len(whole),
         n_rejected=sum(not one.estimate.counted for one in whole),
         rejected_by_reason={why: reasons.count(why) for why in sorted(set(reasons))},
-        payload=_target_errors(payload, vehicle.payload_range_kg, "kg", unloaded_kg=_unloaded_kg(vehicle)),
+        payload=_target_errors(payload, vehicle.payload_range_kg, "kg", unloaded_kg=unloaded_kg),
         front_share=_target_errors(share, vehicle.front_share_range_pct, "pp"),
         cg_left=_cg_left_errors(cg_left),
-        wheels=_wheel_errors(whole, vehicle),
+        wheels=WheelErrors(float(np.mean(wheels_pct)), float(np.max(wheels_pct))) if wheels_pct.size else None,
     )
-
-
-def _unloaded_kg(vehicle: Vehicle) -> float:
-    return vehicle.empty_mass_kg + (vehicle.unsprung_front_kg or 0.0) + (vehicle.unsprung_rear_kg or 0.0)
 
 
 def _target_errors(
@@ -268,13 +270,6 @@ def _cg_left_errors(compared: F64) -> CgLeftErrors | None:
     )
 
 
-def _wheel_errors(judged: Sequence[Judged], vehicle: Vehicle) -> WheelErrors | None:
-    """Over all batches whose wheel loads are known, in truth and by the estimate; None if there is none."""
-    off_pct = np.array([one.wheels_off_pct(vehicle) for one in judged]).reshape(-1, len(WHEELS))
-    known = np.abs(off_pct[np.isfinite(off_pct).all(axis=1)])
-    return WheelErrors(float(np.mean(known)), float(np.max(known))) if known.size else None
-
-
 def _spread(error: F64, unit: str = "") -> dict[str, float | None]:
     """Statistics of errors (n,), their names ending in ``unit``; None without any."""
     size = np.abs(error)
@@ -303,12 +298,6 @@ def _truth(one: Judged) -> dict[str, int | float | str | None]:
 
 def _known(number: float) -> float | None:
     return number if isfinite(number) else None
-
-
-def _batch_record(one: Judged) -> dict[str, Any]:
-    record = {**_truth(one), **estimate_to_json(one.estimate)}
-    record.pop("spectra", None)
-    return record
 
 
 def judge(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: str) -> list[Judged]:

@@ -7,7 +7,7 @@ The questions compare the answers with ordinary road vehicles, and with a sister
 ``gateway.calibration.contradicted`` compares the same answers with a drive.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
 from math import inf
 from types import MappingProxyType
@@ -77,14 +77,9 @@ _ANSWERS: Final = TypeAdapter(VehicleAnswers)
 
 def doubts_of(said: VehicleAnswers, sister: Vehicle | None = None) -> tuple[Doubt, ...]:
     """Unlikely answers; with the answers that leave no doubt if one slip explains all."""
-    found = tuple(_checked(said, sister))
+    found = (*_doubts(said), *(_beside(sister, said) if sister else ()))
     meant = _meant(said, sister) if found else {}
     return tuple(one.model_copy(update={"meant": meant}) for one in found) if meant else found
-
-
-def _checked(said: VehicleAnswers, sister: Vehicle | None) -> Iterator[Doubt]:
-    for rule in _RULES:
-        yield from rule(said, sister)
 
 
 def _meant(said: VehicleAnswers, sister: Vehicle | None) -> dict[str, Any]:
@@ -94,7 +89,8 @@ def _meant(said: VehicleAnswers, sister: Vehicle | None) -> dict[str, Any]:
             fresh = _ANSWERS.validate_python(asdict(replace(said, **changed)))
         except ValidationError:
             continue
-        if next(_checked(fresh, sister), None) is None and _has_wheelbase_of(sister, fresh):
+        is_hers = sister is None or abs(fresh.wheelbase_m / sister.wheelbase_m - 1.0) <= MOST_WHEELBASE_OFF
+        if is_hers and not any((*_doubts(fresh), *(_beside(sister, fresh) if sister else ()))):
             return changed
     return {}
 
@@ -104,9 +100,8 @@ def _candidates(said: VehicleAnswers) -> Iterator[dict[str, Any]]:
     yield {AXLES[0]: said.kerb_rear_axle_kg, AXLES[1]: said.kerb_front_axle_kg}
     for names, slips in _SLIPPED.items():
         typed = [getattr(said, name) for name in names]
-        if None not in typed:
-            for slip in slips:
-                yield {name: _rounded(slip * number) for name, number in zip(names, typed, strict=True)}
+        for slip in slips if None not in typed else ():
+            yield {name: _rounded(slip * number) for name, number in zip(names, typed, strict=True)}
     if said.payload_range_kg is not None:
         for slip in _DECIMALS:
             yield {"payload_range_kg": (0.0, _rounded(slip * said.payload_range_kg[1]))}
@@ -116,135 +111,78 @@ def _rounded(number: float) -> float:
     return float(f"{number:.4g}")
 
 
-def _has_wheelbase_of(sister: Vehicle | None, said: VehicleAnswers) -> bool:
-    return sister is None or abs(said.wheelbase_m - sister.wheelbase_m) <= MOST_WHEELBASE_OFF * sister.wheelbase_m
+def _outside(
+    kind: DoubtKind, number: float | None, span: tuple[float, float], unit: str = "", /, **numbers: Any
+) -> Iterator[Doubt]:
+    """A doubt of a number outside its usual span, whose ends it names if they have a ``unit``."""
+    if number is not None and not span[0] <= number <= span[1]:
+        ends = {f"low_{unit}": span[0], f"high_{unit}": span[1]} if unit else {}
+        yield Doubt.of(kind, **numbers, **ends)
 
 
-def _gross_kg(said: VehicleAnswers) -> float:
-    return said.kerb_front_axle_kg + said.kerb_rear_axle_kg
+def _doubts(said: VehicleAnswers) -> Iterator[Doubt]:
+    """What ordinary vehicles are not like."""
+    front_kg, rear_kg, wheelbase_m = said.kerb_front_axle_kg, said.kerb_rear_axle_kg, said.wheelbase_m
+    gross_kg, front_pct = front_kg + rear_kg, 100.0 * front_kg / (front_kg + rear_kg)
+    low, high = (one * wheelbase_m**2 for one in MASS_PER_WHEELBASE2)
+    yield from _outside(DoubtKind.WHEELBASE, wheelbase_m, WHEELBASE_M, "m", wheelbase_m=wheelbase_m)
+    yield from _outside(DoubtKind.MASS, gross_kg, (low, high), "kg", gross_kg=gross_kg, wheelbase_m=wheelbase_m)
+    yield from _outside(DoubtKind.FRONT_SHARE, front_pct, FRONT_SHARE_PCT, "pct", front_pct=front_pct)
 
-
-def _is_within(number: float, span: tuple[float, float]) -> bool:
-    return span[0] <= number <= span[1]
-
-
-def _body(said: VehicleAnswers, _sister: Vehicle | None) -> Iterator[Doubt]:
-    wheelbase_m, gross_kg = said.wheelbase_m, _gross_kg(said)
-    if not _is_within(wheelbase_m, WHEELBASE_M):
-        low_m, high_m = WHEELBASE_M
-        yield Doubt.of(DoubtKind.WHEELBASE, wheelbase_m=wheelbase_m, low_m=low_m, high_m=high_m)
-    low_kg, high_kg = (one * wheelbase_m**2 for one in MASS_PER_WHEELBASE2)
-    if not _is_within(gross_kg, (low_kg, high_kg)):
-        yield Doubt.of(DoubtKind.MASS, gross_kg=gross_kg, wheelbase_m=wheelbase_m, low_kg=low_kg, high_kg=high_kg)
-    front_pct = 100.0 * said.kerb_front_axle_kg / gross_kg
-    if not _is_within(front_pct, FRONT_SHARE_PCT):
-        low_pct, high_pct = FRONT_SHARE_PCT
-        yield Doubt.of(DoubtKind.FRONT_SHARE, front_pct=front_pct, low_pct=low_pct, high_pct=high_pct)
-
-
-def _beside_its_sister(said: VehicleAnswers, sister: Vehicle | None) -> Iterator[Doubt]:
-    if sister is None:
-        return
-    front_kg, rear_kg = said.kerb_front_axle_kg, said.kerb_rear_axle_kg
-    her_front_kg, her_rear_kg = sister.kerb_front_axle_kg, sister.kerb_rear_axle_kg
-    sprung_kg, her_kg = _sprung_kg(said), sister.empty_mass_kg
-    if sprung_kg and abs(sprung_kg - her_kg) > MOST_MASS_OFF * her_kg:
-        gross_kg = _gross_kg(said)
-        yield Doubt.of(DoubtKind.SISTER_MASS, gross_kg=gross_kg, sister_kg=gross_kg * her_kg / sprung_kg)
-    elif (
-        her_front_kg
-        and her_rear_kg
-        and any(
-            abs(own - other) > MOST_AXLE_OFF * other
-            for own, other in ((front_kg, her_front_kg), (rear_kg, her_rear_kg))
-        )
-    ):
-        yield Doubt.of(
-            DoubtKind.SISTER_AXLES,
-            front_kg=front_kg,
-            rear_kg=rear_kg,
-            sister_front_kg=her_front_kg,
-            sister_rear_kg=her_rear_kg,
-        )
-    track_m, her_track_m = said.track_width_m, sister.track_width_m
-    if track_m and her_track_m and abs(track_m - her_track_m) > MOST_TRACK_OFF * her_track_m:
-        yield Doubt.of(DoubtKind.SISTER_TRACK, track_m=track_m, sister_m=her_track_m)
-
-
-def _sprung_kg(said: VehicleAnswers) -> float | None:
-    """None if the axle weights leave no body, which ``vehicle_table`` refuses."""
-    if said.empty_mass_kg is not None:
-        return said.empty_mass_kg
-    try:
-        return sprung_of(_axle_weights(said)).mass_kg
-    except CampaignError:
-        return None
-
-
-def _places(said: VehicleAnswers, _sister: Vehicle | None) -> Iterator[Doubt]:
     sensor_m, track_m, left_m = said.sensor_position_m, said.track_width_m, said.sensor_offset_left_m
-    if not -MOST_AHEAD_M <= sensor_m <= MOST_BEHIND * said.wheelbase_m:
-        yield Doubt.of(DoubtKind.SENSOR_PLACE, sensor_m=sensor_m, wheelbase_m=said.wheelbase_m)
-    if track_m is not None and not _is_within(track_m, TRACK_M):
-        yield Doubt.of(DoubtKind.TRACK, track_m=track_m, low_m=TRACK_M[0], high_m=TRACK_M[1])
-    if left_m is not None and abs(left_m) > 0.6 * (track_m or TRACK_M[1]):
-        yield Doubt.of(DoubtKind.SENSOR_SIDE, sensor_m=left_m)
+    along_m, across_m = (-MOST_AHEAD_M, MOST_BEHIND * wheelbase_m), 0.6 * (track_m or TRACK_M[1])
+    yield from _outside(DoubtKind.SENSOR_PLACE, sensor_m, along_m, sensor_m=sensor_m, wheelbase_m=wheelbase_m)
+    yield from _outside(DoubtKind.TRACK, track_m, TRACK_M, "m", track_m=track_m)
+    yield from _outside(DoubtKind.SENSOR_SIDE, left_m, (-across_m, across_m), sensor_m=left_m)
 
-
-def _unsprung(said: VehicleAnswers, _sister: Vehicle | None) -> Iterator[Doubt]:
-    gross_kg = _gross_kg(said)
-    low_kg, high_kg = (share * gross_kg for share in UNSPRUNG_SHARE)
+    low, high = (share * gross_kg for share in UNSPRUNG_SHARE)
     for unsprung_kg in (said.unsprung_front_kg, said.unsprung_rear_kg):
-        if unsprung_kg is not None and not _is_within(unsprung_kg, (low_kg, high_kg)):
-            yield Doubt.of(DoubtKind.UNSPRUNG, unsprung_kg=unsprung_kg, low_kg=low_kg, high_kg=high_kg)
-    sprung_kg = said.empty_mass_kg
+        yield from _outside(DoubtKind.UNSPRUNG, unsprung_kg, (low, high), "kg", unsprung_kg=unsprung_kg)
+    sprung_kg, limit_kg = said.empty_mass_kg, said.gross_limit_kg
     if sprung_kg is not None and not LEAST_SPRUNG * gross_kg <= sprung_kg < gross_kg:
         yield Doubt.of(DoubtKind.SPRUNG, sprung_kg=sprung_kg, gross_kg=gross_kg)
 
-
-def _loads(said: VehicleAnswers, _sister: Vehicle | None) -> Iterator[Doubt]:
-    gross_kg = _gross_kg(said)
     payload_kg = said.payload_range_kg[1] if said.payload_range_kg else None
-    if payload_kg is not None:
-        if not _is_within(payload_kg, (PAYLOAD_SHARE[0] * gross_kg, PAYLOAD_SHARE[1] * gross_kg)):
-            yield Doubt.of(DoubtKind.PAYLOAD, payload_kg=payload_kg, gross_kg=gross_kg)
-        elif said.gross_limit_kg is not None and gross_kg + payload_kg > GROSS_ROUNDED * said.gross_limit_kg:
-            yield Doubt.of(
-                DoubtKind.PAYLOAD_LIMIT,
-                gross_kg=gross_kg,
-                payload_kg=payload_kg,
-                sum_kg=gross_kg + payload_kg,
-                limit_kg=said.gross_limit_kg,
-            )
-    if said.payload_length_m is not None and said.payload_length_m > MOST_LENGTH * said.wheelbase_m:
-        yield Doubt.of(DoubtKind.LOAD_LENGTH, length_m=said.payload_length_m, wheelbase_m=said.wheelbase_m)
-    if said.payload_height_m is not None and said.payload_height_m > MOST_HEIGHT_M:
-        yield Doubt.of(DoubtKind.LOAD_HEIGHT, height_m=said.payload_height_m)
+    low, high = (share * gross_kg for share in PAYLOAD_SHARE)
+    yield from _outside(DoubtKind.PAYLOAD, payload_kg, (low, high), payload_kg=payload_kg, gross_kg=gross_kg)
+    if payload_kg and limit_kg and low <= payload_kg <= high:
+        sum_kg, most_kg = gross_kg + payload_kg, GROSS_ROUNDED * limit_kg
+        numbers = {"gross_kg": gross_kg, "payload_kg": payload_kg, "sum_kg": sum_kg, "limit_kg": limit_kg}
+        yield from _outside(DoubtKind.PAYLOAD_LIMIT, sum_kg, (-inf, most_kg), **numbers)
+    length_m, height_m, longest_m = said.payload_length_m, said.payload_height_m, MOST_LENGTH * wheelbase_m
+    yield from _outside(DoubtKind.LOAD_LENGTH, length_m, (0.0, longest_m), length_m=length_m, wheelbase_m=wheelbase_m)
+    yield from _outside(DoubtKind.LOAD_HEIGHT, height_m, (0.0, MOST_HEIGHT_M), height_m=height_m)
 
-
-def _limits(said: VehicleAnswers, _sister: Vehicle | None) -> Iterator[Doubt]:
-    gross_kg, limit_kg = _gross_kg(said), said.gross_limit_kg
-    axles = (
-        (said.kerb_front_axle_kg, said.front_axle_limit_kg),
-        (said.kerb_rear_axle_kg, said.rear_axle_limit_kg),
-    )
+    axles = ((front_kg, said.front_axle_limit_kg), (rear_kg, said.rear_axle_limit_kg))
     for axle_kg, permitted_kg in axles:
         if permitted_kg is not None and not axle_kg < permitted_kg <= MOST_LIMIT * axle_kg:
             yield Doubt.of(DoubtKind.AXLE_LIMIT, limit_kg=permitted_kg, axle_kg=axle_kg)
-    permitted = [kg for _, kg in axles if kg is not None]
-    axles_kg = sum(permitted) if len(permitted) == len(axles) else inf
-    if limit_kg is not None and not gross_kg < limit_kg <= min(GROSS_ROUNDED * axles_kg, MOST_LIMIT * gross_kg):
+    most_kg = min(GROSS_ROUNDED * sum(kg or inf for _, kg in axles), MOST_LIMIT * gross_kg)
+    if limit_kg is not None and not gross_kg < limit_kg <= most_kg:
         yield Doubt.of(DoubtKind.GROSS_LIMIT, limit_kg=limit_kg, gross_kg=gross_kg)
 
 
-_RULES: Final[tuple[Callable[[VehicleAnswers, Vehicle | None], Iterator[Doubt]], ...]] = (
-    _body,
-    _beside_its_sister,
-    _places,
-    _unsprung,
-    _loads,
-    _limits,
-)
+def _beside(sister: Vehicle, said: VehicleAnswers) -> Iterator[Doubt]:
+    """What its sister is not like."""
+    front_kg, rear_kg, her_kg = said.kerb_front_axle_kg, said.kerb_rear_axle_kg, sister.empty_mass_kg
+    gross_kg, sprung_kg = front_kg + rear_kg, said.empty_mass_kg
+    if sprung_kg is None:
+        try:
+            sprung_kg = sprung_of(_axle_weights(said)).mass_kg
+        except CampaignError:  # the axle weights leave no body, which ``vehicle_table`` refuses
+            sprung_kg = her_kg
+    her_front_kg, her_rear_kg = sister.kerb_front_axle_kg, sister.kerb_rear_axle_kg
+    if abs(sprung_kg - her_kg) > MOST_MASS_OFF * her_kg:
+        yield Doubt.of(DoubtKind.SISTER_MASS, gross_kg=gross_kg, sister_kg=gross_kg * her_kg / sprung_kg)
+    elif her_front_kg and her_rear_kg:
+        off = max(abs(front_kg / her_front_kg - 1.0), abs(rear_kg / her_rear_kg - 1.0))
+        numbers = {"front_kg": front_kg, "rear_kg": rear_kg}
+        numbers |= {"sister_front_kg": her_front_kg, "sister_rear_kg": her_rear_kg}
+        yield from _outside(DoubtKind.SISTER_AXLES, off, (0.0, MOST_AXLE_OFF), **numbers)
+    if said.track_width_m and sister.track_width_m:
+        off = abs(said.track_width_m / sister.track_width_m - 1.0)
+        numbers = {"track_m": said.track_width_m, "sister_m": sister.track_width_m}
+        yield from _outside(DoubtKind.SISTER_TRACK, off, (0.0, MOST_TRACK_OFF), **numbers)
 
 
 _SHARED: Final = (

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from gateway.calibration.assigned import Piece
-from gateway.calibration.inspection.rows import RowFacts
-from gateway.calibration.kept.batch_file import KeptBatch
-from gateway.calibration.kept.drive import joined_facts
+from gateway.calibration.inspection.drive import RowFacts, joined_facts
+from gateway.calibration.kept import KeptBatch
 from gateway.calibration.learning.spans import ENOUGH_S, can_teach, spans_of, teaching_most
 from gateway.core.pool import LEAST_LOAD_S, Part, spanned
 from gateway.core.settings import BatchSettings

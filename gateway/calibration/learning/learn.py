@@ -7,18 +7,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import isfinite, nan
 from pathlib import Path
+from statistics import median
 from typing import Final
+
+import numpy as np
 
 from gateway.calibration.assigned import Assigned, assign
 from gateway.calibration.calibrate import OnFit, Outcome, calibrate_inspected, drive_name
 from gateway.calibration.campaign import Campaign, DraftTable
-from gateway.calibration.empties import looking_empty
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.found import FoundClaim, FoundLoad
 from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.drive import LogFacts, RowFacts, SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
-from gateway.calibration.inspection.log import LogFacts, SplitRun
-from gateway.calibration.inspection.rows import RowFacts
 from gateway.calibration.inspection.run import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.drives import Driven, chosen
@@ -26,6 +27,7 @@ from gateway.calibration.statements import Statement
 from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.errors import CalibrationImpossibleError
+from gateway.quantity import Z95
 from gateway.records import Batch
 from gateway.stated.statement import StatementRecord
 
@@ -34,6 +36,11 @@ OF_CAMPAIGNS: Final = frozenset(
 )
 """Kinds of findings about drives that were meant to be alike; ordinary ones are not."""
 LOOKED_FOR: Final = frozenset(Kind) - OF_CAMPAIGNS
+SCATTER_KG: Final = 5.0  # chosen: standard deviation of driver, tank and loose items
+ALIKE: Final = 2.5  # chosen: standard deviations from the mode
+LEAST_MEMBERS: Final = 2
+SURE_SHARE: Final = 0.1  # chosen: of the largest payload; with a narrower interval about zero one drive is enough
+STEP_KG: Final = 2.0  # chosen: of the search for the mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +62,8 @@ class Learnt:
     def loads(self) -> dict[int, FoundLoad]:
         """What was found of each drive's load, by its number."""
         taught = self.outcome.cross_spectrum
-        by_name = {one.name: one for one in taught.loads} if taught else {}
-        numbers = range(1, len(self.drives) + 1)
-        return {number: by_name[drive_name(number)] for number in numbers if drive_name(number) in by_name}
+        found = {n: taught.load_of(drive_name(n)) for n in range(1, len(self.drives) + 1)} if taught else {}
+        return {number: one for number, one in found.items() if one}
 
     def claims_of(self, number: int) -> list[FoundClaim]:
         """What became of the statements about a drive."""
@@ -72,8 +78,34 @@ class Learnt:
             if not self.statements[number - 1].is_of_payload
             and not any(self.drives[number - 1].piece.meets(*span) for span in laden)
         }
-        members = looking_empty(list(unknown.values()), self.outcome.file.vehicle)
+        members = _near_zero(list(unknown.values()), self.outcome.file.vehicle)
         return tuple(number for number, one in unknown.items() if any(one is member for member in members))
+
+
+def _near_zero(loads: Sequence[FoundLoad], vehicle: Vehicle) -> tuple[FoundLoad, ...]:
+    """Those of these drives of unknown load that look empty: the lowest mode of their payloads, if it is near zero.
+
+    The least payload of many is too low by chance; but empty drives are many, and their payloads alike. What drives do
+    not share of their error tells them apart, even if the zero is not known well.
+    """
+    if not loads:
+        return ()
+    payload_kg = np.array([one.load.payload_kg for one in loads])
+    std_kg = np.hypot([one.own_std_kg for one in loads], SCATTER_KG)
+    at_kg = np.arange(payload_kg.min() - STEP_KG, payload_kg.max() + 2.0 * STEP_KG, STEP_KG)
+    density = np.sum(np.exp(-0.5 * ((at_kg[:, None] - payload_kg) / std_kg) ** 2) / std_kg, axis=1)
+    modes = at_kg[1:-1][(density[1:-1] >= density[:-2]) & (density[1:-1] > density[2:])]
+    for mode_kg in modes.tolist():
+        members = [one for one, x, std in zip(loads, payload_kg, std_kg, strict=True) if abs(x - mode_kg) < ALIKE * std]
+        if not members:
+            continue
+        half_kg = Z95 * float(np.hypot(median(one.payload_std_kg for one in members), SCATTER_KG))
+        if mode_kg - half_kg > 0.0:
+            return ()
+        is_sure = abs(mode_kg) + half_kg < SURE_SHARE * vehicle.largest_payload_kg
+        if len(members) >= LEAST_MEMBERS or is_sure:
+            return tuple(members)
+    return ()
 
 
 def matched(records: Sequence[StatementRecord], driven: Sequence[Driven], vehicle: Vehicle) -> Assigned:
@@ -119,7 +151,7 @@ def learn(
         estimators=("cross_spectrum",),
         like=like,
         command=command_of(like, settings.window_s),
-        campaign_sha256=_sha256(vehicle),
+        campaign_sha256=hashlib.sha256(json.dumps(asdict(vehicle), sort_keys=True).encode()).hexdigest(),
         on_fit=on_fit,
     )
     return Learnt(
@@ -137,10 +169,6 @@ def _nothing(faults: Mapping[str, Sequence[Finding]]) -> str:
         return "nothing to learn from yet: a drive teaches from a minute of steady driving with both sensors on"
     told = dict.fromkeys(f"{one.kind}: {one.text}: {one.advice}" for found in faults.values() for one in found)
     return "nothing to learn from: every drive has a fault: " + "; ".join(told)
-
-
-def _sha256(vehicle: Vehicle) -> str:
-    return hashlib.sha256(json.dumps(asdict(vehicle), sort_keys=True).encode()).hexdigest()
 
 
 def _facts(one: Driven) -> LogFacts:

@@ -10,6 +10,7 @@ import re
 import resource
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -17,19 +18,22 @@ import numpy as np
 
 from gateway.calibration.assigned import moments
 from gateway.calibration.calibrate import drive_name
-from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.file import load_calibration
+from gateway.calibration.found import FoundLoad
 from gateway.calibration.judgement.advice import verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
-from gateway.calibration.kept.batch_file import KeptBatch, unpacked
+from gateway.calibration.kept import KeptBatch, unpacked
 from gateway.calibration.learning.drives import pieces
 from gateway.calibration.learning.job import JOB, RESULT, LearnJob, LearnResult
 from gateway.calibration.learning.learn import Learnt, learn, matched
 from gateway.calibration.learning.spans import standing
 from gateway.calibration.learning.told import drives_record, learning_record, statements_record
-from gateway.calibration.left_out import LeftOut
 from gateway.core.settings import BatchSettings
 from gateway.errors import CalibrationFileError, KeptBatchError, SpringscaleError
+from gateway.posterior import Posterior
+from gateway.records import Batch
 from gateway.units import BYTES_PER_MB
+from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate
 
 LOWEST: Final = 19  # of Linux's nice values
@@ -100,17 +104,16 @@ def _why_worse(job: LearnJob, found: Learnt) -> str | None:
     except CalibrationFileError:
         return None
     met = {one.t_start for one in before.provenance.drives if one.statement.is_of_payload}
-    errors = found.outcome.cross_spectrum.errors
+    started = {one.number: one.t_start for one in found.outcome.file.provenance.drives}
     gains = []
-    for number, one in enumerate(found.drives, 1):
-        left_out = [error for error in errors if error.run == drive_name(number)]
-        started = next(drive.t_start for drive in found.outcome.file.provenance.drives if drive.number == number)
-        if not left_out or started in met:
+    for number, drive in enumerate(found.drives, 1):
+        left_out = [one for one in found.outcome.cross_spectrum.errors if one.run == drive_name(number)]
+        if not left_out or started[number] in met:
             continue
-        stated_kg, load = found.loads[number].stated_kg, found.loads[number]
-        by_old = _score_by(before, found, number, stated_kg, load.stated_std_kg)
-        if by_old is not None and len(one.batches):
-            gains.append(float(np.mean([_score_of(error) for error in left_out])) - by_old)
+        by_old = _scores_by(before.for_core(), drive.batches, found.loads[number])
+        if by_old:
+            by_new = [_log_score(float(one.error[0]), one.posterior, float(one.stated_std[0])) for one in left_out]
+            gains.append(float(np.mean(by_new)) - float(np.mean(by_old)))
     if len(gains) < LEAST_COMPARED and job.is_file_before:
         return f"the calibration of the settings stands until {LEAST_COMPARED} drives with a statement compare both"
     if len(gains) < LEAST_COMPARED or float(np.mean(gains)) > -WORSE_BY:
@@ -118,25 +121,19 @@ def _why_worse(job: LearnJob, found: Learnt) -> str | None:
     return f"it predicts the loads of {len(gains)} drives that were left out worse than the calibration before it"
 
 
-def _score_of(error: LeftOut) -> float:
-    """Logarithmic score of a batch that was left out."""
-    variance = float(error.posterior.covariance[0, 0]) + float(error.stated_std[0]) ** 2
-    return _log_score(float(error.error[0]), variance)
+def _scores_by(before: CalibratedVehicle, batches: Sequence[Batch], load: FoundLoad) -> list[float]:
+    """The scores of a calibration on the batches of a drive that it answers, by what is stated of the load."""
+    answers = [estimate(batch, before, "cross_spectrum") for batch in batches]
+    return [
+        _log_score(float(one.posterior.mean[0]) - load.stated_kg, one.posterior, load.stated_std_kg)
+        for one in answers
+        if one.posterior is not None and one.counted
+    ]
 
 
-def _score_by(file: CalibrationFile, found: Learnt, number: int, stated_kg: float, std_kg: float) -> float | None:
-    """The mean score of a calibration on the batches of a drive; None if it answers none."""
-    calibrated = file.for_core()
-    scores = []
-    for batch in found.drives[number - 1].batches:
-        answer = estimate(batch, calibrated, "cross_spectrum")
-        if answer.posterior is not None and answer.counted:
-            variance = float(answer.posterior.covariance[0, 0]) + std_kg**2
-            scores.append(_log_score(float(answer.posterior.mean[0]) - stated_kg, variance))
-    return float(np.mean(scores)) if scores else None
-
-
-def _log_score(error_kg: float, variance: float) -> float:
+def _log_score(error_kg: float, posterior: Posterior, std_kg: float) -> float:
+    """Of an answer whose truth is known to within a standard deviation."""
+    variance = float(posterior.covariance[0, 0]) + std_kg**2
     return -0.5 * (error_kg**2 / variance + float(np.log(variance)))
 
 

@@ -47,11 +47,6 @@ class BandPair:
 Pairs = tuple[BandPair | None, BandPair | None]  # of acceleration and of pitch rate; None without the sensor
 
 
-def indexes(table: SpectrumTable, pairs: Pairs) -> tuple[F64, F64]:
-    """R_a and R_g (n,) of every batch; NaN without the sensor."""
-    return ratios(table, 0, pairs[0]), ratios(table, 1, pairs[1])
-
-
 def ratios(table: SpectrumTable, sensor: int, pair: BandPair | None) -> F64:
     """One sensor's index (n,), the integrals of the spectra through both band-passes (6), one over the other."""
     spectra = table.spectra[sensor]
@@ -114,15 +109,11 @@ def candidate_pairs(table: SpectrumTable, sensor: int, width_hz: float, n_best: 
 
 def partial_residuals(run: I64, levels: F64, target: F64, other: F64) -> tuple[F64, F64]:
     """Run means of levels (r, b) and target (r,) less what is linear in ``other``; all inputs (n, ...)."""
-    by_run = run_means(run, np.column_stack([levels, target, other]))
+    columns = np.column_stack([levels, target, other])
+    by_run = np.array([columns[run == number].mean(axis=0) for number in np.unique(run)])
     nuisance = np.column_stack([np.ones(len(by_run)), by_run[:, -1]])
     residual = by_run[:, :-1] - nuisance @ np.linalg.lstsq(nuisance, by_run[:, :-1], rcond=None)[0]
     return residual[:, :-1], residual[:, -1]
-
-
-def run_means(run: I64, columns: F64) -> F64:
-    """Means (r, ...) of columns (n, ...) over the batches of each run, runs by rising number."""
-    return np.array([columns[run == number].mean(axis=0) for number in np.unique(run)])
 
 
 def rank_correlations(columns: F64, target: F64) -> F64:

@@ -2,8 +2,8 @@
 
 from gateway.calibration.calibrate import Outcome
 from gateway.calibration.file import DrivePart
+from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Finding, RunVerdict
-from gateway.calibration.inspection.log import SplitRun
 from gateway.calibration.judgement.assessment import Assessment
 from gateway.quantity import Z95
 from gateway.records import Why

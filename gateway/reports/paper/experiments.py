@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.calibration.campaign import Campaign, load_campaign
-from gateway.calibration.inspection.log import SplitRun
+from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.regression import fit_regression

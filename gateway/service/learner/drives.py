@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from gateway.calibration.kept.batch_file import KeptBatch, packed
+from gateway.calibration.kept import KeptBatch, packed
 from gateway.calibration.learning.spans import ENOUGH_S, worth
 from gateway.files.kept import KeptFiles
 from gateway.files.reserve import require_room

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 
 from gateway.bus.signals import SignalMap
 from gateway.calibration.assigned import Piece, assign, moments
-from gateway.calibration.kept.batch_file import kept_batch_of
+from gateway.calibration.kept import kept_batch_of
 from gateway.calibration.learning.job import LearnJob, LearnResult
 from gateway.calibration.learning.spans import can_teach, spans_of, teaching_most
 from gateway.config.sections import LearningSection
