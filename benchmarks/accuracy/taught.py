@@ -2,9 +2,10 @@
 
     python -m benchmarks.accuracy.taught DATA [--splits 3] [--output docs]
 
-DATA holds campaigns with a roll rate (campaign_roll.toml). Known loads teach a vehicle that weighs the other sets;
-then, in random splits, one steady empty drive and four mixed drives teach one, of which nothing is said or whose
-kilograms a delivery note states, and the other mixed drives are weighed. Prints payload and front share, each with mean
+DATA holds campaigns with a roll rate (campaign_roll.toml). Known loads teach a vehicle that weighs the other sets, and
+that is the sister of two more, each taught by its empty drives alone. Then, in random splits, one steady empty drive
+and four mixed drives teach a vehicle, of which nothing is said or whose kilograms a delivery note states, or the four
+teach beside known loads, and the other mixed drives are weighed. Prints payload and front share, each with mean
 error, bias, share held by the 95 % interval, half-width and interval score, in percent of the payload range and of 20
 points; ``--output`` writes them to taught.json.
 """
@@ -40,6 +41,8 @@ KNOWN_AND_TESTS: Final = {
     "second_van/known_loads": ("second_van/mixed",),
     "solid_axles/known_loads": ("solid_axles/mixed",),
 }
+SISTER: Final = "known_loads"
+SIBLINGS: Final = ("siblings/van_1", "siblings/van_2")
 NOTE_PLUS_MINUS: Final = 25.0 / 450.0  # of the payload range, half a 95 % interval
 SHARE_SPAN_PCT: Final = 20.0
 SEED: Final = 7
@@ -64,10 +67,12 @@ def note(run: KnownRun, span_kg: float, rng: np.random.Generator) -> Statement:
     return Statement(source=StatementSource.DELIVERY_NOTE, payload_kg=said_kg, payload_plus_minus_kg=plus_minus_kg)
 
 
-def taught(runs: Sequence[KnownRun], said: Sequence[Statement], vehicle: Vehicle) -> VehicleModel:
+def taught(
+    runs: Sequence[KnownRun], said: Sequence[Statement], vehicle: Vehicle, sister: VehicleModel | None = None
+) -> VehicleModel:
     """The vehicle that these drives teach."""
     drives = [TaughtDrive(run.name, run.batches, one) for run, one in zip(runs, said, strict=True)]
-    return teach(drives, vehicle).model
+    return teach(drives, vehicle, sister).model
 
 
 def weighed(runs: Sequence[KnownRun], model: VehicleModel, vehicle: Vehicle) -> tuple[list[F64], Counter[str]]:
@@ -128,6 +133,19 @@ def on_known_loads(data: Path) -> Iterator[Line]:
         for test in tests:
             _, *both = runs_of(data / test)
             yield line_of(test, *weighed(whole(*both), model, vehicle), span_kg)
+        if name == SISTER:
+            yield from on_siblings(data, model)
+
+
+def on_siblings(data: Path, sister: VehicleModel) -> Iterator[Line]:
+    """Vehicles of one model, taught by their empty drives and a sister."""
+    for name in SIBLINGS:
+        vehicle, *both = runs_of(data / name / "empty")
+        span_kg = vehicle.payload_range_kg[1] - vehicle.payload_range_kg[0]
+        drives = whole(*both)
+        model = taught(drives, [empty()] * len(drives), vehicle, sister)
+        _, *tests = runs_of(data / name / "test")
+        yield line_of(f"{name}, empty and a sister", *weighed(whole(*tests), model, vehicle), span_kg)
 
 
 def on_ordinary_drives(data: Path, n_splits: int) -> Iterator[Line]:
@@ -138,24 +156,28 @@ def on_ordinary_drives(data: Path, n_splits: int) -> Iterator[Line]:
         drives = whole(*parts)
         span_kg = vehicle.payload_range_kg[1] - vehicle.payload_range_kg[0]
         rng = np.random.default_rng(SEED)
-        by_known = taught(steady, [run.statement for run in steady], vehicle)
-        rows: dict[str, list[F64]] = {"ten known loads": [], "nothing said": [], "delivery notes": []}
-        refused: dict[str, Counter[str]] = {kind: Counter() for kind in rows}
+        known = [run.statement for run in steady]
+        always = {
+            "ten known loads": taught(steady, known, vehicle),
+            "one empty drive": taught(steady[:1], [empty()], vehicle),
+        }
+        rows: dict[str, list[F64]] = {}
+        refused: dict[str, Counter[str]] = {}
         for _ in range(n_splits):
             order = rng.permutation(len(drives)).tolist()
             teaching = [drives[i] for i in order[:4]]
             tests = [drives[i] for i in order[4:]] or teaching[3:]
-            stated = {
-                "nothing said": [NOTHING_KNOWN] * len(teaching),
-                "delivery notes": [note(run, span_kg, rng) for run in teaching],
-            }
-            models = {"ten known loads": by_known} | {
-                kind: taught([steady[0], *teaching], [empty(), *each], vehicle) for kind, each in stated.items()
+            nothing = [NOTHING_KNOWN] * len(teaching)
+            notes = [note(run, span_kg, rng) for run in teaching]
+            models = always | {
+                "ten known loads and four drives": taught([*steady, *teaching], [*known, *nothing], vehicle),
+                "nothing said": taught([steady[0], *teaching], [empty(), *nothing], vehicle),
+                "delivery notes": taught([steady[0], *teaching], [empty(), *notes], vehicle),
             }
             for kind, model in models.items():
                 found, why = weighed(tests, model, vehicle)
-                rows[kind] += found
-                refused[kind] += why
+                rows.setdefault(kind, []).extend(found)
+                refused.setdefault(kind, Counter()).update(why)
         for kind, found in rows.items():
             yield line_of(f"{mixed}: {kind}", found, refused[kind], span_kg)
 
