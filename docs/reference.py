@@ -15,9 +15,9 @@ from pydantic.json_schema import GenerateJsonSchema
 from gateway.archive.dataset import DIAGNOSTICS
 from gateway.calibration.file import CalibrationFile
 from gateway.config import Settings
-from gateway.estimate import Lack
-from gateway.estimate_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, SPECTRA, WEIGHTS, EstimateField
-from gateway.reasons import EXPLANATIONS, REMEDIES, SOURCES, Cause
+from gateway.estimates.as_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, SPECTRA, WEIGHTS, EstimateField
+from gateway.estimates.estimate import Lack
+from gateway.estimates.reasons import EXPLANATIONS, REMEDIES, SOURCES, Cause
 
 # -- an estimate --
 

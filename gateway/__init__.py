@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gateway.calibration.file import CalibrationFile, load_calibration
-    from gateway.core.settings import BatchSettings
+    from gateway.core.batch_settings import BatchSettings
     from gateway.core.weights.limits import Limits
     from gateway.errors import SpringscaleError
-    from gateway.estimate import Estimate, Quantity
-    from gateway.estimate_json import estimate_to_json, table_row
+    from gateway.estimates.as_json import estimate_to_json, table_row
+    from gateway.estimates.estimate import Estimate, Quantity
     from gateway.offline.estimates import estimate_arrays, estimates_of_logs
     from gateway.records import Spectra, Why
     from gateway.setup import Setup, load_setup
@@ -36,21 +36,21 @@ __all__ = (
 )
 
 _HOMES = {
-    "BatchSettings": "gateway.core.settings",
+    "BatchSettings": "gateway.core.batch_settings",
     "CalibrationFile": "gateway.calibration.file",
-    "Estimate": "gateway.estimate",
+    "Estimate": "gateway.estimates.estimate",
     "Limits": "gateway.core.weights.limits",
-    "Quantity": "gateway.estimate",
+    "Quantity": "gateway.estimates.estimate",
     "Setup": "gateway.setup",
     "Spectra": "gateway.records",
     "SpringscaleError": "gateway.errors",
     "Why": "gateway.records",
     "estimate_arrays": "gateway.offline.estimates",
-    "estimate_to_json": "gateway.estimate_json",
+    "estimate_to_json": "gateway.estimates.as_json",
     "estimates_of_logs": "gateway.offline.estimates",
     "load_calibration": "gateway.calibration.file",
     "load_setup": "gateway.setup",
-    "table_row": "gateway.estimate_json",
+    "table_row": "gateway.estimates.as_json",
 }
 
 

@@ -1,4 +1,4 @@
-"""The types that the rooms exchange: frames, motion, batches and reasons; gateway.estimate has the estimate.
+"""The types that the rooms exchange: frames, motion, batches and reasons; gateway.estimates.estimate has the estimate.
 
 Plain immutable values. Arrays are numpy, SI throughout, unknown is NaN. Time is the frame's own,
 integer nanoseconds since 1970-01-01 UTC.
@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.schema import AsLists
+from gateway.metadata import AsLists
 from gateway.units import NS_PER_S
 
 _START: Final = datetime(1970, 1, 1, tzinfo=UTC)
@@ -68,7 +68,7 @@ ASIDE: Final = JOURNEY | STATIC | {Signal.TRAILER}
 
 
 class Why(StrEnum):
-    """Why a batch gave no estimate. gateway.reasons says what to do about each."""
+    """Why a batch gave no estimate. gateway.estimates.reasons says what to do about each."""
 
     NO_ESTIMATE_YET = "no_estimate_yet"
     NO_CALIBRATION = "no_calibration"

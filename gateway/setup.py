@@ -6,10 +6,10 @@ from pathlib import Path
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.config import Settings
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError
-from gateway.toml_file import Read
+from gateway.files.toml_file import Read
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.flow import Flow, Identity
 

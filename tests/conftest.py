@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, settings
 
-from gateway.allocator import keep_freed_memory
 from gateway.log import LOGGER
+from gateway.model.allocator import keep_freed_memory
 
 # The last lie beside the checkout
 PROMISED = ("chromium", "playwright", "mosquitto", "postgresql", "a test machine", "recorded drives")

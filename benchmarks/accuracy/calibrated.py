@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 
-from gateway.calibration.calibrate import drive_name
+from gateway.calibration.from_drives import drive_name
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
-from gateway.calibration.ratio_index.fit import fit_ratio_index
+from gateway.calibration.ratio_index.index_fit import fit_ratio_index
 from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.teach import teach
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.weighing.calibrated import CalibratedVehicle
 
 

@@ -38,8 +38,8 @@ from benchmarks.accuracy.markdown import (
 from benchmarks.accuracy.study import Study
 from gateway.calibration.judgement.evaluation import judge
 from gateway.records import Motion, Why
-from gateway.sim.sensors import Sensors
-from gateway.sim.vehicle import Load, Vehicle
+from gateway.sim.instruments import Sensors
+from gateway.sim.parameters import Load, Vehicle
 
 ESTIMATOR: Final = "cross_spectrum"
 SEED: Final = 20_270  # arbitrary, of this study alone

@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 
 from gateway.records import F64, I64, Motion, Signal, Why
-from gateway.sim.sensors import Sensors
-from gateway.sim.vehicle import Axle, Damper, Load, Vehicle
+from gateway.sim.instruments import Sensors
+from gateway.sim.parameters import Axle, Damper, Load, Vehicle
 from gateway.units import NS_PER_S
 
 WORN_BY: Final = 0.35  # chosen: of the dampers' rates

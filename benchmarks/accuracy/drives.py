@@ -12,19 +12,19 @@ from benchmarks.accuracy.loads import drawn_load
 from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, OF_TYPES, scattered
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, SignalMap, load_signal_map
 from gateway.calibration.known_run import KnownRun
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import MEASURED_OFFSET_STD_M
 from gateway.core.vehicle import Vehicle as StatedVehicle
 from gateway.offline.campaigns import batches_of_motion
 from gateway.records import Motion
-from gateway.sim.drive import Drive, constant, motorway, rural, urban
+from gateway.sim.instruments import REFERENCE, Sensors
 from gateway.sim.obstacles import ObstacleRoad, UnevenRoad
+from gateway.sim.parameters import Load, Vehicle, front_share_pct, payload_kg, payload_left_m
 from gateway.sim.road import RoadRecipe, iso_road
 from gateway.sim.scenario import simulate_drive
-from gateway.sim.sensors import REFERENCE, Sensors
+from gateway.sim.speed_profile import Drive, constant, motorway, rural, urban
 from gateway.sim.vans import VANS
-from gateway.sim.vehicle import Load, Vehicle, front_share_pct, payload_kg, payload_left_m
-from gateway.workbench.campaigns import ON_PALLETS, PAPER_SPEED_MPS, share_range_pct
+from gateway.workbench.simulated_campaigns import ON_PALLETS, PAPER_SPEED_MPS, share_range_pct
 from gateway.workbench.wiring import Wiring
 
 MAP_NAME: Final = "reference"

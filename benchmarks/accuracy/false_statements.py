@@ -24,18 +24,18 @@ from pydantic import ValidationError
 from benchmarks.accuracy.markdown import table
 from benchmarks.accuracy.taught import line_of, runs_of, weighed, whole
 from gateway.calibration.assigned import Assigned, Fate, Piece, assign
-from gateway.calibration.campaign import load_campaign
+from gateway.calibration.campaign_file import load_campaign
 from gateway.calibration.found import ClaimState, FoundClaim, Taught
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.told import common_errors, question
 from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import Statement
 from gateway.calibration.teach import teach
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import Vehicle
+from gateway.estimates.quantity import Z95
 from gateway.model.table import UNSPRUNG_SHARE
 from gateway.offline.campaigns import split_runs
-from gateway.quantity import Z95
 from gateway.records import F64, Batch
 from gateway.stated.statement import StatementRecord
 

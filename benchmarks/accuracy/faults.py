@@ -22,8 +22,8 @@ from benchmarks.accuracy.markdown import Column, Row, all_but, refused_cell, tab
 from benchmarks.accuracy.study import OnDone, cases_of
 from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
-from gateway.calibration.campaign import Campaign, RunTable, chosen_runs, load_campaign
-from gateway.estimate import Estimate
+from gateway.calibration.campaign_file import Campaign, RunTable, chosen_runs, load_campaign
+from gateway.estimates.estimate import Estimate
 from gateway.offline.estimates import estimates_of_logs
 from gateway.records import Frames, Why
 from gateway.setup import Setup, load_setup

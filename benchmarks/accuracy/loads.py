@@ -1,6 +1,6 @@
 """Loads of every length and height: usual goods of vans, drawn at random, by kind.
 
-Calibration drives carry boxes. Other loads have the pitch inertia of their length and height (gateway.sim.vehicle: a
+Calibration drives carry boxes. Other loads have the pitch inertia of their length and height (gateway.sim.parameters: a
 homogeneous box), their centre at half their height above the floor, and some have a part on the roof. Lengths are parts
 of the wheelbase, like floors.
 """
@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.sim.vehicle import Load, Vehicle
+from gateway.sim.parameters import Load, Vehicle
 
 FLOOR_M: Final = 0.6  # chosen: above the road, of the vans' load floors
 ROOF_M: Final = 1.9  # chosen: above the road

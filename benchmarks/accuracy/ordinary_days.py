@@ -21,7 +21,7 @@ from benchmarks.accuracy.taught import SHARE_SPAN_PCT, taught, weighed
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.teach import teach
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 
 SEED: Final = 20281  # arbitrary, of this study alone
 DAYS: Final = (1, 3, 10, 30)

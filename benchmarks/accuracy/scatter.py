@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.sim.vehicle import Axle, Damper, Vehicle
+from gateway.sim.parameters import Axle, Damper, Vehicle
 
 
 @dataclass(frozen=True, slots=True)

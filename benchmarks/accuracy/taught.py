@@ -20,19 +20,19 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.calibration.campaign import load_campaign
+from gateway.calibration.campaign_file import load_campaign
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import NOTHING_KNOWN, Statement, empty
 from gateway.calibration.teach import teach
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.cargo import shape_hypotheses
-from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
-from gateway.estimate import Estimate
-from gateway.model.vehicle import VehicleModel
+from gateway.estimates.estimate import Estimate
+from gateway.estimates.quantity import Z95
+from gateway.model.vehicle_model import VehicleModel
 from gateway.model.weigh import by_cross_spectrum
 from gateway.offline.campaigns import split_runs
-from gateway.quantity import Z95
 from gateway.records import F64
 from gateway.stated.statement import StatementSource
 

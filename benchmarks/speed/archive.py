@@ -15,7 +15,7 @@ from typing import Any, Final
 from benchmarks.speed.meter import CALIBRATION, springscale
 from gateway.bus.logs.candump_write import append_candump
 from gateway.units import NS_PER_S
-from gateway.workbench.simulate import demo_drive, frames_of
+from gateway.workbench.simulated_drives import demo_drive, frames_of
 
 HOURS: Final = 2.0  # chosen: of each log
 MANIFEST: Final = """\

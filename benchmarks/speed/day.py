@@ -19,7 +19,7 @@ from gateway.bus.logs.candump_write import append_candump
 from gateway.config import ESTIMATOR_NAMES
 from gateway.records import Frames
 from gateway.units import NS_PER_S
-from gateway.workbench.simulate import demo_drive, frames_of
+from gateway.workbench.simulated_drives import demo_drive, frames_of
 from gateway.workbench.wiring import unrelated_traffic
 
 FRAMES_PER_S = 2500  # as in bus_log

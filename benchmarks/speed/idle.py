@@ -18,8 +18,8 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.speed.meter import ENVIRONMENT, cpu_of_s, free_port
-from gateway.estimate import Estimate, Quantity
-from gateway.estimate_json import estimate_to_json
+from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.estimate import Estimate, Quantity
 from gateway.records import Spectra
 from gateway.store import Store
 

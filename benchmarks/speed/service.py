@@ -21,9 +21,9 @@ from typing import Any, Final
 from benchmarks.speed.live import listening_socket
 from benchmarks.speed.meter import CALIBRATION, ENVIRONMENT, command_of, cpu_of_s, in_own_process, peak_mb
 from benchmarks.speed.start import SETTINGS
-from gateway.allocator import keep_freed_memory
 from gateway.bus.receiver import open_channel
 from gateway.config import load_settings
+from gateway.model.allocator import keep_freed_memory
 from gateway.service.gateway import Gateway
 from gateway.setup import setup_of
 from gateway.units import NS_PER_S
@@ -46,7 +46,7 @@ def serve(folder: str) -> None:
 
 def send(port: int, seconds: float) -> int:
     """Send the drive in real time, in groups of five milliseconds -> the number of frames."""
-    from gateway.workbench.simulate import demo_drive, frames_of  # noqa: PLC0415 # nothing that the service's process should hold
+    from gateway.workbench.simulated_drives import demo_drive, frames_of  # noqa: PLC0415 # nothing that the service's process should hold
 
     drive = frames_of(demo_drive())
     since_s = (drive.t_ns - drive.t_ns[0]) / NS_PER_S - BEGIN_S

@@ -5,13 +5,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gateway.sim.drive import constant
+from gateway.sim.instruments import REFERENCE
+from gateway.sim.parameters import Load
 from gateway.sim.ride import ride
 from gateway.sim.road import PaperRoad, iso_road
 from gateway.sim.scenario import simulate_drive
-from gateway.sim.sensors import REFERENCE
+from gateway.sim.speed_profile import constant
 from gateway.sim.vans import PAPER_VAN
-from gateway.sim.vehicle import Load
 from gateway.workbench.wiring import Wiring
 
 DRIVE_S = 900.0  # chosen

@@ -23,7 +23,7 @@ from benchmarks.speed.meter import CALIBRATION, print_and_write
 from gateway.config import load_settings
 from gateway.service.gateway import Gateway
 from gateway.service.lifecycle import live
-from gateway.workbench.simulate import demo_drive, frames_of
+from gateway.workbench.simulated_drives import demo_drive, frames_of
 
 SETTINGS: Final = """\
 signals = "springscale:reference"

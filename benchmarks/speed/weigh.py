@@ -18,17 +18,17 @@ from typing import Any, Final
 
 from benchmarks.speed.meter import CALIBRATION, ENVIRONMENT, best_of, cpu_s, springscale
 from gateway.bus.signals import SignalMap, load_signal_map
-from gateway.calibration.campaign import CampaignTable, load_campaign
+from gateway.calibration.campaign_file import CampaignTable, load_campaign
 from gateway.calibration.kept import KeptBatch, kept_batch_of, packed
 from gateway.calibration.learning.job import JOB, RESULT, LearnJob, LearnResult
 from gateway.config import ESTIMATOR_NAMES
 from gateway.config.sections import LearningSection
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
+from gateway.files.toml_file import checked, read_toml
 from gateway.offline.campaigns import batches_of_motion, read_whole_log
 from gateway.records import Batch, Motion, iso_utc
 from gateway.setup import load_setup
 from gateway.stated.statement import StatementRecord
-from gateway.toml_file import checked, read_toml
 from gateway.weighing.estimator import estimate
 from gateway.weighing.flow import Flow, Identity
 

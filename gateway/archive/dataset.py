@@ -1,6 +1,6 @@
 """The table of a reprocessed archive: one row per batch, as `springscale estimate --json` prints it, with its vehicle.
 
-Every column is a field of an estimate's JSON object (gateway.estimate_json), rounded as there, or gives the row's
+Every column is a field of an estimate's JSON object (gateway.estimates.as_json), rounded as there, or gives the row's
 origin. A change of columns raises ``SCHEMA_VERSION``; columns are added at the end, none is removed or changes its
 kind.
 """
@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gateway.archive.places import MISSING, Location
 from gateway.archive.receipts import Slot
-from gateway.budget import OWN
 from gateway.errors import ConfigurationError
-from gateway.estimate_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, WEIGHTS, EstimateField, FieldKind
-from gateway.estimate_json.kinds import COUNT, INTERVAL, OVER_LIMIT, TEXT, WHOLE, places_over_limit
+from gateway.estimates.as_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, WEIGHTS, EstimateField, FieldKind
+from gateway.estimates.as_json.kinds import COUNT, INTERVAL, OVER_LIMIT, TEXT, WHOLE, places_over_limit
+from gateway.estimates.budget import OWN
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from gateway.archive.jobs import ArchiveJob, JobLog
 from gateway.archive.places import PlaceError
 from gateway.bus.logs import LogReport, motion_of_log
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.errors import ConfigurationError, LogUnreadableError, ReaderMissingError
-from gateway.estimate import Estimate
+from gateway.estimates.estimate import Estimate
 from gateway.records import Batch
 from gateway.units import NS_PER_S
 from gateway.weighing.flow import Flow

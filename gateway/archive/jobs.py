@@ -21,7 +21,7 @@ from gateway.archive.manifest import Assignment
 from gateway.archive.places import Location
 from gateway.archive.receipts import Slot
 from gateway.archive.survey import Facts, LogFile, SurveyedLog
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.setup import Setup
 from gateway.units import NS_PER_S
 from gateway.weighing.flow import Identity

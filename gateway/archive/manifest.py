@@ -17,11 +17,11 @@ from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Fiel
 from gateway.archive.places import Location, place_of
 from gateway.config import BatchSection, EstimatorName
 from gateway.config.sections import OF_CALIBRATION, LimitKg
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError
+from gateway.files.toml_file import checked, read_toml
 from gateway.setup import Setup, load_setup
-from gateway.toml_file import checked, read_toml
 from gateway.units import NS_PER_S
 
 NAME: Final = "archive.toml"  # of a folder's own manifest

@@ -18,8 +18,8 @@ from typing import Final
 from gateway.calibration.statements import NOTHING_KNOWN, Claim, Statement
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.core.weights.on_the_road import unsprung_kg
+from gateway.estimates.quantity import Z95
 from gateway.model.table import ESTIMATED_UNSPRUNG_STD, UNSPRUNG_SHARE
-from gateway.quantity import Z95
 from gateway.records import iso_utc
 from gateway.stated.statement import StatementRecord, StatementSource
 from gateway.units import NS_PER_S

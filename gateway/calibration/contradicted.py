@@ -27,10 +27,10 @@ from gateway.calibration.prior import Prior
 from gateway.core.late import special
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import unsprung_kg
+from gateway.estimates.quantity import Z95
 from gateway.model.fit import Gaussian
 from gateway.model.table import FRONT, INDEX, REAR, N
-from gateway.model.vehicle import VehicleModel
-from gateway.quantity import Z95
+from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64
 from gateway.stated.doubt import Doubt, DoubtKind
 

@@ -19,11 +19,11 @@ from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.ratio_index.regression import TERMS
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError
+from gateway.files.toml_file import Read, describe_faults
+from gateway.metadata import check_shapes
 from gateway.model.table import NAMES, N
-from gateway.model.vehicle import VehicleModel
-from gateway.schema import check_shapes
+from gateway.model.vehicle_model import VehicleModel
 from gateway.stated.facts import Part
-from gateway.toml_file import Read, describe_faults
 from gateway.weighing.calibrated import CalibratedVehicle
 
 FORMAT: Final = "springscale-calibration"

@@ -23,7 +23,7 @@ from gateway.model.checks import MOST_TENSION, reach_of
 from gateway.model.place import spectra_of_sides
 from gateway.model.spectra import CrossSpectra, usual_floor
 from gateway.model.table import INDEX, N_OWN, NAMES, OWN, N
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.model.weigh import SOFT_HZ, answers_by_vehicle, mixture_of, weigh
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64, Why

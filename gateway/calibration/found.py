@@ -11,7 +11,7 @@ from gateway.calibration.left_out import (
     LeftOut,
 )
 from gateway.core.vehicle import Load
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)

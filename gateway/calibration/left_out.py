@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 
 from gateway.core.late import special
+from gateway.estimates.posterior import Posterior, Source
+from gateway.estimates.quantity import Z95
 from gateway.model.checks import MISFIT_ON_OTHER_ROADS, MISFIT_QUANTILE
-from gateway.model.vehicle import VehicleModel
-from gateway.posterior import Posterior, Source
-from gateway.quantity import Z95
+from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64
 
 USUAL_PAYLOAD_SHARE: Final = 0.004  # of the empty mass, see below

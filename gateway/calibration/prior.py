@@ -11,7 +11,7 @@ from gateway.core.cargo import shape_hypotheses
 from gateway.core.vehicle import Vehicle
 from gateway.model import fit
 from gateway.model.table import INDEX, N_OWN, OWN, ROWS, UPRIGHT, N, covariance_of, prior_of
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64
 
 SHARED: Final = 1e-2  # chosen: what is left of the deviations among known loads: one day, one box, one road

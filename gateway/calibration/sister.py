@@ -8,7 +8,7 @@ from typing import Final
 from gateway.calibration.file import CalibrationFile
 from gateway.core.vehicle import Vehicle
 from gateway.errors import NoSisterError
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 
 MOST_WHEELBASE_DIFFERENCE: Final = 0.01  # chosen: of the wheelbase; a larger difference is another model
 MOST_MASS_DIFFERENCE: Final = 0.25  # chosen: of the sprung mass; a larger difference is another body

@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.vehicle import Carries, Load, Vehicle, front_share_pct
-from gateway.quantity import Z95
+from gateway.estimates.quantity import Z95
 from gateway.records import F64
 from gateway.stated.statement import StatementSource
 

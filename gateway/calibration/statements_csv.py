@@ -20,8 +20,8 @@ from pydantic import ValidationError
 
 from gateway.core.vehicle import Carries
 from gateway.errors import ConfigurationError
+from gateway.files.toml_file import describe_faults
 from gateway.stated.statement import HALF_CHARACTER, StatementRecord, StatementSource, is_text
-from gateway.toml_file import describe_faults
 
 OF_ANSWERS: Final = ("row", "at", "state", "found", "reason", "question", "drives")
 """What a service or a command says of a statement: it is not read."""

@@ -34,7 +34,7 @@ from gateway.calibration.statements import common_causes
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.model.spectra import Reading, Segments, grouped, segments_of
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 
 MOST_DISAGREEMENT: Final = 3.7  # chosen: standard deviations; chance exceeds it for one statement in five thousand
 MOST_SUSPECTS: Final = 4  # chosen: statements compared before one is held

@@ -15,8 +15,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads on
 
 import click
 
-from gateway.allocator import keep_freed_memory
 from gateway.errors import SpringscaleError
+from gateway.model.allocator import keep_freed_memory
 
 _COMMANDS = {
     "calibrate": "Make a calibration file from drives with known loads.",

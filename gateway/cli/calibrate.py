@@ -7,9 +7,9 @@ from typing import get_args
 
 import click
 
-from gateway.calibration.calibrate import Outcome, calibrate_inspected, with_statements_tested
-from gateway.calibration.campaign import Campaign, load_campaign
+from gateway.calibration.campaign_file import Campaign, load_campaign
 from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.from_drives import Outcome, calibrate_inspected, with_statements_tested
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
@@ -219,7 +219,7 @@ def judged(outcome: Outcome, report: Path | None) -> Verdict:
     with counted("judging"):
         assessment = assess_calibration(outcome)
     if report is not None:
-        from gateway.reports.calibration.report import write_report_of  # noqa: PLC0415 # a vehicle has no matplotlib
+        from gateway.reports.calibration.calibration_report import write_report_of  # noqa: PLC0415 # a vehicle has no matplotlib
 
         with counted("drawing") as on_chart:
             written = write_report_of(report, assessment, on_chart)

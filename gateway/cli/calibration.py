@@ -12,9 +12,9 @@ from gateway.calibration.axle_weights import UNSPRUNG_SHARE, AxleWeights, Sprung
 from gateway.calibration.file import CalibrationFile, ExpectedErrorsPart, load_calibration
 from gateway.cli.options import FILE, NumberRange, Told, prints
 from gateway.core.ratio_index.regression import RegressionModel
+from gateway.estimates.quantity import Z95
 from gateway.model.table import LOG, ROWS
-from gateway.model.vehicle import VehicleModel
-from gateway.quantity import Z95
+from gateway.model.vehicle_model import VehicleModel
 from gateway.stated.facts import DIVISION_KG
 from gateway.words import in_sections, known
 

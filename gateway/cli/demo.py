@@ -13,7 +13,7 @@ from typing import Any, Final, Literal
 import click
 
 from gateway.bus.sink import BusSink, replay_frames
-from gateway.cli.estimate import sentence
+from gateway.cli.estimate_logs import sentence
 from gateway.cli.options import NumberRange
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
 from gateway.errors import ConfigurationError
@@ -25,7 +25,7 @@ from gateway.sim.scenario import START_NS, Truth
 from gateway.store import Store
 from gateway.units import NS_PER_S
 from gateway.web.routes.weights import KnownLoadTold
-from gateway.workbench.simulate import demo_drive, frames_of
+from gateway.workbench.simulated_drives import demo_drive, frames_of
 
 CHANNEL: Final = "springscale-demo"
 ROUND_NS: Final = 1800 * NS_PER_S  # chosen: from the start of one drive to the start of the next

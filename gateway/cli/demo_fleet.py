@@ -16,14 +16,14 @@ from gateway.bus.signals import Decoder
 from gateway.core.alarms.alarm import alarm_to_json
 from gateway.core.alarms.rules import AlarmRules
 from gateway.core.alarms.watch import AlarmWatch
-from gateway.core.settings import BatchSettings
-from gateway.estimate_json import estimate_to_json
+from gateway.core.batch_settings import BatchSettings
+from gateway.estimates.as_json import estimate_to_json
 from gateway.fleet import Book, Message, fleet_app, served
 from gateway.records import json_line
 from gateway.setup import Setup
 from gateway.units import NS_PER_S
 from gateway.weighing.flow import Identity
-from gateway.workbench.simulate import demo_drive, frames_of
+from gateway.workbench.simulated_drives import demo_drive, frames_of
 
 ROUND_S: Final = 1800.0  # chosen: from the start of one drive to the start of the next
 APART_S: Final = 240.0  # chosen: one van starts that much before the next

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from gateway.calibration.campaign import load_campaign
+from gateway.calibration.campaign_file import load_campaign
 from gateway.calibration.file import load_calibration
 from gateway.calibration.judgement.advice import verdicts_of
 from gateway.calibration.judgement.assessment import Assessment, BatchSet, assess_evaluation
@@ -62,7 +62,7 @@ def evaluate(
 
 
 def _report(directory: Path, assessment: Assessment) -> None:
-    from gateway.reports.calibration import report as calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
+    from gateway.reports.calibration import calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
 
     with counted("drawing") as on_chart:
         written = calibration_report.write_report_of(directory, assessment, on_chart)

@@ -9,12 +9,12 @@ from typing import Final
 
 import click
 
-from gateway.bus.feed import AXES, Feeder, FeedState, Gpsd, IioDevice, find_devices, turned
+from gateway.bus.feeder import AXES, Feeder, FeedState, Gpsd, IioDevice, find_devices, turned
 from gateway.cli import options
 from gateway.cli.options import NumberRange, Told, prints
 from gateway.cli.progress import StatusLine
 from gateway.errors import ConfigurationError
-from gateway.notify import Notifier
+from gateway.service.notify import Notifier
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 GPSD: Final = "127.0.0.1:2947"

@@ -9,11 +9,11 @@ import click
 
 from gateway.bus.signals import load_signal_map
 from gateway.calibration.assigned import Assigned, moments
-from gateway.calibration.campaign import Campaign, load_campaign
+from gateway.calibration.campaign_file import Campaign, load_campaign
 from gateway.calibration.file import load_calibration
 from gateway.calibration.judgement.advice import Verdict
-from gateway.calibration.learning.learn import Learnt, matched
-from gateway.calibration.learning.learn import learn as learnt_from
+from gateway.calibration.learning.from_pieces import Learnt, matched
+from gateway.calibration.learning.from_pieces import learn as learnt_from
 from gateway.calibration.learning.spans import rows_record, rows_told, standing
 from gateway.calibration.learning.told import drives_record, learning_record, statements_record
 from gateway.calibration.statements_csv import ToldRow, ToldRows, read_statements
@@ -23,7 +23,7 @@ from gateway.cli.options import FILE, as_json, batch_settings, require_output_pl
 from gateway.cli.progress import counted, on_share
 from gateway.errors import ConfigurationError
 from gateway.files.whole import refusal_told, write_whole
-from gateway.offline.learn import Drives, read_drives
+from gateway.offline.drives_of_logs import Drives, read_drives
 from gateway.records import json_line, rounded
 from gateway.stated.statement import StatementRecord
 from gateway.units import zone_of

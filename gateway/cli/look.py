@@ -7,11 +7,11 @@ from typing import Any
 
 import click
 
-from gateway.bus.signals.database import DatabaseMessage
+from gateway.bus.signals.dbc import DatabaseMessage
 from gateway.cli.options import FILE, Told, prints
 from gateway.offline.look.draft import write_draft
-from gateway.offline.look.look import Described, Heard, Look, MapFit
-from gateway.offline.look.look import look as look_at
+from gateway.offline.look.log_look import Described, Heard, Look, MapFit
+from gateway.offline.look.log_look import look as look_at
 
 
 @click.command("look")

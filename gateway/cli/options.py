@@ -11,7 +11,7 @@ import click
 
 from gateway.bus.frames import Speed
 from gateway.config import ESTIMATOR_NAMES, BatchSection
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.records import json_line
 
 FILE = click.Path(path_type=Path)

@@ -5,11 +5,11 @@ from typing import Final
 
 import click
 
+from gateway.archive.job_run import JobStatus
 from gateway.archive.manifest import load_manifest
 from gateway.archive.places import place_of
-from gateway.archive.reprocess import Progress, Summary
-from gateway.archive.reprocess import reprocess as reprocess_archive
-from gateway.archive.run import JobStatus
+from gateway.archive.reprocessing import Progress, Summary
+from gateway.archive.reprocessing import reprocess as reprocess_archive
 from gateway.archive.workers import local_workers, workers_of
 from gateway.cli.options import as_json
 from gateway.cli.progress import StatusLine

@@ -8,7 +8,7 @@ import click
 from gateway.cli.options import FILE, Told, prints
 from gateway.cli.progress import counted
 from gateway.reports.paper.experiments import N_STEPS, Extent
-from gateway.reports.paper.reproduce import reproduce as write_report
+from gateway.reports.paper.reproduction import reproduce as write_report
 
 QUICK_WINDOW_S: Final = 100.0  # chosen: a third of the usual window
 QUICK_LONGEST_S: Final = 155.0  # chosen: two thirds of it, which identify, hold one batch

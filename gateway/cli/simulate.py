@@ -12,9 +12,9 @@ from gateway.cli import options
 from gateway.cli.options import FILE, NumberRange, Told, prints
 from gateway.cli.progress import StatusLine, counted
 from gateway.sim.vans import VANS
-from gateway.workbench.campaigns import PLANS
-from gateway.workbench.simulate import SENSORS_OF_MAP, bench_of, write_campaign
-from gateway.workbench.simulate import stream as send_drives
+from gateway.workbench.simulated_campaigns import PLANS
+from gateway.workbench.simulated_drives import SENSORS_OF_MAP, bench_of, write_campaign
+from gateway.workbench.simulated_drives import stream as send_drives
 
 _BENCH = (
     click.argument("kind", type=click.Choice(list(PLANS))),

@@ -7,7 +7,7 @@ import click
 
 from gateway.cli.options import NumberRange
 from gateway.config import load_settings
-from gateway.files.kept import become_owner_of
+from gateway.files.owned import become_owner_of
 from gateway.units import S_PER_DAY
 from gateway.web.access.tokens import Scope, TokenFile
 

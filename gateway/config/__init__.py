@@ -24,9 +24,9 @@ from gateway.config.sections import (
     UplinkSection,
     WebhookSection,
 )
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.errors import ConfigurationError
-from gateway.toml_file import SIMILAR, describe_faults, read_toml
+from gateway.files.toml_file import SIMILAR, describe_faults, read_toml
 
 Section = TypeVar("Section", bound=BaseModel)
 Share = Annotated[float, Field(gt=0.0, le=1.0)]

@@ -6,7 +6,7 @@ from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from gateway.permission import Holder, Kind, encryption_to, may_leave
+from gateway.config.permission import Holder, Kind, encryption_to, may_leave
 
 Seconds = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]  # 32 years: fits 64 bits in nanoseconds
 LimitKg = Annotated[float | None, Field(gt=0.0, le=100_000.0, allow_inf_nan=False)]  # road vehicles weigh less

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.bends import Bends, gyro_gain_of
 from gateway.core.sample_clock import retimed
-from gateway.core.settings import BatchSettings
 from gateway.core.spectrum import longest_run, runs_of
 from gateway.core.timeline import in_order_of_time, onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
 from gateway.records import F64, I64, Batch, Bool, Motion, SensorTraits, Signal, Why

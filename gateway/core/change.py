@@ -1,10 +1,10 @@
 """The probability that the load changed between two groups of batches, and the size of the change.
 
-Errors that batches of one load share do not hide a change (gateway.posterior). So without a change the difference x of
-two groups, in payload, front share and lateral place, is N(0, V0), V0 being the covariance of their own errors. With a
-change of d kg, d ~ N(0, s^2), the payload differs by d, and the moved goods shift the centre of gravity by g_f d and
-g_y d, at an unknown place. So x ~ N((d, 0, 0), V1 + diag(0, (g_f d)^2, (g_y d)^2)), V1 being the covariance of the
-difference of two loads. The Bayes factor is the ratio of the densities,
+Errors that batches of one load share do not hide a change (gateway.estimates.posterior). So without a change the
+difference x of two groups, in payload, front share and lateral place, is N(0, V0), V0 being the covariance of their own
+errors. With a change of d kg, d ~ N(0, s^2), the payload differs by d, and the moved goods shift the centre of gravity
+by g_f d and g_y d, at an unknown place. So x ~ N((d, 0, 0), V1 + diag(0, (g_f d)^2, (g_y d)^2)), V1 being the
+covariance of the difference of two loads. The Bayes factor is the ratio of the densities,
 
     B = int N(d; 0, s^2) N(x; (d, 0, 0), V(d)) dd / N(x; 0, V0),
 
@@ -19,8 +19,8 @@ from typing import Final
 import numpy as np
 
 from gateway.core.vehicle import Vehicle
-from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, difference
-from gateway.quantity import Quantity
+from gateway.estimates.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, difference
+from gateway.estimates.quantity import Quantity
 from gateway.records import F64
 
 SPREAD_SHARE: Final = 0.25  # chosen: of the payload range, standard deviation of the change at a stop

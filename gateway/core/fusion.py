@@ -4,7 +4,7 @@
     replace(estimate, epoch=epoch_of(epoch.posterior, epoch.n_batches))
 
 Only a batch's own error averages out. The error that batches of one load share remains, and cancels in a comparison of
-two batches (gateway.posterior). A batch that does not fit opens a new epoch.
+two batches (gateway.estimates.posterior). A batch that does not fit opens a new epoch.
 """
 
 import math
@@ -13,8 +13,8 @@ from functools import cached_property
 from typing import Final
 
 from gateway.core.change import EVEN, ROLLING, Rules, probability
-from gateway.estimate import Epoch, Estimate
-from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, fused
+from gateway.estimates.estimate import Epoch, Estimate
+from gateway.estimates.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, fused
 
 STOP_THAT_ENDS_EPOCH_S: Final = 60.0  # chosen: time enough to load or unload
 

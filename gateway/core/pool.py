@@ -16,14 +16,14 @@ from typing import Final
 
 import numpy as np
 
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.bends import joined_gains
 from gateway.core.change import Rules
 from gateway.core.journey import LEAST_STOP_S
 from gateway.core.loads import LONG_S, Halt, LoadLink, Weighing, halts_of, loads_of
-from gateway.core.settings import BatchSettings
 from gateway.core.spectrum import longest_run
-from gateway.estimate import Estimate, Way
-from gateway.posterior import Posterior
+from gateway.estimates.estimate import Estimate, Way
+from gateway.estimates.posterior import Posterior
 from gateway.records import Batch, Why
 from gateway.units import NS_PER_S
 

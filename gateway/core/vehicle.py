@@ -6,7 +6,7 @@ from typing import Annotated, Final, NamedTuple
 
 from annotated_types import Interval
 
-from gateway.schema import STRICT, described
+from gateway.metadata import STRICT, described
 
 MEASURED_OFFSET_STD_M: Final = 0.02
 """Chosen: a sensor's place measured with a tape, from a wall or sill to its case, and half the vehicle's width."""

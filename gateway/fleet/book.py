@@ -15,7 +15,7 @@ import sqlalchemy as sql
 from pydantic import BaseModel
 from sqlalchemy.dialects import postgresql, sqlite
 
-from gateway.fleet.records import Alarm, Arrival, Estimate, Fleet, Line, Status, read
+from gateway.fleet.messages import Alarm, Arrival, Estimate, Fleet, Line, Status, read
 
 Read = TypeVar("Read", bound=BaseModel)
 

@@ -14,9 +14,9 @@ from fastapi import Depends, FastAPI, HTTPException, Request
 from starlette.responses import FileResponse, RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
 
+from gateway.config.permission import LOCAL_NAMES, Encryption, Holder, Kind, may_leave, name_in
 from gateway.fleet.book import Book
-from gateway.fleet.records import Fleet
-from gateway.permission import LOCAL_NAMES, Encryption, Holder, Kind, may_leave, name_in
+from gateway.fleet.messages import Fleet
 from gateway.web.access.middleware import SecurityHeaders
 from gateway.web.pages import ASSETS
 

@@ -11,7 +11,7 @@ from gateway.core.reach import beyond
 from gateway.core.vehicle import Load
 from gateway.model.spectra import CrossSpectra, why_no_spectra
 from gateway.model.table import INDEX, UPRIGHT
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64, Batch, Why
 
 COHERENCE_BAND_HZ: Final = (1.4, 4.5)  # chosen: where heave and pitch of the body resonate

@@ -15,7 +15,7 @@ from gateway.core.vehicle import Load
 from gateway.model.expected import with_strokes
 from gateway.model.spectra import CrossSpectra
 from gateway.model.table import INDEX, LOG, UPRIGHT
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64, Bool, Spectra
 

@@ -16,12 +16,12 @@ from typing import Final
 import numpy as np
 
 from gateway.core.vehicle import Load
+from gateway.estimates.quantity import Quantity
 from gateway.model import fit
 from gateway.model.car import has_roll, roll_share_front
 from gateway.model.table import INDEX, LOG, ROLL, N, prior_of_size
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.model.whittle import Point, Whittle
-from gateway.quantity import Quantity
 from gateway.records import F64
 
 ROLL_BAND_HZ: Final = (1.1, 5.0)

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from gateway.model.spectra import CrossSpectra, as_read, expected_floor, floor_of, noise_over
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64, Batch
 from gateway.units import STANDARD_GRAVITY_MPS2
 

@@ -18,7 +18,8 @@ import numpy as np
 
 from gateway.core.cargo import HABIT_PART, ShapeHypothesis
 from gateway.core.vehicle import Load
-from gateway.estimate import Estimate
+from gateway.estimates.estimate import Estimate
+from gateway.estimates.posterior import NORMAL_TAILS, PAYLOAD, Posterior, Source
 from gateway.model import fit
 from gateway.model.checks import VEHICLE_ROWS, Signs, disbelieved, fits, reach_of, unseen_of, why_not
 from gateway.model.expected import with_strokes
@@ -26,9 +27,8 @@ from gateway.model.place import ROLL_BAND_HZ, Place, place_of, roll_share_of, se
 from gateway.model.sensors import GAIN_STD, NOISE_RATIOS, Noise, gain_of, is_changed, noise_of, watched
 from gateway.model.spectra import CrossSpectra, cross_spectra_of, level
 from gateway.model.table import INDEX, UPRIGHT, N, covariance_of
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.model.whittle import Point, Whittle
-from gateway.posterior import NORMAL_TAILS, PAYLOAD, Posterior, Source
 from gateway.records import F64, Batch, Why
 
 EVIDENCE: Final = 0.3

@@ -28,12 +28,12 @@ from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, SignalMap, load_signal_map
 from gateway.bus.signals.mapping import MappedMessage
-from gateway.calibration.campaign import Campaign, RunTable, file_sha256, load_campaign
+from gateway.calibration.campaign_file import Campaign, RunTable, file_sha256, load_campaign
 from gateway.errors import CampaignError, ConfigurationError
+from gateway.files.toml_file import load_toml, read_toml
 from gateway.files.whole import refusal_told, written_whole
 from gateway.records import Frames, Signal
 from gateway.stated.facts import Part
-from gateway.toml_file import load_toml, read_toml
 from gateway.units import NS_PER_S
 
 CAMPAIGN: Final = "campaign.toml"

@@ -11,15 +11,15 @@ from gateway.bus.logs import LogReport, motion_of_log
 from gateway.bus.signals import Decoder, SignalMap, load_signal_map
 from gateway.bus.signals.decode import SignalCounts
 from gateway.bus.signals.mapping import MappedMessage, id_name
-from gateway.calibration.calibrate import Outcome, calibrate_inspected
-from gateway.calibration.campaign import Campaign, OnRun, RunTable, chosen_runs, file_sha256
+from gateway.calibration.campaign_file import Campaign, OnRun, RunTable, chosen_runs, file_sha256
+from gateway.calibration.from_drives import Outcome, calibrate_inspected
 from gateway.calibration.inspection.campaign import Inspection, inspect_drives
 from gateway.calibration.inspection.drive import LogFacts, SplitRun, row_facts
 from gateway.calibration.judgement.evaluation import Judged, judge
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import BandChoice
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
 from gateway.errors import CalibrationImpossibleError, LogUnreadableError
 from gateway.records import Batch, Motion, Signal, joined
 from gateway.units import NS_PER_S

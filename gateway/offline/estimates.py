@@ -11,12 +11,12 @@ from gateway.bus.logs import LogReport, motion_of_log
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import SignalMap
 from gateway.calibration.file import CalibrationFile
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.change import Rules
 from gateway.core.events.entry import Entry
 from gateway.core.events.ledger import Ledger
-from gateway.core.settings import BatchSettings
 from gateway.errors import ArraysError, LogUnreadableError
-from gateway.estimate import Estimate
+from gateway.estimates.estimate import Estimate
 from gateway.records import F64, FIRST_DATED_NS, Motion, Signal
 from gateway.setup import Setup
 from gateway.units import NS_PER_S

@@ -10,15 +10,15 @@ from pydantic import BaseModel
 from gateway.core.change import Rules
 from gateway.core.events.entry import Entry, EntryKind
 from gateway.core.events.ledger import HORIZON, Ledger
-from gateway.estimate import PLACES, Estimate
-from gateway.estimate_json import INSTANT, read_estimate
-from gateway.history import up_to
+from gateway.estimates.as_json import INSTANT, read_estimate
+from gateway.estimates.estimate import PLACES, Estimate
 from gateway.log import Event, log_event
 from gateway.records import Why, json_line, rounded
 from gateway.service.journal_reader import WINDOWS, place_of
 from gateway.setup import Setup
 from gateway.status import State, Status
 from gateway.store import Store, StoreReader, restored
+from gateway.store.journal import up_to
 from gateway.web.live.board import Board
 from gateway.web.routes.history import LoadEvent, Trip
 from gateway.web.routes.weights import LatestWeights

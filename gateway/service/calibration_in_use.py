@@ -2,7 +2,7 @@
 
 from gateway.config import Settings
 from gateway.errors import ConfigurationError
-from gateway.service.learner.book import FILE_NAME, LearningRecord
+from gateway.service.learner.learning_file import FILE_NAME, LearningRecord
 from gateway.service.record_file import load_record
 from gateway.setup import Setup, setup_of
 

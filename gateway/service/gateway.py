@@ -14,12 +14,11 @@ from gateway.bus.signals import Decoder
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event
-from gateway.notify import Notifier
 from gateway.part import ServicePart
-from gateway.service.alarms import AlarmService, rules_of
+from gateway.service.alarm_reader import AlarmService, rules_of
 from gateway.service.batch_log import BatchLog, LoadEventLog, StateLog
 from gateway.service.journal_reader import JournalReader
-from gateway.service.part import CLOSE_WITHIN_S, Deadline, Periodic, Questions, in_own_thread, stop_in_turn
+from gateway.service.notify import Notifier
 from gateway.service.parts import (
     board_of,
     learner_of,
@@ -31,7 +30,8 @@ from gateway.service.parts import (
     webhook_of,
 )
 from gateway.service.pipeline import Beside, Pipeline
-from gateway.service.status import StatusReport
+from gateway.service.status_of_parts import StatusReport
+from gateway.service.stopping import CLOSE_WITHIN_S, Deadline, Periodic, Questions, in_own_thread, stop_in_turn
 from gateway.setup import Setup
 from gateway.uplink.settings import uplink_settings, webhook_settings
 from gateway.web.access.serving import WebServer, refuse_open_address, server_config

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from gateway.estimate import Estimate
-from gateway.estimate_json import read_estimate
-from gateway.history import BATCHES, REMAINDER
+from gateway.estimates.as_json import read_estimate
+from gateway.estimates.estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.store import Store, restored
+from gateway.store.journal import BATCHES, REMAINDER
 
 WINDOWS: Final = (*BATCHES, REMAINDER)
 PAGE: Final = 20  # chosen: records in memory at a time

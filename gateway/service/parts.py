@@ -10,7 +10,7 @@ from gateway.bus.ring_log import RingLog
 from gateway.calibration.file import load_calibration
 from gateway.config import BusSection, Settings, StoreSection
 from gateway.errors import CalibrationFileError
-from gateway.estimate_json import read_estimate
+from gateway.estimates.as_json import read_estimate
 from gateway.log import Event, log_event
 from gateway.service.calibration_in_use import why_not_learning
 from gateway.service.learner.learner import Learner

@@ -7,9 +7,9 @@ from typing import Generic, TypeVar
 from pydantic import ValidationError
 
 from gateway.errors import ConfigurationError
-from gateway.files.kept import BrokenFile, KeptFiles
+from gateway.files.owned import BrokenFile, KeptFiles
+from gateway.files.toml_file import describe_faults
 from gateway.stated.facts import Part
-from gateway.toml_file import describe_faults
 
 R = TypeVar("R", bound=Part)
 

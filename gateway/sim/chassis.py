@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.records import F64
-from gateway.sim.vehicle import Axle, Damper, Load, Spring, Vehicle, Wheel
+from gateway.sim.parameters import Axle, Damper, Load, Spring, Vehicle, Wheel
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 _PARTS: Final = (Spring, Damper, Wheel)

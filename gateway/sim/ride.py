@@ -7,10 +7,10 @@ import numpy as np
 
 from gateway.records import F64
 from gateway.sim.chassis import Chassis, Records, chassis_of
-from gateway.sim.drive import Drive
 from gateway.sim.integrator import FIRST_LOAD, GROUND, N_BODY, Course, accelerations, integrate, look_up_ground
+from gateway.sim.parameters import Load, Vehicle
 from gateway.sim.road import Road
-from gateway.sim.vehicle import Load, Vehicle
+from gateway.sim.speed_profile import Drive
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 STEP_S: Final = 0.001  # chosen: of the integration

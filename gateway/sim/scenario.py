@@ -8,12 +8,12 @@ from typing import Final
 import numpy as np
 
 from gateway.records import F64, I64
-from gateway.sim.drive import Drive
+from gateway.sim.instruments import Recording, Sensors
+from gateway.sim.parameters import Load, Vehicle, axle_loads_kg, cg_left_m, front_share_pct, payload_kg
 from gateway.sim.ride import ride, wheel_loads_kg
 from gateway.sim.road import Road, RoadRecipe
 from gateway.sim.sensing import Felt, felt_at, joined, record
-from gateway.sim.sensors import Recording, Sensors
-from gateway.sim.vehicle import Load, Vehicle, axle_loads_kg, cg_left_m, front_share_pct, payload_kg
+from gateway.sim.speed_profile import Drive
 
 START_NS: Final = 1_767_225_600_000_000_000  # 2026-01-01 00:00:00 UTC
 _SETTLE_S: Final = 5.0  # chosen: transients of the start decay within it

@@ -7,9 +7,9 @@ import numpy as np
 
 from gateway.records import F64, I64, Bool
 from gateway.sim.compiled import compiled
+from gateway.sim.instruments import Channel, Engine, Gps, Imu, Mount, Recording, Sensors
+from gateway.sim.parameters import Vehicle
 from gateway.sim.ride import Ride
-from gateway.sim.sensors import Channel, Engine, Gps, Imu, Mount, Recording, Sensors
-from gateway.sim.vehicle import Vehicle
 from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
 
 

@@ -5,7 +5,7 @@ Imbalance is what balancing leaves: about 10 g on each side of a rim of 0.19 m, 
 
 from typing import Final
 
-from gateway.sim.vehicle import Axle, Damper, Spring, Vehicle, Wheel
+from gateway.sim.parameters import Axle, Damper, Spring, Vehicle, Wheel
 
 PAPER_VAN: Final = Vehicle(
     name="paper_van",  # Table 1, its unsprung mass read as 4 x 40 kg; springs of a laden 2 Hz van

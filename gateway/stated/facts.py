@@ -6,7 +6,7 @@ from typing import Annotated, Final
 from pydantic import BaseModel, ConfigDict, Field
 
 from gateway.core.vehicle import Kilograms, Percent, VehicleFields, WeightKg
-from gateway.schema import described
+from gateway.metadata import described
 
 Instant = Annotated[str, Field(json_schema_extra={"format": "date-time"})]
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from gateway.errors import StoreError
-from gateway.history import BATCHES, ESTIMATE, KINDS, REMAINDER
 from gateway.log import Event, log_event
+from gateway.store.journal import BATCHES, ESTIMATE, KINDS, REMAINDER
 from gateway.store.queries import INSERT, Stored, is_good, stored_row
 from gateway.store.retention import AgeClock, Retention, remove_old, remove_share
 from gateway.store.schema import (

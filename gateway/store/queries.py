@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from gateway.history import BATCHES, ENTRIES, SERVICE, Delivery
 from gateway.records import json_line
+from gateway.store.journal import BATCHES, ENTRIES, SERVICE, Delivery
 from gateway.store.schema import JOURNAL_COLUMNS, JournalRow, checksum
 
 LAST: Final = (1 << 63) - 1  # SQLite's largest integer

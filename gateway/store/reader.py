@@ -10,10 +10,10 @@ from functools import partialmethod
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from gateway.errors import StoreError
-from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, Delivery, HistoryPage, JournalRecord
 from gateway.log import Event, log_event
 from gateway.store import queries
 from gateway.store.database import is_damaged
+from gateway.store.journal import BATCHES, ENTRIES, ESTIMATE, REJECTION, Delivery, HistoryPage, JournalRecord
 from gateway.store.queries import LAST, JournalQuery, without_spectra
 from gateway.store.schema import Chain, JournalRow, connect_reader
 from gateway.store.write_buffer import WriteBuffer

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.errors import StoreError
-from gateway.history import SERVICE
 from gateway.log import Event, log_event
+from gateway.store.journal import SERVICE
 from gateway.store.queries import count_pruned
 from gateway.units import NS_PER_DAY, NS_PER_S, S_PER_DAY
 

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
-from gateway.history import KINDS
+from gateway.store.journal import KINDS
 from gateway.store.schema import DeliveryRow, JournalRow, Row
 
 SEQ_STRIDE: Final = 1 << 20  # chosen: each opening of a database begins a new stride

@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.errors import StoreError
-from gateway.estimate import Estimate
-from gateway.estimate_json import estimate_to_json
+from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.estimate import Estimate
 from gateway.files.reserve import Reserve
-from gateway.history import BATCHES, ENTRIES, ESTIMATE, REJECTION, REMAINDER, SERVICE, Delivery
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ServicePart
 from gateway.records import json_line
 from gateway.status import StoreState, StoreStatus
 from gateway.store.database import FILE_NAME, Database, is_damaged
+from gateway.store.journal import BATCHES, ENTRIES, ESTIMATE, REJECTION, REMAINDER, SERVICE, Delivery
 from gateway.store.reader import Follower, StoreReader
 from gateway.store.retention import Retention, boot_ns
 from gateway.store.schema import Chain, JournalRow

@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Final, Generic, TypeVar
 
 from gateway.errors import StoreError
-from gateway.history import Delivery
 from gateway.part import FIRST_PAUSE_S, STOP_WITHIN_S, BackOff, ThreadPart
 from gateway.status import UplinkStatus, WebhookStatus
+from gateway.store.journal import Delivery
 from gateway.units import NS_PER_S
 from gateway.uplink.outbox import Outbox
 

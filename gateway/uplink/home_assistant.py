@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final
 
-from gateway.quantities import BY_NAME, QUANTITIES, Outward, Unit
+from gateway.estimates.quantities import BY_NAME, QUANTITIES, Outward, Unit
 from gateway.uplink.outbox import LATEST
 
 _SENSOR: Final[dict[Unit, dict[str, str]]] = {

@@ -21,7 +21,7 @@ from gateway.units import S_PER_DAY
 from gateway.uplink.home_assistant import discovery
 from gateway.uplink.outbox import OutboxMessage
 from gateway.uplink.settings import UplinkSettings
-from gateway.uplink.statements import MOST_BYTES, TOPIC, StatementsMessage
+from gateway.uplink.statements_topic import MOST_BYTES, TOPIC, StatementsMessage
 
 CONNECT_TIMEOUT_S: Final = 10.0  # chosen: for the connection, and for the broker's answer to it
 ANSWER_TIMEOUT_S: Final = 30.0  # chosen: a broker that takes longer counts as lost

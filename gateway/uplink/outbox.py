@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from gateway.estimate_json import without_places
-from gateway.history import ALARM, ESTIMATE, KINDS, Delivery, JournalRecord
+from gateway.estimates.as_json import without_places
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.store import Store
+from gateway.store.journal import ALARM, ESTIMATE, KINDS, Delivery, JournalRecord
 
 SETTLES_S: Final = 30.0  # chosen: a record is on disk after that, or the disk refuses
 LATEST: Final = "latest"  # topic of the newest estimate, retained

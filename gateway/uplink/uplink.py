@@ -12,7 +12,7 @@ from gateway.uplink.forwarder import IDLE_S, PAGE, Forwarder
 from gateway.uplink.link import LinkError, MqttLink
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import UplinkSettings
-from gateway.uplink.statements import StatementsDesk, TakeStatements
+from gateway.uplink.statements_topic import StatementsDesk, TakeStatements
 
 Connect = Callable[[UplinkSettings, Mapping[str, Any], Callable[[], None], Callable[[], bool]], MqttLink]
 

@@ -17,11 +17,11 @@ from importlib.metadata import version
 from typing import Any, Final
 
 from gateway.errors import ConfigurationError
-from gateway.history import ESTIMATE, Delivery
 from gateway.log import Event, OnEvent, log_event, tell_event
 from gateway.part import BackOff
 from gateway.records import json_line
 from gateway.status import WebhookStatus
+from gateway.store.journal import ESTIMATE, Delivery
 from gateway.uplink.forwarder import IDLE_S, PAGE, Forwarder
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import WebhookSettings

@@ -21,12 +21,12 @@ from gateway.web.live.board import LATEST_PATH, Board, LatestResponse
 from gateway.web.routes import service_calls as service
 from gateway.web.routes.alarms import alarms_router
 from gateway.web.routes.cab import cab_router
+from gateway.web.routes.explanations import reasons_router
 from gateway.web.routes.history import api_router, events_router, export_router
+from gateway.web.routes.latest_spectra import spectra_router
 from gateway.web.routes.monitoring import alive_router, health_router, metrics_registry
-from gateway.web.routes.reasons import reasons_router
-from gateway.web.routes.spectra import spectra_router
-from gateway.web.routes.statements import statements_router
-from gateway.web.routes.vehicle import vehicle_router
+from gateway.web.routes.stated_loads import statements_router
+from gateway.web.routes.vehicle_in_use import vehicle_router
 from gateway.web.routes.weights import (
     KNOWN_LOADS_PATH,
     KnownLoads,

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from starlette.responses import Response, StreamingResponse
 
-from gateway.history import HistoryPage
+from gateway.store.journal import HistoryPage
 from gateway.web.schemas import problem_responses
 
 FORMATS: Final[Mapping[str, str]] = {"csv": "text/csv; charset=utf-8", "jsonl": "application/jsonl"}

@@ -8,7 +8,7 @@ from gateway.core.cargo import ShapeHypothesis, is_said, known_shape, shape_hypo
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 
 RANGE_MARGIN: Final = 0.25  # chosen: share of the calibrated span, added at either end
 RATE_MARGIN: Final = 0.25

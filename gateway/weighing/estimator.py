@@ -8,14 +8,14 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from gateway.core.ratio_index.estimator import by_ratio_index
 from gateway.core.ratio_index.index import indexes_of
+from gateway.core.ratio_index.paper_estimator import by_ratio_index
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.core.vehicle import Vehicle
-from gateway.estimate import Estimate
+from gateway.estimates.estimate import Estimate
+from gateway.estimates.posterior import FRONT_SHARE, Posterior, Source
 from gateway.model.checks import MOST_PAYLOAD_STD_SHARE
 from gateway.model.weigh import by_cross_spectrum
-from gateway.posterior import FRONT_SHARE, Posterior, Source
 from gateway.records import Batch, Why
 from gateway.weighing.calibrated import CalibratedVehicle
 

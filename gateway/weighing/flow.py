@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
-from gateway.budget import budget_of
 from gateway.core.batch import Traits
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.cargo import is_said
 from gateway.core.change import Rules
 from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S, LoadEpoch, epoch_of, fused_epoch
@@ -28,10 +28,10 @@ from gateway.core.pool import (
     usable_s,
 )
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
 from gateway.core.weights.on_the_road import weighed
-from gateway.estimate import UNWATCHED, Estimate, Way
-from gateway.posterior import Posterior
+from gateway.estimates.budget import budget_of
+from gateway.estimates.estimate import UNWATCHED, Estimate, Way
+from gateway.estimates.posterior import Posterior
 from gateway.records import Batch, Motion, Why
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate

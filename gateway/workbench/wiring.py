@@ -12,7 +12,7 @@ from gateway.bus.frames import merge_frames, take
 from gateway.bus.signals import SHIPPED_PREFIX, Encoder, load_signal_map
 from gateway.errors import ConfigurationError
 from gateway.records import F64, I64, Frames
-from gateway.sim.sensors import Recording
+from gateway.sim.instruments import Recording
 from gateway.units import NS_PER_S
 
 _DEG: Final = math.pi / 180.0  # radians

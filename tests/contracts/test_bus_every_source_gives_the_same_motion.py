@@ -19,9 +19,9 @@ from support.patience import PATIENCE_S
 from gateway.bus.frames import join, merge_frames, message_of
 from gateway.bus.listen import LiveSource
 from gateway.bus.logs import mf4, write_candump
+from gateway.bus.logs.log_report import LogReject
 from gateway.bus.logs.open import open_log
 from gateway.bus.logs.packed import zstd
-from gateway.bus.logs.report import LogReject
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.bus.sink import BusSink, replay
 from gateway.errors import LogUnreadableError

@@ -20,7 +20,7 @@ from support.web import Gateway
 
 from gateway.core.alarms.rules import AlarmRules
 from gateway.records import Why
-from gateway.service.alarms import AlarmService
+from gateway.service.alarm_reader import AlarmService
 from gateway.web.access.tokens import Scope, TokenFile
 
 

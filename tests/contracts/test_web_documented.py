@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from support.web import Client, Gateway
 
-from gateway.estimate_json import COLUMNS
+from gateway.estimates.as_json import COLUMNS
 from gateway.web.schemas import Estimate, WeightFigures
 
 API = (Path(__file__).parents[2] / "docs" / "api.md").read_text()

@@ -11,7 +11,7 @@ from support.paper_van import paper_van
 from support.web import Client, Gateway
 
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
-from gateway.estimate_json import COLUMNS, estimate_to_json
+from gateway.estimates.as_json import COLUMNS, estimate_to_json
 from gateway.records import Why
 from gateway.status import SignalHealth
 from gateway.weighing.calibrated import CalibratedVehicle

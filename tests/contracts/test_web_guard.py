@@ -11,8 +11,8 @@ import trustme
 from support.patience import PATIENCE_S
 from support.web import Client, Gateway, serving
 
+from gateway.config.permission import is_loopback
 from gateway.errors import ConfigurationError
-from gateway.permission import is_loopback
 from gateway.web.access.serving import Tls, refuse_open_address, server_config
 from gateway.web.access.tokens import Scope, TokenFile
 

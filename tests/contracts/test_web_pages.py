@@ -9,7 +9,7 @@ from urllib.parse import urljoin
 import pytest
 from support.web import Client, Gateway, below
 
-from gateway.reasons import EXPLANATIONS, REMEDIES, SOURCES
+from gateway.estimates.reasons import EXPLANATIONS, REMEDIES, SOURCES
 from gateway.records import iso_utc
 from gateway.web.pages import LIBRARY, LIBRARY_URL
 from gateway.web.routes.weights import KnownLoadTold

@@ -14,7 +14,7 @@ from support.commands import called
 from gateway.archive import failures, place_of, receipts, rows_of, slots_done
 from gateway.archive.manifest import load_manifest
 from gateway.archive.places import PlaceError
-from gateway.archive.reprocess import Progress, reprocess
+from gateway.archive.reprocessing import Progress, reprocess
 from gateway.archive.workers import Workers, workers_of
 from gateway.errors import ConfigurationError
 

@@ -9,14 +9,14 @@ from support.commands import called, run
 
 from gateway.bus.logs import motion_of_log
 from gateway.bus.signals import Decoder, load_signal_map
-from gateway.calibration.campaign import load_campaign
+from gateway.calibration.campaign_file import load_campaign
 from gateway.cli import main
 from gateway.cli import reproduce as reproduce_command
 from gateway.cli.progress import StatusLine, counted
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
 from gateway.reports.paper.experiments import Extent
-from gateway.workbench.simulate import LOADS, N_EMPTY_WINDOWS, N_LOADED_WINDOWS, demo_drive, frames_of
+from gateway.workbench.simulated_drives import LOADS, N_EMPTY_WINDOWS, N_LOADED_WINDOWS, demo_drive, frames_of
 
 LINE = "({t:.6f}) can1 101#0102030405060708\n"
 

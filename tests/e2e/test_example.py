@@ -14,11 +14,11 @@ import pytest
 from gateway.bus.logs import motion_of_log
 from gateway.bus.signals import load_signal_map
 from gateway.records import Signal, joined
-from gateway.sim.drive import rural, urban
+from gateway.sim.instruments import Mount, Recording, Sensors
 from gateway.sim.obstacles import UnevenRoad
 from gateway.sim.road import iso_road
 from gateway.sim.scenario import simulate_drive
-from gateway.sim.sensors import Mount, Recording, Sensors
+from gateway.sim.speed_profile import rural, urban
 from gateway.sim.vans import PAPER_VAN
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -27,7 +27,7 @@ from gateway.bus.sink import replay
 from gateway.cli import main
 from gateway.config import load_settings
 from gateway.errors import StoreError
-from gateway.estimate_json import estimate_to_json
+from gateway.estimates.as_json import estimate_to_json
 from gateway.offline.estimates import estimates_of_logs
 from gateway.records import Motion, json_line
 from gateway.service.gateway import Gateway, GatewayFailedError

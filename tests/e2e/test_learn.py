@@ -12,7 +12,7 @@ from support.known_load_logs import write_known_loads
 from gateway.calibration.file import load_calibration
 from gateway.calibration.judgement.advice import Grade
 from gateway.calibration.statements_csv import StatementsFileError
-from gateway.quantity import Z95
+from gateway.estimates.quantity import Z95
 
 README = Path(__file__).parents[2] / "README.md"
 ABOARD_KG = {1: 0.0, 2: 200.0, 3: 380.0, 4: 120.0, 5: 300.0}

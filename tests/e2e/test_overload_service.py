@@ -15,7 +15,7 @@ from gateway.bus.logs import write_candump
 from gateway.bus.signals import shipped_map
 from gateway.log import LOGGER
 from gateway.records import Frames
-from gateway.service.alarms import AlarmService
+from gateway.service.alarm_reader import AlarmService
 from gateway.service.batch_log import BatchLog, LoadEventLog
 
 SATELLITES = """

@@ -12,9 +12,9 @@ from support.html_page import Page
 from gateway.calibration.file import load_calibration
 from gateway.errors import ConfigurationError
 from gateway.reports.paper.experiments import CAMPAIGNS, Extent
-from gateway.reports.paper.reproduce import PAPER_PCT, PLATES, reproduce, rows_of
-from gateway.workbench import simulate
-from gateway.workbench.campaigns import Plan, plan_of
+from gateway.reports.paper.reproduction import PAPER_PCT, PLATES, reproduce, rows_of
+from gateway.workbench import simulated_drives
+from gateway.workbench.simulated_campaigns import Plan, plan_of
 
 SMALL = Extent(seed=3, window_s=80.0, longest_s=125.0)  # two thirds of an experiment's drive make one batch
 THINNED = ("load-sweep", "share-sweep", "ident", "experiment", "speeds")
@@ -28,7 +28,7 @@ def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     output = tmp_path_factory.mktemp("reproduced")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulate, "plan_of", thinned)
+        patch.setattr(simulated_drives, "plan_of", thinned)
         steps: list[tuple[int, int]] = []
         reproduce(output, SMALL, lambda what, done, of: steps.append((done, of)))
     assert steps == sorted(steps)

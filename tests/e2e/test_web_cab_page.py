@@ -12,7 +12,7 @@ from support.cab import BEFORE, VAN, cab_gateway, load_event, loaded, vaguely_lo
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, Look, Watched
 from support.web import Gateway, serving
 
-from gateway.estimate_json import estimate_to_json
+from gateway.estimates.as_json import estimate_to_json
 from gateway.records import Why, json_line
 from gateway.status import AlarmsStatus, OwnReading, Standing, State
 from gateway.web.access.tokens import Scope, TokenFile

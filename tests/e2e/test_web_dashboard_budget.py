@@ -12,8 +12,8 @@ from support.dashboard import CONTRASTS, LEAST_CONTRAST, STATUS, Look, Watched
 from support.estimates import make_estimate
 from support.web import Gateway
 
-from gateway.budget import BudgetLine, budget_of
-from gateway.posterior import Posterior, Source
+from gateway.estimates.budget import BudgetLine, budget_of
+from gateway.estimates.posterior import Posterior, Source
 
 
 @pytest.fixture

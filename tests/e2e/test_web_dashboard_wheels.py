@@ -16,8 +16,8 @@ from support.web import Gateway, serving
 from gateway.core.fusion import epoch_of
 from gateway.core.vehicle import cg_left_m
 from gateway.core.weights import on_the_road as weights
-from gateway.estimate import Estimate
-from gateway.posterior import Posterior
+from gateway.estimates.estimate import Estimate
+from gateway.estimates.posterior import Posterior
 from gateway.weighing.calibrated import CalibratedVehicle
 
 PAYLOAD_KG, LEFT_M = 270.0, 0.3  # 54 kg more on the left wheels, 32.4 of them in front

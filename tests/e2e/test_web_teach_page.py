@@ -16,10 +16,10 @@ from support.sentences import raised, unmet
 from support.web import Gateway, serving
 
 from gateway.calibration.inspection.finding import Kind, Severity
-from gateway.calibration.learning.learn import LOOKED_FOR, _nothing
+from gateway.calibration.learning.from_pieces import LOOKED_FOR, _nothing
 from gateway.calibration.learning.told import SLIPS
 from gateway.calibration.statements_csv import read_statements
-from gateway.service.learner.loads import NEXT_FIT, NO_VEHICLE
+from gateway.service.learner.said import NEXT_FIT, NO_VEHICLE
 from gateway.stated.doubt import DoubtKind
 from gateway.stated.facts import VehicleAnswers
 

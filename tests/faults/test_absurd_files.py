@@ -11,7 +11,7 @@ from support.configured import service_config
 from gateway.bus.signals import load_signal_map
 from gateway.config import VEHICLE_ID
 from gateway.errors import ConfigurationError, SignalMapError
-from gateway.toml_file import read_toml
+from gateway.files.toml_file import read_toml
 
 HUGE = "9" * 400
 DBC = """VERSION ""

@@ -21,12 +21,12 @@ from gateway.bus.ring_log import RingLog
 from gateway.config import load_settings
 from gateway.part import BackOff, ThreadPart
 from gateway.service import gateway as service
-from gateway.service.alarms import AlarmService
+from gateway.service.alarm_reader import AlarmService
 from gateway.service.batch_log import BatchLog, LoadEventLog, StateLog
 from gateway.service.gateway import Gateway
 from gateway.service.learner.learner import Learner
 from gateway.service.signal_watch import SignalWatch, StandingWatch
-from gateway.service.status import StatusReport
+from gateway.service.status_of_parts import StatusReport
 from gateway.setup import setup_of
 from gateway.web.live.board import Board
 

@@ -11,10 +11,10 @@ from support.estimates import make_record
 from support.patience import PATIENCE_S, wait_until
 from support.web import Client, Gateway, serving
 
+from gateway.config.permission import Encryption, Holder, Kind, may_leave
 from gateway.config.sections import UplinkSection, WebhookSection
 from gateway.errors import ConfigurationError
 from gateway.fleet import Book, fleet_app
-from gateway.permission import Encryption, Holder, Kind, may_leave
 from gateway.web.access.serving import refuse_open_address
 from gateway.web.access.tokens import Scope, Token, TokenFile
 from gateway.web.live import stream

@@ -14,7 +14,7 @@ from support.paper_van import PAPER_VAN
 from gateway.archive import place_of, rows_of, slots_done
 from gateway.archive.dataset import PROVENANCE, row_of
 from gateway.archive.manifest import load_manifest
-from gateway.archive.reprocess import reprocess
+from gateway.archive.reprocessing import reprocess
 from gateway.bus.logs import write_candump
 
 IDENTITY = ("id", "vehicle_id", *PROVENANCE)  # `estimate` on bare files knows neither vehicle nor archive

@@ -11,13 +11,13 @@ from support.recordings import recordings
 
 from gateway.bus.logs import LogReport
 from gateway.bus.signals import SignalMap, load_signal_map
-from gateway.calibration.campaign import load_campaign
+from gateway.calibration.campaign_file import load_campaign
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.drive import SplitRun, row_facts
 from gateway.calibration.inspection.roll import roll_sign_of
-from gateway.calibration.inspection.run import inspect_run
+from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.known_run import KnownRun
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M
 from gateway.offline import campaigns as offline_campaigns
 from gateway.offline.campaigns import Stretch, batches_of_motion, inspect, read_whole_log, rows_within

@@ -15,11 +15,11 @@ from gateway.archive.dataset import columns
 from gateway.archive.manifest import ManifestFile, VehicleEntry
 from gateway.bus.signals import load_signal_map
 from gateway.bus.signals.signal_map import SignalEntry, SignalMapFile, shipped_maps
-from gateway.calibration.campaign import CampaignTable, RunTable, load_campaign
+from gateway.calibration.campaign_file import CampaignTable, RunTable, load_campaign
 from gateway.calibration.file import load_calibration
 from gateway.core.vehicle import Vehicle
-from gateway.estimate import Estimate
-from gateway.estimate_json import FIELDS
+from gateway.estimates.as_json import FIELDS
+from gateway.estimates.estimate import Estimate
 from gateway.records import Signal
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import TO_SI

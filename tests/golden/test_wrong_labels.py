@@ -6,13 +6,13 @@ from dataclasses import replace
 import pytest
 from support.recordings import recordings
 
-from gateway.calibration.calibrate import drive_name
-from gateway.calibration.campaign import Campaign, load_campaign
+from gateway.calibration.campaign_file import Campaign, load_campaign
 from gateway.calibration.found import ClaimState
+from gateway.calibration.from_drives import drive_name
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.teach import examined
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import front_share_pct
 from gateway.offline.campaigns import split_runs
 

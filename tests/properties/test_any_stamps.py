@@ -14,10 +14,10 @@ from support.half_car_road import VAN, batch_over_road, taught_by
 from gateway.bus.frames import LAST_SECOND
 from gateway.calibration.known_run import KnownRun
 from gateway.core.batch import BatchWindow, build_batch
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
-from gateway.estimate import Estimate
-from gateway.estimate_json import estimate_to_json
+from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.estimate import Estimate
 from gateway.records import I64, Batch, Motion, Why, json_line
 from gateway.units import NS_PER_S
 from gateway.weighing.calibrated import CalibratedVehicle

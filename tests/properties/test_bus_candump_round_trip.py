@@ -14,7 +14,7 @@ from gateway.bus.frames import join, message_id, stamp_to_ns
 from gateway.bus.logs import LogReport, write_candump
 from gateway.bus.logs.candump import _Finder, read_candump
 from gateway.bus.logs.candump_line import read_line
-from gateway.bus.logs.report import LogReject, Selection
+from gateway.bus.logs.log_report import LogReject, Selection
 from gateway.bus.signals.mapping import EVERY_IDENTIFIER, exact_filter
 from gateway.records import EXTENDED_ID, Frames
 

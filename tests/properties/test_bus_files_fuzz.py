@@ -15,13 +15,13 @@ from support.spoiled import Change, changed, changes, limits, refusal_of
 
 from gateway.bus.frames import message_of, take
 from gateway.bus.logs import motion_of_log, open_whole_log, write_candump
-from gateway.bus.logs.report import LogReport
+from gateway.bus.logs.log_report import LogReport
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
-from gateway.bus.signals.database import Databases
+from gateway.bus.signals.dbc import Databases
 from gateway.bus.signals.signal_map import unsound_messages
 from gateway.cli.look import look_json, look_text
 from gateway.errors import ConfigurationError, LogUnreadableError, SignalMapError
-from gateway.offline.look.look import look
+from gateway.offline.look.log_look import look
 from gateway.records import Frames, json_line
 
 N_FILES: Final = 500  # of each kind

@@ -15,14 +15,14 @@ from support.kept import kept
 from support.model_road import LEFT, QUIET, theta_of
 
 from gateway.calibration.known_run import KnownRun
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.change import Rules
 from gateway.core.fusion import fused_epoch
-from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Load
-from gateway.estimate import Estimate
-from gateway.estimate_json import estimate_to_json
+from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.estimate import Estimate
 from gateway.model import fit, weigh
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64, Batch, Motion, Signal, Why
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate

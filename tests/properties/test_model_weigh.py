@@ -22,15 +22,15 @@ from support.taught_van import (
 from gateway.calibration.teach import teach
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.core.vehicle import Load
+from gateway.estimates.posterior import Source
 from gateway.model import car as equations
 from gateway.model import fit
 from gateway.model.sensors import GAIN_STD
 from gateway.model.spectra import CrossSpectra, Reading, cross_spectra_of, level
 from gateway.model.table import INDEX, N
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.model.weigh import EVIDENCE_WITHOUT_ROLL, Mixture, hypotheses_of, mixture_of, posterior_of
 from gateway.model.whittle import Point, Whittle
-from gateway.posterior import Source
 from gateway.records import C128, F64, Batch
 
 LOAD = (200.0, 50.0)

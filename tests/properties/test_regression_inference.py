@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gateway.calibration.ratio_index.regression import fit_regression, held_out_errors, without_each_run
+from gateway.calibration.ratio_index.least_squares import fit_regression, held_out_errors, without_each_run
 from gateway.core.ratio_index.regression import scaled_columns
 from gateway.records import F64, I64
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from support.drives import T0_NS, drive
 
 from gateway.core.batch import BatchWindow, build_batch
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.sample_clock import retimed, sample_times
-from gateway.core.settings import BatchSettings
 from gateway.records import F64, I64, Motion, Why
 
 DURATION_S = 120.0

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.drives import assert_same_batch, drive, joined, later, steady, with_journey, with_roll, without_rows
 
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
 from gateway.records import Batch, Motion, Why
 from gateway.units import NS_PER_S
 

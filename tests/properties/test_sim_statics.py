@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from support.statics import static_axle_loads_kg
 from support.textbook import linearised
 
-from gateway.sim.drive import JERK_MPS3, STEP_S, Leg, constant, drive_of
+from gateway.sim.parameters import Load, axle_loads_kg, cg_left_m, front_share_pct, load_for_share, payload_kg
 from gateway.sim.ride import ride, wheel_loads_kg
 from gateway.sim.road import PaperRoad
+from gateway.sim.speed_profile import JERK_MPS3, STEP_S, Leg, constant, drive_of
 from gateway.sim.vans import PAPER_VAN, VANS
-from gateway.sim.vehicle import Load, axle_loads_kg, cg_left_m, front_share_pct, load_for_share, payload_kg
 
 vehicles = st.sampled_from(list(VANS.values()))
 loads = st.lists(

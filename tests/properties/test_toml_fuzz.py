@@ -16,7 +16,7 @@ from support.configured import service_config
 from support.spoiled import Change, changed, changes, refusal_of
 
 from gateway.archive.manifest import load_manifest
-from gateway.calibration.campaign import load_campaign
+from gateway.calibration.campaign_file import load_campaign
 from gateway.config import load_settings
 from gateway.errors import SpringscaleError
 

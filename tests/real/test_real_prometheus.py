@@ -23,7 +23,7 @@ from support.ports import first_answer, free_port
 from support.receiver import SECRET_TEXT, Receiver
 
 from gateway.bus.logs import write_candump
-from gateway.workbench.simulate import demo_drive, frames_of
+from gateway.workbench.simulated_drives import demo_drive, frames_of
 
 ROOT = Path(__file__).parents[2]
 RULES = ROOT / "deploy/prometheus/springscale.rules.yml"

@@ -7,9 +7,9 @@ from support.archive import MIDNIGHT_NS, S, write_drive, write_manifest
 
 from gateway.archive import place_of
 from gateway.archive.inventory import look
+from gateway.archive.job_run import run
 from gateway.archive.jobs import ArchiveJob
 from gateway.archive.manifest import load_manifest
-from gateway.archive.run import run
 from gateway.archive.survey import survey
 
 N_PIECES = 10

@@ -11,7 +11,7 @@ from support.archive import MIDNIGHT_NS, Here, S, write_cut_drive, write_manifes
 
 from gateway.archive import failures, place_of, rows_of, slots_done
 from gateway.archive.manifest import load_manifest
-from gateway.archive.reprocess import Summary, reprocess
+from gateway.archive.reprocessing import Summary, reprocess
 from gateway.bus.logs import motion_of_log
 from gateway.bus.signals import SignalMap
 from gateway.records import Motion, joined

@@ -12,10 +12,10 @@ from support.archive import MIDNIGHT_NS, Here, S, write_drive, write_manifest
 
 from gateway.archive import Location, PlaceError, failures, place_of, receipts, rows_of, slots_done
 from gateway.archive.inventory import look
+from gateway.archive.job_run import JobStatus, run
 from gateway.archive.jobs import ArchiveJob
 from gateway.archive.manifest import load_manifest
-from gateway.archive.reprocess import Summary, reprocess
-from gateway.archive.run import JobStatus, run
+from gateway.archive.reprocessing import Summary, reprocess
 from gateway.archive.survey import LogFile, SurveyedLog, survey
 from gateway.archive.workers import WorkerKilledError
 from gateway.errors import ConfigurationError, ReaderMissingError
@@ -139,7 +139,7 @@ def test_two_workers_at_one_job_agree_on_one_receipt(archive: Path, monkeypatch:
     done(archive)
     before = files_of(archive)
     job = look(load_manifest(str(archive)), dataset_of(archive)).jobs()[0]
-    monkeypatch.setattr("gateway.archive.run._is_done", lambda job: False)
+    monkeypatch.setattr("gateway.archive.job_run._is_done", lambda job: False)
     assert run(job).status is JobStatus.ALREADY
     assert files_of(archive) == before
 
@@ -218,7 +218,7 @@ def test_a_vehicle_with_a_log_out_of_reach_is_not_weighed_without_it(
         return survey(log)
 
     with monkeypatch.context() as breaking:
-        breaking.setattr("gateway.archive.reprocess.survey", unreachable)
+        breaking.setattr("gateway.archive.reprocessing.survey", unreachable)
         summary = done(archive)
     assert summary.lost == {"van-1/1.log": "van-1/1.log: timed out"}
     assert {slot.vehicle for slot in slots_done(dataset_of(archive))} == {"van-2"}

@@ -13,10 +13,10 @@ from support.commands import called
 
 from gateway.bus.frames import message_of
 from gateway.bus.logs import open_whole_log
-from gateway.calibration.campaign import load_campaign
+from gateway.calibration.campaign_file import load_campaign
 from gateway.calibration.file import load_calibration
 from gateway.errors import CalibrationImpossibleError
-from gateway.workbench.simulate import bench_of, write_campaign
+from gateway.workbench.simulated_drives import bench_of, write_campaign
 
 DRIVE_S = 165.0
 WINDOW = ("--window-s", "50")

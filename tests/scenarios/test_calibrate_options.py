@@ -14,15 +14,15 @@ from click.testing import Result
 from support.commands import called, run
 from support.known_load_logs import SIGNALS, write_known_loads
 
-from gateway.calibration.calibrate import calibrate_inspected
-from gateway.calibration.campaign import load_campaign
+from gateway.calibration.campaign_file import load_campaign
 from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.from_drives import calibrate_inspected
 from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.ratio_index.index import PAPER_BANDS
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
-from gateway.core.settings import BatchSettings
-from gateway.estimate_json import COLUMNS
+from gateway.estimates.as_json import COLUMNS
 from gateway.offline.campaigns import inspect
 
 WINDOW = ("--window-s", "100")

@@ -14,7 +14,7 @@ from support.parts import found, needs
 from support.patience import wait_until
 from support.ports import free_port
 
-from gateway.bus.feed import Feeder, Gpsd
+from gateway.bus.feeder import Feeder, Gpsd
 from gateway.bus.frames import frames_of
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.records import Signal

@@ -10,10 +10,10 @@ from benchmarks.accuracy.calibrated import taught_by
 from benchmarks.accuracy.drives import without_roll_rate
 from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import cg_left_m
-from gateway.estimate import Estimate, Quantity
-from gateway.model.vehicle import VehicleModel
+from gateway.estimates.estimate import Estimate, Quantity
+from gateway.model.vehicle_model import VehicleModel
 from gateway.records import Batch, Why
-from gateway.sim.vehicle import Load
+from gateway.sim.parameters import Load
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate
 

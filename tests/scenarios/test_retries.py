@@ -18,9 +18,9 @@ from support.patience import PATIENCE_S, wait_until
 from support.ports import free_port
 from support.receiver import SECRET_TEXT, Receiver, cut, status
 
-from gateway.bus import feed
+from gateway.bus import feeder as feeder_module
 from gateway.bus import listen as live
-from gateway.bus.feed import Feeder, Gpsd
+from gateway.bus.feeder import Feeder, Gpsd
 from gateway.bus.listen import LiveSource
 from gateway.bus.ring_log import RingLog
 from gateway.bus.signals import load_signal_map
@@ -191,7 +191,7 @@ def an_interface_that_goes_down(folder: Path, patch: pytest.MonkeyPatch) -> Iter
 
 @contextmanager
 def feeding(patch: pytest.MonkeyPatch, interface: str, gps: Gpsd | None) -> Iterator[None]:
-    patch.setattr(feed, "RETRY_S", 0.001)
+    patch.setattr(feeder_module, "RETRY_S", 0.001)
     feeder = Feeder(interface, "retries", [], gps)
     thread = threading.Thread(target=feeder.run)
     thread.start()
@@ -202,8 +202,8 @@ def feeding(patch: pytest.MonkeyPatch, interface: str, gps: Gpsd | None) -> Iter
 
 @contextmanager
 def a_bus_that_the_feeder_cannot_open(folder: Path, patch: pytest.MonkeyPatch) -> Iterator[Tried]:
-    tries = Tries(feed.BusSink)
-    patch.setattr(feed, "BusSink", tries)
+    tries = Tries(feeder_module.BusSink)
+    patch.setattr(feeder_module, "BusSink", tries)
     with feeding(patch, "socketcan", None):
         yield lambda: tries.n
 

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from gateway.bus.signals import Decoder, load_signal_map
-from gateway.core.settings import BatchSettings
-from gateway.estimate import Estimate
+from gateway.core.batch_settings import BatchSettings
+from gateway.estimates.estimate import Estimate
 from gateway.offline.campaigns import batches_of_motion
 from gateway.records import F64, Bool, Frames, Why
 from gateway.service.pipeline import Pipeline
-from gateway.sim.drive import constant
+from gateway.sim.instruments import REFERENCE, Recording
+from gateway.sim.parameters import Load
 from gateway.sim.road import iso_road
 from gateway.sim.scenario import START_NS, simulate_drive
-from gateway.sim.sensors import REFERENCE, Recording
+from gateway.sim.speed_profile import constant
 from gateway.sim.vans import PAPER_VAN
-from gateway.sim.vehicle import Load
 from gateway.weighing.flow import Flow, Identity
 from gateway.workbench.wiring import Wiring
 

@@ -21,7 +21,7 @@ from gateway.config import load_settings
 from gateway.log import Event
 from gateway.part import ServicePart
 from gateway.service import gateway
-from gateway.service.part import CLOSE_WITHIN_S, STOP_WITHIN_S, Deadline, stop_in_turn
+from gateway.service.stopping import CLOSE_WITHIN_S, STOP_WITHIN_S, Deadline, stop_in_turn
 from gateway.setup import setup_of
 from gateway.web.access import serving
 
@@ -74,7 +74,7 @@ def test_parts_stop_in_reverse_order_and_a_hanging_one_does_not_block(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They stopped as they had started, and a lock held by a stalled disk held them all."""
-    monkeypatch.setattr("gateway.service.part.PART_WITHIN_S", 0.05)
+    monkeypatch.setattr("gateway.service.stopping.PART_WITHIN_S", 0.05)
     stopped: list[str] = []
     for_ever = threading.Event()
 

@@ -12,10 +12,10 @@ from support.patience import PATIENCE_S, wait_until
 from support.sequence import without_sequence
 
 from gateway.errors import StoreError
-from gateway.history import BATCHES, SERVICE
 from gateway.log import Event
 from gateway.records import Why, json_line
 from gateway.store import Store, queries, schema
+from gateway.store.journal import BATCHES, SERVICE
 from gateway.uplink.outbox import Outbox
 
 N_RECORDS = 12

@@ -25,7 +25,7 @@ from gateway.store import Store
 from gateway.uplink.forwarder import BackOff
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings
-from gateway.uplink.statements import MOST_BYTES, StatementsDesk, StatementsMessage, TakeStatements
+from gateway.uplink.statements_topic import MOST_BYTES, StatementsDesk, StatementsMessage, TakeStatements
 from gateway.uplink.uplink import Uplink
 
 TOPIC: Final = "springscale/van-17/statements"

@@ -22,7 +22,7 @@ from support.process import TESTS
 
 from gateway.bus.logs import write_candump
 from gateway.config import load_settings
-from gateway.estimate_json import estimate_to_json
+from gateway.estimates.as_json import estimate_to_json
 from gateway.offline.estimates import estimates_of_logs
 from gateway.records import Spectra
 from gateway.setup import setup_of

@@ -9,11 +9,11 @@ from support.known_load_logs import SIGNALS, START_NS, write_known_loads
 
 from gateway.bus.signals import load_signal_map
 from gateway.calibration.assigned import moments
-from gateway.calibration.learning.learn import learn, matched
+from gateway.calibration.learning.from_pieces import learn, matched
 from gateway.calibration.learning.spans import standing
 from gateway.calibration.learning.told import statements_record
-from gateway.core.settings import BatchSettings
-from gateway.offline.learn import read_drives
+from gateway.core.batch_settings import BatchSettings
+from gateway.offline.drives_of_logs import read_drives
 from gateway.records import iso_utc
 from gateway.stated.statement import StatementRecord
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from gateway.core.alarms.rules import AlarmRules
-from gateway.service.alarms import AlarmService
+from gateway.service.alarm_reader import AlarmService
 from gateway.setup import Subject
 from gateway.store import Store
 from support.learner import LearnerBench

@@ -9,9 +9,9 @@ from gateway.core.alarms.rules import AlarmRules
 from gateway.core.fusion import epoch_of
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import weighed
-from gateway.estimate import Estimate
-from gateway.estimate_json import estimate_to_json
-from gateway.service.alarms import AlarmService
+from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.estimate import Estimate
+from gateway.service.alarm_reader import AlarmService
 from gateway.setup import Subject
 from gateway.store import Store
 from gateway.web.live.board import Board

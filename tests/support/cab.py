@@ -4,8 +4,8 @@ from pathlib import Path
 
 from gateway.core.events.entry import EntryKind
 from gateway.core.vehicle import Vehicle
-from gateway.estimate import Estimate
-from gateway.quantity import Z95
+from gateway.estimates.estimate import Estimate
+from gateway.estimates.quantity import Z95
 from gateway.records import iso_utc, json_line
 from gateway.status import Standing, State, Status
 from gateway.weighing.calibrated import CalibratedVehicle

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from gateway.budget import budget_of
-from gateway.estimate import Epoch, Estimate, Quantity, Weight, Weights
-from gateway.estimate_json import estimate_to_json
-from gateway.posterior import Posterior, Source
+from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.budget import budget_of
+from gateway.estimates.estimate import Epoch, Estimate, Quantity, Weight, Weights
+from gateway.estimates.posterior import Posterior, Source
 from gateway.records import Spectra, Why, json_line
 from gateway.units import NS_PER_S
 

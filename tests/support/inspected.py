@@ -7,19 +7,19 @@ import numpy as np
 from gateway.bus.signals import Decoder, SignalMap, load_signal_map
 from gateway.calibration.inspection.drive import SplitRun, row_facts
 from gateway.calibration.inspection.finding import RunVerdict
-from gateway.calibration.inspection.run import inspect_run
+from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.known_run import KnownRun
 from gateway.core.batch import Traits
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.records import Motion, Signal
-from gateway.sim.drive import Drive
+from gateway.sim.instruments import REFERENCE
+from gateway.sim.parameters import Load
+from gateway.sim.parameters import Vehicle as SimulatedVehicle
 from gateway.sim.road import iso_road
 from gateway.sim.scenario import simulate_drive
-from gateway.sim.sensors import REFERENCE
-from gateway.sim.vehicle import Load
-from gateway.sim.vehicle import Vehicle as SimulatedVehicle
+from gateway.sim.speed_profile import Drive
 from gateway.workbench.wiring import Wiring
 
 ACCELERATION, PITCH_RATE, ROLL_RATE = Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE

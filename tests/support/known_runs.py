@@ -3,7 +3,7 @@
 from gateway.calibration.inspection.drive import LogFacts, SplitRun
 from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import front_share_pct
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64
 from support.half_car_road import CAR, VAN, batch_over_road, taught_by
 from support.kept import kept

@@ -10,7 +10,7 @@ from gateway.calibration.inspection.drive import RowFacts
 from gateway.calibration.kept import KeptBatch
 from gateway.calibration.learning.job import LearnJob, LearnResult
 from gateway.config.sections import LearningSection
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.records import Batch, iso_utc
 from gateway.service.learner.learner import Learner
 from gateway.service.learner.van import LearnerVehicle

@@ -9,7 +9,7 @@ from gateway.core.vehicle import Load, Vehicle
 from gateway.model.car import USUAL_LEVEL, Ground, natural, numbers_of
 from gateway.model.response import Frequencies, Motion
 from gateway.model.table import INDEX, LOG, NAMES, ROLL, ROWS, UPRIGHT, prior_of
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.records import C128, F64, Batch
 
 RATE_HZ = 50.0

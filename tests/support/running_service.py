@@ -12,10 +12,10 @@ from click.testing import Result
 
 from gateway.bus.sink import replay
 from gateway.config import Settings, load_settings
-from gateway.history import SERVICE
 from gateway.service.gateway import Gateway
 from gateway.service.lifecycle import live
 from gateway.store import Store
+from gateway.store.journal import SERVICE
 from support.commands import called, printed
 from support.configured import service_config
 from support.patience import PATIENCE_S, wait_until

@@ -10,13 +10,13 @@ import numpy as np
 from benchmarks.accuracy.drives import known_run, stated
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.calibration.known_run import KnownRun
-from gateway.sim.drive import constant
+from gateway.sim.instruments import REFERENCE
 from gateway.sim.obstacles import UnevenRoad
+from gateway.sim.parameters import Load
 from gateway.sim.road import iso_road
 from gateway.sim.scenario import simulate_drive
-from gateway.sim.sensors import REFERENCE
+from gateway.sim.speed_profile import constant
 from gateway.sim.vans import PAPER_VAN
-from gateway.sim.vehicle import Load
 from gateway.workbench.wiring import Wiring
 
 SENSORS = replace(REFERENCE, mount=replace(REFERENCE.mount, left_m=0.3))

@@ -1,7 +1,7 @@
 """A simulated vehicle at rest."""
 
+from gateway.sim.parameters import Load, Vehicle
 from gateway.sim.ride import wheel_loads_kg
-from gateway.sim.vehicle import Load, Vehicle
 
 
 def static_axle_loads_kg(vehicle: Vehicle, loads: tuple[Load, ...]) -> tuple[float, float]:

@@ -9,11 +9,11 @@ from gateway.calibration.statements import Statement
 from gateway.calibration.teach import teach
 from gateway.core.cargo import known_shape
 from gateway.core.vehicle import Load, Vehicle
-from gateway.estimate import Estimate
+from gateway.estimates.estimate import Estimate
 from gateway.model.car import Ground
 from gateway.model.spectra import CrossSpectra, cross_spectra_of
 from gateway.model.table import ROWS, covariance_of
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.model.weigh import Weighed, by_cross_spectrum, weigh
 from gateway.records import F64, Batch, Why
 from gateway.stated.statement import StatementSource

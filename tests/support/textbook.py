@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from gateway.records import C128, F64
-from gateway.sim.vehicle import Axle, Damper, Load, Vehicle
+from gateway.sim.parameters import Axle, Damper, Load, Vehicle
 
 
 def linearised(vehicle: Vehicle) -> Vehicle:

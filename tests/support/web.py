@@ -14,8 +14,8 @@ import uvicorn
 from fastapi import FastAPI
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from gateway.estimate import Estimate
-from gateway.estimate_json import estimate_to_json
+from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.estimate import Estimate
 from gateway.status import State, Status
 from gateway.store import Store
 from gateway.web.access.serving import server_config

@@ -12,7 +12,7 @@ import pytest
 
 from gateway.bus.frames import join
 from gateway.bus.logs import open_whole_log
-from gateway.bus.logs.report import LogReport
+from gateway.bus.logs.log_report import LogReport
 from gateway.errors import LogUnreadableError
 from gateway.records import Frames
 

@@ -8,14 +8,14 @@ from hypothesis import strategies as st
 from support.calibrated import calibration_file
 from support.paper_van import paper_van
 
-from gateway.calibration.calibrate import Outcome
 from gateway.calibration.file import FoundPart
+from gateway.calibration.from_drives import Outcome
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.judgement.advice import Grade, Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import Assessment, BatchSet, Judgement
 from gateway.calibration.judgement.evaluation import Judged, error_table
-from gateway.estimate import Estimate, Quantity
+from gateway.estimates.estimate import Estimate, Quantity
 from gateway.records import Why
 
 VAN = paper_van()  # ranges of 450 kg and of 20 points

@@ -13,7 +13,7 @@ from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import NOTHING_KNOWN, Statement
 from gateway.calibration.teach import teach
 from gateway.core.vehicle import Load
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.model.whittle import Point, Whittle
 from gateway.stated.statement import StatementSource
 

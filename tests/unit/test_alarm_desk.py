@@ -15,7 +15,7 @@ from gateway.core.alarms.alarm import CAUSE_NAMES
 from gateway.core.alarms.rules import AlarmRules
 from gateway.core.change import Rules
 from gateway.records import Why
-from gateway.service.alarms import rules_of
+from gateway.service.alarm_reader import rules_of
 from gateway.service.batch_log import ledger_of
 from gateway.status import BusStatus, DecodeCount, SignalHealth, State, Status
 

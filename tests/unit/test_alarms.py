@@ -24,8 +24,8 @@ from gateway.core.alarms.alarm import (
 )
 from gateway.core.alarms.rules import SENSORS, AlarmRules, Says
 from gateway.core.alarms.watch import AlarmWatch
-from gateway.estimate import Estimate, Quantity, Weight, Weights
-from gateway.reasons import EXPLANATIONS
+from gateway.estimates.estimate import Estimate, Quantity, Weight, Weights
+from gateway.estimates.reasons import EXPLANATIONS
 from gateway.records import Why, json_line
 
 RULES = AlarmRules()

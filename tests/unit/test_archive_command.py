@@ -12,9 +12,9 @@ from click.testing import Result
 from support.archive import MIDNIGHT_NS, Here, die, write_drive, write_manifest
 from support.commands import called
 
+from gateway.archive.job_run import JobOutcome, JobStatus
 from gateway.archive.receipts import Slot
-from gateway.archive.reprocess import Progress, Summary, done_by
-from gateway.archive.run import JobOutcome, JobStatus
+from gateway.archive.reprocessing import Progress, Summary, done_by
 from gateway.archive.workers import WorkerKilledError, Workers, local_workers
 from gateway.cli import main
 from gateway.cli.reprocess import duration, how_far, size, summary_in_words

@@ -10,7 +10,7 @@ from support.archive import MIDNIGHT_NS, Here, tables_of, write_drive, write_man
 
 from gateway.archive import place_of
 from gateway.archive.manifest import load_manifest
-from gateway.archive.reprocess import Summary, reprocess
+from gateway.archive.reprocessing import Summary, reprocess
 from gateway.bus.logs.packed import zstd
 from gateway.cli.reprocess import summary_in_words
 from gateway.units import NS_PER_S

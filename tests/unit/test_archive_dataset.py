@@ -16,7 +16,7 @@ from gateway.archive import Slot, failures, place_of, receipts, rows_of, slots_d
 from gateway.archive.dataset import PROVENANCE, columns, parquet_of, row_of, schema
 from gateway.archive.receipts import slots_failed, text_of
 from gateway.errors import ConfigurationError
-from gateway.estimate_json import COLUMNS, FIELDS, estimate_to_json
+from gateway.estimates.as_json import COLUMNS, FIELDS, estimate_to_json
 from gateway.records import Why
 
 TOLD = dict.fromkeys(PROVENANCE, "x")

@@ -13,7 +13,7 @@ from gateway.archive import place_of
 from gateway.archive.jobs import PACKAGE, ArchiveJob, code_id, hash_of, plan, software
 from gateway.archive.manifest import Assignment, Manifest, load_manifest
 from gateway.archive.survey import LogFile, SurveyedLog
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 
 HOUR = 3600 * S
 DATASET = place_of("/dataset")

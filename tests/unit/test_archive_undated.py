@@ -5,7 +5,7 @@ from support.archive import Here, write_drive, write_manifest
 
 from gateway.archive import place_of
 from gateway.archive.manifest import load_manifest
-from gateway.archive.reprocess import reprocess
+from gateway.archive.reprocessing import reprocess
 
 
 @pytest.mark.parametrize("span", ["", "\nuntil = 2026-01-01", "\nsince = 2026-01-01"])

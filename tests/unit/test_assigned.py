@@ -8,7 +8,7 @@ import pytest
 from support.half_car_road import VAN as HALF_CAR
 
 from gateway.calibration.assigned import Assigned, Fate, Piece, assign, cut, moments
-from gateway.quantity import Z95
+from gateway.estimates.quantity import Z95
 from gateway.stated.statement import StatementRecord
 
 DAY = datetime.fromisoformat("2026-11-26T00:00:00Z")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from support.drives import T0_NS, assert_same_batch, changed, drive, steady, with_roll
 
 from gateway.core.batch import BatchWindow, build_batch
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.records import F64, Batch, Motion, SensorTraits, Signal, Why
 
 LENGTH_S = 100.0

@@ -9,15 +9,15 @@ from support.half_car_road import CAR, as_if_fitted
 
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.core.batch import BatchWindow, build_batch
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.bends import Bends, gyro_gain_of, joined_gains
-from gateway.core.settings import BatchSettings
 from gateway.model.sensors import gyro_gain_ratio, is_changed
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.records import Batch, Motion, Signal
-from gateway.sim.drive import rural
+from gateway.sim.instruments import REFERENCE
 from gateway.sim.road import iso_road
 from gateway.sim.scenario import simulate_drive
-from gateway.sim.sensors import REFERENCE
+from gateway.sim.speed_profile import rural
 from gateway.sim.vans import VANS
 from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2
 from gateway.workbench.wiring import Wiring

@@ -11,9 +11,9 @@ import pytest
 from gateway.bus.frames import join
 from gateway.bus.logs import LogReport
 from gateway.bus.logs.candump import read_candump
+from gateway.bus.logs.log_report import LogReject, Selection
 from gateway.bus.logs.open import open_whole_log
 from gateway.bus.logs.packed import open_log_file, unpacked_suffix, zstd
-from gateway.bus.logs.report import LogReject, Selection
 from gateway.bus.signals.mapping import IdFilter, exact_filter, j1939_filter
 from gateway.errors import LogUnreadableError
 from gateway.records import EXTENDED_ID, Frames

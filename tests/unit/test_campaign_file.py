@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from gateway.calibration.campaign import Campaign, load_campaign
+from gateway.calibration.campaign_file import Campaign, load_campaign
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.learning.answers import vehicle_table
+from gateway.calibration.learning.fitter_answers import vehicle_table
 from gateway.calibration.statements import KNOWN_SHARE_PLUS_MINUS_PCT
 from gateway.core.vehicle import (
     MEASURED_OFFSET_STD_M,

@@ -15,7 +15,7 @@ from gateway.bus.logs import open_whole_log, write_candump
 from gateway.bus.signals import Encoder, load_signal_map
 from gateway.errors import CampaignError, ConfigurationError
 from gateway.offline.bundle import CONTRIBUTION, MANIFEST, TEMPLATE, pack, unpacked
-from gateway.workbench.simulate import bench_of, write_campaign
+from gateway.workbench.simulated_drives import bench_of, write_campaign
 
 
 def with_strangers(log: Path) -> None:

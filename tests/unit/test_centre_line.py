@@ -12,17 +12,17 @@ from support.half_car_road import RATE_HZ
 
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.table import spectrum_table
+from gateway.calibration.ratio_index.spectra_table import spectrum_table
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.ratio_index.index import RatioIndexCalibration, acceleration_spectrum, indexes_of, mean_spectrum
-from gateway.core.settings import BatchSettings
 from gateway.offline.campaigns import batches_of_motion
 from gateway.records import F64, Batch
-from gateway.sim.drive import constant
+from gateway.sim.instruments import Gps, Imu, Mount, Sensors
+from gateway.sim.parameters import Load
 from gateway.sim.road import iso_road
 from gateway.sim.scenario import simulate_drive
-from gateway.sim.sensors import Gps, Imu, Mount, Sensors
+from gateway.sim.speed_profile import constant
 from gateway.sim.vans import PAPER_VAN
-from gateway.sim.vehicle import Load
 from gateway.workbench.wiring import Wiring
 
 N, N_SEGMENT = 9_000, 1024

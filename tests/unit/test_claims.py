@@ -15,7 +15,7 @@ from gateway.calibration.statements import (
     load_prior_of,
     shared_disagreement,
 )
-from gateway.quantity import Z95
+from gateway.estimates.quantity import Z95
 from gateway.records import F64
 
 KG = st.floats(0.0, 600.0)

@@ -97,7 +97,7 @@ def test_a_failing_drive_ends_the_command_with_its_error(monkeypatch: pytest.Mon
 HEAVY = ("scipy", "asammdf", "pandas", "matplotlib", "numba", "pyarrow")
 
 
-FITTING = ("gateway.calibration.ratio_index", "gateway.calibration.inspection", "gateway.calibration.calibrate")
+FITTING = ("gateway.calibration.ratio_index", "gateway.calibration.inspection", "gateway.calibration.from_drives")
 
 
 def python(code: str) -> str:
@@ -124,9 +124,9 @@ WEIGHED = """
 import sys
 from benchmarks.speed.meter import CALIBRATION
 from gateway.bus.signals import Decoder
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.setup import load_setup
-from gateway.workbench.simulate import demo_drive, frames_of
+from gateway.workbench.simulated_drives import demo_drive, frames_of
 
 setup, frames = load_setup("springscale:reference", CALIBRATION), frames_of(demo_drive())
 for name in [name for name in sys.modules if name.partition(".")[0] == "scipy"]:

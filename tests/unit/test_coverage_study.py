@@ -33,9 +33,9 @@ from gateway.core.vehicle import Vehicle
 from gateway.core.vehicle import front_share_pct as stated_share_pct
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import Signal
-from gateway.sim.sensors import Sensors
-from gateway.sim.vehicle import Load, front_share_pct, payload_kg
-from gateway.sim.vehicle import Vehicle as Van
+from gateway.sim.instruments import Sensors
+from gateway.sim.parameters import Load, front_share_pct, payload_kg
+from gateway.sim.parameters import Vehicle as Van
 from gateway.weighing.calibrated import CalibratedVehicle
 
 

@@ -10,8 +10,8 @@ from support.days import day, told
 from support.patience import PATIENCE_S
 
 from gateway.core.change import Rules
-from gateway.estimate import Estimate
-from gateway.estimate_json import estimate_to_json
+from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.estimate import Estimate
 from gateway.service.batch_log import LoadEventLog
 from gateway.setup import load_setup
 from gateway.store import Store

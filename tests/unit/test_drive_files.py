@@ -6,7 +6,7 @@ import pytest
 from support.learner import NOW_NS, kept_window
 
 from gateway.calibration.kept import packed, unpacked
-from gateway.service.learner.drives import DriveFiles
+from gateway.service.learner.kept_drives import DriveFiles
 from gateway.units import NS_PER_S
 
 BYTES = len(packed(kept_window(0, 0)))

@@ -14,11 +14,11 @@ from gateway.calibration.judgement.evaluation import Comparison, Judged, error_t
 from gateway.calibration.known_run import KnownRun
 from gateway.cli.evaluate import text_of
 from gateway.core.batch import BatchWindow, build_batch
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.weights.on_the_road import Unsprung, weighed
-from gateway.estimate import Estimate, Quantity
-from gateway.estimate_json import estimate_to_json
-from gateway.posterior import exactly
+from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.posterior import exactly
 from gateway.records import Batch, Why
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate

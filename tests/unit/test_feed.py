@@ -17,7 +17,7 @@ from support.commands import called, run
 from support.iio import ACCEL_SCALE, GYRO_SCALE, FakeIio, Scan
 from support.patience import PATIENCE_S, wait_until
 
-from gateway.bus.feed import AXES, Feeder, Gpsd, IioDevice, Numbering, find_devices, turned
+from gateway.bus.feeder import AXES, Feeder, Gpsd, IioDevice, Numbering, find_devices, turned
 from gateway.bus.frames import frames_of
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.core.sample_clock import sample_times
@@ -191,7 +191,7 @@ def test_one_receiver_of_several_counts(case: str) -> None:
 
 def test_a_reconnected_receiver_replaces_the_lost_one(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [100.0]
-    monkeypatch.setattr("gateway.bus.feed.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("gateway.bus.feeder.time.monotonic", lambda: clock[0])
     gps = Gpsd("127.0.0.1", 1)
     speeds = []
     for device, speed_mps, pause_s in ((ONE, 14.0, 1.0), (OTHER, 13.0, 58.0), (OTHER, 12.0, 3.0), (ONE, 11.0, 1.0)):

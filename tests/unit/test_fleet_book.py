@@ -13,7 +13,7 @@ from pydantic import create_model
 
 from gateway.fleet import Book, Message
 from gateway.fleet.book import AWAY
-from gateway.fleet.records import KINDS, Entry
+from gateway.fleet.messages import KINDS, Entry
 
 NOW_S = 1_800_000_000.0
 UNREADABLE = (

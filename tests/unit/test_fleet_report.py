@@ -20,7 +20,7 @@ from gateway.archive.fleet.weeks import monday_of
 from gateway.cli import main
 from gateway.reports.charts import Rule
 from gateway.reports.fleet.text import page_of, time_axis
-from gateway.reports.fleet.vehicle import runs_of, vehicle_sections
+from gateway.reports.fleet.vehicle_page import runs_of, vehicle_sections
 
 EVIL = "<script>alert(1)</script>\"'&"
 N_WEEKS = 26

@@ -14,10 +14,10 @@ from support.fleet import DAY_S, MONDAY_S, row, week, write_table
 
 from gateway.archive import place_of
 from gateway.archive.fleet.batches import Batches, read_batches
-from gateway.archive.fleet.sensors import Health, Share, troubles_of
+from gateway.archive.fleet.faulty_sensors import Health, Share, troubles_of
 from gateway.archive.fleet.weeks import monday_of, weeks_of
-from gateway.estimate import Z95
-from gateway.reasons import EXPLANATIONS, Cause
+from gateway.estimates.estimate import Z95
+from gateway.estimates.reasons import EXPLANATIONS, Cause
 
 REASONS = ["acceleration_stuck", "time_stamps", "too_slow", "model_misfit", "a_reason_of_tomorrow"]
 CAUSE_OF = {str(why): told.cause for why, told in EXPLANATIONS.items()}

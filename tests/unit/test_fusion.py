@@ -11,8 +11,8 @@ from support.paper_van import paper_van
 
 from gateway.core.change import EVEN, ROLLING, Rules, change_of, probability
 from gateway.core.fusion import LoadEpoch, fused_epoch
-from gateway.estimate import Estimate, Quantity
-from gateway.posterior import CG_LEFT, PAYLOAD, Posterior, Source, difference
+from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.posterior import CG_LEFT, PAYLOAD, Posterior, Source, difference
 from gateway.records import Why
 
 RULES = Rules(range_kg=1000.0, mass_kg=2000.0)

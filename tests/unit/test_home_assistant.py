@@ -17,8 +17,8 @@ from support.patience import wait_until
 from gateway.config import VehicleSection
 from gateway.config.sections import UplinkSection
 from gateway.errors import ConfigurationError
-from gateway.estimate import Estimate, Weight, Weights
-from gateway.estimate_json import estimate_to_json
+from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.estimate import Estimate, Weight, Weights
 from gateway.records import Why
 from gateway.store import Store
 from gateway.uplink.home_assistant import discovery

@@ -10,7 +10,7 @@ from gateway.calibration.inspection.campaign import Inspection, inspect_drives, 
 from gateway.calibration.inspection.drive import RowFacts, SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
 from gateway.calibration.known_run import KnownRun
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 
 SETTINGS = BatchSettings(window_s=200.0)
 

@@ -26,14 +26,14 @@ from support.inspected import (
 from gateway.calibration.inspection.campaign import inspect_drives
 from gateway.calibration.inspection.drive import LogFacts, RowFacts, SplitRun, row_facts
 from gateway.calibration.inspection.finding import Finding, Kind
-from gateway.calibration.inspection.run import inspect_run
+from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.known_run import KnownRun
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
 from gateway.records import F64, Motion, Signal, Why
-from gateway.sim.drive import Drive, constant, urban
+from gateway.sim.parameters import Load
+from gateway.sim.speed_profile import Drive, constant, urban
 from gateway.sim.vans import PAPER_VAN, VANS
-from gateway.sim.vehicle import Load
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 DURATION_S = 130.0

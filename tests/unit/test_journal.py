@@ -12,10 +12,10 @@ from support.log import names
 from support.patience import PATIENCE_S, wait_until
 from test_uplink import SETTINGS, FakeBroker, accepted
 
-from gateway.history import BATCHES, ENTRIES, KINDS
 from gateway.log import Event
 from gateway.part import BackOff
 from gateway.store import Store, reader, writer
+from gateway.store.journal import BATCHES, ENTRIES, KINDS
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.uplink import Uplink
 from gateway.web.live.board import Board

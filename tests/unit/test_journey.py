@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from support.drives import T0_NS, drive, joined, later, without_rows
 
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
-from gateway.estimate import Place, Watched, Way
-from gateway.estimate_json.kinds import way_from_json, way_to_json
+from gateway.estimates.as_json.kinds import way_from_json, way_to_json
+from gateway.estimates.estimate import Place, Watched, Way
 from gateway.records import Motion, SensorTraits, Signal
 
 JOURNEY = (Signal.LATITUDE, Signal.LONGITUDE, Signal.ODOMETER, Signal.DOOR, Signal.IGNITION)

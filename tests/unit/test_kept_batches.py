@@ -9,7 +9,7 @@ from support.bus_drive import bus_drive
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.calibration.inspection.drive import row_facts
 from gateway.calibration.kept import KeptBatch, kept_batch_of, packed, unpacked
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.errors import KeptBatchError
 from gateway.records import Batch, Motion, Why
 from gateway.weighing.flow import Flow, Identity

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from support.patience import PATIENCE_S
 
-from gateway.files.kept import KeptFiles
+from gateway.files.owned import KeptFiles
 from gateway.files.whole import write_whole, written_whole
 
 NOBODY = 65_534
@@ -49,7 +49,7 @@ def test_files_set_aside_keep_their_bytes_under_unique_names(tmp_path: Path) -> 
 
 
 def test_waiting_for_a_lock_has_a_time_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.files.kept.LOCK_TIMEOUT_S", 0.05)
+    monkeypatch.setattr("gateway.files.owned.LOCK_TIMEOUT_S", 0.05)
     with (
         KeptFiles(tmp_path).locked(),
         pytest.raises(TimeoutError, match="another process"),

@@ -25,8 +25,8 @@ from gateway.core.change import change_of
 from gateway.core.events import ledger
 from gateway.core.events.entry import Entry
 from gateway.core.events.ledger import Ledger
-from gateway.estimate import Estimate, Place, Stop, Watched
-from gateway.posterior import Posterior, Source
+from gateway.estimates.estimate import Estimate, Place, Stop, Watched
+from gateway.estimates.posterior import Posterior, Source
 
 
 def test_a_delivery_has_its_weight_time_and_both_loads():

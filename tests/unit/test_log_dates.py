@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gateway.bus.frames import join
+from gateway.bus.logs.log_report import LogReport
 from gateway.bus.logs.open import open_log, open_whole_log
-from gateway.bus.logs.report import LogReport
 from gateway.bus.signals import load_signal_map
 from gateway.errors import LogUnreadableError
 from gateway.records import Frames

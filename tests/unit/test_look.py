@@ -20,13 +20,13 @@ from gateway.bus.logs import write_candump
 from gateway.bus.signals import load_signal_map
 from gateway.calibration.inspection.drive import LogFacts, SplitRun, row_facts
 from gateway.calibration.inspection.finding import Kind, Severity
-from gateway.calibration.inspection.run import inspect_run
+from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.known_run import KnownRun
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.offline.campaigns import _silent, read_whole_log
-from gateway.offline.look import look as look_module
-from gateway.offline.look.look import MOST_IDENTIFIERS
+from gateway.offline.look import log_look as look_module
+from gateway.offline.look.log_look import MOST_IDENTIFIERS
 from gateway.offline.look.roles import axis_of
 from gateway.records import EXTENDED_ID, Frames, Signal
 from gateway.status import DecodeCount, SignalHealth, State, Status

@@ -10,8 +10,8 @@ from gateway.bus.signals.decode import Decoder
 from gateway.bus.signals.encode import Encoder
 from gateway.bus.signals.signal_map import load_signal_map, shipped_map
 from gateway.core.batch import BatchWindow, build_batch
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.sample_clock import sample_times
-from gateway.core.settings import BatchSettings
 from gateway.errors import SignalMapError
 from gateway.records import F64, I64, Batch, Bool, Frames, Motion, Signal, joined
 

@@ -11,13 +11,13 @@ from support.model_road import times
 from support.taught_van import FLAT_VAN, VAN, car, drive_of, estimated, spectra_of, taught
 
 from gateway.core.cargo import known_shape, shape_hypotheses
-from gateway.estimate import Estimate, Quantity
+from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.posterior import NORMAL_TAILS
 from gateway.model import weigh
 from gateway.model.sensors import GAIN_STD
 from gateway.model.table import INDEX, N
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.model.weigh import Hypothesis, Mixture, Peak, hypotheses_of, mixture_of, posterior_of
-from gateway.posterior import NORMAL_TAILS
 from gateway.records import F64, Batch
 
 FIRM_HZ = 28.0

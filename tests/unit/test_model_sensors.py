@@ -9,12 +9,12 @@ from scipy.signal import butter, sosfilt
 from support.model_road import RATE_HZ
 from support.taught_van import UNITS, USUAL_SLACK, car, drive_of, estimated, left_of, taught, weighed
 
-from gateway.estimate import Estimate
+from gateway.estimates.estimate import Estimate
 from gateway.model import checks, sensors
 from gateway.model.checks import CHECKS, Signs, disbelieved, most_misfit_at, unseen_of
 from gateway.model.sensors import MOST_GYRO_GAIN_SCORE, gain_of, gyro_gain_ratio
 from gateway.model.table import INDEX, N
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64, Batch, Why
 
 LOAD = (200.0, 50.0)

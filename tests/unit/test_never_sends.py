@@ -34,7 +34,7 @@ def test_the_service_does_not_load_the_sink() -> None:
     loaded = "import gateway.cli.run, gateway.service.lifecycle, sys; print(*sys.modules)"
     names = subprocess.run([sys.executable, "-c", loaded], check=True, capture_output=True, text=True).stdout.split()
     assert gateway.__name__ in names
-    assert not {sink.__name__, "gateway.bus.feed"} & set(names)
+    assert not {sink.__name__, "gateway.bus.feeder"} & set(names)
 
 
 def test_a_running_service_sends_nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

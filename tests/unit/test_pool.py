@@ -9,11 +9,11 @@ import pytest
 from support.calibrated import calibration_file
 from support.drives import drive, joined, later, without_rows
 
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.pool import Part, spanned
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
-from gateway.estimate import Estimate, Way
-from gateway.posterior import Posterior, Source
+from gateway.estimates.estimate import Estimate, Way
+from gateway.estimates.posterior import Posterior, Source
 from gateway.records import F64, Batch, Motion, Why
 from gateway.units import NS_PER_S
 from gateway.weighing import flow as flow_module

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.budget import OWN, Remedy, budget_of, typical_budget
-from gateway.posterior import (
+from gateway.estimates.budget import OWN, Remedy, budget_of, typical_budget
+from gateway.estimates.posterior import (
     CG_LEFT,
     FRONT_SHARE,
     NORMAL_TAILS,
@@ -21,7 +21,7 @@ from gateway.posterior import (
     exactly,
     fused,
 )
-from gateway.quantity import Z95, Quantity
+from gateway.estimates.quantity import Z95, Quantity
 from gateway.records import F64
 
 SCALE = np.array([10.0, 0.5, 0.01])  # kg, %, m

@@ -10,7 +10,7 @@ from support.drives import T0_NS, drive, steady
 
 import gateway
 from gateway.errors import ArraysError
-from gateway.estimate_json import COLUMNS
+from gateway.estimates.as_json import COLUMNS
 from gateway.records import Motion, Signal
 from gateway.weighing.flow import Flow, Identity
 

@@ -10,7 +10,7 @@ from scipy import stats
 from support.calibrated import ratio_index_calibration
 from support.half_car_road import batch_of
 
-from gateway.calibration.ratio_index.regression import fit_regression
+from gateway.calibration.ratio_index.least_squares import fit_regression
 from gateway.core.ratio_index.index import (
     PAPER_BANDS,
     Band,

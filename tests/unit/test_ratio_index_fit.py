@@ -11,8 +11,8 @@ from support.paper_van import paper_van
 
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import candidate_pairs, rank_correlations
-from gateway.calibration.ratio_index.fit import RatioIndexFit, fit_ratio_index
-from gateway.calibration.ratio_index.table import SpectrumTable
+from gateway.calibration.ratio_index.index_fit import RatioIndexFit, fit_ratio_index
+from gateway.calibration.ratio_index.spectra_table import SpectrumTable
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration, indexes_of
 from gateway.core.ratio_index.regression import (
     MODEL_9_PAYLOAD,
@@ -21,7 +21,7 @@ from gateway.core.ratio_index.regression import (
     RegressionModel,
 )
 from gateway.errors import CalibrationImpossibleError
-from gateway.estimate import UNKNOWN
+from gateway.estimates.estimate import UNKNOWN
 from gateway.records import F64, Batch, Why
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate

@@ -16,15 +16,15 @@ from support.half_car_road import VAN
 
 from gateway.archive import place_of, receipts
 from gateway.archive.manifest import load_manifest
-from gateway.archive.reprocess import reprocess
+from gateway.archive.reprocessing import reprocess
 from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.calibration.inspection.drive import LogFacts, SplitRun, row_facts
 from gateway.calibration.inspection.finding import Kind, Severity
-from gateway.calibration.inspection.run import inspect_run
+from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.known_run import KnownRun
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.offline.campaigns import read_whole_log
 from gateway.records import Frames, Signal
 from gateway.service.pipeline import Pipeline

@@ -8,7 +8,7 @@ from support.calibrated import ratio_index_calibration
 from support.estimates import make_estimate
 from support.half_car_road import CAR, RATE_HZ, VAN, as_if_fitted, batch_of, batch_over_road
 
-from gateway.calibration.calibrate import drive_name
+from gateway.calibration.from_drives import drive_name
 from gateway.calibration.judgement.assessment import BatchSet, Judgement
 from gateway.calibration.judgement.evaluation import CgLeftErrors, Errors, ErrorTable, Judged, TargetErrors, WheelErrors
 from gateway.calibration.known_run import KnownRun
@@ -16,15 +16,15 @@ from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.teach import teach
 from gateway.core.ratio_index.index import Band
 from gateway.core.spectrum import spectra_of
-from gateway.estimate import Quantity
+from gateway.estimates.estimate import Quantity
 from gateway.model.displayed import Fitted, modelled_spectra
 from gateway.model.spectra import Reading, cross_spectra_of
 from gateway.model.table import INDEX, NAMES, ROWS, UPRIGHT, prior_of
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.records import Batch, Spectra, Why
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.fitted_vehicle import fits_of, knowledge_of, knowledge_table, told
-from gateway.reports.calibration.spectra import ACCELERATION, N_SEGMENT, PITCH_RATE, density_of, spectra_section
+from gateway.reports.calibration.spectra_charts import ACCELERATION, N_SEGMENT, PITCH_RATE, density_of, spectra_section
 from gateway.reports.charts import LineMark, Ribbon, Span
 
 

@@ -11,13 +11,13 @@ from gateway.calibration.inspection.campaign import inspect_drives
 from gateway.calibration.inspection.drive import SplitRun, row_facts
 from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.known_run import KnownRun
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Vehicle, front_share_pct
 from gateway.records import Motion
-from gateway.sim.drive import constant
+from gateway.sim.parameters import Load
+from gateway.sim.speed_profile import constant
 from gateway.sim.vans import PAPER_VAN, VANS
-from gateway.sim.vehicle import Load
 
 REAR_M = 3.2
 SETTINGS = BatchSettings(window_s=120.0)

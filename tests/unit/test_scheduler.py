@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from support.drives import T0_NS, changed, drive, joined, later, without_rows
 
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
 from gateway.records import Batch, Motion, Signal, Why
 
 RATE_HZ = 50.0

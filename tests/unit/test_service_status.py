@@ -16,10 +16,10 @@ from support.ports import free_port
 
 from gateway.bus.listen import SourceState
 from gateway.config import load_settings
-from gateway.estimate import Estimate, Quantity, Weights
+from gateway.estimates.estimate import Estimate, Quantity, Weights
 from gateway.records import Signal
 from gateway.service.gateway import Gateway
-from gateway.service.status import SENSOR_LOST_S, StatusReport
+from gateway.service.status_of_parts import SENSOR_LOST_S, StatusReport
 from gateway.setup import setup_of
 from gateway.status import State, Status
 from gateway.web.live.board import Board

@@ -15,8 +15,8 @@ from gateway.config import ESTIMATOR_NAMES, Settings, load_settings
 from gateway.config.sections import SettingsSection
 from gateway.core.scheduler import Scheduler
 from gateway.errors import ConfigurationError, SignalMapError
+from gateway.files.toml_file import checked
 from gateway.service.parts import store_of
-from gateway.toml_file import checked
 from gateway.units import si_factor
 from gateway.weighing.estimator import ESTIMATORS
 

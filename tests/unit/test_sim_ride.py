@@ -12,12 +12,12 @@ from support.textbook import half_car, linearised
 from gateway.records import F64
 from gateway.sim import compiled
 from gateway.sim.chassis import Chassis, chassis_of
-from gateway.sim.drive import Drive, Leg, constant, drive_of
 from gateway.sim.integrator import Course, integrate
+from gateway.sim.parameters import Axle, Damper, Load, Vehicle, axle_loads_kg
 from gateway.sim.ride import Ride, ride
 from gateway.sim.road import PaperRoad, Road, iso_road
+from gateway.sim.speed_profile import Drive, Leg, constant, drive_of
 from gateway.sim.vans import LARGE_VAN, PAPER_VAN, SMALL_VAN
-from gateway.sim.vehicle import Axle, Damper, Load, Vehicle, axle_loads_kg
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 FLAT = Road(0.05, np.zeros(60_000), np.zeros(60_000))

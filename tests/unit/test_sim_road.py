@@ -9,9 +9,9 @@ import pytest
 from scipy import signal
 from support.iri import BASE_M, K1, K2, MU, SPEED_MPS, C, iri_by_section, iri_m_per_km
 
-from gateway.sim.drive import STEP_S, Drive, Leg, constant, drive_of, motorway, rural, standstill, urban
 from gateway.sim.obstacles import Bump, ObstacleRoad, UnevenRoad, with_bumps
 from gateway.sim.road import PaperRoad, Road, RoadRecipe, SpectralRoad, iso_road, iso_roughness_m3
+from gateway.sim.speed_profile import STEP_S, Drive, Leg, constant, drive_of, motorway, rural, standstill, urban
 
 RECIPES: list[RoadRecipe] = [PaperRoad(), iso_road("B"), UnevenRoad(iso_road("C")), ObstacleRoad(iso_road("A"))]
 

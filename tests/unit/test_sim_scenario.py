@@ -5,12 +5,12 @@ import pytest
 
 from benchmarks.accuracy.loads import FLOOR_PART, Shape, drawn_load, shaped_load
 from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, OF_TYPES, Scatter, scattered
-from gateway.sim.drive import Leg, constant, drive_of, standstill
+from gateway.sim.instruments import REFERENCE, Sensors
+from gateway.sim.parameters import Load, Vehicle, payload_kg
 from gateway.sim.road import PaperRoad
 from gateway.sim.scenario import START_NS, LoadStep, simulate_drive
-from gateway.sim.sensors import REFERENCE, Sensors
+from gateway.sim.speed_profile import Leg, constant, drive_of, standstill
 from gateway.sim.vans import PAPER_VAN, VANS
-from gateway.sim.vehicle import Load, Vehicle, payload_kg
 
 IDEAL = Sensors()
 HOLD = constant(14.0, 20.0, np.random.default_rng(1))

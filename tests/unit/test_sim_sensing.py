@@ -8,11 +8,11 @@ import pytest
 from support.textbook import linearised
 
 from gateway.records import F64
-from gateway.sim.drive import Drive, constant
+from gateway.sim.instruments import Channel, Clock, Engine, Gps, Imu, Mount, Recording, Sensors
 from gateway.sim.ride import Ride, ride
 from gateway.sim.road import PaperRoad
 from gateway.sim.sensing import Felt, crank_rpm, felt_at, record
-from gateway.sim.sensors import Channel, Clock, Engine, Gps, Imu, Mount, Recording, Sensors
+from gateway.sim.speed_profile import Drive, constant
 from gateway.sim.vans import PAPER_VAN
 from gateway.units import STANDARD_GRAVITY_MPS2
 

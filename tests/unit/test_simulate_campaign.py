@@ -11,16 +11,16 @@ from support.patience import wait_until
 
 from gateway.bus.listen import LiveSource
 from gateway.bus.signals import load_signal_map
-from gateway.calibration.campaign import load_campaign
-from gateway.core.settings import BatchSettings
+from gateway.calibration.campaign_file import load_campaign
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import cg_left_m, left_share_pct
 from gateway.errors import ConfigurationError
 from gateway.offline.campaigns import split_runs
 from gateway.records import Signal, Why
+from gateway.sim.parameters import front_share_pct, payload_kg
 from gateway.sim.vans import PAPER_VAN, VANS
-from gateway.sim.vehicle import front_share_pct, payload_kg
-from gateway.workbench.campaigns import PLANS, plan_of
-from gateway.workbench.simulate import (
+from gateway.workbench.simulated_campaigns import PLANS, plan_of
+from gateway.workbench.simulated_drives import (
     BETWEEN_DRIVES_S,
     SENSORS_OF_MAP,
     bench_of,

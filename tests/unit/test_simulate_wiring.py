@@ -8,16 +8,16 @@ import pytest
 
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.offline.campaigns import batches_of_motion, read_whole_log
 from gateway.records import EXTENDED_ID, Motion, Signal
-from gateway.sim.drive import Drive, constant
+from gateway.sim.instruments import REFERENCE, Clock, Gps, Imu, Recording, Sensors
+from gateway.sim.parameters import Load
 from gateway.sim.road import PaperRoad
 from gateway.sim.scenario import simulate_drive
-from gateway.sim.sensors import REFERENCE, Clock, Gps, Imu, Recording, Sensors
+from gateway.sim.speed_profile import Drive, constant
 from gateway.sim.vans import PAPER_VAN
-from gateway.sim.vehicle import Load
 from gateway.workbench.wiring import WIRED_MAPS, Wiring, unrelated_traffic
 
 SENSORS = Sensors(

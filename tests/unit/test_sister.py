@@ -13,7 +13,7 @@ from gateway.calibration.prior import Prior
 from gateway.calibration.sister import require_alike, sister_in
 from gateway.errors import NoSisterError
 from gateway.model.table import INDEX, UPRIGHT
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 
 SHARED = np.array([bool(row.line) for row in UPRIGHT])
 SCATTER = np.array([row.line for row in UPRIGHT])

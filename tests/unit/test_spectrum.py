@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from support import half_car_road
 from support.drives import drive
 
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
 from gateway.core.spectrum import REFERENCE_SPEED_MPS, roughness_mps2, spectra_of
-from gateway.estimate_json import estimate_to_json
+from gateway.estimates.as_json import estimate_to_json
 from gateway.records import F64, Batch, Bool, Spectra
 from gateway.weighing.estimator import estimate
 

@@ -10,9 +10,9 @@ from support.model_road import times
 
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.learning.answers import doubts_of
+from gateway.calibration.learning.fitter_answers import doubts_of
 from gateway.core.vehicle import Vehicle
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.stated.doubt import Doubt, DoubtKind, meant_by
 from gateway.stated.facts import VehicleAnswers
 

@@ -9,9 +9,9 @@ import pytest
 from support.half_car_road import VAN
 from support.known_runs import campaign as known_campaign
 
-from gateway.calibration.calibrate import Outcome, calibrate_inspected
-from gateway.calibration.campaign import Campaign, DraftTable
+from gateway.calibration.campaign_file import Campaign, DraftTable
 from gateway.calibration.file import load_calibration
+from gateway.calibration.from_drives import Outcome, calibrate_inspected
 from gateway.calibration.inspection.campaign import Inspection
 from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Kind, RunVerdict

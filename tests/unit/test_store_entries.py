@@ -9,8 +9,8 @@ import pytest
 from support.estimates import make_record
 from support.patience import PATIENCE_S
 
-from gateway.history import BATCHES
 from gateway.store import Store
+from gateway.store.journal import BATCHES
 from gateway.uplink.outbox import Outbox
 
 

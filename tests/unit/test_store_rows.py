@@ -10,9 +10,9 @@ from support.estimates import WINDOW_NS, make_record, texts
 from support.patience import PATIENCE_S
 
 from gateway.errors import StoreError
-from gateway.history import SERVICE
 from gateway.records import Why
 from gateway.store import Retention, Store
+from gateway.store.journal import SERVICE
 from gateway.units import NS_PER_S
 
 

@@ -12,7 +12,7 @@ from support.paper_van import paper_van_config
 from support.ports import free_port
 
 from gateway.bus.signals import load_signal_map
-from gateway.bus.signals.database import Databases
+from gateway.bus.signals.dbc import Databases
 from gateway.bus.signals.signal_map import shipped_databases, unsound_messages
 from gateway.errors import SignalMapError
 from gateway.records import Signal

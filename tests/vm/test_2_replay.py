@@ -16,7 +16,7 @@ from vm.harness.vehicle import CONFIG, HEARD, PLAY, SETTINGS, Answer, Vehicle
 from gateway.bus.frames import take
 from gateway.bus.logs import open_whole_log
 from gateway.config import load_settings
-from gateway.estimate_json import estimate_to_json
+from gateway.estimates.as_json import estimate_to_json
 from gateway.offline.estimates import estimates_of_logs
 from gateway.records import I64, Frames
 from gateway.setup import setup_of

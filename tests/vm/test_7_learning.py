@@ -17,7 +17,7 @@ from vm.harness.vehicle import SETTINGS, STATE, Answer, Vehicle
 
 from gateway.calibration.file import load_calibration
 from gateway.records import Frames
-from gateway.sim.vehicle import Load
+from gateway.sim.parameters import Load
 
 DRIVEN_S: Final = 22.0  # one window of 20 s, and a rest
 STANDS_S: Final = 4.5  # longer than [batch] silence_s: a drive ends there

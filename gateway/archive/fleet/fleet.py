@@ -13,7 +13,7 @@ import numpy as np
 
 from gateway.archive.fleet.batches import Batches, by_vehicle, read_batches
 from gateway.archive.fleet.drift import Drift, Series, drifts_of, series_of
-from gateway.archive.fleet.sensors import Health, Trouble, troubles_of
+from gateway.archive.fleet.faulty_sensors import Health, Trouble, troubles_of
 from gateway.archive.fleet.weeks import DAY_NS, Weeks, date_of, weeks_of
 from gateway.archive.places import Location
 from gateway.archive.receipts import failures, slots_done

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from gateway.archive.fleet.batches import DRIFTING, Batches
-from gateway.estimate import Z95
-from gateway.reasons import EXPLANATIONS, Cause
+from gateway.estimates.estimate import Z95
+from gateway.estimates.reasons import EXPLANATIONS, Cause
 from gateway.records import F64, I64, Bool, Why
 from gateway.units import NS_PER_S
 

@@ -5,7 +5,7 @@ what could not be read and where. Damaged lines are counted and left out, they n
 """
 
 from gateway.bus.logs.candump_write import write_candump
+from gateway.bus.logs.log_report import LogReport
 from gateway.bus.logs.open import is_named_as_log, motion_of_log, open_whole_log
-from gateway.bus.logs.report import LogReport
 
 __all__ = ["LogReport", "is_named_as_log", "motion_of_log", "open_whole_log", "write_candump"]

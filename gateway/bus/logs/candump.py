@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from gateway.bus.frames import frames_of, in_order, take
 from gateway.bus.logs.candump_line import LineShape, learn_shape, read_line
+from gateway.bus.logs.log_report import SHOWN_CHARS, LogReject, LogReport, Selection
 from gateway.bus.logs.packed import BLOCK_BYTES, LineBlock, line_blocks
-from gateway.bus.logs.report import SHOWN_CHARS, LogReject, LogReport, Selection
 from gateway.bus.signals.mapping import EVERY_IDENTIFIER, IdFilter
-from gateway.bus.text import OR_CP1252
+from gateway.bus.text_encoding import OR_CP1252
 from gateway.records import EXTENDED_ID, I64, U8, Bool, Frames
 
 KEPT_SHAPES: Final = 32  # chosen: shapes of lines that are remembered

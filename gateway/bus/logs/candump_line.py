@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.bus.frames import LAST_EXTENDED, LAST_SECOND, LAST_STANDARD, ExactStamp
-from gateway.bus.logs.report import LogReject
+from gateway.bus.logs.log_report import LogReject
 from gateway.bus.signals.mapping import CAN_FD_BYTES, CLASSIC_BYTES
 from gateway.records import EXTENDED_ID, F64, I64, U8, U32, Bool, Frames
 from gateway.units import NS_PER_S

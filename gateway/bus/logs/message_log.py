@@ -16,11 +16,11 @@ import can
 from can.io import blf
 
 from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of, has_possible_id, message_id, stamp_to_ns
+from gateway.bus.logs.log_report import SHOWN_CHARS, LogReject, LogReport, Selection
 from gateway.bus.logs.packed import is_packed, open_log_file, unpacked_path, unpacked_suffix
-from gateway.bus.logs.report import SHOWN_CHARS, LogReject, LogReport, Selection
 from gateway.bus.logs.wall_clock import date_in, days_since_1899
 from gateway.bus.signals.mapping import CAN_FD_BYTES
-from gateway.bus.text import OR_CP1252
+from gateway.bus.text_encoding import OR_CP1252
 from gateway.errors import LogUnreadableError
 from gateway.records import FIRST_DATED_NS, Frames
 from gateway.units import NS_PER_S

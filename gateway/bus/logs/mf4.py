@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from gateway.bus.frames import LAST_SECOND, join, take
+from gateway.bus.logs.log_report import LogReject, Selection
 from gateway.bus.logs.packed import unpacked_path
-from gateway.bus.logs.report import LogReject, Selection
 from gateway.errors import LogUnreadableError, ReaderMissingError
 from gateway.records import EXTENDED_ID, Frames
 from gateway.units import NS_PER_S

@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 
 from gateway.bus.logs.candump import read_candump
+from gateway.bus.logs.log_report import LogReport, Selection
 from gateway.bus.logs.message_log import MESSAGE_SUFFIXES, read_message_log
 from gateway.bus.logs.mf4 import read_mf4
 from gateway.bus.logs.packed import PACKED_SUFFIXES, open_log_file, unpacked_suffix
-from gateway.bus.logs.report import LogReport, Selection
 from gateway.bus.signals import Decoder, SignalMap
 from gateway.bus.signals.mapping import CAN_FD_BYTES, EVERY_IDENTIFIER, SOURCE_ADDRESS, IdFilter, id_name, j1939_filter
 from gateway.errors import LogUnreadableError

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, cast
 import numpy as np
 from isal import igzip_lib
 
-from gateway.bus.logs.report import LogReject, LogReport
+from gateway.bus.logs.log_report import LogReject, LogReport
 from gateway.errors import LogUnreadableError
 from gateway.records import U8
 

@@ -11,7 +11,7 @@ from zoneinfo import ZoneInfo
 from pydantic import BaseModel, ConfigDict, Field
 
 from gateway.bus.signals.bit_field import BitField, Coding
-from gateway.bus.signals.database import DatabaseMessage, Databases, DatabaseSignal, closest
+from gateway.bus.signals.dbc import DatabaseMessage, Databases, DatabaseSignal, closest
 from gateway.bus.signals.mapping import (
     CAN_FD_BYTES,
     QUANTITIES,
@@ -24,8 +24,8 @@ from gateway.bus.signals.mapping import (
     j1939_filter,
 )
 from gateway.errors import SignalMapError
+from gateway.files.toml_file import Read, load_toml
 from gateway.records import EXTENDED_ID, Signal
-from gateway.toml_file import Read, load_toml
 from gateway.units import si_factor, zone_of
 
 FEWEST_COUNTER_BITS: Final = 2  # chosen: one bit cannot tell a lost frame from two

@@ -11,11 +11,11 @@ import numpy as np
 from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.roll import roll_sign_of
-from gateway.calibration.inspection.run import inspect_run
+from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.known_run import KnownRun
-from gateway.core.settings import BatchSettings
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import Vehicle
-from gateway.quantity import Z95
+from gateway.estimates.quantity import Z95
 from gateway.weighing.calibrated import is_other_rate
 
 SPEED_DIFFERS_BY: Final = 0.2  # chosen: of the median run's speed

@@ -25,8 +25,8 @@ from gateway.calibration.inspection.axes import reading_of
 from gateway.calibration.known_run import KnownRun
 from gateway.core.late import special
 from gateway.core.vehicle import Vehicle, cg_left_m
+from gateway.estimates.quantity import Z95
 from gateway.model.spectra import CrossSpectra, cross_spectra_of
-from gateway.quantity import Z95
 
 ABOVE_BODY_HZ: Final = (6.0, 13.0)  # chosen: above the body's resonances
 BY_CG: Final = 1.7  # b, the middle of the measured 0.6 to 2.7 (above)

@@ -11,7 +11,7 @@ from enum import StrEnum
 from typing import Any, Final
 
 from gateway.calibration.ahead import Step, next_steps
-from gateway.calibration.calibrate import Outcome
+from gateway.calibration.from_drives import Outcome
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import ErrorTable, Target

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from gateway.budget import BudgetLine, typical_budget
-from gateway.calibration.calibrate import Outcome, drive_name
 from gateway.calibration.file import CalibrationFile
+from gateway.calibration.from_drives import Outcome, drive_name
 from gateway.calibration.judgement.evaluation import ErrorTable, Judged, Target, error_table, judge
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.vehicle import Vehicle
+from gateway.estimates.budget import BudgetLine, typical_budget
 
 
 class BatchSet(StrEnum):

@@ -7,15 +7,15 @@ from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from gateway.budget import budget_of
 from gateway.calibration.judgement.coverage import interval_scores
 from gateway.calibration.known_run import KnownRun
 from gateway.core.cargo import is_said
 from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung, weighed, weights_of
-from gateway.estimate import Estimate, Quantity
-from gateway.estimate_json import estimate_to_json
-from gateway.posterior import Source, exactly
+from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.budget import budget_of
+from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.posterior import Source, exactly
 from gateway.records import F64, Batch, Why
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate

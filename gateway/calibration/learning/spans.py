@@ -6,8 +6,8 @@ from typing import Any, Final
 
 from gateway.calibration.assigned import Fate, Piece, cut
 from gateway.calibration.statements_csv import ToldRow, ToldRows
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.pool import LEAST_LOAD_S, can_be_pooled
-from gateway.core.settings import BatchSettings
 from gateway.records import Batch
 from gateway.stated.statement import StatementRecord
 from gateway.units import NS_PER_S, S_PER_DAY

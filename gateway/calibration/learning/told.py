@@ -10,11 +10,11 @@ from gateway.calibration.ahead import Step
 from gateway.calibration.assigned import BIAS, Assigned
 from gateway.calibration.found import ClaimState, FoundClaim
 from gateway.calibration.judgement.advice import WORTH_SAYING, Verdict
-from gateway.calibration.learning.learn import Learnt
+from gateway.calibration.learning.from_pieces import Learnt
 from gateway.calibration.learning.spans import STATES
 from gateway.calibration.statements import Statement
 from gateway.core.vehicle import Vehicle
-from gateway.quantity import Z95
+from gateway.estimates.quantity import Z95
 from gateway.records import iso_utc, rounded
 from gateway.stated.statement import StatementRecord, StatementSource
 

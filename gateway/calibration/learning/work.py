@@ -17,20 +17,20 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.assigned import moments
-from gateway.calibration.calibrate import drive_name
 from gateway.calibration.file import load_calibration
 from gateway.calibration.found import FoundLoad
+from gateway.calibration.from_drives import drive_name
 from gateway.calibration.judgement.advice import verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
 from gateway.calibration.kept import KeptBatch, unpacked
-from gateway.calibration.learning.drives import pieces
+from gateway.calibration.learning.from_pieces import Learnt, learn, matched
 from gateway.calibration.learning.job import JOB, RESULT, LearnJob, LearnResult
-from gateway.calibration.learning.learn import Learnt, learn, matched
 from gateway.calibration.learning.spans import standing
 from gateway.calibration.learning.told import drives_record, learning_record, statements_record
-from gateway.core.settings import BatchSettings
+from gateway.calibration.learning.windows import pieces
+from gateway.core.batch_settings import BatchSettings
 from gateway.errors import CalibrationFileError, KeptBatchError, SpringscaleError
-from gateway.posterior import Posterior
+from gateway.estimates.posterior import Posterior
 from gateway.records import Batch
 from gateway.units import BYTES_PER_MB
 from gateway.weighing.calibrated import CalibratedVehicle

@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from gateway.calibration.ratio_index.table import N_SEGMENT, SPECTRUM, SpectrumTable
+from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, SPECTRUM, SpectrumTable
 from gateway.core.late import special, stats
 from gateway.core.ratio_index.index import PAPER_BANDS, UPPER_LIMIT_HZ, Band, SpectrumKind, band_pass_gain
 from gateway.errors import CalibrationImpossibleError

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Final
 
-from gateway.estimate import PLACES, Z95
-from gateway.reasons import EXPLANATIONS
+from gateway.estimates.estimate import PLACES, Z95
+from gateway.estimates.reasons import EXPLANATIONS
 from gateway.records import iso_utc, ns_of
 
 ENTRY_KIND: Final = "alarm"

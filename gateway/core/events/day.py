@@ -30,9 +30,9 @@ from gateway.core.loads import (
     loads_of,
     weighings_of,
 )
-from gateway.estimate import NOWHERE, Estimate, Quantity, Way
-from gateway.estimate_json.kinds import place_to_json
-from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD
+from gateway.estimates.as_json.kinds import place_to_json
+from gateway.estimates.estimate import NOWHERE, Estimate, Quantity, Way
+from gateway.estimates.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD
 from gateway.records import iso_utc
 from gateway.units import NS_PER_S
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
+from gateway.metadata import STRICT, described
 from gateway.records import C128, F64, I64, Batch, Bool
-from gateway.schema import STRICT, described
 
 UPPER_LIMIT_HZ = 10.0  # of the integrals (7) and (8), as in the paper
 MIN_SEGMENTS = 6  # chosen: a mean of fewer segments scatters too much

@@ -7,8 +7,8 @@ from types import MappingProxyType
 import numpy as np
 
 from gateway.core.late import special
+from gateway.metadata import STRICT, check_shapes
 from gateway.records import F64
-from gateway.schema import STRICT, check_shapes
 
 Term = Callable[[F64, F64], F64]
 

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from gateway.core.vehicle import Vehicle, left_share_pct
-from gateway.estimate import UNKNOWN, Estimate, Lack, Quantity, Weight, Weights
-from gateway.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, Source
+from gateway.estimates.estimate import UNKNOWN, Estimate, Lack, Quantity, Weight, Weights
+from gateway.estimates.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, Source
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,11 +11,11 @@ import numpy as np
 
 from gateway.bus.signals import load_signal_map, shipped_map
 from gateway.bus.signals.bit_field import Coding
-from gateway.bus.signals.database import DatabaseSignal
+from gateway.bus.signals.dbc import DatabaseSignal
 from gateway.bus.signals.signal_map import shipped_databases
 from gateway.errors import ConfigurationError, SpringscaleError
 from gateway.files.whole import refusal_told, write_whole, written_whole
-from gateway.offline.look.look import Described, Look
+from gateway.offline.look.log_look import Described, Look
 from gateway.offline.look.roles import FoundRole
 from gateway.records import I64, Signal
 

@@ -18,7 +18,7 @@ from gateway.records import Signal
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
-    from gateway.offline.look.look import SignalReading
+    from gateway.offline.look.log_look import SignalReading
 
 LEAST_CORRELATION: Final = 0.4  # chosen: of acceleration and change of speed
 LEAST_MOVING_S: Final = 60  # chosen: of driving for that

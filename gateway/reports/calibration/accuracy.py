@@ -6,13 +6,13 @@ from typing import Final
 
 import numpy as np
 
-from gateway.budget import BudgetLine
 from gateway.calibration.judgement.answers import LEVELS, answers_of, observed_coverage
 from gateway.calibration.judgement.assessment import PART_NAMES, PART_TEXT, BatchSet, Judgement
 from gateway.calibration.judgement.coverage import IDEAL_SCORE
 from gateway.calibration.judgement.evaluation import CgLeftErrors, Comparison, Errors, Target, TargetErrors
-from gateway.estimate import Z95
-from gateway.reasons import REMEDIES, SOURCES
+from gateway.estimates.budget import BudgetLine
+from gateway.estimates.estimate import Z95
+from gateway.estimates.reasons import REMEDIES, SOURCES
 from gateway.records import F64, iso_utc
 from gateway.reports.charts import GREY, Axis, Chart, LineMark, Marker, Panel, Points, Section, Table
 from gateway.words import NONE, counted, decimal, estimator_name, known, percent

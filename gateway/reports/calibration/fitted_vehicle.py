@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.calibrate import drive_name
 from gateway.calibration.found import Taught
+from gateway.calibration.from_drives import drive_name
 from gateway.calibration.known_run import KnownRun
 from gateway.core.spectrum import spectra_of
 from gateway.core.vehicle import Load, Vehicle
@@ -16,7 +16,7 @@ from gateway.model.displayed import Fitted, modelled_spectra
 from gateway.model.expected import with_strokes
 from gateway.model.spectra import cross_spectra_of
 from gateway.model.table import LOG, ROWS, UPRIGHT, prior_of
-from gateway.model.vehicle import VehicleModel
+from gateway.model.vehicle_model import VehicleModel
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64, Spectra
 from gateway.reports.charts import Axis, Chart, LineMark, Panel, Section, Table

@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.fit import RatioIndexFit
-from gateway.calibration.ratio_index.table import IndexRows, index_rows
+from gateway.calibration.ratio_index.index_fit import RatioIndexFit
+from gateway.calibration.ratio_index.spectra_table import IndexRows, index_rows
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.records import F64

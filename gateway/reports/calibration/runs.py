@@ -1,11 +1,11 @@
 """The runs and their findings, and the provenance of every number."""
 
-from gateway.calibration.calibrate import Outcome
 from gateway.calibration.file import DrivePart
+from gateway.calibration.from_drives import Outcome
 from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Finding, RunVerdict
 from gateway.calibration.judgement.assessment import Assessment
-from gateway.quantity import Z95
+from gateway.estimates.quantity import Z95
 from gateway.records import Why
 from gateway.reports.charts import Section, Table
 from gateway.words import NONE, known, span

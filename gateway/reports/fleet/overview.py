@@ -25,7 +25,7 @@ from gateway.reports.fleet.text import (
     trouble_told,
     whole,
 )
-from gateway.reports.fleet.vehicle import reason_told, refusals_section, runs_of
+from gateway.reports.fleet.vehicle_page import reason_told, refusals_section, runs_of
 
 SILENT_DAYS: Final = 28  # chosen: without a batch, before the last of the fleet's
 LITTLE_ANSWERED: Final = 0.5  # chosen: of a vehicle's batches

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from gateway.archive.fleet.drift import Drift, DriftTrend
+from gateway.archive.fleet.faulty_sensors import Share, Trouble
 from gateway.archive.fleet.fleet import FleetSummary, FleetVehicle
-from gateway.archive.fleet.sensors import Share, Trouble
 from gateway.reports.charts import Section
 from gateway.reports.charts.html import (
     Page,
@@ -24,7 +24,7 @@ from gateway.reports.charts.html import (
 )
 from gateway.reports.fleet.overview import Look, fleet_sections, looks_of
 from gateway.reports.fleet.text import page_of, percent, whole
-from gateway.reports.fleet.vehicle import vehicle_sections
+from gateway.reports.fleet.vehicle_page import vehicle_sections
 from gateway.words import counted
 
 OnPage = Callable[[int, int], None]  # (pages written, pages in all)

@@ -9,7 +9,7 @@ from typing import Final
 
 from gateway.archive.fleet.batches import OF_SENSOR, OF_VEHICLE
 from gateway.archive.fleet.drift import Drift, DriftTrend
-from gateway.archive.fleet.sensors import Share, Trouble
+from gateway.archive.fleet.faulty_sensors import Share, Trouble
 from gateway.archive.fleet.weeks import monday_of
 from gateway.reports.charts import Axis
 

@@ -6,19 +6,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from gateway.calibration.campaign import Campaign, load_campaign
+from gateway.calibration.campaign_file import Campaign, load_campaign
 from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.regression import fit_regression
-from gateway.calibration.ratio_index.table import N_SEGMENT, index_rows
+from gateway.calibration.ratio_index.least_squares import fit_regression
+from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, index_rows
 from gateway.config import ESTIMATOR_NAMES
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.ratio_index.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
-from gateway.core.settings import BatchSettings
 from gateway.offline.campaigns import calibrate, split_runs
 from gateway.weighing.calibrated import CalibratedVehicle
-from gateway.workbench.simulate import bench_of, write_campaign
+from gateway.workbench.simulated_drives import bench_of, write_campaign
 
 OnStep = Callable[[str, int, int], None]  # (what is being done, steps done, steps in all)
 

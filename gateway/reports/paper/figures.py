@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from gateway.calibration.judgement.evaluation import Judged
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.regression import fit_regression
-from gateway.calibration.ratio_index.table import N_SEGMENT, IndexRows, index_rows
+from gateway.calibration.ratio_index.least_squares import fit_regression
+from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, IndexRows, index_rows
 from gateway.core.ratio_index.index import PAPER_BANDS, band_pass_gain, mean_spectrum
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
 from gateway.records import F64

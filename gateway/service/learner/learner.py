@@ -18,17 +18,17 @@ from gateway.calibration.kept import kept_batch_of
 from gateway.calibration.learning.job import LearnJob, LearnResult
 from gateway.calibration.learning.spans import can_teach, spans_of, teaching_most
 from gateway.config.sections import LearningSection
+from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.core.settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, RefusedError
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, BackOff, ThreadPart
 from gateway.records import Batch, Motion, iso_utc, ns_of, rounded
-from gateway.service.learner.book import MOST_LADEN, MOST_VERSIONS, Book, Laden, LearningRecord, Outcome
-from gateway.service.learner.book import Version as LearntVersion
-from gateway.service.learner.drives import FOLDER, DriveFiles, Window
-from gateway.service.learner.loads import StatedLoads
+from gateway.service.learner.kept_drives import FOLDER, DriveFiles, Window
+from gateway.service.learner.learning_file import MOST_LADEN, MOST_VERSIONS, Book, Laden, LearningRecord, Outcome
+from gateway.service.learner.learning_file import Version as LearntVersion
+from gateway.service.learner.said import StatedLoads
 from gateway.service.learner.van import LearnerVehicle, StatedVan
 from gateway.service.learner.worker import OnResult, Worker
 from gateway.stated.learning import STATES, Help, LearningState, Question, StatementTold, VersionTold

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gateway.calibration.file import load_calibration
-from gateway.calibration.learning.answers import doubts_of, vehicle_table
+from gateway.calibration.learning.fitter_answers import doubts_of, vehicle_table
 from gateway.calibration.sister import require_alike, sister_in
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, CampaignError, NoSisterError, RefusedError
 from gateway.log import Event
-from gateway.service.learner.book import Book, Sister, Stated
+from gateway.service.learner.learning_file import Book, Sister, Stated
 from gateway.stated.doubt import meant_by
 from gateway.stated.facts import VehicleAnswers
 from gateway.stated.learning import DoubtOfVehicle, SisterTold, StatedVehicle

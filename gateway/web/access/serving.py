@@ -17,10 +17,10 @@ from typing import Any, Final
 import uvicorn
 from starlette.types import ASGIApp
 
+from gateway.config.permission import Holder, Kind, encryption_to, is_loopback, may_leave
 from gateway.errors import ConfigurationError
 from gateway.log import Event, log_event
 from gateway.part import FIRST_PAUSE_S, LAST_PAUSE_S, BackOff
-from gateway.permission import Holder, Kind, encryption_to, is_loopback, may_leave
 
 CONNECTIONS: Final = 100  # chosen: of all clients together, streams among them; beyond them the answer is 503
 HEAD_BYTES: Final = 32_768  # chosen: request line and headers

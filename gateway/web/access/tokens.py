@@ -16,7 +16,7 @@ from typing import Annotated, Final, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from gateway.errors import ConfigurationError
-from gateway.files.kept import KeptFiles
+from gateway.files.owned import KeptFiles
 from gateway.log import Event, log_event
 
 _PREFIX: Final = "spr"  # lets secret scanners recognise a token that leaked

@@ -12,10 +12,10 @@ from fastapi.sse import ServerSentEvent
 from starlette.responses import Response
 from starlette.types import Scope
 
-from gateway.estimate import Estimate, Weights
-from gateway.estimate_json import estimate_from_json, estimate_to_json
-from gateway.history import ESTIMATE, REJECTION
+from gateway.estimates.as_json import estimate_from_json, estimate_to_json
+from gateway.estimates.estimate import Estimate, Weights
 from gateway.records import Why, json_line
+from gateway.store.journal import ESTIMATE, REJECTION
 from gateway.web.live.stream import Fanout
 
 RECENT: Final = 100  # chosen: good estimates for the warnings, which look back over eight hours of driving

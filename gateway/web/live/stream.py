@@ -13,8 +13,8 @@ from typing import Any, Final
 from fastapi.sse import ServerSentEvent
 
 from gateway.errors import StoreError
-from gateway.history import KINDS, JournalRecord
 from gateway.store import StoreReader
+from gateway.store.journal import KINDS, JournalRecord
 
 RETRY_MS: Final = 3000  # chosen: pause of a browser before it connects again
 ASK_AGAIN_S: Final = 5.0  # chosen: how soon a token that was revoked ends a stream on which nothing comes

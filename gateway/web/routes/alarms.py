@@ -8,9 +8,9 @@ from fastapi import APIRouter, Query
 from pydantic import BaseModel, Field
 from starlette.responses import Response
 
-from gateway.history import ALARM
 from gateway.stated.facts import Instant
 from gateway.store import StoreReader
+from gateway.store.journal import ALARM
 from gateway.web.routes.history import HistoryQuery, entries_of
 from gateway.web.schemas import problem_responses
 

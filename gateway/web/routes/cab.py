@@ -14,12 +14,12 @@ from gateway.core.events.entry import EntryKind
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.limits import Room, rooms_of
 from gateway.core.weights.room import Halves, room_of
-from gateway.estimate import Estimate, Lack, Quantity, Weights
+from gateway.estimates.estimate import Estimate, Lack, Quantity, Weights
 from gateway.records import iso_utc, rounded
 from gateway.status import OwnReading, State, Status
 from gateway.store import StoreReader
 from gateway.web.live.board import Board
-from gateway.web.routes.verdict import VerdictTold, present_load
+from gateway.web.routes.present_verdict import VerdictTold, present_load
 from gateway.web.routes.weights import Scales
 from gateway.web.schemas import problem_responses
 

@@ -16,11 +16,11 @@ from starlette.responses import Response, StreamingResponse
 
 from gateway.core.events import entry as table
 from gateway.core.events.entry import EntryKind
-from gateway.estimate_json import COLUMNS, csv_cells
-from gateway.history import BATCHES, HistoryPage
+from gateway.estimates.as_json import COLUMNS, csv_cells
 from gateway.records import json_line
 from gateway.status import Status
 from gateway.store import StoreReader
+from gateway.store.journal import BATCHES, HistoryPage
 from gateway.web.file_response import FORMATS, file_responses, sent_as_file
 from gateway.web.live.board import Board, LatestResponse
 from gateway.web.live.stream import EVENT_SCHEMA, TooManyStreamsError

@@ -13,13 +13,13 @@ from pydantic import BaseModel, Field
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.limits import is_over_limit
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, PayloadPlace, place_of, unsprung_kg, weighed
-from gateway.estimate import Estimate, Weight, Weights
-from gateway.quantities import QUANTITIES
+from gateway.estimates.estimate import Estimate, Weight, Weights
+from gateway.estimates.quantities import QUANTITIES
 from gateway.records import iso_utc, rounded
 from gateway.stated.facts import Instant
 from gateway.status import Status
 from gateway.web.live.board import Board, Shown
-from gateway.web.routes.verdict import VerdictTold, present_load
+from gateway.web.routes.present_verdict import VerdictTold, present_load
 from gateway.web.schemas import WeightFigure, WeightFigures
 from gateway.weighing.calibrated import CalibratedVehicle
 

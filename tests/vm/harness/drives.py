@@ -7,13 +7,13 @@ import numpy as np
 
 from gateway.bus.logs import write_candump
 from gateway.records import Frames
-from gateway.sim.drive import constant
+from gateway.sim.instruments import REFERENCE
+from gateway.sim.parameters import Load
 from gateway.sim.road import iso_road
 from gateway.sim.scenario import START_NS, LoadStep, simulate_drive
-from gateway.sim.sensors import REFERENCE
+from gateway.sim.speed_profile import constant
 from gateway.sim.vans import PAPER_VAN
-from gateway.sim.vehicle import Load
-from gateway.workbench.campaigns import PAPER_SPEED_MPS
+from gateway.workbench.simulated_campaigns import PAPER_SPEED_MPS
 from gateway.workbench.wiring import Wiring
 
 LOAD = Load(270.0, 1.3)

@@ -1,0 +1,220 @@
+"""Reprocesses a whole archive: survey, plan, run the jobs without a receipt, and summarise.
+
+with local_workers() as workers:
+    summary = reprocess(load_manifest("fleet/archive.toml"), place_of("DATASET"), workers)
+"""
+
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any, TypeVar
+
+from gateway.archive.inventory import Inventory, look
+from gateway.archive.job_run import JobOutcome, JobStatus, fail, run
+from gateway.archive.jobs import ArchiveJob
+from gateway.archive.manifest import Manifest
+from gateway.archive.places import Location
+from gateway.archive.receipts import Slot, failure_files, slots_done, slots_failed
+from gateway.archive.survey import Facts, LogFile, SurveyedLog, survey
+from gateway.archive.workers import WorkerKilledError, Workers
+from gateway.errors import ConfigurationError
+
+Task = TypeVar("Task")
+Answer = TypeVar("Answer")
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """The progress of a run: bytes done of all, and pieces of all."""
+
+    what: str
+    done: int
+    total: int
+    n_done: int
+    n_total: int
+    elapsed_s: float
+
+    @property
+    def rate(self) -> float:
+        """Bytes per second so far; 0 before the first piece."""
+        return self.done / self.elapsed_s if self.elapsed_s > 0.0 else 0.0
+
+    @property
+    def remaining_s(self) -> float | None:
+        """The remaining time at that rate; None before the first piece."""
+        return (self.total - self.done) / self.rate if self.rate > 0.0 else None
+
+
+OnProgress = Callable[[Progress], None]
+
+
+def done_by(
+    workers: Workers, fn: Callable[[Task], Answer], tasks: Iterable[Task]
+) -> "Iterator[tuple[Task, Future[Answer]]]":
+    """Yields each task with its future as the tasks are completed; ``tasks`` may be endless.
+
+    No more tasks than workers are under way: one that waits behind a task that kills its worker would be blamed too.
+    """
+    waiting = iter(tasks)
+    under_way: dict[Future[Answer], Task] = {}
+    while True:
+        n_free = max(0, workers.n_workers - len(under_way))
+        under_way.update((workers.submit(fn, task), task) for task in islice(waiting, n_free))
+        if not under_way:
+            return
+        for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+            yield under_way.pop(future), future
+
+
+@dataclass(slots=True)
+class Summary:
+    """The result of a run. ``outcomes`` are those of the jobs that it tried; ``n_already`` had a receipt before."""
+
+    n_vehicles: int
+    n_logs: int
+    size: int
+    n_jobs: int
+    n_already: int
+    n_failed_before: int
+    outcomes: list[JobOutcome] = field(default_factory=list)
+    lost: dict[str, str] = field(default_factory=dict)  # logs and jobs to retry, with reasons
+    copies: dict[str, str] = field(default_factory=dict)  # logs left out, each with the log whose content it has
+    took_s: float = 0.0
+
+    def count(self, status: JobStatus) -> int:
+        return sum(outcome.status is status for outcome in self.outcomes)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        return {
+            "done": self.count(JobStatus.DONE),
+            "already": self.n_already + self.count(JobStatus.ALREADY),
+            "failed": self.count(JobStatus.FAILED),
+            "failed_before": self.n_failed_before,
+            "lost": self.count(JobStatus.LOST),
+        }
+
+    @property
+    def n_failed_logs(self) -> int:
+        return sum(outcome.n_failed_logs for outcome in self.outcomes)
+
+    @property
+    def is_good(self) -> bool:
+        """Whether nothing failed in this run, and nothing remains to do."""
+        return not (self.count(JobStatus.FAILED) or self.n_failed_logs or self.lost)
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "n_vehicles": self.n_vehicles,
+            "n_logs": self.n_logs,
+            "bytes": self.size,
+            "n_jobs": self.n_jobs,
+            "jobs": self.counts,
+            "n_batches": sum(outcome.n_batches for outcome in self.outcomes),
+            "n_weighed": sum(outcome.n_weighed for outcome in self.outcomes),
+            "n_failed_logs": self.n_failed_logs,
+            "failures": [reason for outcome in self.outcomes for reason in outcome.failures],
+            "refused": [text for outcome in self.outcomes for text in outcome.refused],
+            "overlaps": [text for outcome in self.outcomes for text in outcome.overlaps],
+            "lost": self.lost,
+            "copies": self.copies,
+            "took_s": round(self.took_s, 3),
+        }
+
+
+def reprocess(
+    manifest: Manifest,
+    dataset: Location,
+    workers: Workers,
+    on_progress: OnProgress = lambda _: None,
+) -> Summary:
+    """Run every job of the archive without a receipt.
+
+    Raises PlaceError if the data set cannot be reached, ConfigurationError if there is no log, or a worker runs another
+    version of springscale.
+    """
+    begun_s = time.monotonic()
+    inventory = look(manifest, dataset)
+    _survey(inventory, workers, on_progress)
+    jobs = inventory.jobs()
+    done, failed = set(slots_done(dataset)), set(slots_failed(dataset))
+    to_do = [job for job in jobs if job.slot not in done | failed]
+    summary = Summary(
+        n_vehicles=inventory.n_vehicles,
+        n_logs=len(inventory.all_logs),
+        size=inventory.size,
+        n_jobs=len(jobs),
+        n_already=sum(job.slot in done for job in jobs),
+        n_failed_before=sum(job.slot in failed - done for job in jobs),
+        lost=dict(inventory.lost),
+        copies=inventory.copies(),
+    )
+    _weigh(to_do, workers, summary, on_progress)
+    _retire(dataset, jobs)
+    summary.took_s = time.monotonic() - begun_s
+    return summary
+
+
+def _survey(inventory: Inventory, workers: Workers, on_progress: OnProgress) -> None:
+    """Survey every new log; each vehicle's facts are stored when it is complete."""
+    new = [(vehicle, log) for vehicle, logs in inventory.unknown() for log in logs]
+    total, done, begun_s = sum(log.size for _, log in new), 0, time.monotonic()
+    left = Counter(vehicle for vehicle, _ in new)
+    found: defaultdict[str, Facts] = defaultdict(dict)
+    for n, ((vehicle, log), answer) in enumerate(done_by(workers, _surveyed, new), 1):
+        try:
+            found[vehicle][log.key] = answer.result()
+        except ConfigurationError:
+            raise
+        except Exception as fault:  # noqa: BLE001 - whatever happened to a worker, the other vehicles go on
+            inventory.lost[log.name] = str(fault) or repr(fault)
+        left[vehicle] -= 1
+        if not left[vehicle]:
+            inventory.learn(vehicle, found.pop(vehicle, {}))
+        done += log.size
+        on_progress(Progress("looking", done, total, n, len(new), time.monotonic() - begun_s))
+
+
+def _surveyed(new: tuple[str, LogFile]) -> SurveyedLog:
+    return survey(new[1])
+
+
+def _weigh(jobs: Sequence[ArchiveJob], workers: Workers, summary: Summary, on_progress: OnProgress) -> None:
+    total, done, begun_s = sum(job.size for job in jobs), 0, time.monotonic()
+    for n, (job, answer) in enumerate(done_by(workers, run, jobs), 1):
+        outcome = _outcome(job, answer)
+        summary.outcomes.append(outcome)
+        if outcome.status is JobStatus.LOST:
+            summary.lost[f"{job.slot.folder}/{job.slot.job}"] = outcome.failures[0]
+        done += job.size
+        on_progress(Progress("weighing", done, total, n, len(jobs), time.monotonic() - begun_s))
+
+
+def _outcome(job: ArchiveJob, answer: "Future[JobOutcome]") -> JobOutcome:
+    try:
+        return answer.result()
+    except WorkerKilledError as fault:
+        return fail(job, str(fault))
+    except ConfigurationError:  # a missing library or another version: no worker would do better
+        raise
+    except Exception as fault:  # noqa: BLE001 - a store, a cluster or a bug: the other jobs go on, this one is reported
+        return JobOutcome(job.slot, JobStatus.LOST, job.size, failures=(str(fault) or repr(fault),))
+
+
+def _retire(dataset: Location, jobs: Sequence[ArchiveJob]) -> None:
+    """Remove outdated results of a month whose inputs changed, once all its new jobs have receipts."""
+    planned: defaultdict[str, set[Slot]] = defaultdict(set)
+    for job in jobs:
+        planned[job.slot.folder].add(job.slot)
+    done = set(slots_done(dataset))
+    whole = {folder for folder, slots in planned.items() if slots <= done}
+    for slot in done:
+        if slot.folder in whole and slot not in planned[slot.folder]:
+            dataset.remove(slot.receipt)
+    for slot, path in failure_files(dataset):
+        is_of_old_inputs = slot.folder in whole and slot not in planned[slot.folder]
+        if is_of_old_inputs or (slot in done and path == slot.failure()):
+            dataset.remove(path)

@@ -1,0 +1,278 @@
+"""From inspected drives to a calibration file."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.metadata import version
+
+import numpy as np
+
+from gateway.calibration.campaign_file import Campaign, file_sha256
+from gateway.calibration.contradicted import contradictions
+from gateway.calibration.file import CalibrationFile, DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
+from gateway.calibration.found import ClaimState, FoundClaim, FoundLoad, Taught
+from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.drive import SplitRun
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
+from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
+from gateway.calibration.ratio_index.bands import BandChoice
+from gateway.calibration.ratio_index.index_fit import RatioIndexFit, fit_ratio_index
+from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.sister import require_alike, sister_in
+from gateway.calibration.teach import examined, teach
+from gateway.core.spectrum import roughness_mps2, spectra_of
+from gateway.core.vehicle import Load, Vehicle
+from gateway.errors import CalibrationImpossibleError
+from gateway.estimates.quantity import Z95
+from gateway.model.vehicle_model import VehicleModel
+from gateway.records import F64, iso_utc
+from gateway.stated.doubt import Doubt
+
+OnFit = Callable[[str, int, int], None]  # (estimator, steps done, steps in all)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A calibration file with the data it was made from. None for an estimator without a result.
+
+    ``doubts`` are of facts that the campaign states of the vehicle and that its drives contradict.
+    """
+
+    file: CalibrationFile
+    inspection: Inspection
+    ratio_index: RatioIndexFit | None = None
+    cross_spectrum: Taught | None = None
+    doubts: tuple[Doubt, ...] = ()
+
+    @property
+    def split(self) -> tuple[SplitRun, ...]:
+        """The runs without a fault, which were used for the calibration."""
+        return self.inspection.usable
+
+
+def calibrate_inspected(
+    campaign: Campaign,
+    inspection: Inspection,
+    *,
+    estimators: Sequence[str],
+    bands: BandChoice = "campaign",
+    like: CalibrationFile | None = None,
+    command: str = "",
+    campaign_sha256: str | None = None,
+    on_fit: OnFit = lambda name, done, of: None,
+) -> Outcome:
+    """Fits every named estimator on the identification parts of the runs without a fault.
+
+    ``like`` is the calibration of a vehicle of the same model: it replaces the prior of any vehicle.
+    ``bands`` are the ratio index's: found on the campaign, or the paper's Table 2. ``campaign_sha256`` is of what
+    states the vehicle; None: of the campaign's file.
+
+    An estimator that these runs do not determine is left out with a warning; raises CalibrationImpossibleError if none
+    is left, or if the faults of the runs leave no valid calibration.
+    """
+    if inspection.refusal is not None:
+        faults = [
+            f"run {verdict.number}: {one.kind}: {one.text}: {one.advice}"
+            for verdict in inspection.verdicts
+            for one in verdict.findings
+            if one.severity is Severity.FAULT
+        ]
+        refusal = f"{campaign.path}: {inspection.refusal}"
+        raise CalibrationImpossibleError("\n".join([refusal, *dict.fromkeys(faults)]))
+    sister = None
+    if like is not None:
+        sister = sister_in(like)
+        require_alike(like.vehicle, campaign.vehicle)
+        inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)
+    split = inspection.usable
+    runs = [one.identification for one in split]
+    ratio_index, cross_spectrum, claims, warnings = _fit(estimators, runs, campaign, sister, bands, on_fit)
+    inspection = _with_disagreements(inspection, claims)
+    inspection = _as_believed(inspection, claims, cross_spectrum)
+    believed = [one.identification for one in inspection.usable]
+    doubts = contradictions(believed, campaign.vehicle, cross_spectrum.model, sister) if cross_spectrum else ()
+    warnings += [f"{one.kind}: {one.sentence}" for one in doubts]
+    file = CalibrationFile(
+        vehicle=campaign.vehicle,
+        seen=_seen(runs, cross_spectrum),
+        cross_spectrum=cross_spectrum.model if cross_spectrum else None,
+        ratio_index=ratio_index.calibration if ratio_index else None,
+        sister_id=like.id if like and cross_spectrum else None,
+        expected_errors=_expected_errors(ratio_index, cross_spectrum),
+        warnings=(*inspection.warnings, *warnings),
+        provenance=_provenance(campaign_sha256 or file_sha256(campaign.path), split, cross_spectrum, command),
+    )
+    return Outcome(file, inspection, ratio_index, cross_spectrum, doubts)
+
+
+def _fit(
+    estimators: Sequence[str],
+    runs: Sequence[KnownRun],
+    campaign: Campaign,
+    sister: VehicleModel | None,
+    bands: BandChoice,
+    on_fit: OnFit,
+) -> tuple[RatioIndexFit | None, Taught | None, tuple[FoundClaim, ...], list[str]]:
+    """The result of each named estimator, the statements tested, and a warning for each estimator that these runs do
+    not determine.
+    """
+    ratio_index: RatioIndexFit | None = None
+    cross_spectrum: Taught | None = None
+    warnings: list[str] = []
+    drives = _drives(runs)
+    if "cross_spectrum" in estimators:
+        try:
+            cross_spectrum = teach(drives, campaign.vehicle, sister, partial(on_fit, "cross_spectrum"))
+            warnings.extend(cross_spectrum.model.warnings)
+        except CalibrationImpossibleError as fault:
+            warnings.append(f"cross_spectrum: {fault}")
+    claims = cross_spectrum.claims if cross_spectrum else examined(drives, campaign.vehicle, sister)
+    if "ratio_index" in estimators:
+        held = {one.drive for one in claims if one.state is ClaimState.HELD}
+        known = [run for run in runs if run.has_payload and run.has_place and drive_name(run.number) not in held]
+        try:
+            if not known:
+                raise CalibrationImpossibleError("no run has a known payload and place")
+            ratio_index = fit_ratio_index(known, campaign.vehicle, bands=bands, progress=partial(on_fit, "ratio_index"))
+        except CalibrationImpossibleError as fault:
+            warnings.append(f"ratio_index: {fault}")
+    if ratio_index is None and cross_spectrum is None:
+        raise CalibrationImpossibleError(f"{campaign.path}: " + "; ".join(warnings))
+    return ratio_index, cross_spectrum, claims, warnings
+
+
+def _drives(runs: Sequence[KnownRun]) -> list[TaughtDrive]:
+    return [TaughtDrive(drive_name(run.number), run.batches, run.statement) for run in runs]
+
+
+def with_statements_tested(inspection: Inspection, vehicle: Vehicle, like: CalibrationFile | None = None) -> Inspection:
+    """With a warning for each run whose statement the drives contradict, as a calibration would test it."""
+    sister = None if like is None else sister_in(like)
+    runs = [one.identification for one in inspection.usable if one.has_identification]
+    return _with_disagreements(inspection, examined(_drives(runs), vehicle, sister))
+
+
+def drive_name(number: int) -> str:
+    """The name by which a fit knows a run."""
+    return f"drive {number}"
+
+
+def _with_disagreements(inspection: Inspection, claims: Sequence[FoundClaim]) -> Inspection:
+    """With a warning for each run whose statement was held, because the drives contradict it beyond chance."""
+    runs = {drive_name(one.run.number): one.run for one in inspection.split}
+    verdicts = {drive_name(one.number): one for one in inspection.verdicts}
+    for claim in {one.drive: one for one in claims if one.state is ClaimState.HELD}.values():
+        shown = f"the drive shows {claim.without_kg:.0f} ± {Z95 * claim.without_std_kg:.0f} kg"
+        shown += " at another place" if claim.is_of_place else ""
+        text = f"the campaign says {runs[claim.drive].described}, {shown}; the statement taught nothing"
+        kind = Kind.LOAD_DISAGREES
+        if claim.exchanged_with is not None:
+            kind, text = Kind.LOADS_SWAPPED, f"{text}; exchanged with {claim.exchanged_with}, both fit far better"
+        found = verdicts[claim.drive]
+        verdicts[claim.drive] = replace(found, findings=(*found.findings, Finding.of(kind, text)))
+    return replace(inspection, verdicts=tuple(verdicts.values()))
+
+
+def _as_believed(inspection: Inspection, claims: Sequence[FoundClaim], taught: Taught | None) -> Inspection:
+    """With the loads as the fit believes them: without statements that were held and errors that all of them share."""
+    held = {one.drive for one in claims if one.state is ClaimState.HELD}
+
+    def believed(run: KnownRun) -> KnownRun:
+        name = drive_name(run.number)
+        found = taught.load_of(name) if taught else None
+        if name in held and not (found and math.isfinite(found.stated_kg)):
+            return replace(run, payload_kg=math.nan, front_share_pct=math.nan)
+        if run.said is None or not found:
+            return run
+        return replace(run, payload_kg=found.stated_kg, payload_plus_minus_kg=Z95 * found.stated_std_kg)
+
+    split = [
+        replace(one, identification=believed(one.identification), validation=believed(one.validation))
+        for one in inspection.split
+    ]
+    return replace(inspection, split=tuple(split))
+
+
+def _seen(runs: Sequence[KnownRun], taught: Taught | None) -> SeenPart:
+    """The ranges covered by the runs with a batch, and by those of its sister; unknown loads as the fit found them."""
+    counted = [batch for run in runs for batch in run.batches if not batch.rejected]
+    speeds_mps = [batch.mean_speed_mps for batch in counted]
+    roughness = [roughness_mps2(spectra_of(batch), batch.mean_speed_mps) for batch in counted]
+    loads: list[Load] = []
+    if taught is not None:
+        loads += taught.model.taught_loads[: -len(taught.loads)]
+        speeds_mps += taught.model.speed_seen_mps
+    for run in runs:
+        if any(not batch.rejected for batch in run.batches):
+            found = taught.load_of(drive_name(run.number)) if taught else None
+            is_stated = run.has_payload and run.has_place and not (found and found.is_held)
+            loads.append(run.load if found is None or is_stated else found.load)
+    return SeenPart(
+        payload_kg=_span([load.payload_kg for load in loads]),
+        front_share_pct=_span([load.front_share_pct for load in loads]),
+        speed_mps=_span(speeds_mps),
+        roughness_mps2=_span(roughness) if any(math.isfinite(one) for one in roughness) else None,
+        sensor_rate_hz=sensor_rate_seen_hz(runs),
+    )
+
+
+def _span(numbers: Sequence[float]) -> tuple[float, float]:
+    """The least and the largest of those that are known."""
+    known = [one for one in numbers if math.isfinite(one)]
+    return min(known), max(known)
+
+
+def _expected_errors(ratio_index: RatioIndexFit | None, taught: Taught | None) -> dict[str, ExpectedErrorsPart]:
+    errors: dict[str, tuple[F64 | None, F64 | None]] = {}
+    if ratio_index is not None:
+        errors["ratio_index"] = ratio_index.payload_errors_kg, ratio_index.front_share_errors_pct
+    if taught is not None:
+        rows = np.array([one.error[:2] for one in taught.errors]).reshape(-1, 2)
+        errors["cross_spectrum"] = rows[:, 0], rows[:, 1]
+    return {
+        name: ExpectedErrorsPart(payload_rms_kg=_rms(payload_kg), front_share_rms_pct=_rms(share_pct))
+        for name, (payload_kg, share_pct) in errors.items()
+    }
+
+
+def _rms(errors: F64 | None) -> float | None:
+    known = np.empty(0) if errors is None else errors[np.isfinite(errors)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else None
+
+
+def _provenance(campaign_sha256: str, split: Sequence[SplitRun], taught: Taught | None, command: str) -> ProvenancePart:
+    drives = []
+    for one in split:
+        run, span_ns = one.identification, one.log.span_ns
+        found = taught.load_of(drive_name(run.number)) if taught else None
+        drives.append(
+            DrivePart(
+                number=run.number,
+                log=run.name,
+                sha256=one.log.sha256,
+                t_start=iso_utc(span_ns[0]) if span_ns else None,
+                t_end=iso_utc(span_ns[1]) if span_ns else None,
+                n_batches=sum(not batch.rejected for batch in run.batches),
+                statement=run.statement,
+                found=_found_part(found) if found else None,
+            )
+        )
+    return ProvenancePart(
+        software=f"springscale {version('springscale')}",
+        command=command,
+        campaign_sha256=campaign_sha256,
+        drives=tuple(drives),
+    )
+
+
+def _found_part(found: FoundLoad) -> FoundPart:
+    is_stated = math.isfinite(found.without_kg)
+    return FoundPart(
+        payload_kg=found.load.payload_kg,
+        payload_std_kg=found.payload_std_kg,
+        front_share_pct=found.load.front_share_pct,
+        without_statement_kg=found.without_kg if is_stated else None,
+        without_statement_std_kg=found.without_std_kg if is_stated else None,
+        is_held=found.is_held,
+    )
