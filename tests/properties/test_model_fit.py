@@ -131,3 +131,30 @@ def test_a_search_that_cannot_reach_what_is_worth_it_is_given_up() -> None:
     given_up = fit.most_probable(start, prior, drives, worth=-1e6)
     assert not given_up.is_converged
     assert given_up.cost > fit.most_probable(start, prior, drives).cost
+
+
+def test_a_search_that_leads_to_a_known_maximum_ends_before_it() -> None:
+    _, [drive] = drives_of(5, [3], 0)
+    peak = fit.climb(drive.likelihood, drive.prior, np.zeros(3), 1e-9)
+    known = fit.Gaussian.of(peak.own[0], peak.own_covariances[0])
+    again = fit.climb(drive.likelihood, drive.prior, np.full(3, 4.0), 1e-9, known=[known])
+    assert again.cost == np.inf
+    elsewhere = fit.Gaussian(peak.own[0] + 100.0, known.precision)
+    found = fit.climb(drive.likelihood, drive.prior, np.full(3, 4.0), 1e-9, known=[elsewhere])
+    assert found.cost == pytest.approx(peak.cost)
+
+
+class Rounded:
+    """A cost that says nothing of its second parameter, of which rounding left a negative information."""
+
+    def cost(self, common: F64, own: F64) -> float:
+        return 0.5 * float(own[0] ** 2)
+
+    def curvature(self, common: F64, own: F64) -> tuple[F64, F64]:
+        return np.array([own[0], 0.0]), np.array([[1.0, 1.0], [1.0, 1.0 - 1e-7]])
+
+
+def test_what_is_undetermined_but_for_rounding_has_a_wide_interval() -> None:
+    """Its variance would be negative, and the estimate end in an error."""
+    found = fit.climb(Rounded(), fit.Gaussian(np.zeros(2), np.zeros((2, 2))), np.zeros(2))
+    assert np.diag(found.own_covariances[0]).min() > 1e3
