@@ -54,7 +54,7 @@ START_PAYLOADS_N: Final = 6  # chosen: from 0 to the largest load seen, or a thi
 LEAST_START_SHARE: Final = 0.33  # chosen: of the empty mass
 START_PLACES: Final = (0.25, 0.5, 0.9)  # chosen: of the wheelbase
 APART_SHARE: Final = 0.15  # chosen: of the largest starting load; starts nearer to a peak lead to it
-COARSE: Final = 1.0  # chosen: tolerance in log posterior, enough to distinguish peaks
+COARSE: Final = 0.2  # chosen: tolerance in log posterior, enough to compare peaks
 FINE: Final = 0.05  # chosen: tolerance of the final search
 HOPELESS: Final = 12.0  # chosen: a peak that is less probable by so many logarithms is not climbed to its end
 SAME_PEAK: Final = 0.3  # chosen: of a standard deviation; peaks of one hypothesis nearer than that are one
@@ -162,6 +162,11 @@ class Peak:
         """The load there."""
         return Load(float(self.x[N]), 100.0 * float(self.x[N + 1]))
 
+    def moved_as(self, other: "Peak", moved: "Peak") -> "Peak":
+        """This peak, as far from ``moved``, in place and evidence, as it is from ``other``."""
+        log_evidence = self.log_evidence + moved.log_evidence - other.log_evidence
+        return replace(self, x=self.x + moved.x - other.x, log_evidence=log_evidence)
+
     @property
     def deviations(self) -> F64:
         """(N,) of the parameters from the hypothesis, in the standard deviations that they have if it is true."""
@@ -222,8 +227,8 @@ def mixture_of(
     """The posterior of the load behind ``spectra``, as its distinct peaks.
 
     Each axle's movement depends on the load, and so does its place sideways: both are computed at the best of the
-    coarse peaks, from which the search continues. A sensor whose roll rate is lost still reads roll: it is where
-    calibration found it, and the load on the centre line.
+    coarse peaks, from which the search continues; the others keep their distance from it. A sensor whose roll rate is
+    lost still reads roll: it is where calibration found it, and the load on the centre line.
     """
     with_roll = spectra.has_roll and model.has_roll
     weight = EVIDENCE if with_roll else EVIDENCE_WITHOUT_ROLL
@@ -241,8 +246,9 @@ def mixture_of(
         rolling = Whittle(moving.within(ROLL_BAND_HZ), model.ground)
         sideways = search_of_place(rolling, Point.of(np.r_[best.x[:N], roll], best.load)).own[0]
         own = _Own(Whittle(moving.without_roll, model.ground, weight), roll, float(sideways[-1]), most_kg)
-    peaks = [_climb(own, one.hypothesis, one.x, FINE) for one in coarse if _is_worth(one, best)]
-    best = max(peaks, key=lambda one: one.log_evidence)
+    found = _climb(own, best.hypothesis, best.x, FINE)
+    peaks = [found, *(one.moved_as(best, found) for one in coarse[1:])]
+    best = found
     for other in others:
         hypothesis = other.soft() if best.hypothesis.is_soft else other
         start = best.x.copy()
