@@ -16,7 +16,7 @@ from gateway.archive.dataset import DIAGNOSTICS
 from gateway.calibration.file import CalibrationFile
 from gateway.config import Settings
 from gateway.estimates.as_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, SPECTRA, WEIGHTS, EstimateField
-from gateway.estimates.estimate import Lack
+from gateway.estimates.batch_estimate import Lack
 from gateway.estimates.reasons import EXPLANATIONS, REMEDIES, SOURCES, Cause
 
 # -- an estimate --

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from gateway.core.weights.limits import Limits
     from gateway.errors import SpringscaleError
     from gateway.estimates.as_json import estimate_to_json, table_row
-    from gateway.estimates.estimate import Estimate, Quantity
+    from gateway.estimates.batch_estimate import Estimate, Quantity
     from gateway.offline.estimates import estimate_arrays, estimates_of_logs
     from gateway.records import Spectra, Why
     from gateway.setup import Setup, load_setup
@@ -38,9 +38,9 @@ __all__ = (
 _HOMES = {
     "BatchSettings": "gateway.core.batch_settings",
     "CalibrationFile": "gateway.calibration.file",
-    "Estimate": "gateway.estimates.estimate",
+    "Estimate": "gateway.estimates.batch_estimate",
     "Limits": "gateway.core.weights.limits",
-    "Quantity": "gateway.estimates.estimate",
+    "Quantity": "gateway.estimates.batch_estimate",
     "Setup": "gateway.setup",
     "Spectra": "gateway.records",
     "SpringscaleError": "gateway.errors",

@@ -1,4 +1,4 @@
-"""The types that the rooms exchange: frames, motion, batches and reasons; gateway.estimates.estimate has the estimate.
+"""The types that the rooms exchange: frames, motion, batches and reasons; gateway.estimates has what is estimated.
 
 Plain immutable values. Arrays are numpy, SI throughout, unknown is NaN. Time is the frame's own,
 integer nanoseconds since 1970-01-01 UTC.

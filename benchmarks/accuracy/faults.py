@@ -23,7 +23,7 @@ from benchmarks.accuracy.study import OnDone, cases_of
 from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
 from gateway.calibration.campaign_file import Campaign, RunTable, chosen_runs, load_campaign
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.offline.estimates import estimates_of_logs
 from gateway.records import Frames, Why
 from gateway.setup import Setup, load_setup

@@ -28,7 +28,7 @@ from gateway.calibration.teach import teach
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.cargo import shape_hypotheses
 from gateway.core.vehicle import Vehicle
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.estimates.quantity import Z95
 from gateway.model.vehicle_model import VehicleModel
 from gateway.model.weigh import by_cross_spectrum

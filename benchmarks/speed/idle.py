@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.speed.meter import ENVIRONMENT, cpu_of_s, free_port
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.records import Spectra
 from gateway.store import Store
 

@@ -29,7 +29,7 @@ from gateway.bus.receiver import open_channel
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.core.batch_settings import BatchSettings
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.records import Spectra
 from gateway.service.pipeline import Pipeline
 from gateway.status import BusStatus, State, Status

@@ -11,7 +11,7 @@ from gateway.archive.places import PlaceError
 from gateway.bus.logs import LogReport, motion_of_log
 from gateway.core.batch_settings import BatchSettings
 from gateway.errors import ConfigurationError, LogUnreadableError, ReaderMissingError
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.records import Batch
 from gateway.units import NS_PER_S
 from gateway.weighing.flow import Flow

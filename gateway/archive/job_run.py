@@ -21,7 +21,7 @@ from gateway.archive.receipts import Slot, text_of
 from gateway.bus.logs import LogReport
 from gateway.errors import ConfigurationError, LogUnreadableError
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.model.allocator import keep_freed_memory
 from gateway.units import NS_PER_S
 

@@ -12,7 +12,7 @@ from gateway.calibration.campaign_file import Campaign, file_sha256
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.file import CalibrationFile, DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
 from gateway.calibration.found import ClaimState, FoundClaim, FoundLoad, Taught
-from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.across_runs import Inspection
 from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz

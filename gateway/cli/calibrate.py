@@ -10,7 +10,7 @@ import click
 from gateway.calibration.campaign_file import Campaign, load_campaign
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.from_drives import Outcome, calibrate_inspected, with_statements_tested
-from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.across_runs import Inspection
 from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
 from gateway.calibration.judgement.advice import Verdict, verdicts_of

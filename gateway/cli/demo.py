@@ -13,7 +13,7 @@ from typing import Any, Final, Literal
 import click
 
 from gateway.bus.sink import BusSink, replay_frames
-from gateway.cli.estimate_logs import sentence
+from gateway.cli.estimate import sentence
 from gateway.cli.options import NumberRange
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
 from gateway.errors import ConfigurationError

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from gateway.cli import options
-from gateway.cli.estimate_logs import half_width, prepared, tell, when_told
+from gateway.cli.estimate import half_width, prepared, tell, when_told
 from gateway.cli.options import FILE, as_json, one_estimator, window
 from gateway.core.events.entry import Entry, EntryKind
 from gateway.estimates.as_json import without_dates

@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Final
 
 from gateway.core.change import EVEN, ROLLING, Rules, probability
-from gateway.estimates.estimate import Epoch, Estimate
+from gateway.estimates.batch_estimate import Epoch, Estimate
 from gateway.estimates.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, fused
 
 STOP_THAT_ENDS_EPOCH_S: Final = 60.0  # chosen: time enough to load or unload

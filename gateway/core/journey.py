@@ -9,7 +9,7 @@ import numpy as np
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.spectrum import runs_of
 from gateway.core.timeline import sort_by_time
-from gateway.estimates.estimate import NOWHERE, UNWATCHED, Place, Stop, Watched, Way
+from gateway.estimates.batch_estimate import NOWHERE, UNWATCHED, Place, Stop, Watched, Way
 from gateway.records import F64, I64, JOURNEY, Batch, Bool, Motion, SensorTraits, Signal
 from gateway.units import NS_PER_S
 

@@ -17,7 +17,7 @@ from typing import Final
 
 from gateway.core.change import EVEN, ROLLING, Rules, probability
 from gateway.core.fusion import teaches
-from gateway.estimates.estimate import NOWHERE, UNWATCHED, Estimate, Place, Watched
+from gateway.estimates.batch_estimate import NOWHERE, UNWATCHED, Estimate, Place, Watched
 from gateway.estimates.posterior import Fusible, Posterior
 from gateway.units import NS_PER_S
 

@@ -22,7 +22,7 @@ from gateway.core.change import Rules
 from gateway.core.journey import LEAST_STOP_S
 from gateway.core.loads import LONG_S, Halt, LoadLink, Weighing, halts_of, loads_of
 from gateway.core.spectrum import longest_run
-from gateway.estimates.estimate import Estimate, Way
+from gateway.estimates.batch_estimate import Estimate, Way
 from gateway.estimates.posterior import Posterior
 from gateway.records import Batch, Why
 from gateway.units import NS_PER_S

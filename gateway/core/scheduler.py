@@ -12,7 +12,7 @@ import numpy as np
 from gateway.core.batch import BatchWindow, Traits, build_batch
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.journey import watched_all, way_of
-from gateway.estimates.estimate import UNWATCHED, Watched, Way
+from gateway.estimates.batch_estimate import UNWATCHED, Watched, Way
 from gateway.records import ASIDE, I64, Batch, Bool, Motion, Signal, Why, joined
 from gateway.units import NS_PER_S
 

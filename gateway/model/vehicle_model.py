@@ -9,7 +9,7 @@ from annotated_types import Ge, Gt
 
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Load
 from gateway.core.weights.on_the_road import Unsprung
-from gateway.estimates.estimate import Quantity
+from gateway.estimates.batch_estimate import Quantity
 from gateway.metadata import STRICT
 from gateway.model.car import LEAST_SLACK, Ground
 from gateway.model.spectra import Reading, UsualFloor, mount_of

@@ -18,7 +18,7 @@ import numpy as np
 
 from gateway.core.cargo import HABIT_PART, ShapeHypothesis
 from gateway.core.vehicle import Load
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.estimates.posterior import NORMAL_TAILS, PAYLOAD, Posterior, Source
 from gateway.model import fit
 from gateway.model.checks import VEHICLE_ROWS, Signs, disbelieved, fits, reach_of, unseen_of, why_not
@@ -55,7 +55,7 @@ LEAST_START_SHARE: Final = 0.33  # chosen: of the empty mass
 START_PLACES: Final = (0.25, 0.5, 0.9)  # chosen: of the wheelbase
 APART_SHARE: Final = 0.15  # chosen: of the largest starting load; starts nearer to a peak lead to it
 COARSE: Final = 0.2  # chosen: tolerance in log posterior, enough to compare peaks
-FINE: Final = 0.05  # chosen: tolerance of the final search
+FINE: Final = 1e-2  # chosen: tolerance of the final search
 HOPELESS: Final = 12.0  # chosen: a peak that is less probable by so many logarithms is not climbed to its end
 SAME_PEAK: Final = 0.3  # chosen: of a standard deviation; peaks of one hypothesis nearer than that are one
 MOST_LOAD_SHARE: Final = 4.0  # chosen: of the empty mass; bound of the search

@@ -13,7 +13,7 @@ from gateway.bus.signals.decode import SignalCounts
 from gateway.bus.signals.mapping import MappedMessage, id_name
 from gateway.calibration.campaign_file import Campaign, OnRun, RunTable, chosen_runs, file_sha256
 from gateway.calibration.from_drives import Outcome, calibrate_inspected
-from gateway.calibration.inspection.campaign import Inspection, inspect_drives
+from gateway.calibration.inspection.across_runs import Inspection, inspect_drives
 from gateway.calibration.inspection.drive import LogFacts, SplitRun, row_facts
 from gateway.calibration.judgement.evaluation import Judged, judge
 from gateway.calibration.known_run import KnownRun

@@ -16,7 +16,7 @@ from gateway.core.change import Rules
 from gateway.core.events.entry import Entry
 from gateway.core.events.ledger import Ledger
 from gateway.errors import ArraysError, LogUnreadableError
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.records import F64, FIRST_DATED_NS, Motion, Signal
 from gateway.setup import Setup
 from gateway.units import NS_PER_S

@@ -21,7 +21,7 @@ from gateway.core.alarms.alarm import (
 from gateway.core.alarms.rules import AlarmRules, Says
 from gateway.core.alarms.watch import AlarmWatch
 from gateway.estimates.as_json import read_estimate
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.service.journal_reader import place_of

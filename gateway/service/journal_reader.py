@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Final
 
 from gateway.estimates.as_json import read_estimate
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ThreadPart
 from gateway.store import Store, restored

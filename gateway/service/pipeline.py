@@ -12,7 +12,7 @@ from typing import Final, ParamSpec
 
 from gateway.bus.listen import Inbox
 from gateway.bus.signals import Decoder
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.model.sensors import NOISE_RATIOS
 from gateway.model.spectra import NOISY_RATIO

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.fusion import STOP_THAT_ENDS_EPOCH_S
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.records import F64, I64, STATIC, Motion, Signal
 from gateway.units import NS_PER_S
 

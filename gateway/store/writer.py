@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from gateway.errors import StoreError
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.files.reserve import Reserve
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ServicePart

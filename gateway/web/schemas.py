@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model, model_validator
 
 from gateway.estimates.as_json import FIELDS, INSTANT, NUMBERS_BY_NAME, SPECTRA, WEIGHTS, EstimateField, Presence
-from gateway.estimates.estimate import Lack
+from gateway.estimates.batch_estimate import Lack
 from gateway.stated.statement import HALF_CHARACTER, is_text
 from gateway.units import NS_PER_S
 

@@ -12,7 +12,7 @@ from gateway.core.ratio_index.index import indexes_of
 from gateway.core.ratio_index.paper_estimator import by_ratio_index
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.core.vehicle import Vehicle
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.estimates.posterior import FRONT_SHARE, Posterior, Source
 from gateway.model.checks import MOST_PAYLOAD_STD_SHARE
 from gateway.model.weigh import by_cross_spectrum

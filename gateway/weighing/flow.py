@@ -29,8 +29,8 @@ from gateway.core.pool import (
 )
 from gateway.core.scheduler import Scheduler
 from gateway.core.weights.on_the_road import weighed
+from gateway.estimates.batch_estimate import UNWATCHED, Estimate, Way
 from gateway.estimates.budget import budget_of
-from gateway.estimates.estimate import UNWATCHED, Estimate, Way
 from gateway.estimates.posterior import Posterior
 from gateway.records import Batch, Motion, Why
 from gateway.weighing.calibrated import CalibratedVehicle

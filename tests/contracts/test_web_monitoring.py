@@ -14,7 +14,7 @@ from support.estimates import make_estimate
 from support.paper_van import paper_van
 from support.web import Client, Gateway
 
-from gateway.estimates.estimate import Quantity
+from gateway.estimates.batch_estimate import Quantity
 from gateway.status import (
     AlarmsStatus,
     BatchCounts,

@@ -7,7 +7,7 @@ import pytest
 from support.estimates import make_estimate
 from support.web import Client, Gateway
 
-from gateway.estimates.estimate import Place, Way
+from gateway.estimates.batch_estimate import Place, Way
 from gateway.records import json_line
 from gateway.web.access.tokens import Scope, TokenFile
 from gateway.web.app import create_app

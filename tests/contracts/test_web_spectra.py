@@ -14,7 +14,7 @@ from support.web import Client, Gateway
 from gateway.calibration.file import load_calibration
 from gateway.core.spectrum import spectra_of
 from gateway.estimates.as_json import spectra_from_json
-from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.model.displayed import Fitted, modelled_spectra
 from gateway.records import Spectra, Why
 from gateway.web.live.board import Board

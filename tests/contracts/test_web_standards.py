@@ -12,7 +12,7 @@ from support.web import Client, Gateway
 
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import weighed
-from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.estimates.quantities import QUANTITIES
 from gateway.records import Why
 from gateway.web.app import create_app

@@ -18,7 +18,7 @@ from support.patience import wait_until
 from support.ports import free_port
 from support.web import Gateway, serving
 
-from gateway.estimates.estimate import Weight, Weights
+from gateway.estimates.batch_estimate import Weight, Weights
 from gateway.records import Why
 
 ROOT = Path(__file__).parents[2]

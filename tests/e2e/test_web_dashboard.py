@@ -13,7 +13,7 @@ from support.estimates import make_estimate
 from support.learner import ANSWERS, LearnerBench, at, found
 from support.web import Gateway, below, serving
 
-from gateway.estimates.estimate import Z95
+from gateway.estimates.batch_estimate import Z95
 from gateway.records import Why
 from gateway.status import State
 from gateway.web.access.tokens import Scope, TokenFile

@@ -12,7 +12,7 @@ from support.days import RULES, day
 from support.web import Gateway, serving
 
 from gateway.core.events.ledger import Ledger
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.records import json_line
 
 DAY = day(0.0, 500.0, 500.0, 320.0, 200.0)

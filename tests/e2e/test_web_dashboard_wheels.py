@@ -16,7 +16,7 @@ from support.web import Gateway, serving
 from gateway.core.fusion import epoch_of
 from gateway.core.vehicle import cg_left_m
 from gateway.core.weights import on_the_road as weights
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.estimates.posterior import Posterior
 from gateway.weighing.calibrated import CalibratedVehicle
 

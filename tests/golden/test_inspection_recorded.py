@@ -12,7 +12,7 @@ from support.recordings import recordings
 from gateway.bus.logs import LogReport
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.campaign_file import load_campaign
-from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.across_runs import Inspection
 from gateway.calibration.inspection.drive import SplitRun, row_facts
 from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.inspection.run_checks import inspect_run

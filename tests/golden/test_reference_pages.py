@@ -19,7 +19,7 @@ from gateway.calibration.campaign_file import CampaignTable, RunTable, load_camp
 from gateway.calibration.file import load_calibration
 from gateway.core.vehicle import Vehicle
 from gateway.estimates.as_json import FIELDS
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.records import Signal
 from gateway.stated.facts import VehicleAnswers
 from gateway.units import TO_SI

@@ -17,7 +17,7 @@ from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.records import I64, Batch, Motion, Why, json_line
 from gateway.units import NS_PER_S
 from gateway.weighing.calibrated import CalibratedVehicle

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.estimates.as_json import COLUMNS, FIELDS, csv_cells, estimate_from_json, estimate_to_json
+from gateway.estimates.batch_estimate import PLACES, Epoch, Estimate, Lack, Quantity, Weight, Weights
 from gateway.estimates.budget import BudgetLine, Remedy
-from gateway.estimates.estimate import PLACES, Epoch, Estimate, Lack, Quantity, Weight, Weights
 from gateway.estimates.posterior import Posterior, Source
 from gateway.records import Spectra, Why, json_line
 
@@ -130,7 +130,7 @@ def test_the_start_is_read_and_not_sought_by_hashes(estimate: Estimate, ns: int)
     """Up to a thousand hashes of an estimate found the nanoseconds again."""
     start_ns = 1_790_000_000_000_000_000 + ns
     told = estimate_to_json(replace(estimate, t_start_ns=start_ns))
-    with unittest.mock.patch("gateway.estimates.estimate.hashlib.sha256", side_effect=AssertionError("a hash")):
+    with unittest.mock.patch("gateway.estimates.batch_estimate.hashlib.sha256", side_effect=AssertionError("a hash")):
         assert read_back(told).t_start_ns == start_ns
         del told["t_start_ns"]
         assert read_back(told).t_start_ns == 1_790_000_000_000_000_000

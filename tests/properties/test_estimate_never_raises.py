@@ -20,7 +20,7 @@ from gateway.core.change import Rules
 from gateway.core.fusion import fused_epoch
 from gateway.core.vehicle import Load
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.model import fit, weigh
 from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64, Batch, Motion, Signal, Why

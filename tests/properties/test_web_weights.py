@@ -13,7 +13,7 @@ from support.paper_van import paper_van
 from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct, left_share_pct
 from gateway.core.weights.limits import RELEASE_SHARE, is_over_limit
 from gateway.core.weights.on_the_road import PayloadPlace, place_of, unsprung_kg, weighed, weights_of
-from gateway.estimates.estimate import Z95, Estimate, Lack, Quantity, Weights
+from gateway.estimates.batch_estimate import Z95, Estimate, Lack, Quantity, Weights
 from gateway.estimates.posterior import FRONT_SHARE, PAYLOAD, Posterior, Source, exactly
 
 VAN = paper_van(empty_front_share_pct=52.0, unsprung_front_kg=90.0, unsprung_rear_kg=110.0)

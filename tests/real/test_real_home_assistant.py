@@ -19,7 +19,7 @@ from support.patience import wait_until
 from gateway.config import VehicleSection
 from gateway.config.sections import UplinkSection
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Weight, Weights
+from gateway.estimates.batch_estimate import Weight, Weights
 from gateway.store import Store
 from gateway.uplink.home_assistant import ENTITIES
 from gateway.uplink.outbox import Outbox

@@ -17,7 +17,7 @@ from support.ports import free_port
 from gateway.config import VehicleSection
 from gateway.config.sections import UplinkSection
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate, Weight, Weights
+from gateway.estimates.batch_estimate import Estimate, Weight, Weights
 from gateway.records import Why
 from gateway.store import Store
 from gateway.uplink.outbox import Outbox

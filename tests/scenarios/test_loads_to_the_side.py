@@ -10,7 +10,7 @@ from benchmarks.accuracy.calibrated import taught_by
 from benchmarks.accuracy.drives import without_roll_rate
 from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import cg_left_m
-from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.model.vehicle_model import VehicleModel
 from gateway.records import Batch, Why
 from gateway.sim.parameters import Load

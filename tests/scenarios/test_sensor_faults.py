@@ -9,7 +9,7 @@ import pytest
 
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.core.batch_settings import BatchSettings
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.offline.campaigns import batches_of_motion
 from gateway.records import F64, Bool, Frames, Why
 from gateway.service.pipeline import Pipeline

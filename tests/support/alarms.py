@@ -10,7 +10,7 @@ from gateway.core.fusion import epoch_of
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import weighed
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.service.alarm_reader import AlarmService
 from gateway.setup import Subject
 from gateway.store import Store

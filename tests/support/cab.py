@@ -4,7 +4,7 @@ from pathlib import Path
 
 from gateway.core.events.entry import EntryKind
 from gateway.core.vehicle import Vehicle
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.estimates.quantity import Z95
 from gateway.records import iso_utc, json_line
 from gateway.status import Standing, State, Status

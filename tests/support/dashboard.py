@@ -10,7 +10,7 @@ from typing import Any
 from gateway.calibration.file import load_calibration
 from gateway.core.fusion import epoch_of
 from gateway.core.spectrum import spectra_of
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.records import Why, iso_utc
 from gateway.status import BusStatus, SignalHealth, State, Status, StoreStatus, UplinkStatus
 from gateway.web.routes.weights import KnownLoadTold

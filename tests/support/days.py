@@ -7,7 +7,7 @@ import numpy as np
 from gateway.core.change import Rules
 from gateway.core.events.entry import Entry
 from gateway.core.events.ledger import Ledger
-from gateway.estimates.estimate import UNWATCHED, Estimate, Place, Stop, Watched, Way, Weight, Weights
+from gateway.estimates.batch_estimate import UNWATCHED, Estimate, Place, Stop, Watched, Way, Weight, Weights
 from gateway.estimates.posterior import Posterior, Source
 from gateway.records import Why
 from gateway.units import NS_PER_S

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.batch_estimate import Epoch, Estimate, Quantity, Weight, Weights
 from gateway.estimates.budget import budget_of
-from gateway.estimates.estimate import Epoch, Estimate, Quantity, Weight, Weights
 from gateway.estimates.posterior import Posterior, Source
 from gateway.records import Spectra, Why, json_line
 from gateway.units import NS_PER_S

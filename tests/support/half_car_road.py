@@ -8,7 +8,7 @@ from gateway.calibration.known_run import KnownRun
 from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.teach import teach
 from gateway.core.vehicle import Load, Vehicle
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.model.car import Ground
 from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64, Batch

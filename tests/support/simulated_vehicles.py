@@ -13,7 +13,7 @@ from gateway.config import load_settings
 from gateway.core.alarms.alarm import Alarm, AlarmCause, AlarmFigure, AlarmKind, alarm_to_json
 from gateway.core.events.entry import EntryKind, entry_id
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate, Weight, Weights
+from gateway.estimates.batch_estimate import Estimate, Weight, Weights
 from gateway.records import iso_utc, json_line
 from gateway.store import Store
 from gateway.units import NS_PER_S

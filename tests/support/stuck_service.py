@@ -7,7 +7,7 @@ import numpy as np
 import scipy.fft
 
 from gateway.cli import main
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.service import gateway
 from gateway.weighing.flow import Flow
 

@@ -9,7 +9,7 @@ from gateway.calibration.statements import Statement
 from gateway.calibration.teach import teach
 from gateway.core.cargo import known_shape
 from gateway.core.vehicle import Load, Vehicle
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.model.car import Ground
 from gateway.model.spectra import CrossSpectra, cross_spectra_of
 from gateway.model.table import ROWS, covariance_of

@@ -15,7 +15,7 @@ from fastapi import FastAPI
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.status import State, Status
 from gateway.store import Store
 from gateway.web.access.serving import server_config

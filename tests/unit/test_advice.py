@@ -10,12 +10,12 @@ from support.paper_van import paper_van
 
 from gateway.calibration.file import FoundPart
 from gateway.calibration.from_drives import Outcome
-from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.across_runs import Inspection
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.judgement.advice import Grade, Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import Assessment, BatchSet, Judgement
 from gateway.calibration.judgement.evaluation import Judged, error_table
-from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.records import Why
 
 VAN = paper_van()  # ranges of 450 kg and of 20 points

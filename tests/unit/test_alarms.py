@@ -24,7 +24,7 @@ from gateway.core.alarms.alarm import (
 )
 from gateway.core.alarms.rules import SENSORS, AlarmRules, Says
 from gateway.core.alarms.watch import AlarmWatch
-from gateway.estimates.estimate import Estimate, Quantity, Weight, Weights
+from gateway.estimates.batch_estimate import Estimate, Quantity, Weight, Weights
 from gateway.estimates.reasons import EXPLANATIONS
 from gateway.records import Why, json_line
 

@@ -11,7 +11,7 @@ from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, coverage_
 from gateway.calibration.judgement.answers import LEVELS, Answers, answers_of, observed_coverage, standardised
 from gateway.calibration.judgement.coverage import IDEAL_SCORE, coverage_of, interval_scores
 from gateway.calibration.judgement.evaluation import Judged
-from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.records import Why
 
 

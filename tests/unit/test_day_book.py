@@ -11,7 +11,7 @@ from support.patience import PATIENCE_S
 
 from gateway.core.change import Rules
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.service.batch_log import LoadEventLog
 from gateway.setup import load_setup
 from gateway.store import Store

@@ -14,15 +14,15 @@ from support.commands import called, run
 from support.encoded import encode_signals
 from support.estimates import make_estimate, posterior_of
 
-import gateway.cli.estimate_logs as command
+import gateway.cli.estimate as command
 from gateway.bus.logs import open_whole_log
 from gateway.bus.logs.candump_write import write_candump
 from gateway.bus.logs.packed import zstd
 from gateway.bus.signals import load_signal_map
-from gateway.cli.estimate_logs import sentence
+from gateway.cli.estimate import sentence
 from gateway.errors import SpringscaleError
 from gateway.estimates.as_json import estimate_to_json, without_dates
-from gateway.estimates.estimate import UNKNOWN, Estimate, Quantity, Weight, Weights
+from gateway.estimates.batch_estimate import UNKNOWN, Estimate, Quantity, Weight, Weights
 from gateway.records import F64, Signal, Why
 
 DEMO = str(files("gateway") / "demo" / "paper_van.json")

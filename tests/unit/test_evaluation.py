@@ -17,7 +17,7 @@ from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.weights.on_the_road import Unsprung, weighed
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.estimates.posterior import exactly
 from gateway.records import Batch, Why
 from gateway.weighing.calibrated import CalibratedVehicle

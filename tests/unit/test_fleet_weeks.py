@@ -16,7 +16,7 @@ from gateway.archive import place_of
 from gateway.archive.fleet.batches import Batches, read_batches
 from gateway.archive.fleet.faulty_sensors import Health, Share, troubles_of
 from gateway.archive.fleet.weeks import monday_of, weeks_of
-from gateway.estimates.estimate import Z95
+from gateway.estimates.batch_estimate import Z95
 from gateway.estimates.reasons import EXPLANATIONS, Cause
 
 REASONS = ["acceleration_stuck", "time_stamps", "too_slow", "model_misfit", "a_reason_of_tomorrow"]

@@ -11,7 +11,7 @@ from support.paper_van import paper_van
 
 from gateway.core.change import EVEN, ROLLING, Rules, change_of, probability
 from gateway.core.fusion import LoadEpoch, fused_epoch
-from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.estimates.posterior import CG_LEFT, PAYLOAD, Posterior, Source, difference
 from gateway.records import Why
 

@@ -18,7 +18,7 @@ from gateway.config import VehicleSection
 from gateway.config.sections import UplinkSection
 from gateway.errors import ConfigurationError
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Estimate, Weight, Weights
+from gateway.estimates.batch_estimate import Estimate, Weight, Weights
 from gateway.records import Why
 from gateway.store import Store
 from gateway.uplink.home_assistant import discovery

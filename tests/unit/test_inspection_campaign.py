@@ -6,7 +6,7 @@ import pytest
 from support.half_car_road import VAN, batch_over_road
 from support.known_runs import LOADS, campaign, known_run
 
-from gateway.calibration.inspection.campaign import Inspection, inspect_drives, load_findings
+from gateway.calibration.inspection.across_runs import Inspection, inspect_drives, load_findings
 from gateway.calibration.inspection.drive import RowFacts, SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
 from gateway.calibration.known_run import KnownRun

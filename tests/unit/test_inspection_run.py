@@ -23,7 +23,7 @@ from support.inspected import (
     without,
 )
 
-from gateway.calibration.inspection.campaign import inspect_drives
+from gateway.calibration.inspection.across_runs import inspect_drives
 from gateway.calibration.inspection.drive import LogFacts, RowFacts, SplitRun, row_facts
 from gateway.calibration.inspection.finding import Finding, Kind
 from gateway.calibration.inspection.run_checks import inspect_run

@@ -10,7 +10,7 @@ from support.drives import T0_NS, drive, joined, later, without_rows
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
 from gateway.estimates.as_json.kinds import way_from_json, way_to_json
-from gateway.estimates.estimate import Place, Watched, Way
+from gateway.estimates.batch_estimate import Place, Watched, Way
 from gateway.records import Motion, SensorTraits, Signal
 
 JOURNEY = (Signal.LATITUDE, Signal.LONGITUDE, Signal.ODOMETER, Signal.DOOR, Signal.IGNITION)

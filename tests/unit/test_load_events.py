@@ -25,7 +25,7 @@ from gateway.core.change import change_of
 from gateway.core.events import ledger
 from gateway.core.events.entry import Entry
 from gateway.core.events.ledger import Ledger
-from gateway.estimates.estimate import Estimate, Place, Stop, Watched
+from gateway.estimates.batch_estimate import Estimate, Place, Stop, Watched
 from gateway.estimates.posterior import Posterior, Source
 
 

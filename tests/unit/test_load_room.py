@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import weights_of
 from gateway.core.weights.room import NOTHING, Halves, LoadingArea, LoadRoom, Spare, room_of
-from gateway.estimates.estimate import Weight, Weights
+from gateway.estimates.batch_estimate import Weight, Weights
 from gateway.estimates.posterior import Posterior
 
 VAN = Vehicle(

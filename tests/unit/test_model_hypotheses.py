@@ -11,7 +11,7 @@ from support.model_road import times
 from support.taught_van import FLAT_VAN, VAN, car, drive_of, estimated, spectra_of, taught
 
 from gateway.core.cargo import known_shape, shape_hypotheses
-from gateway.estimates.estimate import Estimate, Quantity
+from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.estimates.posterior import NORMAL_TAILS
 from gateway.model import weigh
 from gateway.model.sensors import GAIN_STD

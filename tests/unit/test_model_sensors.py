@@ -9,7 +9,7 @@ from scipy.signal import butter, sosfilt
 from support.model_road import RATE_HZ
 from support.taught_van import UNITS, USUAL_SLACK, car, drive_of, estimated, left_of, taught, weighed
 
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.model import checks, sensors
 from gateway.model.checks import CHECKS, Signs, disbelieved, most_misfit_at, unseen_of
 from gateway.model.sensors import MOST_GYRO_GAIN_SCORE, gain_of, gyro_gain_ratio

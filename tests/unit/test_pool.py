@@ -12,7 +12,7 @@ from support.drives import drive, joined, later, without_rows
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.pool import Part, spanned
 from gateway.core.scheduler import Scheduler
-from gateway.estimates.estimate import Estimate, Way
+from gateway.estimates.batch_estimate import Estimate, Way
 from gateway.estimates.posterior import Posterior, Source
 from gateway.records import F64, Batch, Motion, Why
 from gateway.units import NS_PER_S

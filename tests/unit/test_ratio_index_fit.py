@@ -21,7 +21,7 @@ from gateway.core.ratio_index.regression import (
     RegressionModel,
 )
 from gateway.errors import CalibrationImpossibleError
-from gateway.estimates.estimate import UNKNOWN
+from gateway.estimates.batch_estimate import UNKNOWN
 from gateway.records import F64, Batch, Why
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Epoch, Estimate, Quantity
+from gateway.estimates.batch_estimate import Epoch, Estimate, Quantity
 from gateway.records import Motion, Signal, Why, iso_utc, json_line
 
 FULL = Estimate(

@@ -16,7 +16,7 @@ from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.teach import teach
 from gateway.core.ratio_index.index import Band
 from gateway.core.spectrum import spectra_of
-from gateway.estimates.estimate import Quantity
+from gateway.estimates.batch_estimate import Quantity
 from gateway.model.displayed import Fitted, modelled_spectra
 from gateway.model.spectra import Reading, cross_spectra_of
 from gateway.model.table import INDEX, NAMES, ROWS, UPRIGHT, prior_of

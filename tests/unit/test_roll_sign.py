@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.inspected import driven, kinds, scaled, stated, traits_of_reference
 
-from gateway.calibration.inspection.campaign import inspect_drives
+from gateway.calibration.inspection.across_runs import inspect_drives
 from gateway.calibration.inspection.drive import SplitRun, row_facts
 from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.known_run import KnownRun

@@ -7,7 +7,7 @@ from support.calibrated import calibration_file
 from support.estimates import make_estimate, posterior_of
 from support.log import fields_of, logged, names
 
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.log import Event
 from gateway.records import Why
 from gateway.service.batch_log import BatchLog, StateLog

@@ -16,7 +16,7 @@ from support.ports import free_port
 
 from gateway.bus.listen import SourceState
 from gateway.config import load_settings
-from gateway.estimates.estimate import Estimate, Quantity, Weights
+from gateway.estimates.batch_estimate import Estimate, Quantity, Weights
 from gateway.records import Signal
 from gateway.service.gateway import Gateway
 from gateway.service.status_of_parts import SENSOR_LOST_S, StatusReport

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.estimates import make_estimate
 
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.records import Motion, Signal
 from gateway.service.signal_watch import SignalWatch, StandingWatch
 

@@ -12,7 +12,7 @@ from support.known_runs import campaign as known_campaign
 from gateway.calibration.campaign_file import Campaign, DraftTable
 from gateway.calibration.file import load_calibration
 from gateway.calibration.from_drives import Outcome, calibrate_inspected
-from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.across_runs import Inspection
 from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Kind, RunVerdict
 from gateway.calibration.judgement.advice import Grade, verdicts_of

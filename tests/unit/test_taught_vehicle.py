@@ -13,7 +13,7 @@ from gateway.calibration.statements import NOTHING_KNOWN, Statement, empty, load
 from gateway.calibration.teach import teach
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.errors import CalibrationImpossibleError
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.model.spectra import cross_spectra_of
 from gateway.model.weigh import by_cross_spectrum, mixture_of, posterior_of, weigh
 from gateway.records import Batch, Why

@@ -6,7 +6,7 @@ import pytest
 
 from gateway.core.weights.limits import Light
 from gateway.core.weights.verdict import Says, verdict_of
-from gateway.estimates.estimate import Weight, Weights
+from gateway.estimates.batch_estimate import Weight, Weights
 
 LIGHT, NEAR, HEAVY = (
     Weight(900.0, 10.0, 950.0, None),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from support.estimates import WINDOW_NS, make_estimate, make_record
 
 from gateway.estimates.as_json import estimate_to_json
-from gateway.estimates.estimate import Lack, Quantity, Weight, Weights
+from gateway.estimates.batch_estimate import Lack, Quantity, Weight, Weights
 from gateway.records import Why, iso_utc
 from gateway.web.live.board import Board
 from gateway.web.schemas import parse_instant

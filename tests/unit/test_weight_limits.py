@@ -27,7 +27,7 @@ from gateway.core.weights.limits import Light, Limits, nearness, over_limit_prob
 from gateway.core.weights.on_the_road import PayloadPlace, place_of, weighed, weights_of
 from gateway.errors import ConfigurationError
 from gateway.estimates.as_json import table_row
-from gateway.estimates.estimate import PLACES, Z95, Estimate, Quantity, Weight, Weights
+from gateway.estimates.batch_estimate import PLACES, Z95, Estimate, Quantity, Weight, Weights
 from gateway.estimates.posterior import Posterior, Source
 from gateway.setup import Setup, setup_of
 from gateway.uplink.outbox import Outbox

@@ -18,7 +18,7 @@ from scipy.stats import rankdata
 
 from gateway.archive.fleet.batches import DRIFTING
 from gateway.archive.fleet.weeks import Weeks
-from gateway.estimates.estimate import Z95
+from gateway.estimates.batch_estimate import Z95
 from gateway.records import F64, I64, Bool
 
 LEAST_POINTS: Final = 8  # chosen: with fewer points S is not approximately normal

@@ -11,7 +11,7 @@ import numpy as np
 
 from gateway.archive.fleet.batches import Batches
 from gateway.archive.fleet.weeks import CAUSES, DAY_NS, date_of
-from gateway.estimates.estimate import Z95
+from gateway.estimates.batch_estimate import Z95
 from gateway.estimates.reasons import Cause
 from gateway.records import F64, I64, Bool
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from gateway.archive.fleet.batches import DRIFTING, Batches
-from gateway.estimates.estimate import Z95
+from gateway.estimates.batch_estimate import Z95
 from gateway.estimates.reasons import EXPLANATIONS, Cause
 from gateway.records import F64, I64, Bool, Why
 from gateway.units import NS_PER_S

@@ -13,8 +13,8 @@ from gateway.core.cargo import is_said
 from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung, weighed, weights_of
 from gateway.estimates.as_json import estimate_to_json
+from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.estimates.budget import budget_of
-from gateway.estimates.estimate import Estimate, Quantity
 from gateway.estimates.posterior import Source, exactly
 from gateway.records import F64, Batch, Why
 from gateway.weighing.calibrated import CalibratedVehicle

@@ -17,7 +17,7 @@ from gateway.calibration.campaign_file import Campaign, DraftTable
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.found import FoundClaim, FoundLoad
 from gateway.calibration.from_drives import OnFit, Outcome, calibrate_inspected, drive_name
-from gateway.calibration.inspection.campaign import Inspection
+from gateway.calibration.inspection.across_runs import Inspection
 from gateway.calibration.inspection.drive import LogFacts, RowFacts, SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.run_checks import inspect_run

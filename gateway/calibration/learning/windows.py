@@ -11,7 +11,7 @@ from gateway.calibration.kept import KeptBatch
 from gateway.calibration.learning.spans import ENOUGH_S, can_teach, spans_of, teaching_most
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.pool import LEAST_LOAD_S, Part, spanned
-from gateway.estimates.estimate import Way
+from gateway.estimates.batch_estimate import Way
 from gateway.records import Batch, Why, iso_utc
 
 

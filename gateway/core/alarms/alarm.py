@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Final
 
-from gateway.estimates.estimate import PLACES, Z95
+from gateway.estimates.batch_estimate import PLACES, Z95
 from gateway.estimates.reasons import EXPLANATIONS
 from gateway.records import iso_utc, ns_of
 

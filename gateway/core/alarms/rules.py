@@ -12,7 +12,7 @@ from gateway.core.alarms.alarm import OVERLOADS, AlarmCause, AlarmFigure
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.limits import over_limit_probability
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung, weighed
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.estimates.reasons import EXPLANATIONS, Cause
 
 NOTHING_FOUND: Final = AlarmFigure()

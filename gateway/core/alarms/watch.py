@@ -6,7 +6,7 @@ from gateway.core.alarms.alarm import CAUSES, REFUSED, Alarm, AlarmCause, AlarmF
 from gateway.core.alarms.rules import REFUSED_BATCHES, SENSORS, AlarmRules, Says, overload_says
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.records import Why
 
 

@@ -31,7 +31,7 @@ from gateway.core.loads import (
     weighings_of,
 )
 from gateway.estimates.as_json.kinds import place_to_json
-from gateway.estimates.estimate import NOWHERE, Estimate, Quantity, Way
+from gateway.estimates.batch_estimate import NOWHERE, Estimate, Quantity, Way
 from gateway.estimates.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD
 from gateway.records import iso_utc
 from gateway.units import NS_PER_S

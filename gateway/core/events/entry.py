@@ -8,7 +8,7 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Any, Final
 
-from gateway.estimates.estimate import Quantity
+from gateway.estimates.batch_estimate import Quantity
 
 NEWS_STD_SHARE: Final = 0.25  # chosen: of its standard deviation; a smaller change is not reported
 NEWS_PROBABILITY: Final = 0.05  # chosen: a smaller change of a probability is not reported

@@ -16,7 +16,7 @@ from gateway.core.change import EVEN, Rules
 from gateway.core.events.day import Day, trips_of
 from gateway.core.events.entry import Entry, EntryKind, is_news
 from gateway.estimates.as_json import estimate_from_json, estimate_to_json
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 
 TOLD_FROM: Final = 0.9  # chosen: a less likely change is not reported; a reported one is withdrawn below 0.5
 PLAIN_STDS: Final = (

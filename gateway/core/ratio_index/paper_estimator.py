@@ -13,7 +13,7 @@ import numpy as np
 
 from gateway.core.ratio_index.index import RatioIndexCalibration, indexes_of
 from gateway.core.ratio_index.regression import RegressionModel
-from gateway.estimates.estimate import UNKNOWN, Z95, Estimate, Quantity
+from gateway.estimates.batch_estimate import UNKNOWN, Z95, Estimate, Quantity
 from gateway.estimates.posterior import Posterior, Source
 from gateway.records import Batch, Why
 

@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Any, Final, Self
 
 from gateway.core.vehicle import Vehicle
-from gateway.estimates.estimate import Quantity, Weights
+from gateway.estimates.batch_estimate import Quantity, Weights
 
 RELEASE_SHARE: Final = 0.03  # chosen: of the limit; a warning ends below this margin
 

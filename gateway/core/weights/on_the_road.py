@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.vehicle import Vehicle, left_share_pct
-from gateway.estimates.estimate import UNKNOWN, Estimate, Lack, Quantity, Weight, Weights
+from gateway.estimates.batch_estimate import UNKNOWN, Estimate, Lack, Quantity, Weight, Weights
 from gateway.estimates.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, Posterior, Source
 
 

@@ -16,7 +16,7 @@ from itertools import combinations
 from typing import Final
 
 from gateway.core.vehicle import Vehicle
-from gateway.estimates.estimate import Z95, Quantity, Weight, Weights
+from gateway.estimates.batch_estimate import Z95, Quantity, Weight, Weights
 
 USUAL_AREA: Final = (0.35, 1.25)
 """Chosen: the loading area in wheelbases behind the front axle if none is stated; longer than that of usual vans at

@@ -12,7 +12,7 @@ from enum import StrEnum
 from typing import Final
 
 from gateway.core.weights.limits import LOADED_PLACES, Light, nearness
-from gateway.estimates.estimate import Weights
+from gateway.estimates.batch_estimate import Weights
 
 
 class Says(StrEnum):

@@ -32,7 +32,7 @@ from gateway.estimates.as_json.kinds import (
     weights_to_json,
     without_dates,
 )
-from gateway.estimates.estimate import UNKNOWN_INTERVAL, Epoch, Estimate, Quantity, Weight, Weights
+from gateway.estimates.batch_estimate import UNKNOWN_INTERVAL, Epoch, Estimate, Quantity, Weight, Weights
 from gateway.estimates.quantities import BY_NAME
 
 _INTERVAL95: Final = "95 % interval [low, high]"

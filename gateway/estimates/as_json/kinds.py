@@ -12,8 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.estimates.budget import BudgetLine, Remedy
-from gateway.estimates.estimate import (
+from gateway.estimates.batch_estimate import (
     NOWHERE,
     PLACES,
     UNKNOWN_INTERVAL,
@@ -26,6 +25,7 @@ from gateway.estimates.estimate import (
     Weight,
     Weights,
 )
+from gateway.estimates.budget import BudgetLine, Remedy
 from gateway.estimates.posterior import NORMAL_TAILS, Posterior, Source
 from gateway.records import F64, FIRST_DATED_NS, Spectra, Why, iso_utc, ns_of
 

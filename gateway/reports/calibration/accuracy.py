@@ -10,8 +10,8 @@ from gateway.calibration.judgement.answers import LEVELS, answers_of, observed_c
 from gateway.calibration.judgement.assessment import PART_NAMES, PART_TEXT, BatchSet, Judgement
 from gateway.calibration.judgement.coverage import IDEAL_SCORE
 from gateway.calibration.judgement.evaluation import CgLeftErrors, Comparison, Errors, Target, TargetErrors
+from gateway.estimates.batch_estimate import Z95
 from gateway.estimates.budget import BudgetLine
-from gateway.estimates.estimate import Z95
 from gateway.estimates.reasons import REMEDIES, SOURCES
 from gateway.records import F64, iso_utc
 from gateway.reports.charts import GREY, Axis, Chart, LineMark, Marker, Panel, Points, Section, Table

@@ -13,7 +13,7 @@ from starlette.responses import Response
 from starlette.types import Scope
 
 from gateway.estimates.as_json import estimate_from_json, estimate_to_json
-from gateway.estimates.estimate import Estimate, Weights
+from gateway.estimates.batch_estimate import Estimate, Weights
 from gateway.records import Why, json_line
 from gateway.store.journal import ESTIMATE, REJECTION
 from gateway.web.live.stream import Fanout

@@ -14,7 +14,7 @@ from gateway.core.events.entry import EntryKind
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.limits import Room, rooms_of
 from gateway.core.weights.room import Halves, room_of
-from gateway.estimates.estimate import Estimate, Lack, Quantity, Weights
+from gateway.estimates.batch_estimate import Estimate, Lack, Quantity, Weights
 from gateway.records import iso_utc, rounded
 from gateway.status import OwnReading, State, Status
 from gateway.store import StoreReader

@@ -11,7 +11,7 @@ from starlette.responses import Response
 
 from gateway.core.ratio_index.index import Band
 from gateway.estimates.as_json import estimate_to_json, spectra_to_json
-from gateway.estimates.estimate import Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.model.displayed import Fitted, modelled_spectra
 from gateway.records import Spectra as SpectraSeen
 from gateway.records import Why, json_line

@@ -14,7 +14,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, ProcessCol
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from starlette.responses import JSONResponse, Response
 
-from gateway.estimates.estimate import PLACES
+from gateway.estimates.batch_estimate import PLACES
 from gateway.estimates.quantities import FOUND, Outward
 from gateway.records import Why
 from gateway.status import State, Status

@@ -11,7 +11,7 @@ from gateway.core.alarms.rules import as_of_load
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.limits import Light
 from gateway.core.weights.verdict import Says, Verdict, verdict_of
-from gateway.estimates.estimate import Estimate, Weights
+from gateway.estimates.batch_estimate import Estimate, Weights
 from gateway.estimates.quantity import Z95
 from gateway.estimates.reasons import EXPLANATIONS, Cause
 from gateway.records import Why, rounded

@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.limits import is_over_limit
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, PayloadPlace, place_of, unsprung_kg, weighed
-from gateway.estimates.estimate import Estimate, Weight, Weights
+from gateway.estimates.batch_estimate import Estimate, Weight, Weights
 from gateway.estimates.quantities import QUANTITIES
 from gateway.records import iso_utc, rounded
 from gateway.stated.facts import Instant
