@@ -299,7 +299,12 @@ class Feeder:
     """Feeds until :meth:`stop`. A failing bus or gpsd is tried again; a device that disappears ends the feeding."""
 
     def __init__(
-        self, interface: str, channel: str, devices: Sequence[IioDevice], gps: Gpsd | None, say: Callable[[str], None]
+        self,
+        interface: str,
+        channel: str,
+        devices: Sequence[IioDevice],
+        gps: Gpsd | None,
+        say: Callable[[str], None] = lambda text: None,
     ) -> None:
         self.devices, self._place, self._gps, self._say = devices, (interface, channel), gps, say
         self.n_fixes = self.n_sent = self.n_dropped = 0
@@ -324,7 +329,8 @@ class Feeder:
                 device.open()
             while not self._stopping.is_set():
                 on_tick()
-                ready = select.select([one for one in sources if one.fileno() >= 0], [], [], READ_S)[0]
+                self._send(np.empty(0, np.int64), {})  # opens the bus
+                ready = select.select([one for one in sources if one.fileno() >= 0], [], [], min(READ_S, RETRY_S))[0]
                 for device in self.devices:
                     if device in ready and (samples := device.read()) is not None:
                         self._feed_inertial(*samples)
@@ -374,7 +380,8 @@ class Feeder:
             if self._bus is not None:
                 self._bus.send(frames)
                 self.n_sent += len(frames)
-                self._note("bus", None)
+                if len(frames):
+                    self._note("bus", None)
                 return
         except BusError as fault:
             self._close_bus()
