@@ -2,6 +2,7 @@
 
 import time
 from abc import abstractmethod
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from typing import Final, Generic, TypeVar
@@ -11,17 +12,25 @@ from gateway.part import FIRST_PAUSE_S, STOP_WITHIN_S, BackOff, ThreadPart
 from gateway.status import UplinkStatus, WebhookStatus
 from gateway.store.journal import Delivery
 from gateway.units import NS_PER_S
-from gateway.uplink.outbox import Outbox
+from gateway.uplink.outbox import Outbox, OutboxMessage
 
-LOOK_S: Final = 5.0  # chosen: how often the backlog is counted
-IDLE_S: Final = 5.0  # chosen: how often what waits is counted; a new message is seen at once
+LOOK_S: Final = 5.0  # chosen: how often what waits is counted
+IDLE_S: Final = 5.0  # chosen: likewise where nothing comes; a new message is seen at once
 PAGE: Final = 100  # chosen: messages asked for at once
 
 Report = TypeVar("Report", UplinkStatus, WebhookStatus)
 
 
+class NotTakenError(Exception):
+    """The receiver did not take a message; it asks to be left alone for ``wait_s``."""
+
+    def __init__(self, why: str, wait_s: float = 0.0) -> None:
+        super().__init__(why)
+        self.wait_s = wait_s
+
+
 class Forwarder(ThreadPart, Generic[Report]):
-    """Owns the thread, which alone writes the report; a sender implements ``_deliver`` and ``_note``.
+    """Owns the thread, which alone writes the report; a sender implements ``_work`` and ``_note``.
 
     Messages that are undelivered at a stop are sent after the next start. Failures are in the report, not ``fault``.
     """
@@ -42,11 +51,32 @@ class Forwarder(ThreadPart, Generic[Report]):
         """The present report; safe from any thread. Its counts of waiting and pruned records are a few seconds old."""
         return self._report
 
+    def _deliver_all(
+        self, deliver: Callable[[OutboxMessage], bool], at_each_turn: Callable[[], None] = lambda: None
+    ) -> None:
+        """Deliver one message after the other until stopped; ``deliver`` returns False at a stop before its end."""
+        while not self._stopping.is_set():
+            messages = self._outbox.next_messages(PAGE)
+            self._look()
+            at_each_turn()
+            for message in messages:
+                if self._stopping.is_set() or not deliver(message):
+                    return
+                if not message.is_extra:
+                    self._outbox.delivered(message)
+            if not messages:
+                self._outbox.wait(IDLE_S)
+
     def _failed(self, failure: Exception) -> None:
-        """Put the failure into the report, and try again after a pause."""
+        """Put the failure into the report, and try again after a pause in which what waits is counted."""
         self._note(str(failure) or repr(failure))
         self._outbox.rewind()
-        self._pause(self._back_off.next_s())
+        wait_s = failure.wait_s if isinstance(failure, NotTakenError) else 0.0
+        end_s = time.monotonic() + max(self._back_off.next_s(), wait_s)
+        while not self._stopping.is_set() and (left_s := end_s - time.monotonic()) > 0.0:
+            with suppress(StoreError, TimeoutError, OSError):  # next_messages reports them
+                self._look()
+            self._stopping.wait(min(left_s, LOOK_S))
 
     @abstractmethod
     def _note(self, fault: str) -> None:
@@ -55,17 +85,6 @@ class Forwarder(ThreadPart, Generic[Report]):
     def _n_pruned(self, found: Delivery) -> int:
         """Number of records that retention removed before this sender delivered them."""
         return found.n_pruned
-
-    def _pause(self, pause_s: float) -> None:
-        """Wait before the next attempt, or until stopped, and keep counting the waiting records."""
-        end_s = time.monotonic() + pause_s
-        while not self._stopping.is_set():
-            with suppress(StoreError, TimeoutError, OSError):  # next_messages reports them
-                self._look()
-            left_s = end_s - time.monotonic()
-            if left_s <= 0.0:
-                return
-            self._stopping.wait(min(left_s, LOOK_S))
 
     def _look(self) -> None:
         """Count the waiting records, at most every LOOK_S."""

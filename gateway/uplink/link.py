@@ -18,6 +18,7 @@ from paho.mqtt.reasoncodes import ReasonCode
 from paho.mqtt.subscribeoptions import SubscribeOptions
 
 from gateway.units import S_PER_DAY
+from gateway.uplink.forwarder import NotTakenError
 from gateway.uplink.home_assistant import discovery
 from gateway.uplink.outbox import OutboxMessage
 from gateway.uplink.settings import UplinkSettings
@@ -42,10 +43,6 @@ ReasonCode.names = {
 }
 
 
-class LinkError(Exception):
-    """The connection could not be made, or it broke."""
-
-
 @dataclass(frozen=True, slots=True)
 class BrokerAnswer:
     """The broker's answer for one message. ``is_hopeless``: the broker will never accept this message."""
@@ -59,7 +56,7 @@ class MqttLink:
     """Connects on construction, leaves the will with the broker and publishes the birth message, which the broker must
     acknowledge.
 
-    Raises LinkError if the broker cannot be reached, refuses the connection or does not take the birth message,
+    Raises NotTakenError if the broker cannot be reached, refuses the connection or does not take the birth message,
     ConfigurationError if a TLS or password file cannot be used. One thread sends; paho's thread only puts what it hears
     into a queue.
     """
@@ -87,7 +84,7 @@ class MqttLink:
             self._connect()
             code = self._answer(self._publish("status", json.dumps(birth), retain=True), ANSWER_TIMEOUT_S, is_stopping)
             if code is not None and code.is_failure:
-                raise LinkError(f"{settings.broker} does not take the birth message: {code}")
+                raise NotTakenError(f"{settings.broker} does not take the birth message: {code}")
         except BaseException:
             self.abandon()
             raise
@@ -98,12 +95,12 @@ class MqttLink:
             self._client.publish(topic, text.encode(), qos=1, retain=True)  # a refusal does not stop the delivery
 
     def check(self) -> None:
-        """Raise LinkError if the connection is lost."""
+        """Raise NotTakenError if the connection is lost."""
         if self._loss is not None or not self._client.is_connected():
-            raise LinkError(self._loss or f"the connection to {self._settings.broker} was lost")
+            raise NotTakenError(self._loss or f"the connection to {self._settings.broker} was lost")
 
     def send(self, message: OutboxMessage, is_stopping: Callable[[], bool] = lambda: False) -> BrokerAnswer | None:
-        """Send one message and wait for the answer; None if it is time to stop before. Raises LinkError.
+        """Send one message and wait for the answer; None if it is time to stop before. Raises NotTakenError.
 
         A message larger than the broker's limit is not sent.
         """
@@ -124,7 +121,7 @@ class MqttLink:
 
     def close(self) -> None:
         """Disconnect cleanly, so that the broker does not publish the will."""
-        with suppress(LinkError):  # it was broken already, or the broker is gone
+        with suppress(NotTakenError):  # it was broken already, or the broker is gone
             farewell = json.dumps({"state": "offline", "reason": "stopped"})
             self._answer(self._publish("status", farewell, retain=True), FAREWELL_S)
             self._client.disconnect()
@@ -148,12 +145,9 @@ class MqttLink:
     def _make_client(self) -> mqtt.Client:
         settings = self._settings
         client = mqtt.Client(
-            CallbackAPIVersion.VERSION2,
-            settings.client_id,
-            protocol=mqtt.MQTTv5,
-            reconnect_on_failure=False,
+            CallbackAPIVersion.VERSION2, settings.client_id, protocol=mqtt.MQTTv5, reconnect_on_failure=False,
             manual_ack=True,
-        )
+        )  # fmt: skip
         client.connect_timeout = CONNECT_TIMEOUT_S
         if settings.username is not None:
             client.username_pw_set(settings.username, settings.password())
@@ -178,22 +172,19 @@ class MqttLink:
             wanted |= {"ReceiveMaximum": MOST_UNDER_WAY, "MaximumPacketSize": MOST_PACKET_BYTES}
         session = _properties(PacketTypes.CONNECT, wanted)
         try:
-            self._client.connect(
-                self._settings.host,
-                self._settings.port,
-                keepalive=self._settings.keep_alive_s,
-                clean_start=not hears,  # what was stated while the vehicle was away
+            self._client.connect(  # a session that goes on has what was stated while the vehicle was away
+                self._settings.host, self._settings.port, self._settings.keep_alive_s, clean_start=not hears,
                 properties=session,
-            )
+            )  # fmt: skip
         except (OSError, ValueError) as fault:  # ssl.SSLError and socket.gaierror are OSErrors
-            raise LinkError(f"no connection to {broker}: {fault}") from None
+            raise NotTakenError(f"no connection to {broker}: {fault}") from None
         self._client.loop_start()
         try:
             code = self._connack.get(timeout=CONNECT_TIMEOUT_S)
         except queue.Empty:
-            raise LinkError(self._loss or f"{broker} refused the connection: it did not answer") from None
+            raise NotTakenError(self._loss or f"{broker} refused the connection: it did not answer") from None
         if code.is_failure:
-            raise LinkError(f"{broker} refused the connection: {code}")
+            raise NotTakenError(f"{broker} refused the connection: {code}")
 
     def _publish(self, leaf: str, text: str, *, retain: bool = False, properties: Properties | None = None) -> int:
         """Packet identifier of what is sent. A loss shows in ``check`` and in ``_answer``: what paho returns says
@@ -203,12 +194,12 @@ class MqttLink:
         return self._client.publish(topic, text.encode(), qos=1, retain=retain, properties=properties).mid
 
     def _answer(self, mid: int, within_s: float, is_stopping: Callable[[], bool] = lambda: False) -> ReasonCode | None:
-        """The broker's code for one packet; None if it is time to stop before. Raises LinkError."""
+        """The broker's code for one packet; None if it is time to stop before. Raises NotTakenError."""
         end_s = time.monotonic() + within_s
         while not is_stopping():
             left_s = end_s - time.monotonic()
             if left_s <= 0.0:
-                raise LinkError(f"{self._settings.broker} did not acknowledge for {within_s:g} s")
+                raise NotTakenError(f"{self._settings.broker} did not acknowledge for {within_s:g} s")
             try:
                 heard, code = self._heard.get(timeout=0.0 if self._loss else min(left_s, TURN_S))
             except queue.Empty:

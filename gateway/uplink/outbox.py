@@ -38,27 +38,6 @@ class OutboxMessage:
     is_extra: bool = False  # a copy: not counted, and nothing is lost with it
 
 
-class Lately:
-    """The positions before each recently delivered message, which a killed broker may have forgotten."""
-
-    def __init__(self, span_s: float) -> None:
-        self._span_s = span_s
-        self._before: deque[tuple[float, str | None]] = deque()
-
-    def delivered(self, before: str | None, now_s: float) -> None:
-        """Note a delivered message; ``before`` is the position before it."""
-        if self._span_s > 0.0:
-            self._before.append((now_s, before))
-            while now_s - self._before[0][0] > self._span_s:
-                self._before.popleft()
-
-    def before_it(self, place: str | None) -> str | None:
-        """The position from which to send again: before the oldest of them, or ``place`` if there is none."""
-        oldest = self._before[0][1] if self._before else place
-        self._before.clear()
-        return oldest
-
-
 class Outbox:
     """Hands out messages in order; after :meth:`rewind` it starts again behind the last delivered one. Not thread-safe.
 
@@ -81,25 +60,30 @@ class Outbox:
         ``repeat_s`` is the time span sent again after a broken connection, because a killed broker forgets what it has
         not saved. ``with_latest`` also sends the newest estimate as a retained copy.
         """
-        self._journal = journal
-        self._name = name
-        self._with_places = with_places
-        self._with_latest = with_latest
+        self._journal, self._name = journal, name
+        self._with_places, self._with_latest = with_places, with_latest
         self._kinds = tuple(kind.name for kind in KINDS.values() if not only or kind.webhook_type in only)
-        self._lately = Lately(repeat_s)
+        self._repeat_s = repeat_s
+        self._lately: deque[tuple[float, str | None]] = deque()  # the position before each recently delivered message
         self._delivered: str | None = None  # until the store was asked
         self._under_way: str | None = None  # the last message handed out, until it is delivered
         self._news = threading.Event()
         self._follower = journal.follow(self._kinds, None, self.tell_news)
-        self._is_placed = False
-        self._looked: tuple[tuple[str, str | None], float, Delivery] | None = None
+        self._state: tuple[str, str | None] | None = None  # of the store and of the delivery,
+        self._since_s = 0.0  # and since when
+        self._found: Delivery | None = None
 
     def next_messages(self, limit: int) -> list[OutboxMessage]:
         """Up to ``limit`` messages after the last one handed out. Raises StoreError or TimeoutError."""
         self._news.clear()
         epoch = _epoch(self._journal.head())
-        if not self._is_placed or _epoch(self._follower.place) != epoch:
-            self._take_place(epoch)
+        if self._delivered is None or _epoch(self._follower.place) != epoch:
+            known = self._journal.delivery(self._name, self._kinds).cursor
+            if _epoch(known) != epoch:  # a new database, or a new uplink: from its first record
+                known = f"{epoch}-0"
+                self._journal.write_delivery(self._name, known)  # from here on, what retention removes is counted
+            self._delivered = known
+            self._follower.go_to(known)
         messages: list[OutboxMessage] = []
         while not messages and (records := self._follower.read(limit)):
             messages = [message for record in records if (message := self._message(record)) is not None]
@@ -116,7 +100,10 @@ class Outbox:
 
     def delivered(self, message: OutboxMessage) -> None:
         """Store that the receiver has this message and all before it."""
-        self._lately.delivered(self._delivered, time.monotonic())
+        if self._repeat_s > 0.0:
+            self._lately.append((time.monotonic(), self._delivered))
+            while self._lately[-1][0] - self._lately[0][0] > self._repeat_s:
+                self._lately.popleft()
         self._delivered = message.cursor
         if message.cursor == self._under_way:
             self._under_way = None
@@ -125,49 +112,38 @@ class Outbox:
     def rewind(self) -> None:
         """Sends undelivered messages again after a broken connection, with those delivered in the last ``repeat_s``."""
         self._under_way = None
-        self._delivered = self._lately.before_it(self._delivered)
+        if self._lately:
+            self._delivered = self._lately[0][1]
+            self._lately.clear()
         self._follower.go_to(self._delivered)
-        self._is_placed = self._delivered is not None
 
     def look(self) -> Delivery:
         """Number of waiting records, and of those that retention removed undelivered.
 
-        Queries the store only if records came or were delivered since the last query.
+        Queries the store only if records came or were delivered since, and then until they are on disk.
         """
         state, now_s = (self._journal.head(), self._delivered), time.monotonic()
-        if self._looked is None or self._looked[0] != state:
-            self._looked = (state, now_s, self._journal.delivery(self._name, self._kinds))
-        elif now_s - self._looked[1] < SETTLES_S:  # what came may not have been on disk
-            self._looked = (state, self._looked[1], self._journal.delivery(self._name, self._kinds))
-        return self._looked[2]
+        if self._state != state:
+            self._state, self._since_s, self._found = state, now_s, None
+        if self._found is None or now_s - self._since_s < SETTLES_S:
+            self._found = self._journal.delivery(self._name, self._kinds)
+        return self._found
 
     def tell_news(self) -> None:
         """Wake the sender to look for messages; from any thread."""
         self._news.set()
 
-    def _take_place(self, epoch: str) -> None:
-        """Continue at the position stored in the present database; a new uplink starts at its first record."""
-        known = self._journal.delivery(self._name, self._kinds).cursor
-        if _epoch(known) != epoch:
-            known = f"{epoch}-0"
-            self._journal.write_delivery(self._name, known)  # from here on, what retention removes is counted
-        self._delivered = known
-        self._follower.go_to(known)
-        self._is_placed = True
-
     def _message(self, record: JournalRecord) -> OutboxMessage | None:
-        """The message of a record; None, and logged, for a record that this program cannot read."""
+        """The message of a record: without spectra, and with positions only if they are wanted. None, and logged, for a
+        record that this program cannot read.
+        """
         try:
-            return message_of_record(record, self._shown(record.text))
+            shown: dict[str, Any] = json.loads(record.text if self._with_places else without_places(record.text))
+            shown.pop("spectra", None)
+            return message_of_record(record, shown)
         except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as fault:
             log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, seq=record.number, fault=repr(fault))
             return None
-
-    def _shown(self, text: str) -> dict[str, Any]:
-        """The part of a record that may leave the vehicle: no spectra, and positions only if they are wanted."""
-        record: dict[str, Any] = json.loads(text if self._with_places else without_places(text))
-        record.pop("spectra", None)
-        return record
 
     def _with_retained(self, messages: list[OutboxMessage]) -> list[OutboxMessage]:
         """Add a retained copy of the newest estimate under ``latest``, before that estimate."""
@@ -183,13 +159,9 @@ def message_of_record(record: JournalRecord, shown: dict[str, Any]) -> OutboxMes
     """A message for a record. Batches carry their place in the chain; each cause of alarms has a topic of its own."""
     kind = KINDS[record.kind]
     if not kind.is_revised:
-        sequence = {
-            "stream": _epoch(record.cursor), "number": record.number, "previous": record.previous
-        }  # fmt: skip
-        text = json_line(shown | {"sequence": sequence})
-        return OutboxMessage(
-            record.cursor, record.id, text, kind.branch, kind=kind.webhook_type, is_answer=record.kind == ESTIMATE
-        )
+        place = {"stream": _epoch(record.cursor), "number": record.number, "previous": record.previous}
+        text, is_answer = json_line(shown | {"sequence": place}), record.kind == ESTIMATE
+        return OutboxMessage(record.cursor, record.id, text, kind.branch, False, kind.webhook_type, is_answer)
     branch = kind.branch
     if record.kind == ALARM:
         branch = "/".join((branch, *(part for part in (shown["kind"], shown["where"]) if part)))

@@ -1,10 +1,8 @@
 """Settings of the senders: the broker, and the webhook's receiver with its signing secrets."""
 
 import base64
-import binascii
 import hashlib
 import ssl
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 from urllib.parse import urlsplit
@@ -12,6 +10,11 @@ from urllib.parse import urlsplit
 from gateway.config import VehicleSection
 from gateway.config.sections import UplinkSection, WebhookSection
 from gateway.errors import ConfigurationError
+
+PREFIX: Final = "whsec_"
+LEAST_BYTES: Final = 24  # Standard Webhooks 1.0.0: 24 to 64 bytes
+MOST_BYTES: Final = 64  # likewise
+HOW_TO_MAKE_ONE: Final = 'echo "whsec_$(openssl rand -base64 32)" > FILE'
 
 
 class UplinkSettings(UplinkSection):
@@ -38,16 +41,7 @@ class UplinkSettings(UplinkSection):
 
     def tls_context(self) -> ssl.SSLContext | None:
         """Checks the broker's certificate and name. Raises ConfigurationError for files that cannot be used."""
-        if not self.tls:
-            return None
-        try:
-            context = ssl.create_default_context(cafile=self.ca)
-            if self.certificate is not None:
-                context.load_cert_chain(self.certificate, self.key)
-        except OSError as fault:  # ssl.SSLError is one
-            names = ", ".join(str(path) for path in (self.ca, self.certificate, self.key) if path is not None)
-            raise ConfigurationError(f"[uplink] TLS files {names} cannot be used: {fault}") from None
-        return context
+        return _tls_context("[uplink] TLS files", self.ca, self.certificate, self.key) if self.tls else None
 
     def password(self) -> str | None:
         """The password, read at every connection, so that it can be changed while the service runs.
@@ -70,18 +64,17 @@ def uplink_settings(section: UplinkSection, vehicle: VehicleSection) -> UplinkSe
     if section.host is None:
         return None
     topic = section.topic.replace("{vehicle_id}", vehicle.id)
-    if any(character in topic for character in "+#\0") or topic.startswith("$"):
-        raise ConfigurationError(f"[uplink] topic {topic!r}: MQTT allows no +, # or NUL in a topic, nor a $ before it")
+    for key, told in (("topic", topic), ("home_assistant", section.home_assistant or "")):
+        if {*told} & {*"+#\0"} or told.startswith("$"):
+            raise ConfigurationError(
+                f"[uplink] {key} {told!r}: MQTT allows no +, # or NUL in a topic, nor a $ before it"
+            )
     settings = UplinkSettings(
         **section.model_dump(exclude={"port", "topic", "client_id"}),
         port=section.port if section.port is not None else (8883 if section.tls else 1883),
         topic=topic,
         client_id=section.client_id or f"springscale-{vehicle.id}",
     )
-    if any(character in (section.home_assistant or "") for character in "+#\0"):
-        raise ConfigurationError(
-            f"[uplink] home_assistant {section.home_assistant!r}: MQTT allows no +, # or NUL there"
-        )
     settings.tls_context()  # a wrong file is reported at the start
     settings.password()
     require_own_id("[uplink] host", vehicle, "two of them would cut each other's link")
@@ -97,20 +90,29 @@ def require_own_id(key: str, vehicle: VehicleSection, why: str) -> None:
         )
 
 
-HOW_TO_MAKE_ONE = 'echo "whsec_$(openssl rand -base64 32)" > FILE'
+def _tls_context(
+    where: str, ca: Path | None, certificate: Path | None = None, key: Path | None = None
+) -> ssl.SSLContext:
+    try:
+        context = ssl.create_default_context(cafile=ca)
+        if certificate is not None:
+            context.load_cert_chain(certificate, key)
+    except OSError as fault:  # ssl.SSLError is one
+        names = ", ".join(str(path) for path in (ca, certificate, key) if path is not None)
+        raise ConfigurationError(f"{where} {names} cannot be used: {fault}") from None
+    return context
 
 
-@dataclass(frozen=True, slots=True)
-class WebhookSettings:
-    """Where to push, and with what. ``kinds`` are the webhook types to send."""
+class WebhookSettings(WebhookSection):
+    """Where to push, and with what: the section with its address and its secret."""
 
     url: str
     secret_file: Path
-    kinds: tuple[str, ...]
-    ca: Path | None = None
-    timeout_s: float = 20.0
-    back_off_max_s: float = 300.0
-    give_up_s: float = 72 * 3600.0
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The webhook types to send."""
+        return tuple(kind.removesuffix("s") for kind in self.send)
 
     @property
     def receiver(self) -> str:
@@ -133,62 +135,42 @@ class WebhookSettings:
         """
         try:
             return secrets_of(self.secret_file.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, SecretError) as fault:
-            raise ConfigurationError(
-                f"[webhook] secret_file {self.secret_file} cannot be used: {fault}; one is made by {HOW_TO_MAKE_ONE}"
-            ) from None
+        except (OSError, ValueError) as fault:  # UnicodeDecodeError is one
+            told = f"{self.secret_file} cannot be used: {fault}; one is made by {HOW_TO_MAKE_ONE}"
+            raise ConfigurationError(f"[webhook] secret_file {told}") from None
 
     def tls_context(self) -> ssl.SSLContext | None:
         """Checks the receiver's certificate and name. Raises ConfigurationError for a file that cannot be used."""
-        if not self.url.startswith("https:"):
-            return None
-        try:
-            return ssl.create_default_context(cafile=self.ca)
-        except OSError as fault:  # ssl.SSLError is one
-            raise ConfigurationError(f"[webhook] ca {self.ca} cannot be used: {fault}") from None
+        return _tls_context("[webhook] ca", self.ca) if self.url.startswith("https:") else None
 
 
 def webhook_settings(section: WebhookSection, vehicle: VehicleSection) -> WebhookSettings | None:
     """The settings of [webhook]; None without a url. Raises ConfigurationError for files that cannot be used."""
-    if section.url is None or section.secret_file is None:  # the section asks for both
+    if section.url is None:
         return None
-    settings = WebhookSettings(
-        url=section.url,
-        secret_file=section.secret_file,
-        kinds=tuple(kind.removesuffix("s") for kind in section.send),
-        ca=section.ca,
-        timeout_s=section.timeout_s,
-        back_off_max_s=section.back_off_max_s,
-        give_up_s=3600.0 * section.give_up_h,
-    )
+    settings = WebhookSettings(**section.model_dump())
     settings.tls_context()  # a wrong file is reported at the start
     settings.secrets()
     require_own_id("[webhook] url", vehicle, "a receiver could not tell them apart")
     return settings
 
 
-PREFIX: Final = "whsec_"
-LEAST_BYTES: Final = 24  # Standard Webhooks 1.0.0: 24 to 64 bytes
-MOST_BYTES: Final = 64  # likewise
-
-
-class SecretError(ValueError):
-    """The text is no secret to sign with."""
-
-
 def secrets_of(text: str) -> tuple[bytes, ...]:
-    """One secret per line, the current one first; older ones sign too during a change-over. Raises SecretError."""
+    """One secret per line, the current one first; older ones sign too during a change-over.
+
+    Raises ValueError for a text that is no secret to sign with.
+    """
     found = tuple(_secret(line.strip()) for line in text.splitlines() if line.strip())
     if not found:
-        raise SecretError("is empty")
+        raise ValueError("is empty")
     return found
 
 
 def _secret(line: str) -> bytes:
     try:
         secret = base64.b64decode(line.removeprefix(PREFIX), validate=True)
-    except (binascii.Error, ValueError):
-        raise SecretError(f"is not {PREFIX} and base64") from None
+    except ValueError:  # binascii.Error is one
+        raise ValueError(f"is not {PREFIX} and base64") from None
     if not LEAST_BYTES <= len(secret) <= MOST_BYTES:
-        raise SecretError(f"holds {len(secret)} bytes, {LEAST_BYTES} to {MOST_BYTES} are allowed")
+        raise ValueError(f"holds {len(secret)} bytes, {LEAST_BYTES} to {MOST_BYTES} are allowed")
     return secret

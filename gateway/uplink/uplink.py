@@ -3,13 +3,14 @@
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from gateway.log import Event, log_event
 from gateway.part import BackOff
 from gateway.status import UplinkStatus
-from gateway.uplink.forwarder import IDLE_S, PAGE, Forwarder
-from gateway.uplink.link import LinkError, MqttLink
+from gateway.uplink.forwarder import Forwarder, NotTakenError
+from gateway.uplink.link import MqttLink
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import UplinkSettings
 from gateway.uplink.statements_topic import StatementsDesk, TakeStatements
@@ -37,21 +38,19 @@ class Uplink(Forwarder[UplinkStatus]):
     ) -> None:
         """``take_statements`` is handed what comes from the broker, if the settings want it."""
         super().__init__(outbox, UplinkStatus(settings.broker), back_off, settings.back_off_max_s)
-        self._settings = settings
-        self._birth = {"state": "online", **birth}
-        self._connect = connect
+        self._settings, self._birth, self._connect = settings, {"state": "online", **birth}, connect
         self._desk = StatementsDesk(take_statements) if settings.statements and take_statements is not None else None
         self._refusal: str | None = None  # of the last record, until one is accepted
 
     def _work(self) -> None:
-        """Deliver until stopped. Raises LinkError if the connection breaks."""
+        """Deliver until stopped. Raises NotTakenError if the connection breaks."""
         link = self._connect(self._settings, self._birth, self._outbox.tell_news, self._stopping.is_set)
         self._report = replace(
             self._report, is_connected=True, n_connections=self._report.n_connections + 1, last_fault=self._refusal
         )
         log_event(Event.UPLINK_CONNECTED, broker=self._settings.broker)
         try:
-            self._deliver_in_turn(link)
+            self._deliver_all(partial(self._deliver, link), partial(self._hear, link))
             link.close()
         except BaseException:
             self._report = replace(self._report, n_cuts=self._report.n_cuts + 1)
@@ -60,21 +59,11 @@ class Uplink(Forwarder[UplinkStatus]):
         finally:
             self._report = replace(self._report, is_connected=False)
 
-    def _deliver_in_turn(self, link: MqttLink) -> None:
-        """One message is in flight at a time, which keeps the order."""
-        while not self._stopping.is_set():
-            messages = self._outbox.next_messages(PAGE)
-            self._look()
-            link.check()
-            self._hear(link)
-            for message in messages:
-                if not self._deliver_one(link, message):
-                    return
-            if not messages:
-                self._outbox.wait(IDLE_S)  # a new record, statements or the loss of the link end it
-
     def _hear(self, link: MqttLink) -> None:
-        """Take the statements that came; each is acknowledged when it is on disk or refused for good."""
+        """Take the statements that came; each is acknowledged when it is on disk or refused for good. Raises
+        NotTakenError if the link is lost.
+        """
+        link.check()
         if self._desk is None:
             return
         if link.subscription_fault is not None:
@@ -84,8 +73,8 @@ class Uplink(Forwarder[UplinkStatus]):
             link.acknowledge_statements()
         self._report = replace(self._report, statements=self._desk.report)
 
-    def _deliver_one(self, link: MqttLink, message: OutboxMessage) -> bool:
-        """Send one message; False at a stop before its answer. Raises LinkError if the answer asks to retry."""
+    def _deliver(self, link: MqttLink, message: OutboxMessage) -> bool:
+        """Send one message; False at a stop before its answer. Raises NotTakenError if the answer asks to retry."""
         answer = link.send(message, self._stopping.is_set)
         if answer is None:
             return False
@@ -103,8 +92,7 @@ class Uplink(Forwarder[UplinkStatus]):
             self._report = replace(report, n_refused=report.n_refused + 1, last_fault=self._refusal)
         else:
             self._refusal = f"{report.broker} does not take estimates: {answer.reason}"
-            raise LinkError(self._refusal)
-        self._outbox.delivered(message)
+            raise NotTakenError(self._refusal)
         self._back_off.reset()
         return True
 

@@ -22,7 +22,7 @@ from gateway.part import BackOff
 from gateway.records import json_line
 from gateway.status import WebhookStatus
 from gateway.store.journal import ESTIMATE, Delivery
-from gateway.uplink.forwarder import IDLE_S, PAGE, Forwarder
+from gateway.uplink.forwarder import Forwarder, NotTakenError
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import WebhookSettings
 
@@ -71,40 +71,32 @@ class Webhook(Forwarder[WebhookStatus]):
         super().__init__(outbox, WebhookStatus(settings.receiver), back_off, settings.back_off_max_s)
         self._settings, self._on_event, self._clock_s = settings, on_event, clock_s
         self._tls = settings.tls_context()
+        self._refused_since_s: float | None = None  # the message that is tried
 
     def _work(self) -> None:
-        while not self._stopping.is_set():
-            messages = self._outbox.next_messages(PAGE)
-            self._look()
-            for message in messages:
-                if not self._done(message):
-                    return
-                self._outbox.delivered(message)
-            if not messages:
-                self._outbox.wait(IDLE_S)
+        self._deliver_all(self._deliver)
 
-    def _done(self, message: OutboxMessage) -> bool:
-        """Try until the message is accepted or dead; False if the service was stopped before."""
-        refused_since_s = None
-        while not self._stopping.is_set():
-            status, told, wait_s = self._posted(message)
-            if 200 <= status < 300:
-                if self._report.last_fault is not None:
-                    log_event(Event.WEBHOOK_CONNECTED, receiver=self._settings.receiver)
-                self._report = replace(self._report, n_delivered=self._report.n_delivered + 1, last_fault=None)
-                self._back_off.reset()
-                return True
-            self._note(told)
-            self._report = replace(self._report, n_failed=self._report.n_failed + 1)
-            now_s = self._clock_s()
-            refused_since_s = None if status in AWAY else refused_since_s or now_s
-            if status in UNWANTED or now_s - (refused_since_s or now_s) >= self._settings.give_up_s:
-                dead = {"receiver": self._settings.receiver, "id": message.id, "reason": told}
-                tell_event(Event.WEBHOOK_REFUSED, dead, self._on_event, logging.ERROR)  # it stays in the history
-                self._report = replace(self._report, n_dead=self._report.n_dead + 1)
-                return True
-            self._pause(max(self._back_off.next_s(), wait_s))
-        return False
+    def _deliver(self, message: OutboxMessage) -> bool:
+        """Post a message once; True if it is done. Raises NotTakenError if it must come again."""
+        status, told, wait_s = self._posted(message)
+        report, now_s = self._report, self._clock_s()
+        if 200 <= status < 300:
+            if report.last_fault is not None:
+                log_event(Event.WEBHOOK_CONNECTED, receiver=report.receiver)
+            self._report = replace(report, n_delivered=report.n_delivered + 1, last_fault=None)
+            self._refused_since_s = None
+            self._back_off.reset()
+            return True
+        self._report = replace(report, n_failed=report.n_failed + 1)
+        self._refused_since_s = None if status in AWAY else self._refused_since_s or now_s
+        if status not in UNWANTED and now_s - (self._refused_since_s or now_s) < 3600.0 * self._settings.give_up_h:
+            raise NotTakenError(told, wait_s)
+        self._note(told)
+        dead = {"receiver": report.receiver, "id": message.id, "reason": told}
+        tell_event(Event.WEBHOOK_REFUSED, dead, self._on_event, logging.ERROR)  # it stays in the history
+        self._report = replace(self._report, n_dead=report.n_dead + 1)
+        self._refused_since_s = None
+        return True
 
     def _posted(self, message: OutboxMessage) -> tuple[int, str, float]:
         """One attempt -> HTTP status or NO_ANSWER, what happened, and the seconds that Retry-After asks for."""

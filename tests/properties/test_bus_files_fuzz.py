@@ -19,9 +19,9 @@ from gateway.bus.logs.log_report import LogReport
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
 from gateway.bus.signals.dbc import Databases
 from gateway.bus.signals.signal_map import unsound_messages
-from gateway.cli.look import look_json, look_text
+from gateway.cli.look import look_lines
 from gateway.errors import ConfigurationError, LogUnreadableError, SignalMapError
-from gateway.offline.look.log_look import look
+from gateway.offline.look.log_look import Look
 from gateway.records import Frames, json_line
 
 N_FILES: Final = 500  # of each kind
@@ -239,6 +239,6 @@ def test_look_shows_a_log_of_any_content_or_says_why_not(
     path.write_bytes(changed(sound(kind), where))
     (tmp_path / "a.dbc").write_bytes(changed(DATABASE, where))
     with limits(), contextlib.suppress(LogUnreadableError):
-        seen = look(path)
-        look_text(seen)
-        json_line(look_json(seen))
+        seen = Look(path)
+        assert "".join(look_lines(seen, []))
+        json_line(seen.to_json())

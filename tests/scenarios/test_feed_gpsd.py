@@ -86,7 +86,7 @@ def test_readings_of_the_receiver_are_sent_to_the_bus(tmp_path: Path) -> None:
     assert program is not None
     with receiver([None] * 5 + [13.9] * 20 + [25.0]) as nmea, (tmp_path / "gpsd.log").open("wb") as log:
         gpsd = subprocess.Popen([program, "-N", "-n", "-S", str(port), f"tcp://127.0.0.1:{nmea}"], stderr=log)
-        feeder = Feeder("virtual", "feed-gpsd", [], Gpsd("127.0.0.1", port))
+        feeder = Feeder("virtual", "feed-gpsd", [], Gpsd("127.0.0.1", port), print)
         thread = threading.Thread(target=feeder.run)
         with can.Bus(interface="virtual", channel="feed-gpsd") as bus:
             notifier = can.Notifier(bus, [heard.append])

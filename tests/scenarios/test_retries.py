@@ -129,7 +129,7 @@ def pushing(folder: Path, port: int, secret: str | None = SECRET_TEXT) -> Iterat
         (folder / "secret").write_text(secret)
     store = Store.open(folder / "state")
     store.write_entry("alarm", "alarm-1", 1, json_line({"id": "alarm-1", "revision": 1, "kind": "a", "where": "b"}))
-    settings = WebhookSettings(f"http://127.0.0.1:{port}/", folder / "secret", ("alarm",))
+    settings = WebhookSettings(url=f"http://127.0.0.1:{port}/", secret_file=folder / "secret", send=("alarms",))
     webhook = Webhook(settings, Outbox(store, "hook", only=("alarm",)), back_off=BackOff(0.001, 0.001))
     webhook.start()
     yield lambda: webhook.report().n_failed

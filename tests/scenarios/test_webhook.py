@@ -36,7 +36,7 @@ from gateway.uplink.settings import WebhookSettings
 from gateway.uplink.webhook import Webhook
 
 store = Store.open(pathlib.Path(sys.argv[1]))
-settings = WebhookSettings(f"http://127.0.0.1:{sys.argv[2]}/hook", pathlib.Path(sys.argv[3]), ("alarm", "event"))
+settings = WebhookSettings(url=f"http://127.0.0.1:{sys.argv[2]}/hook", secret_file=pathlib.Path(sys.argv[3]))
 outbox = Outbox(store, settings.queue, only=settings.kinds)
 Webhook(settings, outbox, back_off=BackOff(0.01, 0.05)).start()
 print("started", flush=True)
@@ -56,15 +56,11 @@ class Sending:
 
     def __init__(self, directory: Path, port: int, secret_file: Path, **changed: object) -> None:
         self.store = Store.open(directory)
-        told = {
-            "timeout_s": 5.0,
-            "give_up_s": 3600.0,
-            "kinds": KINDS,
-            "url": f"http://127.0.0.1:{port}/hook",
-            **changed,
-        }
+        settings = WebhookSettings(
+            url=f"http://127.0.0.1:{port}/hook", secret_file=secret_file, timeout_s=5.0, give_up_h=1.0
+        )
+        settings = settings.model_copy(update=changed)
         self.clock_s = 1.0
-        settings = WebhookSettings(secret_file=secret_file, **told)  # type: ignore[arg-type]
         self.kept: list[tuple[str, dict[str, str]]] = []
         self.webhook = Webhook(
             settings,
@@ -284,7 +280,9 @@ def test_a_missing_secret_is_reported_until_it_is_back(tmp_path: Path, secret_fi
 def test_every_revision_of_an_alarm_is_delivered(tmp_path: Path, secret_file: Path) -> None:
     bench = AlarmBench(tmp_path / "state")
     with Receiver() as receiver:
-        settings = WebhookSettings(f"http://127.0.0.1:{receiver.port}/hook", secret_file, ("alarm",))
+        settings = WebhookSettings(
+            url=f"http://127.0.0.1:{receiver.port}/hook", secret_file=secret_file, send=("alarms",)
+        )
         outbox = Outbox(bench.store, settings.queue, only=settings.kinds)
         webhook = Webhook(settings, outbox)
         webhook.start()

@@ -16,14 +16,14 @@ Scan = tuple[tuple[int, int, int], tuple[int, int, int], int]
 class FakeIio:
     """An MPU-6050 as its driver shows it: big-endian 16 bits, accelerometer, temperature, gyroscope, time stamp."""
 
-    def __init__(self, folder: Path, name: str = "mpu6050", *, has_gyro: bool = True, has_stamps: bool = True) -> None:
+    def __init__(self, folder: Path, name: str = "mpu6050", *, has_gyro: bool = True) -> None:
         self.sysfs, self.nodes = folder / "sys", folder / "dev"
         device = self.sysfs / "iio:device0"
         (device / "scan_elements").mkdir(parents=True)
         (device / "buffer").mkdir()
         self.nodes.mkdir()
         self.device = device
-        self._has_gyro, self._has_stamps = has_gyro, has_stamps
+        self._has_gyro = has_gyro
         texts = {
             "name": name,
             "sampling_frequency": "50",
@@ -40,12 +40,11 @@ class FakeIio:
         for channel, index in channels:
             texts |= {f"scan_elements/{channel}_en": "1" if channel == "in_temp" else "0"}
             texts |= {f"scan_elements/{channel}_index": str(index), f"scan_elements/{channel}_type": "be:s16/16>>0"}
-        if has_stamps:
-            texts |= {
-                "scan_elements/in_timestamp_en": "0",
-                "scan_elements/in_timestamp_index": "7",
-                "scan_elements/in_timestamp_type": "le:s64/64>>0",
-            }
+        texts |= {
+            "scan_elements/in_timestamp_en": "0",
+            "scan_elements/in_timestamp_index": "7",
+            "scan_elements/in_timestamp_type": "le:s64/64>>0",
+        }
         for path, text in texts.items():
             (device / path).write_text(text + "\n")
         self.node = self.nodes / "iio:device0"
@@ -58,8 +57,6 @@ class FakeIio:
         """One scan: the temperature is switched off by then; the stamp lies at a multiple of eight."""
         accel, gyro, t_ns = scan
         words = struct.pack(">3h", *accel) + (struct.pack(">3h", *gyro) if self._has_gyro else b"")
-        if not self._has_stamps:
-            return words
         return words + b"\0" * (-len(words) % 8) + struct.pack("<q", t_ns)
 
     @contextmanager

@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from support.bus_drive import bus_drive
 from support.commands import called, printed
-from support.encoded import encode_signals
 from support.half_car_road import VAN
 from support.spoiled import limits
 
-from gateway.bus.frames import merge_frames, message_of
+from gateway.bus.frames import merge_frames, message_of, take
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import load_signal_map
 from gateway.calibration.inspection.drive import LogFacts, SplitRun, row_facts
@@ -25,8 +24,8 @@ from gateway.calibration.known_run import KnownRun
 from gateway.core.batch_settings import BatchSettings
 from gateway.errors import ConfigurationError
 from gateway.offline.campaigns import _silent, read_whole_log
-from gateway.offline.look import log_look as look_module
-from gateway.offline.look.log_look import MOST_IDENTIFIERS
+from gateway.offline.look import heard as heard_module
+from gateway.offline.look.heard import MOST_IDENTIFIERS
 from gateway.offline.look.roles import axis_of
 from gateway.records import EXTENDED_ID, Frames, Signal
 from gateway.status import DecodeCount, SignalHealth, State, Status
@@ -99,11 +98,11 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_box_on_its_side_is_mapped_by_gravity_and_braking(box: Path, tmp_path: Path) -> None:
     output = box.parent / "signals.toml"
     told = run(box, "--output", output)
-    assert "BOX.AccY: -9.80 m/s2  reads -9.80 m/s2: this axis is vertical" in told
+    assert "BOX.AccY: -9.80 m/s2  vertical_acceleration, sign -1: reads -9.80 m/s2: this axis is vertical" in told
     assert "BOX.AccZ: +0." in told or "BOX.AccZ: -0." in told
     assert "points rearward: goes with the change of speed" in told
     assert "This can work." in told
-    assert f'Next: `springscale run` with signals = "{output}" in springscale.toml' in told
+    assert f'Next: `springscale run` with signals = "{output}"' in told
     mapped = {m.signal: m for message in load_signal_map(output).messages for m in message.signals}
     # up = -y, forward = -z, left = up x forward = y x z = x
     assert (mapped[Signal.VERTICAL_ACCELERATION].dbc_signal, mapped[Signal.VERTICAL_ACCELERATION].to_si) == ("AccY", -1)
@@ -176,10 +175,10 @@ def test_the_frames_kept_of_a_long_log_are_bounded(tmp_path: Path, monkeypatch: 
     t_ns = T0_NS + np.arange(40_000) * 1_000_000
     frames = merge_frames([packed(0x6A0 + n, 8, t_ns + n) for n in range(5)])
     write_candump(frames, "can0", tmp_path / "a.log")
-    monkeypatch.setattr(look_module, "KEPT_BYTES", 1000)
-    heard, _ = look_module.heard_in(tmp_path / "a.log")
+    monkeypatch.setattr(heard_module, "MOST_KEPT", 1000)
+    heard, _ = heard_module.heard_in(tmp_path / "a.log")
     assert [one.n_frames for one in heard] == [40_000] * 5
-    assert [len(one.kept) for one in heard[1:]] == [look_module.FIRST_FRAMES] * 4
+    assert [len(one.frames) for one in heard[1:]] == [heard_module.FIRST_FRAMES] * 4
 
 
 def test_a_map_is_not_written_over(box: Path) -> None:
@@ -251,47 +250,30 @@ def test_two_channels_are_two(tmp_path: Path) -> None:
     ]
 
 
-def of_reference(samples: dict[Signal, float], t_ns: np.ndarray) -> Frames:
-    signals = load_signal_map("springscale:reference")
-    constant = {signal: np.full(len(t_ns), x) for signal, x in samples.items()}
-    return encode_signals(signals, dict.fromkeys(constant, t_ns), constant)
+UNITS = "m/s^2, m/s2, m/s², m/s/s, g, mg"
+UNKNOWN = f"no acceleration reads 9.8 m/s2: no database describes one in {UNITS}: give that of the sensor by --dbc"
+NO_GRAVITY = "no acceleration reads 9.8 m/s2: the sensor is not in this log, or takes gravity off"
+NO_SPEED = "no speed: add [signals.speed] from a GNSS receiver or the vehicle"
 
 
 @pytest.mark.parametrize(
-    ("mps2", "rate_hz", "words"),
+    ("frames", "dbc", "lacking"),
     [
-        (0.0, 100.0, "no acceleration reads 9.8 m/s2"),
-        (9.8, 20.0, "comes 20 times a second; 40 are needed"),
+        (box_on_its_side(0.0), DBC, [NO_GRAVITY]),
+        (take(whole := box_on_its_side(), whole.t_ns % 50_000_000 < 2), DBC,
+         [f"{name} comes 20 times a second; 40 are needed" for name in ("BOX.AccY", "TURN.GyroX")]),
+        (packed(0x321, 8, T0_NS + np.arange(500) * 10_000_000), "", [UNKNOWN, NO_SPEED]),
+        (packed(512, 8, T0_NS + np.arange(500) * 10_000_000), DBC.replace('"m/s^2"', '"m/s**2"'), [UNKNOWN, NO_SPEED]),
     ],
-)
-def test_obstacles_are_reported(mps2: float, rate_hz: float, words: str, tmp_path: Path) -> None:
-    (tmp_path / "box.dbc").write_text(DBC)
-    whole = box_on_its_side(mps2)
-    is_kept = np.ones(len(whole), bool) if rate_hz == 100.0 else whole.t_ns % 50_000_000 < 2
-    thinned = Frames(whole.t_ns[is_kept], whole.can_id[is_kept], whole.length[is_kept], whole.payload[is_kept])
-    write_candump(thinned, "can0", tmp_path / "drive.log")
-    told = run(tmp_path / "drive.log")
-    assert "This cannot work yet:" in told
-    assert words in told
-
-
-def test_an_unknown_sensor_asks_for_its_database(tmp_path: Path) -> None:
-    write_candump(packed(0x321, 8, T0_NS + np.arange(500) * 10_000_000), "can0", tmp_path / "drive.log")
+    ids=["no gravity", "slow", "no database", "an unknown unit"],
+)  # fmt: skip
+def test_obstacles_are_reported(frames: Frames, dbc: str, lacking: list[str], tmp_path: Path) -> None:
+    if dbc:
+        (tmp_path / "box.dbc").write_text(dbc)
+    write_candump(frames, "can0", tmp_path / "drive.log")
     told = seen(tmp_path / "drive.log")
-    assert not told["can_work"]
-    assert told["lacking"] == [
-        "no database describes an acceleration in it: give the DBC of the sensor with --dbc"
-    ]  # fmt: skip
-
-
-def test_an_unknown_unit_is_reported_with_the_known_ones(tmp_path: Path) -> None:
-    """It described the acceleration, and was asked for."""
-    write_candump(packed(512, 8, T0_NS + np.arange(500) * 10_000_000), "can0", tmp_path / "drive.log")
-    (tmp_path / "box.dbc").write_text(DBC.replace('"m/s^2"', '"m/s**2"'))
-    assert seen(tmp_path / "drive.log")["lacking"] == [
-        "no signal of BOX has a unit of acceleration (m/s^2, m/s2, m/s², m/s/s, g, mg): "
-        "correct the unit in the database"
-    ]
+    assert (told["can_work"], told["lacking"]) == (False, lacking)
+    assert "This cannot work yet:\n  " + "\n  ".join(lacking) in run(tmp_path / "drive.log")
 
 
 def test_a_database_of_another_device_is_no_certainty(tmp_path: Path) -> None:
@@ -300,7 +282,7 @@ def test_a_database_of_another_device_is_no_certainty(tmp_path: Path) -> None:
     payload = drive.payload.copy()
     payload[drive.can_id < 0x130, 7] = 0
     write_candump(Frames(drive.t_ns, drive.can_id, drive.length, payload), "can0", tmp_path / "drive.log")
-    assert "if springscale_reference.dbc describes your device" in run(tmp_path / "drive.log")
+    assert "is springscale_reference.dbc the database of this device?" in run(tmp_path / "drive.log")
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,8 @@ from gateway.errors import ConfigurationError
 from gateway.log import Event
 from gateway.part import BackOff
 from gateway.store import Retention, Store
-from gateway.uplink.link import BrokerAnswer, LinkError
+from gateway.uplink.forwarder import NotTakenError
+from gateway.uplink.link import BrokerAnswer
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.settings import UplinkSettings, uplink_settings
 from gateway.uplink.uplink import Uplink
@@ -100,7 +101,7 @@ def test_after_a_break_only_the_message_in_flight_is_repeated(store: Store) -> N
     def answer(n: int, message: OutboxMessage) -> BrokerAnswer | None:
         if n in breaks:
             broker.taken.append(message)  # it arrived, its answer did not
-            raise LinkError("cut")
+            raise NotTakenError("cut")
         return accepted(n, message)
 
     broker = FakeBroker(answer)
@@ -159,7 +160,7 @@ def test_waiting_records_are_counted_without_a_link(store: Store, monkeypatch: p
     fill(store, 3)
 
     def unreachable(*_: Any) -> FakeBroker:
-        raise LinkError("no route to host")
+        raise NotTakenError("no route to host")
 
     uplink = Uplink(SETTINGS, Outbox(store, "fleet"), {}, unreachable, BackOff(60.0, 60.0))
     uplink.start()
@@ -290,12 +291,12 @@ def test_the_log_reports_connects_and_disconnects(store: Store, caplog: pytest.L
 
     def connect(*_: Any) -> FakeBroker:
         if (fault := next(faults)) is not None:
-            raise LinkError(fault)
+            raise NotTakenError(fault)
         return broker()
 
     def answer(n: int, message: OutboxMessage) -> BrokerAnswer:
         if n == 2:
-            raise LinkError("cut")
+            raise NotTakenError("cut")
         return accepted(n, message)
 
     broker = FakeBroker(answer)

@@ -1,5 +1,5 @@
 """Inspects an unknown log: its content, and whether it suffices to weigh a vehicle.
 
-A log and databases go in; identifiers with their rates, the matching shipped signal maps, the axis with gravity and a
+A log and databases go in; identifiers with their rates, the shipped signal maps that fit, the axis with gravity and a
 draft of a signal map come out. Only the databases are trusted.
 """

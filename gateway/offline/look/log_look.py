@@ -1,443 +1,268 @@
-"""Inspects a log: its identifiers, their signals by the databases, the shipped maps that fit, and what is lacking."""
+"""Looks at a log: the shipped maps that fit it, the roles of its signals, what is lacking, and a draft of a map."""
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+import json
+import math
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from gateway.bus.frames import join, merge_frames, take, widened
-from gateway.bus.logs import LogReport, open_whole_log
-from gateway.bus.signals import Decoder, load_signal_map
+from gateway.bus.frames import merge_frames
+from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map, shipped_map
 from gateway.bus.signals.bit_field import Coding
-from gateway.bus.signals.dbc import DatabaseMessage, Databases, DatabaseSignal
-from gateway.bus.signals.decode import (
-    RANGE_TOLERANCE_STEPS,
-    SAME_SPEED_SHARE,
-    TELLING_SHARE,
-    is_j1939_code,
-    told_lengths,
-    told_range,
-    told_share,
-)
-from gateway.bus.signals.mapping import CAN_FD_BYTES, CLASSIC_BYTES, SOURCE_ADDRESS, id_name, j1939_filter
-from gateway.bus.signals.signal_map import shipped_databases, shipped_maps
+from gateway.bus.signals.dbc import DatabaseMessage, Databases
+from gateway.bus.signals.decode import SAME_SPEED_SHARE, TELLING_SHARE
+from gateway.bus.signals.mapping import SOURCE_ADDRESS, id_name
+from gateway.bus.signals.signal_map import FEWEST_COUNTER_BITS, MOST_COUNTER_BITS, shipped_databases, shipped_maps
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE
 from gateway.core.batch_settings import BatchSettings
-from gateway.errors import SignalMapError
-from gateway.offline.look.roles import FoundRole, roles_of, tilt_deg
-from gateway.records import ASIDE, EXTENDED_ID, F64, Frames, Signal
-from gateway.units import NS_PER_S, STANDARD_GRAVITY_MPS2, TO_SI
+from gateway.errors import ConfigurationError, SignalMapError, SpringscaleError
+from gateway.files.whole import refusal_told, write_whole, written_whole
+from gateway.offline.look.heard import Heard, SignalReading, heard_in, readings_of, with_message
+from gateway.offline.look.roles import FoundRole, beside, roles_of
+from gateway.records import ASIDE, Signal
+from gateway.units import STANDARD_GRAVITY_MPS2, TO_SI
 
-KEPT_FRAMES: Final = 100_000  # chosen: of one identifier: a quarter of an hour at 100 Hz; counts cover all frames
-KEPT_BYTES: Final = 100_000_000  # chosen: of all frames kept; beyond it an identifier gets its first few
-FIRST_FRAMES: Final = 200  # chosen: the few
-MOST_IDENTIFIERS: Final = 4096  # chosen: of one channel; a bus has some hundreds
 LEAST_RATE_HZ: Final = RATE_MIN_SHARE * BatchSettings().rate_hz
 MOST_TILT_DEG: Final = 15.0  # chosen: 3 % of gravity; beyond it the horizontal axes mix in noticeably
-QUANTITIES: Final = ("acceleration", "angular_rate", "speed")
-
-
-@dataclass(frozen=True)
-class Heard:
-    """One identifier of one channel: the number of its frames, their time span, and the first of them."""
-
-    channel: str | None
-    can_id: int
-    n_frames: int
-    duration_s: float
-    kept: Frames
-
-    @property
-    def frames(self) -> Frames:
-        """The kept frames with payload rows of all their possible bytes."""
-        return widened(self.kept, CAN_FD_BYTES)
-
-    @property
-    def rate_hz(self) -> float:
-        """Frames a second, from the first to the last."""
-        return (self.n_frames - 1) / self.duration_s if self.duration_s > 0.0 else 0.0
-
-    @cached_property
-    def lengths(self) -> dict[int, int]:
-        """How many of the kept frames have which length, the most frequent first."""
-        lengths, n_times = np.unique(self.kept.length, return_counts=True)
-        order = np.argsort(-n_times, kind="stable")
-        return dict(zip(lengths[order].tolist(), n_times[order].tolist(), strict=True))
-
-    @property
-    def name(self) -> str:
-        """The identifier as candump writes it: three digits, or eight if it has 29 bits."""
-        return id_name(self.can_id)
-
-
-def heard_in(log: Path) -> tuple[tuple[Heard, ...], LogReport]:
-    """Every identifier in order of channel and number. Raises LogUnreadableError if nothing can be read."""
-    chunks, report = open_whole_log(log)
-    of_all, n_others = _heard_of(chunks, None)
-    report.require_frames()
-    if n_others:
-        report.notes.append(
-            f"{n_others} frames are under further identifiers than the first {MOST_IDENTIFIERS}, which no bus has; "
-            "they are left out here"
-        )
-    channels = sorted(report.channels)
-    if len(channels) < 2:
-        return tuple(replace(one, channel=next(iter(channels), None)) for one in of_all), report
-    return tuple(one for each in channels for one in _heard_of(open_whole_log(log, each)[0], each)[0]), report
-
-
-def _heard_of(chunks: Iterable[Frames], channel: str | None) -> tuple[list[Heard], int]:
-    """The identifiers of the frames, all of one channel, ordered by identifier, and the number of frames of those that
-    come when there are MOST_IDENTIFIERS.
-    """
-    spans: dict[int, tuple[int, int, int]] = {}  # number of frames, first and last stamp
-    kept: dict[int, list[Frames]] = {}
-    n_others = n_bytes = 0
-    for chunk in chunks:
-        order = np.argsort(chunk.can_id, kind="stable")
-        can_ids, begins = np.unique(chunk.can_id[order], return_index=True)
-        for can_id, begin, end in zip(can_ids.tolist(), begins.tolist(), [*begins[1:].tolist(), None], strict=True):
-            rows = order[begin:end]
-            if can_id not in spans and len(spans) >= MOST_IDENTIFIERS:
-                n_others += len(rows)
-                continue
-            t_ns = chunk.t_ns[rows]
-            first_ns, last_ns = int(t_ns.min()), int(t_ns.max())
-            n, before_ns, after_ns = spans.get(can_id, (0, first_ns, last_ns))
-            spans[can_id] = n + len(rows), min(first_ns, before_ns), max(last_ns, after_ns)
-            if (room := (KEPT_FRAMES if n_bytes < KEPT_BYTES else FIRST_FRAMES) - n) > 0:
-                ours = _narrowed(take(chunk, rows[:room]))
-                kept.setdefault(can_id, []).append(ours)
-                n_bytes += sum(column.nbytes for column in (ours.t_ns, ours.can_id, ours.length, ours.payload))
-    return [
-        Heard(channel, can_id, n, (last_ns - first_ns) / NS_PER_S, _joined(kept[can_id]))
-        for can_id, (n, first_ns, last_ns) in sorted(spans.items())
-    ], n_others
-
-
-def _narrowed(frames: Frames) -> Frames:
-    """Frames, at least one, with payload rows of 8 bytes where these hold all of them."""
-    if int(frames.length.max()) > CLASSIC_BYTES:
-        return frames
-    return replace(frames, payload=frames.payload[:, :CLASSIC_BYTES].copy())
-
-
-def _joined(parts: list[Frames]) -> Frames:
-    width = max(part.payload.shape[1] for part in parts)
-    return join([widened(part, width) for part in parts], width)
-
-
-@dataclass(frozen=True, slots=True)
-class Described:
-    """An identifier and its message by a database; ``by_group`` if only the J1939 group is the same."""
-
-    heard: Heard
-    message: DatabaseMessage
-    by_group: bool
-
-    @property
-    def source_address(self) -> int:
-        return self.heard.can_id & SOURCE_ADDRESS
-
-    def is_rival(self, other: "Described") -> bool:
-        """Whether another device sends the same J1939 group on the same channel."""
-        is_same = self.message is other.message and self.heard.channel == other.heard.channel
-        return is_same and self.source_address != other.source_address
-
-    @property
-    def has_length(self) -> bool:
-        """Whether frames have the length in the database."""
-        return self.message.length in self.heard.lengths
-
-
-@dataclass(frozen=True)
-class SignalReading:
-    """One signal of one identifier: times (n,) from the log's origin, valid samples (n,) and those out of range, in
-    SI.
-    """
-
-    described: Described
-    signal: DatabaseSignal
-    quantity: str
-    t_s: F64
-    x: F64
-    beyond: F64
-
-    @property
-    def name(self) -> str:
-        """MESSAGE.SIGNAL."""
-        return f"{self.described.message.name}.{self.signal.name}"
-
-    @property
-    def rate_hz(self) -> float:
-        return self.described.heard.rate_hz
-
-    @property
-    def driving_rate_hz(self) -> float:
-        """Frames a second as they usually follow each other, if that is more: a log may have long pauses."""
-        step_s = float(np.median(np.diff(self.t_s))) if len(self.t_s) > 1 else 0.0
-        return max(self.rate_hz, 1.0 / step_s) if step_s > 0.0 else self.rate_hz
-
-    @cached_property
-    def usual(self) -> float:
-        """The median, SI; NaN without a sample."""
-        return float(np.median(self.x)) if len(self.x) else float("nan")
-
-
-def described(heard: Sequence[Heard], messages: Sequence[DatabaseMessage]) -> tuple[Described, ...]:
-    """The identifiers with a message: first a message of their length, then the first of all."""
-    found = []
-    for one in heard:
-        same = [Described(one, message, False) for message in messages if message.frame_id == one.can_id]
-        groups = [m for m in messages if m.frame_id & one.can_id & EXTENDED_ID]
-        same += [Described(one, m, True) for m in groups if j1939_filter(m.frame_id).is_for(one.can_id)]
-        if same:
-            found.append(min(same, key=lambda each: (not each.has_length, each.by_group)))
-    return tuple(found)
-
-
-def readings_of(found: Described, origin_ns: int) -> Iterator[SignalReading]:
-    """The signals with a known unit, from frames of the right length."""
-    frames = take(found.heard.frames, found.heard.frames.length == found.message.length)
-    for signal in found.message.signals.values():
-        quantity = _quantity_of(signal)
-        if quantity is None or signal.multiplexer is not None or signal.field.n_bytes > found.message.length:
-            continue
-        bits = signal.field.bits(frames.payload)
-        x = signal.field.physical(bits)
-        is_valid = np.isfinite(x)
-        if found.by_group and signal.field.coding is Coding.UNSIGNED:
-            is_valid &= ~is_j1939_code(signal.field, bits)
-        (low, high), slack = signal.limits, RANGE_TOLERANCE_STEPS * abs(signal.field.scale)
-        is_beyond = is_valid & ((x < low - slack) | (x > high + slack))
-        is_valid &= ~is_beyond
-        x = x * TO_SI[quantity][_unit_of(signal)]
-        t_s = (frames.t_ns[is_valid] - origin_ns) / NS_PER_S
-        yield SignalReading(found, signal, quantity, t_s, x[is_valid], x[is_beyond])
-
-
-def _unit_of(signal: DatabaseSignal) -> str:
-    return (signal.unit or "").strip().lower()
-
-
-def _quantity_of(signal: DatabaseSignal) -> str | None:
-    return next((quantity for quantity in QUANTITIES if _unit_of(signal) in TO_SI[quantity]), None)
-
-
-@dataclass(frozen=True, slots=True)
-class Refused:
-    """Frames of another length than the database says, or values out of its range: a sentence, their share, and the
-    quantities that lack them.
-    """
-
-    text: str
-    share: float
-    quantities: frozenset[str]
-
-
-def refused_in(
-    messages: Sequence[Described], readings: Sequence[SignalReading], sources: Collection[Path]
-) -> Iterator[Refused]:
-    """The messages with a known unit that a map by these databases would refuse."""
-    for one in messages:
-        quantities = frozenset(filter(None, map(_quantity_of, one.message.signals.values())))
-        counts, n_all = dict(one.heard.lengths), len(one.heard.kept)
-        n_right = counts.pop(one.message.length, 0)
-        if counts and quantities and one.message.source in sources:
-            text = f"{one.message.name} ({one.heard.name}): {told_lengths(counts, n_all, one.message.length)}"
-            yield Refused(text, 1.0 - n_right / n_all, quantities)
-    for each in readings:
-        if (n := len(each.beyond)) and each.described.message.source in sources:
-            n_all, to_si = len(each.described.heard.kept), TO_SI[each.quantity]
-            factor, unit = to_si[_unit_of(each.signal)], next(iter(to_si))
-            low, high = (end * factor for end in each.signal.limits)
-            read = float(each.beyond.min()), float(each.beyond.max())
-            text = f"{each.name}: {told_share(n, n_all)} values read {told_range(read, (low, high), unit)}"
-            yield Refused(text, n / n_all, frozenset({each.quantity}))
+MOSTLY: Final = 0.5  # more often than not
+COUNTED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE)  # timed by the message counter
+FIX_3D: Final = 3  # usual code of a three-dimensional GNSS fix
 
 
 @dataclass(frozen=True, slots=True)
 class MapFit:
-    """A shipped map on one channel: the signals found, the missing ones, the mean of its vertical axis, and which
-    frames do not fit it.
+    """A shipped map on one channel: the signals found and missing, the median of its vertical axis, and
+    which frames do not fit it. It fits if both inertial signals come, and gravity is on the mapped axis.
     """
 
     name: str
     channel: str | None
-    found: tuple[Signal, ...]
-    missing: tuple[Signal, ...]
-    gravity_mps2: float
-    causes: tuple[str, ...]
+    found: list[Signal]
+    missing: list[Signal]
+    vertical_mps2: float | None
+    causes: list[str]
 
     @property
-    def has_gravity(self) -> bool:
-        """Whether gravity is on the mapped axis."""
-        return abs(self.gravity_mps2 - STANDARD_GRAVITY_MPS2) < GRAVITY_TOLERANCE_MPS2
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether both inertial signals come, and gravity is on the mapped axis."""
-        return self.has_gravity and {Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE} <= set(self.found)
+    def fits(self) -> bool:
+        off_mps2 = abs((self.vertical_mps2 or 0.0) - STANDARD_GRAVITY_MPS2)
+        return off_mps2 < GRAVITY_TOLERANCE_MPS2 and {Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE} <= {*self.found}
 
 
-def fits_of(heard: Sequence[Heard]) -> tuple[MapFit, ...]:
-    """The maps with at least one signal found, the best first."""
+def fits_of(heard: Sequence[Heard]) -> list[MapFit]:
+    """The shipped maps with at least one signal found, the best first."""
     fits = []
-    for name in shipped_maps():
-        signal_map = load_signal_map(f"springscale:{name}")
+    for name in (f"{SHIPPED_PREFIX}{name}" for name in shipped_maps()):
+        signal_map = load_signal_map(name)
         for channel in sorted({one.channel for one in heard}, key=str):
             on_it = [one for one in heard if one.channel == channel]
-            ours = [one for one in on_it if any(ids.is_for(one.can_id) for ids in signal_map.filters)]
+            ours = [one.frames for one in on_it if any(ids.is_for(one.can_id) for ids in signal_map.filters)]
             decoder = Decoder(signal_map)
-            motion = decoder.decode(merge_frames([one.frames for one in ours]))
-            found = tuple(signal for signal in motion.signals if len(motion.of(signal)[1]))
-            missing = tuple(signal for signal in motion.signals if signal not in found and signal not in ASIDE)
+            motion = decoder.decode(merge_frames(ours))
+            found = [signal for signal in motion.signals if len(motion.of(signal)[1])]
+            missing = [signal for signal in motion.signals if signal not in found and signal not in ASIDE]
             vertical = motion.of(Signal.VERTICAL_ACCELERATION)[1]
-            gravity_mps2 = float(np.median(vertical)) if len(vertical) else np.nan
-            causes = tuple(cause.text for cause in decoder.causes())
-            fits.append(MapFit(name, channel, found, missing, gravity_mps2, causes))
-    return tuple(
-        sorted((fit for fit in fits if fit.found), key=lambda fit: (not fit.is_whole, len(fit.missing), fit.name))
-    )
+            vertical_mps2 = round(float(np.median(vertical)), 3) if len(vertical) else None
+            fits.append(MapFit(name, channel, found, missing, vertical_mps2, [each.text for each in decoder.causes()]))
+    return sorted((fit for fit in fits if fit.found), key=lambda fit: (not fit.fits, len(fit.missing), fit.name))
 
 
-@dataclass(frozen=True, slots=True)
 class Look:
-    """The findings about a log. ``lacking`` lists the obstacles; empty if it suffices. ``to_mend`` is what the signal
-    map must say or have corrected before, such as which of several devices counts.
+    """The findings about a log.
+
+    ``refused`` are frames and values that the databases do not allow, ``to_mend`` what a signal map must say or a
+    person must check, ``lacking`` the obstacles: none if the log suffices.
     """
 
-    log: Path
-    report: LogReport
-    heard: tuple[Heard, ...]
-    described: tuple[Described, ...]
-    fits: tuple[MapFit, ...]
-    readings: tuple[SignalReading, ...]
-    found: tuple[FoundRole, ...]
-    tilt_deg: float
-    refused: tuple[Refused, ...]
-    to_mend: tuple[str, ...]
-    lacking: tuple[str, ...]
-    faults: tuple[str, ...]
+    def __init__(self, log: Path, databases: Sequence[Path] = ()) -> None:
+        """Inspect a log with these databases (default: those beside it or in the parent folder) and the shipped ones.
 
-    @property
-    def unsure_databases(self) -> tuple[str, ...]:
-        """Shipped databases used by the findings, if no shipped map fits as it is."""
-        sources = dict.fromkeys(found.reading.described.message.source for found in self.found)
-        is_whole = any(fit.is_whole for fit in self.fits)
-        return () if is_whole else tuple(path.name for path in sources if path in shipped_databases())
+        Raises LogUnreadableError if there is no frame in it, SignalMapError for a given database that cannot be read.
+        """
+        self.log, folder = log, log.resolve().parent
+        heard, self.report = heard_in(log)
+        # campaigns have a folder per drive
+        self._own = list(databases) or sorted(folder.glob("*.dbc")) or sorted(folder.parent.glob("*.dbc"))
+        messages: list[DatabaseMessage] = []
+        self.faults: list[str] = []
+        for path in (*self._own, *shipped_databases()):
+            try:
+                sound, unsound = Databases(path, [path]).sound()
+            except SignalMapError as fault:
+                if path in databases:
+                    raise
+                sound, unsound = [], [str(fault)]
+            messages += sound
+            self.faults += unsound
+        self.heard = [with_message(one, messages, self._own) for one in heard]
+        origin_ns = min(int(one.frames.t_ns.min()) for one in heard)
+        known = [(one, one.message) for one in self.heard if one.message]
+        self.readings = [reading for one, message in known for reading in readings_of(one, message, origin_ns)]
+        able = [each for each in self.readings if len(each.x)]
+        self.found = roles_of([each for each in able if each.message.source in self._own] or able)
+        self.fits = fits_of(heard)
+        self.whole = [fit for fit in self.fits if fit.fits]
+        used = {*self._own, *(each.reading.message.source for each in self.found)}
+        self._remarks = [
+            each for reading in self.readings if reading.message.source in used for each in reading.remarks
+        ]
+        self.refused = list(dict.fromkeys(remark.text for remark in self._remarks))
+        self.to_mend = list(dict.fromkeys(self._to_mend()))
+        up = next((each for each in self.found if each.role is Signal.VERTICAL_ACCELERATION), None)
+        across_mps2 = math.hypot(*(each.usual for each in beside(able, up))) if up else 0.0
+        self.tilt_deg = round(math.degrees(math.atan2(across_mps2, abs(up.reading.usual))), 1) if up else None
+        self.lacking = list(self._lacking())
 
-    @property
-    def shipped(self) -> MapFit | None:
-        """The only shipped map that fits as it is; None if none or several do."""
-        whole = [fit for fit in self.fits if fit.is_whole]
-        return whole[0] if len(whole) == 1 else None
+    def to_json(self) -> dict[str, Any]:
+        """The findings for programs; numbers in SI."""
+        identifiers = [
+            {
+                "channel": one.channel,
+                "id": id_name(one.can_id),
+                "n_frames": one.n_frames,
+                "rate_hz": round(one.rate_hz, 2),
+                "lengths": one.lengths,
+                "message": one.message and one.message.name,
+                "database": one.message and one.message.source.name,
+            }
+            for one in self.heard
+        ]
+        return {
+            "identifiers": identifiers,
+            "signals": {each.role: _part(each, "name", "sign", "is_sure", "why") for each in self.found},
+            "left_out": self.report.left_out,
+            "maps": [_part(fit, "name", "channel", "fits", "missing", "vertical_mps2") for fit in self.fits],
+            "can_work": not self.lacking,
+            **_part(self, "tilt_deg", "refused", "to_mend", "lacking"),
+        }
 
+    def _to_mend(self) -> Iterator[str]:
+        """What suits no map as it is. J1939 devices that send the same speed are no matter."""
+        if self.whole:
+            yield from (cause for fit in self.whole for cause in fit.causes)
+            return
+        for path in dict.fromkeys(each.reading.message.source for each in self.found):
+            if path in shipped_databases():
+                yield f"is {path.name} the database of this device? Only identifiers and lengths say so"
+        for ours in (each.reading for each in self.found):
+            same = [each for each in self.readings if each.is_rival(ours) and len(each.x)]
+            if ours.quantity == "speed":
+                same = [each for each in same if not np.isclose(each.x.mean(), ours.x.mean(), SAME_SPEED_SHARE, 0.0)]
+            if same:
+                devices = " and ".join(f"{_address(one)} ({len(one.x):,} samples)" for one in (ours, *same))
+                yield f"{ours.name} comes from {devices}: state the source_address of one"
 
-def look(log: Path, databases: Sequence[Path] = ()) -> Look:
-    """Inspect a log with these databases (default: those beside it or in the parent folder) and the shipped ones.
+    def _lacking(self) -> Iterator[str]:
+        """The obstacles to weighing with this log, and their remedies."""
+        lost = {signal for each in self._remarks if each.share >= TELLING_SHARE for signal in each.signals}
+        roles = {each.role: each for each in self.found}
+        up, pitch = roles.get(Signal.VERTICAL_ACCELERATION), roles.get(Signal.PITCH_RATE)
+        has_speed = {Signal.SPEED, Signal.WHEEL_SPEED} & {*(self.whole[0].found if self.whole else roles)}
+        described = any(each.quantity == "acceleration" for each in self.readings)
+        no_database = (
+            f"no database describes one in {', '.join(TO_SI['acceleration'])}: give that of the sensor by --dbc"
+        )
+        no_gravity = "the sensor is not in this log, or takes gravity off" if described else no_database
+        for is_missing, signal, what, remedy in (
+            (not self.whole and up is None, Signal.VERTICAL_ACCELERATION, "acceleration reads 9.8 m/s2", no_gravity),
+            (not self.whole and up is not None and pitch is None, Signal.PITCH_RATE, "pitch rate could be told",
+             "drive with some braking, or name it yourself"),
+            (not has_speed, Signal.SPEED, "speed", "add [signals.speed] from a GNSS receiver or the vehicle"),
+        ):  # fmt: skip
+            if is_missing:
+                told = "frames or values that would show it are refused, as told above" if signal in lost else remedy
+                yield f"no {what}: {told}"
+        if not self.whole and (self.tilt_deg or 0.0) > MOST_TILT_DEG:
+            yield f"the sensor leans by {self.tilt_deg:.0f} degrees: mount it level, or have it turn its axes"
+        for each in (up, pitch):
+            if each is not None and (rate_hz := each.reading.rate_hz) < LEAST_RATE_HZ:
+                yield f"{each.name} comes {rate_hz:.3g} times a second; {LEAST_RATE_HZ:.0f} are needed"
 
-    Raises LogUnreadableError if there is no frame in it, SignalMapError for a given database that cannot be read.
-    """
-    heard, report = heard_in(log)
-    own, faults = _messages_of(databases or _near(log), are_given=bool(databases))
-    by_own = described(heard, own)
-    others = [one for one in heard if not any(one is each.heard for each in by_own)]
-    messages = (*by_own, *described(others, _messages_of(shipped_databases())[0]))
-    origin_ns = min(int(one.kept.t_ns.min()) for one in heard)
-    readings = tuple(reading for one in messages for reading in readings_of(one, origin_ns))
-    heard_of = [reading for reading in readings if len(reading.x)]
-    found = roles_of([r for r in heard_of if r.described in by_own] or heard_of)
-    up = next((each for each in found if each.role is Signal.VERTICAL_ACCELERATION), None)
-    tilt, fits = tilt_deg(readings, up) if up else float("nan"), fits_of(heard)
-    sources = {one.message.source for one in by_own} | {each.reading.described.message.source for each in found}
-    refused = tuple(refused_in(messages, readings, sources))
-    lacking = tuple(_lacking(by_own, found, fits, readings, tilt, refused))
-    causes = (cause for fit in fits if fit.is_whole for cause in fit.causes)
-    to_mend = tuple(dict.fromkeys([*causes, *_rivals(found, readings)]))
-    return Look(log, report, heard, messages, fits, readings, found, tilt, refused, to_mend, lacking, faults)
+    def write_draft(self, output: Path) -> list[Path]:
+        """Write a map and, beside it, the shipped databases it needs; returns the paths, the map first.
 
-
-def _rivals(found: Sequence[FoundRole], readings: Sequence[SignalReading]) -> Iterator[str]:
-    """Signals with a role that several J1939 devices send; speeds that agree are no matter."""
-    for each in found:
-        ours = each.reading
-        same = [r for r in readings if r.signal is ours.signal and r.described.is_rival(ours.described) and len(r.x)]
-        if ours.quantity == "speed":
-            same = [r for r in same if abs(np.mean(r.x) - np.mean(ours.x)) > SAME_SPEED_SHARE * abs(np.mean(ours.x))]
-        if same:
-            unit = next(iter(TO_SI[ours.quantity]))
-            devices = [
-                f"{one.described.source_address:#04x} ({len(one.x):,} samples, usually {one.usual:.3g} {unit})"
-                for one in (ours, *same)
-            ]
-            yield f"{ours.name} comes from {' and '.join(devices)}: state the source_address of one"
-
-
-def _messages_of(
-    paths: Iterable[Path], *, are_given: bool = False
-) -> tuple[tuple[DatabaseMessage, ...], tuple[str, ...]]:
-    """Every message of the databases, and the faults of those that cannot be read.
-
-    Raises SignalMapError for a whole database among them if they are given.
-    """
-    messages: list[DatabaseMessage] = []
-    faults: list[str] = []
-    for path in paths:
-        try:
-            found, unsound = Databases(path, [path]).sound()
-        except SignalMapError as fault:
-            if are_given:
-                raise
-            faults.append(str(fault))
-            continue
-        messages += found
-        faults += unsound
-    return tuple(messages), tuple(faults)
-
-
-def _near(log: Path) -> list[Path]:
-    """Databases beside a log or else in the parent folder, as campaigns have a folder per drive."""
-    folder = log.resolve().parent
-    each = (sorted(path for path in place.glob("*") if path.suffix == ".dbc") for place in (folder, folder.parent))
-    return next((found for found in each if found), [])
-
-
-def _lacking(
-    by_own: Sequence[Described],
-    found: Sequence[FoundRole],
-    fits: Sequence[MapFit],
-    readings: Sequence[SignalReading],
-    tilt: float,
-    refused: Sequence[Refused],
-) -> Iterator[str]:
-    """The obstacles to weighing with this log, and their remedies."""
-    whole = next((fit for fit in fits if fit.is_whole), None)
-    roles = {each.role: each for each in found}
-    up, pitch = roles.get(Signal.VERTICAL_ACCELERATION), roles.get(Signal.PITCH_RATE)
-    lost = {quantity for one in refused if one.share >= TELLING_SHARE for quantity in one.quantities}
-    if whole is None and not readings and not lost:
-        if own := ", ".join(sorted({one.message.name for one in by_own})):
-            units = ", ".join(TO_SI["acceleration"])
-            yield f"no signal of {own} has a unit of acceleration ({units}): correct the unit in the database"
+        Raises ConfigurationError if a file exists or the disk fails, SpringscaleError if nothing was found.
+        """
+        text = "".join(f"# CHECK: {what}\n" for what in self.to_mend)
+        if len(self.whole) == 1:
+            text += shipped_map(self.whole[0].name.removeprefix(SHIPPED_PREFIX)).read_text(encoding="utf-8")
+        elif any(each.role is Signal.VERTICAL_ACCELERATION for each in self.found):
+            text += "\n".join(self._draft(output.resolve().parent)) + "\n"
         else:
-            yield "no database describes an acceleration in it: give the DBC of the sensor with --dbc"
-        return
-    as_told = "frames or values that would show it are refused, as told above"
-    if whole is None and up is None:
-        why = "the sensor is not in this log, or takes gravity off"
-        yield f"no acceleration reads 9.8 m/s2: {as_told if 'acceleration' in lost else why}"
-    if whole is None and tilt > MOST_TILT_DEG:
-        yield f"the sensor leans by {tilt:.0f} degrees: mount it level, or have it turn its axes"
-    if whole is None and up is not None and pitch is None:
-        why = "drive with some braking, or name it yourself"
-        yield f"no pitch rate could be told: {as_told if 'angular_rate' in lost else why}"
-    if not {Signal.SPEED, Signal.WHEEL_SPEED} & set(whole.found if whole else roles):
-        why = "add [signals.speed] from a GNSS receiver or the vehicle"
-        yield f"no speed: {as_told if 'speed' in lost else why}"
-    for each in (up, pitch):
-        if each is not None and (rate_hz := each.reading.driving_rate_hz) < LEAST_RATE_HZ:
-            yield f"{each.reading.name} comes {rate_hz:.3g} times a second; {LEAST_RATE_HZ:.0f} are needed"
+            alike = f"{' and '.join(fit.name for fit in self.whole)} fit alike: take the one of your device"
+            raise SpringscaleError(f"{output} is not written: {alike if self.whole else '; '.join(self.lacking)}")
+        databases = [path for path in shipped_databases() if f'"{path.name}"' in text]
+        new = [output, *(output.parent / path.name for path in databases)]
+        if taken := [path for path in new if path.exists()]:
+            raise ConfigurationError(f"{taken[0]}: is there already, and is not written over; name another --output")
+        with refusal_told(output, ConfigurationError):
+            for path in databases:
+                with written_whole(output.parent / path.name) as file:
+                    file.write(path.read_bytes())
+            write_whole(output, text)
+        load_signal_map(output)
+        return new
+
+    def _draft(self, folder: Path) -> Iterator[str]:
+        """The lines of a map of the findings. Shipped databases are copied beside it, others named relative to it."""
+        yield f"# A first signal map, drafted from {self.log.name} by springscale look: look at what says CHECK."
+        yield from (f"# Still lacking: {what}" for what in self.lacking)
+        sources, shipped = dict.fromkeys(each.reading.message.source for each in self.found), shipped_databases()
+        paths = [each.name if each in shipped else os.path.relpath(each.resolve(), folder) for each in sources]
+        yield f"dbc = {_toml(paths)}"
+        if len({one.channel for one in self.heard}) > 1:
+            up = next(each for each in self.found if each.role is Signal.VERTICAL_ACCELERATION)
+            yield f"channel = {_toml(up.reading.heard.channel)}"
+        if any(each.reading.heard.by_group for each in self.found):
+            yield "j1939 = true"
+        for each in self.found:
+            yield ""
+            yield from _entry(each, [one for one in self.readings if one.is_rival(each.reading)])
+
+
+def _entry(found: FoundRole, rivals: list[SignalReading]) -> Iterator[str]:
+    """The lines of one signal: its conditions and its counter are the signals beside it that behave so."""
+    ours = found.reading
+    yield f"[signals.{found.role}] # {'' if found.is_sure else 'CHECK: '}{found.why}"
+    yield f"message = {_toml(ours.message.name)}"
+    yield f"signal = {_toml(ours.signal.name)}"
+    if rivals:
+        yield f"source_address = {_address(ours)} # CHECK: {', '.join(map(_address, rivals))} send it too"
+    lateness = "0.0 # CHECK: how late the receiver tells it; 0.2 is usual where it sends five times a second"
+    yield f"latency_s = {lateness}" if ours.quantity == "speed" else f"sign = {found.sign}"
+    payload = ours.heard.frames.payload[ours.heard.frames.length == ours.message.length]
+    raw = {
+        name: (each.field.length, each.field.bits(payload).astype(np.int64))
+        for name, each in ours.message.signals.items()
+        if each is not ours.signal and each.multiplexer is None and each.field.coding is not Coding.FLOAT
+        and each.field.n_bytes <= ours.message.length
+    }  # fmt: skip
+    is_flag = re.compile(r"(?i)(?<!in)valid")
+    valid = [name for name, (n, bits) in raw.items() if n == 1 and is_flag.search(name) and np.mean(bits) > MOSTLY]
+    fixes = [name for name, (_, bits) in raw.items() if name.lower().startswith("fix") and bits.max() == FIX_3D]
+    whole = [name for name in fixes if np.mean(raw[name][1] == FIX_3D) > MOSTLY]
+    if condition := (f"{_toml(valid[0])} = 1" if len(valid) == 1 else f"{_toml(whole[0])} = {FIX_3D}" if whole else ""):
+        yield f"valid_when = {{ {condition} }}"
+    counters = [
+        name for name, (n, bits) in raw.items()
+        if FEWEST_COUNTER_BITS <= n <= MOST_COUNTER_BITS and re.search(r"(?i)count|alive|seq", name)
+        and np.count_nonzero(np.diff(bits) % (1 << n) == 1) > MOSTLY * (len(bits) - 1)
+    ]  # fmt: skip
+    if found.role in COUNTED and counters:
+        yield f"counter = {_toml(counters[0])}"
+
+
+def _address(reading: SignalReading) -> str:
+    return f"{reading.heard.can_id & SOURCE_ADDRESS:#04x}"
+
+
+def _part(one: object, *names: str) -> dict[str, Any]:
+    return {name: getattr(one, name) for name in names}
+
+
+def _toml(told: str | list[str] | None) -> str:
+    return json.dumps(told, ensure_ascii=False)  # a basic string of TOML, or a list of them
