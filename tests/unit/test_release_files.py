@@ -124,19 +124,9 @@ def test_every_commented_key_of_the_shipped_configuration_is_a_setting(tmp_path:
 
 
 def test_the_shipped_configuration_shows_the_true_defaults(tmp_path: Path) -> None:
-    examples = [
-        "calibration",
-        "calibrated_as",
-        "vin",
-        "tls_certificate",
-        "tls_key",
-        "interface",  # of another bus
-        "channel",
-        "source_address",
-        "url",
-        "secret_file",
-        *(one.name for one in fields(Limits)),
-    ]
+    keys = ["calibration", "calibrated_as", "vin", "tls_certificate", "tls_key", "source_address", "url", "secret_file"]
+    of_another_bus = ("interface", "channel")
+    examples = [*keys, *of_another_bus, *(one.name for one in fields(Limits))]
     kept = [
         line
         for line in (DEPLOY / "springscale.toml").read_text().splitlines()
