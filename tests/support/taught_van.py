@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import Statement
@@ -24,6 +25,7 @@ FLAT_VAN = replace(VAN, track_width_m=None, sensor_offset_left_std_m=1e-3)
 """A vehicle of which nobody stated a width: its roll rate is not used."""
 KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))  # payload (kg), front share (%)
 USUAL_SLACK = 0.03
+ROLL = pytest.mark.parametrize("with_roll", [False, True], ids=["two sensors", "three sensors"])
 UNITS = {
     "spring_front_npm": 62e3,
     "spring_rear_npm": 70e3,
@@ -57,6 +59,11 @@ UNITS = {
     "empty_left_m": 0.01,
 }
 """No two axles or sides alike."""
+
+
+def lost(reason: str) -> pytest.MarkDecorator:
+    """A behaviour that the vehicle ought to have."""
+    return pytest.mark.xfail(strict=True, reason=reason)
 
 
 def car(*, with_roll: bool = False, **changed: float) -> F64:
