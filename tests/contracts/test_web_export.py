@@ -106,8 +106,5 @@ def test_the_last_spectra_are_those_of_the_last_batch_rejected_or_not(tmp_path: 
         told = client.get("/api/v1/spectra/latest").json()
     assert (told["id"], told["rejected"]) == (rejected.id, ["no_calibration"])
     assert told["spectra"] == estimate_to_json(rejected)["spectra"]
-    assert told["acceleration_bands"] == [
-        {"centre_hz": 2.4, "width_hz": 0.05},
-        {"centre_hz": 3.25, "width_hz": 0.05},
-    ]
+    assert told["acceleration_bands"] == [{"centre_hz": 2.4, "width_hz": 0.05}, {"centre_hz": 3.25, "width_hz": 0.05}]
     assert told["pitch_rate_bands"] is None

@@ -115,11 +115,7 @@ def test_a_stop_makes_the_load_unknown_until_it_is_weighed_again(config: Path) -
 
 @pytest.mark.parametrize(
     ("broken", "told_as"),
-    [
-        (AlarmService, "alarms failed"),
-        (LoadEventLog, "load events failed"),
-        (BatchLog, "log of batches failed"),
-    ],
+    [(AlarmService, "alarms failed"), (LoadEventLog, "load events failed"), (BatchLog, "log of batches failed")],
 )
 def test_a_failing_listener_does_not_stop_the_weighing(
     config: Path, monkeypatch: pytest.MonkeyPatch, broken: type, told_as: str

@@ -255,11 +255,7 @@ def longer(model: VehicleModel, batch: Batch, by: float) -> tuple[VehicleModel, 
     place = INDEX["sensor_position_m"]
     covariance[place] *= by
     covariance[:, place] *= by
-    far = replace(
-        batch,
-        pitch_rate_radps=batch.pitch_rate_radps / by,
-        speed_mps=by * batch.speed_mps,
-    )
+    far = replace(batch, pitch_rate_radps=batch.pitch_rate_radps / by, speed_mps=by * batch.speed_mps)
     reading = Reading(model.wheelbase_m, BAND_HZ, 256)
     usual = [
         cross_spectra_of([one], replace(reading, wheelbase_m=wheelbase)).reading.usual_log_amplitude

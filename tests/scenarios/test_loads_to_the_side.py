@@ -83,9 +83,7 @@ def sideways() -> dict[tuple[float, float, float], KnownRun]:
 
 @pytest.mark.parametrize("side", SIDES, ids=str)
 def test_a_load_to_the_side_is_weighed_and_found(
-    side: tuple[float, float, float],
-    sideways: dict[tuple[float, float, float], KnownRun],
-    rolling: VehicleModel,
+    side: tuple[float, float, float], sideways: dict[tuple[float, float, float], KnownRun], rolling: VehicleModel
 ) -> None:
     payload_kg, _, left_m = side
     run = sideways[side]

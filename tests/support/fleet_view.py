@@ -45,11 +45,7 @@ def write_table(path: Path, names: list[str]) -> None:
 def provision(folder: Path, broker: str) -> "subprocess.CompletedProcess[str]":
     asked = f"fleet.csv --settings settings.toml --broker {broker} --ca ca.pem --output out"
     return subprocess.run(
-        [sys.executable, FLEET / "provision.py", *asked.split()],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=True,
+        [sys.executable, FLEET / "provision.py", *asked.split()], cwd=folder, capture_output=True, text=True, check=True
     )
 
 

@@ -21,11 +21,7 @@ from gateway.stated.statement import StatementSource
 
 def stated(payload_kg: float, share_pct: float) -> Statement:
     return Statement(
-        source=StatementSource.KNOWN,
-        payload_kg=payload_kg,
-        front_share_pct=share_pct,
-        left_m=0.0,
-        is_compact=True,
+        source=StatementSource.KNOWN, payload_kg=payload_kg, front_share_pct=share_pct, left_m=0.0, is_compact=True
     )
 
 

@@ -69,8 +69,7 @@ def test_green_never_stands_beside_an_active_overload_alarm(
 
 
 @pytest.mark.parametrize(
-    ("weight", "says"),
-    [(LIGHT, Says.VAGUE), (NEAR, Says.NEAR), (HEAVY, Says.OVER), (UNKNOWN, Says.WEIGHT_UNKNOWN)],
+    ("weight", "says"), [(LIGHT, Says.VAGUE), (NEAR, Says.NEAR), (HEAVY, Says.OVER), (UNKNOWN, Says.WEIGHT_UNKNOWN)]
 )
 def test_a_useless_weighing_warns_and_is_never_green(weight: Weight, says: Says) -> None:
     found = verdict_of(Weights(gross=weight), is_calibrated=True, is_weighed=True, is_doubted=False, is_vague=True)
