@@ -108,6 +108,7 @@ def python(code: str) -> str:
     [
         ("gateway", ("gateway.", "numpy")),  # the Python API
         ("gateway.service.gateway", HEAVY),
+        ("gateway.cli.run, gateway.service.lifecycle", ("gateway.bus.sink", "gateway.bus.feeder")),  # what sends
         ("gateway.cli, gateway.bus.logs", ("asammdf",)),  # python-can takes it, and pandas: two seconds of every start
         ("gateway.calibration.file", FITTING),  # these take the others
     ],
