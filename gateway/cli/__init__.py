@@ -39,8 +39,7 @@ _COMMANDS = {
     "simulate": "Simulate drives, as log files or onto a bus.",
     "state": "Say to a running service what its vehicle carries, import delivery notes, and see what became of them.",
     "token": "Make, list and revoke access tokens for other machines.",
-}  # each in the module of its name, unless another room has a module of that name
-_MODULES = {"campaign": "campaign_bundle", "estimate": "estimate_logs"}
+}  # each in the module of its name
 
 INTERRUPTED = 130  # 128 and the number of SIGINT, as shells have it
 
@@ -71,7 +70,7 @@ class _Lazy(click.Group):
             return None
         name = cmd_name.replace("-", "_")
         with _without_collections():
-            command: click.Command = getattr(import_module(f"gateway.cli.{_MODULES.get(name, name)}"), name)
+            command: click.Command = getattr(import_module(f"gateway.cli.{name}"), name)
         return command
 
     def resolve_command(

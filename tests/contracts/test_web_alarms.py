@@ -21,38 +21,28 @@ URL = "/api/v1/alarms"
 OVER = LIMIT_KG + 60.0
 
 
-class Alarmed:
-    """The application with a desk of alarms behind it."""
-
-    def __init__(self, directory: Path) -> None:
-        self.bench = AlarmBench(directory)
-        desk = self.bench.desk
-        self.app = create_app(self.bench.board, self.bench.store.reader(), self._status, alarms=desk.standing)
-
-    def _status(self) -> Status:
-        return Status(version="1", state=State.ESTIMATING, uptime_s=1.0, alarms=self.bench.desk.summary())
-
-    def __enter__(self) -> "Alarmed":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.bench.board.close()
-        self.bench.store.close()
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[AlarmBench]:
+    made = AlarmBench(tmp_path)
+    made.weigh(of_load(0, OVER, n_batches=2))
+    yield made
+    made.board.close()
+    made.store.close()
 
 
 @pytest.fixture
-def alarmed(tmp_path: Path) -> Iterator[Alarmed]:
-    with Alarmed(tmp_path) as opened:
-        opened.bench.weigh(of_load(0, OVER, n_batches=2))
-        yield opened
+def client(bench: AlarmBench) -> Client:
+    def status() -> Status:
+        return Status(version="1", state=State.ESTIMATING, uptime_s=1.0, alarms=bench.desk.summary())
+
+    return Client(create_app(bench.board, bench.store.reader(), status, alarms=bench.desk.standing))
 
 
-def test_active_and_past_alarms_are_listed(alarmed: Alarmed) -> None:
-    client = Client(alarmed.app)
+def test_active_and_past_alarms_are_listed(bench: AlarmBench, client: Client) -> None:
     told = client.get(URL).json()
     assert [one["sentence"] for one in told["active"]] == ["The vehicle weighs 2560 +- 22 kg, limit 2500 kg"]
     assert told["items"] == told["active"]
-    alarmed.bench.weigh(of_load(1, 100.0))
+    bench.weigh(of_load(1, 100.0))
     later = client.get(f"{URL}?cursor={told['last_cursor']}").json()
     assert later["active"] == []
     assert [(one["id"], one["is_active"], one["revision"]) for one in later["items"]] == [
@@ -60,19 +50,19 @@ def test_active_and_past_alarms_are_listed(alarmed: Alarmed) -> None:
     ]
 
 
-def test_metrics_name_every_alarm_that_is_watched(alarmed: Alarmed) -> None:
-    text = Client(alarmed.app).get("/metrics").text
+def test_metrics_name_every_alarm_that_is_watched(client: Client) -> None:
+    text = client.get("/metrics").text
     assert 'springscale_alarm{alarm="overload.gross"} 1.0' in text
     assert 'springscale_alarm{alarm="sensor_fault.silent"} 0.0' in text
     assert "springscale_alarms_raised_total 1.0" in text
-    assert Client(alarmed.app).get("/api/v1/status").json()["alarms"]["active"] == ["overload.gross"]
+    assert client.get("/api/v1/status").json()["alarms"]["active"] == ["overload.gross"]
 
 
-def test_a_resumed_stream_sends_what_was_missed(alarmed: Alarmed) -> None:
+def test_a_resumed_stream_sends_what_was_missed(bench: AlarmBench) -> None:
     async def first() -> list[ServerSentEvent]:
-        board = alarmed.bench.board
+        board = bench.board
         told = []
-        with board.fanout.joined(alarmed.bench.store.reader(), "0000-0") as subscription:
+        with board.fanout.joined(bench.store.reader(), "0000-0") as subscription:
             async for event in subscription.events():
                 told.append(event)
                 if event.event == "alarm":
@@ -83,15 +73,14 @@ def test_a_resumed_stream_sends_what_was_missed(alarmed: Alarmed) -> None:
     assert json.loads(text or "")["kind"] == "overload"
 
 
-def test_answers_match_the_schema(alarmed: Alarmed) -> None:
+def test_answers_match_the_schema(bench: AlarmBench, client: Client) -> None:
     schema = json.loads((Path(__file__).parents[2] / "docs/alarms.schema.json").read_text())
     validator = jsonschema_rs.validator_for(schema)
-    client = Client(alarmed.app)
     (alarm,) = client.get(URL).json()["active"]
     validator.validate(alarm)
     for n in (1, 2):
-        alarmed.bench.weigh(replace(of_load(n, 100.0), rejected=(Why.PITCH_RATE_STUCK,)))
-    alarmed.bench.weigh(of_load(3, 100.0))
+        bench.weigh(replace(of_load(n, 100.0), rejected=(Why.PITCH_RATE_STUCK,)))
+    bench.weigh(of_load(3, 100.0))
     items = client.get(URL).json()["items"]
     assert sorted(one["kind"] for one in items) == ["overload", "sensor_fault"]
     for one in items:

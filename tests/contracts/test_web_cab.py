@@ -39,13 +39,8 @@ def test_room_counts_the_levers_of_both_axles_and_says_where(gateway: Gateway) -
     assert cab["room"]["is_anywhere"] is False
     assert cab["room"]["take_out"] == {"front_half_kg": 0.0, "rear_half_kg": 0.0}
     assert [spare["place"] for spare in cab["spare"]] == ["rear_axle", "front_axle", "gross"]
-    assert cab["spare"][2] == {
-        "place": "gross",
-        "kg": 300.0,
-        "std_kg": 6.0,
-        "interval95_kg": [288.2, 311.8],
-        "limit_kg": 2000.0,
-    }
+    told_kg = {"kg": 300.0, "std_kg": 6.0, "interval95_kg": [288.2, 311.8], "limit_kg": 2000.0}
+    assert cab["spare"][2] == {"place": "gross", **told_kg}
     assert cab["spare"][0]["kg"] == 169.2
     assert (cab["light"], cab["says"], cab["light_about"], cab["has_limits"]) == ("go", "go", [], True)
     assert cab["over_limit_probability"] < 1e-3
@@ -121,11 +116,6 @@ def test_before_the_first_estimate_everything_is_unknown(gateway: Gateway) -> No
     assert (cab["lacks"], cab["last_event"], cab["t_end"], cab["rejected"]) == ("estimate", None, None, [])
 
 
-def test_an_early_look_is_marked_as_one(gateway: Gateway) -> None:
-    gateway.board.publish(replace(loaded(0, 300.0, 48.0), is_provisional=True))
-    assert told(gateway)["is_early"] is True
-
-
 def test_refusals_since_the_last_answer_are_shown_with_their_reasons(gateway: Gateway) -> None:
     gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 300.0, 48.0).refused(Why.TOO_SLOW, Why.GAP))
     assert told(gateway)["rejected"] == ["too_slow", "gap"]
@@ -154,10 +144,13 @@ def test_a_useless_road_changes_nothing_and_doubt_never_clears_an_overload(gatew
     assert (told(gateway)["light"], told(gateway)["rejected"]) == ("over", ["model_misfit"])
 
 
-def test_an_old_number_is_stale(gateway: Gateway) -> None:
+def test_an_early_look_and_an_old_number_are_marked(gateway: Gateway) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     gateway.clock_s += 3600.0
-    assert (told(gateway)["age_s"], told(gateway)["is_stale"]) == (3600.0, True)
+    assert (told(gateway)["age_s"], told(gateway)["is_stale"], told(gateway)["is_early"]) == (3600.0, True, False)
+    gateway.restart_board()
+    gateway.board.publish(replace(loaded(0, 300.0, 48.0), is_provisional=True))
+    assert told(gateway)["is_early"] is True
 
 
 def test_missing_limits_or_calibration_are_named(tmp_path: Path) -> None:
@@ -180,18 +173,12 @@ def test_the_latest_load_event_is_shown_unless_withdrawn(gateway: Gateway) -> No
     assert last["t_end"] == "1970-01-01T00:03:20.000000Z"
 
 
-def test_active_alarms_are_named(gateway: Gateway) -> None:
-    gateway.publish(loaded(0, 300.0, 48.0))
+def test_active_alarms_and_readings_of_the_vehicles_own_sensors_are_passed_on(gateway: Gateway) -> None:
     assert told(gateway)["alarms"] == []
     active = ("overload.gross", "sensor_fault.silent")
-    gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(active=active)})
-    assert told(gateway)["alarms"] == list(active)
-
-
-def test_readings_of_the_vehicles_own_sensors_are_passed_on(gateway: Gateway) -> None:
     reading = OwnReading(signal="air_spring_pressure", number=412.0, unit="kPa", age_s=0.4)
-    gateway.status = BEFORE.model_copy(update={"own_readings": (reading,)})
-    assert told(gateway)["own_readings"] == [reading.model_dump()]
+    gateway.status = BEFORE.model_copy(update={"alarms": AlarmsStatus(active=active), "own_readings": (reading,)})
+    assert (told(gateway)["alarms"], told(gateway)["own_readings"]) == (list(active), [reading.model_dump()])
 
 
 @pytest.mark.parametrize(("of_useful", "light", "says"), [(0.9, "go", "go"), (1.1, "unknown", "vague")])

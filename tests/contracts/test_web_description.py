@@ -39,13 +39,7 @@ def headers(token_file: TokenFile) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def schema(token_file: TokenFile) -> Iterator[BaseSchema]:
-    with (
-        tempfile.TemporaryDirectory() as directory,
-        Gateway(
-            Path(directory),
-            tokens=token_file,
-        ) as gateway,
-    ):
+    with tempfile.TemporaryDirectory() as directory, Gateway(Path(directory), tokens=token_file) as gateway:
         gateway.publish(*(make_estimate(n, *([Why.GAP] if n % 3 == 0 else []), with_spectra=True) for n in range(20)))
         AlarmService(AlarmRules(), SUBJECT, gateway.store)(of_load(0, LIMIT_KG + 60.0, n_batches=2))
         assert gateway.store.flush(PATIENCE_S)

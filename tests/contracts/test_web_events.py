@@ -8,7 +8,7 @@ from pathlib import Path
 import jsonschema_rs
 import pytest
 from support.days import RULES, day
-from support.web import Client, Gateway
+from support.web import Gateway
 
 from gateway.core.events.ledger import Ledger
 from gateway.records import json_line
@@ -16,19 +16,16 @@ from gateway.records import json_line
 DAY = day(0.0, 500.0, 500.0, 320.0, 200.0, batches=2)
 
 
-@pytest.fixture
-def gateway(tmp_path: Path):
-    with Gateway(tmp_path) as opened:
-        ledger = Ledger(RULES)
-        for one in DAY:
-            opened.publish(one)
-            for entry in ledger.add(one):
-                opened.store.write_entry(entry.kind, entry.id, entry.t_end_ns, json_line(entry.record))
-        yield opened
+@pytest.fixture(autouse=True)
+def _driven(gateway: Gateway) -> None:
+    ledger = Ledger(RULES)
+    for one in DAY:
+        gateway.publish(one)
+        for entry in ledger.add(one):
+            gateway.store.write_entry(entry.kind, entry.id, entry.t_end_ns, json_line(entry.record))
 
 
-def test_events_and_trips_of_a_day(gateway):
-    client = Client(gateway.app)
+def test_events_and_trips_of_a_day(client):
     events = client.get("/api/v1/events").json()
     assert sorted(round(one["change_kg"]) for one in events["items"]) == [-180, -120, 500]
     assert events["next_cursor"] is None
@@ -37,8 +34,8 @@ def test_events_and_trips_of_a_day(gateway):
     assert {one["is_over"] for one in trips} == {True, False}
 
 
-def test_the_cursor_pages_through_all_events(gateway):
-    client, found, cursor = Client(gateway.app), [], ""
+def test_the_cursor_pages_through_all_events(client):
+    found, cursor = [], ""
     while cursor is not None:
         page = client.get(f"/api/v1/trips?limit=2{cursor and f'&cursor={cursor}'}").json()
         found += [one["id"] for one in page["items"]]
@@ -46,23 +43,21 @@ def test_the_cursor_pages_through_all_events(gateway):
     assert len(found) == len(set(found)) == 5
 
 
-def test_answers_match_the_schema(gateway):
+def test_answers_match_the_schema(client):
     validator = jsonschema_rs.validator_for(
         json.loads((Path(__file__).parents[2] / "docs/events.schema.json").read_text())
     )
-    client = Client(gateway.app)
     for path in ("events", "trips"):
         for one in client.get(f"/api/v1/{path}").json()["items"]:
             validator.validate(one)
 
 
 @pytest.mark.parametrize(("question", "status"), [("cursor=nonsense", 422), ("limit=0", 422), ("since=when", 422)])
-def test_invalid_queries_are_refused(gateway, question, status):
-    assert Client(gateway.app).get(f"/api/v1/events?{question}").status_code == status
+def test_invalid_queries_are_refused(client, question, status):
+    assert client.get(f"/api/v1/events?{question}").status_code == status
 
 
-def test_files(gateway):
-    client = Client(gateway.app)
+def test_files(client):
     lines = client.get("/api/v1/events.jsonl").text.splitlines()
     assert [json.loads(one)["id"] for one in lines] == [
         one["id"] for one in client.get("/api/v1/events").json()["items"]

@@ -19,46 +19,42 @@ from gateway.weighing.calibrated import CalibratedVehicle
 N_ROWS = 1203  # several pages of the store, the last one not full
 
 
-def test_every_batch_is_in_the_csv_once(tmp_path: Path) -> None:
-    with Gateway(tmp_path) as gateway:
-        gateway.publish(*(make_estimate(n, *([Why.GAP, Why.TOO_SLOW] if n % 4 == 0 else [])) for n in range(N_ROWS)))
-        answer = Client(gateway.app).get("/api/v1/export.csv")
-        assert answer.headers["content-type"] == "text/csv; charset=utf-8"
-        assert answer.headers["content-disposition"] == 'attachment; filename="springscale.csv"'
-        rows = list(csv.DictReader(io.StringIO(answer.text, newline="")))
-        assert [int(row["t_end_ns"]) for row in rows] == [make_record(n)["t_end_ns"] for n in range(N_ROWS)]
-        assert list(rows[0]) == list(COLUMNS)
-        assert rows[0]["payload_kg"] == rows[0]["payload_low95_kg"] == ""  # unknown is empty, never 0
-        assert rows[0]["rejected"] == "gap too_slow"
-        assert [float(rows[1][c]) for c in ("payload_kg", "payload_low95_kg", "payload_high95_kg")] == [101, 89, 113]
+def test_every_batch_is_in_the_csv_once(gateway: Gateway) -> None:
+    gateway.publish(*(make_estimate(n, *([Why.GAP, Why.TOO_SLOW] if n % 4 == 0 else [])) for n in range(N_ROWS)))
+    answer = Client(gateway.app).get("/api/v1/export.csv")
+    assert answer.headers["content-type"] == "text/csv; charset=utf-8"
+    assert answer.headers["content-disposition"] == 'attachment; filename="springscale.csv"'
+    rows = list(csv.DictReader(io.StringIO(answer.text, newline="")))
+    assert [int(row["t_end_ns"]) for row in rows] == [make_record(n)["t_end_ns"] for n in range(N_ROWS)]
+    assert list(rows[0]) == list(COLUMNS)
+    assert rows[0]["payload_kg"] == rows[0]["payload_low95_kg"] == ""  # unknown is empty, never 0
+    assert rows[0]["rejected"] == "gap too_slow"
+    assert [float(rows[1][c]) for c in ("payload_kg", "payload_low95_kg", "payload_high95_kg")] == [101, 89, 113]
 
 
-def test_every_batch_is_in_the_json_lines_once(tmp_path: Path) -> None:
-    with Gateway(tmp_path) as gateway:
-        records = [make_record(n, with_spectra=True) for n in range(N_ROWS)]
-        gateway.publish(*(make_estimate(n, with_spectra=True) for n in range(N_ROWS)))
-        client = Client(gateway.app)
-        with_spectra = client.get("/api/v1/export.jsonl?spectra=true").text.splitlines()
-        assert [json.loads(line) for line in with_spectra] == records
-        plain = client.get("/api/v1/export.jsonl").text.splitlines()
-        assert [json.loads(line) for line in plain] == [make_record(n) for n in range(N_ROWS)]
+def test_every_batch_is_in_the_json_lines_once(gateway: Gateway) -> None:
+    records = [make_record(n, with_spectra=True) for n in range(N_ROWS)]
+    gateway.publish(*(make_estimate(n, with_spectra=True) for n in range(N_ROWS)))
+    client = Client(gateway.app)
+    with_spectra = client.get("/api/v1/export.jsonl?spectra=true").text.splitlines()
+    assert [json.loads(line) for line in with_spectra] == records
+    plain = client.get("/api/v1/export.jsonl").text.splitlines()
+    assert [json.loads(line) for line in plain] == [make_record(n) for n in range(N_ROWS)]
 
 
-def test_since_and_until_limit_the_export(tmp_path: Path) -> None:
-    with Gateway(tmp_path) as gateway:
-        gateway.publish(*(make_estimate(n) for n in range(4)))
-        query = "?since=1970-01-01T00:10:00Z&until=1970-01-01T00:20:00Z"
-        lines = Client(gateway.app).get(f"/api/v1/export.jsonl{query}").text.splitlines()
-        assert [json.loads(line) for line in lines] == [make_record(1), make_record(2)]
-        empty = Client(gateway.app).get("/api/v1/export.csv?since=2026-01-01T00:00:00Z").text
-        assert empty == ",".join(COLUMNS) + "\r\n"
+def test_since_and_until_limit_the_export(gateway: Gateway) -> None:
+    gateway.publish(*(make_estimate(n) for n in range(4)))
+    query = "?since=1970-01-01T00:10:00Z&until=1970-01-01T00:20:00Z"
+    lines = Client(gateway.app).get(f"/api/v1/export.jsonl{query}").text.splitlines()
+    assert [json.loads(line) for line in lines] == [make_record(1), make_record(2)]
+    empty = Client(gateway.app).get("/api/v1/export.csv?since=2026-01-01T00:00:00Z").text
+    assert empty == ",".join(COLUMNS) + "\r\n"
 
 
 @pytest.mark.parametrize("query", ["since=now", "spectra=perhaps", "limit=5"])
-def test_an_invalid_query_is_a_problem(tmp_path: Path, query: str) -> None:
-    with Gateway(tmp_path) as gateway:
-        answer = Client(gateway.app).get(f"/api/v1/export.jsonl?{query}")
-        assert (answer.status_code, answer.headers["content-type"]) == (422, "application/problem+json")
+def test_an_invalid_query_is_a_problem(gateway: Gateway, query: str) -> None:
+    answer = Client(gateway.app).get(f"/api/v1/export.jsonl?{query}")
+    assert (answer.status_code, answer.headers["content-type"]) == (422, "application/problem+json")
 
 
 CALIBRATED = CalibratedVehicle(
@@ -93,11 +89,10 @@ def test_the_vehicle_is_shown_with_its_calibration_and_ranges(tmp_path: Path) ->
     assert told["signals"][0]["rate_hz"] == 5.0
 
 
-def test_a_missing_calibration_is_reported(tmp_path: Path) -> None:
-    with Gateway(tmp_path) as gateway:
-        told = Client(gateway.app).get("/api/v1/vehicle").json()
-        assert told["calibration"] is None
-        assert told["figures"] is None
+def test_a_missing_calibration_is_reported(gateway: Gateway) -> None:
+    told = Client(gateway.app).get("/api/v1/vehicle").json()
+    assert told["calibration"] is None
+    assert told["figures"] is None
 
 
 def test_the_last_spectra_are_those_of_the_last_batch_rejected_or_not(tmp_path: Path) -> None:
@@ -111,8 +106,5 @@ def test_the_last_spectra_are_those_of_the_last_batch_rejected_or_not(tmp_path: 
         told = client.get("/api/v1/spectra/latest").json()
     assert (told["id"], told["rejected"]) == (rejected.id, ["no_calibration"])
     assert told["spectra"] == estimate_to_json(rejected)["spectra"]
-    assert told["acceleration_bands"] == [
-        {"centre_hz": 2.4, "width_hz": 0.05},
-        {"centre_hz": 3.25, "width_hz": 0.05},
-    ]
+    assert told["acceleration_bands"] == [{"centre_hz": 2.4, "width_hz": 0.05}, {"centre_hz": 3.25, "width_hz": 0.05}]
     assert told["pitch_rate_bands"] is None

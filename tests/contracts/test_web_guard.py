@@ -19,6 +19,12 @@ from gateway.web.access.tokens import Scope, TokenFile
 GUARDED = ["/api/v1/estimates/latest", "/api/v1/estimates", "/api/v1/status", "/api/v1/stream", "/metrics"]
 GUARDED += ["/api/v1/vehicle", "/api/v1/export.csv", "/health/ready", "/api/v1/vss", "/api/v1/reasons", "/api/v1/cab"]
 OF_NO_ROUTE = ["/nothing", "/api/v1/estimates/latest/", "/assets", "/assetsx/../api/v1/status", "/health/live/../ready"]
+OF_NO_ROUTE += [
+    "/assets/../api/v1/status",
+    "/assets/%2e%2e/api/v1/status",
+    "/assets//../../app.py",
+    "/swagger/..%2fcore.py",
+]
 
 
 @pytest.fixture
@@ -32,11 +38,6 @@ def tokens(tmp_path: Path) -> TokenFile:
 def gateway(tmp_path: Path, tokens: TokenFile) -> Iterator[Gateway]:
     with Gateway(tmp_path / "store", tokens=tokens) as opened:
         yield opened
-
-
-@pytest.fixture
-def client(gateway: Gateway) -> Client:
-    return Client(gateway.app)
 
 
 def bearer(text: str) -> dict[str, str]:
@@ -53,7 +54,7 @@ def test_without_a_token_nothing_is_answered(client: Client, path: str) -> None:
 
 
 @pytest.mark.parametrize("path", OF_NO_ROUTE)
-def test_an_unknown_address_reveals_nothing(client: Client, path: str) -> None:
+def test_an_unknown_address_or_one_beside_a_public_folder_reveals_nothing(client: Client, path: str) -> None:
     assert client.get(path).status_code in (401, 404)
 
 
@@ -62,16 +63,6 @@ def test_an_unknown_address_reveals_nothing(client: Client, path: str) -> None:
 )
 def test_routes_that_reveal_nothing_are_public(client: Client, path: str) -> None:
     assert client.get(path).status_code == 200
-
-
-def test_public_folders_give_access_to_nothing_else(client: Client) -> None:
-    for path in (
-        "/assets/../api/v1/status",
-        "/assets/%2e%2e/api/v1/status",
-        "/assets//../../app.py",
-        "/swagger/..%2fcore.py",
-    ):
-        assert client.get(path).status_code in (401, 404), path
 
 
 def test_a_token_opens_what_its_scope_allows(client: Client, tokens: TokenFile) -> None:

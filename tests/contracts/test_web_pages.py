@@ -2,7 +2,6 @@
 
 import gzip
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urljoin
 
@@ -21,12 +20,6 @@ TRUTH = tuple(
     KnownLoadTold(t_start=iso_utc(t_ns), payload_kg=kg, front_share_pct=pct)
     for t_ns, kg, pct in ((0, 0.0, 50.0), (900 * 10**9, 270.0, 50.6))
 )
-
-
-@pytest.fixture
-def client(tmp_path: Path) -> Iterator[Client]:
-    with Gateway(tmp_path) as gateway:
-        yield Client(gateway.app)
 
 
 def test_the_policy_forbids_foreign_and_inline_code(client: Client) -> None:

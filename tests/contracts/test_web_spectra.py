@@ -61,11 +61,6 @@ def board(gateway: Gateway) -> Board:
     return gateway.board
 
 
-@pytest.fixture
-def client(gateway: Gateway) -> Client:
-    return Client(gateway.app)
-
-
 def told(client: Client) -> dict[str, Any]:
     return client.get("/api/v1/spectra/latest").json()
 

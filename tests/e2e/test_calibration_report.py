@@ -48,15 +48,11 @@ def test_every_section_is_there_and_linked(page: Page) -> None:
     assert {f"#{name}" for name in sections} <= {link for link in page.links if link.startswith("#")}
 
 
-def test_the_page_is_well_formed_and_headings_descend_by_one(page: Page) -> None:
+def test_the_page_is_well_formed_with_all_it_needs_beside_it_and_says_what_its_pictures_show(
+    made: Path, page: Page
+) -> None:
     assert_well_formed(page)
-
-
-def test_all_it_needs_lies_in_its_directory(made: Path) -> None:
     assert_self_contained(made / "report" / "report.html")
-
-
-def test_every_picture_says_what_is_to_be_seen(page: Page) -> None:
     assert len(page.alts) > 10
     assert all(len(alt) > 40 for alt in page.alts)
     assert len(set(page.alts)) == len(page.alts)
@@ -147,31 +143,32 @@ def test_a_report_is_not_written_over_a_file(made: Path, capsys: pytest.CaptureF
     assert "no report can be written there" in capsys.readouterr().err
 
 
+def reported(folder: Path, **known: Any) -> tuple[dict[str, Any], Page]:
+    """The numbers and the page of a calibration on these known loads."""
+    report = folder / "report"
+    campaign = write_known_loads(folder, **known)
+    run("calibrate", str(campaign), "--output", str(folder / "v.json"), "--report", str(report), *WINDOW)
+    page = Page((report / "report.html").read_text(encoding="utf-8"))
+    return json.loads((report / "report.json").read_text(encoding="utf-8")), page
+
+
 def test_one_load_without_validation_reports_what_there_is(tmp_path: Path) -> None:
-    campaign = write_known_loads(tmp_path, loads=((0.0, None),), identification_fraction=1.0)
-    report = tmp_path / "report"
-    run("calibrate", str(campaign), "--output", str(tmp_path / "v.json"), "--report", str(report), *WINDOW)
-    numbers = json.loads((report / "report.json").read_text(encoding="utf-8"))
+    numbers, page = reported(tmp_path, loads=((0.0, None),), identification_fraction=1.0)
     assert numbers["grade"] != "fit"  # it knows the zero, and says itself how little of the rest
     assert {"unseen", "springs_from_priors"} <= {r["rule"] for r in numbers["verdicts"][0]["reasons"]}
     assert list(numbers["errors"]) == ["cross_spectrum"]
     assert list(numbers["errors"]["cross_spectrum"]) == ["identification"]
-    page = Page((report / "report.html").read_text(encoding="utf-8"))
     assert "ratio-index" not in page.ids
     assert {"half-car", "accuracy-cross-spectrum"} <= set(page.ids)
 
 
 def test_one_sensor_reports_what_it_can(tmp_path: Path) -> None:
     """Without a pitch rate the ratio index alone answers, and of the payload alone."""
-    campaign = write_known_loads(tmp_path, has_pitch_rate=False)
-    report = tmp_path / "report"
-    run("calibrate", str(campaign), "--output", str(tmp_path / "v.json"), "--report", str(report), *WINDOW)
-    numbers = json.loads((report / "report.json").read_text(encoding="utf-8"))
+    numbers, page = reported(tmp_path, has_pitch_rate=False)
     assert list(numbers["errors"]) == ["ratio_index"]
     assert numbers["errors"]["ratio_index"]["left_one_run_out"]["front_share"]["mean_abs_pct"] is None
     reasons = {reason["rule"]: reason["grade"] for reason in numbers["verdicts"][0]["reasons"]}
     assert reasons["front_share_error"] == "fit_with_reservations"
-    page = Page((report / "report.html").read_text(encoding="utf-8"))
     assert {"ratio-index", "accuracy-ratio-index"} <= set(page.ids)
 
 

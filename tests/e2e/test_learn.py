@@ -41,17 +41,8 @@ def drives(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def learn_of(directory: Path, *more: object) -> list[object]:
-    logs = sorted(directory.glob("*.log"))
-    return [
-        "learn",
-        *logs,
-        "--vehicle",
-        directory / "van.toml",
-        "--statements",
-        directory / "notes.csv",
-        *WINDOW,
-        *more,
-    ]
+    said = ("--vehicle", directory / "van.toml", "--statements", directory / "notes.csv")
+    return ["learn", *sorted(directory.glob("*.log")), *said, *WINDOW, *more]
 
 
 @pytest.fixture(scope="module")

@@ -24,11 +24,7 @@ from gateway.records import iso_utc
 from gateway.service.learner import learner
 
 WINDOW_S = 100.0
-BATCH: dict[str, Any] = {
-    "batch__window_s": WINDOW_S,
-    "batch__provisional_every_s": 0.0,
-    "batch__silence_s": 2.0,
-}
+BATCH: dict[str, Any] = {"batch__window_s": WINDOW_S, "batch__provisional_every_s": 0.0, "batch__silence_s": 2.0}
 DRIVEN_S = 210.0
 LOADS = ((0.0, None), (300.0, 1.4), (150.0, 1.8))
 ANSWERS: dict[str, Any] = {

@@ -1,14 +1,14 @@
 """The ring log of a real service: what it recorded is weighed as it was live, byte for byte."""
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from support.bus_drive import START_NS, white_noise
 from support.calibrated import calibration_file
-from support.patience import PATIENCE_S, wait_until
+from support.commands import ended
+from support.patience import wait_until
 from support.ports import first_answer
 from support.running_service import Running, configuration, counted, estimated, serve, stored
 
@@ -81,14 +81,7 @@ def test_a_disk_that_takes_no_frames_costs_no_estimate(tmp_path: Path, log: Path
 
 
 def test_a_full_disk_is_reported_and_recording_resumes(tmp_path: Path) -> None:
-    run = subprocess.run(
-        [sys.executable, "-c", FULL, str(tmp_path)],
-        capture_output=True,
-        check=False,
-        text=True,
-        timeout=PATIENCE_S,
-        cwd=Path(__file__).parents[1],
-    )
+    run = ended(sys.executable, "-c", FULL, tmp_path, check=False, cwd=Path(__file__).parents[1])
     assert run.returncode == 0, run.stderr
     told = json.loads(run.stdout)
     assert "File too large" in told["fault"]

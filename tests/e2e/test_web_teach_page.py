@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,15 @@ VAN = {
 @pytest.fixture
 def bench(tmp_path: Path) -> LearnerBench:
     return LearnerBench(tmp_path / "learner")
+
+
+@contextmanager
+def read_in(browser: Any, page: Any, locale: str, **more: Any) -> Iterator[Any]:
+    """The same page as somebody with this locale opens it."""
+    other = browser.new_page(locale=locale, **more)
+    other.goto(page.url)
+    yield other
+    other.close()
 
 
 @pytest.fixture
@@ -110,10 +120,8 @@ def test_what_helps_is_said_once_and_in_the_readers_language(
     page: Any, browser: Any, bench: LearnerBench, locale: str, helps: str
 ) -> None:
     learn_two_drives(bench)
-    other = browser.new_page(locale=locale)
-    other.goto(page.url)
-    expect(other.locator("#helps li")).to_have_text([helps])
-    other.close()
+    with read_in(browser, page, locale) as other:
+        expect(other.locator("#helps li")).to_have_text([helps])
 
 
 def test_a_no_takes_the_question_away(page: Any, bench: LearnerBench) -> None:
@@ -132,17 +140,15 @@ def test_a_decimal_comma_is_a_comma_in_german_and_refused_in_english(
     page: Any, browser: Any, locale: str, typed: str, is_valid: bool
 ) -> None:
     """A field of type "number" made 15 of a typed "1,5" where the browser itself is English."""
-    other = browser.new_page(locale=locale)
-    other.goto(page.url)
-    field = other.locator("#aboard-kg")
-    expect(field).to_be_visible()  # a key that is pressed before goes elsewhere
-    field.press_sequentially(typed)
-    assert field.evaluate("field => field.validity.valid") == is_valid
-    if is_valid:
-        with other.expect_request(lambda asked: asked.method == "POST") as sent:
-            field.press("Enter")
-        assert sent.value.post_data_json["load"] == {"payload_kg": 1240.5}
-    other.close()
+    with read_in(browser, page, locale) as other:
+        field = other.locator("#aboard-kg")
+        expect(field).to_be_visible()  # a key that is pressed before goes elsewhere
+        field.press_sequentially(typed)
+        assert field.evaluate("field => field.validity.valid") == is_valid
+        if is_valid:
+            with other.expect_request(lambda asked: asked.method == "POST") as sent:
+                field.press("Enter")
+            assert sent.value.post_data_json["load"] == {"payload_kg": 1240.5}
 
 
 def test_a_vehicle_of_the_same_model_is_handed_in_and_taken_back(page: Any) -> None:
@@ -215,28 +221,26 @@ def sentences() -> Iterator[str]:
 
 
 def test_every_sentence_of_the_gateway_is_german_for_germans(page: Any, browser: Any) -> None:
-    german = browser.new_page(locale="de-DE")
-    german.goto(page.url)
-    texts = sorted(set(sentences()))
-    told = german.evaluate("texts => import('./assets/teach/translated.js').then(m => texts.map(m.translated))", texts)
-    assert [text for text in told if ENGLISH.search(COLUMN.sub("", text))] == []
-    said = german.evaluate("() => import('./assets/words/said.js').then(m => m.SAID.map(([english]) => english))")
-    assert unmet(said, texts) == []
-    faults = [kind.advice for kind in Kind if kind in LOOKED_FOR and Severity.FAULT in kind.severities]
-    rows = german.evaluate("() => import('./assets/words/said.js').then(m => m.LEFT_OUT)")
-    assert sorted(english for english, _ in rows) == sorted(faults)
-    assert [text for _, text in rows if ENGLISH.search(text)] == []
-    german.close()
+    with read_in(browser, page, "de-DE") as german:
+        texts = sorted(set(sentences()))
+        told = german.evaluate(
+            "texts => import('./assets/teach/translated.js').then(m => texts.map(m.translated))", texts
+        )
+        assert [text for text in told if ENGLISH.search(COLUMN.sub("", text))] == []
+        said = german.evaluate("() => import('./assets/words/said.js').then(m => m.SAID.map(([english]) => english))")
+        assert unmet(said, texts) == []
+        faults = [kind.advice for kind in Kind if kind in LOOKED_FOR and Severity.FAULT in kind.severities]
+        rows = german.evaluate("() => import('./assets/words/said.js').then(m => m.LEFT_OUT)")
+        assert sorted(english for english, _ in rows) == sorted(faults)
+        assert [text for _, text in rows if ENGLISH.search(text)] == []
 
 
 def test_the_page_speaks_german_of_what_was_learnt_and_is_asked(page: Any, browser: Any, bench: LearnerBench) -> None:
     learn_two_drives(bench)
-    german = browser.new_page(locale="de-DE")
-    german.goto(page.url)
-    expect(german.locator("#versions li")).to_have_text(re.compile("^2 Fahrten und 0 Angaben: ± 40 kg"))
-    expect(german.locator("#questions")).to_contain_text("Diese 2 Fahrten sehen leer aus")
-    assert [line for line in german.locator("main").inner_text().splitlines() if ENGLISH.search(line)] == []
-    german.close()
+    with read_in(browser, page, "de-DE") as german:
+        expect(german.locator("#versions li")).to_have_text(re.compile("^2 Fahrten und 0 Angaben: ± 40 kg"))
+        expect(german.locator("#questions")).to_contain_text("Diese 2 Fahrten sehen leer aus")
+        assert [line for line in german.locator("main").inner_text().splitlines() if ENGLISH.search(line)] == []
 
 
 @pytest.mark.parametrize(
@@ -254,15 +258,13 @@ def test_times_in_sentences_are_those_of_the_readers_place(page: Any, browser: A
 
 
 def test_rows_that_cannot_be_read_are_told_in_german(page: Any, browser: Any) -> None:
-    german = browser.new_page(locale="de-DE")
-    german.goto(page.url)
-    table = b"from;payload_kg;price\nsofort;310;7\n2026-11-26 08:40;viel;7\n2026-11-26 08:40;300;7\n"
-    german.locator("#import-file").set_input_files({"name": "n.csv", "mimeType": "text/csv", "buffer": table})
-    german.get_by_role("button", name="Einlesen").click()
-    expect(german.locator("#import-problems li")).to_have_text([
-        "Spalten, die nicht gelesen werden: price",
-        "Zeile 2: from: sofort: keine Zeit; so schreiben: 2026-11-26 07:40",
-        "Zeile 3: payload_kg: viel: keine Zahl: in kg angeben, etwa 310 oder 12,5",
-        re.compile("^Zeile 4: das Fahrzeug ist noch nicht angegeben"),
-    ])  # fmt: skip
-    german.close()
+    with read_in(browser, page, "de-DE") as german:
+        table = b"from;payload_kg;price\nsofort;310;7\n2026-11-26 08:40;viel;7\n2026-11-26 08:40;300;7\n"
+        german.locator("#import-file").set_input_files({"name": "n.csv", "mimeType": "text/csv", "buffer": table})
+        german.get_by_role("button", name="Einlesen").click()
+        expect(german.locator("#import-problems li")).to_have_text([
+            "Spalten, die nicht gelesen werden: price",
+            "Zeile 2: from: sofort: keine Zeit; so schreiben: 2026-11-26 07:40",
+            "Zeile 3: payload_kg: viel: keine Zahl: in kg angeben, etwa 310 oder 12,5",
+            re.compile("^Zeile 4: das Fahrzeug ist noch nicht angegeben"),
+        ])  # fmt: skip

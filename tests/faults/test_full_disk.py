@@ -1,7 +1,11 @@
 """Accepted means on disk: a full disk costs no record that was shown, or the service says so and ends with a fault."""
 
 import json
+import os
 import signal
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +14,33 @@ from support.estimates import make_estimate, make_record
 from support.patience import PATIENCE_S, wait_until
 from support.ports import first_answer, free_port
 from support.process import ReplayedService
-from support.small_disk import fill, needs_root, small_disk
 
 from gateway.files import reserve
 from gateway.files.reserve import RESERVE_BYTES, Reserve, require_room
 from gateway.status import StoreState
 from gateway.store import Store
 from gateway.web.live.board import Board
+
+needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount a disk of its own")
+
+
+@contextmanager
+def small_disk(place: Path, size_mb: int) -> Iterator[Path]:
+    place.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size_mb}m", "small", place], check=True)
+    try:
+        yield place
+    finally:
+        subprocess.run(["umount", "--lazy", place], check=True)
+
+
+def fill(disk: Path) -> Path:
+    """A file that takes all the room that is left."""
+    filler = disk / "filler"
+    with filler.open("wb", buffering=0) as file, suppress(OSError):
+        while True:
+            file.write(bytes(4096))
+    return filler
 
 
 def test_the_reserve_is_given_up_for_a_full_disk_alone_and_made_again(

@@ -111,11 +111,7 @@ def test_the_sensors_place_shows_the_sign_of_the_roll_rate() -> None:
     runs = [one.identification for one in split]
     turned = [replace(run, batches=tuple(_roll_turned(batch) for batch in run.batches)) for run in runs]
     unknown = replace(campaign.vehicle, sensor_offset_left_m=0.0, sensor_offset_left_std_m=UNKNOWN_OFFSET_STD_M)
-    for seen, vehicle, sign in (
-        (runs, campaign.vehicle, 1),
-        (turned, campaign.vehicle, -1),
-        (runs, unknown, 0),
-    ):
+    for seen, vehicle, sign in ((runs, campaign.vehicle, 1), (turned, campaign.vehicle, -1), (runs, unknown, 0)):
         assert (told := roll_sign_of(seen, vehicle)) is not None
         assert told.sign == sign
 

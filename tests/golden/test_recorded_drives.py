@@ -51,12 +51,7 @@ def table(campaign: str, calibration: Path, *arguments: str) -> dict[str, Any]:
     ],
 )
 def test_errors_stay_within_what_is_promised(
-    calibration: Path,
-    campaign: str,
-    arguments: list[str],
-    n_batches: int,
-    payload_pct: float,
-    front_share_pct: float,
+    calibration: Path, campaign: str, arguments: list[str], n_batches: int, payload_pct: float, front_share_pct: float
 ) -> None:
     found = table(campaign, calibration, *arguments)
     assert found["n_batches"] == pytest.approx(n_batches, abs=0)

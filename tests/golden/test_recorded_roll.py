@@ -64,8 +64,7 @@ def test_errors_stay_small_and_intervals_true(
 
 
 @pytest.mark.parametrize(
-    ("drives", "n_batches", "most_refused"),
-    [("known_loads", 10, 1), ("sideways", 10, 1), ("mixed", 24, 6)],
+    ("drives", "n_batches", "most_refused"), [("known_loads", 10, 1), ("sideways", 10, 1), ("mixed", 24, 6)]
 )
 def test_a_lost_roll_rate_leaves_true_intervals(
     calibration: Path, drives: str, n_batches: int, most_refused: int

@@ -171,11 +171,7 @@ def indefinite(matrix: F64) -> F64:
     ids=["inv", "solve", "eigh", "an indefinite inverse"],
 )
 def test_a_routine_that_fails_refuses_the_batch(
-    calibration: VehicleModel,
-    monkeypatch: pytest.MonkeyPatch,
-    room: object,
-    routine: str,
-    fails: Callable[..., object],
+    calibration: VehicleModel, monkeypatch: pytest.MonkeyPatch, room: object, routine: str, fails: Callable[..., object]
 ) -> None:
     assert weighed(GOOD, calibration).counted
     monkeypatch.setattr(room, routine, fails)

@@ -8,6 +8,7 @@ from support.four_wheels import FourWheels
 from support.model_road import BAND_HZ, GROUND, VAN, batch_by
 from support.taught_van import (
     FLAT_VAN,
+    ROLL,
     as_if_taught,
     car,
     drive_of,
@@ -35,7 +36,7 @@ from gateway.records import C128, F64, Batch
 
 LOAD = (200.0, 50.0)
 LOADS = pytest.mark.parametrize("load", [(0.0, 52.0), (60.0, 51.0), (250.0, 54.0), (430.0, 43.0)], ids=str)
-ROLL = pytest.mark.parametrize("with_roll", [False, True], ids=["two sensors", "three sensors"])
+
 PER_CENT = np.array([1.0, 100.0])
 
 
@@ -254,11 +255,7 @@ def longer(model: VehicleModel, batch: Batch, by: float) -> tuple[VehicleModel, 
     place = INDEX["sensor_position_m"]
     covariance[place] *= by
     covariance[:, place] *= by
-    far = replace(
-        batch,
-        pitch_rate_radps=batch.pitch_rate_radps / by,
-        speed_mps=by * batch.speed_mps,
-    )
+    far = replace(batch, pitch_rate_radps=batch.pitch_rate_radps / by, speed_mps=by * batch.speed_mps)
     reading = Reading(model.wheelbase_m, BAND_HZ, 256)
     usual = [
         cross_spectra_of([one], replace(reading, wheelbase_m=wheelbase)).reading.usual_log_amplitude
@@ -343,6 +340,7 @@ def test_sources_and_own_errors_add_up_to_the_covariance(with_roll: bool) -> Non
     found = posterior_of(one, model, 1.0, GAIN_STD).without(Source.SIDEWAYS)
     of_peak = several.best.covariance[N:, N:] * np.outer(PER_CENT, PER_CENT)
     np.testing.assert_allclose(found.covariance[:2, :2], of_peak, rtol=1e-4)
+    assert np.all(np.linalg.eigvalsh(found.own) > 0.0)
     assert {Source.CALIBRATION, Source.DAY, Source.SENSOR, Source.LOAD_LENGTH} <= {
         name for name, columns in found.sources.items() if np.any(columns)
     }

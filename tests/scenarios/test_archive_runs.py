@@ -255,3 +255,16 @@ def test_an_archive_without_logs_is_reported_with_the_searched_folders(tmp_path:
     write_manifest(tmp_path, "van-1")
     with pytest.raises(ConfigurationError, match=r"not one log in the folders of its vehicles, .*van-1; see logs"):
         done(tmp_path)
+
+
+@pytest.mark.parametrize("span", ["", "\nuntil = 2026-01-01", "\nsince = 2026-01-01"])
+def test_an_undated_log_is_refused_and_named_whatever_the_span(span: str, tmp_path: Path) -> None:
+    """It belongs to no month and no calibration's span."""
+    write_drive(tmp_path / "van-1" / "1.log", 0, 3.0)
+    write_manifest(tmp_path, f'id = "van-1"{span}')
+    summary = done(tmp_path)
+    assert not summary.is_good
+    assert [reason for outcome in summary.outcomes for reason in outcome.failures] == [
+        "van-1/1.log: has no date: nothing tells which month and calibration it belongs to; "
+        "weigh it with springscale estimate"
+    ]

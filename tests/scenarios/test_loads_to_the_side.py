@@ -4,18 +4,44 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.sideways_drives import SENSORS, VEHICLE, driven, known_drives
 
 from benchmarks.accuracy.calibrated import taught_by
-from benchmarks.accuracy.drives import without_roll_rate
+from benchmarks.accuracy.drives import known_run, stated, without_roll_rate
+from gateway.bus.signals import Decoder, load_signal_map
 from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import cg_left_m
 from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.model.vehicle_model import VehicleModel
 from gateway.records import Batch, Why
+from gateway.sim.instruments import REFERENCE
+from gateway.sim.obstacles import UnevenRoad
 from gateway.sim.parameters import Load
+from gateway.sim.road import iso_road
+from gateway.sim.scenario import simulate_drive
+from gateway.sim.speed_profile import constant
+from gateway.sim.vans import PAPER_VAN
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate
+from gateway.workbench.wiring import Wiring
+
+SENSORS = replace(REFERENCE, mount=replace(REFERENCE.mount, left_m=0.3))
+VEHICLE = stated(PAPER_VAN, SENSORS)
+ROAD = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
+
+
+def driven(number: int, loads: tuple[Load, ...], seed: int, duration_s: float = 310.0) -> KnownRun:
+    """One batch at about 14 m/s, through sensors, frames and decoder."""
+    course = constant(14.0, duration_s, np.random.default_rng([seed, number]), jitter_std_mps=0.4)
+    simulated = simulate_drive(PAPER_VAN, loads, ROAD, course, SENSORS, 100 * seed + number)
+    rows = Decoder(load_signal_map("springscale:reference")).decode(Wiring("reference").frames_of(simulated.recording))
+    return known_run(rows, number, f"drive {number}", PAPER_VAN, loads)
+
+
+def known_drives() -> list[KnownRun]:
+    """Empty, and three loads about the centre line."""
+    loads: list[tuple[Load, ...]] = [(), (Load(150.0, 0.6),), (Load(280.0, 2.6),), (Load(430.0, 1.4),)]
+    return [driven(number, load, seed=1) for number, load in enumerate(loads, 1)]
+
 
 SIDES = ((300.0, 1.2, 0.3), (300.0, 1.2, -0.3), (180.0, 2.3, 0.35), (420.0, 1.8, -0.25))
 
@@ -57,9 +83,7 @@ def sideways() -> dict[tuple[float, float, float], KnownRun]:
 
 @pytest.mark.parametrize("side", SIDES, ids=str)
 def test_a_load_to_the_side_is_weighed_and_found(
-    side: tuple[float, float, float],
-    sideways: dict[tuple[float, float, float], KnownRun],
-    rolling: VehicleModel,
+    side: tuple[float, float, float], sideways: dict[tuple[float, float, float], KnownRun], rolling: VehicleModel
 ) -> None:
     payload_kg, _, left_m = side
     run = sideways[side]

@@ -65,9 +65,7 @@ FAULTS: dict[str, tuple[Spoil, tuple[Why, ...]]] = {
     ),
     "GPS frozen": (lambda r, _, gps: {"gps_speed_mps": held(r.gps_speed_mps, gps)}, (Why.SPEED_FROZEN,)),
     "unit on its edge, x and z exchanged": (
-        lambda r, imu, _: {
-            name: np.where(imu[:, None], getattr(r, name)[:, ::-1], getattr(r, name)) for name in IMU[1:]
-        },
+        lambda r, imu, _: {name: edgewise(getattr(r, name), imu) for name in IMU[1:]},
         (Why.GRAVITY_MISSING,),
     ),
     "acceleration turned over": (

@@ -3,12 +3,12 @@
 import json
 import os
 import sqlite3
-import subprocess
 import sys
 from contextlib import closing
 from pathlib import Path
 
 import pytest
+from support.commands import ended
 from support.estimates import make_record, texts
 from support.log import fields_of, names
 from support.patience import PATIENCE_S
@@ -20,14 +20,7 @@ from gateway.store import Retention, Store, StoreReader
 
 
 def test_a_full_disk_degrades_to_memory_and_heals(tmp_path: Path) -> None:
-    run = subprocess.run(
-        [sys.executable, "-m", "support.full_disk", tmp_path],
-        capture_output=True,
-        check=False,
-        text=True,
-        timeout=PATIENCE_S,
-        cwd=Path(__file__).parents[1],
-    )
+    run = ended(sys.executable, "-m", "support.full_disk", tmp_path, check=False, cwd=Path(__file__).parents[1])
     assert run.returncode == 0, run.stderr
     said = json.loads(run.stdout)
     assert said["is_written"] == [True, False, True]

@@ -2,9 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from gateway.core.events.entry import EntryKind
 from gateway.core.vehicle import Vehicle
-from gateway.estimates.batch_estimate import Estimate
+from gateway.core.weights.on_the_road import weights_of
+from gateway.estimates.batch_estimate import Estimate, Weights
+from gateway.estimates.posterior import Posterior
 from gateway.estimates.quantity import Z95
 from gateway.records import iso_utc, json_line
 from gateway.status import Standing, State, Status
@@ -40,6 +44,12 @@ def cab_gateway(directory: Path) -> Gateway:
 def loaded(n: int, payload_kg: float, front_share_pct: float) -> Estimate:
     """The n-th batch with this aboard."""
     return make_estimate(n).answered(posterior_of(payload_kg, front_share_pct, 6.0, 0.2))
+
+
+def aboard(payload_kg: float, front_share_pct: float, std_kg: float = 6.0) -> Weights:
+    """Its weights with this aboard."""
+    posterior = Posterior(np.array([payload_kg, front_share_pct]), np.diag([std_kg**2, 0.04]))
+    return weights_of(VAN.vehicle, posterior)
 
 
 def vaguely_loaded(n: int, payload_kg: float, of_useful: float = 1.1) -> Estimate:

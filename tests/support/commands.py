@@ -1,8 +1,12 @@
-"""The command line as a person calls it, in this process."""
+"""The command line as a person calls it, in this process; and other commands, in processes of their own."""
+
+import subprocess
+from typing import Any
 
 from click.testing import CliRunner, Result
 
 from gateway.cli import springscale
+from support.patience import PATIENCE_S
 
 
 def called(*arguments: object) -> Result:
@@ -20,3 +24,9 @@ def run(*arguments: object) -> Result:
 def printed(*arguments: object) -> str:
     """The standard output of a command that must end well."""
     return run(*arguments).stdout
+
+
+def ended(*command: object, check: bool = True, **how: Any) -> "subprocess.CompletedProcess[str]":
+    """What a command in a process of its own has said; unless ``check`` is False it must end well."""
+    words = [*map(str, command)]
+    return subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, check=check, **how)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from support.broker import MOSQUITTO
+from support.commands import ended
 from support.patience import PATIENCE_S, wait_until
 from support.ports import free_port
 from support.postgres import Postgres, running_postgres
@@ -44,13 +45,7 @@ def write_table(path: Path, names: list[str]) -> None:
 
 def provision(folder: Path, broker: str) -> "subprocess.CompletedProcess[str]":
     asked = f"fleet.csv --settings settings.toml --broker {broker} --ca ca.pem --output out"
-    return subprocess.run(
-        [sys.executable, FLEET / "provision.py", *asked.split()],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    return ended(sys.executable, FLEET / "provision.py", *asked.split(), cwd=folder)
 
 
 class FleetBroker:

@@ -16,41 +16,14 @@ from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate
 from support import model_road
 from support.kept import kept
-from support.model_road import QUIET, RATE_HZ, UNCOUPLED, batch_of, paths_of, theta_of
+from support.model_road import HALF_UNITS, KNOWN, QUIET, RATE_HZ, UNCOUPLED, batch_of, paths_of, theta_of
 
-KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))  # payload (kg), front share (%)
-VAN = Vehicle(
-    name="van",
-    empty_mass_kg=1240.0,
-    wheelbase_m=2.8,
-    empty_front_share_pct=52.0,
-    sensor_position_m=3.1,
-    sensor_offset_left_std_m=1e-3,  # a half-car has no width
-)
+# a half-car has no width
+VAN = replace(model_road.VAN, track_width_m=None, sensor_offset_left_m=None, sensor_offset_left_std_m=1e-3)
 GROUND = Ground.of(VAN)
-CAR = theta_of(
-    vehicle=VAN,
-    **dict.fromkeys(QUIET, 1e-30),
-    **UNCOUPLED,
-    spring_front_npm=62e3,
-    spring_rear_npm=70e3,
-    spring_slope_front_per_kn=0.02,
-    spring_slope_rear_per_kn=0.04,
-    damper_front_nspm=3.9e3,
-    damper_rear_nspm=4.1e3,
-    damper_mount_front_npm=8e5,
-    damper_mount_rear_npm=7e5,
-    tyre_front_npm=3.6e5,
-    tyre_rear_npm=3.8e5,
-    unsprung_front_kg=82.0,
-    unsprung_rear_kg=88.0,
-    pitch_inertia_kgm2=2200.0,
-    payload_gyration_m2=0.1,
-    payload_mode_hz=28.0,
-    payload_damping_ratio=0.15,
-    track_offset_m=1e-6,
-    **dict.fromkeys((f"{kind}_friction_{end}" for kind in ("spring", "damper") for end in ("front", "rear")), 0.0),
-)
+WITHOUT_NOISE = dict.fromkeys(QUIET, 1e-30)
+FIRM = {"payload_damping_ratio": 0.15, "track_offset_m": 1e-6}
+CAR = theta_of(vehicle=VAN, **WITHOUT_NOISE, **UNCOUPLED, **HALF_UNITS, **FIRM)
 
 
 def as_if_fitted(theta: F64, std: F64, vehicle: Vehicle = VAN) -> VehicleModel:

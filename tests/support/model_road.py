@@ -24,6 +24,26 @@ VAN = Vehicle(
     sensor_offset_left_m=0.3,
 )
 GROUND = Ground.of(VAN)
+KNOWN = ((0.0, 52.0), (270.0, 55.5), (270.0, 47.0), (420.0, 41.5))  # payload (kg), front share (%)
+HALF_UNITS = {
+    "spring_front_npm": 62e3,
+    "spring_rear_npm": 70e3,
+    "spring_slope_front_per_kn": 0.02,
+    "spring_slope_rear_per_kn": 0.04,
+    "damper_front_nspm": 3.9e3,
+    "damper_rear_nspm": 4.1e3,
+    "damper_mount_front_npm": 8e5,
+    "damper_mount_rear_npm": 7e5,
+    **dict.fromkeys((f"{kind}_friction_{end}" for kind in ("damper", "spring") for end in ("front", "rear")), 0.0),
+    "tyre_front_npm": 3.6e5,
+    "tyre_rear_npm": 3.8e5,
+    "unsprung_front_kg": 82.0,
+    "unsprung_rear_kg": 88.0,
+    "pitch_inertia_kgm2": 2200.0,
+    "payload_gyration_m2": 0.1,
+    "payload_mode_hz": 28.0,
+}
+"""A known half-car, its axles not alike."""
 UNCOUPLED = dict.fromkeys(("driveline_front_kg", "driveline_rear_kg"), 1e-20)
 """No driveline."""
 QUIET = {row.name: 1e-20 for row in ROWS if row.name.startswith(("slack_", "noise_"))}

@@ -141,14 +141,8 @@ def test_runs_that_cannot_be_used_count(severities: tuple[Severity | None, ...],
 def test_held_statements_are_a_reservation_and_a_majority_makes_unfit(n_held: int, grade: Grade | None) -> None:
     file = calibration_file()
     (drive,) = file.provenance.drives
-    found = FoundPart(
-        payload_kg=5.0,
-        payload_std_kg=9.0,
-        front_share_pct=50.0,
-        without_statement_kg=5.0,
-        without_statement_std_kg=9.0,
-        is_held=False,
-    )
+    kg = {"payload_kg": 5.0, "payload_std_kg": 9.0, "without_statement_kg": 5.0, "without_statement_std_kg": 9.0}
+    found = FoundPart(**kg, front_share_pct=50.0, is_held=False)
     drives = tuple(
         drive.model_copy(update={"number": n, "found": found.model_copy(update={"is_held": n <= n_held})})
         for n in range(1, 6)

@@ -33,15 +33,8 @@ def kept(dataset: Path, slot: Slot, *records: dict[str, object]) -> None:
 def test_every_field_of_an_estimate_is_a_column_but_its_spectra() -> None:
     names = list(columns())
     assert set(COLUMNS) <= set(names)
-    assert {one.name for one in FIELDS if not one.columns} - set(names) == {
-        "spectra",
-        "provisional",
-        "diagnostics",
-        "way",
-        "error_budget",
-        "posterior",
-        "epoch_posterior",
-    }
+    left_out = "spectra provisional diagnostics way error_budget posterior epoch_posterior"
+    assert {one.name for one in FIELDS if not one.columns} - set(names) == set(left_out.split())
     assert names[-len(PROVENANCE) :] == list(PROVENANCE)
 
 

@@ -11,7 +11,7 @@ from support.calibrated import calibration_file
 
 from gateway.archive import place_of
 from gateway.archive.jobs import PACKAGE, ArchiveJob, code_id, hash_of, plan, software
-from gateway.archive.manifest import Assignment, Manifest, load_manifest
+from gateway.archive.manifest import Assignment, load_manifest
 from gateway.archive.survey import LogFile, SurveyedLog
 from gateway.core.batch_settings import BatchSettings
 
@@ -19,14 +19,9 @@ HOUR = 3600 * S
 DATASET = place_of("/dataset")
 
 
-@pytest.fixture(name="manifest")
-def _manifest(tmp_path: Path) -> Manifest:
-    return load_manifest(str(write_manifest(tmp_path, "van")))
-
-
-@pytest.fixture(name="van")
-def _van(manifest: Manifest) -> Assignment:
-    return manifest.assignments[0]
+@pytest.fixture
+def van(tmp_path: Path) -> Assignment:
+    return load_manifest(str(write_manifest(tmp_path, "van"))).assignments[0]
 
 
 def jobs_of(van: Assignment, starts: Sequence[int | None], settings: BatchSettings | None = None) -> list[ArchiveJob]:

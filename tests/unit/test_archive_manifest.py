@@ -47,52 +47,41 @@ def test_a_manifest_lies_in_an_object_store_with_all_it_names(tmp_path: Path) ->
             load_manifest(f"{bucket}/nothing")
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        (
-            'signals = "springscale:reference"',
-            r"archive\.toml: names no vehicle; write \[\[vehicles\]\] with id or vin",
-        ),
-        ("signals = 1\nvehicles = []", r"archive\.toml: signals: Input should be a valid string \(it says 1\)"),
-        ("vehicles = [{}]", r"vehicles\[1\]: give id or vin: nothing tells whose logs these are"),
-        ('vehicles = [{id = "a", vins = "x"}]', r"vehicles\[1\]\.vins: unknown key"),
-        ('vehicles = [{id = "../a"}]', r"vehicles\[1\]\.id: String should match pattern"),
-        ('vehicles = [{id = "a"}]', r"vehicles\[1\]\.signals: missing; give it here, or at the top for every vehicle"),
-        (
-            'vehicles = [{id = "a", since = 2026-11-02, until = 2026-11-01}]',
-            r"vehicles\[1\]: since must be before until",
-        ),
-        ('vehicles = [{id = "a", since = 2026-11-02T10:00:00}]', r"vehicles\[1\]\.since: .*timezone"),
-        (
-            'signals = "springscale:reference"\nvehicles = [{id = "a"}, {id = "a", logs = "b", since = 2026-11-01}]',
-            r"vehicles\[2\]: vehicle a is in vehicles\[1\] too, at the same time; part them by since and until",
-        ),
-        (
-            'signals = "springscale:reference"\nvehicles = [{id = "a"}, {id = "b", logs = "a"}]',
-            r"vehicles\[2\]: folder a is in vehicles\[1\] too",
-        ),
-        (
-            'signals = "springscale:reference"\nvehicles = [{id = "a"}, {id = "b", logs = "./a//"}]',
-            r"vehicles\[2\]: folder a is in vehicles\[1\] too",
-        ),
-        (
-            'signals = "springscale:reference"\nvehicles = [{id = "c", logs = "a/c"}, {id = "a"}]',
-            r"vehicles\[1\]: folder a/c lies in that of vehicles\[2\] too, at the same time; part them by since",
-        ),
-        (
-            'signals = "springscale:reference"\nvehicles = [{id = "a"}, {id = "b", logs = "."}]',
-            r"vehicles\[1\]: folder a lies in that of vehicles\[2\] too",
-        ),
-        ('signals = "none.toml"\nvehicles = [{id = "a"}]', r"none\.toml: no such file"),
-        (
-            'signals = "springscale:reference"\nvehicles = [{id = "a", calibration = "none.json"}]',
-            r"none\.json: no such calibration file",
-        ),
-        ("batch.window_s = 5\nvehicles = []", r"batch\.window_s: 5 is below 20"),
-        ("vehicles = [", r"archive\.toml: not valid TOML"),
-    ],
-)
+OF_MAP = 'signals = "springscale:reference"\n'
+FAULTS = [
+    (OF_MAP, r"archive\.toml: names no vehicle; write \[\[vehicles\]\] with id or vin"),
+    ("signals = 1\nvehicles = []", r"archive\.toml: signals: Input should be a valid string \(it says 1\)"),
+    ("vehicles = [{}]", r"vehicles\[1\]: give id or vin: nothing tells whose logs these are"),
+    ('vehicles = [{id = "a", vins = "x"}]', r"vehicles\[1\]\.vins: unknown key"),
+    ('vehicles = [{id = "../a"}]', r"vehicles\[1\]\.id: String should match pattern"),
+    ('vehicles = [{id = "a"}]', r"vehicles\[1\]\.signals: missing; give it here, or at the top for every vehicle"),
+    ('vehicles = [{id = "a", since = 2026-11-02, until = 2026-11-01}]', r"vehicles\[1\]: since must be before until"),
+    ('vehicles = [{id = "a", since = 2026-11-02T10:00:00}]', r"vehicles\[1\]\.since: .*timezone"),
+    (
+        OF_MAP + 'vehicles = [{id = "a"}, {id = "a", logs = "b", since = 2026-11-01}]',
+        r"vehicles\[2\]: vehicle a is in vehicles\[1\] too, at the same time; part them by since and until",
+    ),
+    (OF_MAP + 'vehicles = [{id = "a"}, {id = "b", logs = "a"}]', r"vehicles\[2\]: folder a is in vehicles\[1\] too"),
+    (
+        OF_MAP + 'vehicles = [{id = "a"}, {id = "b", logs = "./a//"}]',
+        r"vehicles\[2\]: folder a is in vehicles\[1\] too",
+    ),
+    (
+        OF_MAP + 'vehicles = [{id = "c", logs = "a/c"}, {id = "a"}]',
+        r"vehicles\[1\]: folder a/c lies in that of vehicles\[2\] too, at the same time; part them by since",
+    ),
+    (
+        OF_MAP + 'vehicles = [{id = "a"}, {id = "b", logs = "."}]',
+        r"vehicles\[1\]: folder a lies in that of vehicles\[2\] too",
+    ),
+    ('signals = "none.toml"\nvehicles = [{id = "a"}]', r"none\.toml: no such file"),
+    (OF_MAP + 'vehicles = [{id = "a", calibration = "none.json"}]', r"none\.json: no such calibration file"),
+    ("batch.window_s = 5\nvehicles = []", r"batch\.window_s: 5 is below 20"),
+    ("vehicles = [", r"archive\.toml: not valid TOML"),
+]
+
+
+@pytest.mark.parametrize(("text", "told"), FAULTS)
 def test_a_fault_is_reported_with_its_place_and_remedy(tmp_path: Path, text: str, told: str) -> None:
     (tmp_path / "archive.toml").write_text(text)
     with pytest.raises(ConfigurationError, match=told):
@@ -101,8 +90,4 @@ def test_a_fault_is_reported_with_its_place_and_remedy(tmp_path: Path, text: str
 
 def test_the_extension_decides_what_is_a_log() -> None:
     names = ("a.log", "b/c.LOG.gz", "d.mf4", "truth.csv", "notes.txt", ".e.log")
-    assert [name for name in names if is_log(name)] == [
-        "a.log",
-        "b/c.LOG.gz",
-        "d.mf4",
-    ]
+    assert [name for name in names if is_log(name)] == ["a.log", "b/c.LOG.gz", "d.mf4"]

@@ -28,19 +28,9 @@ def when(clock: str) -> datetime:
 
 def told(begin: str, until: str | None = None, source: str = "delivery_note", **said: Any) -> StatementRecord:
     ref, place, learn = said.pop("ref", None), said.pop("place", None), said.pop("learn", True)
-    return StatementRecord.model_validate(
-        {
-            "ref": ref,
-            "from": when(begin),
-            "until": None if until is None else when(until),
-            "source": source,
-            "load": said or None,
-            "place": place,
-            "learn": learn,
-        }
-        if said
-        else {"ref": ref, "from": when(begin), "until": None if until is None else when(until), "source": source}
-    ).identified()
+    record = {"ref": ref, "from": when(begin), "until": None if until is None else when(until), "source": source}
+    loaded = {"load": said, "place": place, "learn": learn} if said else {}
+    return StatementRecord.model_validate(record | loaded).identified()
 
 
 def drives(*spans: str) -> list[Piece]:
@@ -52,88 +42,58 @@ def payloads(found: Assigned) -> list[float | None]:
     return [None if one.payload_kg is None else round(one.payload_kg, 6) for one in found.statements]
 
 
+def noted(begin: str, payload_kg: float, until: str | None = None, **said: Any) -> StatementRecord:
+    return told(begin, until, payload_kg=payload_kg, **said)
+
+
 MORNING = drives("07:50-08:30", "09:00-09:40", "13:00-13:30")
+LESS, MORE = told("08:45", change_kg=-60.0), told("09:50", "14:00", change_kg=40.0)
+HELD: dict[str, tuple[list[StatementRecord], list[float | None]]] = {  # records, and what they say of each drive
+    "before its drive": ([noted("07:40", 310.0)], [310.0, None, None]),
+    "during it": ([noted("08:00", 310.0)], [310.0, None, None]),
+    "at its end it is of the next": ([noted("08:29", 310.0)], [None, 310.0, None]),
+    "until it says": ([noted("07:40", 310.0, "10:00")], [310.0, 310.0, None]),
+    "to the end of one drive": ([noted("07:40", 310.0, "08:31")], [310.0, None, None]),
+    "said anew": ([noted("07:40", 310.0), noted("07:45", 200.0)], [200.0, None, None]),
+    "a change of load": ([noted("07:40", 310.0, "10:00"), LESS], [310.0, 250.0, None]),
+    "two changes": ([noted("07:40", 310.0), LESS, MORE], [310.0, 250.0, 290.0]),
+    "empty ends it": ([noted("07:40", 310.0, "14:00"), told("09:50", source="empty")], [310.0, 310.0, 0.0]),
+    "empty all day": ([told("07:40", "14:00", source="empty")], [0.0, 0.0, 0.0]),
+    "only a check": ([noted("07:40", 310.0, learn=False)], [None, None, None]),
+    "nothing said": ([], [None, None, None]),
+}
 
 
-@pytest.mark.parametrize(
-    ("records", "expected"),
-    [
-        pytest.param([told("07:40", payload_kg=310.0)], [310.0, None, None], id="before its drive"),
-        pytest.param([told("08:00", payload_kg=310.0)], [310.0, None, None], id="during it"),
-        pytest.param([told("08:29", payload_kg=310.0)], [None, 310.0, None], id="at its end it is of the next"),
-        pytest.param([told("07:40", "10:00", payload_kg=310.0)], [310.0, 310.0, None], id="until it says"),
-        pytest.param([told("07:40", "08:31", payload_kg=310.0)], [310.0, None, None], id="to the end of one drive"),
-        pytest.param(
-            [told("07:40", payload_kg=310.0), told("07:45", payload_kg=200.0)], [200.0, None, None], id="said anew"
-        ),
-        pytest.param(
-            [told("07:40", "10:00", payload_kg=310.0), told("08:45", change_kg=-60.0)],
-            [310.0, 250.0, None],
-            id="a change of load",
-        ),
-        pytest.param(
-            [told("07:40", payload_kg=310.0), told("08:45", change_kg=-60.0), told("09:50", "14:00", change_kg=40.0)],
-            [310.0, 250.0, 290.0],
-            id="two changes",
-        ),
-        pytest.param(
-            [told("07:40", "14:00", payload_kg=310.0), told("09:50", source="empty")],
-            [310.0, 310.0, 0.0],
-            id="empty ends it",
-        ),
-        pytest.param([told("07:40", "14:00", source="empty")], [0.0, 0.0, 0.0], id="empty all day"),
-        pytest.param([told("07:40", payload_kg=310.0, learn=False)], [None, None, None], id="only a check"),
-        pytest.param([], [None, None, None], id="nothing said"),
-    ],
-)
-def test_a_statement_holds_for_its_drives(records: list[StatementRecord], expected: list[float | None]) -> None:
+@pytest.mark.parametrize("case", HELD)
+def test_a_statement_holds_for_its_drives(case: str) -> None:
+    records, expected = HELD[case]
     assert payloads(assign(records, MORNING, VAN)) == expected
 
 
-@pytest.mark.parametrize(
-    ("records", "fates", "reason"),
-    [
-        pytest.param([told("15:00", payload_kg=1.0e2)], [Fate.WAITING], "no drive within 12 hours", id="no drive yet"),
-        pytest.param([told("10:00", "11:00", payload_kg=310.0)], [Fate.WAITING], "no drive from", id="between drives"),
-        pytest.param(
-            [told("06:00", source="empty"), told("07:00", payload_kg=310.0)],
-            [Fate.WAITING, Fate.MATCHED],
-            "another statement began before the drive",
-            id="loaded before it drove",
-        ),
-        pytest.param(
-            [told("07:40", payload_kg=310.0, ref="A"), told("07:41", payload_kg=130.0, ref="A")],
-            [Fate.REPLACED, Fate.MATCHED],
-            "replaced by a later one with the ref A",
-            id="one ref twice",
-        ),
-        pytest.param(
-            [told("07:40", "09:00", payload_kg=310.0, ref="A"), told("08:00", "09:00", payload_kg=200.0, ref="B")],
-            [Fate.OVERLAPPING] * 2,
-            "of the same time as B",
-            id="two notes for one load",
-        ),
-        pytest.param(
-            [told("07:40", payload_kg=310.0), told("07:40", payload_kg=310.5)],
-            [Fate.OVERLAPPING] * 2,
-            "of the same time as that from 2026-11-26T07:40Z",
-            id="two notes from one minute",
-        ),
-        pytest.param(
-            [told("07:40", "08:50", payload_kg=310.0), told("08:49", "09:50", payload_kg=200.0)],
-            [Fate.MATCHED] * 2,
-            "",
-            id="times written to the minute touch",
-        ),
-        pytest.param(
-            [told("07:40", payload_kg=310.0), told("07:45", source="scale", gross_kg=1720.0)],
-            [Fate.MATCHED] * 2,
-            "",
-            id="a note and a weighing on a scale",
-        ),
-    ],
-)
-def test_the_state_of_each_record_is_reported(records: list[StatementRecord], fates: list[Fate], reason: str) -> None:
+ONE_REF = [noted("07:40", 310.0, ref="A"), noted("07:41", 130.0, ref="A")]
+ONE_LOAD = [noted("07:40", 310.0, "09:00", ref="A"), noted("08:00", 200.0, "09:00", ref="B")]
+ONE_MINUTE = "of the same time as that from 2026-11-26T07:40Z"
+WEIGHED = told("07:45", source="scale", gross_kg=1720.0)
+WAITING, MATCHED, OVERLAPPING = Fate.WAITING, Fate.MATCHED, Fate.OVERLAPPING
+FATES: dict[str, tuple[list[StatementRecord], list[Fate], str]] = {
+    "no drive yet": ([noted("15:00", 100.0)], [WAITING], "no drive within 12 hours"),
+    "between drives": ([noted("10:00", 310.0, "11:00")], [WAITING], "no drive from"),
+    "loaded before it drove": (
+        [told("06:00", source="empty"), noted("07:00", 310.0)],
+        [WAITING, MATCHED],
+        "another statement began before the drive",
+    ),
+    "one ref twice": (ONE_REF, [Fate.REPLACED, MATCHED], "replaced by a later one with the ref A"),
+    "two notes for one load": (ONE_LOAD, [OVERLAPPING] * 2, "of the same time as B"),
+    "two notes from one minute": ([noted("07:40", 310.0), noted("07:40", 310.5)], [OVERLAPPING] * 2, ONE_MINUTE),
+    "written to the minute": ([noted("07:40", 310.0, "08:50"), noted("08:49", 200.0, "09:50")], [MATCHED] * 2, ""),
+    "a note and a weighing on a scale": ([noted("07:40", 310.0), WEIGHED], [MATCHED] * 2, ""),
+}
+
+
+@pytest.mark.parametrize("case", FATES)
+def test_the_state_of_each_record_is_reported(case: str) -> None:
+    records, fates, reason = FATES[case]
     found = assign(records, MORNING, VAN)
     assert list(found.fates) == fates
     assert found.reasons[0].startswith(reason)

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 from audit_locks import LOCKS
+from support.commands import ended
 from support.locks import ROOT, pins
-from support.patience import PATIENCE_S
 from support.ports import free_port
 
 SCRIPT = ROOT / "deploy/dist/audit_locks.py"
@@ -70,14 +70,8 @@ def service() -> Iterator[Service]:
 
 
 def audit(url: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, SCRIPT, f"--service={url}", *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=PATIENCE_S,
-        env={"NO_PROXY": "127.0.0.1", "PATH": "/usr/bin:/bin"},
-    )
+    surroundings = {"NO_PROXY": "127.0.0.1", "PATH": "/usr/bin:/bin"}
+    return ended(sys.executable, SCRIPT, f"--service={url}", *arguments, check=False, env=surroundings)
 
 
 def test_every_locked_package_is_checked_by_its_version(service: Service) -> None:

@@ -35,6 +35,10 @@ def campaign_text(
     return "\n".join(tables) + "\n"
 
 
+def text_of_runs(*runs: dict[str, str]) -> str:
+    return campaign_text('signals = "s"', None, *runs)
+
+
 def written(tmp_path: Path, text: str) -> Path:
     (tmp_path / "a.log").touch()
     path = tmp_path / "campaign.toml"
@@ -76,7 +80,7 @@ def test_axle_weights_give_the_sprung_mass(tmp_path: Path) -> None:
 
 def test_shares_follow_from_positions_unless_they_are_given(tmp_path: Path) -> None:
     given = {"log": '"a.log"', "payload_kg": "270.0", "front_share_pct": "47.5"}
-    campaign = loaded(tmp_path, campaign_text('signals = "s"', None, EMPTY_RUN, LOADED_RUN, given))
+    campaign = loaded(tmp_path, text_of_runs(EMPTY_RUN, LOADED_RUN, given))
     empty, positioned, stated = (campaign.front_share_pct(run) for run in campaign.runs)
     assert empty == 50.0
     assert positioned == pytest.approx(100.0 * (620.0 + (1.0 - 0.5 / 2.8) * 270.0) / 1510.0)
@@ -84,7 +88,7 @@ def test_shares_follow_from_positions_unless_they_are_given(tmp_path: Path) -> N
 
 
 def test_a_run_without_a_load_has_an_unknown_load(tmp_path: Path) -> None:
-    campaign = loaded(tmp_path, campaign_text('signals = "s"', None, EMPTY_RUN, {"log": '"a.log"'}))
+    campaign = loaded(tmp_path, text_of_runs(EMPTY_RUN, {"log": '"a.log"'}))
     run = campaign.known_run(2, campaign.runs[1], ())
     assert (run.has_payload, run.has_place, run.described) == (False, False, "an unknown load")
     assert (run.statement.payload_kg, run.statement.front_share_pct, run.statement.source) == (None, None, None)
@@ -93,7 +97,7 @@ def test_a_run_without_a_load_has_an_unknown_load(tmp_path: Path) -> None:
 
 def test_a_load_without_a_place_is_a_note(tmp_path: Path) -> None:
     note = {"log": '"a.log"', "payload_kg": "310.0", "payload_plus_minus_kg": "25.0"}
-    campaign = loaded(tmp_path, campaign_text('signals = "s"', None, note))
+    campaign = loaded(tmp_path, text_of_runs(note))
     run = campaign.known_run(1, campaign.runs[0], ())
     assert (run.has_payload, run.has_place, run.described) == (True, False, "310 kg")
     assert (run.statement.payload_kg, run.statement.payload_plus_minus_kg) == (310.0, 25.0)
@@ -103,8 +107,8 @@ def test_a_load_without_a_place_is_a_note(tmp_path: Path) -> None:
 
 def test_the_doubt_of_a_place_is_that_of_the_share(tmp_path: Path) -> None:
     """0.28 m of a wheelbase of 2.8 m move a tenth of the payload from one axle to the other."""
-    rough = LOADED_RUN | {"payload_position_plus_minus_m": "0.28"}
-    campaign = loaded(tmp_path, campaign_text('signals = "s"', None, rough, LOADED_RUN))
+    rough = loaded_run(payload_position_plus_minus_m="0.28")
+    campaign = loaded(tmp_path, text_of_runs(rough, LOADED_RUN))
     doubtful, usual = (campaign.known_run(i, run, ()).statement for i, run in enumerate(campaign.runs, 1))
     assert doubtful.front_share_plus_minus_pct == pytest.approx(100.0 * 27.0 / 1510.0)
     assert usual.front_share_plus_minus_pct == KNOWN_SHARE_PLUS_MINUS_PCT
@@ -147,53 +151,55 @@ def test_a_payload_without_a_lateral_place_is_near_the_middle(tmp_path: Path) ->
     assert (there.payload_left_m, there.payload_left_std_m) == (-0.25, PAYLOAD_LEFT_NOTED_STD_M)
 
 
+def of_vehicle(**keys: str) -> str:
+    return campaign_text(vehicle=keys)
+
+
+def loaded_run(**keys: str) -> dict[str, str]:
+    return LOADED_RUN | keys
+
+
 FAULTS = [
     (campaign_text('signals = "s"\ncolour = 1'), "colour: unknown key"),
     (campaign_text('signals = ""'), "signals: "),
     (campaign_text('signals = "s"\nidentification_fraction = 1.5'), "identification_fraction: "),
-    (campaign_text(vehicle={"doors": "5"}), "vehicle.doors: unknown key"),
-    (campaign_text(vehicle={"wheelbase_m": "0.0"}), "vehicle.wheelbase_m: "),
-    (campaign_text(vehicle={"empty_mass_kg": '"heavy"'}), "vehicle.empty_mass_kg: "),
-    (campaign_text(vehicle={"empty_front_share_pct": "0.5e3"}), "vehicle.empty_front_share_pct: "),
-    (campaign_text(vehicle={"payload_range_kg": "[450.0, 0.0]"}), "payload_range_kg must rise"),
-    (campaign_text(vehicle={"carries": '"elephants"'}), "vehicle.carries"),
+    (of_vehicle(doors="5"), "vehicle.doors: unknown key"),
+    (of_vehicle(wheelbase_m="0.0"), "vehicle.wheelbase_m: "),
+    (of_vehicle(empty_mass_kg='"heavy"'), "vehicle.empty_mass_kg: "),
+    (of_vehicle(empty_front_share_pct="0.5e3"), "vehicle.empty_front_share_pct: "),
+    (of_vehicle(payload_range_kg="[450.0, 0.0]"), "payload_range_kg must rise"),
+    (of_vehicle(carries='"elephants"'), "vehicle.carries"),
     (
-        campaign_text('signals = "s"', None, {"log": '"a.log"', "payload_position_m": "0.5"}),
+        text_of_runs({"log": '"a.log"', "payload_position_m": "0.5"}),
         "payload_position_m says nothing without payload_kg: state it, or leave both out",
     ),
-    (campaign_text('signals = "s"', None, LOADED_RUN | {"payload_plus_minus_kg": "0"}), "payload_plus_minus_kg: "),
-    (campaign_text('signals = "s"', None, EMPTY_RUN, LOADED_RUN | {"payload_kg": "-5.0"}), "runs[2].payload_kg: "),
-    (campaign_text('signals = "s"', None, LOADED_RUN | {"front_share_pct": "48.0"}), "not both"),
-    (campaign_text('signals = "s"', None, EMPTY_RUN | {"start_s": "9.0", "end_s": "5.0"}), "end_s must be after"),
-    (campaign_text('signals = "s"', None, EMPTY_RUN | {"split": '"test"'}), "runs[1].split: "),
-    (campaign_text('signals = "s"', None, EMPTY_RUN, LOADED_RUN | {"log": '"b.log"'}), "runs[2].log: b.log: no such"),
-    (campaign_text(vehicle={"wheelbase_m": "2800"}), "vehicle.wheelbase_m: "),
-    (campaign_text(vehicle={"empty_mass_kg": "1.24"}), "vehicle.empty_mass_kg: "),
-    (campaign_text(vehicle={"sensor_position_m": "320"}), "vehicle.sensor_position_m: "),
-    (campaign_text('signals = "s"', None, {"log": '"a.log"', "payload_kg": "9", "front_share_pct": "0.5"}), "_pct: "),
-    (campaign_text('signals = "s"', None, EMPTY_RUN, LOADED_RUN | {"payload_position_m": "500"}), "_position_m: "),
-    (campaign_text('signals = "s"', None, EMPTY_RUN, LOADED_RUN | {"payload_position_m": "13"}), "lift the other"),
-    (campaign_text('signals = "s"', None, LOADED_RUN | {"payload_kg": "0.27"}), "write 270 if these are tonnes"),
-    (campaign_text('signals = "s"', None, LOADED_RUN | {"payload_kg": "1.3"}), "write 1300 if these are tonnes"),
-    (campaign_text(vehicle={"payload_range_kg": "[0.0, 0.45]"}), "vehicle.payload_range_kg: 0.45 kg is no load"),
-    (campaign_text(vehicle={"track_width_m": "1500"}), "vehicle.track_width_m: 1500 is above 4: millimetres?"),
+    (text_of_runs(loaded_run(payload_plus_minus_kg="0")), "payload_plus_minus_kg: "),
+    (text_of_runs(EMPTY_RUN, loaded_run(payload_kg="-5.0")), "runs[2].payload_kg: "),
+    (text_of_runs(loaded_run(front_share_pct="48.0")), "not both"),
+    (text_of_runs(EMPTY_RUN | {"start_s": "9.0", "end_s": "5.0"}), "end_s must be after"),
+    (text_of_runs(EMPTY_RUN | {"split": '"test"'}), "runs[1].split: "),
+    (text_of_runs(EMPTY_RUN, loaded_run(log='"b.log"')), "runs[2].log: b.log: no such"),
+    (of_vehicle(wheelbase_m="2800"), "vehicle.wheelbase_m: "),
+    (of_vehicle(empty_mass_kg="1.24"), "vehicle.empty_mass_kg: "),
+    (of_vehicle(sensor_position_m="320"), "vehicle.sensor_position_m: "),
+    (text_of_runs({"log": '"a.log"', "payload_kg": "9", "front_share_pct": "0.5"}), "_pct: "),
+    (text_of_runs(EMPTY_RUN, loaded_run(payload_position_m="500")), "_position_m: "),
+    (text_of_runs(EMPTY_RUN, loaded_run(payload_position_m="13")), "lift the other"),
+    (text_of_runs(loaded_run(payload_kg="0.27")), "write 270 if these are tonnes"),
+    (text_of_runs(loaded_run(payload_kg="1.3")), "write 1300 if these are tonnes"),
+    (of_vehicle(payload_range_kg="[0.0, 0.45]"), "vehicle.payload_range_kg: 0.45 kg is no load"),
+    (of_vehicle(track_width_m="1500"), "vehicle.track_width_m: 1500 is above 4: millimetres?"),
+    (of_vehicle(sensor_offset_left_m="-300"), "vehicle.sensor_offset_left_m: -300 is below -2: millimetres?"),
+    (of_vehicle(sensor_offset_left_std_m="20"), "vehicle.sensor_offset_left_std_m: 20 is above 2"),
+    (text_of_runs(loaded_run(payload_left_m="35")), "runs[1].payload_left_m: 35 is above 2: centimetres?"),
     (
-        campaign_text(vehicle={"sensor_offset_left_m": "-300"}),
-        "vehicle.sensor_offset_left_m: -300 is below -2: millimetres?",
-    ),
-    (campaign_text(vehicle={"sensor_offset_left_std_m": "20"}), "vehicle.sensor_offset_left_std_m: 20 is above 2"),
-    (
-        campaign_text('signals = "s"', None, LOADED_RUN | {"payload_left_m": "35"}),
-        "runs[1].payload_left_m: 35 is above 2: centimetres?",
-    ),
-    (
-        campaign_text('signals = "s"', {"track_width_m": "0.6"}, LOADED_RUN | {"payload_left_m": "-1.8"}),
+        campaign_text('signals = "s"', {"track_width_m": "0.6"}, loaded_run(payload_left_m="-1.8")),
         "runs[1].payload_left_m: 270 kg at -1.8 m would put -4 % of the weight on the left wheels",
     ),
-    (campaign_text(vehicle={"gross_limit_kg": "inf"}), "vehicle.gross_limit_kg: Input should be a finite number"),
-    (campaign_text('signals = "s"', None, EMPTY_RUN | {"end_s": "inf"}), "runs[1].end_s: Input should be a finite"),
+    (of_vehicle(gross_limit_kg="inf"), "vehicle.gross_limit_kg: Input should be a finite number"),
+    (text_of_runs(EMPTY_RUN | {"end_s": "inf"}), "runs[1].end_s: Input should be a finite"),
     (
-        campaign_text(vehicle={"kerb_rear_axle_kg": "600.0"}),
+        of_vehicle(kerb_rear_axle_kg="600.0"),
         "vehicle.kerb_rear_axle_kg: is 20 kg less than the load on this axle by empty_mass_kg",
     ),
     ('signals = "s"\n[vehicle]\n' + lines(VEHICLE), "runs: missing"),
@@ -214,7 +220,7 @@ def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
 
 
 def test_a_fault_in_the_only_run_is_reported_as_itself(tmp_path: Path) -> None:
-    assert fault_of(tmp_path, campaign_text('signals = "s"', None, EMPTY_RUN | {"end_s": "-1.0"})).count("\n") == 0
+    assert fault_of(tmp_path, text_of_runs(EMPTY_RUN | {"end_s": "-1.0"})).count("\n") == 0
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:

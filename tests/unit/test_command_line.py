@@ -1,14 +1,12 @@
 """The command line beside any one command: version, mistyped names and numbers, what a start does not import."""
 
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import click
 import pytest
-from support.commands import called, run
-from support.patience import PATIENCE_S
+from support.commands import called, ended, run
 
 import gateway.cli
 from gateway.cli import INTERRUPTED
@@ -102,8 +100,7 @@ FITTING = ("gateway.calibration.ratio_index", "gateway.calibration.inspection", 
 
 def python(code: str) -> str:
     """The output of the code in a process of its own."""
-    command = [sys.executable, "-c", code]
-    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=True).stdout
+    return ended(sys.executable, "-c", code).stdout
 
 
 @pytest.mark.parametrize(
@@ -111,6 +108,7 @@ def python(code: str) -> str:
     [
         ("gateway", ("gateway.", "numpy")),  # the Python API
         ("gateway.service.gateway", HEAVY),
+        ("gateway.cli.run, gateway.service.lifecycle", ("gateway.bus.sink", "gateway.bus.feeder")),  # what sends
         ("gateway.cli, gateway.bus.logs", ("asammdf",)),  # python-can takes it, and pandas: two seconds of every start
         ("gateway.calibration.file", FITTING),  # these take the others
     ],

@@ -1,6 +1,7 @@
 """The study of false statements: which kinds are refused before any fit, and what its table says of the others."""
 
 import pytest
+from support.paper_van import paper_van
 
 from benchmarks.accuracy.false_statements import (
     KINDS,
@@ -15,16 +16,9 @@ from benchmarks.accuracy.false_statements import (
 )
 from gateway.calibration.assigned import Fate
 from gateway.calibration.known_run import KnownRun
-from gateway.core.vehicle import Vehicle, front_share_pct
+from gateway.core.vehicle import front_share_pct
 
-VAN = Vehicle(
-    name="van",
-    empty_mass_kg=1240.0,
-    wheelbase_m=2.8,
-    empty_front_share_pct=50.0,
-    sensor_position_m=3.2,
-    payload_range_kg=(0.0, 450.0),
-)
+VAN = paper_van(sensor_position_m=3.2, payload_range_kg=(0.0, 450.0))
 LOADS = ((358.5, 2.179), (130.4, 1.859), (306.0, 2.867), (0.0, 1.0), (172.9, 2.907), (436.4, 1.989), (207.6, 0.959),
          (396.8, 2.241))  # fmt: skip
 REFUSED = {
@@ -71,11 +65,8 @@ def test_a_statement_that_cannot_be_true_is_refused_before_any_fit(recorded: Rec
 def test_the_table_counts_states_and_names_true_statements_that_were_accused() -> None:
     line = {"title": "exchanged", "payload": {"error": 2.25, "held": 100.0, "half": 10.9}}
     worse = {"title": "half", "payload": {"error": 4.0, "held": 100.0, "half": 12.0}}
-    one = {
-        "states": {"false": ["held", "used", "held"], "true": ["used", "weak"]},
-        "asked": ["is it gross?"],
-        "weighs": line,
-    }
+    states = {"false": ["held", "used", "held"], "true": ["used", "weak"]}
+    one = {"states": states, "asked": ["is it gross?"], "weighs": line}
     other = {"states": {"false": ["used"], "true": ["used"]}, "asked": [], "weighs": worse}
     every = {"title": "all", "states": {"false": [], "true": ["used"]}, "asked": [], "error_kg": 12.4, "held_pct": 87.5}
     found = section({"kinds": [one, other], "all": [every]}).splitlines()

@@ -137,31 +137,20 @@ def test_a_new_calibration_is_marked_and_the_slope_begins_there(tmp_path: Path) 
     assert monday_of(int(rule.at)) == date(2026, 1, 5) + timedelta(weeks=12)
 
 
-def test_every_page_is_well_formed_and_headings_descend_by_one(made: Path) -> None:
-    for path in pages(made):
-        page = Page(path.read_text(encoding="utf-8"))
-        assert_well_formed(page)
-        assert all(len(alt) > 40 for alt in page.alts)
-
-
-def test_pages_link_only_to_files_beside_them(made: Path) -> None:
-    for path in pages(made):
-        assert_self_contained(path)
-
-
-def test_names_cannot_break_out_of_the_page(made: Path) -> None:
+def test_every_page_is_well_formed_and_links_only_to_files_beside_it(made: Path) -> None:
+    """No name breaks out of a page, and every chart is a picture with words."""
     for path in pages(made):
         text = path.read_text(encoding="utf-8")
+        alts = Page(text).alts
+        assert_well_formed(Page(text))
+        assert_self_contained(path)
+        assert all(len(alt) > 40 for alt in alts)
+        assert text.count("<img") == text.count("<figure") == len(alts) > 0
         assert "<script>alert" not in text
         assert text.count("<script") == text.count("</script>")
-    assert "&lt;script&gt;alert(1)&lt;/script&gt;&quot;&#x27;&amp;.log" in (made / "report.html").read_text()
-
-
-def test_every_chart_is_a_picture_with_words_beside_its_page(made: Path) -> None:
-    for path in pages(made):
-        text = path.read_text(encoding="utf-8")
-        assert text.count("<img") == text.count("<figure") == len(Page(text).alts) > 0
-    assert '<img src="figures/loads.svg"' in (made / "report.html").read_text()
+    report = (made / "report.html").read_text()
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;&quot;&#x27;&amp;.log" in report
+    assert '<img src="figures/loads.svg"' in report
 
 
 @pytest.mark.parametrize("name", ["van-17", "../../etc/passwd", "a b", "", EVIL, "x" * 300])

@@ -98,10 +98,7 @@ def test_a_calibration_is_refused_only_where_faults_leave_no_scale() -> None:
 def test_the_calibration_file_remembers_faults_of_runs_left_out_and_warnings_of_the_others() -> None:
     found_in = inspection((FAULT, WARNING), (WARNING,), (), ())
     assert [one.identification.number for one in found_in.usable] == [2, 3, 4]
-    assert found_in.warnings == (
-        "run 1 left out: pitch_rate_sign: it is turned",
-        "run 2: smooth_road: it is smooth",
-    )
+    assert found_in.warnings == ("run 1 left out: pitch_rate_sign: it is turned", "run 2: smooth_road: it is smooth")
 
 
 def test_a_campaign_without_identification_is_reported() -> None:

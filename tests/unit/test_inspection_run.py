@@ -95,10 +95,7 @@ SPOILT: dict[str, tuple[Callable[[Motion], Motion], list[str]]] = {
         lambda m: scaled(m, pitch_rate=-DEGREES),
         ["fault:pitch_rate_unit", "fault:pitch_rate_sign"],
     ),
-    "level axis": (
-        lambda m: exchanged(m, ACCELERATION, Signal.LONGITUDINAL_ACCELERATION),
-        ["fault:acceleration_axis"],
-    ),
+    "level axis": (lambda m: exchanged(m, ACCELERATION, Signal.LONGITUDINAL_ACCELERATION), ["fault:acceleration_axis"]),
     "channels swapped": (lambda m: exchanged(m, ACCELERATION, PITCH_RATE), ["fault:channels_swapped"]),
     "channels swapped, as deg/s": (
         lambda m: exchanged(m, ACCELERATION, PITCH_RATE, 1.0 / DEGREES),

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from support.patience import PATIENCE_S
+from support.commands import ended
 
 from gateway.files.owned import KeptFiles
 from gateway.files.whole import write_whole, written_whole
@@ -72,8 +72,8 @@ def of_nobody() -> Iterator[Path]:
 
 
 def token(place: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "gateway", "token", *arguments, "--config", str(place / "springscale.toml")]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+    of_place = ("--config", place / "springscale.toml")
+    return ended(sys.executable, "-m", "gateway", "token", *arguments, *of_place, check=False)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root has rights to give up")

@@ -3,36 +3,20 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.cab import VAN as BENCH_VAN
+from support.cab import aboard
 
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights.on_the_road import weights_of
 from gateway.core.weights.room import NOTHING, Halves, LoadingArea, LoadRoom, Spare, room_of
 from gateway.estimates.batch_estimate import Weight, Weights
-from gateway.estimates.posterior import Posterior
 
-VAN = Vehicle(
-    name="van",
-    empty_mass_kg=1240.0,
-    wheelbase_m=2.8,
-    sensor_position_m=0.0,
-    unsprung_front_kg=80.0,
-    unsprung_rear_kg=80.0,
-    gross_limit_kg=2000.0,
-    front_axle_limit_kg=1000.0,
-    rear_axle_limit_kg=1050.0,
-    loading_area_m=(1.4, 2.8),
-)
+VAN = BENCH_VAN.vehicle
 AREA = LoadingArea(0.5, 1.0)  # from the middle between the axles to the rear axle
 INSIDE = st.floats(0.0, 1.0)
 SPARES = st.floats(1.0, 900.0) | st.just(math.inf)
-
-
-def aboard(payload_kg: float, front_share_pct: float, std_kg: float = 6.0) -> Weights:
-    return weights_of(VAN, Posterior(np.array([payload_kg, front_share_pct]), np.diag([std_kg**2, 0.04])))
 
 
 def found(weights: Weights, vehicle: Vehicle = VAN) -> LoadRoom:

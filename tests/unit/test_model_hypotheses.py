@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ndtr
 from support.model_road import times
-from support.taught_van import FLAT_VAN, VAN, car, drive_of, estimated, spectra_of, taught
+from support.taught_van import FLAT_VAN, ROLL, VAN, car, drive_of, estimated, lost, spectra_of, taught
 
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.estimates.batch_estimate import Estimate, Quantity
@@ -21,12 +21,6 @@ from gateway.model.weigh import Hypothesis, Mixture, Peak, hypotheses_of, mixtur
 from gateway.records import F64, Batch
 
 FIRM_HZ = 28.0
-ROLL = pytest.mark.parametrize("with_roll", [False, True], ids=["two sensors", "three sensors"])
-
-
-def lost(reason: str) -> pytest.MarkDecorator:
-    """A behaviour that the vehicle ought to have."""
-    return pytest.mark.xfail(strict=True, reason=reason)
 
 
 def holds(quantity: Quantity, truth: float) -> bool:

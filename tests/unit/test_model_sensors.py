@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 from support.model_road import RATE_HZ
-from support.taught_van import UNITS, USUAL_SLACK, car, drive_of, estimated, left_of, taught, weighed
+from support.taught_van import ROLL, UNITS, USUAL_SLACK, car, drive_of, estimated, left_of, lost, taught, weighed
 
 from gateway.estimates.batch_estimate import Estimate
 from gateway.model import checks, sensors
@@ -19,7 +19,6 @@ from gateway.records import F64, Batch, Why
 
 LOAD = (200.0, 50.0)
 DENSITY = 8.7e-4  # rad/s/sqrt(Hz): a gyro of 0.05 deg/s/sqrt(Hz)
-ROLL = pytest.mark.parametrize("with_roll", [False, True], ids=["two sensors", "three sensors"])
 
 
 def told(batch: Batch, *, with_roll: bool = False) -> Estimate:
@@ -44,11 +43,6 @@ def test_untouched_sensors_are_believed(seed: int, with_roll: bool) -> None:
 REFUSED_AS_CHANGED = {Why.SENSOR_CHANGED, Why.MODEL_MISFIT}
 CLEAN = 0.0
 """The slack of drives whose sensors are as alike as a model can have them, but for noise."""
-
-
-def lost(reason: str) -> pytest.MarkDecorator:
-    """A behaviour that the vehicle ought to have."""
-    return pytest.mark.xfail(strict=True, reason=reason)
 
 
 def moved(moved_m: float, *, with_roll: bool, slack: float = USUAL_SLACK) -> Estimate:

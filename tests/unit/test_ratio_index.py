@@ -11,14 +11,7 @@ from support.calibrated import ratio_index_calibration
 from support.half_car_road import batch_of
 
 from gateway.calibration.ratio_index.least_squares import fit_regression
-from gateway.core.ratio_index.index import (
-    PAPER_BANDS,
-    Band,
-    band_pass_gain,
-    indexes_of,
-    mean_spectrum,
-    ratio_index,
-)
+from gateway.core.ratio_index.index import PAPER_BANDS, Band, band_pass_gain, indexes_of, mean_spectrum, ratio_index
 from gateway.core.ratio_index.regression import (
     MODEL_9_PAYLOAD,
     MODEL_11_FRONT_SHARE,

@@ -14,12 +14,7 @@ from gateway.calibration.ratio_index.bands import candidate_pairs, rank_correlat
 from gateway.calibration.ratio_index.index_fit import RatioIndexFit, fit_ratio_index
 from gateway.calibration.ratio_index.spectra_table import SpectrumTable
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration, indexes_of
-from gateway.core.ratio_index.regression import (
-    MODEL_9_PAYLOAD,
-    MODEL_11_FRONT_SHARE,
-    MODEL_11_PAYLOAD,
-    RegressionModel,
-)
+from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD, RegressionModel
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimates.batch_estimate import UNKNOWN
 from gateway.records import F64, Batch, Why

@@ -28,16 +28,7 @@ DRIVE = white_noise(20.0, START_NS, seed=1)
 def recorded(log: Path, signals: str = "springscale:reference", for_s: float = 0.3) -> Result:
     """The log that ``springscale record`` makes from a virtual bus named after the log's folder."""
     return called(
-        "record",
-        log,
-        "--signals",
-        signals,
-        "--for-s",
-        for_s,
-        "--interface",
-        "virtual",
-        "--channel",
-        log.parent.name,
+        "record", log, "--signals", signals, "--for-s", for_s, "--interface", "virtual", "--channel", log.parent.name
     )
 
 

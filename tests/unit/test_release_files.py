@@ -4,7 +4,6 @@ import json
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 import tomllib
 from dataclasses import fields
@@ -19,8 +18,8 @@ from machine_code import ELF_MAGIC, PROCESSORS, ForeignCodeError, require_own_co
 from make_deb import UNIMPORTED, of_desk
 from packaging.tags import Tag
 from packaging.utils import parse_wheel_filename
+from support.commands import ended
 from support.locks import ROOT, pins
-from support.patience import PATIENCE_S
 
 from gateway.config import load_settings
 from gateway.core.weights.limits import Limits
@@ -37,17 +36,14 @@ def of(instruction: str) -> list[str]:
 
 
 def test_there_is_one_version() -> None:
-    command = [sys.executable, "-m", "gateway", "--version"]
-    said = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=True).stdout
+    said = ended(sys.executable, "-m", "gateway", "--version").stdout
     assert said.split()[-1] == PROJECT["version"] == version("springscale") == make_deb.version()
     assert yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"] == PROJECT["version"]
 
 
 def test_the_citation_is_valid() -> None:
-    command = ["check_jsonschema", "--builtin-schema", "vendor.citation-file-format", str(ROOT / "CITATION.cff")]
-    checked = subprocess.run(
-        [sys.executable, "-m", *command], capture_output=True, text=True, timeout=PATIENCE_S, check=False
-    )
+    command = ("check_jsonschema", "--builtin-schema", "vendor.citation-file-format", ROOT / "CITATION.cff")
+    checked = ended(sys.executable, "-m", *command, check=False)
     assert checked.returncode == 0, checked.stdout
 
 
@@ -124,19 +120,9 @@ def test_every_commented_key_of_the_shipped_configuration_is_a_setting(tmp_path:
 
 
 def test_the_shipped_configuration_shows_the_true_defaults(tmp_path: Path) -> None:
-    examples = [
-        "calibration",
-        "calibrated_as",
-        "vin",
-        "tls_certificate",
-        "tls_key",
-        "interface",  # of another bus
-        "channel",
-        "source_address",
-        "url",
-        "secret_file",
-        *(one.name for one in fields(Limits)),
-    ]
+    keys = ["calibration", "calibrated_as", "vin", "tls_certificate", "tls_key", "source_address", "url", "secret_file"]
+    of_another_bus = ("interface", "channel")
+    examples = [*keys, *of_another_bus, *(one.name for one in fields(Limits))]
     kept = [
         line
         for line in (DEPLOY / "springscale.toml").read_text().splitlines()
@@ -150,13 +136,8 @@ def test_the_shipped_configuration_shows_the_true_defaults(tmp_path: Path) -> No
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd is not installed here")
 def test_the_sandbox_scores_below_one_and_a_half_and_what_remains_is_explained() -> None:
-    report = subprocess.run(
-        ["systemd-analyze", "security", "--no-pager", "--offline=true", str(DEPLOY / "springscale.service")],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=True,
-    ).stdout
+    command = ("systemd-analyze", "security", "--no-pager", "--offline=true", DEPLOY / "springscale.service")
+    report = ended(*command).stdout
     score = re.search(r"exposure level for springscale.service: ([\d.]+)", report)
     assert float(score[1]) <= 1.5
     explained = UNIT.partition("still counts, and why it stays:")[2]
@@ -207,8 +188,7 @@ def planned(*arguments: str) -> str:
     """The commands of a set-up from nothing, not run."""
     if shutil.which("make") is None:
         pytest.skip("needs make")
-    asked = ["make", "--no-print-directory", "--dry-run", "--always-make", *arguments]
-    return subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return ended("make", "--no-print-directory", "--dry-run", "--always-make", *arguments, cwd=ROOT).stdout
 
 
 def test_the_demonstration_takes_a_port() -> None:

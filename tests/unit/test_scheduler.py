@@ -66,10 +66,7 @@ def test_a_clock_step_back_ends_the_drive() -> None:
     stepped = joined(drive(60.0, None, RATE_HZ), later(drive(300.0, None, RATE_HZ), 30.0))
     first, second = batches_of(stepped)
     assert first.rejected == (Why.TOO_SHORT, Why.CLOCK_STEP)
-    assert spans_s([first, second]) == [
-        pytest.approx((0.0, 60.0), abs=0.1),
-        pytest.approx((30.0, 330.0), abs=0.1),
-    ]
+    assert spans_s([first, second]) == [pytest.approx((0.0, 60.0), abs=0.1), pytest.approx((30.0, 330.0), abs=0.1)]
     assert second.rejected == ()
 
 

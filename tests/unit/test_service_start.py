@@ -30,9 +30,7 @@ def test_tls_files_are_found_beside_the_configuration(tmp_path: Path) -> None:
     assert (tls.certificate, tls.key, tls.client_ca) == (tmp_path / "web.pem", tmp_path / "web.key", None)
 
 
-def test_a_restart_under_systemd_uses_the_exit_code_of_the_unit(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_restart_under_systemd_uses_the_exit_code_of_the_unit(monkeypatch: pytest.MonkeyPatch) -> None:
     """A service that began anew inside its process had to clear private caches of FastAPI."""
     unit = (Path(__file__).parents[2] / "deploy/springscale.service").read_text()
     assert f"RestartForceExitStatus={life.RESTART_CODE}\n" in unit

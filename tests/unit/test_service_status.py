@@ -56,42 +56,33 @@ def report(
     return told.state()
 
 
-def test_all_is_well() -> None:
-    assert report(ALL_HEARD) is State.ESTIMATING
+PARKED = {"is_stale": True, "is_parked": True}
+STATES: list[tuple[State, dict[Signal, float | None], dict[str, Any]]] = [  # when signals were heard, and the rest
+    (State.ESTIMATING, {}, {}),
+    *(
+        (State.SENSOR_FAULT, {one: age_s}, how)
+        for one in SIGNALS[:2]
+        for age_s in (LONG_S, None)
+        for how in ({}, PARKED)
+    ),
+    (State.ESTIMATING, {Signal.PITCH_RATE: 0.5 * SENSOR_LOST_S}, {}),  # a pause is no fault
+    (State.WAITING_FOR_SPEED, {Signal.SPEED: LONG_S}, {}),
+    (State.WAITING_FOR_SPEED, {Signal.SPEED: None}, {}),
+    (State.WAITING_FOR_SPEED, {}, {"is_parked": True}),
+    # a silent bus is not the sensors' fault
+    (State.READER_FAULT, dict.fromkeys(SIGNALS, LONG_S), {"source": SourceState.READER_FAULT}),
+    (State.STARTING, dict.fromkeys(SIGNALS, LONG_S), {"source": SourceState.STARTING}),
+    (State.WAITING_FOR_BUS, dict.fromkeys(SIGNALS, LONG_S), {"source": SourceState.BUS_SILENT}),
+    (State.COLLECTING, {}, {"estimate_age_s": None}),
+    (State.STALE, {}, {"is_stale": True}),
+]
 
 
-@pytest.mark.parametrize("silent", [Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE])
-@pytest.mark.parametrize("age_s", [LONG_S, None])
-def test_a_silent_sensor_on_a_living_bus_is_a_fault(silent: Signal, age_s: float | None) -> None:
-    assert report({**ALL_HEARD, silent: age_s}) is State.SENSOR_FAULT
-    assert report({**ALL_HEARD, silent: age_s}, is_stale=True, is_parked=True) is State.SENSOR_FAULT
-
-
-def test_a_pause_is_no_fault() -> None:
-    assert report({**ALL_HEARD, Signal.PITCH_RATE: 0.5 * SENSOR_LOST_S}) is State.ESTIMATING
-
-
-def test_a_lost_speed_is_waited_for() -> None:
-    assert report({**ALL_HEARD, Signal.SPEED: LONG_S}) is State.WAITING_FOR_SPEED
-    assert report({**ALL_HEARD, Signal.SPEED: None}) is State.WAITING_FOR_SPEED
-    assert report(ALL_HEARD, is_parked=True) is State.WAITING_FOR_SPEED
-
-
-@pytest.mark.parametrize(
-    ("source", "state"),
-    [
-        (SourceState.READER_FAULT, State.READER_FAULT),
-        (SourceState.STARTING, State.STARTING),
-        (SourceState.BUS_SILENT, State.WAITING_FOR_BUS),
-    ],
-)
-def test_a_silent_bus_is_not_the_sensors_fault(source: SourceState, state: State) -> None:
-    assert report(dict.fromkeys(SIGNALS, LONG_S), source) is state
-
-
-def test_an_estimate_is_collected_shown_and_grows_old() -> None:
-    assert report(ALL_HEARD, estimate_age_s=None) is State.COLLECTING
-    assert report(ALL_HEARD, is_stale=True) is State.STALE
+@pytest.mark.parametrize(("state", "ages_s", "how"), STATES)
+def test_the_state_follows_from_what_was_heard(
+    state: State, ages_s: dict[Signal, float | None], how: dict[str, Any]
+) -> None:
+    assert report({**ALL_HEARD, **ages_s}, **how) is state
 
 
 VAN = paper_van(unsprung_front_kg=90.0, unsprung_rear_kg=110.0, gross_limit_kg=1500.0)

@@ -34,13 +34,14 @@ def read(felt: Felt, sensors: Sensors, seed: int = 1, start_ns: int = 0) -> Reco
     return record(felt, sensors, np.random.default_rng(seed), start_ns)
 
 
+def at_rest(n: int) -> Ride:
+    """The van on a flat road for so many steps."""
+    flat = PaperRoad(sigma_m=0.0).lay(20.0, np.random.default_rng(1))
+    return ride(linearised(PAPER_VAN), (), flat, Drive(np.zeros(n), np.zeros(n)))
+
+
 def test_at_rest_the_reading_is_gravity_upwards() -> None:
-    still = ride(
-        linearised(PAPER_VAN),
-        (),
-        PaperRoad(sigma_m=0.0).lay(20.0, np.random.default_rng(1)),
-        Drive(np.zeros(101), np.zeros(101)),
-    )
+    still = at_rest(101)
     recording = read(felt_at(still, PAPER_VAN, Mount()), Sensors())
     assert recording.accel_mps2 == pytest.approx(np.tile([0.0, 0.0, STANDARD_GRAVITY_MPS2], (501, 1)), abs=1e-9)
     assert np.max(np.abs(recording.gyro_radps)) < 1e-12
@@ -74,12 +75,7 @@ def test_rates_are_roll_pitch_yaw(driven: Ride) -> None:
     ],
 )
 def test_a_turned_unit_sees_gravity_askew(turned: Mount, expected: tuple[float, float, float]) -> None:
-    still = ride(
-        linearised(PAPER_VAN),
-        (),
-        PaperRoad(sigma_m=0.0).lay(20.0, np.random.default_rng(1)),
-        Drive(np.zeros(3), np.zeros(3)),
-    )
+    still = at_rest(3)
     force = felt_at(still, PAPER_VAN, turned).force_mps2[0]
     assert force / STANDARD_GRAVITY_MPS2 == pytest.approx(expected, abs=1e-9)
 

@@ -24,11 +24,8 @@ def split(**said: dict[str, float]) -> tuple[SplitRun, ...]:
 
     def told(one: SplitRun) -> SplitRun:
         change = said.get(f"run_{one.identification.number}", {})
-        return replace(
-            one,
-            identification=replace(one.identification, **change),
-            validation=replace(one.validation, **change),
-        )
+        parts = {name: replace(getattr(one, name), **change) for name in ("identification", "validation")}
+        return replace(one, **parts)
 
     return tuple(told(one) for one in known_campaign())
 
@@ -65,12 +62,8 @@ def test_an_unknown_load_teaches_and_is_found_and_is_not_judged(tmp_path: Path) 
 def test_a_note_is_judged_by_its_kilograms_alone(tmp_path: Path) -> None:
     _, outcome = calibrated(tmp_path, split(run_2=NOTE))
     told = outcome.file.provenance.drives[1].statement
-    assert (told.payload_kg, told.payload_plus_minus_kg, told.front_share_pct, told.is_compact) == (
-        200,
-        25,
-        None,
-        False,
-    )
+    found = (told.payload_kg, told.payload_plus_minus_kg, told.front_share_pct, told.is_compact)
+    assert found == (200, 25, None, False)
     (judgement,) = assess_calibration(outcome).judgements
     noted = [one for one in judgement.tables[BatchSet.VALIDATION].judged if one.run == 2]
     assert all(one.is_covered("payload") is not None for one in noted)

@@ -26,20 +26,9 @@ def run(*arguments: str) -> str:
 def test_the_coverage_study_reports_a_shortfall(
     n_missed: int, verdict: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    told = {"payload_half_width_pct": 3.0, "payload_score_pct": 6.5}
     batches = [
-        JudgedBatch(
-            "a",
-            f"a {i}",
-            "mixed",
-            "cross_spectrum",
-            (),
-            1.0,
-            1.0,
-            i >= n_missed,
-            i % 20 > 0,
-            payload_half_width_pct=3.0,
-            payload_score_pct=6.5,
-        )
+        JudgedBatch("a", f"a {i}", "mixed", "cross_spectrum", (), 1.0, 1.0, i >= n_missed, i % 20 > 0, **told)
         for i in range(200)
     ]
     refused = [

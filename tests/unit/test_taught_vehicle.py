@@ -14,19 +14,14 @@ from gateway.calibration.teach import teach
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimates.batch_estimate import Estimate
-from gateway.model.spectra import cross_spectra_of
-from gateway.model.weigh import by_cross_spectrum, mixture_of, posterior_of, weigh
-from gateway.records import Batch, Why
+from gateway.model.weigh import by_cross_spectrum
+from gateway.records import Batch
 from gateway.stated.statement import StatementSource
 
 
 def stated(payload_kg: float, share_pct: float) -> Statement:
     return Statement(
-        source=StatementSource.KNOWN,
-        payload_kg=payload_kg,
-        front_share_pct=share_pct,
-        left_m=0.0,
-        is_compact=True,
+        source=StatementSource.KNOWN, payload_kg=payload_kg, front_share_pct=share_pct, left_m=0.0, is_compact=True
     )
 
 
@@ -87,37 +82,6 @@ def test_each_statement_is_compared_with_its_drive_weighed_without_it() -> None:
     for found, (payload_kg, _) in zip(known().loads, KNOWN, strict=True):
         assert abs(found.without_kg - payload_kg) < 3.0 * found.without_std_kg
         assert found.payload_std_kg < found.without_std_kg
-
-
-def test_the_sources_of_error_add_up_to_the_answer() -> None:
-    """The columns' squares and the batch's own covariance are the covariance of the answer with its parameters."""
-    model = replace(known().model, model_std=(0.0, 0.0, 0.0), spread=(1.0, 1.0, 1.0))
-    spectra = cross_spectra_of([batch_over_road(200.0, 50.0, seed=97)], model.reading)
-    assert spectra is not None
-    several = mixture_of(spectra, model, known_shape(*model.known_shape))
-    mixture = replace(several, peaks=(several.best,), weights=np.ones(1))
-    posterior = posterior_of(mixture, model, 1.0, 0.0042)
-    of_peak = mixture.best.covariance[-2:, -2:] * np.outer([1.0, 100.0], [1.0, 100.0])
-    found = posterior.covariance - sum(
-        column.T @ column for name, column in posterior.sources.items() if name == "sideways"
-    )
-    np.testing.assert_allclose(found, of_peak, rtol=1e-4)
-    assert np.all(np.linalg.eigvalsh(posterior.own) > 0.0)
-
-
-def test_a_reversed_gyro_is_recognised() -> None:
-    told = estimated(batch_over_road(200.0, 50.0, seed=96, pitch_sign=-1.0), known())
-    assert told.rejected == (Why.WRONG_SIGN,)
-
-
-def test_a_vehicle_that_hardly_moves_is_not_weighed() -> None:
-    quiet = batch_over_road(200.0, 50.0, seed=95, shaken_mps2=0.005)
-    assert weigh(quiet, known().model, known_shape(*known().model.known_shape)) is Why.NOT_ENOUGH_EXCITATION
-
-
-def test_the_same_batch_gives_the_same_answer() -> None:
-    batch = batch_over_road(200.0, 50.0, seed=94)
-    assert estimated(batch, known()) == estimated(batch, known())
 
 
 def test_drives_without_steady_driving_teach_nothing() -> None:

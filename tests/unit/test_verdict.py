@@ -1,11 +1,12 @@
 """One light and one sentence on the weight of a vehicle."""
 
 from itertools import product
+from typing import Any
 
 import pytest
 
 from gateway.core.weights.limits import Light
-from gateway.core.weights.verdict import Says, verdict_of
+from gateway.core.weights.verdict import Says, Verdict, verdict_of
 from gateway.estimates.batch_estimate import Weight, Weights
 
 LIGHT, NEAR, HEAVY = (
@@ -14,6 +15,12 @@ LIGHT, NEAR, HEAVY = (
     Weight(961.0, 14.0, 950.0, None),
 )
 UNKNOWN, UNLIMITED = Weight(limit_kg=950.0), Weight(900.0, 10.0, None, None)
+
+
+def said(weights: Weights, **how: Any) -> Verdict:
+    """What is said of a calibrated vehicle that was weighed, unless ``how`` says otherwise."""
+    usual = {"is_calibrated": True, "is_weighed": True, "is_doubted": False, "is_vague": False}
+    return verdict_of(weights, **usual | how)
 
 
 @pytest.mark.parametrize(
@@ -31,23 +38,17 @@ def test_each_weight_has_its_light_and_sentence(
     weights: Weights, light: Light, says: Says, about: tuple[str, ...]
 ) -> None:
     """961 +- 28 of 950 kg is too heavy on every page: it is more probable than not."""
-    found = verdict_of(weights, is_calibrated=True, is_weighed=True, is_doubted=False, is_vague=False)
+    found = said(weights)
     assert (found.light, found.says, found.about) == (light, says, about)
 
 
 def test_before_the_first_weighing_a_calibrated_vehicle_is_ready() -> None:
-    states = [
-        verdict_of(Weights(), is_calibrated=is_calibrated, is_weighed=False, is_doubted=False, is_vague=False).says
-        for is_calibrated in (True, False)
-    ]
+    states = [said(Weights(), is_calibrated=is_calibrated, is_weighed=False).says for is_calibrated in (True, False)]
     assert states == [Says.READY, Says.NOT_CALIBRATED]
 
 
 def test_doubt_takes_back_everything_but_an_overload() -> None:
-    light, heavy = (
-        verdict_of(Weights(gross=weight), is_calibrated=True, is_weighed=True, is_doubted=True, is_vague=False).says
-        for weight in (LIGHT, HEAVY)
-    )
+    light, heavy = (said(Weights(gross=weight), is_doubted=True).says for weight in (LIGHT, HEAVY))
     assert (light, heavy) == (Says.DOUBTED, Says.OVER)
 
 
@@ -56,23 +57,16 @@ def test_doubt_takes_back_everything_but_an_overload() -> None:
 def test_green_never_stands_beside_an_active_overload_alarm(
     weight: Weight, is_calibrated: bool, is_weighed: bool, is_doubted: bool
 ) -> None:
-    found = verdict_of(
-        Weights(gross=weight),
-        is_calibrated=is_calibrated,
-        is_weighed=is_weighed,
-        is_doubted=is_doubted,
-        is_vague=False,
-        alarmed=("gross",),
-    )
+    known = {"is_calibrated": is_calibrated, "is_weighed": is_weighed, "is_doubted": is_doubted}
+    found = said(Weights(gross=weight), **known, alarmed=("gross",))
     assert found.light is not Light.GO
     assert (found.light is Light.OVER) == (found.says is Says.OVER)
 
 
 @pytest.mark.parametrize(
-    ("weight", "says"),
-    [(LIGHT, Says.VAGUE), (NEAR, Says.NEAR), (HEAVY, Says.OVER), (UNKNOWN, Says.WEIGHT_UNKNOWN)],
+    ("weight", "says"), [(LIGHT, Says.VAGUE), (NEAR, Says.NEAR), (HEAVY, Says.OVER), (UNKNOWN, Says.WEIGHT_UNKNOWN)]
 )
 def test_a_useless_weighing_warns_and_is_never_green(weight: Weight, says: Says) -> None:
-    found = verdict_of(Weights(gross=weight), is_calibrated=True, is_weighed=True, is_doubted=False, is_vague=True)
+    found = said(Weights(gross=weight), is_vague=True)
     assert found.says is says
     assert found.light is not Light.GO

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from support.archive import write_manifest
+from support.cab import aboard
 from support.calibrated import calibration_text
 from support.commands import called
 from support.configured import service_config
@@ -22,7 +23,7 @@ from support.web import Client, Gateway
 
 from gateway.archive.manifest import load_manifest
 from gateway.config import load_settings
-from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct
+from gateway.core.vehicle import cg_left_m, front_share_pct
 from gateway.core.weights.limits import Light, Limits, nearness, over_limit_probability, rooms_of
 from gateway.core.weights.on_the_road import PayloadPlace, place_of, weighed, weights_of
 from gateway.errors import ConfigurationError
@@ -63,14 +64,7 @@ def test_the_probability_is_symmetric(std_kg: float, limit_kg: float, by_kg: flo
 
 
 def test_stated_limits_override_the_vehicles_own() -> None:
-    vehicle = Vehicle(
-        name="v",
-        empty_mass_kg=1240.0,
-        wheelbase_m=2.8,
-        sensor_position_m=0.0,
-        gross_limit_kg=2000.0,
-        rear_axle_limit_kg=1100.0,
-    )
+    vehicle = paper_van(gross_limit_kg=2000.0, rear_axle_limit_kg=1100.0)
     limited = Limits(gross_limit_kg=1900.0, front_wheel_limit_kg=500.0).on(vehicle)
     assert Limits.of(limited) == Limits(gross_limit_kg=1900.0, rear_axle_limit_kg=1100.0, front_wheel_limit_kg=500.0)
     assert Limits().on(vehicle) == vehicle
@@ -169,18 +163,7 @@ def test_an_archive_is_judged_by_its_manifests_limits(tmp_path: Path) -> None:
     assert other.setup.calibrated.vehicle.rear_axle_limit_kg == 900.0
 
 
-VAN = paper_van(
-    unsprung_front_kg=80.0,
-    unsprung_rear_kg=80.0,
-    gross_limit_kg=2000.0,
-    front_axle_limit_kg=1000.0,
-    rear_axle_limit_kg=1050.0,
-)
 WITHIN = st.floats(0.0, 1.0)
-
-
-def aboard(payload_kg: float, front_share_pct: float, std_kg: float = 6.0) -> Weights:
-    return weights_of(VAN, Posterior(np.array([payload_kg, front_share_pct]), np.diag([std_kg**2, 0.04])))
 
 
 def test_rooms_of_all_limits_are_sorted_tightest_first() -> None:
