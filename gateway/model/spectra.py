@@ -18,7 +18,7 @@ from gateway.records import C128, F64, I64, Batch, Bool, Why
 
 PAIRS: Final = ((1, 0), (2, 0), (2, 1))
 """Pairs (row, column) of sensors: pitch rate and acceleration; roll rate and each of these."""
-SPEED_BIN: Final = 0.06  # chosen: width of a group of segments in the logarithm of speed
+SPEED_BIN: Final = 0.03  # chosen: width of a group of segments in the logarithm of speed
 AMPLITUDE_BIN: Final = 0.5  # chosen: and in the logarithm of amplitude; friction and noise matter more at small ones
 SPEED_CHANGE_MAX_MPS2: Final = 0.3  # chosen: braking and accelerating pitch the body without any road
 SPEED_SAMPLE_STEP: Final = 8  # chosen: the speed varies little within 0.16 s
