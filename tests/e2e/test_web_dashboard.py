@@ -260,7 +260,7 @@ def test_an_old_estimate_is_marked(gateway: Gateway, dashboard: Look) -> None:
 
 
 #: The cards move until all their numbers have come.
-IN_THREE_COLUMNS = """new Set([...document.querySelectorAll("#packed > .card")].map(
+IN_THREE_COLUMNS = """new Set([...document.querySelectorAll("#packed > .card:not([hidden])")].map(
   card => card.getBoundingClientRect().x)).size === 3"""
 ENGLISH = re.compile(r"\b(the|and|not|of|load|weighed|batch|unknown|heard|never)\b")
 NEVER_HEARD = STATUS.bus.model_copy(update={"n_frames": 0})
