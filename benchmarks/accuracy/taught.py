@@ -2,12 +2,12 @@
 
     python -m benchmarks.accuracy.taught DATA [--splits 3] [--output docs]
 
-DATA holds campaigns with a roll rate (campaign_roll.toml). Known loads teach a vehicle that weighs the other sets, and
-that is the sister of two more, each taught by its empty drives alone. Then, in random splits, one steady empty drive
-and four mixed drives teach a vehicle, of which nothing is said or whose kilograms a delivery note states, or the four
-teach beside known loads, and the other mixed drives are weighed. Prints payload and front share, each with mean
-error, bias, share held by the 95 % interval, half-width and interval score, in percent of the payload range and of 20
-points; ``--output`` writes them to taught.json.
+DATA holds campaigns with a roll rate (campaign_roll.toml). Known loads teach a vehicle, which weighs the other sets;
+with its calibration two vehicles of its model are taught by their empty drives alone. Then, in random splits, four
+mixed drives teach a vehicle and it weighs the others. One steady empty drive teaches with the four, of which nothing
+is said or whose kilograms a delivery note states; or known loads teach with them. Known loads, and the empty drive,
+also teach alone. Prints payload and front share, each with mean error, bias, share held by the 95 % interval, half-
+width and interval score, in percent of the payload range and of 20 points; ``--output`` writes them to taught.json.
 """
 
 import argparse

@@ -233,22 +233,19 @@ def mixture_of(
     with_roll = spectra.has_roll and model.has_roll
     weight = EVIDENCE if with_roll else EVIDENCE_WITHOUT_ROLL
     first, *others = hypotheses_of(model, shapes, gain, with_roll=with_roll)
-    flat = spectra.without_roll
     most_kg = MOST_LOAD_SHARE * model.empty_mass_kg
     roll = np.empty(0) if with_roll else model.parameters[N:]
-    own = _Own(Whittle(flat, model.ground, weight), roll, 0.0, most_kg)
-    coarse = _coarse(own, first, model)
-    best = coarse[0]
+    own = _Own(Whittle(spectra.without_roll, model.ground, weight), roll, 0.0, most_kg)
+    likeliest, *rivals = _coarse(own, first, model)
     rolling = sideways = None
     if with_roll:
         roll = level(model.parameters)[N:]
-        moving = with_strokes(spectra, np.r_[model.parameters[:N], roll], best.load, model.ground)
+        moving = with_strokes(spectra, np.r_[model.parameters[:N], roll], likeliest.load, model.ground)
         rolling = Whittle(moving.within(ROLL_BAND_HZ), model.ground)
-        sideways = search_of_place(rolling, Point.of(np.r_[best.x[:N], roll], best.load)).own[0]
+        sideways = search_of_place(rolling, Point.of(np.r_[likeliest.x[:N], roll], likeliest.load)).own[0]
         own = _Own(Whittle(moving.without_roll, model.ground, weight), roll, float(sideways[-1]), most_kg)
-    found = _climb(own, best.hypothesis, best.x, FINE)
-    peaks = [found, *(one.moved_as(best, found) for one in coarse[1:])]
-    best = found
+    best = _climb(own, likeliest.hypothesis, likeliest.x, FINE)
+    peaks = [best, *(one.moved_as(likeliest, best) for one in rivals)]
     for other in others:
         hypothesis = other.soft() if best.hypothesis.is_soft else other
         start = best.x.copy()
@@ -307,10 +304,6 @@ def _climb(own: _Own, hypothesis: Hypothesis, start: F64, tolerance: float, riva
     return Peak(hypothesis, found.own[0], found.own_covariances[0], log_evidence, found.is_converged)
 
 
-def _is_worth(one: Peak, best: Peak) -> bool:
-    return one.log_evidence > best.log_evidence - HOPELESS
-
-
 def _distinct(peaks: Sequence[Peak]) -> list[Peak]:
     """The peaks, the likeliest first, without those that another search of the same hypothesis has found."""
     found: list[Peak] = []
@@ -320,7 +313,7 @@ def _distinct(peaks: Sequence[Peak]) -> list[Peak]:
             and abs(other.x[N] - one.x[N]) < SAME_PEAK * math.sqrt(other.covariance[N, N])
             for other in found
         )
-        if not any(same) and (not found or _is_worth(one, found[0])):
+        if not any(same) and (not found or one.log_evidence > found[0].log_evidence - HOPELESS):
             found.append(one)
     return found
 

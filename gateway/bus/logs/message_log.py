@@ -7,6 +7,7 @@ python-can takes the computer's own zone, knows two languages, and passes over w
 import io
 import re
 import zlib
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterator, Sequence
 from datetime import UTC, datetime
 from itertools import chain, islice
@@ -85,22 +86,22 @@ def _ours(found: Iterator[Found], selection: Selection) -> Iterator[can.Message]
             yield message
 
 
-class _TextLog:
+class _TextLog(ABC):
     """What the header of a text log says of the lines behind it."""
 
     reader: ClassVar[Callable[..., Any]]
-    header_form: ClassVar[re.Pattern[str]]
+    header_form: ClassVar[re.Pattern[str]] = re.compile("(?!)")  # no line is a header
 
     def __init__(self, selection: Selection) -> None:
         self.report, self.zone, self.start_ns = selection.report, selection.zone, 0
         self.header: dict[str, str] = {}  # lines that tell python-can's reader how to read those of frames
 
-    def read_header(self, told: re.Match[str]) -> None:
-        raise NotImplementedError
+    def read_header(self, told: re.Match[str]) -> None:  # noqa: B027 # most kinds have one, the table has none
+        """Take a line that ``header_form`` matches."""
 
+    @abstractmethod
     def frame_in(self, line: str) -> str | None:
         """The line as python-can reads it; None if it should hold no frame."""
-        raise NotImplementedError
 
 
 class _AscLog(_TextLog):
@@ -174,7 +175,6 @@ class _CsvLog(_TextLog):
     """python-can's table. Its first line names the columns."""
 
     reader = can.CSVReader
-    header_form = re.compile("(?!)")  # none but the first, which is read as it comes
     COLUMNS: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 
     def frame_in(self, line: str) -> str | None:
