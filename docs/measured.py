@@ -29,6 +29,7 @@ SAMPLE: Final = re.compile(
 
 PAYLOAD_KG: Final = 700.0  # of the van in README: what it may carry
 TOLD: Final = {
+    "one empty drive": "one empty drive at an even speed",
     "nothing said": "one empty drive, four drives without a statement",
     "delivery notes": "one empty drive, four drives with delivery notes that are right to 6 % of the payload range",
     "ten known loads": "ten steady drives with weighed loads",
