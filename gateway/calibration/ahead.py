@@ -22,11 +22,12 @@ from gateway.core.cargo import shape_hypotheses
 from gateway.core.spectrum import frequencies_hz
 from gateway.core.vehicle import Load, Vehicle, front_share_pct
 from gateway.estimates.quantity import Z95
+from gateway.model.answer import posterior_of
+from gateway.model.mixture import mixture_of
 from gateway.model.sensors import GAIN_STD
 from gateway.model.spectra import CrossSpectra, Reading, level
 from gateway.model.table import N
 from gateway.model.vehicle_model import VehicleModel
-from gateway.model.weigh import mixture_of, posterior_of
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64
 from gateway.stated.statement import StatementSource

@@ -14,9 +14,9 @@ from gateway.calibration.read_drive import EVIDENCE
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model import fit
 from gateway.model.car import Ground
+from gateway.model.mixture import MOST_LOAD_SHARE
 from gateway.model.spectra import CrossSpectra, Reading, grouped, segments_of
 from gateway.model.table import N
-from gateway.model.weigh import MOST_LOAD_SHARE
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64
 

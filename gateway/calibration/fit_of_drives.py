@@ -18,13 +18,16 @@ from gateway.core.bends import joined_gains
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model import fit
+from gateway.model.answer import answers_by_vehicle
 from gateway.model.car import Ground
 from gateway.model.checks import MOST_TENSION, reach_of
+from gateway.model.hypotheses import SOFT_HZ
+from gateway.model.mixture import mixture_of
 from gateway.model.place import spectra_of_sides
 from gateway.model.spectra import CrossSpectra, usual_floor
 from gateway.model.table import INDEX, N_OWN, NAMES, OWN, N
 from gateway.model.vehicle_model import VehicleModel
-from gateway.model.weigh import SOFT_HZ, answers_by_vehicle, mixture_of, weigh
+from gateway.model.weigh import weigh
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64, Why
 
@@ -191,7 +194,7 @@ class FitOfDrives:
 
     def _model_error(self, i: int) -> tuple[float, float]:
         """Standard deviations of payload (kg) and front share (0..1) of drive i that the model's own error causes, and
-        without a roll rate the load's unknown place across (gateway.model.weigh says how).
+        without a roll rate the load's unknown place across (gateway.model.answer says how).
         """
         one, own = self.seen[i], self.half_car.own[i]
         usual = USUAL_PAYLOAD_SHARE * one.vehicle.empty_mass_kg, USUAL_FRONT_SHARE_PCT / 100.0

@@ -11,10 +11,10 @@ from gateway.calibration.statements import Claim, Statement, Terms, load_prior_o
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model.car import Ground
 from gateway.model.expected import log_stroke_speeds, with_strokes
+from gateway.model.mixture import MOST_LOAD_SHARE
 from gateway.model.place import ROLL_BAND_HZ
 from gateway.model.spectra import CrossSpectra, Reading, Segments, grouped, level, mount_of
 from gateway.model.table import INDEX, N_OWN, OWN, N, of_drive
-from gateway.model.weigh import MOST_LOAD_SHARE
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64, Batch
 

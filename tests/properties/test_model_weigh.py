@@ -26,11 +26,13 @@ from gateway.core.vehicle import Load
 from gateway.estimates.posterior import Source
 from gateway.model import car as equations
 from gateway.model import fit
+from gateway.model.answer import posterior_of
+from gateway.model.hypotheses import hypotheses_of
+from gateway.model.mixture import EVIDENCE_WITHOUT_ROLL, Mixture, mixture_of
 from gateway.model.sensors import GAIN_STD
 from gateway.model.spectra import CrossSpectra, Reading, cross_spectra_of, level
 from gateway.model.table import INDEX, N
 from gateway.model.vehicle_model import VehicleModel
-from gateway.model.weigh import EVIDENCE_WITHOUT_ROLL, Mixture, hypotheses_of, mixture_of, posterior_of
 from gateway.model.whittle import Point, Whittle
 from gateway.records import C128, F64, Batch
 

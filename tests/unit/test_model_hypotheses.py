@@ -13,11 +13,13 @@ from support.taught_van import FLAT_VAN, ROLL, VAN, car, drive_of, estimated, lo
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.estimates.posterior import NORMAL_TAILS
-from gateway.model import weigh
+from gateway.model import answer, mixture
+from gateway.model.answer import posterior_of
+from gateway.model.hypotheses import Hypothesis, hypotheses_of
+from gateway.model.mixture import Mixture, Peak, mixture_of
 from gateway.model.sensors import GAIN_STD
 from gateway.model.table import INDEX, N
 from gateway.model.vehicle_model import VehicleModel
-from gateway.model.weigh import Hypothesis, Mixture, Peak, hypotheses_of, mixture_of, posterior_of
 from gateway.records import F64, Batch
 
 FIRM_HZ = 28.0
@@ -233,29 +235,29 @@ def peak(payload_kg: float, front_share: float, log_evidence: float, hypothesis:
 
 def test_peaks_of_one_hypothesis_that_coincide_are_one() -> None:
     best = peak(200.0, 0.5, -10.0)
-    (only,) = weigh._distinct([peak(201.0, 0.5, -10.5), best])
+    (only,) = mixture._distinct([peak(201.0, 0.5, -10.5), best])
     assert only is best
 
 
 def test_peaks_that_coincide_under_two_hypotheses_are_two() -> None:
     best = peak(200.0, 0.5, -10.0)
-    assert len(weigh._distinct([best, peak(200.0, 0.5, -11.0, best.hypothesis.soft())])) == 2
+    assert len(mixture._distinct([best, peak(200.0, 0.5, -11.0, best.hypothesis.soft())])) == 2
 
 
 def test_a_peak_far_below_the_best_is_none() -> None:
-    assert len(weigh._distinct([peak(200.0, 0.5, -10.0), peak(400.0, 0.5, -100.0)])) == 1
-    assert len(weigh._distinct([peak(200.0, 0.5, -10.0), peak(400.0, 0.5, -12.0)])) == 2
+    assert len(mixture._distinct([peak(200.0, 0.5, -10.0), peak(400.0, 0.5, -100.0)])) == 1
+    assert len(mixture._distinct([peak(200.0, 0.5, -10.0), peak(400.0, 0.5, -12.0)])) == 2
 
 
 @given(st.lists(st.floats(0.0, 50.0), min_size=2, max_size=5))
 def test_a_peak_with_less_evidence_weighs_less_but_never_vanishes(excess: list[float]) -> None:
     """By a power of its excess, for the model may err, and not exponentially."""
     rising = np.sort(excess)
-    against = weigh._against(rising)
+    against = mixture._against(rising)
     assert np.all(np.diff(against) >= 0.0)
-    assert weigh._against(np.zeros(1))[0] == 0.0
-    assert np.all(against <= rising * (weigh.EVIDENCE_DOF + 1.0) / weigh.EVIDENCE_DOF + 1e-12 + 5.0 * rising)
-    assert weigh._against(np.array([50.0]))[0] < 15.0
+    assert mixture._against(np.zeros(1))[0] == 0.0
+    assert np.all(against <= rising * (mixture.EVIDENCE_DOF + 1.0) / mixture.EVIDENCE_DOF + 1e-12 + 5.0 * rising)
+    assert mixture._against(np.array([50.0]))[0] < 15.0
 
 
 def two(apart_kg: float, weights: tuple[float, float], share_apart: float = 0.0) -> Mixture:
@@ -299,7 +301,7 @@ def test_quantiles_of_a_mixture_are_where_its_distribution_has_them(
 ) -> None:
     weights = np.random.default_rng(seed).uniform(0.1, 1.0, len(middles))
     weights /= weights.sum()
-    at = np.array(weigh._quantiles(np.array(middles), weights, std))
+    at = np.array(answer._quantiles(np.array(middles), weights, std))
     cumulated = weights @ ndtr((at - np.array(middles)[:, None]) / std)
     np.testing.assert_allclose(cumulated, [0.025, 0.5, 0.975], atol=3e-3)
 
