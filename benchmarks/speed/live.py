@@ -15,8 +15,6 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from can.interfaces.socketcan import socketcan
-
 from benchmarks.speed.meter import command_of, in_own_process, peak_mb
 from gateway.bus.listen import LiveSource
 from gateway.bus.receiver import open_channel
@@ -57,6 +55,8 @@ def listening_socket() -> socket.socket:
     """A loopback socket that stands in for a CAN one, in python-can's SocketCAN bus too."""
     wire = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     wire.bind(("127.0.0.1", 0))
+    from can.interfaces.socketcan import socketcan  # noqa: PLC0415 # after ours, which keeps asammdf out of it (gateway/bus)
+
     bus: Any = socketcan  # its way to a real CAN socket is put out of the way
     bus.create_socket = lambda: wire
     bus.bind_socket = lambda sock, channel: None
