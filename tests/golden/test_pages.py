@@ -121,6 +121,22 @@ def test_every_fault_names_a_test_that_exists_and_every_fault_test_of_the_machin
     assert found <= named
 
 
+def test_every_recorded_run_and_every_test_of_make_soak_still_has_its_name() -> None:
+    there = {
+        name
+        for file in (ROOT / "tests" / "vm").glob("test_*.py")
+        for name in re.findall(r"^def (test_\w+)", file.read_text(encoding="utf-8"), re.MULTILINE)
+    }
+    recorded = {
+        test.partition("[")[0]
+        for file in measured.RECORDED.values()
+        for test in measured.numbers(file).get("tests", {})
+    }
+    soaked = set(re.findall(r"::(test_\w+)", (ROOT / "Makefile").read_text(encoding="utf-8")))
+    assert recorded | soaked | {name for name, *_ in measured.ENDURED} <= there
+    assert soaked
+
+
 FLEETS = json.loads(measured.COUNTS.read_text(encoding="utf-8"))
 
 
