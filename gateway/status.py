@@ -201,17 +201,6 @@ class RecordStatus:
 
 
 @dataclass(frozen=True, slots=True)
-class VerificationStatus:
-    """Known loads weighed with the present calibration, and when the next ones are due."""
-
-    n_records: Annotated[int, Field(description="kept in all, those of earlier calibrations among them")] = 0
-    last_at: Annotated[str | None, Field(description="of the present calibration; null: never")] = None
-    last_verdict: Annotated[str | None, Field(examples=["passed", "failed"])] = None
-    due_at: Annotated[str | None, Field(description="null: not required, [verification] every_days = 0")] = None
-    is_due: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class AlarmsStatus:
     """Active alarms; counts begin at the start of the service."""
 
@@ -230,7 +219,6 @@ class Status(_Told):
     vehicle_id: str | None = None
     vin: str | None = None
     calibration_id: str | None = None
-    known_weights_id: str | None = Field(None, description="hash of the known weights in use; null: there are none")
     estimator: str | None = None
     bus: BusStatus = BusStatus()
     decode: tuple[DecodeCount, ...] = ()
@@ -242,7 +230,6 @@ class Status(_Told):
     uplink: UplinkStatus | None = Field(None, description="null if no broker is configured")
     webhook: WebhookStatus | None = Field(None, description="null if none is configured")
     record: RecordStatus | None = Field(None, description="the ring log; null if it is off")
-    verification: VerificationStatus = VerificationStatus()
     alarms: AlarmsStatus = AlarmsStatus()
     is_ready: bool = Field(True, description="whether estimates are possible: the answer of /health/ready")
     not_ready_reason: str | None = None
