@@ -16,6 +16,7 @@ import numpy as np
 from gateway.core.cargo import ShapeHypothesis
 from gateway.core.vehicle import Load
 from gateway.model import fit
+from gateway.model.checks import VEHICLE_ROWS
 from gateway.model.expected import with_strokes
 from gateway.model.hypotheses import DAMPERS, Hypothesis, hypotheses_of
 from gateway.model.place import ROLL_BAND_HZ, Place, place_of, search_of_place
@@ -40,6 +41,9 @@ LEAST_WEAR: Final = 2.0  # chosen: standard deviations of a damper from which wo
 START_PAYLOADS_N: Final = 6  # chosen: from 0 to the largest load seen, or a third of the empty mass
 LEAST_START_SHARE: Final = 0.33  # chosen: of the empty mass
 START_PLACES: Final = (0.25, 0.5, 0.9)  # chosen: of the wheelbase
+DOUBTFUL: Final = (
+    20.0  # chosen: tension of a peak, which one healthy batch in twenty exceeds, from which every start is tried
+)
 APART_SHARE: Final = 0.15  # chosen: of the largest starting load; starts nearer to a peak lead to it
 COARSE: Final = 0.2  # chosen: tolerance in log posterior, enough to compare peaks
 FINE: Final = 1e-2  # chosen: tolerance of the final search
@@ -66,6 +70,12 @@ class Peak:
     def load(self) -> Load:
         """The load there."""
         return Load(float(self.x[N]), 100.0 * float(self.x[N + 1]))
+
+    @property
+    def tension(self) -> float:
+        """Chi-squared of the vehicle's parameters about their prior."""
+        off = (self.x[:N] - self.hypothesis.mean)[VEHICLE_ROWS]
+        return float(off @ np.linalg.solve(self.hypothesis.covariance[np.ix_(VEHICLE_ROWS, VEHICLE_ROWS)], off))
 
     def moved_as(self, other: "Peak", moved: "Peak") -> "Peak":
         """This peak, as far from ``moved``, in place and evidence, as it is from ``other``."""
@@ -171,7 +181,7 @@ def mixture_of(
 
 def _coarse(own: BatchLikelihood, first: Hypothesis, model: VehicleModel) -> list[Peak]:
     """Distinct peaks, the likeliest first: on a soft and on a firm mount from the best of a few starting loads, and on
-    the likelier of them from a load far from both.
+    the likelier of them from a load far from both; from every other load too, where only an unlikely vehicle fits.
 
     The soft mount is first: a search on a firm one follows a long valley if the load stands on a soft one.
     """
@@ -186,10 +196,13 @@ def _coarse(own: BatchLikelihood, first: Hypothesis, model: VehicleModel) -> lis
         found.append(climb(own, hypothesis, start, COARSE, found))
     best = max(found, key=lambda one: one.log_evidence)
     ordered = order[best.hypothesis.name]
-    near_kg = np.array([loads[ordered[0], 0], best.x[N]])
-    far = next((i for i in ordered if np.min(np.abs(loads[i, 0] - near_kg)) > apart_kg), None)
-    if far is not None:
-        found.append(climb(own, best.hypothesis, np.r_[best.hypothesis.mean, loads[far]], COARSE, found))
+    near_kg = [loads[ordered[0], 0], best.x[N]]
+    for i in ordered:
+        if np.min(np.abs(loads[i, 0] - near_kg)) > apart_kg:
+            found.append(climb(own, best.hypothesis, np.r_[best.hypothesis.mean, loads[i]], COARSE, found))
+            near_kg.append(loads[i, 0])
+            if max(found, key=lambda one: one.log_evidence).tension < DOUBTFUL:
+                break
     return _distinct(found)
 
 

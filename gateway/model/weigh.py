@@ -18,7 +18,7 @@ from gateway.core.cargo import ShapeHypothesis
 from gateway.estimates.batch_estimate import Estimate
 from gateway.estimates.posterior import PAYLOAD, Posterior
 from gateway.model.answer import posterior_of
-from gateway.model.checks import VEHICLE_ROWS, Signs, disbelieved, fits, reach_of, unseen_of, why_not
+from gateway.model.checks import Signs, disbelieved, fits, reach_of, unseen_of, why_not
 from gateway.model.mixture import (
     COARSE,
     MOST_LOAD_SHARE,
@@ -126,9 +126,6 @@ def _signs_of(
     followed_by = best
     if not fits(misfit, model, unseen):
         followed_by, followed = _following(mixture, model)
-    off = best.x[:N] - best.hypothesis.mean
-    of_vehicle = off[VEHICLE_ROWS]
-    prior = best.hypothesis.covariance[np.ix_(VEHICLE_ROWS, VEHICLE_ROWS)]
     between = float(mixture.weights @ np.array([one.x[N] - best.x[N] for one in mixture.peaks]) ** 2)
     return Signs(
         model=model,
@@ -139,7 +136,7 @@ def _signs_of(
         is_reversed=_is_reversed(mixture, model, misfit),
         off=followed_by.x[:N] - model.parameters[:N],
         deviations=followed_by.deviations,
-        tension=float(of_vehicle @ np.linalg.solve(prior, of_vehicle)),
+        tension=best.tension,
         loudness=noise.loudness,
         is_mount_changed=mixture.place is not None and mixture.place.is_mount_changed,
         is_settled=is_settled and mixture.is_converged,

@@ -20,6 +20,7 @@ from gateway.model.mixture import Mixture, Peak, mixture_of
 from gateway.model.sensors import GAIN_STD
 from gateway.model.table import INDEX, N
 from gateway.model.vehicle_model import VehicleModel
+from gateway.model.whittle import Whittle
 from gateway.records import F64, Batch
 
 FIRM_HZ = 28.0
@@ -247,6 +248,28 @@ def test_peaks_that_coincide_under_two_hypotheses_are_two() -> None:
 def test_a_peak_far_below_the_best_is_none() -> None:
     assert len(mixture._distinct([peak(200.0, 0.5, -10.0), peak(400.0, 0.5, -100.0)])) == 1
     assert len(mixture._distinct([peak(200.0, 0.5, -10.0), peak(400.0, 0.5, -12.0)])) == 2
+
+
+def test_every_load_is_tried_where_the_peaks_found_need_an_unlikely_vehicle(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A high load of 628 kg was once weighed to 114: both searches ended at such peaks, and no heavy load was tried."""
+    model = taught()
+    (known,) = hypotheses_of(model, known_shape(*model.known_shape), (0.0, GAIN_STD), with_roll=False)
+    spectra = spectra_of(drive_of((0.0, 50.0), 3, with_roll=False), model)
+    own = mixture.BatchLikelihood(Whittle(spectra, model.ground), np.empty(0), 0.0, 1e4)
+    heaviest_kg = max(payload_kg for payload_kg, _ in mixture.starting_loads(model))
+    unlikely = np.zeros(N + 2)
+    unlikely[INDEX["pitch_inertia_kgm2"]] = 1.0
+
+    def climbed(own: object, hypothesis: Hypothesis, start: F64, *others: object) -> Peak:
+        if start[N] == heaviest_kg:
+            return peak(heaviest_kg, 0.5, -10.0, hypothesis)
+        light = peak(float(start[N]), 0.5, -20.0, hypothesis)
+        return replace(light, x=light.x + unlikely)
+
+    monkeypatch.setattr(mixture, "climb", climbed)
+    found = mixture._coarse(own, known, model)
+    assert found[0].load.payload_kg == heaviest_kg
+    assert found[0].tension < mixture.DOUBTFUL < found[1].tension
 
 
 @given(st.lists(st.floats(0.0, 50.0), min_size=2, max_size=5))
