@@ -53,8 +53,6 @@ class Event(StrEnum):
     FRESH = "estimate fresh"
     ALARM = "alarm raised"
     ALARM_ENDED = "alarm ended"
-    OVERLOAD_BEGINS = "overload begins"
-    OVERLOAD_ENDS = "overload ends"
     STORE_HOLDS = "store keeps rows in memory"
     STORE_RECOVERED = "store is on disk again"
     STORE_DAMAGED = "database set aside"

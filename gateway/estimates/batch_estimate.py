@@ -58,7 +58,7 @@ class Weight:
 
     @property
     def is_over_limit(self) -> bool:
-        """Whether this number exceeds the limit, without the hysteresis of warnings (core.weights)."""
+        """Whether this number exceeds the limit; alarms have a hysteresis (core.alarms)."""
         return self.limit_kg is not None and self.kg > self.limit_kg
 
 

@@ -2,7 +2,7 @@
 
 import json
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
 from pydantic import BaseModel
@@ -11,7 +11,7 @@ from gateway.core.change import Rules
 from gateway.core.events.entry import Entry, EntryKind
 from gateway.core.events.ledger import HORIZON, Ledger
 from gateway.estimates.as_json import INSTANT, read_estimate
-from gateway.estimates.batch_estimate import PLACES, Estimate
+from gateway.estimates.batch_estimate import Estimate
 from gateway.log import Event, log_event
 from gateway.records import Why, json_line, rounded
 from gateway.service.journal_reader import WINDOWS, place_of
@@ -20,19 +20,16 @@ from gateway.status import State, Status
 from gateway.store import Store, StoreReader, restored
 from gateway.store.journal import up_to
 from gateway.web.live.board import Board
-from gateway.web.routes.history import LoadEvent, Trip
-from gateway.web.routes.weights import LatestWeights
+from gateway.web.routes.events_trips_alarms import LoadEvent, Trip
 
 
 class BatchLog:
-    """Called with every stored batch. ``weigh`` returns the weights shown by the web, with warnings."""
+    """Called with every stored batch."""
 
     NAME: Final = "log of batches"
 
-    def __init__(self, weigh: Callable[[], LatestWeights]) -> None:
-        self._weigh = weigh
+    def __init__(self) -> None:
         self._rejected: frozenset[Why] = frozenset()  # of the last full batch; before the first, as if it had counted
-        self._overloaded = overloaded(weigh())
 
     def __call__(self, found: Estimate) -> None:
         """Log a new estimate at level info, a rejected one at level debug."""
@@ -50,23 +47,6 @@ class BatchLog:
         before, self._rejected = self._rejected, frozenset(found.rejected)
         if self._rejected != before:
             log_event(Event.REASONS_CHANGED, rejected=found.rejected, before=sorted(before))
-        self._tell_overload()
-
-    def _tell_overload(self) -> None:
-        weights = self._weigh()
-        before, self._overloaded = self._overloaded, overloaded(weights)
-        for where in PLACES:
-            if where in before ^ self._overloaded:
-                figure = getattr(weights, where)
-                event, level = Event.OVERLOAD_ENDS, logging.INFO
-                if where in self._overloaded:
-                    event, level = Event.OVERLOAD_BEGINS, logging.WARNING
-                log_event(event, level=level, where=where, kg=figure.kg, limit_kg=figure.limit_kg)
-
-
-def overloaded(weights: LatestWeights) -> frozenset[str]:
-    """The places whose weight is over its limit."""
-    return frozenset(where for where in PLACES if getattr(weights, where).is_over_limit)
 
 
 class StateLog:

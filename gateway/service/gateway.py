@@ -6,7 +6,6 @@ import logging
 import signal
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 from gateway.bus.listen import OpenReceiver, SourceState
@@ -37,7 +36,7 @@ from gateway.uplink.settings import uplink_settings, webhook_settings
 from gateway.web.access.serving import WebServer, refuse_open_address, server_config
 from gateway.web.access.tokens import TokenFile
 from gateway.web.app import create_app
-from gateway.web.routes.weights import KnownLoads, Scales, weigh_latest
+from gateway.web.routes.weights import KnownLoads
 
 SUPERVISE_S = 0.25  # chosen: interval between checks for dead parts
 LOOK_S = 1.0  # chosen: interval between checks of the whole status
@@ -91,12 +90,11 @@ class Gateway:
         self.source = source_of(settings.bus, setup, open_receiver)
         flow = setup.flow(replace(settings.batch.for_core(is_live=True), position_decimals=settings.position.decimals))
         self.learner = learner_of(settings, by_file or settings.calibration, setup, flow, self.store)
-        log_batch = BatchLog(partial(weigh_latest, self.board, Scales(setup.calibrated)))
         self.ring_log = ring_log_of(settings, setup)
         subject = setup.subject
         self.alarms = AlarmService(rules_of(settings.alarms), subject, self.store)
         events = LoadEventLog(setup, self.store)
-        self.readers = [JournalReader(one.NAME, self.store, one) for one in (log_batch, events, self.alarms)]
+        self.readers = [JournalReader(one.NAME, self.store, one) for one in (BatchLog(), events, self.alarms)]
         self.pipeline = Pipeline(
             self.source.inbox,
             Decoder(setup.signal_map),

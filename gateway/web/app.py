@@ -19,12 +19,13 @@ from gateway.web.access.middleware import HeadAsGet, SecurityHeaders
 from gateway.web.access.tokens import TokenFile
 from gateway.web.live.board import LATEST_PATH, Board, LatestResponse
 from gateway.web.routes import service_calls as service
-from gateway.web.routes.alarms import alarms_router
 from gateway.web.routes.cab import cab_router
+from gateway.web.routes.events_trips_alarms import alarms_router, events_router
 from gateway.web.routes.explanations import reasons_router
-from gateway.web.routes.history import api_router, events_router, export_router
+from gateway.web.routes.history import estimates_router
 from gateway.web.routes.latest_spectra import spectra_router
 from gateway.web.routes.monitoring import alive_router, health_router, metrics_registry
+from gateway.web.routes.present import present_router
 from gateway.web.routes.stated_loads import statements_router
 from gateway.web.routes.vehicle_in_use import vehicle_router
 from gateway.web.routes.weights import (
@@ -79,12 +80,12 @@ def create_app(
     scales = Scales(calibrated)
     metrics = metrics_registry(board, scales, status, responses)
     routers = [
-        api_router(board, reader, status),
+        present_router(board, reader, status),
+        estimates_router(reader),
         reasons_router(),
         vehicle_router(status, calibrated, learner),
         *([statements_router(learner)] if learner else ()),
         spectra_router(board, calibrated),
-        export_router(reader),
         events_router(reader),
         *([alarms_router(reader, alarms)] if alarms else ()),
         weights_router(board, scales, status),

@@ -15,7 +15,7 @@ from support.web import Client
 from gateway.records import Why
 from gateway.status import State, Status
 from gateway.web.app import create_app
-from gateway.web.routes.alarms import Alarm
+from gateway.web.routes.events_trips_alarms import Alarm
 
 URL = "/api/v1/alarms"
 OVER = LIMIT_KG + 60.0

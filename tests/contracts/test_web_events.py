@@ -58,10 +58,6 @@ def test_invalid_queries_are_refused(client, question, status):
 
 
 def test_files(client):
-    lines = client.get("/api/v1/events.jsonl").text.splitlines()
-    assert [json.loads(one)["id"] for one in lines] == [
-        one["id"] for one in client.get("/api/v1/events").json()["items"]
-    ]
     table = list(csv.DictReader(io.StringIO(client.get("/api/v1/events.csv").text)))
     assert sorted(round(float(row["change_kg"])) for row in table) == [-180, -120, 500]
     assert float(table[0]["change_low95_kg"]) < float(table[0]["change_kg"]) < float(table[0]["change_high95_kg"])

@@ -13,7 +13,7 @@ from gateway.web.access.tokens import Scope, TokenFile
 from gateway.web.app import create_app
 
 PLACE = Place(48.1, 11.5)
-ASKED = ["estimates", "estimates/latest", "events", "trips", "export.jsonl", "events.jsonl", "events.csv", "stream"]
+ASKED = ["estimates", "estimates/latest", "events", "trips", "events.csv", "stream"]
 
 
 @pytest.fixture

@@ -112,15 +112,6 @@ def test_every_record_brings_its_weights_to_the_history(gateway: Gateway) -> Non
     assert (answer["cg_left_m"], answer["left_share_pct"]) == (0.05, 53.3333333)
 
 
-def test_the_overload_warning_stays_until_the_overload_is_clearly_gone(gateway: Gateway) -> None:
-    ask = client(gateway)
-    warned = []
-    for n, payload_kg in enumerate([100.0, 106.0, 104.0, 59.0, 50.0, 104.0]):
-        gateway.publish(loaded(n, payload_kg))
-        warned.append(ask.get("/api/v1/weights/latest").json()["gross"]["is_over_limit"])
-    assert warned == [False, True, True, True, False, False]
-
-
 @pytest.mark.parametrize("vehicle", [None, replace(VAN, unsprung_front_kg=None)])
 def test_unknown_weights_are_null(gateway: Gateway, vehicle: Vehicle | None) -> None:
     gateway.publish(loaded(0))

@@ -78,7 +78,7 @@ def test_an_overload_by_the_settings_reaches_every_channel(config: Path, caplog:
         assert 'springscale_overload{where="gross"} 1.0' in told(service, "/metrics")
 
     serve(config, play)
-    assert "overload begins" in caplog.text
+    assert "alarm raised" in caplog.text
 
 
 def test_a_stop_makes_the_load_unknown_until_it_is_weighed_again(config: Path) -> None:

@@ -107,7 +107,7 @@ def test_a_long_answer_ends_with_the_permission(tmp_path: Path, monkeypatch: pyt
             gateway.store.write_estimate(make_record(n))
         assert gateway.store.flush(PATIENCE_S)
         headers = {"authorization": f"Bearer {token}"}
-        url = f"{server.url}/api/v1/export.jsonl"
+        url = f"{server.url}/api/v1/export.csv"
         with (
             pytest.raises(httpx.RemoteProtocolError),
             httpx.stream("GET", url, headers=headers, timeout=PATIENCE_S) as answer,

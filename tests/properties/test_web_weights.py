@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from support.paper_van import paper_van
 
 from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct, left_share_pct
-from gateway.core.weights.limits import RELEASE_SHARE, is_over_limit
 from gateway.core.weights.on_the_road import PayloadPlace, place_of, unsprung_kg, weighed, weights_of
 from gateway.estimates.batch_estimate import Z95, Estimate, Lack, Quantity, Weights
 from gateway.estimates.posterior import FRONT_SHARE, PAYLOAD, Posterior, Source, exactly
@@ -71,21 +70,6 @@ def test_unstated_figures_are_unknown_and_never_zero() -> None:
     assert not weights.rear_axle.is_known
     assert not weights.gross.is_known
     assert math.isnan(weights.gross.std_kg)
-
-
-@given(st.lists(st.floats(1500.0, 2500.0) | st.just(math.nan), max_size=30), st.none() | st.floats(1800.0, 2200.0))
-def test_a_warning_has_hysteresis(series_kg: list[float], limit_kg: float | None) -> None:
-    was_over = False
-    for n in range(1, len(series_kg) + 1):
-        is_over = is_over_limit(series_kg[:n], limit_kg)
-        newest_kg = series_kg[n - 1]
-        if limit_kg is not None and newest_kg > limit_kg:
-            assert is_over
-        elif limit_kg is None or newest_kg <= limit_kg * (1.0 - RELEASE_SHARE):
-            assert not is_over
-        else:  # between both bounds, or unknown
-            assert is_over is was_over
-        was_over = is_over
 
 
 def test_an_error_of_the_empty_share_moves_no_place() -> None:

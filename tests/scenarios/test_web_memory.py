@@ -34,7 +34,7 @@ N_STORED = 1200
 STRANGERS = ("127.0.0.2", "127.0.0.3", "127.0.0.4", "127.0.0.5")  # 20 connections each: 80 of the 100 that there are
 EACH = 20
 ASKED = {
-    "history": ["/api/v1/estimates?limit=1000", "/api/v1/export.jsonl?spectra=true", "/api/v1/export.csv"],
+    "history": ["/api/v1/estimates?limit=1000", "/api/v1/export.csv"],
     "streams": ["/api/v1/stream"],
     "assets": [LIBRARY_URL, "/swagger/swagger-ui-bundle.js", "/docs"],
 }

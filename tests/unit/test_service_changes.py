@@ -1,11 +1,8 @@
 """The service's log has a line for each change, and none while all stays as it is."""
 
-from dataclasses import replace
-
 import pytest
-from support.calibrated import calibration_file
-from support.estimates import make_estimate, posterior_of
-from support.log import fields_of, logged, names
+from support.estimates import make_estimate
+from support.log import logged, names
 
 from gateway.estimates.batch_estimate import Estimate
 from gateway.log import Event
@@ -13,17 +10,15 @@ from gateway.records import Why
 from gateway.service.batch_log import BatchLog, StateLog
 from gateway.status import State, Status
 from gateway.web.live.board import Board
-from gateway.web.routes.weights import Scales, weigh_latest
-from gateway.weighing.calibrated import CalibratedVehicle
 
 
 class Told:
     """A board and the log of what is put on it, as in the pipeline."""
 
-    def __init__(self, calibrated: CalibratedVehicle | None = None) -> None:
+    def __init__(self) -> None:
         self.clock_s = 0.0
         self.board = Board(stale_after_s=900.0, clock=lambda: self.clock_s)
-        self.log = BatchLog(lambda: weigh_latest(self.board, Scales(calibrated)))
+        self.log = BatchLog()
 
     def hear(self, *estimates: Estimate) -> None:
         for estimate in estimates:
@@ -72,25 +67,6 @@ def test_debug_level_logs_every_batch(caplog: pytest.LogCaptureFixture) -> None:
     Told().hear(make_estimate(0, Why.GAP))
     assert names(caplog) == [Event.REJECTED, Event.REASONS_CHANGED]
     assert dict(logged(caplog))[Event.REJECTED]["payload_kg"] is None
-
-
-def test_an_overload_begins_and_ends_once(caplog: pytest.LogCaptureFixture) -> None:
-    calibrated = calibration_file().for_core()
-    limited = replace(calibrated.vehicle, unsprung_front_kg=90.0, unsprung_rear_kg=110.0, gross_limit_kg=1_800.0)
-    told = Told(replace(calibrated, vehicle=limited))
-    empty_kg = limited.empty_mass_kg + 200.0
-
-    def loaded(n: int, gross_kg: float) -> Estimate:
-        return make_estimate(n).answered(posterior_of(gross_kg - empty_kg, 50.5, 6.0, 0.1))
-
-    told.hear(loaded(0, 1_790.0))
-    assert Event.OVERLOAD_BEGINS not in names(caplog)
-    told.hear(loaded(1, 1_820.0), loaded(2, 1_790.0), loaded(3, 1_850.0))  # 1 % below is not yet the end
-    assert names(caplog).count(Event.OVERLOAD_BEGINS) == 1
-    assert fields_of(caplog, Event.OVERLOAD_BEGINS) == {"where": "gross", "kg": 1_820.0, "limit_kg": 1_800.0}
-    assert Event.OVERLOAD_ENDS not in names(caplog)
-    told.hear(loaded(4, 1_700.0))
-    assert fields_of(caplog, Event.OVERLOAD_ENDS) == {"where": "gross", "kg": 1_700.0, "limit_kg": 1_800.0}
 
 
 def test_the_state_and_an_old_estimate_are_lines_when_they_change(caplog: pytest.LogCaptureFixture) -> None:

@@ -4,27 +4,21 @@ import asyncio
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
-from support.estimates import make_estimate
-from support.paper_van import paper_van, paper_van_config
+from support.paper_van import paper_van_config
 from support.ports import free_port
 
 from gateway.bus.listen import SourceState
 from gateway.config import load_settings
-from gateway.estimates.batch_estimate import Estimate, Quantity, Weights
 from gateway.records import Signal
 from gateway.service.gateway import Gateway
 from gateway.service.status_of_parts import SENSOR_LOST_S, StatusReport
 from gateway.setup import setup_of
 from gateway.status import State, Status
-from gateway.web.live.board import Board
-from gateway.web.routes.weights import Scales, weigh_latest
-from gateway.weighing.calibrated import CalibratedVehicle
 
 SIGNALS = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
 ALL_HEARD: Mapping[Signal, float | None] = dict.fromkeys(SIGNALS, 0.0)
@@ -83,30 +77,6 @@ def test_the_state_follows_from_what_was_heard(
     state: State, ages_s: dict[Signal, float | None], how: dict[str, Any]
 ) -> None:
     assert report({**ALL_HEARD, **ages_s}, **how) is state
-
-
-VAN = paper_van(unsprung_front_kg=90.0, unsprung_rear_kg=110.0, gross_limit_kg=1500.0)
-
-
-def test_repeated_requests_weigh_each_estimate_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each call weighed the last hundred anew."""
-    board, scales = Board(), Scales(CalibratedVehicle("sha256:ab", VAN, (0.0, 420.0), (40.0, 60.0)))
-    n_weighed = 0
-    weigh = Scales.weigh
-
-    def counted(self: Scales, estimate: Estimate | None) -> Weights:
-        nonlocal n_weighed
-        n_weighed += 1
-        return weigh(self, estimate)
-
-    monkeypatch.setattr(Scales, "weigh", counted)
-    for n in range(150):
-        board.publish(replace(make_estimate(n), payload=Quantity(100.0 + n, 6.0), front_share=Quantity(50.0, 0.5)))
-        for _ in range(3):
-            shown = weigh_latest(board, scales)
-    assert n_weighed == 150
-    assert shown.gross.kg == 1240.0 + 200.0 + 249.0
-    assert shown.gross.is_over_limit
 
 
 def test_the_whole_status_is_made_beside_the_event_loop_and_once_a_second(

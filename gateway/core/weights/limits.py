@@ -1,15 +1,12 @@
-"""Permitted weights: the probability of exceeding them, the warning, and how much more a vehicle may carry."""
+"""Permitted weights: the probability of exceeding them, and how much more a vehicle may carry."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from typing import Any, Final, Self
 
 from gateway.core.vehicle import Vehicle
 from gateway.estimates.batch_estimate import Quantity, Weights
-
-RELEASE_SHARE: Final = 0.03  # chosen: of the limit; a warning ends below this margin
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,20 +49,6 @@ def over_limit_probability(kg: float, std_kg: float, limit_kg: float | None) -> 
     if std_kg == 0.0:
         return float(kg > limit_kg)
     return 0.5 * math.erfc((limit_kg - kg) / (std_kg * math.sqrt(2.0)))
-
-
-def is_over_limit(weights_kg: Iterable[float], limit_kg: float | None) -> bool:
-    """Whether the last of a series of weights counts as over the limit, with hysteresis.
-
-    A warning begins above the limit and ends 3 % below it, so that it does not flicker near the limit. No limit, or no
-    known weight: no warning.
-    """
-    is_over = False
-    for weight_kg in weights_kg:
-        if limit_kg is None or math.isnan(weight_kg):
-            continue
-        is_over = weight_kg > limit_kg * (1.0 - RELEASE_SHARE if is_over else 1.0)
-    return is_over
 
 
 LOADED_PLACES: Final = ("gross", "front_axle", "rear_axle")  # the places that any additional load affects

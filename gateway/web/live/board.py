@@ -3,7 +3,6 @@
 import json
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
@@ -18,7 +17,6 @@ from gateway.records import Why, json_line
 from gateway.store.journal import ESTIMATE, REJECTION
 from gateway.web.live.stream import Fanout
 
-RECENT: Final = 100  # chosen: good estimates for the warnings, which look back over eight hours of driving
 PROVISIONAL: Final = "provisional"
 _JSON: Final = {None: b"null", True: b"true", False: b"false"}
 _NOT_CALIBRATED: Final = Weights()
@@ -100,7 +98,6 @@ class Board:
         self._none_yet = _nothing_yet(unweighed)
         self._answer = _Answer.of(None, None, None, self._none_yet)
         self._heard: Estimate | None = None  # the last full batch, answered or not
-        self._recent: deque[Estimate] = deque(maxlen=RECENT)  # good estimates, oldest first
         self._drive_has_estimate = False
         self.fanout = Fanout()
 
@@ -122,8 +119,6 @@ class Board:
         refusal = None if rejection is None else estimate_from_json(json.loads(rejection))
         with self._lock:
             self._rejection = refusal
-            if answer is not None:
-                self._recent.append(answer)
             full = [one for one in (answer, refusal) if one is not None]
             self._heard = max(full, key=lambda one: one.t_end_ns, default=None)
             received_s = None if age_s is None or answer is None else self._clock() - age_s
@@ -157,11 +152,6 @@ class Board:
         age_s = self._age_s(answer)
         return Shown(answer.estimate, None if age_s is None else round(age_s, 1), self._is_stale(answer))
 
-    def recent_estimates(self) -> tuple[Estimate, ...]:
-        """The last good estimates, oldest first."""
-        with self._lock:
-            return tuple(self._recent)
-
     def heard(self) -> Estimate | None:
         """The last full batch, weighed or not; None before the first."""
         return self._heard
@@ -187,7 +177,6 @@ class Board:
         elif kind == ESTIMATE or not (self._drive_has_estimate or estimate.rejected):
             if kind == ESTIMATE:
                 self._drive_has_estimate = True
-                self._recent.append(estimate)
             self._answer = _Answer.of(estimate, self._rejection, now_s, self._none_yet)
 
 

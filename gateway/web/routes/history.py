@@ -1,36 +1,31 @@
-"""/api/v1: the latest estimate, the status, the stream, and the history as pages and as files."""
+"""The recorded history: pages to follow by a cursor, and all of it as one file; routes of the estimates."""
 
 import asyncio
+import csv
+import io
 import json
 import re
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
-from dataclasses import replace
+from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Final, Literal
 
-from fastapi import APIRouter, Depends, Header, HTTPException, Query, Request
+from fastapi import APIRouter, Query
 from fastapi.exceptions import RequestValidationError
-from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic.json_schema import SkipJsonSchema
 from starlette.responses import Response, StreamingResponse
 
-from gateway.core.events import entry as table
-from gateway.core.events.entry import EntryKind
 from gateway.estimates.as_json import COLUMNS, csv_cells
 from gateway.records import json_line
-from gateway.status import Status
 from gateway.store import StoreReader
 from gateway.store.journal import BATCHES, HistoryPage
-from gateway.web.file_response import FORMATS, file_responses, sent_as_file
-from gateway.web.live.board import Board, LatestResponse
-from gateway.web.live.stream import EVENT_SCHEMA, TooManyStreamsError
 from gateway.web.routes.service_calls import AsShown, Shown
-from gateway.web.schemas import EstimatesPage, Instant, Latest, problem_responses
+from gateway.web.schemas import EstimatesPage, Instant, problem_responses
 
 JSON: Final = "application/json"
+CSV: Final = "text/csv; charset=utf-8"
 PAGE_LIMIT: Final = 1000  # chosen: records in one answer; part of the described API, therefore no setting
 BATCHES_AT_A_TIME: Final = 10  # chosen: in memory for each answer that is being sent: with spectra they are large
-ENTRIES_AT_A_TIME: Final = 100  # chosen: likewise of load events and trips, which are small
 _CURSOR: Final = r"^[0-9a-z]{1,32}-[0-9]{1,18}$"
 
 
@@ -60,12 +55,6 @@ class TimeSpan(BaseModel):
         return {"since_ns": self.since, "until_ns": self.until}
 
 
-class SpanWithSpectra(TimeSpan):
-    """Which part of the history, and whether with spectra."""
-
-    spectra: bool = Field(False, description="true sends the spectra too")
-
-
 class HistoryQuery(TimeSpan):
     """Which part of the history, how much of it, and in which order."""
 
@@ -88,247 +77,32 @@ class EstimatesQuery(HistoryQuery):
         return super().question() | {"with_spectra": self.spectra}
 
 
-class Place(BaseModel):
-    """WGS 84, rounded as the settings say."""
-
-    latitude_deg: float
-    longitude_deg: float
-
-
-class Stop(BaseModel):
-    """A standstill at which the load can have changed; null: unknown."""
-
-    t_start: str
-    t_end: str
-    door_opened: bool | None
-    ignition_off: bool | None
-    place: Place | None
-
-
-class CarriedLoad(BaseModel):
-    """The load, by all batches of it."""
-
-    payload_kg: float
-    payload_std_kg: float
-    payload_interval95_kg: list[float]
-    front_share_pct: float
-    front_share_std_pct: float
-    cg_left_m: float | None
-    cg_left_std_m: float | None
-    n_batches: int
-
-
-class LoadEvent(BaseModel):
-    """The load changed, from t_start to t_end; a higher revision of the same id corrects it."""
-
-    id: str
-    revision: int
-    vehicle_id: str | None
-    t_start: str
-    t_end: str
-    change_kg: float = Field(description="positive: loaded")
-    change_std_kg: float
-    change_interval95_kg: list[float]
-    probability: float = Field(description="that the load changed at all, 0 to 1")
-    is_withdrawn: bool = Field(description="true: later batches say that nothing changed")
-    place: Place | None
-    stops: list[Stop]
-    before: CarriedLoad
-    after: CarriedLoad
-
-
-class Trip(BaseModel):
-    """One drive; unknown is null."""
-
-    model_config = ConfigDict(populate_by_name=True)
-
-    id: str
-    revision: int
-    vehicle_id: str | None
-    t_start: str
-    t_end: str
-    is_over: bool
-    from_: Place | None = Field(alias="from")
-    to: Place | None
-    distance_m: float
-    distance_by: Literal["odometer", "speed"]
-    unknown_s: float
-    moving_s: float
-    mean_speed_mps: float | None
-    payload_kg: float | None
-    payload_std_kg: float | None
-    payload_interval95_kg: list[float] | None
-    carried_tkm: float | None
-    carried_std_tkm: float | None
-    carried_interval95_tkm: list[float] | None
-    weighed_share: float | None
-    empty_share: float | None
-    overloaded_share: float | None
-    n_weighed: int
-
-
-class _EntriesPage(BaseModel):
-    next_cursor: str | None
-    last_cursor: str | None
-
-
-class EventsPage(_EntriesPage):
-    """Load events in the order in which their last revisions came."""
-
-    items: list[LoadEvent]
-
-
-class TripsPage(_EntriesPage):
-    """Trips in the order in which their last revisions came."""
-
-    items: list[Trip]
-
-
-_ENTRIES: Final = {
-    EntryKind.EVENT: (
-        "events",
-        EventsPage,
-        "Loading and unloading. A revised event comes again, behind all earlier ones: follow next_cursor.",
-    ),
-    EntryKind.TRIP: (
-        "trips",
-        TripsPage,
-        "Every drive with its load and tonne-kilometres. A revised trip comes again: follow next_cursor.",
-    ),
+FILE: Final[dict[int | str, dict[str, Any]]] = {
+    200: {"content": {"text/csv": {"schema": {"type": "string"}}}, "description": "the file"},
+    **problem_responses(422, 503),
 }
+"""The answers of a route that sends a file, for the API's description."""
 
 
-def api_router(board: Board, reader: StoreReader, status: Callable[[], Status]) -> APIRouter:
-    """The latest estimate, the history of estimates, the status and the stream."""
+def estimates_router(reader: StoreReader) -> APIRouter:
+    """The history of estimates, in pages and as a file."""
     router = APIRouter(prefix="/api/v1", tags=["api"])
-
-    @router.get(
-        "/estimates/latest", response_model=Latest, responses={304: {"description": "nothing but the age has changed"}}
-    )
-    async def latest(request: Request, shown: AsShown) -> Response:
-        """The last good estimate and its age. Its ETag changes with all but the age."""
-        return LatestResponse(board, request.scope, shown)
 
     @router.get("/estimates", response_model=EstimatesPage, responses=problem_responses(422, 503))
     async def estimates(query: Annotated[EstimatesQuery, Query()], shown: AsShown) -> Response:
         """Estimates and rejections in the order they were made. Follow next_cursor: nothing is missed or repeated."""
         first = await history_page(reader, BATCHES, query, min(query.limit, BATCHES_AT_A_TIME), query.cursor, shown)
         if len(first.items) == query.limit or first.next_cursor is None:
-            return Response(f'{{"items":[{",".join(first.items)}{_end(first, first.last_cursor)}', media_type=JSON)
+            return Response("{" + rest_of_page(first), media_type=JSON)
         return StreamingResponse(_page_by_page(reader, query, first, shown), media_type=JSON)
 
-    @router.get("/status", response_model=Status)
-    async def status_now() -> Status:
-        """The state of the service, as a sentence and as numbers."""
-        return status()
-
-    async def joined(
-        request: Request,
-        shown: AsShown,
-        last_event_id: Annotated[Cursor | SkipJsonSchema[None], Header()] = None,
-    ) -> AsyncIterator[Any]:
-        address = request.client.host if request.client else ""
-        whose = f"{address} {getattr(request.state, 'token_name', '')}"
-        try:
-            with board.fanout.joined(reader, last_event_id, shown, whose) as subscription:
-                yield subscription
-        except TooManyStreamsError as refusal:
-            raise HTTPException(503, str(refusal)) from None
-
-    @router.get(
-        "/stream",
-        response_class=EventSourceResponse,
-        responses={
-            200: {"content": {EventSourceResponse.media_type: {"itemSchema": EVENT_SCHEMA}}},
-            **problem_responses(422, 503),
-        },
-    )
-    async def stream(subscription: Annotated[Any, Depends(joined)]) -> AsyncIterator[ServerSentEvent]:
-        """Server-sent events: estimate, rejection, provisional; data is the estimate object.
-
-        With Last-Event-ID, missed events come first. 503: this client, or all together, have too many streams open.
-        """
-        async for event in subscription.events():
-            yield event
-
-    return router
-
-
-def export_router(reader: StoreReader) -> APIRouter:
-    """All estimates as a file."""
-    router = APIRouter(prefix="/api/v1", tags=["export"])
-
-    def rows_of(items: Sequence[str]) -> list[dict[str, Any]]:
-        return reader.understood(items, lambda item: csv_cells(json.loads(item)))
-
-    def sent(span: TimeSpan, ending: str, shown: Shown, *, with_spectra: bool) -> Awaitable[Response]:
-        def page(cursor: str | None) -> Awaitable[HistoryPage]:
-            return history_page(reader, BATCHES, span, BATCHES_AT_A_TIME, cursor, shown, with_spectra=with_spectra)
-
-        return sent_as_file(page, "springscale", ending, COLUMNS, rows_of)
-
-    @router.get("/export.csv", response_class=Response, responses=file_responses("csv", "the file"))
+    @router.get("/export.csv", response_class=Response, responses=FILE)
     async def export_csv(span: Annotated[TimeSpan, Query()], shown: AsShown) -> Response:
         """Comma-separated values (RFC 4180), one batch a line, several reasons of rejection joined by a space."""
-        return await sent(span, "csv", shown, with_spectra=False)
-
-    @router.get("/export.jsonl", response_class=Response, responses=file_responses("jsonl", "the file"))
-    async def export_jsonl(span: Annotated[SpanWithSpectra, Query()], shown: AsShown) -> Response:
-        """JSON Lines, one estimate object a line."""
-        return await sent(span, "jsonl", shown, with_spectra=span.spectra)
+        file = CsvFile("springscale", COLUMNS, csv_cells, BATCHES_AT_A_TIME)
+        return await file.sent(reader, BATCHES, span, shown, with_spectra=False)
 
     return router
-
-
-def events_router(reader: StoreReader) -> APIRouter:
-    """Load events and trips, as pages and as files."""
-    router = APIRouter(prefix="/api/v1", tags=["events"])
-    for kind, (path, page, words) in _ENTRIES.items():
-        router.add_api_route(
-            f"/{path}",
-            _entries(reader, kind),
-            name=path,
-            description=words,
-            response_model=page,
-            responses=problem_responses(422, 503),
-        )
-    for kind, (path, _, _) in _ENTRIES.items():
-        for ending in FORMATS:
-            router.add_api_route(
-                f"/{path}.{ending}",
-                _whole(reader, kind, f"springscale-{path}", ending),
-                name=f"{path}_{ending}",
-                description=f"All {path} as one file, each in its last revision.",
-                response_class=Response,
-                responses=file_responses(ending, f"the {path}"),
-            )
-    return router
-
-
-def _entries(reader: StoreReader, kind: EntryKind) -> Callable[..., Any]:
-    async def page(query: Annotated[HistoryQuery, Query()], shown: AsShown) -> Response:
-        return Response("{" + await entries_of(reader, kind, query, shown), media_type=JSON)
-
-    return page
-
-
-def _whole(reader: StoreReader, kind: EntryKind, name: str, ending: str) -> Callable[..., Any]:
-    def rows_of(items: Sequence[str]) -> list[dict[str, Any]]:
-        return reader.understood(items, lambda item: table.cells_of(kind, json.loads(item)))
-
-    async def whole(span: Annotated[TimeSpan, Query()], shown: AsShown) -> Response:
-        def page(cursor: str | None) -> Awaitable[HistoryPage]:
-            return history_page(reader, (kind,), span, ENTRIES_AT_A_TIME, cursor, shown)
-
-        return await sent_as_file(page, name, ending, table.COLUMNS[kind], rows_of)
-
-    return whole
-
-
-async def entries_of(reader: StoreReader, kind: str, query: HistoryQuery, shown: Shown = str) -> str:
-    """One page of entries as the rest of a JSON object. Raises RequestValidationError for an invalid cursor."""
-    page = await history_page(reader, (kind,), query, query.limit, query.cursor, shown)
-    return f'"items":[{",".join(page.items)}{_end(page, page.last_cursor)}'
 
 
 async def history_page(
@@ -346,6 +120,11 @@ async def history_page(
     except ValueError as error:
         raise RequestValidationError([{"loc": ("query", "cursor"), "msg": str(error)}]) from None
     return replace(page, items=tuple(map(shown, page.items)))
+
+
+def rest_of_page(page: HistoryPage) -> str:
+    """The JSON object of a page behind its opening brace."""
+    return f'"items":[{",".join(page.items)}{_end(page, page.last_cursor)}'
 
 
 async def _page_by_page(
@@ -367,3 +146,46 @@ async def _page_by_page(
 def _end(page: HistoryPage, newest: str | None) -> str:
     """The end of the JSON of an answer whose last page this is."""
     return "]," + json_line({"next_cursor": page.next_cursor, "last_cursor": newest})[1:]
+
+
+@dataclass(frozen=True, slots=True)
+class CsvFile:
+    """A table of records (RFC 4180) of this name. ``cells`` gives the known cells of a record's JSON object.
+
+    It is sent while it is read, ``at_a_time`` records at once, so that it takes constant memory.
+    """
+
+    name: str
+    columns: Collection[str]
+    cells: Callable[[Mapping[str, Any]], Mapping[str, Any]]
+    at_a_time: int
+
+    async def sent(
+        self, reader: StoreReader, kinds: Sequence[str], span: TimeSpan, shown: Shown, **more: Any
+    ) -> Response:
+        """The answer with all records of these kinds in the span, as far as this program understands them."""
+        sink = io.StringIO(newline="")
+        writer = csv.DictWriter(sink, tuple(self.columns), restval="")
+        writer.writeheader()
+
+        async def page_behind(cursor: str | None) -> HistoryPage:
+            return await history_page(reader, kinds, span, self.at_a_time, cursor, shown, **more)
+
+        def lines(page: HistoryPage) -> str:
+            writer.writerows(reader.understood(page.items, lambda item: self.cells(json.loads(item))))
+            text = sink.getvalue()
+            sink.seek(0)
+            sink.truncate()
+            return text
+
+        first = await page_behind(None)  # before the answer begins: what goes wrong here is still a problem
+
+        async def pieces() -> AsyncIterator[str]:
+            page = first
+            yield lines(page)
+            while page.next_cursor is not None:
+                page = await page_behind(page.next_cursor)
+                yield lines(page)
+
+        named = {"content-disposition": f'attachment; filename="{self.name}.csv"'}
+        return StreamingResponse(pieces(), media_type=CSV, headers=named)

@@ -5,20 +5,19 @@ much, the same in the terms of the COVESA Vehicle Signal Specification, and the 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from typing import Any, Final
+from typing import Final
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights.limits import is_over_limit
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, PayloadPlace, place_of, unsprung_kg, weighed
 from gateway.estimates.batch_estimate import Estimate, Weight, Weights
 from gateway.estimates.quantities import QUANTITIES
 from gateway.records import iso_utc, rounded
 from gateway.stated.facts import Instant
 from gateway.status import Status
-from gateway.web.live.board import Board, Shown
+from gateway.web.live.board import Board
 from gateway.web.routes.present_verdict import VerdictTold, present_load
 from gateway.web.schemas import WeightFigure, WeightFigures
 from gateway.weighing.calibrated import CalibratedVehicle
@@ -36,46 +35,31 @@ class LoadPlace(BaseModel):
     correlation: float | None = Field(description="of both errors, -1 to 1", examples=[0.1])
 
 
-class WeighedWhen(BaseModel):
-    """The estimate that the weights belong to, and its age."""
+class LatestWeights(WeightFigures):
+    """Static weights, unsprung masses included, of the estimate that ``/estimates/latest`` shows, and its age.
+
+    ``is_over_limit`` is of this estimate alone; ``verdict`` counts all batches of the load and the alarms, and is what
+    pages show.
+    """
 
     id: str | None = Field(description="of the estimate")
     t_end: str | None
     age_s: float | None
     is_stale: bool
-
-
-class LatestWeights(WeightFigures, WeighedWhen):
-    """Static weights, unsprung masses included, of the estimate that ``/estimates/latest`` shows.
-
-    ``is_over_limit`` begins above the limit and ends 3 % below it, looking back over the last estimates; ``verdict`` is
-    what pages show.
-    """
-
     load: LoadPlace | None = Field(description="null: unknown, or no payload that is surely there")
+    verdict: VerdictTold
 
 
 class Scales:
-    """Weights of estimates as they are sent: of this vehicle, unknown if its figures are."""
+    """Weights of estimates by the vehicle's present figures, not by those an estimate was stored with."""
 
     def __init__(self, calibrated: CalibratedVehicle | None) -> None:
         self.vehicle: Vehicle | None = None if calibrated is None else calibrated.vehicle
         self._unsprung = NOT_CALIBRATED if calibrated is None else calibrated.unsprung
-        self._known: dict[int, tuple[Estimate, Weights]] = {}  # by identity: the estimates are kept with them
 
     def weigh(self, estimate: Estimate | None) -> Weights:
-        """Weighs an estimate by the vehicle's present figures, not by those it was stored with; None: nothing was
-        weighed yet."""
+        """Unknown if the vehicle's figures are; None: nothing was weighed yet."""
         return weighed(estimate or _NONE, self.vehicle, self._unsprung).weights
-
-    def weigh_each(self, estimates: Sequence[Estimate]) -> list[Weights]:
-        """Weighs many estimates, each once however often it is requested. May be called from any thread."""
-        known, found = self._known, dict[int, tuple[Estimate, Weights]]()
-        for one in estimates:
-            if id(one) not in found:
-                found[id(one)] = known.get(id(one)) or (one, self.weigh(one))
-        self._known = found
-        return [found[id(one)][1] for one in estimates]
 
     def place(self, estimate: Estimate | None) -> PayloadPlace | None:
         """The position of its payload; None if unknown."""
@@ -84,62 +68,36 @@ class Scales:
         return place_of(self.vehicle, estimate.posterior)
 
 
-class JudgedWeights(LatestWeights):
-    """The weights with the verdict on the present load, which counts all its batches and the alarms."""
-
-    verdict: VerdictTold
-
-
 def weights_router(board: Board, scales: Scales, status: Callable[[], Status]) -> APIRouter:
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
 
     @router.get("/weights/latest")
-    async def latest_weights() -> JudgedWeights:
+    async def latest_weights() -> LatestWeights:
         """Gross weight, axle and wheel loads in kg, with standard deviation and limit, and the verdict on them."""
-        verdict = present_load(board, scales.weigh, status(), scales.vehicle).told()
-        return JudgedWeights(**weigh_latest(board, scales).model_dump(), verdict=verdict)
+        shown = board.shown()
+        estimate, place = shown.estimate, scales.place(shown.estimate)
+        return LatestWeights(
+            id=None if estimate is None else estimate.id,
+            t_end=None if estimate is None else iso_utc(estimate.t_end_ns),
+            age_s=shown.age_s,
+            is_stale=shown.is_stale,
+            load=None if place is None else LoadPlace(**{name: rounded(x, 3) for name, x in asdict(place).items()}),
+            verdict=present_load(board, scales.weigh, status(), scales.vehicle).told(),
+            **{where: _figure(weight) for where, weight in scales.weigh(estimate).items()},
+        )
 
     return router
 
 
-def weigh_latest(board: Board, scales: Scales) -> LatestWeights:
-    """Weights of the estimate shown now; the warnings look back over the last estimates."""
-    shown = board.shown()
-    *history, now = scales.weigh_each([*board.recent_estimates(), shown.estimate or _NONE])
-    figures = {
-        place: _figure(weight, [getattr(weights, place).kg for weights in history]) for place, weight in now.items()
-    }
-    return LatestWeights(
-        **_when(shown),
-        load=_place(scales.place(shown.estimate)),
-        **figures,
-    )
-
-
-def _when(shown: Shown) -> dict[str, Any]:
-    """The fields of WeighedWhen."""
-    estimate = shown.estimate
-    return {
-        "id": None if estimate is None else estimate.id,
-        "t_end": None if estimate is None else iso_utc(estimate.t_end_ns),
-        "age_s": shown.age_s,
-        "is_stale": shown.is_stale,
-    }
-
-
-def _figure(now: Weight, history_kg: Sequence[float]) -> WeightFigure:
+def _figure(weight: Weight) -> WeightFigure:
     return WeightFigure(
-        kg=rounded(now.kg, 3),
-        std_kg=rounded(now.std_kg, 3),
-        limit_kg=now.limit_kg,
-        is_over_limit=is_over_limit(history_kg, now.limit_kg),
-        lacks=now.lacks,
-        is_unsprung_estimated=now.is_unsprung_estimated,
+        kg=rounded(weight.kg, 3),
+        std_kg=rounded(weight.std_kg, 3),
+        limit_kg=weight.limit_kg,
+        is_over_limit=weight.is_over_limit,
+        lacks=weight.lacks,
+        is_unsprung_estimated=weight.is_unsprung_estimated,
     )
-
-
-def _place(place: PayloadPlace | None) -> LoadPlace | None:
-    return None if place is None else LoadPlace(**{name: rounded(x, 3) for name, x in asdict(place).items()})
 
 
 _UINT16_LAST: Final = 65_535  # the greatest number of 16 bits
@@ -168,35 +126,29 @@ def standards_router(board: Board, scales: Scales) -> APIRouter:
 
 def vss_points(board: Board, scales: Scales) -> list[VssPoint]:
     """Every VSS path that we support, in a fixed order."""
-    weights, estimate = weigh_latest(board, scales), board.shown().estimate or _NONE
+    estimate = board.shown().estimate
+    weights, t_end = scales.weigh(estimate), None if estimate is None else iso_utc(estimate.t_end_ns)
     points = [
-        VssPoint(path="Vehicle.CurbWeight", value=_uint16(_kerb_kg(scales)), unit="kg", timestamp=None),
+        VssPoint(path="Vehicle.CurbWeight", value=_uint16(_kerb_kg(scales.vehicle)), unit="kg", timestamp=None),
         VssPoint(path="Vehicle.GrossWeight", value=_uint16(weights.gross.limit_kg), unit="kg", timestamp=None),
     ]
     for one in QUANTITIES:
-        figure = getattr(weights if one.is_weight else estimate, one.name)
-        known, std = (figure.kg, figure.std_kg) if one.is_weight else map(_finite, (figure.number, figure.std))
-        found = {one.vss: known, f"{one.vss}Std": std} if one.has_vss_std else {one.vss: _uint16(known)}
-        points += [
-            VssPoint(path=path, value=value, unit=one.vss_unit, timestamp=weights.t_end)
-            for path, value in found.items()
-        ]
+        figure = getattr(weights if one.is_weight else estimate or _NONE, one.name)
+        known, std = (figure.kg, figure.std_kg) if one.is_weight else (figure.number, figure.std)
+        found: dict[str, float | None] = {one.vss: _uint16(known)}
+        if one.has_vss_std:
+            found = {one.vss: rounded(known, 3), f"{one.vss}Std": rounded(std, 3)}
+        points += [VssPoint(path=path, value=x, unit=one.vss_unit, timestamp=t_end) for path, x in found.items()]
     return points
 
 
-def _kerb_kg(scales: Scales) -> float | None:
-    if scales.vehicle is None:
-        return None
-    return _finite(scales.vehicle.empty_mass_kg + sum(unsprung_kg(scales.vehicle)))
-
-
-def _finite(x: float) -> float | None:
-    return x if math.isfinite(x) else None
+def _kerb_kg(vehicle: Vehicle | None) -> float | None:
+    return None if vehicle is None else vehicle.empty_mass_kg + sum(unsprung_kg(vehicle))
 
 
 def _uint16(kg: float | None) -> int | None:
     """VSS gives these the type uint16."""
-    return None if kg is None else min(max(round(kg), 0), _UINT16_LAST)
+    return None if kg is None or not math.isfinite(kg) else min(max(round(kg), 0), _UINT16_LAST)
 
 
 KNOWN_LOADS_PATH: Final = "/api/v1/known-loads"
