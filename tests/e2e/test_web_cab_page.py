@@ -301,9 +301,9 @@ def test_before_the_first_estimate_and_without_limits_it_claims_nothing(tmp_path
     ("script", "said"),
     [
         (WAKE_LOCK, "The screen stays on."),
-        (NO_WAKE_LOCK, "this browser cannot keep it on"),
+        (NO_WAKE_LOCK, "the browser does not keep it on"),
         (f"{NO_WAKE_LOCK}; {INSECURE}", "browsers keep it on over HTTPS only"),
-        (REFUSED, "it refused to keep it on"),
+        (REFUSED, "the browser does not keep it on"),
     ],
 )
 def test_the_page_keeps_the_screen_on_or_warns(phone: Watched, cab: Look, script: str, said: str) -> None:

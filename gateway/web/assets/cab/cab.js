@@ -2,9 +2,8 @@
 
 import { stayAwake } from "./wake-lock.js";
 import { aboard, about, alarm, alarmText, eventText, lightText, notSeen, ownReading, phrase, question, spareText, stood } from "./sentences.js";
-import { listen, offer } from "./tell.js";
-import { Refused, ask, setToken } from "../dashboard/gateway.js";
-import { element, made, pair, say, write } from "../dashboard/page.js";
+import { LEARNING, Refused, acceptToken, ask, load, stateLoad } from "../dashboard/gateway.js";
+import { acceptNumbers, element, made, numberText, pair, say, typedNumber, write } from "../dashboard/page.js";
 import { number } from "../dashboard/words.js";
 import { fill } from "../language.js";
 
@@ -82,18 +81,32 @@ function draw() {
   write("likely", isAnswered ? likely : "");
   element("rooms").replaceChildren(...cab.spare.map((spare) => pair(...spareText(spare))));
   say("alarms", alarmText(cab));
-  offer(cab);
+  element("tell").hidden = cab.load !== "standing";
+  if (element("tell").hidden) say("told", "");
   write("aboard", aboard(cab, cab.age_s === null ? null : cab.age_s + silentS));
   write("last-event", eventText(cab.last_event));
   element("own").hidden = cab.own_readings.length === 0;
   element("own-readings").replaceChildren(...cab.own_readings.map((reading) => pair(...ownReading(reading, silentS))));
 }
 
-element("token").addEventListener("submit", (event) => {
+/** States what is aboard from the vehicle's present time on. Whoever knows nothing just drives. */
+async function tell(source, kg) {
+  try {
+    await stateLoad((await load(LEARNING)).vehicle_time, source, kg);
+    element("tell").reset();
+    say("told", phrase("told"));
+  } catch (error) {
+    say("told", phrase("not_told", { why: error.message }));
+  }
+}
+
+element("tell").addEventListener("submit", (event) => {
   event.preventDefault();
-  setToken(element("token-text").value);
-  askNow();
+  tell(element("tell-source").value, typedNumber(element("tell-kg").value));
 });
+element("tell-empty").addEventListener("click", () => tell("empty"));
+
+acceptToken(askNow);
 
 element("panel").addEventListener("click", () => {
   element("details").open = !element("details").open; // the whole panel is easier to hit than one word
@@ -106,7 +119,7 @@ document.addEventListener("visibilitychange", () => {
 });
 
 fill(phrase);
-listen();
+acceptNumbers(phrase("number_hint", { example: numberText(310) }));
 document.title = phrase("title");
 askNow();
 setInterval(askNow, ASK_EVERY_MS);

@@ -1,10 +1,4 @@
-// Keeps the screen on if the browser allows it, and says if it does not.
-
-// Names of rows in /assets/words/cab.js
-const HELD = "awake";
-const INSECURE = "awake_insecure";
-const UNKNOWN = "awake_unknown";
-const REFUSED = "awake_refused";
+// Keeps the screen on if the browser allows it, and says how it is, by the name of a row in /assets/words/cab.js.
 
 /** Requests it at once, whenever the page becomes visible again, and at a touch; calls `tell` with the result. */
 export function stayAwake(tell) {
@@ -13,19 +7,19 @@ export function stayAwake(tell) {
   async function hold() {
     if (lock !== null || document.visibilityState !== "visible") return;
     if (navigator.wakeLock === undefined) {
-      tell(window.isSecureContext ? UNKNOWN : INSECURE);
+      tell(window.isSecureContext ? "awake_refused" : "awake_insecure");
       return;
     }
     try {
       lock = await navigator.wakeLock.request("screen");
     } catch (error) {
-      tell(REFUSED);
+      tell("awake_refused");
       return;
     }
-    tell(HELD);
+    tell("awake");
     lock.addEventListener("release", () => {
       lock = null;
-      tell(REFUSED);
+      tell("awake_refused");
     });
   }
 

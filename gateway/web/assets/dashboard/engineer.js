@@ -1,7 +1,6 @@
 // The engineer's page: why batches were refused, spectra, sensors, bus and calibration.
 
 import "./phrases.js"; // first: the others find its words in the page
-import "./theme-button.js";
 import "./fold.js";
 import "./state-view.js";
 import "./alarm-view.js";

@@ -3,11 +3,12 @@
 
 import { follow } from "./event-stream.js";
 import { alarmsOf } from "./alarm-view.js";
-import { ALARMS, LEARNING, Refused, load } from "./gateway.js";
+import { LEARNING, Refused, load } from "./gateway.js";
 import { known, learn } from "./known.js";
 import { element } from "./page.js";
 import { explained } from "./phrases.js";
 
+const ALARMS = "api/v1/alarms?order=newest_first&limit=50";
 const ASK_EVERY_MS = 5000; // chosen: as the cab page
 const GATHER_MS = 50; // chosen: shorter than a person notices
 const MOST_BATCHES = 1000; // the limit of a page of the API

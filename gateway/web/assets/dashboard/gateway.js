@@ -2,14 +2,21 @@
 
 const TOKEN = `springscale-token ${new URL(".", document.baseURI).pathname}`; // one proxy may serve several vehicles
 export const LEARNING = "api/v1/learning";
-export const ALARMS = "api/v1/alarms?order=newest_first&limit=50";
+export const STATEMENTS = "api/v1/statements";
 
 export class Refused extends Error {}
 
-export const setToken = (text) => sessionStorage.setItem(TOKEN, text.trim());
+/** Takes the token of this session from the page's form, then calls `goOn`. */
+export function acceptToken(goOn) {
+  document.getElementById("token").addEventListener("submit", (event) => {
+    event.preventDefault();
+    sessionStorage.setItem(TOKEN, document.getElementById("token-text").value.trim());
+    goOn();
+  });
+}
 
 /** With the token of this session, if there is one. */
-export function headers(token = sessionStorage.getItem(TOKEN)) {
+function headers(token = sessionStorage.getItem(TOKEN)) {
   return token ? { Authorization: `Bearer ${token}` } : {};
 }
 
@@ -22,3 +29,17 @@ export async function ask(path, more = {}, signal = null) {
 }
 
 export const load = async (path) => (await ask(path)).json();
+
+/** Sends a change and gives the answer; throws the gateway's words against it. */
+export async function send(method, path, body, type = "application/json") {
+  const response = await fetch(path, { method, body, headers: { ...headers(), "Content-Type": type } });
+  const told = await response.json();
+  if (!response.ok) throw new Error(told.detail);
+  return told;
+}
+
+/** States what is aboard from an instant on: a scale weighs the whole vehicle, all other sources name the payload. */
+export function stateLoad(from, source, kg = null) {
+  const load = kg === null ? {} : { load: source === "scale" ? { gross_kg: kg } : { payload_kg: kg } };
+  return send("POST", STATEMENTS, JSON.stringify({ from, source, ...load }));
+}

@@ -4,7 +4,7 @@ import { show } from "./known.js";
 import { element, made, pair } from "./page.js";
 import { row } from "./parts.js";
 import { phrase, taughtHere } from "./phrases.js";
-import { isAsleep, isSilent } from "./sleep.js";
+import { isAsleep, isSilent } from "./state-view.js";
 import { UNKNOWN, between, capital, clock, duration, figure, number } from "./words.js";
 
 const NEEDED = new Set(["vertical_acceleration", "pitch_rate", "speed"]);

@@ -1,7 +1,6 @@
 // The dashboard: what a dispatcher asks. Creates the views, then the feed that fills them.
 
 import "./phrases.js"; // first: the others find its words in the page
-import "./theme-button.js";
 import "./fold.js";
 import "./state-view.js";
 import "./alarm-view.js";

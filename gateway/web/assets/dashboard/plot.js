@@ -100,4 +100,4 @@ document.addEventListener("unfold", ({ target }) => {
 });
 
 let palette = 0;
-document.addEventListener("themechange", () => learn({ palette: ++palette }));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => learn({ palette: ++palette }));

@@ -2,10 +2,9 @@
 
 import { show } from "./known.js";
 import { element, made, write } from "./page.js";
-import { row } from "./parts.js";
 import { colour, plot } from "./plot.js";
 import { phrase } from "./phrases.js";
-import { clock, figure, number, reasons } from "./words.js";
+import { clock, figure, reasons } from "./words.js";
 
 const PANELS = [
   { name: "vertical_acceleration_mps2_rthz", title: phrase("spectra_acceleration"), bands: "acceleration_bands" },
@@ -78,26 +77,6 @@ function caption(told) {
   return phrase(told.model ? "spectra_model" : told.rejected.length ? "spectra_refused" : "spectra_none", said);
 }
 
-function drawTable(told) {
-  const kinds = (told.model ? ["measured", "model"] : ["measured"]).map((kind) => phrase(kind));
-  const head = PANELS.flatMap(({ title }) => kinds.map((kind) => `${title}, ${kind}`));
-  const cells = ["Hz", ...head].map((text) => {
-    const cell = made("th", text);
-    cell.scope = "col";
-    return cell;
-  });
-  element("spectra-head").replaceChildren(made("tr", cells));
-  const inModel = new Map((told.model?.freq_hz ?? []).map((hz, n) => [hz, n]));
-  const short = (x) => (x == null ? "–" : Number(x.toPrecision(3)).toString());
-  element("spectra-rows").replaceChildren(...told.spectra.freq_hz.map((hz, n) => row([
-    number(hz, 2),
-    ...PANELS.flatMap(({ name }) => [
-      short(told.spectra[name][n]),
-      ...(told.model ? [short(told.model[name][inModel.get(hz)])] : []),
-    ]),
-  ])));
-}
-
 function drawLegend(told) {
   element("spectra-legend").replaceChildren(
     made("li", phrase("measured"), "estimate"),
@@ -113,5 +92,4 @@ show(({ spectra: told }) => {
   write("spectra-of", caption(told));
   drawLegend(told);
   drawPanels(told);
-  drawTable(told);
 }, "spectra", "palette");

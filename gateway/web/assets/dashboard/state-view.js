@@ -1,16 +1,27 @@
 // The state of the service in words, and whether this page hears it.
 
-import { setToken } from "./gateway.js";
+import { acceptToken } from "./gateway.js";
 import { show } from "./known.js";
 import { element, write } from "./page.js";
 import { phrase } from "./phrases.js";
-import { isAsleep, silentSignals } from "./sleep.js";
 import { language } from "../language.js";
 
 const TONES = {
   starting: "busy", waiting_for_bus: "warn", sensor_fault: "bad", waiting_for_speed: "busy", collecting: "busy",
   estimating: "good", stale: "warn", reader_fault: "bad",
 };
+
+const SILENT_AFTER_S = 5; // as gateway/status.py
+
+export const isSilent = (signal) => signal.last_age_s == null || signal.last_age_s > SILENT_AFTER_S;
+
+const silentSignals = (status) => status.signals.filter(isSilent).map((one) => phrase.named("signal", one.signal));
+
+/** A parked vehicle's bus is silent, which is no cause for alarm; one that never had a frame may not be connected. */
+export function isAsleep({ status, latest }) {
+  if (status?.state !== "waiting_for_bus") return false;
+  return status.bus.n_frames > 0 || Boolean(latest?.id);
+}
 
 /** The gateway's own English sentence has more details than the translation. */
 function sentence(status) {
@@ -52,8 +63,4 @@ show(({ isLive }) => {
   element("link").className = isLive ? "live" : "lost";
 }, "isLive");
 
-element("token").addEventListener("submit", (event) => {
-  event.preventDefault();
-  setToken(element("token-text").value);
-  location.reload();
-});
+acceptToken(() => location.reload());

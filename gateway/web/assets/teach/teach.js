@@ -1,6 +1,6 @@
 // The page that teaches a vehicle: what it is, what was aboard, how exactly it weighs now, and what would help most.
 
-import { headers, load, setToken, Refused } from "../dashboard/gateway.js";
+import { LEARNING, Refused, STATEMENTS, acceptToken, load, send, stateLoad } from "../dashboard/gateway.js";
 import { acceptNumbers, element, made, numberText, say, typedNumber, write } from "../dashboard/page.js";
 import { button, row } from "../dashboard/parts.js";
 import { clock, duration, figure } from "../dashboard/words.js";
@@ -16,7 +16,6 @@ const REQUIRED = ["kerb_front_axle_kg", "kerb_rear_axle_kg", "wheelbase_m", "sen
 const MORE = ["loading_begin_m", "loading_end_m", "sensor_offset_left_m", "track_width_m"];
 const SIGNED = ["sensor_position_m", "sensor_offset_left_m", "loading_begin_m"];
 const CARRIES = ["", "pallets", "parcels", "long_goods", "tools", "mixed"];
-const STATEMENTS = "api/v1/statements";
 
 const phrase = speaker(COMMON, HELPS, TEACH);
 const kg = (x) => figure(x, 0, "kg");
@@ -24,14 +23,11 @@ const kg = (x) => figure(x, 0, "kg");
 let learning = null;
 let stated = null; // the figures that were sent last, with those that no field shows
 
-/** Sends a change; what the gateway says against it becomes the page's fault. */
-async function send(method, path, body, type = "application/json") {
+/** Waits for the answer to a change; what the gateway says against it becomes the page's fault, and the answer null. */
+async function attempt(change) {
   say("fault", "");
   try {
-    const response = await fetch(path, { method, body, headers: { ...headers(), "Content-Type": type } });
-    const told = await response.json();
-    if (!response.ok) throw new Error(told.detail);
-    return told;
+    return await change;
   } catch (error) {
     say("fault", error.message);
     return null;
@@ -40,7 +36,7 @@ async function send(method, path, body, type = "application/json") {
   }
 }
 
-const state = (statement) => send("POST", STATEMENTS, JSON.stringify({ from: learning.vehicle_time, ...statement }));
+const change = (...request) => attempt(send(...request));
 
 // -- the van --
 
@@ -75,7 +71,7 @@ function typedVan() {
 }
 
 async function stateVan(isConfirmed) {
-  const told = await send("PUT", `api/v1/vehicle${isConfirmed ? "?confirm=true" : ""}`, JSON.stringify(typedVan()));
+  const told = await change("PUT", `api/v1/vehicle${isConfirmed ? "?confirm=true" : ""}`, JSON.stringify(typedVan()));
   if (told !== null) showVan(told);
 }
 
@@ -100,7 +96,7 @@ function showSister(sister) {
 }
 
 async function changeSister(method, body) {
-  const told = await send(method, "api/v1/vehicle/sister", body);
+  const told = await change(method, "api/v1/vehicle/sister", body);
   element("sister-file").value = "";
   if (told !== null) showSister(told.sister);
 }
@@ -149,11 +145,11 @@ function showLearning() {
 function question(one) {
   const asked = translated(one.text);
   const yes = async () => {
-    if (one.statement_id) await send("POST", `${STATEMENTS}/${encodeURIComponent(one.statement_id)}/confirm`);
-    else await send("POST", STATEMENTS, JSON.stringify(one.propose));
+    if (one.statement_id) await change("POST", `${STATEMENTS}/${encodeURIComponent(one.statement_id)}/confirm`);
+    else await change("POST", STATEMENTS, JSON.stringify(one.propose));
   };
   const answers = [button(phrase("yes"), `${phrase("yes")}: ${asked}`, yes)];
-  const no = () => send("PUT", "api/v1/learning", JSON.stringify({ not_empty: one.propose.map(({ from }) => from) }));
+  const no = () => change("PUT", LEARNING, JSON.stringify({ not_empty: one.propose.map(({ from }) => from) }));
   if (one.statement_id) answers.push(button(phrase("withdraw"), `${phrase("withdraw")}: ${asked}`, () => withdraw(one.statement_id)));
   else answers.push(button(phrase("no"), `${phrase("no")}: ${asked}`, no));
   return made("li", [made("span", `${asked} `), ...answers]);
@@ -161,7 +157,7 @@ function question(one) {
 
 // -- statements --
 
-const withdraw = (id) => send("DELETE", `${STATEMENTS}/${encodeURIComponent(id)}`);
+const withdraw = (id) => change("DELETE", `${STATEMENTS}/${encodeURIComponent(id)}`);
 
 function loadText({ payload_kg: payload, gross_kg: gross, front_axle_kg: front, rear_axle_kg: rear, change_kg: change, plus_minus_kg: half }) {
   const half95 = (x) => (half === null ? kg(x) : phrase("with_plus_minus", { kg: figure(x, 0, ""), half: kg(half) }));
@@ -205,7 +201,7 @@ const problem = ({ row, text }) => phrase("row_problem", { row, what: translated
 
 async function importNotes(isDryRun) {
   const [file] = element("import-file").files;
-  const told = await send("POST", `${STATEMENTS}?${timezone()}&dry_run=${isDryRun}`, await file.text(), "text/csv");
+  const told = await change("POST", `${STATEMENTS}?${timezone()}&dry_run=${isDryRun}`, await file.text(), "text/csv");
   element("import-sure").hidden = told === null || !isDryRun;
   if (told === null) return;
   say("import-told", isDryRun ? rowsText(told) : phrase("taken", { text: rowsText(told) }));
@@ -217,7 +213,7 @@ async function importNotes(isDryRun) {
 
 async function askNow() {
   try {
-    const [now, statements] = await Promise.all([load("api/v1/learning"), load(STATEMENTS)]);
+    const [now, statements] = await Promise.all([load(LEARNING), load(STATEMENTS)]);
     learning = now;
     element("token").hidden = true;
     element("main").hidden = false;
@@ -248,11 +244,11 @@ element("van").addEventListener("submit", (event) => {
 });
 element("confirm").addEventListener("click", () => stateVan(true));
 element("sister-file").addEventListener("change", async ({ target }) => changeSister("PUT", await target.files[0].text()));
-element("empty").addEventListener("click", () => state({ source: "empty" }));
+element("empty").addEventListener("click", () => attempt(stateLoad(learning.vehicle_time, "empty")));
 element("aboard").addEventListener("submit", async (event) => {
   event.preventDefault();
-  const source = element("aboard-source").value, weight = typedNumber(element("aboard-kg").value);
-  const told = await state({ source, load: source === "scale" ? { gross_kg: weight } : { payload_kg: weight } });
+  const weight = typedNumber(element("aboard-kg").value);
+  const told = await attempt(stateLoad(learning.vehicle_time, element("aboard-source").value, weight));
   if (told !== null) element("aboard").reset();
 });
 element("import").addEventListener("submit", (event) => {
@@ -260,10 +256,6 @@ element("import").addEventListener("submit", (event) => {
   importNotes(true);
 });
 element("import-send").addEventListener("click", () => importNotes(false));
-element("token").addEventListener("submit", (event) => {
-  event.preventDefault();
-  setToken(element("token-text").value);
-  begin();
-});
+acceptToken(begin);
 begin();
 setInterval(askNow, ASK_EVERY_MS);

@@ -88,12 +88,8 @@ export const CAB = {
     "The phone may switch its screen off: browsers keep it on over HTTPS only. Until then set the phone's own screen time-out to never.",
     "Das Telefon kann den Bildschirm abschalten: Browser halten ihn nur über HTTPS an. Stellen Sie bis dahin am Telefon ein, dass er nie abschaltet.",
   ],
-  awake_unknown: [
-    "The phone may switch its screen off: this browser cannot keep it on, so set the phone's screen time-out to never.",
-    "Das Telefon kann den Bildschirm abschalten: Dieser Browser kann ihn nicht anhalten. Stellen Sie am Telefon ein, dass er nie abschaltet.",
-  ],
   awake_refused: [
-    "The phone may switch its screen off: it refused to keep it on, perhaps to save its battery. Touch the page to try again.",
-    "Das Telefon kann den Bildschirm abschalten: Es hat abgelehnt, vielleicht um den Akku zu schonen. Berühren Sie die Seite, um erneut zu fragen.",
+    "The phone may switch its screen off: the browser does not keep it on. Set the screen time-out to never. Touch the page to try again.",
+    "Das Telefon kann den Bildschirm abschalten: Der Browser hält ihn nicht an. Stellen Sie ein, dass er nie abschaltet. Berühren Sie die Seite, um erneut zu fragen.",
   ],
 };

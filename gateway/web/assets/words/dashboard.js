@@ -2,10 +2,6 @@
 
 export const DASHBOARD = {
   skip: ["Skip to the load", "Zur Ladung springen"],
-  theme: ["Theme: {choice}", "Farben: {choice}"],
-  "choice.system": ["system", "System"],
-  "choice.light": ["light", "hell"],
-  "choice.dark": ["dark", "dunkel"],
   live: ["live", "verbunden"],
   not_live: ["not connected: trying again", "nicht verbunden: neuer Versuch"],
   connecting: ["connecting", "verbindet"],
@@ -224,12 +220,11 @@ export const DASHBOARD = {
   running: ["Running for", "Läuft seit"],
 
   spectra: ["Spectra of the suspension", "Spektren der Federung"],
-  spectra_table: ["Spectra as a table", "Spektren als Tabelle"],
   spectra_acceleration: ["Vertical acceleration [m/s²/√Hz], log scale", "Vertikalbeschleunigung [m/s²/√Hz], logarithmisch"],
   spectra_pitch: ["Pitch rate [rad/s/√Hz], log scale", "Nickrate [rad/s/√Hz], logarithmisch"],
   spectra_coherence: ["Coherence of the two", "Kohärenz der beiden"],
   spectra_phase: ["Phase of pitch rate against acceleration [rad]", "Phase der Nickrate gegen die Beschleunigung [rad]"],
-  spectra_chart: ["{title}. The table below has the numbers.", "{title}. Die Tabelle darunter enthält die Zahlen."],
+  spectra_chart: ["{title}. The API has the numbers.", "{title}. Die Zahlen stehen in der API."],
   spectra_model: [
     "Batch until {time}. Model: the calibrated vehicle with {kg} on board and {share} on its front axle.",
     "Abschnitt bis {time}. Modell: das kalibrierte Fahrzeug mit {kg} Ladung und {share} auf der Vorderachse.",
