@@ -24,7 +24,7 @@ from gateway.uplink.uplink import Uplink
 from gateway.uplink.webhook import Webhook
 from gateway.web.access.serving import Tls
 from gateway.web.live.board import Board
-from gateway.web.routes.weights import Scales
+from gateway.web.routes.present_load import Scales
 from gateway.weighing.flow import Flow
 
 

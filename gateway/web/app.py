@@ -26,12 +26,12 @@ from gateway.web.routes.history import estimates_router
 from gateway.web.routes.latest_spectra import spectra_router
 from gateway.web.routes.monitoring import alive_router, health_router, metrics_registry
 from gateway.web.routes.present import present_router
+from gateway.web.routes.present_load import Scales
 from gateway.web.routes.stated_loads import statements_router
 from gateway.web.routes.vehicle_in_use import vehicle_router
 from gateway.web.routes.weights import (
     KNOWN_LOADS_PATH,
     KnownLoads,
-    Scales,
     known_loads_router,
     standards_router,
     weights_router,

@@ -14,7 +14,6 @@ from support.web import Gateway, serving
 
 from gateway.records import Why
 from gateway.status import State
-from gateway.web.access.tokens import Scope, TokenFile
 
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 MOST_SCREENS_ON_A_PHONE = 3.0
@@ -52,18 +51,6 @@ def test_a_number_that_nobody_confirms_is_grey(gateway: Gateway, watched: Watche
 
 
 NUMBERS_COLOUR = "getComputedStyle(document.getElementById('payload')).color"
-
-
-def test_a_locked_page_claims_nothing(tmp_path: Path, watched: Watched) -> None:
-    tokens = TokenFile(tmp_path / "tokens.json")
-    tokens.create("somebody else", Scope.READ)
-    with Gateway(tmp_path / "store", tokens=tokens) as gateway, serving(gateway.app) as server:
-        gateway.publish(make_estimate(0))
-        watched.page.goto(server.url)
-        expect(watched.page.locator("#state-name")).to_have_text("Locked")
-        seen = watched.page.locator("body").inner_text()
-        assert not re.search("no batch|none|unknown|nothing", seen, re.IGNORECASE), seen
-        gateway.board.close()
 
 
 def test_without_scripts_it_shows_where_the_numbers_are_and_claims_nothing(site: str, browser: Any) -> None:

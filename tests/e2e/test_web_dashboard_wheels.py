@@ -58,7 +58,7 @@ def site(gateway: Gateway) -> Iterator[str]:
         gateway.board.close()
 
 
-def test_every_wheel_has_its_load_and_the_one_that_bears_too_much_is_marked(site: str, watched: Watched) -> None:
+def test_every_wheel_has_its_load_and_the_load_lies_to_scale(site: str, watched: Watched) -> None:
     page = watched.page
     page.goto(site)
     drawing = page.get_by_role("img", name=re.compile(r"front left wheel 435 ± \d+ kg \(limit 430 kg\)"))
@@ -68,11 +68,6 @@ def test_every_wheel_has_its_load_and_the_one_that_bears_too_much_is_marked(site
     expect(page.locator("#van text.on-wheel.over").first).to_contain_text("435 ±")
     expect(page.locator("#overload")).to_contain_text("front left wheel", ignore_case=True)
     expect(page.locator("#overload")).not_to_contain_text("front right wheel", ignore_case=True)
-
-
-def test_the_load_lies_to_scale_to_the_left_which_is_below(site: str, watched: Watched) -> None:
-    page = watched.page
-    page.goto(site)
     disc = page.locator("#van circle.load")
     across_px = float(disc.get_attribute("cy") or "nan") - 96.0
     assert across_px / ACROSS == pytest.approx(LEFT_M, abs=0.01)

@@ -63,7 +63,7 @@ def page(browser: Any, tmp_path: Path, bench: LearnerBench) -> Iterator[Any]:
     assert watched.complaints == []
 
 
-def test_from_nothing_to_the_drive_it_takes_few_clicks_and_numbers(page: Any, bench: LearnerBench) -> None:
+def test_from_nothing_to_the_drive_it_takes_few_clicks(page: Any, bench: LearnerBench) -> None:
     """Every number is typed into a field that was clicked; then the van is stated, and stated empty."""
     expect(page.locator("#now")).to_have_text("Next: state the van below.")
     n_clicks = n_numbers = 0
@@ -80,6 +80,11 @@ def test_from_nothing_to_the_drive_it_takes_few_clicks_and_numbers(page: Any, be
     assert n_numbers <= MOST_NUMBERS
     bench.drive(0)
     expect(page.locator("#driven")).to_have_text("5 min of driving kept, 1 drive")
+    page.get_by_role("button", name=re.compile("^Withdraw: .*, empty")).click()
+    expect(page.locator("#statements")).to_contain_text("withdrawn")
+    page.get_by_label("Kilograms").fill("310")
+    page.get_by_role("button", name="That is aboard").click()
+    expect(page.locator("#statements")).to_contain_text("310 kg")
 
 
 def test_a_place_before_the_front_axle_is_a_number_and_a_length_is_not_negative(page: Any) -> None:
@@ -87,18 +92,6 @@ def test_a_place_before_the_front_axle_is_a_number_and_a_length_is_not_negative(
         field = page.locator(f"#{name}")
         field.fill("-0.4", force=True)
         assert field.evaluate("field => field.checkValidity()") is is_valid
-
-
-def test_a_stated_load_is_listed_and_can_be_withdrawn(page: Any) -> None:
-    for name, number in VAN.items():
-        page.locator(f"#{name}").fill(number)
-    page.get_by_role("button", name="State the van").click()
-    expect(page.locator("#now")).to_have_text("Next: drive. Ordinary drives are enough.")
-    page.get_by_label("Kilograms").fill("310")
-    page.get_by_role("button", name="That is aboard").click()
-    expect(page.locator("#statements")).to_contain_text("310 kg")
-    page.get_by_role("button", name="Withdraw").click()
-    expect(page.locator("#statements")).to_contain_text("withdrawn")
 
 
 def learn_two_drives(bench: LearnerBench) -> None:
@@ -112,21 +105,10 @@ def learn_two_drives(bench: LearnerBench) -> None:
     bench.finish(drives=drives, looks_empty=(1, 2), learning=learning)
 
 
-@pytest.mark.parametrize(
-    ("locale", "helps"),
-    [("en-GB", "a large load on a scale: then ± 17 kg"), ("de-DE", "eine große Ladung auf einer Waage: dann ± 17 kg")],
-)
-def test_what_helps_is_said_once_and_in_the_readers_language(
-    page: Any, browser: Any, bench: LearnerBench, locale: str, helps: str
-) -> None:
-    learn_two_drives(bench)
-    with read_in(browser, page, locale) as other:
-        expect(other.locator("#helps li")).to_have_text([helps])
-
-
-def test_a_no_takes_the_question_away(page: Any, bench: LearnerBench) -> None:
+def test_what_helps_is_said_once_and_a_no_takes_the_question_away(page: Any, bench: LearnerBench) -> None:
     learn_two_drives(bench)
     expect(page.locator("#questions")).to_contain_text("These 2 drives look empty", timeout=15_000)
+    expect(page.locator("#helps li")).to_have_text(["a large load on a scale: then ± 17 kg"])
     page.get_by_role("button", name="No: These").click()
     expect(page.locator("#questions-card")).to_be_hidden()
     assert json.loads(bench.learner.loads.page())["items"] == []
@@ -238,6 +220,7 @@ def test_every_sentence_of_the_gateway_is_german_for_germans(page: Any, browser:
 def test_the_page_speaks_german_of_what_was_learnt_and_is_asked(page: Any, browser: Any, bench: LearnerBench) -> None:
     learn_two_drives(bench)
     with read_in(browser, page, "de-DE") as german:
+        expect(german.locator("#helps li")).to_have_text(["eine große Ladung auf einer Waage: dann ± 17 kg"])
         expect(german.locator("#versions li")).to_have_text(re.compile("^2 Fahrten und 0 Angaben: ± 40 kg"))
         expect(german.locator("#questions")).to_contain_text("Diese 2 Fahrten sehen leer aus")
         assert [line for line in german.locator("main").inner_text().splitlines() if ENGLISH.search(line)] == []

@@ -19,8 +19,7 @@ from gateway.records import iso_utc, rounded
 from gateway.status import OwnReading, State, Status
 from gateway.store import StoreReader
 from gateway.web.live.board import Board
-from gateway.web.routes.present_verdict import VerdictTold, present_load
-from gateway.web.routes.weights import Scales
+from gateway.web.routes.present_load import Scales, VerdictTold
 from gateway.web.schemas import problem_responses
 
 RoomPlace = Literal["gross", "front_axle", "rear_axle"]
@@ -120,7 +119,7 @@ def cab_router(board: Board, reader: StoreReader, status: Callable[[], Status], 
     async def cab() -> Cab:
         """The payload that can still be loaded, the verdict on the load, its age, and the last load event."""
         now, shown = status(), board.shown()
-        found = present_load(board, scales.weigh, now, scales.vehicle)
+        found = scales.present_load(board, now)
         load, weights = found.load, found.weights
         is_known = not (found.is_doubted or found.is_vague)
         return Cab(

@@ -20,7 +20,7 @@ from gateway.records import Why, rounded
 from gateway.status import State, Status
 from gateway.web.access.problems import problem_response
 from gateway.web.live.board import Board, Shown
-from gateway.web.routes.weights import Scales
+from gateway.web.routes.present_load import Scales
 from gateway.web.schemas import Alive, Ready, problem_responses
 
 

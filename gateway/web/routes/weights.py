@@ -11,18 +11,15 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.core.vehicle import Vehicle
-from gateway.core.weights.on_the_road import NOT_CALIBRATED, PayloadPlace, place_of, unsprung_kg, weighed
-from gateway.estimates.batch_estimate import Estimate, Weight, Weights
+from gateway.core.weights.on_the_road import unsprung_kg
+from gateway.estimates.batch_estimate import Weight
 from gateway.estimates.quantities import QUANTITIES
 from gateway.records import iso_utc, rounded
 from gateway.stated.facts import Instant
 from gateway.status import Status
 from gateway.web.live.board import Board
-from gateway.web.routes.present_verdict import VerdictTold, present_load
+from gateway.web.routes.present_load import NOT_WEIGHED, Scales, VerdictTold
 from gateway.web.schemas import WeightFigure, WeightFigures
-from gateway.weighing.calibrated import CalibratedVehicle
-
-_NONE: Final = Estimate(0, 0, "")
 
 
 class LoadPlace(BaseModel):
@@ -50,24 +47,6 @@ class LatestWeights(WeightFigures):
     verdict: VerdictTold
 
 
-class Scales:
-    """Weights of estimates by the vehicle's present figures, not by those an estimate was stored with."""
-
-    def __init__(self, calibrated: CalibratedVehicle | None) -> None:
-        self.vehicle: Vehicle | None = None if calibrated is None else calibrated.vehicle
-        self._unsprung = NOT_CALIBRATED if calibrated is None else calibrated.unsprung
-
-    def weigh(self, estimate: Estimate | None) -> Weights:
-        """Unknown if the vehicle's figures are; None: nothing was weighed yet."""
-        return weighed(estimate or _NONE, self.vehicle, self._unsprung).weights
-
-    def place(self, estimate: Estimate | None) -> PayloadPlace | None:
-        """The position of its payload; None if unknown."""
-        if self.vehicle is None or estimate is None or estimate.posterior is None:
-            return None
-        return place_of(self.vehicle, estimate.posterior)
-
-
 def weights_router(board: Board, scales: Scales, status: Callable[[], Status]) -> APIRouter:
     router = APIRouter(prefix="/api/v1", tags=["vehicle"])
 
@@ -82,7 +61,7 @@ def weights_router(board: Board, scales: Scales, status: Callable[[], Status]) -
             age_s=shown.age_s,
             is_stale=shown.is_stale,
             load=None if place is None else LoadPlace(**{name: rounded(x, 3) for name, x in asdict(place).items()}),
-            verdict=present_load(board, scales.weigh, status(), scales.vehicle).told(),
+            verdict=scales.present_load(board, status()).told(),
             **{where: _figure(weight) for where, weight in scales.weigh(estimate).items()},
         )
 
@@ -133,7 +112,7 @@ def vss_points(board: Board, scales: Scales) -> list[VssPoint]:
         VssPoint(path="Vehicle.GrossWeight", value=_uint16(weights.gross.limit_kg), unit="kg", timestamp=None),
     ]
     for one in QUANTITIES:
-        figure = getattr(weights if one.is_weight else estimate or _NONE, one.name)
+        figure = getattr(weights if one.is_weight else estimate or NOT_WEIGHED, one.name)
         known, std = (figure.kg, figure.std_kg) if one.is_weight else (figure.number, figure.std)
         found: dict[str, float | None] = {one.vss: _uint16(known)}
         if one.has_vss_std:

@@ -1,18 +1,14 @@
-// The last day: what was loaded and unloaded where, and the trips between; as bars over time, and as a list in words.
+// The last day: what was loaded and unloaded where, and the trips between; as a chart over time, and as a list in words.
 
-import { known, show } from "./known.js";
+import { show } from "./known.js";
 import { element, made, write } from "./page.js";
-import { shape } from "./parts.js";
+import { TIME_AXIS, colour, local, plot } from "./plot.js";
 import { phrase } from "./phrases.js";
-import { SURE, clock, figure, number, span, withStd } from "./words.js";
+import { SURE, figure, number, span, withStd } from "./words.js";
 
 const DAY_MS = 24 * 3600 * 1000;
 const N_SHOWN = 10; // chosen: entries before the fold
-const HEIGHT = 130; // chosen, as the next three: pixels of the drawing
-const FLOOR = 108; // of the bars
-const CEILING = 20;
-const LEAST_WIDTH = 3;
-const LETTER_PX = 10; // chosen: of a label, on average: a bold sign is wider than a digit
+const UNKNOWN_HEIGHT = 0.06; // chosen: of the highest bar, for a trip with an unknown load
 
 const at = (iso) => new Date(iso).getTime();
 
@@ -52,45 +48,36 @@ function summary(entries) {
   });
 }
 
-function tripBar(trip, x, y) {
-  const [left, right] = [x(trip.t_start), x(trip.t_end)];
-  const top = trip.payload_kg == null ? FLOOR - 6 : Math.min(y(trip.payload_kg), FLOOR - 2);
-  const kind = trip.payload_kg == null ? "unknown" : trip.overloaded_share > 0 ? "over" : "known";
-  return shape("rect", { class: `day-${kind}`, x: left, y: top, width: Math.max(right - left, LEAST_WIDTH), height: FLOOR - top });
+const during = (entry) => at(entry.t_end) - at(entry.t_start);
+const middle = (entry) => local(at(entry.t_start) + during(entry) / 2);
+const HOVER = { textposition: "none", hovertemplate: "%{text}<extra></extra>" };
+
+/** Trips as bars from start to end, as high as their load. */
+function bars(trips) {
+  const most = Math.max(...trips.map((trip) => trip.payload_kg ?? 0), 1);
+  const kind = (trip) => (trip.payload_kg == null ? "line" : trip.overloaded_share > 0 ? "refused" : "accent");
+  return {
+    type: "bar",
+    x: trips.map(middle),
+    width: trips.map(during),
+    y: trips.map((trip) => trip.payload_kg ?? UNKNOWN_HEIGHT * most),
+    marker: { color: trips.map((trip) => colour(kind(trip))) },
+    text: trips.map(tripText),
+    ...HOVER,
+  };
 }
 
-/** Places labels that overlap no earlier one, and omits those without room; the list below is complete. */
-function labels(wanted, width) {
-  const taken = [];
-  return wanted.filter((label) => {
-    const half = (label.text.length * LETTER_PX) / 2;
-    label.x = Math.min(Math.max(label.x, half), width - half);
-    const isFree = taken.every((other) => Math.abs(other.x - label.x) > other.half + half || Math.abs(other.y - label.y) > 14);
-    if (isFree) taken.push({ ...label, half });
-    return isFree;
-  }).map(({ text, x, y, kind }) => shape("text", { class: kind, x, y }, text));
-}
-
-function changeLabel(event, x, y) {
-  const top = y(Math.max(event.before.payload_kg, event.after.payload_kg)) - 6;
-  const text = `${event.change_kg >= 0 ? "+" : "−"}${number(Math.abs(event.change_kg), 0)}`;
-  return { text, kind: "day-change", x: (x(event.t_start) + x(event.t_end)) / 2, y: Math.max(top, 12), size: Math.abs(event.change_kg) };
-}
-
-/** Bars of load over time, scaled to the pixels available. */
-function timeline(entries, width) {
-  const [first, last] = [Math.min(...entries.map((entry) => at(entry.t_start))), Math.max(...entries.map((entry) => at(entry.t_end)))];
-  const loads = entries.flatMap((entry) => (isTrip(entry) ? [entry.payload_kg ?? 0] : [entry.before.payload_kg, entry.after.payload_kg]));
-  const most = Math.max(...loads, 1);
-  const x = (iso) => (width * (at(iso) - first)) / Math.max(last - first, 1);
-  const y = (kg) => FLOOR - ((FLOOR - CEILING) * Math.max(kg, 0)) / most;
-  const picture = shape("svg", { viewBox: `0 0 ${width} ${HEIGHT}`, width, height: HEIGHT, "aria-hidden": "true" });
-  picture.append(shape("line", { class: "day-floor", x1: 0, x2: width, y1: FLOOR, y2: FLOOR }));
-  picture.append(...entries.filter(isTrip).map((trip) => tripBar(trip, x, y)));
-  const changes = entries.filter((entry) => !isTrip(entry)).map((event) => changeLabel(event, x, y)).sort((a, b) => b.size - a.size);
-  const ends = [[first, 0], [last, width]].map(([ms, where]) => ({ text: clock(ms), kind: "day-hour", x: where, y: HEIGHT - 6 }));
-  picture.append(...labels([...ends, ...changes], width));
-  return picture;
+/** Changes of load as triangles above the bars beside them. */
+function changes(events) {
+  return {
+    type: "scatter",
+    mode: "markers",
+    x: events.map(middle),
+    y: events.map((event) => Math.max(event.before.payload_kg, event.after.payload_kg)),
+    marker: { symbol: events.map((event) => (event.change_kg >= 0 ? "triangle-up" : "triangle-down")), size: 11, color: colour("ink") },
+    text: events.map(eventText),
+    ...HOVER,
+  };
 }
 
 function item(entry) {
@@ -100,28 +87,17 @@ function item(entry) {
   return made("li", [time, made("span", `${isTrip(entry) ? tripText(entry) : eventText(entry)}.`)], kind);
 }
 
-function entries() {
-  const { events, trips } = known;
-  return events === null || trips === null || !(events.length + trips.length) ? [] : lastDay(events, trips);
-}
-
-function drawChart() {
-  const told = entries(), width = element("day-chart").clientWidth;
-  if (told.length && width) element("day-chart").replaceChildren(timeline(told, width));
-}
-
 show(({ events, trips }) => {
   if (events === null || trips === null) return;
-  const told = entries();
+  const told = events.length + trips.length ? lastDay(events, trips) : [];
   element("day-figure").hidden = told.length === 0;
   write("day-words", told.length ? summary(told) : phrase("no_trip"));
   if (!told.length) return;
-  drawChart();
+  const drawn = [bars(told.filter(isTrip)), changes(told.filter((entry) => !isTrip(entry)))];
+  plot(element("day-chart"), drawn, { xaxis: TIME_AXIS, yaxis: { rangemode: "tozero" } });
   const items = told.reverse().map(item); // newest first
   element("day-entries").replaceChildren(...items.slice(0, N_SHOWN));
   element("day-more").hidden = items.length <= N_SHOWN;
   element("day-earlier").replaceChildren(...items.slice(N_SHOWN));
   write("day-more-title", phrase("list_more", { n: items.length - N_SHOWN }));
-}, "events", "trips");
-
-new ResizeObserver(drawChart).observe(element("day-chart"));
+}, "events", "trips", "palette");

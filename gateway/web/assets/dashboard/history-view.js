@@ -3,7 +3,7 @@
 import { known, show } from "./known.js";
 import { element, made, write } from "./page.js";
 import { row } from "./parts.js";
-import { axisDay, colour, plot } from "./plot.js";
+import { TIME_AXIS, colour, local, plot } from "./plot.js";
 import { phrase } from "./phrases.js";
 import { between, clock, figure, kmh, reasons, withStd } from "./words.js";
 
@@ -13,12 +13,6 @@ const QUANTITIES = {
   share: { value: "front_share_pct", interval: "front_share_interval95_pct", digits: 1, unit: "%" },
   side: { value: "cg_left_m", interval: "cg_left_interval95_m", digits: 3, unit: "m", isRare: true },
 };
-
-/** Local time without a zone, as the charts expect it. */
-function local(iso) {
-  const when = new Date(iso);
-  return new Date(when.getTime() - when.getTimezoneOffset() * 60e3).toISOString().slice(0, 23);
-}
 
 function shownBatches({ batches, hours }) {
   if (!batches?.length) return [];
@@ -95,11 +89,9 @@ function inWords(batches, quantity) {
 function range(batches) {
   const ends = [batches[0].t_start, (known.early ?? batches.at(-1)).t_end].map((iso) => new Date(iso).getTime());
   const margin = 0.02 * (ends[1] - ends[0]);
-  return [ends[0] - margin, ends[1] + margin].map((ms) => local(new Date(ms).toISOString()));
+  return [ends[0] - margin, ends[1] + margin].map(local);
 }
 
-const HALF_DAY_MS = 43_200_000;
-const TICKS = [{ dtickrange: [null, HALF_DAY_MS], value: `%H:%M\n${axisDay()}` }, { dtickrange: [HALF_DAY_MS, null], value: axisDay() }];
 const floor = { overlaying: "y", range: [0, 1], visible: false, fixedrange: true };
 
 function drawCharts() {
@@ -113,7 +105,7 @@ function drawCharts() {
     if (!isTold) continue;
     element(`${name}-chart-words`).textContent = inWords(batches, quantity);
     plot(element(`${name}-chart`), traces(batches, quantity), {
-      xaxis: { type: "date", range: range(batches), tickformatstops: TICKS },
+      xaxis: { ...TIME_AXIS, range: range(batches) },
       yaxis: { zeroline: name !== "share" },
       yaxis2: floor,
     });

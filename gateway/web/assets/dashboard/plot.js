@@ -10,9 +10,19 @@ const part = (type) => new Intl.NumberFormat(locale, { useGrouping: "always" }).
 const SEPARATORS = part("decimal") + part("group"); // as the page writes its numbers
 
 /** A day on an axis, in the notation of d3-time-format: in the order of the locale, by number in German. */
-export function axisDay() {
+function axisDay() {
   if (language === "de") return "%-d.%-m.";
   return new Intl.DateTimeFormat(locale, { month: "short", day: "numeric" }).formatToParts(0)[0].type === "month" ? "%b %-d" : "%-d %b";
+}
+
+const HALF_DAY_MS = 43_200_000;
+const TICKS = [{ dtickrange: [null, HALF_DAY_MS], value: `%H:%M\n${axisDay()}` }, { dtickrange: [HALF_DAY_MS, null], value: axisDay() }];
+export const TIME_AXIS = { type: "date", tickformatstops: TICKS };
+
+/** Local time without a zone, as the charts expect it. */
+export function local(time) {
+  const when = new Date(time);
+  return new Date(when.getTime() - when.getTimezoneOffset() * 60e3).toISOString().slice(0, 23);
 }
 
 let loading = null;

@@ -1,6 +1,5 @@
-"""The verdict on the present load, for the cab page and the dashboard alike."""
+"""The present load: its weights, and the verdict on it, for the cab page and the dashboard alike."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,6 +9,7 @@ from gateway.core.alarms.alarm import AlarmKind
 from gateway.core.alarms.rules import as_of_load
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.limits import Light
+from gateway.core.weights.on_the_road import NOT_CALIBRATED, PayloadPlace, place_of, weighed
 from gateway.core.weights.verdict import Says, Verdict, verdict_of
 from gateway.estimates.batch_estimate import Estimate, Weights
 from gateway.estimates.quantity import Z95
@@ -17,6 +17,7 @@ from gateway.estimates.reasons import EXPLANATIONS, Cause
 from gateway.records import Why, rounded
 from gateway.status import Status
 from gateway.web.live.board import Board
+from gateway.weighing.calibrated import CalibratedVehicle
 
 _DOUBTING: Final = {Cause.SENSORS, Cause.ANSWER}  # roads and driving say nothing against an earlier weight
 
@@ -67,29 +68,47 @@ class PresentLoad:
         )
 
 
-def present_load(
-    board: Board, weigh: Callable[[Estimate | None], Weights], now: Status, vehicle: Vehicle | None
-) -> PresentLoad:
-    """The present load as far as it is known."""
-    shown = board.shown().estimate
-    load = None if shown is None else as_of_load(shown)
-    weights, rejected = weigh(load), _rejected(board.heard(), shown, now)
-    verdict = verdict_of(
-        weights,
-        is_calibrated=now.calibration_id is not None,
-        is_weighed=load is not None,
-        is_doubted=any(EXPLANATIONS[why].cause in _DOUBTING for why in rejected),
-        is_vague=_is_vague(load, vehicle),
-        alarmed=tuple(
-            where for kind, where in (name.split(".") for name in now.alarms.active) if kind == AlarmKind.OVERLOAD
-        ),
-    )
-    return PresentLoad(load, weights, rejected, verdict)
+NOT_WEIGHED: Final = Estimate(0, 0, "")
 
 
-def _is_vague(load: Estimate | None, vehicle: Vehicle | None) -> bool:
-    """Whether the payload's 95 % interval is wider than one that is of use."""
-    return load is not None and vehicle is not None and Z95 * load.payload.std > vehicle.useful_half_width_kg
+class Scales:
+    """Weights of estimates by the vehicle's present figures, not by those an estimate was stored with."""
+
+    def __init__(self, calibrated: CalibratedVehicle | None) -> None:
+        self.vehicle: Vehicle | None = None if calibrated is None else calibrated.vehicle
+        self._unsprung = NOT_CALIBRATED if calibrated is None else calibrated.unsprung
+
+    def weigh(self, estimate: Estimate | None) -> Weights:
+        """Unknown if the vehicle's figures are; None: nothing was weighed yet."""
+        return weighed(estimate or NOT_WEIGHED, self.vehicle, self._unsprung).weights
+
+    def place(self, estimate: Estimate | None) -> PayloadPlace | None:
+        """The position of its payload; None if unknown."""
+        if self.vehicle is None or estimate is None or estimate.posterior is None:
+            return None
+        return place_of(self.vehicle, estimate.posterior)
+
+    def present_load(self, board: Board, now: Status) -> PresentLoad:
+        """The present load as far as it is known."""
+        shown = board.shown().estimate
+        load = None if shown is None else as_of_load(shown)
+        weights, rejected = self.weigh(load), _rejected(board.heard(), shown, now)
+        alarms = [name.partition(".") for name in now.alarms.active]
+        verdict = verdict_of(
+            weights,
+            is_calibrated=now.calibration_id is not None,
+            is_weighed=load is not None,
+            is_doubted=any(EXPLANATIONS[why].cause in _DOUBTING for why in rejected),
+            is_vague=self._is_vague(load),
+            alarmed=tuple(where for kind, _, where in alarms if kind == AlarmKind.OVERLOAD),
+        )
+        return PresentLoad(load, weights, rejected, verdict)
+
+    def _is_vague(self, load: Estimate | None) -> bool:
+        """Whether the payload's 95 % interval is wider than one that is of use."""
+        return (
+            load is not None and self.vehicle is not None and Z95 * load.payload.std > self.vehicle.useful_half_width_kg
+        )
 
 
 def _rejected(heard: Estimate | None, shown: Estimate | None, now: Status) -> tuple[Why, ...]:
