@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import jsonschema_rs
 import pytest
 from fastapi.sse import ServerSentEvent
 from support.alarms import LIMIT_KG, AlarmBench, of_load
@@ -73,16 +72,14 @@ def test_a_resumed_stream_sends_what_was_missed(bench: AlarmBench) -> None:
     assert json.loads(text or "")["kind"] == "overload"
 
 
-def test_answers_match_the_schema(bench: AlarmBench, client: Client) -> None:
-    schema = json.loads((Path(__file__).parents[2] / "docs/alarms.schema.json").read_text())
-    validator = jsonschema_rs.validator_for(schema)
-    (alarm,) = client.get(URL).json()["active"]
-    validator.validate(alarm)
+def test_answers_have_the_described_fields_and_no_other(bench: AlarmBench, client: Client) -> None:
+    active = client.get(URL).json()["active"]
+    assert len(active) == 1
     for n in (1, 2):
         bench.weigh(replace(of_load(n, 100.0), rejected=(Why.PITCH_RATE_STUCK,)))
     bench.weigh(of_load(3, 100.0))
     items = client.get(URL).json()["items"]
     assert sorted(one["kind"] for one in items) == ["overload", "sensor_fault"]
-    for one in items:
-        validator.validate(one)
-    assert set(schema["properties"]) == set(Alarm.model_fields)
+    for one in active + items:
+        Alarm.model_validate_json(json.dumps(one), strict=True)
+        assert set(one) == set(Alarm.model_fields)

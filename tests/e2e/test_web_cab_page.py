@@ -159,12 +159,30 @@ def test_a_lorrys_number_fits_too(tmp_path: Path, phone: Watched) -> None:
         phone.page.close()
 
 
-def test_standing_the_driver_may_say_what_is_aboard(gateway: Gateway, cab: Look) -> None:
+def test_a_standing_vehicle_warns_that_new_loads_are_not_seen_and_asks_what_is_aboard(
+    gateway: Gateway, cab: Look
+) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     page = cab()
     expect(page.locator("#number")).to_have_text("210 kg")
     expect(page.locator("#tell")).to_be_hidden()
-    gateway.status = BEFORE.model_copy(update={"standing": Standing(stood_s=240.0)})
+    readings = (
+        OwnReading(signal="air_spring_pressure", number=412.35, unit="kPa", age_s=0.4),
+        OwnReading(signal="ride_height", number=-12.0, unit="mm", age_s=200.0),
+    )
+    gateway.status = BEFORE.model_copy(
+        update={"standing": Standing(stood_s=240.0), "state": State.WAITING_FOR_SPEED, "own_readings": readings}
+    )
+    expect(page.locator("#not-seen")).to_have_text(
+        "Parked for 4 min. Last weighed at 1 Jan 1970, 00:05. Loading since then is not included."
+    )
+    expect(page.locator("#light")).to_have_text("Go, when last weighed")
+    expect(page.locator("#question")).to_have_text("You can still load, when last weighed")
+    expect(page.locator("#main")).to_have_attribute("data-is", "earlier")
+    expect(page.locator("#own-readings")).to_contain_text("Air spring pressure412.4 kPa")
+    expect(page.locator("#own-readings")).to_contain_text("Ride height−12 mm, silent for 3 min")
+    expect(page.locator("#own")).to_contain_text("Not weighed by Springscale.")
+
     expect(page.get_by_text("Not known? Just drive.")).to_be_visible()
     page.get_by_label("Kilograms").fill("310")
     page.get_by_role("button", name="That is aboard").click()
@@ -175,32 +193,11 @@ def test_standing_the_driver_may_say_what_is_aboard(gateway: Gateway, cab: Look)
     page.wait_for_function(
         "fetch('api/v1/statements').then(async (answer) => (await answer.json()).items.length === 2)"
     )
-    gateway.status = BEFORE
-    expect(page.locator("#tell")).to_be_hidden()
 
-
-def test_a_standing_vehicle_warns_that_new_loads_are_not_seen(gateway: Gateway, cab: Look) -> None:
-    gateway.publish(loaded(0, 300.0, 48.0))
-    readings = (
-        OwnReading(signal="air_spring_pressure", number=412.35, unit="kPa", age_s=0.4),
-        OwnReading(signal="ride_height", number=-12.0, unit="mm", age_s=200.0),
-    )
-    gateway.status = BEFORE.model_copy(
-        update={"standing": Standing(stood_s=240.0), "state": State.WAITING_FOR_SPEED, "own_readings": readings}
-    )
-    page = cab()
-    expect(page.locator("#not-seen")).to_have_text(
-        "Parked for 4 min. Last weighed at 1 Jan 1970, 00:05. Loading since then is not included."
-    )
-    expect(page.locator("#light")).to_have_text("Go, when last weighed")
-    expect(page.locator("#question")).to_have_text("You can still load, when last weighed")
-    expect(page.locator("#main")).to_have_attribute("data-is", "earlier")
-    expect(page.locator("#own-readings")).to_contain_text("Air spring pressure412.4 kPa")
-    expect(page.locator("#own-readings")).to_contain_text("Ride height−12 mm, silent for 3 min")
-    expect(page.locator("#own")).to_contain_text("Not weighed by Springscale.")
     gateway.status = BEFORE.model_copy(update={"standing": Standing(is_load_weighed=False)})
     expect(page.locator("#not-seen")).to_contain_text("The load may have changed at the last stop.")
     expect(page.locator("#own")).to_be_hidden()
+    expect(page.locator("#tell")).to_be_hidden()
     gateway.status = BEFORE
     expect(page.locator("#not-seen")).to_be_hidden()
     expect(page.locator("#main")).to_have_attribute("data-is", "current")
@@ -248,14 +245,6 @@ def test_a_lost_gateway_is_announced_until_it_is_back(gateway: Gateway, phone: W
     expect(page.locator("#main")).to_have_attribute("data-is", "current")
 
 
-def test_a_silent_sensor_is_shown(gateway: Gateway, cab: Look) -> None:
-    gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 0.0, 50.0).refused(Why.ACCELERATION_MISSING))
-    gateway.status = BEFORE.model_copy(update={"state": State.SENSOR_FAULT})
-    page = cab()
-    expect(page.get_by_role("alert")).to_contain_text("weighing has stopped")
-    expect(page.locator("#aboard")).to_contain_text("Not weighed since: acceleration missing.")
-
-
 def test_while_batches_are_refused_the_light_is_not_green(gateway: Gateway, phone: Watched, cab: Look) -> None:
     """An early look between two refused batches brings it back no more than what was weighed before."""
     gateway.publish(loaded(0, 300.0, 48.0), loaded(1, 300.0, 48.0).refused(Why.MODEL_MISFIT))
@@ -268,6 +257,10 @@ def test_while_batches_are_refused_the_light_is_not_green(gateway: Gateway, phon
     gateway.publish(loaded(9, 300.0, 48.0))
     expect(page.locator("#light")).to_have_text("Go")
     expect(page.locator("#main")).to_have_attribute("data-is", "current")
+    gateway.publish(loaded(10, 0.0, 50.0).refused(Why.ACCELERATION_MISSING))
+    gateway.status = BEFORE.model_copy(update={"state": State.SENSOR_FAULT})
+    expect(page.get_by_role("alert")).to_contain_text("weighing has stopped")
+    expect(page.locator("#aboard")).to_contain_text("Not weighed since: acceleration missing.")
     assert phone.complaints == []
 
 
