@@ -159,9 +159,7 @@ def test_a_lorrys_number_fits_too(tmp_path: Path, phone: Watched) -> None:
         phone.page.close()
 
 
-def test_a_standing_vehicle_warns_that_new_loads_are_not_seen_and_asks_what_is_aboard(
-    gateway: Gateway, cab: Look
-) -> None:
+def test_a_standing_vehicle_warns_that_new_loads_are_not_seen(gateway: Gateway, cab: Look) -> None:
     gateway.publish(loaded(0, 300.0, 48.0))
     page = cab()
     expect(page.locator("#number")).to_have_text("210 kg")
