@@ -4,7 +4,6 @@ words.
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
-from starlette.responses import Response
 
 from gateway.estimates.budget import Remedy
 from gateway.estimates.reasons import EXPLANATIONS, REMEDIES, SOURCES, Cause
@@ -54,13 +53,12 @@ def reasons_router() -> APIRouter:
         sources=[SourceInWords(source=source, words=words) for source, words in SOURCES.items()],
         remedies=[RemedyInWords(remedy=remedy, advice=advice) for remedy, advice in REMEDIES.items()],
     )
-    body = explained.model_dump_json()
 
-    @router.get("/reasons", response_model=ReasonsInWords)
-    async def reasons() -> Response:
+    @router.get("/reasons")
+    async def reasons() -> ReasonsInWords:
         """The meaning of each reason in ``rejected`` and each source in ``error_budget``; fixed by the service's
         version.
         """
-        return Response(body, media_type="application/json")
+        return explained
 
     return router

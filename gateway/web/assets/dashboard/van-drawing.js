@@ -54,7 +54,7 @@ function axleLabel(x, place, weight) {
 }
 
 /** The 95 % ellipse of two numbers with these deviations and correlation: half axes, and degrees from along to across. */
-export function ellipse(along, across, correlation) {
+function ellipse(along, across, correlation) {
   const common = (correlation ?? 0) * along * across, mean = (along ** 2 + across ** 2) / 2;
   const apart = Math.hypot((along ** 2 - across ** 2) / 2, common);
   return {

@@ -40,7 +40,7 @@ function judged(weights) {
 }
 
 /** The verdict as a sentence; empty while nothing is near a limit. */
-export function verdictText({ says, light_about: about }) {
+function verdictText({ says, light_about: about }) {
   if (!SAID.includes(says)) return "";
   return phrase(`verdict.${says}`, { places: capital(about.map((place) => phrase.named("place", place)).join(", ")) });
 }

@@ -38,7 +38,6 @@ export const TEACH = {
   "source.scale": ["scale: the whole vehicle", "Waage: das ganze Fahrzeug"],
   "source.known": ["otherwise known: the load", "sonst bekannt: die Ladung"],
   "source.empty": ["empty", "leer"],
-  "source.axle_scales": ["axle scales", "Achswaage"],
   import: ["Import", "Einlesen"],
   import_file: ["A table of delivery notes (CSV)", "Eine Tabelle von Lieferscheinen (CSV)"],
   import_send: ["Take these rows", "Diese Zeilen übernehmen"],
