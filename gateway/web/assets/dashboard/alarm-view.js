@@ -3,7 +3,7 @@
 import { show } from "./known.js";
 import { element, made } from "./page.js";
 import { phrase } from "./phrases.js";
-import { capital, clock, reasons, span, withStd } from "./words.js";
+import { alarmName, capital, clock, placeName, reasons, span, withStd } from "./words.js";
 
 /** Alarms of an answer, newest first, each once. */
 export const alarmsOf = ({ active, items }) => [...new Map([...items, ...active].map((alarm) => [alarm.id, alarm])).values()];
@@ -13,10 +13,10 @@ const when = (alarm) => (alarm.t_end ? span(alarm.t_start, alarm.t_end) : phrase
 function plain({ kind, where, found_kg, std_kg, limit_kg, detail }) {
   if (kind === "overload") {
     const measured = { found: withStd(found_kg, std_kg, 0, "kg"), limit: withStd(limit_kg, null, 0, "kg") };
-    return phrase("over_limit", { place: capital(phrase(`place.${where}`)), ...measured });
+    return phrase("over_limit", { place: capital(placeName(where)), ...measured });
   }
-  if (where === "silent") return `${phrase("fault_silent")}${detail ? `: ${detail}` : ""}`;
-  return `${phrase("fault_refused")}${detail ? `: ${reasons(detail.split(", "))}` : ""}`;
+  const why = where === "refused" && detail ? reasons(detail.split(", ")) : detail;
+  return `${capital(alarmName(kind, where))}${why ? `: ${why}` : ""}`;
 }
 
 /** An overload alarm that stands is red only where the verdict on the present load is. */

@@ -15,7 +15,7 @@ const at = (iso) => new Date(iso).getTime();
 function eventText(event) {
   const place = event.place ? phrase("day_place", { latitude: event.place.latitude_deg, longitude: event.place.longitude_deg }) : "";
   const stops = event.stops.length > 1 ? phrase("day_stops", { n: event.stops.length }) : "";
-  const sure = event.probability >= SURE ? "" : phrase("day_sure", { percent: number(100 * event.probability, 0) });
+  const sure = event.probability >= SURE ? "" : phrase("sure", { percent: number(100 * event.probability, 0) });
   const kg = withStd(Math.abs(event.change_kg), event.change_std_kg, 0, "kg");
   return phrase(event.change_kg >= 0 ? "day_loaded" : "day_unloaded", { kg, place, stops, sure });
 }

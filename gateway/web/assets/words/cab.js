@@ -75,7 +75,6 @@ export const CAB = {
   refused: [" Not weighed since: {reasons}.", " Seitdem nicht gewogen: {reasons}."],
   loaded: ["Last change, by {time}: {kg} loaded{interval}{sure}.", "Letzte Änderung, bis {time}: {kg} geladen{interval}{sure}."],
   unloaded: ["Last change, by {time}: {kg} unloaded{interval}{sure}.", "Letzte Änderung, bis {time}: {kg} entladen{interval}{sure}."],
-  sure: [", {percent} % probable", ", zu {percent} % sicher"],
   own: ["The vehicle's own sensors", "Eigene Sensoren des Fahrzeugs"],
   not_ours: ["Not weighed by Springscale.", "Nicht von Springscale gewogen."],
   silent_for: [", silent for {duration}", ", schweigt seit {duration}"],

@@ -9,6 +9,7 @@ export const COMMON = {
   minutes: ["{x} min", "{x} min"],
   hours: ["{x} h", "{x} h"],
   days: ["{x} day|{x} days", "{x} Tag|{x} Tagen"],
+  sure: [", {percent} % probable", ", zu {percent} % sicher"],
   ago: ["{duration} ago", "vor {duration}"],
 
   token: ["Token", "Token"],

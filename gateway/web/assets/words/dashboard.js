@@ -53,8 +53,6 @@ export const DASHBOARD = {
   alarm_since: ["Since {time}", "Seit {time}"],
   alarm_ending: ["The next full batch decides whether it ends.", "Der nächste volle Abschnitt entscheidet, ob er endet."],
   over_limit: ["{place}: {found}, limit {limit}", "{place}: {found}, Grenze {limit}"],
-  fault_silent: ["A sensor gives no valid sample", "Ein Sensor liefert keinen gültigen Wert"],
-  fault_refused: ["Batches are refused because of a sensor", "Abschnitte werden wegen eines Sensors abgelehnt"],
 
   load: ["Load now", "Ladung jetzt"],
   none_until_next_drive: [
@@ -160,7 +158,6 @@ export const DASHBOARD = {
   day_unloaded: ["{kg} unloaded{place}{stops}{sure}", "{kg} entladen{place}{stops}{sure}"],
   day_place: [" at {latitude}, {longitude}", " bei {latitude}, {longitude}"],
   day_stops: [", at one or more of {n} stops", ", bei einem oder mehreren von {n} Halten"],
-  day_sure: [", {percent} % probable", ", zu {percent} % sicher"],
   trip_known: ["Drove {km} with {kg}{over}{going}", "{km} gefahren mit {kg}{over}{going}"],
   trip_unknown: ["Drove {km} with an unknown load{over}{going}", "{km} gefahren mit unbekannter Ladung{over}{going}"],
   trip_over: [", {percent} % of the distance overloaded", ", {percent} % des Weges überladen"],
