@@ -2,8 +2,7 @@
 
 from gateway.config import Settings
 from gateway.errors import ConfigurationError
-from gateway.service.learner.learning_file import FILE_NAME, LearningRecord
-from gateway.service.record_file import load_record
+from gateway.service.learner.learning_file import load_learning
 from gateway.setup import Setup, setup_of
 
 
@@ -30,7 +29,7 @@ def _learnt(settings: Settings) -> str | None:
     if why_not_learning(settings) is not None:
         return None
     try:
-        active = load_record(settings.store.directory / FILE_NAME, LearningRecord()).active
+        active = load_learning(settings.store.directory).active
     except ConfigurationError:
         return None
     return None if active is None else active.file_name

@@ -62,7 +62,7 @@ def test_an_unreadable_record_is_skipped_and_reported(store: Store, caplog: pyte
     outbox = Outbox(store, "fleet")
     messages = outbox.next_messages(10)
     assert [message.id for message in messages] == ["event-0-1", "event-2-1"]
-    assert names(caplog) == [Event.STORE_BAD_RECORD] * 2
+    assert wait_until(lambda: names(caplog) == [Event.STORE_BAD_RECORD] * 2)
     for message in messages:
         outbox.delivered(message)
     assert outbox.next_messages(10) == []
