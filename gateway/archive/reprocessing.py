@@ -19,7 +19,7 @@ from gateway.archive.manifest import Manifest
 from gateway.archive.places import Location
 from gateway.archive.receipts import Slot, failure_files, slots_done, slots_failed
 from gateway.archive.survey import Facts, LogFile, SurveyedLog, survey
-from gateway.archive.workers import WorkerKilledError, Workers
+from gateway.archive.workers import WorkerKilledError, Workers, answer_of
 from gateway.errors import ConfigurationError
 
 Task = TypeVar("Task")
@@ -166,7 +166,7 @@ def _survey(inventory: Inventory, workers: Workers, on_progress: OnProgress) -> 
     found: defaultdict[str, Facts] = defaultdict(dict)
     for n, ((vehicle, log), answer) in enumerate(done_by(workers, _surveyed, new), 1):
         try:
-            found[vehicle][log.key] = answer.result()
+            found[vehicle][log.key] = answer_of(answer)
         except ConfigurationError:
             raise
         except Exception as fault:  # noqa: BLE001 - whatever happened to a worker, the other vehicles go on
@@ -195,7 +195,7 @@ def _weigh(jobs: Sequence[ArchiveJob], workers: Workers, summary: Summary, on_pr
 
 def _outcome(job: ArchiveJob, answer: "Future[JobOutcome]") -> JobOutcome:
     try:
-        return answer.result()
+        return answer_of(answer)
     except WorkerKilledError as fault:
         return fail(job, str(fault))
     except ConfigurationError:  # a missing library or another version: no worker would do better

@@ -7,7 +7,7 @@ given up.
 import logging
 import os
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import CancelledError, Executor, Future
 from types import TracebackType
 from typing import Any, Final, TypeVar
 
@@ -37,11 +37,9 @@ class Workers(Executor):
         return max(1, int(sum(self._client.nthreads().values())))
 
     def submit(self, fn: Callable[..., Answer], /, *args: Any, **kwargs: Any) -> Future[Answer]:
-        """Run it on any worker; the task of a lost worker is repeated by another."""
-        told: Future[Answer] = Future()
-        asked: Future[Answer] = self._executor.submit(fn, *args, **kwargs)
-        asked.add_done_callback(lambda done: _pass_on(done, told))
-        return told
+        """Run it on any worker; the task of a lost worker is repeated by another. ``answer_of`` gives the result."""
+        submitted: Future[Answer] = self._executor.submit(fn, *args, **kwargs)
+        return submitted
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Disconnect; with ``cancel_futures`` at once."""
@@ -93,23 +91,19 @@ def workers_of(address: str) -> Workers:
     return Workers(client)
 
 
-def _pass_on(done: Future[Answer], told: Future[Answer]) -> None:
-    """Pass on the answer, or the fault in our own words."""
-    if done.cancelled():
-        told.set_exception(PlaceError("the cluster dropped the job: its scheduler went away, or was stopped"))
-        return
-    fault = done.exception()
-    if fault is None:
-        told.set_result(done.result())
-    elif isinstance(fault, _distributed().KilledWorker):
-        told.set_exception(
-            WorkerKilledError(
-                "several processes died over it without a word: out of memory, or killed; "
-                "see the system's log, and try fewer workers"
-            )
-        )
-    else:
-        told.set_exception(fault)
+def answer_of(task: Future[Answer]) -> Answer:
+    """What a task of ``Workers`` returned. Raises what it raised, PlaceError if its cluster dropped it, and
+    WorkerKilledError if its workers were killed.
+    """
+    try:
+        return task.result()
+    except CancelledError:
+        raise PlaceError("the cluster dropped the job: its scheduler went away, or was stopped") from None
+    except _distributed().KilledWorker:
+        raise WorkerKilledError(
+            "several processes died over it without a word: out of memory, or killed; "
+            "see the system's log, and try fewer workers"
+        ) from None
 
 
 def _distributed() -> Any:

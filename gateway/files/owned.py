@@ -112,29 +112,3 @@ def become_owner_of(directory: Path) -> None:
         os.setgroups([])
         os.setgid(owner.st_gid)
         os.setuid(owner.st_uid)
-
-
-class BrokenFile:
-    """Sets an invalid file at ``path`` aside instead of overwriting it. Not thread-safe."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._is_in_the_way = False
-
-    def set_aside(self) -> str:
-        """Rename the file -> what became of it, as a clause for people."""
-        self._is_in_the_way = True
-        try:
-            return f"is set aside as {self._moved()}"
-        except OSError as refusal:
-            return f"cannot be set aside: {refusal}"
-
-    def make_way(self) -> None:
-        """Call before writing to ``path``: moves the invalid file if that failed before. Raises OSError."""
-        if self._is_in_the_way:
-            self._moved()
-
-    def _moved(self) -> str:
-        name = KeptFiles(self._path.parent).set_aside(self._path.name)
-        self._is_in_the_way = False
-        return name

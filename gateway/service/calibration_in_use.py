@@ -2,8 +2,7 @@
 
 from gateway.config import Settings
 from gateway.errors import ConfigurationError
-from gateway.service.learner.learning_file import FILE_NAME, LearningRecord
-from gateway.service.record_file import load_record
+from gateway.service.learner.learning_file import load_learning
 from gateway.setup import Setup, setup_of
 
 
@@ -19,21 +18,16 @@ def with_learnt(settings: Settings) -> Settings:
 
     An invalid record is ignored here: the service sets it aside and reports it.
     """
-    name = _learnt(settings)
-    if name is None:
-        return settings
-    path = settings.store.directory / name
-    return settings.model_copy(update={"calibration": path, "estimator": "cross_spectrum"})
-
-
-def _learnt(settings: Settings) -> str | None:
     if why_not_learning(settings) is not None:
-        return None
+        return settings
     try:
-        active = load_record(settings.store.directory / FILE_NAME, LearningRecord()).active
+        active = load_learning(settings.store.directory).active
     except ConfigurationError:
-        return None
-    return None if active is None else active.file_name
+        return settings
+    if active is None:
+        return settings
+    path = settings.store.directory / active.file_name
+    return settings.model_copy(update={"calibration": path, "estimator": "cross_spectrum"})
 
 
 def learnt(settings: Settings) -> tuple[Settings, Setup, str | None]:

@@ -4,7 +4,7 @@ import logging
 import sqlite3
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partialmethod
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -16,7 +16,7 @@ from gateway.store.database import is_damaged
 from gateway.store.journal import BATCHES, ENTRIES, ESTIMATE, REJECTION, Delivery, HistoryPage, JournalRecord
 from gateway.store.queries import LAST, JournalQuery, without_spectra
 from gateway.store.schema import Chain, JournalRow, connect_reader
-from gateway.store.write_buffer import WriteBuffer
+from gateway.store.write_buffer import Held, WriteBuffer
 from gateway.units import NS_PER_S
 
 if TYPE_CHECKING:
@@ -68,31 +68,41 @@ class StoreReader:
         Following ``next_cursor`` neither misses nor repeats a record while records arrive. A cursor of a database that
         no longer exists starts at the first record. Raises ValueError for a text that is not a cursor.
         """
-        # Read the rows in memory before the file: a row that moves to disk in between is then seen twice and merged by
-        # its number, instead of being missed.
-        epoch, held = self._store.held()
+        held = self.held()
         window = JournalQuery(
             tuple(kinds),
-            seq_after(cursor, epoch),
+            seq_after(cursor, held.epoch),
             -LAST if since_ns is None else _within_64_bits(since_ns),
             LAST if until_ns is None else _within_64_bits(until_ns),
             newest_first,
         )
-        with self._connection() as connection:
-            fresh = [row for row in _not_stored(connection, held) if window.holds(row)]
+        rows = self.rows(window, held, limit + 1, with_spectra=with_spectra)
+        shown = rows[:limit]
+        return HistoryPage(
+            items=tuple(row.text if with_spectra or not row.boot_ns else without_spectra(row.text) for row in shown),
+            next_cursor=f"{held.epoch}-{shown[-1].seq}" if len(rows) > limit else None,
+            last_cursor=f"{held.epoch}-{max(row.seq for row in shown)}" if shown else cursor,
+        )
+
+    def held(self) -> Held:
+        """The records in memory. Take them before reading the file: a record that moves to disk in between is then
+        found twice and merged by its number, instead of being missed.
+        """
+        return self._store.held()
+
+    def rows(
+        self, window: JournalQuery, held: Held, limit: int, *, with_spectra: bool = True, with_disk: bool = True
+    ) -> list[JournalRow]:
+        """The first records of a window in their last revision, in memory and, ``with_disk``, on disk."""
+        with self._connection() if with_disk else nullcontext() as connection:
+            fresh = [row for row in _not_stored(connection, held.rows) if window.holds(row)]
             n_revised = sum(row.kind not in BATCHES for row in fresh)
-            stored = self._stored(connection, window, limit + 1 + n_revised, with_spectra=with_spectra)
+            stored = self._stored(connection, window, limit + n_revised, with_spectra=with_spectra)
         newest: dict[str, JournalRow] = {}
         for row in (*stored, *fresh):
             if row.id not in newest or newest[row.id].seq < row.seq:
                 newest[row.id] = row
-        rows = sorted(newest.values(), key=lambda row: row.seq, reverse=newest_first)
-        has_more, shown = len(rows) > limit, rows[:limit]
-        return HistoryPage(
-            items=tuple(row.text if with_spectra or not row.boot_ns else without_spectra(row.text) for row in shown),
-            next_cursor=f"{epoch}-{shown[-1].seq}" if has_more else None,
-            last_cursor=f"{epoch}-{max(row.seq for row in shown)}" if shown else cursor,
-        )
+        return sorted(newest.values(), key=lambda row: row.seq, reverse=window.newest_first)[:limit]
 
     def understood(self, texts: Iterable[str], parse: Callable[[str], T]) -> list[T]:
         """What ``parse`` makes of each record. One that it cannot read is left out, logged and counted."""
@@ -116,14 +126,9 @@ class StoreReader:
     def head(self) -> str:
         return self._store.head()
 
-    def behind(self, kinds: Sequence[str], seq: int, limit: int) -> list[JournalRow]:
-        """The first records on disk behind a number."""
-        with self._connection() as connection:
-            return self._stored(connection, JournalQuery(tuple(kinds), seq), limit)
-
     def latest(self) -> Latest:
         """The last answer and the last rejection ever accepted."""
-        _, held = self._store.held()
+        held = self.held().rows
         with self._connection() as connection:
             answer, rejection = (self._newest(connection, held, kind) for kind in (ESTIMATE, REJECTION))
             age_s = self._age_s(connection, answer) if answer else None
@@ -230,14 +235,11 @@ def _not_stored(connection: sqlite3.Connection | None, held: Sequence[JournalRow
             yield row
 
 
-Link = Callable[[Sequence[JournalRow]], tuple[JournalRow, ...]]
-
-
 class Follower:
     """A read position in the journal. One thread reads; any thread may close it.
 
-    An idle follower costs nothing: it has no thread, no connection and sends no query. It reads recent records from
-    memory and older ones from disk. If a database that was out of reach comes back, records in memory get new numbers
+    An idle follower costs nothing: it has no thread, no connection and sends no query. It reads from disk
+    only what is no longer in memory. If a database that was out of reach comes back, records in memory get new numbers
     and the position moves with them. A position in a database that no longer exists starts again at the first record.
     """
 
@@ -245,14 +247,13 @@ class Follower:
         self,
         buffer: WriteBuffer,
         reader: StoreReader,
-        link: Link,
         kinds: Sequence[str],
         after: str | None,
         on_news: Callable[[], None],
     ) -> None:
         """Raises ValueError if ``after`` is not a cursor of this program."""
         seq_after(after, buffer.epoch)
-        self._buffer, self._reader, self._link = buffer, reader, link
+        self._buffer, self._reader = buffer, reader
         self._kinds = tuple(kinds)
         self._after = after
         buffer.listen(self, on_news)
@@ -267,26 +268,16 @@ class Follower:
 
         Raises StoreError or TimeoutError.
         """
-        epoch, floor, head, recent = self._buffer.in_memory()
-        seq = self._seq(epoch)
-        if seq >= self._buffer.newest(self._kinds):
-            self._after = f"{epoch}-{max(seq, head)}"
-            return []
-        last_revision = {row.id: row.seq for row in recent}
-        rows = [
-            row
-            for row in self._link(recent)
-            if row.seq > seq and row.kind in self._kinds and (row.kind in BATCHES or last_revision[row.id] == row.seq)
-        ]
-        if seq < floor:
-            stored = self._reader.behind(self._kinds, seq, limit)
-            last = stored[-1].seq if stored else seq
-            rows = stored + ([] if len(stored) >= limit else [row for row in rows if row.seq > last])
-        found = [JournalRecord(f"{epoch}-{row.seq}", row.kind, row.id, row.previous, row.text) for row in rows[:limit]]
-        if len(found) == limit:
-            self._after = found[-1].cursor
-        else:  # all up to there was looked through
-            self._after = f"{epoch}-{max(head, found[-1].number if found else 0)}"
+        held = self._reader.held()
+        seq = self._seq(held.epoch)
+        found: list[JournalRecord] = []
+        if seq < self._buffer.newest(self._kinds):
+            window = JournalQuery(self._kinds, seq)
+            rows = self._reader.rows(window, held, limit, with_disk=seq < held.floor)
+            found = [JournalRecord(f"{held.epoch}-{row.seq}", row.kind, row.id, row.previous, row.text) for row in rows]
+        # After a whole page more may come; otherwise everything up to ``head`` was looked through.
+        last = found[-1].number if found else seq
+        self._after = f"{held.epoch}-{last if len(found) == limit else max(last, held.head)}"
         return found
 
     def go_to(self, cursor: str | None) -> None:

@@ -5,13 +5,24 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 from gateway.store.journal import KINDS
 from gateway.store.schema import DeliveryRow, JournalRow, Row
 
 SEQ_STRIDE: Final = 1 << 20  # chosen: each opening of a database begins a new stride
-RECENT: Final = 16  # chosen: records on disk that stay in memory: whoever follows closely needs no disk
+
+
+class Held(NamedTuple):
+    """The records that are not on disk yet, oldest first, as they were at one moment.
+
+    Records up to number ``floor`` are on disk; ``head`` is the newest number given. Both count within ``epoch``.
+    """
+
+    epoch: str
+    floor: int
+    head: int
+    rows: tuple[JournalRow, ...]
 
 
 class WriteBuffer:
@@ -30,12 +41,12 @@ class WriteBuffer:
         self._changed = threading.Condition()
         self._waiting: deque[Row] = deque()
         self._in_flight: tuple[Row, ...] = ()
-        self._recent: deque[JournalRow] = deque()
         self._is_at_work = False
         self._listeners: dict[object, Callable[[], None]] = {}
         self._newest: dict[str, int] = {}
         self._rebased: tuple[str, Mapping[int, int]] = ("", {})
         self._epoch = epoch
+        self._floor = 0
         self._number_behind(0, 0)
         self.n_dropped = 0
 
@@ -110,16 +121,11 @@ class WriteBuffer:
         with self._changed:
             return f"{self._epoch}-{self._next_seq - 1}"
 
-    def in_memory(self) -> tuple[str, int, int, tuple[JournalRow, ...]]:
-        """The epoch, a number, the newest number given, and all records after the first number, oldest first."""
+    def held(self) -> Held:
+        """The records not yet on disk, with the numbers around them."""
         with self._changed:
-            return self._epoch, self._floor, self._next_seq - 1, (*self._recent, *self.held()[1])
-
-    def held(self) -> tuple[str, tuple[JournalRow, ...]]:
-        """The epoch and the records not yet on disk, oldest first."""
-        with self._changed:
-            rows = (*self._in_flight, *self._waiting)
-            return self._epoch, tuple(row for row in rows if isinstance(row, JournalRow))
+            rows = (row for row in (*self._in_flight, *self._waiting) if isinstance(row, JournalRow))
+            return Held(self._epoch, self._floor, self._next_seq - 1, tuple(rows))
 
     def wait_for_rows(self, timeout_s: float, has_other_work: Callable[[], bool]) -> None:
         """Sleep until a row waits, ``wake`` finds other work, or the time is out."""
@@ -134,13 +140,12 @@ class WriteBuffer:
             self._waiting.clear()
             return self._in_flight
 
-    def settle(self, stored: Sequence[JournalRow] = ()) -> None:
-        """The rows taken are on disk; ``stored`` are those of their records that were new."""
+    def settle(self) -> None:
+        """The rows taken are on disk."""
         with self._changed:
+            written = (row.seq for row in self._in_flight if isinstance(row, JournalRow))
+            self._floor = max(written, default=self._floor)
             self._in_flight = ()
-            self._recent.extend(stored)
-            while len(self._recent) > RECENT:
-                self._floor = self._recent.popleft().seq
 
     def rest(self) -> None:
         """The writer pauses until rows wait or other work appears."""

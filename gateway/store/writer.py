@@ -24,7 +24,7 @@ from gateway.store.journal import BATCHES, ENTRIES, ESTIMATE, REJECTION, REMAIND
 from gateway.store.reader import Follower, StoreReader
 from gateway.store.retention import Retention, boot_ns
 from gateway.store.schema import Chain, JournalRow
-from gateway.store.write_buffer import WriteBuffer
+from gateway.store.write_buffer import Held, WriteBuffer
 
 IDLE_S: Final = 900.0  # chosen: without new rows: how often age is looked at
 RETRY_FIRST_S: Final = 0.5  # chosen: pause after a fault of the disk; doubles up to the last
@@ -115,11 +115,11 @@ class Store(ServicePart):
         """Follow these kinds after a cursor (None: from the first record). ``on_news`` is called for each accepted
         record, in the thread that writes it, and must not block. Raises ValueError for a text that is not a cursor.
         """
-        return Follower(self._buffer, self.reader(), self._linked, kinds, after, on_news)
+        return Follower(self._buffer, self.reader(), kinds, after, on_news)
 
     def is_stored(self, record_id: str) -> bool:
         """Whether an accepted record is on disk."""
-        return not len(self._buffer) or all(row.id != record_id for row in self._buffer.held()[1])
+        return not len(self._buffer) or all(row.id != record_id for row in self._buffer.held().rows)
 
     def head(self) -> str:
         return self._buffer.head()
@@ -167,10 +167,10 @@ class Store(ServicePart):
             log_event(Event.STORE_LOST_ROWS, level=logging.ERROR, n_rows=n_lost, reason=self._reason or "no time")
         return n_lost
 
-    def held(self) -> tuple[str, tuple[JournalRow, ...]]:
-        """The epoch and the records that are not on disk yet, linked to those that are."""
-        epoch, rows = self._buffer.held()
-        return epoch, self._linked(rows)
+    def held(self) -> Held:
+        """The records that are not on disk yet, linked to those that are."""
+        held = self._buffer.held()
+        return held._replace(rows=tuple(map(Chain(self._database.chain).linked, held.rows)))
 
     def boot(self) -> tuple[str, int]:
         """Identifier of the machine's boot, and the nanoseconds since then, including sleep."""
@@ -196,9 +196,6 @@ class Store(ServicePart):
     def _append(self, kind: str, record_id: str, t_end_ns: int, text: str, revision: int = 1) -> str:
         row = JournalRow(0, kind, record_id, revision, t_end_ns, 0, self._clock_ns(), text, boot_ns())
         return self._buffer.append(row)
-
-    def _linked(self, rows: Sequence[JournalRow]) -> tuple[JournalRow, ...]:
-        return tuple(map(Chain(self._database.chain).linked, rows))
 
     def _write_until_closed(self) -> None:
         pause_s = RETRY_FIRST_S
@@ -269,7 +266,6 @@ class Store(ServicePart):
 
     def _commit(self) -> None:
         rows = self._buffer.take()
-        stored: list[JournalRow] = []
         if rows:
             stored, n_known = self._database.add(rows, self._boot_id)
             self._n_written += sum(row.kind != SERVICE for row in stored)
@@ -277,7 +273,7 @@ class Store(ServicePart):
         if self._reason is not None:
             log_event(Event.STORE_RECOVERED, n_held=len(rows))
             self._reason = None
-        self._buffer.settle(stored)
+        self._buffer.settle()
         self._n_pruned += self._database.prune(self._clock_ns())
         self._size_bytes = self._database.size_bytes()
         self._reserve.keep()

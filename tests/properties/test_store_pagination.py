@@ -92,7 +92,7 @@ def test_accepted_records_are_written_held_or_counted(steps: list[str], capacity
             held.give_back()
             in_flight = ()
         n_accepted += step in ("add", "event")
-        seqs = [r.seq for r in held.held()[1]]
+        seqs = [r.seq for r in held.held().rows]
         assert seqs == sorted(set(seqs))
         assert n_accepted == n_written + len(held) + held.n_dropped
         assert len(held) <= max(capacity, len(in_flight))

@@ -18,15 +18,6 @@ def burst(first, n):
     return frames_of((i, 0, b"") for i in range(first, first + n))
 
 
-def test_what_was_put_comes_out_at_once_in_order():
-    inbox = Inbox(100, 8)
-    inbox.put(burst(0, 3))
-    inbox.put(burst(3, 2))
-    assert len(inbox) == 5
-    assert inbox.drain(0.0).t_ns.tolist() == [0, 1, 2, 3, 4]
-    assert inbox.drain(0.0) is None
-
-
 @pytest.mark.parametrize("sizes", [[DRAINED_FRAMES] * 3, [3 * DRAINED_FRAMES], [1000] * 13, [1, DRAINED_FRAMES, 5000]])
 def test_one_drain_gives_no_more_than_a_turn_of_the_pipeline_can_take(sizes):
     """A full inbox of stamps that jump was half a minute of one turn; the watchdog waits for 20 s."""

@@ -1,10 +1,11 @@
 """The journal: one row of numbers, published as they are given, followed by all alike, and robust against its disk."""
 
 import json
+import sqlite3
 import threading
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 from support.estimates import make_record
@@ -26,6 +27,10 @@ DAY_S = 86_400.0
 def entry(store: Store, n: int, kind: str = "event", revision: int = 1) -> str:
     record = {"id": f"{kind}-{n}", "revision": revision, "kind": "drift", "where": None}
     return store.write_entry(kind, record["id"], n, json.dumps(record), revision)
+
+
+def refuse(*_: object) -> NoReturn:
+    raise sqlite3.OperationalError("disk I/O error")
 
 
 def test_a_flipped_bit_in_an_event_is_passed_over_counted_and_shown(
@@ -62,7 +67,7 @@ def test_an_unreadable_record_is_skipped_and_reported(store: Store, caplog: pyte
     outbox = Outbox(store, "fleet")
     messages = outbox.next_messages(10)
     assert [message.id for message in messages] == ["event-0-1", "event-2-1"]
-    assert names(caplog) == [Event.STORE_BAD_RECORD] * 2
+    assert wait_until(lambda: names(caplog) == [Event.STORE_BAD_RECORD] * 2)
     for message in messages:
         outbox.delivered(message)
     assert outbox.next_messages(10) == []
@@ -137,9 +142,16 @@ def test_idle_followers_open_no_database(store: Store, monkeypatch: pytest.Monke
         assert outbox.next_messages(10) == []
         assert outbox.look().n_waiting == 0
     assert opened == []
-    store.write_estimate(make_record(9))  # what comes is in memory
-    assert len(outbox.next_messages(10)) == 1
-    assert opened == []
+
+
+def test_a_follower_reads_what_the_disk_refuses_from_memory(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    store.write_estimate(make_record(0))
+    assert store.flush(PATIENCE_S)
+    follower = store.follow(BATCHES, store.head(), lambda: None)
+    monkeypatch.setattr(store._database, "add", refuse)
+    monkeypatch.setattr(reader, "connect_reader", refuse)
+    store.write_estimate(make_record(1))
+    assert [record.id for record in follower.read(9)] == [make_record(1)["id"]]
 
 
 @pytest.mark.parametrize("wall_s", [60.0, 0.0, -7.0 * DAY_S, -50.0 * 365.0 * DAY_S, 7.0 * DAY_S])

@@ -2,20 +2,21 @@
 
 import logging
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.learning.spans import standing
 from gateway.core.vehicle import Vehicle
-from gateway.errors import NOT_STORED, CalibrationFileError, RefusedError
+from gateway.errors import NOT_STORED, CalibrationFileError, ConfigurationError, RefusedError
 from gateway.files.owned import KeptFiles
+from gateway.files.toml_file import describe_faults
 from gateway.log import Event, OnEvent, tell_event
 from gateway.records import iso_utc
-from gateway.service.record_file import RecordFile
 from gateway.stated.facts import Part, VehicleAnswers
 from gateway.stated.statement import StatementRecord
 
@@ -151,22 +152,49 @@ class LearningRecord(Part):
         return self.model_copy(update={"said": said})
 
 
-class Book(RecordFile[LearningRecord]):
-    """The file and those that it names. A caller that reads and then changes holds ``lock``."""
+def load_learning(directory: Path) -> LearningRecord:
+    """The record in a directory, an empty one if there is none. Raises ConfigurationError for an invalid one."""
+    path = directory / FILE_NAME
+    try:
+        return LearningRecord.model_validate_json(KeptFiles(directory).read(FILE_NAME))
+    except FileNotFoundError:
+        return LearningRecord()
+    except OSError as fault:
+        raise ConfigurationError(f"{path}: cannot be read: {fault.strerror or fault}") from None
+    except ValidationError as fault:
+        raise ConfigurationError(describe_faults(path, fault, LearningRecord)) from None
+
+
+class Book:
+    """The file and those that it names. A caller that reads and then changes holds ``lock``.
+
+    A change is on disk before it is in ``record``. An invalid file is set aside, and ``fault`` says so.
+    """
 
     def __init__(self, directory: Path, on_event: OnEvent, clock_ns: Callable[[], int]) -> None:
+        """Reads the file."""
         self.directory = directory
         self.lock = threading.RLock()
+        self.record = LearningRecord()
+        self.fault: str | None = None
+        self._files = KeptFiles(directory)
+        self._is_invalid_file_in_the_way = False
         self._on_event = on_event
         self._clock_ns = clock_ns
-        super().__init__(directory / FILE_NAME, LearningRecord())
+        try:
+            self.record = load_learning(directory)
+        except ConfigurationError as broken:
+            self._set_aside(str(broken))
 
     def save(self, record: LearningRecord) -> None:
-        """Write the record to disk. Raises RefusedError if the disk fails; then nothing has changed."""
-        try:
-            self.keep(record)
-        except OSError as fault:
-            raise RefusedError(NOT_STORED, f"{self.path} cannot be written, so nothing has changed: {fault}") from None
+        """Replace the record; on disk when this returns. Raises RefusedError if the disk fails; then nothing has
+        changed.
+        """
+        with _refused_if_not_stored(self.directory / FILE_NAME):
+            if self._is_invalid_file_in_the_way:
+                self._move_invalid_file()
+            self._files.write(FILE_NAME, (record.model_dump_json(indent=1) + "\n").encode())
+        self.record, self.fault = record, None
 
     def write_calibration(self, text: str, calibration_id: str) -> str:
         """Write a calibration that was learnt here -> the name of its file, after reading it back.
@@ -174,7 +202,7 @@ class Book(RecordFile[LearningRecord]):
         Raises OSError, and CalibrationFileError if the file differs from what was learnt.
         """
         name = f"{LEARNT}{calibration_id.removeprefix('sha256:')[:16]}.json"
-        KeptFiles(self.directory).write(name, text.encode())
+        self._files.write(name, text.encode())
         if load_calibration(self.directory / name).id != calibration_id:
             raise CalibrationFileError(f"{name}: is not what was learnt")
         return name
@@ -182,10 +210,8 @@ class Book(RecordFile[LearningRecord]):
     def write_sister(self, content: bytes, held: CalibrationFile, by: str) -> Sister:
         """Write the calibration of a vehicle of the same model. Raises RefusedError if the disk fails."""
         name = f"{SISTER}{held.id.removeprefix('sha256:')[:16]}.json"
-        try:
-            KeptFiles(self.directory).write(name, content)
-        except OSError as fault:
-            raise RefusedError(NOT_STORED, f"{name} cannot be written, so nothing has changed: {fault}") from None
+        with _refused_if_not_stored(self.directory / name):
+            self._files.write(name, content)
         return Sister(file_name=name, id=held.id, vehicle=held.vehicle, said=self.act(by))
 
     def forget_others(self) -> None:
@@ -207,6 +233,26 @@ class Book(RecordFile[LearningRecord]):
         """Somebody does something now."""
         return Act(at=self.now(), by=by)
 
-    def set_aside(self, fault: str, aside: str) -> None:
+    def _set_aside(self, fault: str) -> None:
+        """Move an invalid file out of the way, instead of overwriting it, and report what became of it."""
+        self._is_invalid_file_in_the_way = True
+        try:
+            aside = f"is set aside as {self._move_invalid_file()}"
+        except OSError as refusal:
+            aside = f"cannot be set aside: {refusal}"
         self.fault = f"{fault} (it {aside}): statements and calibrations that were learnt here are not in use"
         self.tell(Event.LEARNING_SET_ASIDE, {"fault": fault, "set_aside": aside}, level=logging.ERROR)
+
+    def _move_invalid_file(self) -> str:
+        name = self._files.set_aside(FILE_NAME)
+        self._is_invalid_file_in_the_way = False
+        return name
+
+
+@contextmanager
+def _refused_if_not_stored(path: Path) -> Iterator[None]:
+    """Turn a failure of the disk into a refusal that people read."""
+    try:
+        yield
+    except OSError as fault:
+        raise RefusedError(NOT_STORED, f"{path} cannot be written, so nothing has changed: {fault}") from None
