@@ -6,14 +6,12 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import isfinite, nan
-from pathlib import Path
 from statistics import median
 from typing import Final
 
 import numpy as np
 
 from gateway.calibration.assigned import Assigned, assign
-from gateway.calibration.campaign_file import Campaign, DraftTable
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.found import FoundClaim, FoundLoad
 from gateway.calibration.from_drives import OnFit, Outcome, calibrate_inspected, drive_name
@@ -146,12 +144,13 @@ def learn(
         split.append(SplitRun(run, replace(run, batches=()), log=_facts(driven[i])))
         verdicts.append(RunVerdict(number, run.name))
     outcome = calibrate_inspected(
-        Campaign(Path(vehicle.name), DraftTable(vehicle=vehicle)),
+        vehicle,
         Inspection(tuple(split), tuple(verdicts), ()),
+        where=vehicle.name,
+        sha256=hashlib.sha256(json.dumps(asdict(vehicle), sort_keys=True).encode()).hexdigest(),
         estimators=("cross_spectrum",),
         like=like,
         command=command_of(like, settings.window_s),
-        campaign_sha256=hashlib.sha256(json.dumps(asdict(vehicle), sort_keys=True).encode()).hexdigest(),
         on_fit=on_fit,
     )
     return Learnt(
