@@ -15,7 +15,7 @@ from math import hypot, inf, sqrt
 from types import MappingProxyType
 from typing import Final
 
-from gateway.calibration.statements import NOTHING_KNOWN, Claim, Statement
+from gateway.calibration.statements import NOTHING_KNOWN, Claim, Statement, is_in_tonnes
 from gateway.core.vehicle import Vehicle, front_share_pct
 from gateway.core.weights.on_the_road import unsprung_kg
 from gateway.estimates.quantity import Z95
@@ -48,7 +48,6 @@ PLUS_MINUS_KG: Final[Mapping[StatementSource, float]] = MappingProxyType(
 )
 """Chosen: half the 95 % interval of a weight that states none."""
 NOTE_PLUS_MINUS_SHARE: Final = 0.05  # chosen: of a large payload by its note
-LEAST_PAYLOAD_SHARE: Final = 0.004  # of the empty mass: no vehicle carries four times its own mass, so these are tonnes
 MOST_PAYLOADS: Final = 2.0  # chosen: times the largest payload; more is another unit or another vehicle
 MOST_LIGHTER_SHARE: Final = 0.1  # chosen: of the empty mass, by which scales may show less than the empty vehicle
 SHARES: Final = (0.05, 0.95)  # chosen: on the front axle
@@ -254,7 +253,7 @@ def _weight(
         found = _changed(i, records, spans, weights)
     elif load.payload_kg is not None:
         found = _of_payload(one, load.payload_kg)
-        if 0.0 < load.payload_kg < LEAST_PAYLOAD_SHARE * vehicle.empty_mass_kg:
+        if is_in_tonnes(load.payload_kg, vehicle):
             raise ImpossibleError(
                 f"payload_kg: {load.payload_kg:g} kg is no load of a vehicle of {vehicle.empty_mass_kg:g} kg: write "
                 f"{1000.0 * load.payload_kg:g} if these are tonnes"

@@ -4,17 +4,18 @@ import hashlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from gateway.calibration.axle_weights import AxleWeights, sprung_of
+from gateway.calibration.axle_weights import sprung_keys
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.statements import (
     KNOWN_PLACE_PLUS_MINUS_M,
     KNOWN_PLUS_MINUS_KG,
     KNOWN_SHARE_PLUS_MINUS_PCT,
     UNKNOWN_LEFT_STD_M,
+    is_in_tonnes,
 )
 from gateway.core.vehicle import (
     Kilograms,
@@ -32,9 +33,6 @@ from gateway.files.toml_file import checked, read_toml
 from gateway.records import Batch
 
 OnRun = Callable[[int, int], None]  # (runs done, runs in all)
-
-LEAST_PAYLOAD_SHARE: Final = 0.004
-"""Of the empty mass. No vehicle carries four times its own mass, so a load in tonnes reads less than this in kg."""
 
 
 class _Table(BaseModel):
@@ -182,28 +180,23 @@ def _with_sprung(tables: dict[str, Any], path: Path) -> dict[str, Any]:
     front_kg, rear_kg = (vehicle.get(f"kerb_{end}_axle_kg") for end in ("front", "rear"))
     if not (isinstance(front_kg, int | float) and isinstance(rear_kg, int | float)):
         return tables
-    unsprung = (vehicle.get(f"unsprung_{end}_kg") for end in ("front", "rear"))
     try:
-        sprung = sprung_of(AxleWeights(front_kg, rear_kg, *unsprung))
+        sprung = sprung_keys(front_kg, rear_kg, vehicle.get("unsprung_front_kg"), vehicle.get("unsprung_rear_kg"))
     except CampaignError as fault:
         raise CampaignError(f"{path}: vehicle.kerb_front_axle_kg: {fault}") from None
-    return {**tables, "vehicle": sprung.vehicle_keys() | vehicle}
-
-
-def _is_in_tonnes(payload_kg: float, vehicle: Vehicle) -> bool:
-    return 0.0 < payload_kg < LEAST_PAYLOAD_SHARE * vehicle.empty_mass_kg
+    return {**tables, "vehicle": sprung | vehicle}
 
 
 def _range_faults(vehicle: Vehicle) -> Iterator[str]:
     most_kg = vehicle.payload_range_kg[1]
-    if _is_in_tonnes(most_kg, vehicle):
+    if is_in_tonnes(most_kg, vehicle):
         yield f"payload_range_kg: {most_kg:g} kg is no load of a vehicle of {vehicle.empty_mass_kg:g} kg; tonnes?"
     for end, unsprung in zip(("front", "rear"), unsprung_kg(vehicle), strict=True):
         if unsprung <= 0.0:
             yield (
                 f"kerb_{end}_axle_kg: is {-unsprung:g} kg less than the load on this axle by empty_mass_kg and "
-                f"empty_front_share_pct: scales also include axle and wheels; `springscale calibration sprung` "
-                f"computes these figures from axle weights"
+                f"empty_front_share_pct: scales also include axle and wheels; leave "
+                f"both out, and they follow from the axle weights"
             )
 
 
@@ -212,7 +205,7 @@ def _faults(campaign: Campaign, run: RunTable) -> Iterator[str]:
         yield f"log: {run.log}: no such file"
     if run.payload_kg is None:
         return
-    if _is_in_tonnes(run.payload_kg, campaign.vehicle):
+    if is_in_tonnes(run.payload_kg, campaign.vehicle):
         yield (
             f"payload_kg: {run.payload_kg:g} kg is no load of a vehicle of {campaign.vehicle.empty_mass_kg:g} kg: "
             f"write {1000.0 * run.payload_kg:g} if these are tonnes, 0 if it was empty"

@@ -1,4 +1,4 @@
-"""From inspected drives to a calibration file."""
+"""From inspected drives to a calibration file, for campaigns of known loads as for ordinary drives."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -8,7 +8,6 @@ from importlib.metadata import version
 
 import numpy as np
 
-from gateway.calibration.campaign_file import Campaign, file_sha256
 from gateway.calibration.contradicted import contradictions
 from gateway.calibration.file import CalibrationFile, DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
 from gateway.calibration.found import ClaimState, FoundClaim, FoundLoad, Taught
@@ -52,21 +51,22 @@ class Outcome:
 
 
 def calibrate_inspected(
-    campaign: Campaign,
+    vehicle: Vehicle,
     inspection: Inspection,
     *,
+    where: str,
+    sha256: str,
     estimators: Sequence[str],
     bands: BandChoice = "campaign",
     like: CalibrationFile | None = None,
     command: str = "",
-    campaign_sha256: str | None = None,
     on_fit: OnFit = lambda name, done, of: None,
 ) -> Outcome:
     """Fits every named estimator on the identification parts of the runs without a fault.
 
     ``like`` is the calibration of a vehicle of the same model: it replaces the prior of any vehicle.
-    ``bands`` are the ratio index's: found on the campaign, or the paper's Table 2. ``campaign_sha256`` is of what
-    states the vehicle; None: of the campaign's file.
+    ``bands`` are the ratio index's: found on these drives, or the paper's Table 2. ``where`` names in messages what
+    states the vehicle, a campaign file for instance; ``sha256`` is of its content.
 
     An estimator that these runs do not determine is left out with a warning; raises CalibrationImpossibleError if none
     is left, or if the faults of the runs leave no valid calibration.
@@ -78,30 +78,32 @@ def calibrate_inspected(
             for one in verdict.findings
             if one.severity is Severity.FAULT
         ]
-        refusal = f"{campaign.path}: {inspection.refusal}"
+        refusal = f"{where}: {inspection.refusal}"
         raise CalibrationImpossibleError("\n".join([refusal, *dict.fromkeys(faults)]))
     sister = None
     if like is not None:
         sister = sister_in(like)
-        require_alike(like.vehicle, campaign.vehicle)
+        require_alike(like.vehicle, vehicle)
         inspection = inspection.excusing(Kind.ONE_LOAD_ONLY)
     split = inspection.usable
     runs = [one.identification for one in split]
-    ratio_index, cross_spectrum, claims, warnings = _fit(estimators, runs, campaign, sister, bands, on_fit)
+    ratio_index, cross_spectrum, claims, warnings = _fit(estimators, runs, vehicle, sister, bands, on_fit)
+    if ratio_index is None and cross_spectrum is None:
+        raise CalibrationImpossibleError(f"{where}: " + "; ".join(warnings))
     inspection = _with_disagreements(inspection, claims)
     inspection = _as_believed(inspection, claims, cross_spectrum)
     believed = [one.identification for one in inspection.usable]
-    doubts = contradictions(believed, campaign.vehicle, cross_spectrum.model, sister) if cross_spectrum else ()
+    doubts = contradictions(believed, vehicle, cross_spectrum.model, sister) if cross_spectrum else ()
     warnings += [f"{one.kind}: {one.sentence}" for one in doubts]
     file = CalibrationFile(
-        vehicle=campaign.vehicle,
+        vehicle=vehicle,
         seen=_seen(runs, cross_spectrum),
         cross_spectrum=cross_spectrum.model if cross_spectrum else None,
         ratio_index=ratio_index.calibration if ratio_index else None,
         sister_id=like.id if like and cross_spectrum else None,
         expected_errors=_expected_errors(ratio_index, cross_spectrum),
         warnings=(*inspection.warnings, *warnings),
-        provenance=_provenance(campaign_sha256 or file_sha256(campaign.path), split, cross_spectrum, command),
+        provenance=_provenance(sha256, split, cross_spectrum, command),
     )
     return Outcome(file, inspection, ratio_index, cross_spectrum, doubts)
 
@@ -109,7 +111,7 @@ def calibrate_inspected(
 def _fit(
     estimators: Sequence[str],
     runs: Sequence[KnownRun],
-    campaign: Campaign,
+    vehicle: Vehicle,
     sister: VehicleModel | None,
     bands: BandChoice,
     on_fit: OnFit,
@@ -123,22 +125,20 @@ def _fit(
     drives = _drives(runs)
     if "cross_spectrum" in estimators:
         try:
-            cross_spectrum = teach(drives, campaign.vehicle, sister, partial(on_fit, "cross_spectrum"))
+            cross_spectrum = teach(drives, vehicle, sister, partial(on_fit, "cross_spectrum"))
             warnings.extend(cross_spectrum.model.warnings)
         except CalibrationImpossibleError as fault:
             warnings.append(f"cross_spectrum: {fault}")
-    claims = cross_spectrum.claims if cross_spectrum else examined(drives, campaign.vehicle, sister)
+    claims = cross_spectrum.claims if cross_spectrum else examined(drives, vehicle, sister)
     if "ratio_index" in estimators:
         held = {one.drive for one in claims if one.state is ClaimState.HELD}
         known = [run for run in runs if run.has_payload and run.has_place and drive_name(run.number) not in held]
         try:
             if not known:
                 raise CalibrationImpossibleError("no run has a known payload and place")
-            ratio_index = fit_ratio_index(known, campaign.vehicle, bands=bands, progress=partial(on_fit, "ratio_index"))
+            ratio_index = fit_ratio_index(known, vehicle, bands=bands, progress=partial(on_fit, "ratio_index"))
         except CalibrationImpossibleError as fault:
             warnings.append(f"ratio_index: {fault}")
-    if ratio_index is None and cross_spectrum is None:
-        raise CalibrationImpossibleError(f"{campaign.path}: " + "; ".join(warnings))
     return ratio_index, cross_spectrum, claims, warnings
 
 

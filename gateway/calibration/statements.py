@@ -35,7 +35,13 @@ KNOWN_PLUS_MINUS_KG: Final = 4.0  # chosen: of a weighed known load
 KNOWN_PLACE_PLUS_MINUS_M: Final = 0.05  # chosen: of a measured place
 KNOWN_SHARE_PLUS_MINUS_PCT: Final = 0.4  # the same as a front share, of a load of a quarter of the vehicle
 LEAST_SHARE_STD: Final = 0.002  # chosen: 0..1, of any stated place
+LEAST_PAYLOAD_SHARE: Final = 0.004  # of the empty mass: no vehicle carries four times its own mass, so these are tonnes
 LEAST_PRECISION: Final = 1e-7  # per kg2: of a payload of which nothing is known
+
+
+def is_in_tonnes(payload_kg: float, vehicle: Vehicle) -> bool:
+    """Whether a payload is so small beside its vehicle that somebody wrote tonnes."""
+    return 0.0 < payload_kg < LEAST_PAYLOAD_SHARE * vehicle.empty_mass_kg
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ from typing import get_args
 
 import click
 
-from gateway.calibration.campaign_file import Campaign, load_campaign
+from gateway.calibration.campaign_file import Campaign, file_sha256, load_campaign
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.from_drives import Outcome, calibrate_inspected, with_statements_tested
 from gateway.calibration.inspection.across_runs import Inspection
@@ -129,7 +129,7 @@ def calibrate(
         raise click.UsageError("name the calibration file to write with --output, or ask with --check")
     if like and estimators and "cross_spectrum" not in estimators:
         raise click.UsageError("--like is for cross_spectrum: the ratio index has nothing to inherit")
-    _require_places(output, report)
+    require_places(output, report)
     loaded = load_campaign(campaign)
     _say_payload_range(loaded)
     sister = load_calibration(like) if like else None
@@ -146,18 +146,17 @@ def calibrate(
         return
     with counted("fitting") as on_step:
         outcome = calibrate_inspected(
-            loaded,
+            loaded.vehicle,
             inspection,
+            where=str(loaded.path),
+            sha256=file_sha256(loaded.path),
             estimators=estimators or ESTIMATOR_NAMES,
             bands=bands,
             like=sister,
             command=_command(campaign, estimators, numbers, sister, bands, window_s),
             on_fit=on_share(on_step, estimators or ESTIMATOR_NAMES),
         )
-    if output is not None:
-        with refusal_told(output, ConfigurationError):
-            write_whole(output, outcome.file.to_json())
-    verdict = judged(outcome, report)
+    verdict = written_and_judged(outcome, output, report)
     if as_json:
         told = {"verdict": verdict.to_json(), "inspection": inspection_json(outcome.inspection)}
         click.echo(json_line(_record(outcome.file, output) | told))
@@ -206,7 +205,7 @@ def _tell_inspection(inspection: Inspection, *, as_json: bool, is_all: bool) -> 
         click.echo(json_line(inspection_json(inspection)))
 
 
-def _require_places(output: Path | None, report: Path | None) -> None:
+def require_places(output: Path | None, report: Path | None) -> None:
     """Checked before minutes of work: the file and the directory can be written."""
     if output is not None:
         require_output_place(output)
@@ -214,8 +213,13 @@ def _require_places(output: Path | None, report: Path | None) -> None:
         raise click.UsageError(f"--report {report}: is a file, not a directory")
 
 
-def judged(outcome: Outcome, report: Path | None) -> Verdict:
-    """Judges the calibration by the estimator that the service runs, and writes the report if one is wanted."""
+def written_and_judged(outcome: Outcome, output: Path | None, report: Path | None) -> Verdict:
+    """Writes the calibration file, judges it by the estimator that the service runs, and writes the report if one is
+    wanted.
+    """
+    if output is not None:
+        with refusal_told(output, ConfigurationError):
+            write_whole(output, outcome.file.to_json())
     with counted("judging"):
         assessment = assess_calibration(outcome)
     if report is not None:

@@ -1,4 +1,4 @@
-"""springscale calibration: show a calibration file, and find the sprung mass."""
+"""springscale calibration show: the content of a calibration file."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -8,20 +8,18 @@ from pathlib import Path
 import click
 import numpy as np
 
-from gateway.calibration.axle_weights import UNSPRUNG_SHARE, AxleWeights, Sprung, sprung_of
 from gateway.calibration.file import CalibrationFile, ExpectedErrorsPart, load_calibration
-from gateway.cli.options import FILE, NumberRange, Told, prints
+from gateway.cli.options import FILE, Told, prints
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.estimates.quantity import Z95
 from gateway.model.table import LOG, ROWS
 from gateway.model.vehicle_model import VehicleModel
-from gateway.stated.facts import DIVISION_KG
 from gateway.words import in_sections, known
 
 
 @click.group("calibration")
 def calibration() -> None:
-    """Show a calibration file, and find the sprung mass."""
+    """Show a calibration file."""
 
 
 @calibration.command("show")
@@ -31,51 +29,6 @@ def show(file: Path) -> Told:
     """The content of FILE: vehicle, ranges, parameters with their standard deviations, expected errors, provenance."""
     held = load_calibration(file)
     return {"id": held.id, **held.model_dump(mode="json")}, calibration_text(held)
-
-
-KILOGRAMS = NumberRange(0.0, 100_000.0, min_open=True)  # chosen: no road vehicle has more
-
-
-@calibration.command("sprung")
-@click.option("--front-axle-kg", type=KILOGRAMS, required=True, help="weight on the front axle, vehicle empty")
-@click.option("--rear-axle-kg", type=KILOGRAMS, required=True, help="weight on the rear axle, vehicle empty")
-@click.option("--unsprung-front-kg", type=KILOGRAMS, default=None, help="axle, wheels, brakes [default: estimated]")
-@click.option("--unsprung-rear-kg", type=KILOGRAMS, default=None, help="the same at the rear [default: estimated]")
-@click.option("--division-kg", type=KILOGRAMS, default=DIVISION_KG, show_default=True, help="step of the scales")
-@prints
-def sprung(
-    front_axle_kg: float,
-    rear_axle_kg: float,
-    unsprung_front_kg: float | None,
-    unsprung_rear_kg: float | None,
-    division_kg: float,
-) -> Told:
-    """Sprung mass and front share from axle weights: a [vehicle] block for the campaign file.
-
-    Weigh each axle of the empty vehicle, on level ground, with driver and tank as in service. docs/campaign.md has
-    the formula.
-    """
-    body = sprung_of(AxleWeights(front_axle_kg, rear_axle_kg, unsprung_front_kg, unsprung_rear_kg), division_kg)
-    record = {"vehicle": body.vehicle_keys(), **asdict(body)}
-    del record["weights"]
-    return record, vehicle_block(body)
-
-
-def vehicle_block(sprung: Sprung) -> str:
-    """The table with a comment on the source of its figures. The keys that a tape measures are named, not made up."""
-    head = [
-        "[vehicle]",
-        f"# unsprung masses: front {_unsprung(sprung.unsprung_front_kg, sprung.weights.unsprung_front_kg)},",
-        f"#                   rear {_unsprung(sprung.unsprung_rear_kg, sprung.weights.unsprung_rear_kg)}",
-        f"# standard deviation of empty_mass_kg: {sprung.mass_std_kg:.0f} kg",
-    ]
-    keys = [f"{name} = {number}" for name, number in sprung.vehicle_keys().items()]
-    return "\n".join([*head, *keys, "# still to be given: name, wheelbase_m, sensor_position_m"])
-
-
-def _unsprung(kg: float, given_kg: float | None) -> str:
-    told = "as given" if given_kg is not None else f"estimated, {100.0 * UNSPRUNG_SHARE:.1f} % of the sprung mass"
-    return f"{kg:.1f} kg ({told})"
 
 
 def calibration_text(held: CalibrationFile) -> str:

@@ -18,11 +18,10 @@ from gateway.calibration.learning.spans import rows_record, rows_told, standing
 from gateway.calibration.learning.told import drives_record, learning_record, statements_record
 from gateway.calibration.statements_csv import ToldRow, ToldRows, read_statements
 from gateway.cli import options
-from gateway.cli.calibrate import judged
-from gateway.cli.options import FILE, as_json, batch_settings, require_output_place, window
+from gateway.cli.calibrate import require_places, written_and_judged
+from gateway.cli.options import FILE, as_json, batch_settings, window
 from gateway.cli.progress import counted, on_share
 from gateway.errors import ConfigurationError
-from gateway.files.whole import refusal_told, write_whole
 from gateway.offline.drives_of_logs import Drives, read_drives
 from gateway.records import json_line, rounded
 from gateway.stated.statement import StatementRecord
@@ -79,10 +78,7 @@ def learn(
     """
     if output is None and not only_matches:
         raise click.UsageError("name the calibration file to write with --output, or ask with --dry-run")
-    if output is not None:
-        require_output_place(output)
-    if report is not None and report.exists() and not report.is_dir():
-        raise click.UsageError(f"--report {report}: is a file, not a directory")
+    require_places(output, report)
     campaign = load_campaign(vehicle_path, is_draft=True)
     signal_map = load_signal_map(_signals(signals, campaign))
     sister = load_calibration(like) if like else None
@@ -110,10 +106,7 @@ def learn(
             like=sister,
             on_fit=on_share(on_step, ("cross_spectrum",)),
         )
-    if output is not None:
-        with refusal_told(output, ConfigurationError):
-            write_whole(output, found.outcome.file.to_json())
-    verdict = judged(found.outcome, report)
+    verdict = written_and_judged(found.outcome, output, report)
     record |= {"drives": drives_record(found), "n_drives_unneeded": found.n_unneeded}
     of_rows = [{"row": numbers[one["id"]], **one} for one in statements_record(records, assigned, found)]
     record |= {"statements": sorted(of_rows, key=lambda one: one["row"]), "looks_empty": list(found.looking_empty())}

@@ -193,7 +193,15 @@ def calibrate(
     Raises as :func:`calibrate_inspected` does.
     """
     inspection = inspect(campaign, settings, numbers=numbers, on_run=on_run)
-    return calibrate_inspected(campaign, inspection, estimators=estimators, bands=bands, command=command)
+    return calibrate_inspected(
+        campaign.vehicle,
+        inspection,
+        where=str(campaign.path),
+        sha256=file_sha256(campaign.path),
+        estimators=estimators,
+        bands=bands,
+        command=command,
+    )
 
 
 def judge_campaign(

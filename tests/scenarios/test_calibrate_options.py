@@ -121,7 +121,14 @@ def test_every_estimator_tells_its_steps(campaign: Path) -> None:
     loaded = load_campaign(campaign)
     inspection = inspect(loaded, BatchSettings(window_s=100.0))
     told: list[tuple[str, int, int]] = []
-    calibrate_inspected(loaded, inspection, estimators=ESTIMATOR_NAMES, on_fit=lambda *step: told.append(step))
+    calibrate_inspected(
+        loaded.vehicle,
+        inspection,
+        where="",
+        sha256="",
+        estimators=ESTIMATOR_NAMES,
+        on_fit=lambda *step: told.append(step),
+    )
     for estimator in ESTIMATOR_NAMES:
         steps = [(done, of) for name, done, of in told if name == estimator]
         assert len(steps) >= N_RUNS

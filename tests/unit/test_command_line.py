@@ -48,7 +48,6 @@ def test_both_names_print_the_version() -> None:
     "command",
     [
         ("estimate", "drive.log", "--signals", "springscale:reference", "--window-s"),
-        ("calibration", "sprung", "--rear-axle-kg", "700", "--front-axle-kg"),
         ("demo", "--once", "--speed"),
         ("record", "a.log", "--signals", "x", "--interface", "virtual", "--channel", "x", "--for-s"),
         ("simulate", "campaign", "paper", "somewhere", "--longest-s"),

@@ -233,13 +233,6 @@ def test_facts_are_those_of_the_rows_in_any_order() -> None:
         assert other.streams[signal].mean == pytest.approx(stream.mean)
 
 
-def test_a_sound_drive_has_no_findings() -> None:
-    motion = drive(30.0)
-    assert rate_kinds(motion) == []
-    gravity = tuple(kind for kind in Kind if kind.startswith("acceleration"))
-    assert told_of(gravity, facts=row_facts(motion, TRAITS)) == ()
-
-
 def test_a_slow_sensor_is_named() -> None:
     assert rate_kinds(drive(30.0, rate_hz=30.0)) == ["rate_low", "rate_low"]
 

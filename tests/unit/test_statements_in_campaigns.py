@@ -9,7 +9,6 @@ import pytest
 from support.half_car_road import VAN
 from support.known_runs import campaign as known_campaign
 
-from gateway.calibration.campaign_file import Campaign, DraftTable
 from gateway.calibration.file import load_calibration
 from gateway.calibration.from_drives import Outcome, calibrate_inspected
 from gateway.calibration.inspection.across_runs import Inspection
@@ -30,21 +29,19 @@ def split(**said: dict[str, float]) -> tuple[SplitRun, ...]:
     return tuple(told(one) for one in known_campaign())
 
 
-def calibrated(folder: Path, runs: Sequence[SplitRun], *others: str) -> tuple[Campaign, Outcome]:
-    path = folder / "campaign.toml"
-    path.write_text("as inspected")
-    campaign = Campaign(path, DraftTable(vehicle=VAN))
+def calibrated(runs: Sequence[SplitRun], *others: str) -> Outcome:
     verdicts = tuple(RunVerdict(one.identification.number, one.identification.name) for one in runs)
     inspection = Inspection(tuple(runs), verdicts, ())
-    return campaign, calibrate_inspected(campaign, inspection, estimators=["cross_spectrum", *others])
+    estimators = ["cross_spectrum", *others]
+    return calibrate_inspected(VAN, inspection, where="campaign.toml", sha256="", estimators=estimators)
 
 
 UNKNOWN = {"payload_kg": nan, "front_share_pct": nan}
 NOTE = {"front_share_pct": nan, "payload_plus_minus_kg": 25.0}
 
 
-def test_an_unknown_load_teaches_and_is_found_and_is_not_judged(tmp_path: Path) -> None:
-    _, outcome = calibrated(tmp_path, split(run_3=UNKNOWN))
+def test_an_unknown_load_teaches_and_is_found_and_is_not_judged() -> None:
+    outcome = calibrated(split(run_3=UNKNOWN))
     told = outcome.file.provenance.drives[2]
     assert (told.statement.payload_kg, told.statement.front_share_pct) == (None, None)
     assert told.found is not None
@@ -59,8 +56,8 @@ def test_an_unknown_load_teaches_and_is_found_and_is_not_judged(tmp_path: Path) 
     assert validation.to_json()["runs"][2]["true_payload_kg"] is None
 
 
-def test_a_note_is_judged_by_its_kilograms_alone(tmp_path: Path) -> None:
-    _, outcome = calibrated(tmp_path, split(run_2=NOTE))
+def test_a_note_is_judged_by_its_kilograms_alone() -> None:
+    outcome = calibrated(split(run_2=NOTE))
     told = outcome.file.provenance.drives[1].statement
     found = (told.payload_kg, told.payload_plus_minus_kg, told.front_share_pct, told.is_compact)
     assert found == (200, 25, None, False)
@@ -70,8 +67,8 @@ def test_a_note_is_judged_by_its_kilograms_alone(tmp_path: Path) -> None:
     assert all(one.is_covered("front_share") is None for one in noted)
 
 
-def test_only_the_wrong_statement_is_held(tmp_path: Path) -> None:
-    _, outcome = calibrated(tmp_path, split(run_3={"payload_kg": 0.0, "front_share_pct": 52.0}))
+def test_only_the_wrong_statement_is_held() -> None:
+    outcome = calibrated(split(run_3={"payload_kg": 0.0, "front_share_pct": 52.0}))
     assert [one.found.is_held for one in outcome.file.provenance.drives if one.found] == [False, False, True, False]
     assert outcome.file.provenance.drives[2].found is not None
     assert outcome.file.provenance.drives[2].found.payload_kg == pytest.approx(300.0, abs=60.0)
@@ -84,14 +81,14 @@ def test_only_the_wrong_statement_is_held(tmp_path: Path) -> None:
     assert labels.grade is Grade.RESERVED
 
 
-def test_the_ratio_index_is_left_out_where_no_load_is_known(tmp_path: Path) -> None:
-    _, outcome = calibrated(tmp_path, split(run_1=NOTE, run_2=UNKNOWN, run_3=UNKNOWN, run_4=UNKNOWN), "ratio_index")
+def test_the_ratio_index_is_left_out_where_no_load_is_known() -> None:
+    outcome = calibrated(split(run_1=NOTE, run_2=UNKNOWN, run_3=UNKNOWN, run_4=UNKNOWN), "ratio_index")
     assert outcome.file.estimators == ("cross_spectrum",)
     assert "ratio_index: no run has a known payload and place" in outcome.file.warnings
 
 
 def test_the_file_is_read_back_as_it_was_written(tmp_path: Path) -> None:
-    _, outcome = calibrated(tmp_path, split(run_3=UNKNOWN))
+    outcome = calibrated(split(run_3=UNKNOWN))
     path = tmp_path / "van.json"
     path.write_text(outcome.file.to_json())
     held = load_calibration(path)
@@ -100,8 +97,8 @@ def test_the_file_is_read_back_as_it_was_written(tmp_path: Path) -> None:
     assert held.for_core().payload_seen_kg == outcome.file.seen.payload_kg
 
 
-def test_the_verdict_says_what_to_drive_next(tmp_path: Path) -> None:
-    _, outcome = calibrated(tmp_path, split()[:1])
+def test_the_verdict_says_what_to_drive_next() -> None:
+    outcome = calibrated(split()[:1])
     (verdict,) = verdicts_of(assess_calibration(outcome))
     assert verdict.advice.startswith("Next: a known load ")
     assert verdict.advice in verdict.text

@@ -1,13 +1,12 @@
 """The content of a report on a calibration or an evaluation: estimates compared with known loads, by set."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.from_drives import Outcome, drive_name
-from gateway.calibration.judgement.evaluation import ErrorTable, Judged, Target, error_table, judge
-from gateway.core.ratio_index.regression import RegressionModel
+from gateway.calibration.judgement.evaluation import ErrorTable, Judged, error_table, judge
 from gateway.core.vehicle import Vehicle
 from gateway.estimates.budget import BudgetLine, typical_budget
 
@@ -37,14 +36,10 @@ PART_TEXT: Mapping[BatchSet, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """One estimator's error tables (12) by set; a set without a batch is not there.
-
-    ``dof`` are the degrees of freedom behind its intervals, where they are Student's and not normal.
-    """
+    """One estimator's error tables (12) by set; a set without a batch is not there."""
 
     estimator: str
     tables: Mapping[BatchSet, ErrorTable]
-    dof: Mapping[Target, float] = field(default_factory=dict)
 
     @property
     def unseen(self) -> BatchSet | None:
@@ -91,13 +86,13 @@ def assess_calibration(outcome: Outcome) -> Assessment:
             BatchSet.IDENTIFICATION: judge([run.identification for run in outcome.split], calibrated, estimator),
         }
         tables = {part: error_table(rows, vehicle, estimator) for part, rows in judged.items() if rows}
-        judgements.append(Judgement(estimator, tables, _dof(file, estimator)))
+        judgements.append(Judgement(estimator, tables))
     return Assessment(f"Calibration of {vehicle.name}", file, vehicle, tuple(judgements), outcome)
 
 
 def assess_evaluation(vehicle: Vehicle, file: CalibrationFile, part: BatchSet, table: ErrorTable) -> Assessment:
     """One estimator of a calibration file judged on one part of a campaign."""
-    judgement = Judgement(table.estimator, {part: table}, _dof(file, table.estimator))
+    judgement = Judgement(table.estimator, {part: table})
     return Assessment(f"Evaluation of {vehicle.name}", file, vehicle, (judgement,))
 
 
@@ -121,14 +116,3 @@ def judged_left_out(outcome: Outcome, estimator: str) -> list[Judged]:
         }
     runs = [one.identification for one in outcome.split if one.identification.number in without]
     return [one for run in runs for one in judge([run], without[run.number], estimator)]
-
-
-def _dof(file: CalibrationFile, estimator: str) -> dict[Target, float]:
-    """The ratio index's intervals are a regression's."""
-    if estimator != "ratio_index" or file.ratio_index is None:
-        return {}
-    models: dict[Target, RegressionModel | None] = {
-        "payload": file.ratio_index.payload,
-        "front_share": file.ratio_index.front_share,
-    }
-    return {target: model.dof for target, model in models.items() if model is not None}

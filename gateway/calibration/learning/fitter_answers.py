@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from pydantic import TypeAdapter, ValidationError
 
-from gateway.calibration.axle_weights import AxleWeights, sprung_of
+from gateway.calibration.axle_weights import sprung_keys
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CampaignError
 from gateway.files.toml_file import describe_faults
@@ -168,7 +168,7 @@ def _beside(sister: Vehicle, said: VehicleAnswers) -> Iterator[Doubt]:
     gross_kg, sprung_kg = front_kg + rear_kg, said.empty_mass_kg
     if sprung_kg is None:
         try:
-            sprung_kg = sprung_of(_axle_weights(said)).mass_kg
+            sprung_kg = sprung_keys(*_axle_weights(said))["empty_mass_kg"]
         except CampaignError:  # the axle weights leave no body, which ``vehicle_table`` refuses
             sprung_kg = her_kg
     her_front_kg, her_rear_kg = sister.kerb_front_axle_kg, sister.kerb_rear_axle_kg
@@ -207,13 +207,13 @@ def vehicle_table(said: VehicleAnswers, name: str, sister: Vehicle | None = None
         raise CampaignError("empty_mass_kg and empty_front_share_pct belong together: give both or neither")
     typed = {name: answer for name, answer in asdict(said).items() if answer is not None and name != "division_kg"}
     try:
-        sprung = sprung_of(_axle_weights(said), said.division_kg)
+        sprung = sprung_keys(*_axle_weights(said), said.division_kg)
         shared = {key: known for key in _SHARED if sister and (known := getattr(sister, key)) is not None}
         named = {"name": said.name.strip() or name}
-        return _VEHICLE.validate_python(sprung.vehicle_keys() | shared | typed | named)
+        return _VEHICLE.validate_python(sprung | shared | typed | named)
     except ValidationError as fault:
         raise CampaignError(describe_faults("the vehicle that follows", fault, Vehicle)) from None
 
 
-def _axle_weights(said: VehicleAnswers) -> AxleWeights:
-    return AxleWeights(said.kerb_front_axle_kg, said.kerb_rear_axle_kg, said.unsprung_front_kg, said.unsprung_rear_kg)
+def _axle_weights(said: VehicleAnswers) -> tuple[float, float, float | None, float | None]:
+    return (said.kerb_front_axle_kg, said.kerb_rear_axle_kg, said.unsprung_front_kg, said.unsprung_rear_kg)

@@ -6,14 +6,12 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import isfinite, nan
-from pathlib import Path
 from statistics import median
 from typing import Final
 
 import numpy as np
 
 from gateway.calibration.assigned import Assigned, assign
-from gateway.calibration.campaign_file import Campaign, DraftTable
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.found import FoundClaim, FoundLoad
 from gateway.calibration.from_drives import OnFit, Outcome, calibrate_inspected, drive_name
@@ -44,42 +42,43 @@ STEP_KG: Final = 2.0  # chosen: of the search for the mode
 
 
 @dataclass(frozen=True, slots=True)
-class Learnt:
-    """The calibration, the pieces it was made from with what is stated of each, and what became of each statement.
+class LearntDrive:
+    """A piece of a drive that taught: what is stated of its load, and what was found of it.
 
-    drives, statements and ``holding`` (records that hold for it) go together, numbered from 1; ``n_unneeded`` pieces of
-    unknown load were not used, ``findings`` are of pieces that were left out for a fault of a sensor or of the map.
+    ``holding`` are the records that hold for it, ``claims`` say what became of each, ``load`` is None if the drive had
+    too little steady driving.
+    """
+
+    number: int
+    driven: Driven
+    statement: Statement
+    holding: tuple[int, ...]
+    load: FoundLoad | None
+    claims: tuple[FoundClaim, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Learnt:
+    """The calibration, and the drives it was made from, numbered from 1.
+
+    ``n_unneeded`` pieces of unknown load were not used, ``findings`` are of pieces that were left out for a fault of a
+    sensor or of the map.
     """
 
     outcome: Outcome
-    drives: tuple[Driven, ...]
-    statements: tuple[Statement, ...]
-    holding: tuple[tuple[int, ...], ...]
+    drives: tuple[LearntDrive, ...]
     n_unneeded: int
     findings: Mapping[str, tuple[Finding, ...]]
-
-    @property
-    def loads(self) -> dict[int, FoundLoad]:
-        """What was found of each drive's load, by its number."""
-        taught = self.outcome.cross_spectrum
-        found = {n: taught.load_of(drive_name(n)) for n in range(1, len(self.drives) + 1)} if taught else {}
-        return {number: one for number, one in found.items() if one}
-
-    def claims_of(self, number: int) -> list[FoundClaim]:
-        """What became of the statements about a drive."""
-        taught = self.outcome.cross_spectrum
-        return [one for one in (taught.claims if taught else ()) if one.drive == drive_name(number)]
 
     def looking_empty(self, laden: Sequence[tuple[int, int]] = ()) -> tuple[int, ...]:
         """The numbers of the drives of unknown load that look empty; none of those at a time (ns) of ``laden``."""
         unknown = {
-            number: one
-            for number, one in self.loads.items()
-            if not self.statements[number - 1].is_of_payload
-            and not any(self.drives[number - 1].piece.meets(*span) for span in laden)
+            one.number: one.load
+            for one in self.drives
+            if one.load and not one.statement.is_of_payload and not any(one.driven.piece.meets(*span) for span in laden)
         }
         members = _near_zero(list(unknown.values()), self.outcome.file.vehicle)
-        return tuple(number for number, one in unknown.items() if any(one is member for member in members))
+        return tuple(number for number, load in unknown.items() if any(load is member for member in members))
 
 
 def _near_zero(loads: Sequence[FoundLoad], vehicle: Vehicle) -> tuple[FoundLoad, ...]:
@@ -146,22 +145,23 @@ def learn(
         split.append(SplitRun(run, replace(run, batches=()), log=_facts(driven[i])))
         verdicts.append(RunVerdict(number, run.name))
     outcome = calibrate_inspected(
-        Campaign(Path(vehicle.name), DraftTable(vehicle=vehicle)),
+        vehicle,
         Inspection(tuple(split), tuple(verdicts), ()),
+        where=vehicle.name,
+        sha256=hashlib.sha256(json.dumps(asdict(vehicle), sort_keys=True).encode()).hexdigest(),
         estimators=("cross_spectrum",),
         like=like,
         command=command_of(like, settings.window_s),
-        campaign_sha256=hashlib.sha256(json.dumps(asdict(vehicle), sort_keys=True).encode()).hexdigest(),
         on_fit=on_fit,
     )
-    return Learnt(
-        outcome,
-        tuple(driven[i] for i in used),
-        tuple(assigned.statements[i] for i in used),
-        tuple(assigned.holding[i] for i in used),
-        len(sound) - len(used),
-        faults,
-    )
+    taught = outcome.cross_spectrum
+    drives = []
+    for number, i in enumerate(used, 1):
+        name = drive_name(number)
+        load = taught.load_of(name) if taught else None
+        claims = tuple(one for one in taught.claims if one.drive == name) if taught else ()
+        drives.append(LearntDrive(number, driven[i], assigned.statements[i], assigned.holding[i], load, claims))
+    return Learnt(outcome, tuple(drives), len(sound) - len(used), faults)
 
 
 def _nothing(faults: Mapping[str, Sequence[Finding]]) -> str:

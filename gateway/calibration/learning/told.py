@@ -36,19 +36,19 @@ SURE: Final = 1.64  # chosen: standard deviations
 def drives_record(found: Learnt) -> list[Record]:
     """Each drive, with what is stated and found of its load."""
     drives = []
-    for number, (one, said) in enumerate(zip(found.drives, found.statements, strict=True), 1):
-        load, claims = found.loads.get(number), found.claims_of(number)
+    for one in found.drives:
+        driven, load = one.driven, one.load
         drives.append(
             {
-                "number": number,
-                "log": one.source,
-                "t_start": iso_utc(one.piece.begin_ns),
-                "t_end": iso_utc(one.piece.end_ns),
-                "driven_s": rounded(one.usable_s, 1),
-                "stated": _stated(said),
+                "number": one.number,
+                "log": driven.source,
+                "t_start": iso_utc(driven.piece.begin_ns),
+                "t_end": iso_utc(driven.piece.end_ns),
+                "driven_s": rounded(driven.usable_s, 1),
+                "stated": _stated(one.statement),
                 "found": load and _kg(load.load.payload_kg, load.payload_std_kg),
                 "found_without_statement": load and _kg(load.without_kg, load.without_std_kg),
-                "state": str(max((claim.state for claim in claims), key=_gravity)) if claims else None,
+                "state": str(max((claim.state for claim in one.claims), key=_gravity)) if one.claims else None,
             }
         )
     return drives
@@ -75,21 +75,21 @@ def statements_record(records: Sequence[StatementRecord], assigned: Assigned, fo
     """What became of each statement: its state, and what its drives said without it."""
     statements = []
     for i, (record, fate) in enumerate(zip(records, assigned.fates, strict=True)):
-        numbers = [n for n, holding in enumerate(found.holding, 1) if i in holding]
-        claims = [one for n in numbers for one in found.claims_of(n) if one.name == record.id]
+        drives = [one for one in found.drives if i in one.holding]
+        claims = [claim for one in drives for claim in one.claims if claim.name == record.id]
         state, shown, asked = STATES[fate], None, None
         if claims:
             worst = max(claims, key=lambda one: (_gravity(one.state), one.disagreement))
             state, shown = str(worst.state), _kg(worst.without_kg, worst.without_std_kg)
             if worst.state is not ClaimState.USED:
                 asked = f"{worst.drive} {question(worst, record, found.outcome.file.vehicle)}"
-        elif not record.learn and (loads := [found.loads[n] for n in numbers if n in found.loads]):
+        elif not record.learn and (loads := [one.load for one in drives if one.load]):
             state, shown = "checked", _kg(loads[0].load.payload_kg, loads[0].payload_std_kg)
         told = record.model_dump(mode="json", by_alias=True)
         statements.append(
             {
                 **told,
-                "drives": numbers,
+                "drives": [one.number for one in drives],
                 "state": state,
                 "found": shown,
                 "question": asked,

@@ -106,11 +106,11 @@ def _why_worse(job: LearnJob, found: Learnt) -> str | None:
     met = {one.t_start for one in before.provenance.drives if one.statement.is_of_payload}
     started = {one.number: one.t_start for one in found.outcome.file.provenance.drives}
     gains = []
-    for number, drive in enumerate(found.drives, 1):
-        left_out = [one for one in found.outcome.cross_spectrum.errors if one.run == drive_name(number)]
-        if not left_out or started[number] in met:
+    for drive in found.drives:
+        left_out = [one for one in found.outcome.cross_spectrum.errors if one.run == drive_name(drive.number)]
+        if not left_out or drive.load is None or started[drive.number] in met:
             continue
-        by_old = _scores_by(before.for_core(), drive.batches, found.loads[number])
+        by_old = _scores_by(before.for_core(), drive.driven.batches, drive.load)
         if by_old:
             by_new = [_log_score(float(one.error[0]), one.posterior, float(one.stated_std[0])) for one in left_out]
             gains.append(float(np.mean(by_new)) - float(np.mean(by_old)))

@@ -1,4 +1,4 @@
-"""Estimates against the truth: the error table (12), and charts of estimates and of coverage of intervals."""
+"""Estimates against the truth: the error table (12), and a chart of the estimates over it."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -6,7 +6,6 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.judgement.answers import LEVELS, answers_of, observed_coverage
 from gateway.calibration.judgement.assessment import PART_NAMES, PART_TEXT, BatchSet, Judgement
 from gateway.calibration.judgement.coverage import IDEAL_SCORE
 from gateway.calibration.judgement.evaluation import CgLeftErrors, Comparison, Errors, Target, TargetErrors
@@ -59,29 +58,23 @@ def _sideways(judgement: Judgement) -> Iterator[str]:
 
 
 def _charts(judgement: Judgement, name: str) -> Iterator[Chart]:
-    """Estimates over the truth and coverage of their intervals, of the sets that were not fitted, or else of all."""
+    """Estimates over the truth, of the sets that were not fitted, or else of all."""
     unfitted = [part for part in judgement.tables if part is not BatchSet.IDENTIFICATION]
-    over_truth, covered = [], []
+    panels = []
     for target, (what, unit) in _TARGETS.items():
-        sets = [(part, answers_of(judgement.tables[part].judged, target)) for part in unfitted or judgement.tables]
-        sets = [(part, answers) for part, answers in sets if len(answers.run)]
-        if not sets:
-            continue
-        ends = np.array([f([f(a.true) for _, a in sets]) for f in (min, max)])
-        marks = [_points(part, a.true, a.estimated, a.estimated - a.half95, a.estimated + a.half95) for part, a in sets]
-        axes = (Axis(f"true {what} [{unit}]"), Axis(f"estimated {what} [{unit}]"))
-        over_truth.append(Panel(*axes, (LineMark(ends, ends, "exact", GREY, "dash"), *marks)))
-        marks = []
-        for shift, (part, answers) in enumerate(sets):
-            if len(np.unique(answers.run)) > 1:
-                share, low, high = 100.0 * observed_coverage(answers, judgement.dof.get(target)).T
-                marks.append(_points(part, 100.0 * LEVELS + 0.8 * shift, share, low, high))
-        if marks:
-            ends = np.array([0.0, 100.0])
-            exact = LineMark(ends, ends, "exact", GREY, "dash")
-            covered.append(Panel(Axis("nominal [%]"), Axis("observed [%]"), (exact, *marks), what))
-    errors = [(PART_NAMES[part], table.errors) for part, table in judgement.tables.items()]
-    if over_truth:
+        answers = {part: _answered(judgement, part, target) for part in unfitted or judgement.tables}
+        every = np.concatenate([np.empty(0), *(rows[:, 0] for rows in answers.values())])
+        if every.size:
+            ends = np.array([every.min(), every.max()])
+            marks = [
+                Points(rows[:, 0], rows[:, 1], PART_NAMES[part], *_SETS[part], low=rows[:, 2], high=rows[:, 3])
+                for part, rows in answers.items()
+                if len(rows)
+            ]
+            axes = (Axis(f"true {what} [{unit}]"), Axis(f"estimated {what} [{unit}]"))
+            panels.append(Panel(*axes, (LineMark(ends, ends, "exact", GREY, "dash"), *marks)))
+    if panels:
+        errors = [(PART_NAMES[part], table.errors) for part, table in judgement.tables.items()]
         yield Chart(
             f"estimated_over_true_{judgement.estimator}",
             f"Estimates of the {name} over the truth, with 95 % intervals. On the dashed line an estimate is exact.",
@@ -91,27 +84,15 @@ def _charts(judgement: Judgement, name: str) -> Iterator[Chart]:
                 f"{decimal(of.front_share.mean_abs, ' pp')}."
                 for part, of in errors
             ),
-            tuple(over_truth),
+            tuple(panels),
             row_height_px=400,
         )
-    if covered:
-        yield Chart(
-            f"coverage_{judgement.estimator}",
-            "How often intervals of each nominal level hold the truth. Above the dashed line they are wider than they "
-            "need be, below it narrower than they claim. Bars: what so few runs can tell, batches of one run being "
-            "alike.",
-            f"Observed over nominal coverage of the {name}: "
-            + " ".join(
-                f"95 % intervals of payload hold {percent(of.payload.coverage95)} over the {part}."
-                for part, of in errors
-            ),
-            tuple(covered),
-            row_height_px=360,
-        )
 
 
-def _points(part: BatchSet, x: F64, y: F64, low: F64, high: F64) -> Points:
-    return Points(x, y, PART_NAMES[part], *_SETS[part], low, high)
+def _answered(judgement: Judgement, part: BatchSet, target: Target) -> F64:
+    """Rows (n, 4) of Comparison of the batches with an answer and a known truth."""
+    rows = np.array([one.compared(target) for one in judgement.tables[part].judged], float).reshape(-1, 4)
+    return np.asarray(rows[np.isfinite(rows[:, :2]).all(axis=1)])
 
 
 _COLUMNS: Final = (
