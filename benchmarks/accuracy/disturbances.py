@@ -98,13 +98,13 @@ def section(found: Mapping[str, Any]) -> str:
     harmless = [line for line in lines if line is not undisturbed and _is_harmless(line, undisturbed)]
     shown = [line for line in lines if line not in harmless]
     names = ", ".join(line["kind"] for line in harmless) or "none"
-    told = f"- Nothing refused, every interval held, errors within {MENDED_WITHIN:g} times those as recorded: {names}."
+    told = f"- No more refused, every interval held, errors within {MENDED_WITHIN:g} times those as recorded: {names}."
     return "\n".join([*table_of(COLUMNS, shown), "", told, *_verdicts(lines), ""])
 
 
 def _is_harmless(line: Mapping[str, Any], undisturbed: Mapping[str, Any]) -> bool:
     is_held = all(held_or_refused(line, quantity) == 1.0 for quantity in ("payload", "front_share"))
-    return is_held and not line["n_rejected"] and is_mended(line, undisturbed)
+    return is_held and line["n_rejected"] == undisturbed["n_rejected"] and is_mended(line, undisturbed)
 
 
 def held_or_refused(line: Mapping[str, Any], quantity: str) -> float:
