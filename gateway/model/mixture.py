@@ -238,7 +238,13 @@ def _of_payload(payload_kg: float, load: Load, model: VehicleModel) -> tuple[flo
     empty_kg, empty_share = model.empty_mass_kg, model.ground.empty_front_share
     front_kg = 0.01 * load.front_share_pct * (empty_kg + load.payload_kg) - empty_share * empty_kg
     in_front = front_kg / load.payload_kg if load.payload_kg > 0.0 else empty_share
-    return payload_kg, (empty_share * empty_kg + in_front * payload_kg) / (empty_kg + payload_kg)
+    return payload_kg, _front_share(payload_kg, in_front, model)
+
+
+def _front_share(payload_kg: float, in_front: float, model: VehicleModel) -> float:
+    """0..1, of the vehicle with a payload of which the part ``in_front`` rests on the front axle."""
+    empty_kg, empty_share = model.empty_mass_kg, model.ground.empty_front_share
+    return (empty_share * empty_kg + in_front * payload_kg) / (empty_kg + payload_kg)
 
 
 def _distinct(peaks: Sequence[Peak]) -> list[Peak]:
@@ -263,11 +269,9 @@ def _against(excess: F64) -> F64:
 
 def starting_loads(model: VehicleModel) -> list[tuple[float, float]]:
     """(payload in kg, front share 0..1) for a few loads at a few places."""
-    empty_kg, share = model.empty_mass_kg, model.ground.empty_front_share
-    loads = []
-    most_kg = max(model.payload_seen_kg[1], LEAST_START_SHARE * empty_kg)
-    for payload_kg in np.linspace(0.0, most_kg, START_PAYLOADS_N).tolist():
-        for place in START_PLACES if payload_kg else (0.5,):
-            front_kg = share * empty_kg + (1.0 - place) * payload_kg
-            loads.append((payload_kg, front_kg / (empty_kg + payload_kg)))
-    return loads
+    most_kg = max(model.payload_seen_kg[1], LEAST_START_SHARE * model.empty_mass_kg)
+    return [
+        (payload_kg, _front_share(payload_kg, 1.0 - place, model))
+        for payload_kg in np.linspace(0.0, most_kg, START_PAYLOADS_N).tolist()
+        for place in (START_PLACES if payload_kg else (0.5,))
+    ]
