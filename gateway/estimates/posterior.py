@@ -48,8 +48,8 @@ class Posterior:
     """Mean (d,), own covariance (d, d) and columns (k, d) by source, d being 2, 3 with a lateral place, or 1 for a
     payload alone.
 
-    ``tails`` are the distances of the 2.5 and the 97.5 % point of the error from the load's shape, in its standard
-    deviations: a load can be much longer than it is thought to be, but hardly shorter.
+    ``tails`` are the distances of the 2.5 and the 97.5 % point of the payload's error, in its standard deviations: a
+    load can be much longer than it is thought to be, but hardly shorter.
     """
 
     mean: F64
@@ -114,21 +114,14 @@ class Posterior:
             return Quantity(number)
         whole = np.zeros(self.size)
         whole[: len(slopes[: self.size])] = slopes[: self.size]
-        by_shape = sum(float(np.sum((self.sources[name] @ whole) ** 2)) for name in SHAPE if name in self.sources)
-        variance = float(whole @ self.covariance @ whole) + independent_std**2
-        rest = Z95**2 * max(variance - by_shape, 0.0)
-        below, above = (tail**2 * by_shape for tail in self._tails_along(whole))
-        low, high = number - math.sqrt(rest + below), number + math.sqrt(rest + above)
-        return Quantity(number, math.sqrt(max(variance, 0.0)), (low, high))
-
-    def _tails_along(self, slopes: F64) -> tuple[float, float]:
-        """Skewed interval; the tails are swapped for a quantity that falls as the payload rises."""
-        rises = sum(
-            float((self.sources[name] @ slopes) @ self.sources[name][:, PAYLOAD])
-            for name in SHAPE
-            if name in self.sources
-        )
-        return self.tails if rises >= 0.0 else (self.tails[1], self.tails[0])
+        covariance = self.covariance
+        variance = float(whole @ covariance @ whole) + independent_std**2
+        with_payload = float(whole @ covariance[:, PAYLOAD])
+        of_payload = with_payload**2 / max(float(covariance[PAYLOAD, PAYLOAD]), 1e-300)
+        rest = Z95**2 * max(variance - of_payload, 0.0)
+        tails = self.tails if with_payload >= 0.0 else self.tails[::-1]
+        low, high = (math.sqrt(rest + tail**2 * of_payload) for tail in tails)
+        return Quantity(number, math.sqrt(max(variance, 0.0)), (number - low, number + high))
 
     def covariance_of(self, slopes: Sequence[float] | F64, other_slopes: Sequence[float] | F64) -> float:
         """Covariance of two linear functions of the quantities."""

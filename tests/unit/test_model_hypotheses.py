@@ -13,11 +13,10 @@ from support.taught_van import FLAT_VAN, ROLL, VAN, car, drive_of, estimated, lo
 
 from gateway.core.cargo import known_shape, shape_hypotheses
 from gateway.estimates.batch_estimate import Estimate, Quantity
-from gateway.estimates.posterior import NORMAL_TAILS
-from gateway.model import answer, mixture
+from gateway.model import answer, fit, mixture
 from gateway.model.answer import posterior_of
 from gateway.model.hypotheses import Hypothesis, hypotheses_of
-from gateway.model.mixture import Mixture, Peak, mixture_of
+from gateway.model.mixture import BatchLikelihood, Mixture, Peak, mixture_of
 from gateway.model.sensors import GAIN_STD
 from gateway.model.table import INDEX, N
 from gateway.model.vehicle_model import VehicleModel
@@ -322,7 +321,27 @@ def test_a_rival_widens_the_answer_by_its_distance_and_weight() -> None:
     assert beside.std(0) ** 2 - alone.std(0) ** 2 == pytest.approx(between, rel=1e-3)
     assert beside.std(1) > alone.std(1)
     assert alone.mean[0] <= beside.mean[0] < alone.mean[0] + 100.0
-    assert alone.tails == NORMAL_TAILS
+
+
+def test_an_interval_reaches_as_far_as_the_posterior_does() -> None:
+    """The ends of a batch's interval, by a search at every payload in place of one step at two."""
+    model = taught()
+    alone = two(0.0, (1.0, 0.0))
+    own = BatchLikelihood(alone.whittle, alone.point.theta[N:], alone.point.cg_left_m, np.inf)
+    best, prior = alone.best, alone.best.hypothesis.prior
+    std_kg = float(best.covariance[N, N]) ** 0.5
+    top = own.cost(np.empty(0), best.x) + prior.cost(best.x)
+    for lean, sign in zip(answer._leans_of(alone), (-1.0, 1.0), strict=True):
+        at_kg = best.x[N] + sign * answer.LEAN_AT * std_kg
+        held = fit.Gaussian(prior.mean.copy(), prior.precision.copy())
+        held.mean[N], held.precision[N, N] = at_kg, 1e6 / std_kg**2
+        found = fit.climb(own, held, best.x + sign * answer.LEAN_AT * best.covariance[:, N] / std_kg, 1e-3).own[0]
+        drop = own.cost(np.empty(0), found) + prior.cost(found) - top
+        expected = np.clip(answer.LEAN_AT / (2.0 * drop) ** 0.5, 1.0, answer.MOST_LEAN)
+        assert lean == pytest.approx(expected, abs=0.03)
+    told = posterior_of(alone, model, 1.0, GAIN_STD)
+    below, above = told.tails
+    assert above > below == pytest.approx(1.96, rel=0.1)
 
 
 def test_a_rival_on_one_side_makes_the_interval_longer_there() -> None:
@@ -336,16 +355,20 @@ def test_a_rival_on_one_side_makes_the_interval_longer_there() -> None:
 
 @given(
     middles=st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=4),
-    std=st.floats(0.5, 50.0),
+    below=st.floats(0.5, 50.0),
+    lean=st.floats(0.5, 2.0),
     seed=st.integers(0, 1000),
 )
 def test_quantiles_of_a_mixture_are_where_its_distribution_has_them(
-    middles: list[float], std: float, seed: int
+    middles: list[float], below: float, lean: float, seed: int
 ) -> None:
+    above = lean * below
     weights = np.random.default_rng(seed).uniform(0.1, 1.0, len(middles))
     weights /= weights.sum()
-    at = np.array(answer._quantiles(np.array(middles), weights, std))
-    cumulated = weights @ ndtr((at - np.array(middles)[:, None]) / std)
+    at = np.array(answer._quantiles(np.array(middles), weights, below, above))
+    off = at - np.array(middles)[:, None]
+    lower, upper = 2.0 * below * ndtr(off / below), below - above + 2.0 * above * ndtr(off / above)
+    cumulated = weights @ (np.where(off < 0.0, lower, upper) / (below + above))
     np.testing.assert_allclose(cumulated, [0.025, 0.5, 0.975], atol=3e-3)
 
 
