@@ -134,16 +134,11 @@ class WebSection(SettingsSection):
     stale_after_s: Seconds = Field(900.0, description="an estimate older than this is marked stale")
     tls_certificate: Path | None = Field(None, description="PEM file of the certificate chain; makes it HTTPS")
     tls_key: Path | None = Field(None, description="PEM file of the certificate's private key")
-    tls_client_ca: Path | None = Field(
-        None, description="PEM file of the authority whose certificates clients must show (mutual TLS)"
-    )
 
     @model_validator(mode="after")
     def _whole_tls(self) -> "WebSection":
         if (self.tls_certificate is None) != (self.tls_key is None):
             raise ValueError("tls_certificate and tls_key belong together: give both or neither")
-        if self.tls_client_ca is not None and self.tls_certificate is None:
-            raise ValueError("tls_client_ca needs tls_certificate and tls_key")
         return self
 
 

@@ -146,4 +146,4 @@ def tls_of(settings: Settings) -> Tls | None:
     web = settings.web
     if web.tls_certificate is None or web.tls_key is None:
         return None
-    return Tls(web.tls_certificate, web.tls_key, web.tls_client_ca)
+    return Tls(web.tls_certificate, web.tls_key)
