@@ -20,9 +20,9 @@ from support.patience import PATIENCE_S, wait_until
 
 from gateway.config.sections import UplinkSection
 from gateway.errors import RefusedError
+from gateway.part import BackOff
 from gateway.status import StatementsHeard
 from gateway.store import Store
-from gateway.uplink.forwarder import BackOff
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings
 from gateway.uplink.statements_topic import MOST_BYTES, StatementsDesk, StatementsMessage, TakeStatements
@@ -172,7 +172,7 @@ def test_statements_for_an_absent_vehicle_arrive_when_it_returns(tmp_path: Path,
 
 @needs_mosquitto
 def test_a_disk_that_fails_keeps_the_message_at_the_broker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.uplink.forwarder.IDLE_S", 0.05)
+    monkeypatch.setattr("gateway.uplink.sender.IDLE_S", 0.05)
     answers = [RefusedError("not_stored", "the disk is full")] * 3
 
     def take(content: bytes, by: str) -> str:

@@ -122,7 +122,7 @@ def test_an_overload_is_in_every_message_of_the_vehicle(tmp_path: Path) -> None:
     setup = loaded(tmp_path, "gross_limit_kg = 1850.0")
     with Gateway(tmp_path / "state", calibrated=setup.calibrated) as gateway:
         gateway.publish(batch(setup))
-        [message] = Outbox(gateway.store, "fleet").next_messages(10)
+        message = Outbox(gateway.store, "fleet").next()
         told = json.loads(message.text)["weights"]
         ask = Client(gateway.app)
         metrics = ask.get("/metrics").text
