@@ -197,20 +197,20 @@ def test_metrics_can_be_parsed_and_follow_the_status(gateway: Gateway, client: C
     families = list(text_string_to_metric_families(answer.text))
     samples = {(s.name, *sorted(s.labels.values())): s.value for family in families for s in family.samples}
     assert all(family.name.startswith("springscale_") and family.documentation for family in families)
-    assert samples["springscale_payload_kilograms",] == 120.0
-    assert samples["springscale_front_share_ratio",] == pytest.approx(0.505)
-    assert samples["springscale_bus_frames_total",] == 1234
-    assert samples["springscale_bus_dropped_frames_total", "kernel"] == 6
-    assert samples["springscale_decoded_frames_total", "not_valid", "speed"] == 7
-    assert samples["springscale_rejections_total", "gap"] == 2
-    assert samples["springscale_rejections_total", "too_slow"] == 0  # which a rate needs to see the first
+    assert samples["springscale_estimate_payload_kg",] == 120.0
+    assert samples["springscale_estimate_is_stale",] == 0.0
+    assert samples["springscale_bus_n_frames",] == 1234
+    assert samples["springscale_bus_n_kernel_dropped",] == 6
+    assert samples["springscale_decode_n", "not_valid", "speed"] == 7
+    assert samples["springscale_signals_rate_hz", "speed"] == 5.0
+    assert samples["springscale_batches_rejected_by_reason_gap",] == 2
     assert samples["springscale_state", "estimating"] == 1
-    assert samples["springscale_state", "stale"] == 0
+    assert ("springscale_bus_last_fault",) not in samples
 
 
 def test_unknown_quantities_have_no_metric(client: Client) -> None:
     text = client.get("/metrics").text
-    for name in ("payload_kilograms", "estimate_age_seconds", "bus_last_frame_age_seconds"):
+    for name in ("estimate_payload_kg", "estimate_age_s", "bus_last_frame_age_s"):
         assert f"springscale_{name}" not in text
 
 

@@ -85,15 +85,15 @@ def test_each_known_wheel_has_a_metric(gateway: Gateway) -> None:
     ask = client(gateway)
     gateway.publish(loaded(0))
     before = ask.get("/metrics").text
-    assert 'springscale_weight_kilograms{where="front_left"}' not in before
-    assert "springscale_cg_left_meters" not in before
+    assert "springscale_weights_front_left_kg" not in before
+    assert "springscale_estimate_cg_left_m" not in before
     gateway.publish(to_the_left(1))
     told = ask.get("/metrics").text.splitlines()
-    assert 'springscale_weight_kilograms{where="front_left"} 406.8' in told
-    assert 'springscale_overload{where="front_left"} 1.0' in told
-    assert 'springscale_overload{where="front_right"} 0.0' in told
-    assert "springscale_cg_left_meters 0.05" in told
-    assert "springscale_left_share_ratio 0.533" in told
+    assert "springscale_weights_front_left_kg 406.8" in told
+    assert "springscale_weights_front_left_is_over_limit 1.0" in told
+    assert "springscale_weights_front_right_is_over_limit 0.0" in told
+    assert "springscale_estimate_cg_left_m 0.05" in told
+    assert "springscale_estimate_left_share_pct 53.3" in told
 
 
 def test_every_record_brings_its_weights_to_the_history(gateway: Gateway) -> None:

@@ -62,13 +62,13 @@ def weights_router(board: Board, scales: Scales, status: Callable[[], Status]) -
             is_stale=shown.is_stale,
             load=None if place is None else LoadPlace(**{name: rounded(x, 3) for name, x in asdict(place).items()}),
             verdict=scales.present_load(board, status()).told(),
-            **{where: _figure(weight) for where, weight in scales.weigh(estimate).items()},
+            **{where: figure_of(weight) for where, weight in scales.weigh(estimate).items()},
         )
 
     return router
 
 
-def _figure(weight: Weight) -> WeightFigure:
+def figure_of(weight: Weight) -> WeightFigure:
     return WeightFigure(
         kg=rounded(weight.kg, 3),
         std_kg=rounded(weight.std_kg, 3),
