@@ -78,12 +78,14 @@ class Uplink(Sender[UplinkStatus]):
         self._under_way: int | None = None  # packet identifier of the message that waits for its answer
         self._answer: ReasonCode | None = None  # to it
         self._is_announced = False  # on the present connection
+        self._connects_by_s = 0.0  # else the attempt has failed, and this client with it
         self._most_bytes: int | None = None  # the broker's Maximum Packet Size
         self._refusal: str | None = None  # of the last record, until one is accepted
 
     def _work(self) -> None:
         """Deliver through one client until stopped, or until the broker does not take a message."""
         self._heard, self._is_announced = queue.SimpleQueue(), False
+        self._connects_by_s = time.monotonic() + ANSWER_TIMEOUT_S
         self._client = client = self._made_client()
         session_s = KEPT_S if self._desk else WILL_DELAY_S  # the will waits no longer than the session lives
         session = _properties(
@@ -115,6 +117,8 @@ class Uplink(Sender[UplinkStatus]):
         while not self._heard.empty():
             self._heard.get()()
         if not self._report.is_connected:
+            if time.monotonic() > self._connects_by_s:
+                raise NotTakenError(f"{self._settings.broker} did not answer for {ANSWER_TIMEOUT_S:g} s")
             return False
         if not self._is_announced:
             self._announce()
@@ -245,8 +249,9 @@ class Uplink(Sender[UplinkStatus]):
         self._later(self._on_lost)(client, userdata, *told)
 
     def _pause(self, client: mqtt.Client) -> None:
-        """Choose the pause before the next attempt; after a success pauses begin anew with short ones."""
+        """Choose the pause before the next attempt, which paho takes twice after a first one that failed."""
         pause_s = self._back_off.next_s()
+        self._connects_by_s = time.monotonic() + 2.0 * pause_s + ANSWER_TIMEOUT_S
         client.reconnect_delay_set(pause_s, pause_s)  # type: ignore[arg-type]  # any number of seconds will do
 
     # In the uplink's thread:

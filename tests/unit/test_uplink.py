@@ -1,6 +1,7 @@
 """The uplink's own logic against a broker that does what the test says, and its settings."""
 
 import random
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,16 @@ def test_waiting_records_are_counted_without_a_link(
     assert uplink.report().waiting_age_s is not None
     assert (uplink.report().n_connections, uplink.report().n_cuts) == (0, 0)
     assert names(caplog) == [Event.UPLINK_NOT_REACHED]  # many times for one reason is one line
+
+
+def test_a_broker_that_accepts_and_says_nothing_is_a_fault(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gateway.uplink.uplink.ANSWER_TIMEOUT_S", 0.05)
+    monkeypatch.setattr("gateway.uplink.sender.IDLE_S", 0.01)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        uplink = started(store, silent.getsockname()[1])
+        assert wait_until(lambda: "did not answer" in (uplink.report().last_fault or ""))
+        uplink.stop()
+    assert not uplink.is_alive()
 
 
 def test_the_log_reports_connects_and_cuts(store: Store, caplog: pytest.LogCaptureFixture) -> None:
@@ -173,6 +184,8 @@ def test_a_vehicle_without_a_name_of_its_own_is_given_no_uplink() -> None:
         ({"host": "b", "key": "k.pem"}, "belong together"),
         ({"host": "b", "password_file": "p"}, "needs username"),
         ({"host": "b", "tls": False}, "in the clear"),
+        ({"host": f"{'b' * 64}.example"}, "nor a name that a host can have"),
+        *(({"host": "b", key: "x" * 65_536}, "1000 characters") for key in ("topic", "client_id", "username")),
     ],
 )
 def test_settings_that_contradict_each_other_are_refused(section: dict[str, Any], said: str) -> None:
