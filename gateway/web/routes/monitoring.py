@@ -15,11 +15,11 @@ from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, ProcessCol
 from prometheus_client.core import Metric, UnknownMetricFamily
 from starlette.responses import JSONResponse, Response
 
+from gateway.estimates.as_json import weights_to_json
 from gateway.status import Status
 from gateway.web.access.problems import problem_response
 from gateway.web.live.board import Board
 from gateway.web.routes.present_load import Scales
-from gateway.web.routes.weights import figure_of
 from gateway.web.schemas import Alive, Ready, problem_responses
 
 _NAME: Final = re.compile(r"[\w.:/+-]{1,80}")
@@ -105,11 +105,10 @@ class StatusCollector:
     def _told(self) -> dict[str, Any]:
         """The status but for its sentences, the numbers of the latest estimate, its weights, and the answers so far."""
         latest = json.loads(self.board.latest()[1])
-        weights = self.scales.weigh(self.board.shown().estimate)
         return {
             **self.status().model_dump(mode="json", exclude={"state_in_words", "warnings"}),
             "estimate": {name: figure for name, figure in latest.items() if isinstance(figure, int | float)},
-            "weights": {where: figure_of(weight).model_dump(mode="json") for where, weight in weights.items()},
+            "weights": weights_to_json(self.scales.weigh(self.board.shown().estimate)),
             "http_responses": self.responses,
             "stream_clients": self.board.fanout.n_subscribers,
         }
