@@ -2,8 +2,7 @@
 
 from datetime import UTC, datetime, timedelta
 from http import HTTPStatus
-from types import GenericAlias
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Generic, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model, model_validator
 
@@ -113,21 +112,20 @@ Latest: Final = create_model(
 )
 
 
-_ESTIMATES: Final[Any] = GenericAlias(list, Estimate)  # list[Estimate], where Estimate is no name of a class
+Item = TypeVar("Item")
 
-EstimatesPage: Final = create_model(
-    "EstimatesPage",
-    __doc__="A piece of the history, rejections included.",
-    items=(_ESTIMATES, Field()),
-    next_cursor=(
-        str | None,
-        Field(description="send as cursor for more; null: no more now", examples=["3f2a9c1e-7"]),
-    ),
-    last_cursor=(
-        str | None,
-        Field(description="place of the newest item: cursor to wait here for new ones", examples=["3f2a9c1e-7"]),
-    ),
-)
+
+class Page(BaseModel, Generic[Item]):
+    """A piece of the history."""
+
+    items: list[Item]
+    next_cursor: str | None = Field(description="send as cursor for more; null: no more now", examples=["3f2a9c1e-7"])
+    last_cursor: str | None = Field(
+        description="place of the newest item: cursor to wait here for new ones", examples=["3f2a9c1e-7"]
+    )
+
+
+EstimatesPage: Final[Any] = Page[Estimate]
 
 
 class Alive(BaseModel):
