@@ -31,7 +31,7 @@ from gateway.uplink.home_assistant import LATEST, discovery
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.sender import NotTakenError, Sender
 from gateway.uplink.settings import UplinkSettings
-from gateway.uplink.statements_topic import MOST_BYTES, TOPIC, StatementsDesk, StatementsMessage, TakeStatements
+from gateway.uplink.statements_topic import MOST_BYTES, TOPIC, StatementsDesk, TakeStatements
 
 CONNECT_TIMEOUT_S: Final = 10.0  # chosen
 ANSWER_TIMEOUT_S: Final = 30.0  # chosen: a broker that takes longer counts as lost
@@ -73,7 +73,7 @@ class Uplink(Sender[UplinkStatus]):
         super().__init__(outbox, UplinkStatus(settings.broker), back_off, settings.back_off_max_s)
         self._settings, self._birth = settings, {"state": "online", **birth}
         self._desk = StatementsDesk(take_statements) if settings.statements and take_statements is not None else None
-        self._statements: deque[StatementsMessage] = deque()  # each until it is acknowledged
+        self._statements: deque[mqtt.MQTTMessage] = deque()  # each until it is acknowledged
         self._heard: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()  # what paho's thread tells ours to do
         self._under_way: int | None = None  # packet identifier of the message that waits for its answer
         self._answer: ReasonCode | None = None  # to it
@@ -215,7 +215,7 @@ class Uplink(Sender[UplinkStatus]):
         client.on_connect = self._later(self._on_connect)
         client.on_disconnect = self._on_disconnect
         client.on_publish = self._later(self._on_publish)
-        client.on_message = self._later(self._on_message)
+        client.on_message = self._later(self._statements.append)
         client.on_subscribe = self._later(self._on_subscribe)
         return client
 
@@ -278,10 +278,6 @@ class Uplink(Sender[UplinkStatus]):
     def _on_publish(self, mid: int, code: ReasonCode, _told: Any) -> None:
         if mid == self._under_way:
             self._answer = code
-
-    def _on_message(self, message: mqtt.MQTTMessage) -> None:
-        kind = getattr(message.properties, "ContentType", None)
-        self._statements.append(StatementsMessage(bytes(message.payload), kind, message.mid))
 
     def _on_subscribe(self, _mid: int, codes: list[ReasonCode], _told: Any) -> None:
         refused = next((code for code in codes if code.is_failure), None)

@@ -25,7 +25,7 @@ from gateway.status import StatementsHeard
 from gateway.store import Store
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings
-from gateway.uplink.statements_topic import MOST_BYTES, StatementsDesk, StatementsMessage, TakeStatements
+from gateway.uplink.statements_topic import MOST_BYTES, StatementsDesk, TakeStatements
 from gateway.uplink.uplink import Uplink
 
 TOPIC: Final = "springscale/van-17/statements"
@@ -227,7 +227,7 @@ def test_any_exception_on_a_message_is_a_refusal() -> None:
         raise ZeroDivisionError
 
     desk = StatementsDesk(take)
-    assert desk.is_done(StatementsMessage(b"[]"))
+    assert desk.is_done(mqtt.MQTTMessage())
     assert desk.report == StatementsHeard(n_refused=1, last_refusal="ZeroDivisionError()")
 
 
