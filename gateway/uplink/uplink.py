@@ -116,9 +116,7 @@ class Uplink(Sender[UplinkStatus]):
         """
         while not self._heard.empty():
             self._heard.get()()
-        if not self._report.is_connected:
-            if time.monotonic() > self._connects_by_s:
-                raise NotTakenError(f"{self._settings.broker} did not answer for {ANSWER_TIMEOUT_S:g} s")
+        if not self._is_connected():
             return False
         if not self._is_announced:
             self._announce()
@@ -185,7 +183,7 @@ class Uplink(Sender[UplinkStatus]):
     ) -> ReasonCode | None:
         """Send a message, again after each cut -> the broker's answer; None if it is time to stop before.
 
-        Raises NotTakenError if the broker is connected and does not answer.
+        Raises NotTakenError if the broker does not answer.
         """
         self._answer, end_s = None, time.monotonic() + ANSWER_TIMEOUT_S
         self._under_way = self._client.publish(topic, text.encode(), qos=1, retain=retain, properties=properties).mid
@@ -193,13 +191,19 @@ class Uplink(Sender[UplinkStatus]):
             try:
                 self._heard.get(timeout=TURN_S)()
             except queue.Empty:
-                if not self._report.is_connected:
+                self._look()  # a cut may last for hours
+                if not self._is_connected():
                     end_s = time.monotonic() + ANSWER_TIMEOUT_S
                 elif time.monotonic() > end_s:
-                    raise NotTakenError(
-                        f"{self._settings.broker} did not acknowledge for {ANSWER_TIMEOUT_S:g} s"
-                    ) from None
+                    told = f"{self._settings.broker} did not acknowledge for {ANSWER_TIMEOUT_S:g} s"
+                    raise NotTakenError(told) from None
         return self._answer
+
+    def _is_connected(self) -> bool:
+        """Whether the broker can be reached now. Raises NotTakenError if an attempt to reach it has no end."""
+        if not self._report.is_connected and time.monotonic() > self._connects_by_s:
+            raise NotTakenError(f"{self._settings.broker} did not answer for {ANSWER_TIMEOUT_S:g} s")
+        return self._report.is_connected
 
     def _made_client(self) -> mqtt.Client:
         settings = self._settings

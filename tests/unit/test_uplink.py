@@ -74,6 +74,23 @@ def test_waiting_records_are_counted_without_a_link(
     assert names(caplog) == [Event.UPLINK_NOT_REACHED]  # many times for one reason is one line
 
 
+def test_waiting_records_are_counted_while_a_message_waits_for_the_link(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.uplink.sender.LOOK_S", 0.01)
+    monkeypatch.setattr("gateway.uplink.uplink.TURN_S", 0.01)
+    fill(store, 3)
+    silent_on_estimates = lambda topic: 0 if topic.endswith("/status") else None  # noqa: E731
+    with SmallBroker(1 << 20, "puback", code_of=silent_on_estimates) as broker, CuttableLink(broker.port) as link:
+        uplink = started(store, link.port)
+        assert wait_until(lambda: uplink.report().n_waiting == 3 and uplink.report().is_connected)
+        link.cut_for_good()
+        store.write_estimate(make_record(9))
+        assert wait_until(lambda: uplink.report().n_waiting == 4 and not uplink.report().is_connected)
+        uplink.stop()
+    assert not uplink.is_alive()
+
+
 def test_a_broker_that_accepts_and_says_nothing_is_a_fault(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gateway.uplink.uplink.ANSWER_TIMEOUT_S", 0.05)
     monkeypatch.setattr("gateway.uplink.sender.IDLE_S", 0.01)
