@@ -101,9 +101,6 @@ def take_dashboard(browser: Browser) -> None:
         laptop.wait_for_timeout(2000)
         save(laptop.screenshot(full_page=True, clip=down_to(laptop, "#history")), "dashboard-laptop.png")
         save(phone.screenshot(), "dashboard-phone.png")
-        of_engineer = opened(browser, f"{url}/engineer", LAPTOP, "#spectra-phase_rad")
-        of_engineer.wait_for_timeout(2000)
-        save(of_engineer.locator("#spectra").screenshot(), "dashboard-spectra.png")
 
 
 def take_cab(browser: Browser) -> None:

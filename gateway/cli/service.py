@@ -30,8 +30,6 @@ class Service:
     url: str | None
     token: str | None
     ca: Path | None
-    certificate: Path | None
-    key: Path | None
 
     def address(self, path: str) -> str:
         """Where ``path`` is. Raises a usage error if the options name no service, or two."""
@@ -74,19 +72,11 @@ class Service:
         return answer
 
     def _context(self) -> ssl.SSLContext:
-        """Checks certificates, and shows the client certificate if there is one."""
+        """Trusts the system's authorities, or only that of ``ca``."""
         try:
-            context = ssl.create_default_context(cafile=self.ca)
-        except OSError as fault:
+            return ssl.create_default_context(cafile=self.ca)
+        except OSError as fault:  # ssl.SSLError is one
             raise ConfigurationError(f"{self.ca}: no certificate of an authority: {fault}") from None
-        if self.certificate is None and self.key is not None:
-            raise click.UsageError("--key is the key of a --certificate: give both, or neither")
-        if self.certificate is not None:
-            try:
-                context.load_cert_chain(self.certificate, self.key)
-            except OSError as fault:  # ssl.SSLError is one
-                raise ConfigurationError(f"{self.certificate}: no certificate with its key: {fault}") from None
-        return context
 
 
 def _json_of(answer: httpx.Response) -> Answer:
@@ -119,13 +109,6 @@ def asks_service(command: Command) -> Command:
 
     decorated: Command = asking
     for option in (
-        click.option("--key", type=FILE, default=None, help="PEM file of its key, if that is a separate file"),
-        click.option(
-            "--certificate",
-            type=FILE,
-            default=None,
-            help="PEM file of our certificate, for a service that requires one",
-        ),
         click.option("--ca", type=FILE, default=None, help="PEM file of the authority that signed its certificate"),
         click.option("--token", envvar="SPRINGSCALE_TOKEN", default=None, help="token, if the service requires one"),
         click.option("--url", default=None, help="address of the service, such as http://127.0.0.1:8000"),

@@ -9,12 +9,13 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar, get_args
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
 from gateway.config.sections import (
     OF_CALIBRATION,
     AlarmsSection,
+    HostName,
     LearningSection,
     LimitKg,
     PositionSection,
@@ -118,32 +119,19 @@ class BatchSection(SettingsSection):
         return BatchSettings(**chosen)
 
 
-def _host(name: str) -> str:
-    try:
-        name.encode("idna")
-    except UnicodeError:
-        raise ValueError(f"{name!r} is neither an address nor a name that a host can have") from None
-    return name
-
-
 class WebSection(SettingsSection):
     """The HTTP side."""
 
-    host: Annotated[str, AfterValidator(_host)] = Field("127.0.0.1", description="address to listen on")
+    host: HostName = Field("127.0.0.1", description="address to listen on")
     port: int = Field(8000, ge=0, le=65535, description="port to listen on; 0 takes a free one")
     stale_after_s: Seconds = Field(900.0, description="an estimate older than this is marked stale")
     tls_certificate: Path | None = Field(None, description="PEM file of the certificate chain; makes it HTTPS")
     tls_key: Path | None = Field(None, description="PEM file of the certificate's private key")
-    tls_client_ca: Path | None = Field(
-        None, description="PEM file of the authority whose certificates clients must show (mutual TLS)"
-    )
 
     @model_validator(mode="after")
     def _whole_tls(self) -> "WebSection":
         if (self.tls_certificate is None) != (self.tls_key is None):
             raise ValueError("tls_certificate and tls_key belong together: give both or neither")
-        if self.tls_client_ca is not None and self.tls_certificate is None:
-            raise ValueError("tls_client_ca needs tls_certificate and tls_key")
         return self
 
 

@@ -10,7 +10,19 @@ from gateway.config.permission import Holder, Kind, encryption_to, may_leave
 
 Seconds = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]  # 32 years: fits 64 bits in nanoseconds
 LimitKg = Annotated[float | None, Field(gt=0.0, le=100_000.0, allow_inf_nan=False)]  # road vehicles weigh less
+MqttText = Annotated[str, Field(min_length=1, max_length=1000)]  # MQTT can write 65,535 bytes
 OF_CALIBRATION = "[default: as the calibration has it]"
+
+
+def _host(name: str) -> str:
+    try:
+        name.encode("idna")
+    except UnicodeError:
+        raise ValueError(f"{name!r} is neither an address nor a name that a host can have") from None
+    return name
+
+
+HostName = Annotated[str, AfterValidator(_host)]
 
 
 def _may_be_sent_to(host: str, *, has_tls: bool) -> bool:
@@ -58,7 +70,7 @@ class PositionSection(SettingsSection):
 class UplinkSection(SettingsSection):
     """Where estimates are forwarded to: an MQTT 5 broker, for vehicles that cannot be reached from outside."""
 
-    host: str | None = Field(None, min_length=1, description="the broker; without it nothing is forwarded")
+    host: HostName | None = Field(None, min_length=1, description="the broker; without it nothing is forwarded")
     port: int | None = Field(None, ge=1, le=65535, description="its port [default: 8883 with TLS, 1883 without]")
     tls: bool = Field(True, description="encrypted, the broker's certificate checked; without it on this machine alone")
     ca: Path | None = Field(
@@ -66,10 +78,10 @@ class UplinkSection(SettingsSection):
     )
     certificate: Path | None = Field(None, description="PEM file of our certificate, for a broker that requires one")
     key: Path | None = Field(None, description="PEM file of its key")
-    username: str | None = Field(None, description="our client identifier at the broker")
+    username: MqttText | None = Field(None, description="our client identifier at the broker")
     password_file: Path | None = Field(None, description="file that contains only the password")
-    topic: str = Field("springscale/{vehicle_id}", min_length=1, description="branch below which this vehicle reports")
-    client_id: str | None = Field(None, min_length=1, description="[default: springscale- and the vehicle's id]")
+    topic: MqttText = Field("springscale/{vehicle_id}", description="branch below which this vehicle reports")
+    client_id: MqttText | None = Field(None, description="[default: springscale- and the vehicle's id]")
     keep_alive_s: int = Field(60, ge=5, le=3600, description="the link is probed after this long without traffic")
     back_off_max_s: Seconds = Field(300.0, description="longest pause between two tries to connect")
     repeat_s: float = Field(
@@ -83,9 +95,8 @@ class UplinkSection(SettingsSection):
         False,
         description="a record without a subscriber at the broker, as MQTT 5 reports it, is kept here and tried again",
     )
-    home_assistant: str | None = Field(
+    home_assistant: MqttText | None = Field(
         None,
-        min_length=1,
         description="appear in Home Assistant on this broker: its discovery prefix, which is `homeassistant` unless "
         "somebody changed it there",
     )

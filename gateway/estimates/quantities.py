@@ -1,7 +1,7 @@
 """Every quantity in the outputs, with its name in each of them: one row per quantity.
 
-JSON, CSV and Parquet take a name from ``json_name``, VSS from ``vss``, Prometheus from ``metric``, Home Assistant from
-``label``. A new quantity is a row here, a new outlet a column.
+JSON, CSV, Parquet and Prometheus take a name from ``json_name``, VSS from ``vss``, Home Assistant from ``label``. A new
+quantity is a row here, a new outlet a column.
 """
 
 from dataclasses import dataclass
@@ -10,11 +10,6 @@ from typing import Final, Literal
 Unit = Literal["kg", "%", "m"]
 _SUFFIX: Final[dict[Unit, str]] = {"kg": "kg", "%": "pct", "m": "m"}
 _VSS_UNIT: Final[dict[Unit, str]] = {"kg": "kg", "%": "percent", "m": "m"}
-_METRIC: Final[dict[Unit, tuple[str, float]]] = {  # Prometheus has base units: a ratio is of 1
-    "kg": ("kilograms", 1.0),
-    "%": ("ratio", 0.01),
-    "m": ("meters", 1.0),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +48,6 @@ class Outward:
     def vss_unit(self) -> str:
         """The unit as VSS names it."""
         return _VSS_UNIT[self.unit]
-
-    @property
-    def metric(self) -> tuple[str, str, float]:
-        """Prometheus's names of it and of its standard deviation, and the factor to their unit."""
-        unit, factor = _METRIC[self.unit]
-        return f"springscale_{self.name}_{unit}", f"springscale_{self.name}_std_{unit}", factor
 
 
 _ROW: Final = "Vehicle.Chassis.Axle.Row"
@@ -118,7 +107,4 @@ QUANTITIES: Final = (
         for side in ("left", "right")
     ),
 )
-FOUND: Final = tuple(one for one in QUANTITIES if not one.is_weight)
-"""What an estimate finds; the others are weights that follow from it."""
-
 BY_NAME: Final = {one.name: one for one in QUANTITIES}

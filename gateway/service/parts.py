@@ -41,13 +41,7 @@ def uplink_of(
         "estimator": setup.estimator,
         "calibration_id": setup.calibration_id,
     }
-    outbox = Outbox(
-        store,
-        wanted.queue,
-        with_places=with_places,
-        repeat_s=wanted.repeat_s,
-        with_latest=wanted.home_assistant is not None,
-    )
+    outbox = Outbox(store, wanted.queue, with_places=with_places, repeat_s=wanted.repeat_s)
     take = partial(learner.loads.import_all, where="the message", may_come_again=True)
     return Uplink(wanted, outbox, birth, take_statements=take)
 
@@ -146,4 +140,4 @@ def tls_of(settings: Settings) -> Tls | None:
     web = settings.web
     if web.tls_certificate is None or web.tls_key is None:
         return None
-    return Tls(web.tls_certificate, web.tls_key, web.tls_client_ca)
+    return Tls(web.tls_certificate, web.tls_key)

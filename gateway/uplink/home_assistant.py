@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from gateway.estimates.quantities import BY_NAME, QUANTITIES, Outward, Unit
-from gateway.uplink.outbox import LATEST
 
+LATEST: Final = "latest"  # topic of the newest estimate, retained
 _SENSOR: Final[dict[Unit, dict[str, str]]] = {
     "kg": {"device_class": "weight", "unit_of_measurement": "kg"},
     "%": {"unit_of_measurement": "%"},

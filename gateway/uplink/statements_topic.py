@@ -3,8 +3,10 @@
 import json
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
+
+from paho.mqtt.client import MQTTMessage
 
 from gateway.errors import NOT_STORED, RefusedError
 from gateway.log import Event, log_event
@@ -19,15 +21,6 @@ TakeStatements = Callable[[bytes, str], str]
 """Takes the content of a message and who sent it -> JSON of an ImportTold. Raises RefusedError."""
 
 
-@dataclass(frozen=True, slots=True)
-class StatementsMessage:
-    """A message as it came; ``mid`` is its number on its connection."""
-
-    payload: bytes
-    content_type: str | None = None
-    mid: int = 0
-
-
 class StatementsDesk:
     """Takes or refuses statements from messages, and counts both in ``report``. Not thread-safe."""
 
@@ -35,7 +28,7 @@ class StatementsDesk:
         self._take = take
         self.report = StatementsHeard()
 
-    def is_done(self, message: StatementsMessage) -> bool:
+    def is_done(self, message: MQTTMessage) -> bool:
         """Take the message or refuse it for good; False if the disk fails, so that it must come again."""
         try:
             refusal = self._taken(message)
@@ -54,14 +47,14 @@ class StatementsDesk:
         """The broker does not let this vehicle hear its statements."""
         self._refuse(f"the broker refuses the subscription: {why}", is_final=False)
 
-    def _taken(self, message: StatementsMessage) -> str | None:
+    def _taken(self, message: MQTTMessage) -> str | None:
         """The faults of its bad rows; None without any. Raises RefusedError."""
-        kind = (message.content_type or TYPES[0]).partition(";")[0].strip().lower()
+        kind = getattr(message.properties, "ContentType", TYPES[0]).partition(";")[0].strip().lower()
         if kind not in TYPES:
             raise RefusedError("unreadable", f"{kind[:100]!r}: send {TYPES[0]} or {TYPES[1]}")
         if len(message.payload) > MOST_BYTES:
             raise RefusedError("too_large", f"{len(message.payload)} bytes, {MOST_BYTES} are allowed: split it")
-        told = json.loads(self._take(message.payload, BY))
+        told = json.loads(self._take(bytes(message.payload), BY))
         bad = [f"row {one['row']}: {one['text']}" for one in told["problems"] if one["kind"] == "bad"]
         return "; ".join(bad[:20]) or None
 

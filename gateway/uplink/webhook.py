@@ -22,8 +22,8 @@ from gateway.part import BackOff
 from gateway.records import json_line
 from gateway.status import WebhookStatus
 from gateway.store.journal import ESTIMATE, Delivery
-from gateway.uplink.forwarder import Forwarder, NotTakenError
 from gateway.uplink.outbox import Outbox, OutboxMessage
+from gateway.uplink.sender import NotTakenError, Sender
 from gateway.uplink.settings import WebhookSettings
 
 MOST_PAUSE_S: Final = 3600.0  # chosen: whatever Retry-After says
@@ -54,7 +54,7 @@ def body_of(message: OutboxMessage) -> bytes:
     return json_line({"type": message.kind, "timestamp": happened, "data": record}).encode()
 
 
-class Webhook(Forwarder[WebhookStatus]):
+class Webhook(Sender[WebhookStatus]):
     """Runs until :meth:`stop`. Delivers at least once and in order: a message waits until the one before it is done.
 
     A message is done when the receiver accepted it, or when it is dead: 410 or 413 came, or only refusals for
@@ -72,9 +72,6 @@ class Webhook(Forwarder[WebhookStatus]):
         self._settings, self._on_event, self._clock_s = settings, on_event, clock_s
         self._tls = settings.tls_context()
         self._refused_since_s: float | None = None  # the message that is tried
-
-    def _work(self) -> None:
-        self._deliver_all(self._deliver)
 
     def _deliver(self, message: OutboxMessage) -> bool:
         """Post a message once; True if it is done. Raises NotTakenError if it must come again."""

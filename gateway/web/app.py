@@ -23,7 +23,6 @@ from gateway.web.routes.cab import cab_router
 from gateway.web.routes.events_trips_alarms import alarms_router, events_router
 from gateway.web.routes.explanations import reasons_router
 from gateway.web.routes.history import estimates_router
-from gateway.web.routes.latest_spectra import spectra_router
 from gateway.web.routes.monitoring import alive_router, health_router, metrics_registry
 from gateway.web.routes.present import present_router
 from gateway.web.routes.present_load import Scales
@@ -85,7 +84,6 @@ def create_app(
         reasons_router(),
         vehicle_router(status, calibrated, learner),
         *([statements_router(learner)] if learner else ()),
-        spectra_router(board, calibrated),
         events_router(reader),
         *([alarms_router(reader, alarms)] if alarms else ()),
         weights_router(board, scales, status),

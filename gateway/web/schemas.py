@@ -1,35 +1,28 @@
 """The shapes of the answers, for the API's description; board and store provide the finished bytes."""
 
-import re
-from datetime import UTC, datetime, timedelta, timezone
+from datetime import UTC, datetime, timedelta
 from http import HTTPStatus
-from types import GenericAlias
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Generic, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model, model_validator
 
 from gateway.estimates.as_json import FIELDS, INSTANT, NUMBERS_BY_NAME, SPECTRA, WEIGHTS, EstimateField, Presence
 from gateway.estimates.batch_estimate import Lack
 from gateway.stated.statement import HALF_CHARACTER, is_text
-from gateway.units import NS_PER_S
 
-_RFC_3339: Final = re.compile(
-    r"(\d{4}-\d\d-\d\d)[Tt ](\d\d:\d\d:\d\d)(?:\.(\d{1,9})\d*)?(?:([Zz])|([+-])(\d\d):([0-5]\d))", re.ASCII
-)
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 def parse_instant(text: object) -> int:
-    """2026-11-21T04:00:00.5+01:00 -> ns since 1970 UTC. Raises ValueError that says what is expected."""
-    match = _RFC_3339.fullmatch(text) if isinstance(text, str) else None
-    if match is None:
+    """2026-11-21T04:00:00.5+01:00 -> ns since 1970 UTC, to a microsecond. Raises ValueError that says what is
+    expected.
+    """
+    try:
+        return (datetime.fromisoformat(str(text)) - _EPOCH) // timedelta(microseconds=1) * 1000
+    except (TypeError, ValueError):  # TypeError: it names no zone
         raise ValueError(
             "write a date and time with its zone, such as 2026-11-21T04:00:00Z (in a URL, the + of a zone is %2B)"
-        )
-    date, clock, fraction, utc, sign, hours, minutes = match.groups()
-    away = timedelta() if utc else timedelta(hours=int(hours), minutes=int(minutes)) * (-1 if sign == "-" else 1)
-    moment = datetime.fromisoformat(f"{date}T{clock}").replace(tzinfo=timezone(away))
-    return int((moment - _EPOCH) // timedelta(seconds=1)) * NS_PER_S + int((fraction or "0").ljust(9, "0"))
+        ) from None
 
 
 Instant = Annotated[
@@ -56,6 +49,7 @@ class WeightFigure(BaseModel):
 
     kg: float | None = Field(examples=[1894.2])
     std_kg: float | None = Field(examples=[6.1])
+    interval95_kg: tuple[float, float] | None = Field(examples=[[1882.2, 1906.2]])
     limit_kg: float | None = Field(description="null: no limit is known", examples=[2100.0])
     is_over_limit: bool = Field(examples=[False])
     lacks: Lack | None = Field(description="facts that are missing for it; null: it is known", examples=[None])
@@ -118,21 +112,20 @@ Latest: Final = create_model(
 )
 
 
-_ESTIMATES: Final[Any] = GenericAlias(list, Estimate)  # list[Estimate], where Estimate is no name of a class
+Item = TypeVar("Item")
 
-EstimatesPage: Final = create_model(
-    "EstimatesPage",
-    __doc__="A piece of the history, rejections included.",
-    items=(_ESTIMATES, Field()),
-    next_cursor=(
-        str | None,
-        Field(description="send as cursor for more; null: no more now", examples=["3f2a9c1e-7"]),
-    ),
-    last_cursor=(
-        str | None,
-        Field(description="place of the newest item: cursor to wait here for new ones", examples=["3f2a9c1e-7"]),
-    ),
-)
+
+class Page(BaseModel, Generic[Item]):
+    """A piece of the history."""
+
+    items: list[Item]
+    next_cursor: str | None = Field(description="send as cursor for more; null: no more now", examples=["3f2a9c1e-7"])
+    last_cursor: str | None = Field(
+        description="place of the newest item: cursor to wait here for new ones", examples=["3f2a9c1e-7"]
+    )
+
+
+EstimatesPage: Final[Any] = Page[Estimate]
 
 
 class Alive(BaseModel):

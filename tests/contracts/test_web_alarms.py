@@ -49,11 +49,12 @@ def test_active_and_past_alarms_are_listed(bench: AlarmBench, client: Client) ->
     ]
 
 
-def test_metrics_name_every_alarm_that_is_watched(client: Client) -> None:
+def test_metrics_name_active_and_watched_alarms(client: Client) -> None:
     text = client.get("/metrics").text
-    assert 'springscale_alarm{alarm="overload.gross"} 1.0' in text
-    assert 'springscale_alarm{alarm="sensor_fault.silent"} 0.0' in text
-    assert "springscale_alarms_raised_total 1.0" in text
+    assert 'springscale_alarms_active{is="overload.gross"} 1.0' in text
+    assert 'springscale_alarms_active{is="sensor_fault.silent"}' not in text
+    assert 'springscale_alarms_watched{is="sensor_fault.silent"} 1.0' in text
+    assert "springscale_alarms_n_raised 1.0" in text
     assert client.get("/api/v1/status").json()["alarms"]["active"] == ["overload.gross"]
 
 

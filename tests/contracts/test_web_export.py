@@ -10,7 +10,7 @@ from support.paper_van import paper_van
 from support.web import Client, Gateway
 
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
-from gateway.estimates.as_json import COLUMNS, estimate_to_json
+from gateway.estimates.as_json import COLUMNS
 from gateway.records import Why
 from gateway.status import SignalHealth
 from gateway.weighing.calibrated import CalibratedVehicle
@@ -82,18 +82,3 @@ def test_a_missing_calibration_is_reported(gateway: Gateway) -> None:
     told = Client(gateway.app).get("/api/v1/vehicle").json()
     assert told["calibration"] is None
     assert told["figures"] is None
-
-
-def test_the_last_spectra_are_those_of_the_last_batch_rejected_or_not(tmp_path: Path) -> None:
-    with Gateway(tmp_path, calibrated=CALIBRATED) as gateway:
-        client, board = Client(gateway.app), gateway.board
-        assert client.get("/api/v1/spectra/latest").json()["spectra"] is None
-        board.publish(make_estimate(0, with_spectra=True))
-        rejected = make_estimate(1, Why.NO_CALIBRATION, with_spectra=True)
-        board.publish(rejected)
-        board.publish(make_estimate(2, is_provisional=True, with_spectra=True))
-        told = client.get("/api/v1/spectra/latest").json()
-    assert (told["id"], told["rejected"]) == (rejected.id, ["no_calibration"])
-    assert told["spectra"] == estimate_to_json(rejected)["spectra"]
-    assert told["acceleration_bands"] == [{"centre_hz": 2.4, "width_hz": 0.05}, {"centre_hz": 3.25, "width_hz": 0.05}]
-    assert told["pitch_rate_bands"] is None

@@ -2,21 +2,16 @@
 
 import asyncio
 import logging
-import ssl
-import threading
-import time
 from collections.abc import Callable, Coroutine
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
-import trustme
 from support.patience import PATIENCE_S, wait_until
 from support.web import Gateway, Server, serving
 
-from gateway.web.access.serving import CONNECTIONS, Tls, server_config
+from gateway.web.access.serving import CONNECTIONS
 from gateway.web.app import BODY_BYTES
 
 LIVE = b"GET /health/live HTTP/1.1\r\nHost: localhost\r\n\r\n"
@@ -44,28 +39,6 @@ async def said_to(server: Server, *parts: bytes) -> bytes:
         return b""
     finally:
         writer.transport.abort()
-
-
-def test_every_handshake_works_however_busy_the_loop_is(tmp_path: Path) -> None:
-    """A ClientHello that came before the connection was handed over was thrown away: 1 of 12 handshakes worked."""
-    authority, pem = trustme.CA(), tmp_path / "server.pem"
-    authority.issue_cert("localhost", "127.0.0.1").private_key_and_cert_chain_pem.write_to_path(pem)
-    trusting = ssl.create_default_context()
-    authority.configure_trust(trusting)
-    with Gateway(tmp_path / "store") as gateway:
-        config = server_config(gateway.app, "127.0.0.1", 0, Tls(pem, pem))
-        with serving(gateway.app, config) as server, ThreadPoolExecutor(12) as pool:
-            url = server.url.replace("http://", "https://")
-            begun = threading.Event()
-
-            def be_busy() -> None:
-                begun.set()
-                time.sleep(0.5)  # all say hello meanwhile
-
-            server.loop.call_soon_threadsafe(be_busy)
-            assert begun.wait(PATIENCE_S)
-            ask = lambda _: httpx.get(f"{url}/health/live", verify=trusting, timeout=PATIENCE_S).status_code  # noqa: E731
-            assert list(pool.map(ask, range(12))) == [200] * 12
 
 
 @pytest.mark.parametrize(
@@ -125,16 +98,5 @@ def test_too_many_requests_get_503_and_places_are_freed_again(tmp_path: Path) ->
         for _, writer in crowd:
             writer.transport.abort()
         await asyncio.to_thread(wait_until, lambda: not server.uvicorn.server_state.connections)
-
-    run(tmp_path, scenario)
-
-
-def test_many_pipelined_requests_are_answered(tmp_path: Path) -> None:
-    async def scenario(server: Server) -> None:
-        reader, writer = await asyncio.open_connection(*server.socket.getsockname())
-        writer.write(LIVE * 100)
-        for _ in range(100):
-            assert (await reader.readuntil(b'{"is_alive":true}')).startswith(b"HTTP/1.1 200")
-        writer.transport.abort()
 
     run(tmp_path, scenario)

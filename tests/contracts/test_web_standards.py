@@ -60,8 +60,10 @@ def test_weights_have_deviation_limit_and_warning(gateway: Gateway) -> None:
     gateway.publish(loaded(0))
     told = client(gateway).get("/api/v1/weights/latest").json()
     known = {"is_over_limit": False, "lacks": None, "is_unsprung_estimated": False}
-    assert told["gross"] == {"kg": 1540.0, "std_kg": 6.0, "limit_kg": 1545.0, **known}
-    assert told["front_axle"] == {"kg": 760.0, "std_kg": 7.341, "limit_kg": 900.0, **known}
+    interval = {"interval95_kg": [1528.24022, 1551.75978]}
+    assert told["gross"] == {"kg": 1540.0, "std_kg": 6.0, **interval, "limit_kg": 1545.0, **known}
+    assert (told["front_axle"]["kg"], told["front_axle"]["std_kg"]) == pytest.approx((760.0, 7.341), abs=1e-3)
+    assert told["front_axle"]["limit_kg"] == 900.0
     assert told["rear_axle"]["limit_kg"] is None
     assert (told["id"], told["age_s"]) == (loaded(0).id, 0.0)
 
@@ -69,14 +71,22 @@ def test_weights_have_deviation_limit_and_warning(gateway: Gateway) -> None:
 def test_wheels_are_weighed_where_the_load_is_known_to_lie_sideways(gateway: Gateway) -> None:
     gateway.publish(loaded(0))
     told = client(gateway).get("/api/v1/weights/latest").json()
-    unknown = {"kg": None, "std_kg": None, "limit_kg": 400.0, "is_over_limit": False, "lacks": "roll_rate"}
+    unknown = {
+        "kg": None,
+        "std_kg": None,
+        "interval95_kg": None,
+        "limit_kg": 400.0,
+        "is_over_limit": False,
+        "lacks": "roll_rate",
+    }
     unknown["is_unsprung_estimated"] = False
     assert told["front_left"] == unknown
     assert (told["load"]["left_m"], told["load"]["left_std_m"]) == (None, None)
     gateway.publish(to_the_left(1))
     told = client(gateway).get("/api/v1/weights/latest").json()
     wheels = [told[wheel]["kg"] for wheel in ("front_left", "front_right", "rear_left", "rear_right")]
-    assert wheels == [406.8, 353.2, 407.867, 372.133]  # of 1340 kg sprung, 50 mm to the left on 1.5 m: 44.667 kg
+    expected = [406.8, 353.2, 407.867, 372.133]  # of 1340 kg sprung, 50 mm to the left on 1.5 m: 44.667 kg
+    assert wheels == pytest.approx(expected, abs=1e-3)
     assert (told["front_left"]["is_over_limit"], told["front_right"]["is_over_limit"]) == (True, False)
     assert (told["load"]["left_m"], told["load"]["left_std_m"]) == (0.67, 0.065)
 
@@ -85,15 +95,15 @@ def test_each_known_wheel_has_a_metric(gateway: Gateway) -> None:
     ask = client(gateway)
     gateway.publish(loaded(0))
     before = ask.get("/metrics").text
-    assert 'springscale_weight_kilograms{where="front_left"}' not in before
-    assert "springscale_cg_left_meters" not in before
+    assert "springscale_weights_front_left_kg" not in before
+    assert "springscale_estimate_cg_left_m" not in before
     gateway.publish(to_the_left(1))
     told = ask.get("/metrics").text.splitlines()
-    assert 'springscale_weight_kilograms{where="front_left"} 406.8' in told
-    assert 'springscale_overload{where="front_left"} 1.0' in told
-    assert 'springscale_overload{where="front_right"} 0.0' in told
-    assert "springscale_cg_left_meters 0.05" in told
-    assert "springscale_left_share_ratio 0.533" in told
+    assert "springscale_weights_front_left_kg 406.8" in told
+    assert "springscale_weights_front_left_is_over_limit 1.0" in told
+    assert "springscale_weights_front_right_is_over_limit 0.0" in told
+    assert "springscale_estimate_cg_left_m 0.05" in told
+    assert "springscale_estimate_left_share_pct 53.3" in told
 
 
 def test_every_record_brings_its_weights_to_the_history(gateway: Gateway) -> None:

@@ -47,7 +47,7 @@ def test_the_service_forwards_its_history_and_reports_progress(tmp_path: Path) -
         listener.close()
     assert status["n_delivered"] == len(records)
     assert status["is_connected"]
-    assert 'springscale_uplink_rows_total{outcome="delivered"} 3.0' in metrics
+    assert "springscale_uplink_n_delivered 3.0" in metrics
     said = [json.loads(message.payload) for message in listener.heard]
     assert said[0]["state"] == "online"
     assert [one["id"] for one in said[1:4]] == [record["id"] for record in records]

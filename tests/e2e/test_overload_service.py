@@ -75,7 +75,7 @@ def test_an_overload_by_the_settings_reaches_every_channel(config: Path, caplog:
         known |= {"lacks": None, "is_unsprung_estimated": False}
         assert {**weights["gross"], "std_kg": None} == known
         assert weights["rear_axle"]["limit_kg"] == 1000.0
-        assert 'springscale_overload{where="gross"} 1.0' in told(service, "/metrics")
+        assert "springscale_weights_gross_is_over_limit 1.0" in told(service, "/metrics")
 
     serve(config, play)
     assert "alarm raised" in caplog.text

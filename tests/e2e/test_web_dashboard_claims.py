@@ -121,16 +121,15 @@ def test_a_phone_shows_the_load_and_folds_the_rest(site: str, browser: Any) -> N
     assert page.evaluate("document.documentElement.scrollHeight / innerHeight") < MOST_SCREENS_ON_A_PHONE
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["viewport"]["width"]
     page.goto(f"{site}/engineer")
-    fold = page.get_by_role("button", name="Spectra of the suspension")
+    fold = page.get_by_role("button", name="Batches that could not be weighed")
     expect(fold).to_have_attribute("aria-expanded", "false")
-    expect(page.locator("#spectra-charts")).to_be_hidden()
+    expect(page.locator("#rejected")).to_be_hidden()
     fold.click()
-    expect(page.locator("#spectra-phase_rad[data-drawn]")).to_be_visible()
-    assert page.evaluate("document.querySelector('#spectra-phase_rad .main-svg').clientWidth") > 250
+    expect(page.locator("#rejected")).to_be_visible()
     fold.click()
-    expect(page.locator("#spectra-charts")).to_be_hidden()
+    expect(page.locator("#rejected")).to_be_hidden()
     page.set_viewport_size({"width": 1240, "height": 800})
-    expect(page.locator("#spectra-charts")).to_be_visible()
+    expect(page.locator("#rejected")).to_be_visible()
     expect(fold).to_have_count(0)
     assert watched.complaints == []
     page.close()

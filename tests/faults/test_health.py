@@ -31,7 +31,6 @@ from gateway.status import (
     judged,
 )
 from gateway.store import Store
-from gateway.uplink import link
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings
 from gateway.uplink.uplink import Uplink
@@ -120,7 +119,7 @@ BROKERS: dict[str, tuple[Callable[[str], int | None], str]] = {
 @pytest.mark.parametrize("what", BROKERS)
 def test_a_broker_that_takes_nothing_is_a_fault(what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It was connected, without a fault."""
-    monkeypatch.setattr(link, "ANSWER_TIMEOUT_S", 0.2)
+    monkeypatch.setattr("gateway.uplink.uplink.ANSWER_TIMEOUT_S", 0.2)
     code_of, fault = BROKERS[what]
     with Broker(tmp_path, code_of) as there:
         assert wait_until(lambda: fault in (there.uplink.report().last_fault or ""))

@@ -39,7 +39,7 @@ def vehicle(store: Store, broker: Broker) -> Iterator[Uplink]:
     """The product's own uplink, as the service starts it."""
     section = UplinkSection(host="127.0.0.1", port=broker.port, tls=False, home_assistant="homeassistant")
     settings = uplink_settings(section, VehicleSection(id="van-17"))
-    uplink = Uplink(settings, Outbox(store, "fleet", with_latest=settings.home_assistant is not None), BIRTH)
+    uplink = Uplink(settings, Outbox(store, "fleet"), BIRTH)
     uplink.start()
     try:
         yield uplink

@@ -67,10 +67,10 @@ def scraped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scraped]:
         here = Scraped(f"http://127.0.0.1:{port}", f"127.0.0.1:{web_port}")
         try:
             assert wait_until(lambda: _answers(here.url))
-            assert wait_until(lambda: bool(here.values("springscale_bus_frames_total")))
+            assert wait_until(lambda: bool(here.values("springscale_bus_n_frames")))
             service.stdin.write(b"\n")  # now it drives
             service.stdin.flush()
-            assert wait_until(lambda: bool(here.values('springscale_payload_kilograms{instance="$instance"}')))
+            assert wait_until(lambda: bool(here.values('springscale_estimate_payload_kg{instance="$instance"}')))
             yield here
         finally:
             prometheus.terminate()

@@ -25,10 +25,9 @@ from gateway.bus.listen import LiveSource
 from gateway.bus.ring_log import RingLog
 from gateway.bus.signals import load_signal_map
 from gateway.log import LOGGER
+from gateway.part import BackOff
 from gateway.records import json_line
 from gateway.store import Store
-from gateway.uplink.forwarder import BackOff
-from gateway.uplink.link import MqttLink
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings, WebhookSettings
 from gateway.uplink.uplink import Uplink
@@ -81,9 +80,10 @@ def forwarding(folder: Path, port: int, **changed: object) -> Iterator[Tried]:
     store = Store.open(folder / "state")
     store.write_estimate(make_record(1))
     known = {"host": "127.0.0.1", "port": port, "topic": "springscale/van-17", "client_id": "van-17", "tls": False}
-    tries = Tries(MqttLink)
     settings = UplinkSettings(**{**known, **changed})
-    uplink = Uplink(settings, Outbox(store, "fleet"), {}, tries, BackOff(0.001, 0.001))  # type: ignore[arg-type] # a test's
+    uplink = Uplink(settings, Outbox(store, "fleet"), {}, BackOff(0.001, 0.001))
+    tries = Tries(uplink._before_connecting)
+    uplink._before_connecting = tries  # type: ignore[method-assign, assignment] # counted
     uplink.start()
     yield lambda: tries.n
     uplink.stop(PATIENCE_S)

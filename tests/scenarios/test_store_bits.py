@@ -9,7 +9,7 @@ import pytest
 from support.estimates import make_record, texts
 from support.log import names
 from support.patience import PATIENCE_S, wait_until
-from support.sequence import without_sequence
+from support.sequence import drained, without_sequence
 
 from gateway.errors import StoreError
 from gateway.log import Event
@@ -62,7 +62,7 @@ def ask(store: Store) -> set[str]:
     told |= set(reader.estimates(since_ns=0, limit=1000).items)
     latest = reader.latest()
     told |= {text for text in (latest.estimate, latest.rejection) if text is not None}
-    messages = Outbox(store, "fleet").next_messages(1000)
+    messages = drained(Outbox(store, "fleet"))
     reader.delivery("fleet")
     reader.page((SERVICE,))
     assert {without_sequence(message.text) for message in messages} <= set(PLAIN)

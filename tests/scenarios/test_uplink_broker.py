@@ -16,8 +16,8 @@ from support.estimates import make_record
 from support.patience import PATIENCE_S, wait_until
 from support.sequence import BackEnd
 
+from gateway.part import BackOff
 from gateway.store import Store
-from gateway.uplink.forwarder import BackOff
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings
 from gateway.uplink.uplink import Uplink
@@ -33,7 +33,7 @@ from gateway.store import Store
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings
 from gateway.uplink.uplink import Uplink
-from gateway.uplink.forwarder import BackOff
+from gateway.part import BackOff
 
 store = Store.open(pathlib.Path(sys.argv[1]))
 broker = {"host": "127.0.0.1", "port": int(sys.argv[2]), "tls": False}
@@ -220,7 +220,7 @@ def test_a_topic_the_broker_forbids_loses_nothing(tmp_path: Path) -> None:
 
 
 def test_a_killed_vehicle_is_announced_by_its_will(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.uplink.link.WILL_DELAY_S", 1)
+    monkeypatch.setattr("gateway.uplink.uplink.WILL_DELAY_S", 1)
     with running_broker(tmp_path) as broker, CuttableLink(broker.port) as link:
         listener = Listener(broker.port, "springscale/van-17/status")
         store = Store.open(tmp_path / "state")

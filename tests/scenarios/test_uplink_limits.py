@@ -12,8 +12,8 @@ from support.sequence import BackEnd
 from support.small_broker import Refusal, SmallBroker
 
 from gateway.log import Event
+from gateway.part import BackOff
 from gateway.store import Store
-from gateway.uplink.forwarder import BackOff
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings
 from gateway.uplink.uplink import Uplink

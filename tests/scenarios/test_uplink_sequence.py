@@ -13,7 +13,7 @@ import jsonschema
 import pytest
 from support.estimates import make_record
 from support.patience import PATIENCE_S, wait_until
-from support.sequence import BackEnd
+from support.sequence import BackEnd, drained
 
 from gateway.records import json_line
 from gateway.store import Retention, Store
@@ -44,13 +44,10 @@ def write(store: Store, *numbers: int) -> None:
 
 def deliver(store: Store, back_end: BackEnd, is_lost: Callable[[OutboxMessage], bool] = lambda message: False) -> None:
     """All that waits; what is lost is lost behind the broker's acknowledgement, or refused."""
-    outbox = Outbox(store, "fleet")
-    while messages := outbox.next_messages(7):
-        for message in messages:
-            jsonschema.validate(json.loads(message.text), SCHEMA)
-            if not is_lost(message):
-                back_end.take(message.text)
-            outbox.delivered(message)
+    for message in drained(Outbox(store, "fleet")):
+        jsonschema.validate(json.loads(message.text), SCHEMA)
+        if not is_lost(message):
+            back_end.take(message.text)
     assert store.flush(PATIENCE_S)
 
 
@@ -106,8 +103,7 @@ def test_a_record_dropped_from_memory_leaves_a_gap(tmp_path: Path) -> None:
     with closing(Store.open(tmp_path / "mount" / "state", Retention(max_held=5))) as store:
         for n in range(9):
             store.write_estimate(make_record(n))
-        outbox = Outbox(store, "fleet")
-        for message in outbox.next_messages(100):
+        for message in drained(Outbox(store, "fleet")):
             back_end.take(message.text)
     assert (len(back_end.missing), len(back_end.ids)) == (1, 4)  # the queue's own place takes one of five
 

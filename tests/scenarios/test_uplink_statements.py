@@ -20,12 +20,12 @@ from support.patience import PATIENCE_S, wait_until
 
 from gateway.config.sections import UplinkSection
 from gateway.errors import RefusedError
+from gateway.part import BackOff
 from gateway.status import StatementsHeard
 from gateway.store import Store
-from gateway.uplink.forwarder import BackOff
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import UplinkSettings
-from gateway.uplink.statements_topic import MOST_BYTES, StatementsDesk, StatementsMessage, TakeStatements
+from gateway.uplink.statements_topic import MOST_BYTES, StatementsDesk, TakeStatements
 from gateway.uplink.uplink import Uplink
 
 TOPIC: Final = "springscale/van-17/statements"
@@ -172,7 +172,7 @@ def test_statements_for_an_absent_vehicle_arrive_when_it_returns(tmp_path: Path,
 
 @needs_mosquitto
 def test_a_disk_that_fails_keeps_the_message_at_the_broker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.uplink.forwarder.IDLE_S", 0.05)
+    monkeypatch.setattr("gateway.uplink.sender.IDLE_S", 0.05)
     answers = [RefusedError("not_stored", "the disk is full")] * 3
 
     def take(content: bytes, by: str) -> str:
@@ -227,7 +227,7 @@ def test_any_exception_on_a_message_is_a_refusal() -> None:
         raise ZeroDivisionError
 
     desk = StatementsDesk(take)
-    assert desk.is_done(StatementsMessage(b"[]"))
+    assert desk.is_done(mqtt.MQTTMessage())
     assert desk.report == StatementsHeard(n_refused=1, last_refusal="ZeroDivisionError()")
 
 

@@ -9,14 +9,12 @@ from typing import Any
 
 from gateway.calibration.file import load_calibration
 from gateway.core.fusion import epoch_of
-from gateway.core.spectrum import spectra_of
 from gateway.estimates.batch_estimate import Estimate
 from gateway.records import Why, iso_utc
 from gateway.status import BusStatus, SignalHealth, State, Status, StoreStatus, UplinkStatus
 from gateway.web.routes.weights import KnownLoadTold
 from gateway.weighing.calibrated import CalibratedVehicle
 from support.estimates import WINDOW_NS, make_estimate, posterior_of
-from support.half_car_road import batch_over_road
 from support.patience import PATIENCE_S
 from support.web import Gateway
 
@@ -62,14 +60,12 @@ def weighed(n: int, payload_kg: float, front_share_pct: float, calibrated: Calib
 
 
 def furnished(directory: Path) -> Gateway:
-    """Two batches empty, one rejected, then 270 kg with spectra; the truth beside them."""
+    """Two batches empty, one rejected, then 270 kg; the truth beside them."""
     calibrated = demo_calibration()
     gateway = Gateway(directory, calibrated=calibrated, known_loads=lambda: TRUTH)
     gateway.status = STATUS
-    last = replace(
-        weighed(3, 270.0, 48.0, calibrated), spectra=spectra_of(batch_over_road(270.0, 48.0, seed=3, duration_s=60.0))
-    )
-    batches = [*(weighed(n, 2.0, 50.0, calibrated) for n in range(2)), make_estimate(2, Why.TOO_SLOW, Why.GAP), last]
+    refused, loaded = make_estimate(2, Why.TOO_SLOW, Why.GAP), weighed(3, 270.0, 48.0, calibrated)
+    batches = [*(weighed(n, 2.0, 50.0, calibrated) for n in range(2)), refused, loaded]
     gateway.publish(*batches)
     return gateway
 

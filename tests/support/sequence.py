@@ -1,9 +1,10 @@
-"""A back-end that keeps to what docs/uplink.md says of ``sequence``."""
+"""All that an outbox holds, and a back-end that keeps to what docs/uplink.md says of ``sequence``."""
 
 import json
 from typing import Any
 
 from gateway.records import json_line
+from gateway.uplink.outbox import Outbox, OutboxMessage
 
 
 class BackEnd:
@@ -29,3 +30,12 @@ def without_sequence(text: str) -> str:
     record = json.loads(text)
     del record["sequence"]
     return json_line(record)
+
+
+def drained(outbox: Outbox, most: int = 10_000) -> list[OutboxMessage]:
+    """Deliver everything that waits, or the first ``most`` messages."""
+    found: list[OutboxMessage] = []
+    while len(found) < most and (message := outbox.next()) is not None:
+        found.append(message)
+        outbox.delivered()
+    return found

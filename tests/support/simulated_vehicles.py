@@ -14,10 +14,10 @@ from gateway.core.alarms.alarm import Alarm, AlarmCause, AlarmFigure, AlarmKind,
 from gateway.core.events.entry import EntryKind, entry_id
 from gateway.estimates.as_json import estimate_to_json
 from gateway.estimates.batch_estimate import Estimate, Weight, Weights
+from gateway.part import BackOff
 from gateway.records import iso_utc, json_line
 from gateway.store import Store
 from gateway.units import NS_PER_S
-from gateway.uplink.forwarder import BackOff
 from gateway.uplink.outbox import Outbox
 from gateway.uplink.settings import uplink_settings
 from gateway.uplink.uplink import Uplink

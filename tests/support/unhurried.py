@@ -12,7 +12,7 @@ from gateway.cli import main
 from gateway.cli import service as asked_service
 from gateway.service.pipeline import Pipeline
 from gateway.store import Store, StoreReader
-from gateway.uplink import link
+from gateway.uplink import uplink
 from gateway.uplink.uplink import Uplink
 from support.patience import PATIENCE_S
 
@@ -20,7 +20,7 @@ CONSTANTS = (
     (listen, "START_WAIT_S"),
     (sink, "SEND_TIMEOUT_S"),
     (asked_service, "TIMEOUT_S"),
-    (link, "CONNECT_TIMEOUT_S"),
+    (uplink, "CONNECT_TIMEOUT_S"),
 )
 ONLY_DEFAULT = (listen.LiveSource.stop, Pipeline.stop, RingLog.stop, Uplink.stop, Store.close, StoreReader.__init__)
 

@@ -101,7 +101,7 @@ def delivered(folder: Path, prefix: str, *records: dict[str, Any], **broker: str
         for record in records:
             store.write_estimate(record)
         settings = uplink_settings(section.model_copy(update={"port": running.port}), VehicleSection(id="van-17"))
-        uplink = Uplink(settings, Outbox(store, "fleet", with_latest=True), BIRTH)
+        uplink = Uplink(settings, Outbox(store, "fleet"), BIRTH)
         uplink.start()
         assert wait_until(lambda: uplink.report().n_delivered == len(records)), uplink.report()
         uplink.stop()

@@ -11,14 +11,12 @@ import pytest
 from support.estimates import make_record
 from support.log import names
 from support.patience import PATIENCE_S, wait_until
-from test_uplink import SETTINGS, FakeBroker, accepted
+from support.sequence import drained
 
 from gateway.log import Event
-from gateway.part import BackOff
 from gateway.store import Store, reader, writer
 from gateway.store.journal import BATCHES, ENTRIES, KINDS
 from gateway.uplink.outbox import Outbox
-from gateway.uplink.uplink import Uplink
 from gateway.web.live.board import Board
 
 DAY_S = 86_400.0
@@ -45,16 +43,10 @@ def test_a_flipped_bit_in_an_event_is_passed_over_counted_and_shown(
     content = path.read_bytes()
     place = content.index(b'"revision"', content.index(b'{"id": "event-2"'))
     path.write_bytes(content[: place + 8] + bytes([content[place + 8] ^ 1]) + content[place + 9 :])
-    broker = FakeBroker(accepted)
     with closing(Store.open(tmp_path)) as store:
-        uplink = Uplink(SETTINGS, Outbox(store, "fleet"), {}, broker, BackOff(0.001, 0.002))
-        uplink.start()
-        assert wait_until(lambda: uplink.report().n_delivered == 4)
+        assert [message.id for message in drained(Outbox(store, "fleet"))] == [f"event-{n}-1" for n in (0, 1, 3, 4)]
         assert wait_until(lambda: store.health().n_bad_records == 1)
-        assert uplink.is_alive()
         assert len(store.reader().entries().items) == 4
-        uplink.stop()
-    assert [message.id for message in broker.taken] == [f"event-{n}-1" for n in (0, 1, 3, 4)]
     assert Event.STORE_BAD_RECORD in names(caplog)
 
 
@@ -65,12 +57,8 @@ def test_an_unreadable_record_is_skipped_and_reported(store: Store, caplog: pyte
     entry(store, 2)
     store.write_entry("event", "event-3", 0, "{}")
     outbox = Outbox(store, "fleet")
-    messages = outbox.next_messages(10)
-    assert [message.id for message in messages] == ["event-0-1", "event-2-1"]
+    assert [message.id for message in drained(outbox)] == ["event-0-1", "event-2-1"]
     assert wait_until(lambda: names(caplog) == [Event.STORE_BAD_RECORD] * 2)
-    for message in messages:
-        outbox.delivered(message)
-    assert outbox.next_messages(10) == []
     assert store.flush(PATIENCE_S)
     assert store.reader().delivery("fleet").n_waiting == 0
 
@@ -131,15 +119,13 @@ def test_idle_followers_open_no_database(store: Store, monkeypatch: pytest.Monke
     for n in range(3):
         store.write_estimate(make_record(n))
     outbox = Outbox(store, "fleet")
-    for message in outbox.next_messages(10):
-        outbox.delivered(message)
+    assert len(drained(outbox)) == 3
     assert store.flush(PATIENCE_S)
     outbox.look()
-    monkeypatch.setattr("gateway.uplink.outbox.SETTLES_S", 0.0)
     opened: list[Any] = []
     monkeypatch.setattr(reader, "connect_reader", opened.append)
     for _ in range(50):
-        assert outbox.next_messages(10) == []
+        assert outbox.next() is None
         assert outbox.look().n_waiting == 0
     assert opened == []
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from support.estimates import make_record
 from support.patience import PATIENCE_S
+from support.sequence import drained
 
 from gateway.records import json_line
 from gateway.store import Retention, Store
@@ -29,49 +30,46 @@ def outbox(store: Store, *only: str) -> Outbox:
     return Outbox(store, NAME, only=only)
 
 
-def drained(box: Outbox, limit: int = 2) -> list[str]:
-    found: list[str] = []
-    while letters := box.next_messages(limit):
-        found += [letter.id for letter in letters]
-        for letter in letters:
-            box.delivered(letter)
-    return found
+def ids(box: Outbox, most: int = 10_000) -> list[str]:
+    return [letter.id for letter in drained(box, most)]
 
 
 MIXED = ("event-1", "estimate", "trip-1", "estimate", "estimate", "alarm-1", "estimate", "event-2", "trip-2", "alarm-2")
 
 
-@pytest.mark.parametrize("limit", [1, 2, 3, 100])
+@pytest.mark.parametrize("page", [1, 2, 3, 100])
 @pytest.mark.parametrize("only", [("alarm",), ("alarm", "event"), ("event", "trip", "alarm"), ("trip",)])
-def test_wanted_records_come_in_order_and_once(store: Store, only: tuple[str, ...], limit: int) -> None:
+def test_wanted_records_come_in_order_and_once(
+    store: Store, only: tuple[str, ...], page: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.uplink.outbox.PAGE", page)
     tell(store, *MIXED)
     wanted = [f"{each}-1" for each in MIXED if each.partition("-")[0] in only]
-    assert drained(outbox(store, *only), limit) == wanted
+    assert ids(outbox(store, *only)) == wanted
     assert store.flush(PATIENCE_S)
-    assert drained(outbox(store, *only), limit) == []  # as after a restart
+    assert ids(outbox(store, *only)) == []  # as after a restart
 
 
 def test_unwanted_records_count_as_delivered_so_that_age_may_remove_them(store: Store) -> None:
     tell(store, *["estimate"] * 7, "trip-1")
     box = outbox(store, "alarm")
-    assert box.next_messages(2) == []
+    assert box.next() is None
     assert store.flush(PATIENCE_S)
     kept = store.reader().delivery(NAME)
     assert kept.n_waiting == 0
     assert kept.cursor == store.reader().entries(limit=1).last_cursor
     tell(store, "estimate", "alarm-1", "estimate")
     assert box.look().n_waiting == 1
-    assert drained(box) == ["alarm-1-1"]
+    assert ids(box) == ["alarm-1-1"]
     assert store.flush(PATIENCE_S)
     assert box.look().n_waiting == 0
 
 
-def test_undelivered_records_come_again(store: Store) -> None:
+def test_a_record_comes_until_it_is_delivered(store: Store) -> None:
     tell(store, *MIXED)
     box = outbox(store, "alarm")
-    assert [letter.id for letter in box.next_messages(10)] == ["alarm-1-1", "alarm-2-1"]
-    box.rewind()
-    assert drained(box) == ["alarm-1-1", "alarm-2-1"]
+    assert [box.next().id for _ in range(3)] == ["alarm-1-1"] * 3
+    assert ids(box) == ["alarm-1-1", "alarm-2-1"]
 
 
 def test_entries_that_retention_takes_undelivered_are_counted_and_newer_revisions_are_not(tmp_path: Path) -> None:
@@ -79,10 +77,9 @@ def test_entries_that_retention_takes_undelivered_are_counted_and_newer_revision
 
     store = Store.open(tmp_path, Retention(max_age_s=100.0), lambda: now_ns[0])
     box = outbox(store, "alarm")
-    assert box.next_messages(1) == []
+    assert box.next() is None
     tell(store, "alarm-0", "estimate")
-    first = box.next_messages(1)
-    box.delivered(first[0])
+    assert ids(box, 1) == ["alarm-0-1"]
     tell(store, "alarm-1", "alarm-1", "alarm-2")  # the second takes the place of the first
     now_ns[0] += 1_000_000_000_000
     tell(store, "estimate")
@@ -119,10 +116,8 @@ def delivered(outbox: Outbox, n: int, clock: Clock) -> list[str]:
     """The next ``n``, one a second."""
     said = []
     for _ in range(n):
-        (letter,) = outbox.next_messages(1)
         clock.now_s += 1.0
-        outbox.delivered(letter)
-        said.append(letter.id)
+        said += ids(outbox, 1)
     return said
 
 
@@ -130,22 +125,32 @@ def test_recently_delivered_records_are_repeated(six: Store, clock: Clock) -> No
     outbox = Outbox(six, "fleet", repeat_s=1.5)
     assert delivered(outbox, 4, clock) == IDS[:4]
     clock.now_s += 1000.0  # a dead link may be noticed late: what counts is the time before the last delivery
-    outbox.rewind()
-    outbox.rewind()  # no connection yet
-    assert [letter.id for letter in outbox.next_messages(9)] == IDS[2:]
+    outbox.repeat()
+    outbox.repeat()  # nothing was delivered in between
+    assert ids(outbox) == IDS[2:]
 
 
 def test_a_second_break_in_the_middle_begins_no_later(six: Store, clock: Clock) -> None:
     outbox = Outbox(six, "fleet", repeat_s=1.5)
     delivered(outbox, 4, clock)
-    outbox.rewind()
+    outbox.repeat()
     assert delivered(outbox, 1, clock) == IDS[2:3]
-    outbox.rewind()
-    assert [letter.id for letter in outbox.next_messages(9)] == IDS[2:]
+    outbox.repeat()
+    assert ids(outbox) == IDS[2:]
 
 
 def test_without_it_nothing_that_was_delivered_comes_again(six: Store, clock: Clock) -> None:
     outbox = Outbox(six, "fleet")
     delivered(outbox, 4, clock)
-    outbox.rewind()
-    assert [letter.id for letter in outbox.next_messages(9)] == IDS[4:]
+    outbox.repeat()
+    assert ids(outbox) == IDS[4:]
+
+
+def test_a_database_that_was_replaced_is_delivered_from_its_first_row(six: Store, tmp_path: Path) -> None:
+    outbox = Outbox(six, "fleet")
+    assert ids(outbox) == IDS
+    other = Store.open(tmp_path / "other")
+    tell(other, "estimate", "estimate")
+    outbox._journal, outbox._follower = other, other.follow(outbox._kinds, outbox._follower.place, lambda: None)
+    assert len(ids(outbox)) == 2
+    other.close()

@@ -19,7 +19,7 @@ def settings_of(folder: Path, text: str) -> Settings:
     return load_settings(folder / "springscale.toml")
 
 
-@pytest.mark.parametrize("half", ['tls_certificate = "a"', 'tls_key = "a"', 'tls_client_ca = "a"'])
+@pytest.mark.parametrize("half", ['tls_certificate = "a"', 'tls_key = "a"'])
 def test_half_of_a_tls_configuration_is_refused(half: str, tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="web: tls_"):
         settings_of(tmp_path, PLAIN + f"[web]\n{half}\n")
@@ -27,7 +27,7 @@ def test_half_of_a_tls_configuration_is_refused(half: str, tmp_path: Path) -> No
 
 def test_tls_files_are_found_beside_the_configuration(tmp_path: Path) -> None:
     tls = tls_of(settings_of(tmp_path, TLS))
-    assert (tls.certificate, tls.key, tls.client_ca) == (tmp_path / "web.pem", tmp_path / "web.key", None)
+    assert (tls.certificate, tls.key) == (tmp_path / "web.pem", tmp_path / "web.key")
 
 
 def test_a_restart_under_systemd_uses_the_exit_code_of_the_unit(monkeypatch: pytest.MonkeyPatch) -> None:

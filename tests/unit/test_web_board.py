@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
@@ -168,16 +167,8 @@ def test_written_times_are_read_back(t_us: int) -> None:
     assert parse_instant(iso_utc(t_us * 1000)) == t_us * 1000
 
 
-@given(st.integers(-(10**9), 10**10), st.integers(-23 * 60, 23 * 60))
-def test_a_zone_moves_the_clock_and_not_the_instant(t_s: int, away_min: int) -> None:
-    moment = datetime.fromtimestamp(0, UTC) + timedelta(seconds=t_s)
-    sign = "-" if away_min < 0 else "+"
-    shown = (moment + timedelta(minutes=away_min)).strftime("%Y-%m-%dT%H:%M:%S")
-    assert parse_instant(f"{shown}{sign}{abs(away_min) // 60:02d}:{abs(away_min) % 60:02d}") == t_s * 10**9
-
-
-def test_nanoseconds_are_kept() -> None:
-    assert parse_instant("1970-01-01T00:00:01.000000001Z") == 1_000_000_001
+def test_an_instant_has_a_zone_and_fractions() -> None:
+    assert parse_instant("1970-01-01T01:00:00.5+01:00") == 500_000_000
     assert parse_instant("1969-12-31T23:59:59.5Z") == -500_000_000
 
 
@@ -187,7 +178,6 @@ yesterday
 2026-11-21
 2026-11-21T04:00:00
 2026-11-21T04:00:00 01:00
-2026-11-21T04:00:00+01
 2026-13-01T00:00:00Z
 2026-02-30T00:00:00Z
 2026-11-21T24:00:01Z
@@ -197,5 +187,5 @@ yesterday
 
 @pytest.mark.parametrize("text", [*NOT_AN_INSTANT, None, 7])
 def test_anything_else_is_refused(text: object) -> None:
-    with pytest.raises(ValueError):  # noqa: PT011  # half of the messages are the standard library's
+    with pytest.raises(ValueError, match="with its zone"):
         parse_instant(text)

@@ -41,11 +41,6 @@ def test_a_token_is_recognised_and_its_secret_is_not_kept(path: Path) -> None:
     assert [entry.name for entry in path.parent.iterdir()] == ["tokens.json"]
 
 
-def test_every_token_is_unique(path: Path) -> None:
-    tokens = TokenFile(path)
-    assert len({tokens.create(f"n{i}", Scope.READ) for i in range(20)}) == 20
-
-
 def test_a_token_revoked_by_another_process_is_refused_at_once(path: Path) -> None:
     service, command_line = TokenFile(path), TokenFile(path)
     first, second = command_line.create("first", Scope.READ), command_line.create("second", Scope.OPERATE)
@@ -186,11 +181,6 @@ def test_an_edited_scope_must_be_a_scope(path: Path) -> None:
     path.write_text(json.dumps(content))
     with pytest.raises(ConfigurationError, match="scope"):
         TokenFile(path).tokens()
-
-
-def test_the_operate_scope_includes_read() -> None:
-    allowed = {(held, wanted) for held in Scope for wanted in Scope if held.allows(wanted)}
-    assert allowed == {(Scope.READ, Scope.READ), (Scope.OPERATE, Scope.READ), (Scope.OPERATE, Scope.OPERATE)}
 
 
 @pytest.fixture

@@ -23,8 +23,7 @@ from gateway.estimates.as_json.kinds import (
     FieldKind,
     posterior_from_json,
     posterior_to_json,
-    spectra_from_json,
-    spectra_to_json,
+    weights_to_json,
     without_dates,
     without_places,
 )
@@ -46,9 +45,8 @@ __all__ = [
     "posterior_from_json",
     "posterior_to_json",
     "read_estimate",
-    "spectra_from_json",
-    "spectra_to_json",
     "table_row",
+    "weights_to_json",
     "without_dates",
     "without_places",
 ]

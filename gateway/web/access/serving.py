@@ -31,13 +31,10 @@ ANSWER_WITHIN_S: Final = 5.0  # chosen: for the service's own question
 
 @dataclass(frozen=True, slots=True)
 class Tls:
-    """Certificate chain and key in PEM files; ``client_ca`` requires clients to show a certificate signed by it
-    (mTLS).
-    """
+    """Certificate chain and key in PEM files."""
 
     certificate: Path
     key: Path
-    client_ca: Path | None = None
 
 
 def refuse_open_address(host: str, *, has_tokens: bool, has_tls: bool) -> None:
@@ -79,17 +76,10 @@ def server_config(app: ASGIApp, host: str, port: int, tls: Tls | None = None) ->
 def _tls_settings(tls: Tls) -> dict[str, Any]:
     """Checked here, so that a wrong file gives a clear line at the start and not a traceback."""
     try:
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        context.load_cert_chain(tls.certificate, tls.key)
-        if tls.client_ca is not None:
-            context.load_verify_locations(tls.client_ca)
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(tls.certificate, tls.key)
     except OSError as fault:  # ssl.SSLError is one
-        names = ", ".join(str(path) for path in (tls.certificate, tls.key, tls.client_ca) if path is not None)
-        raise ConfigurationError(f"[web] TLS files {names} cannot be used: {fault}") from None
-    wanted = {"ssl_certfile": tls.certificate, "ssl_keyfile": tls.key}
-    if tls.client_ca is None:
-        return wanted
-    return wanted | {"ssl_ca_certs": str(tls.client_ca), "ssl_cert_reqs": ssl.CERT_REQUIRED}
+        raise ConfigurationError(f"[web] TLS files {tls.certificate}, {tls.key} cannot be used: {fault}") from None
+    return {"ssl_certfile": tls.certificate, "ssl_keyfile": tls.key}
 
 
 class _Server(uvicorn.Server):
@@ -173,11 +163,8 @@ class WebServer:
                 with contextlib.closing(writer):
                     writer.write(b"GET /health/live HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n")
                     is_answered = bool(await reader.read(1))
-        except ssl.SSLError:  # it answers, and wants a certificate
-            is_answered = True
         except OSError:  # a timeout is one
             is_answered = False
-        is_answered |= self.is_started and self._config.ssl_cert_reqs == ssl.CERT_REQUIRED
         if is_answered:
             self.fault = None
         return is_answered

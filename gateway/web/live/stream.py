@@ -39,7 +39,7 @@ class TooManyStreamsError(Exception):
 
 
 class Subscription:
-    """The events of one client. All but ``hear`` and ``end`` belongs to the loop it was made in.
+    """The events of one client. All but ``wake``, ``hear`` and ``end`` belongs to the loop it was made in.
 
     Records are in the journal, where the client has a place; of events that are not stored only the newest waits here,
     with the number of the newest record at its time.
@@ -55,15 +55,22 @@ class Subscription:
         self._passing: tuple[int, ServerSentEvent] | None = None
         self._is_ended = False
         self._head = reader.head
-        self._follower = reader.follow(tuple(KINDS), behind or reader.head(), self.hear)
+        self._follower = reader.follow(tuple(KINDS), behind or reader.head(), self.wake)
 
-    def hear(self, passing: ServerSentEvent | None = None) -> None:
-        """Takes a new record, or an event that is not stored; may be called from any thread."""
-        self._in_loop(self._note, None if passing is None else (_number(self._head()), passing))
+    def wake(self) -> None:
+        """There is news; may be called from any thread."""
+        with suppress(RuntimeError):  # the loop is closed: so is the stream
+            self._loop.call_soon_threadsafe(self._news.set)
+
+    def hear(self, passing: ServerSentEvent) -> None:
+        """Takes an event that is not stored, from any thread."""
+        self._passing = (_number(self._head()), passing)
+        self.wake()
 
     def end(self) -> None:
         """End the stream behind what there is by now, from any thread."""
-        self._in_loop(self._note_end)
+        self._is_ended = True
+        self.wake()
 
     def close(self) -> None:
         self._follower.close()
@@ -80,10 +87,12 @@ class Subscription:
 
     async def _events(self) -> AsyncIterator[ServerSentEvent]:
         yield ServerSentEvent(retry=RETRY_MS)
+        sent = None
         while True:
             is_last = self._is_ended  # before the last look: what came before the end still goes out
             self._news.clear()
-            passing, self._passing = self._passing, None
+            newest = self._passing
+            passing, sent = (None if newest is sent else newest), newest
             while records := await asyncio.to_thread(self._read):
                 for record in records:
                     if passing is not None and record.number > passing[0]:
@@ -108,18 +117,6 @@ class Subscription:
             return self._follower.read(_PAGE)
         except (StoreError, TimeoutError):
             return []
-
-    def _note(self, passing: tuple[int, ServerSentEvent] | None) -> None:
-        self._passing = passing or self._passing
-        self._news.set()
-
-    def _note_end(self) -> None:
-        self._is_ended = True
-        self._news.set()
-
-    def _in_loop(self, call: Callable[..., None], *args: object) -> None:
-        with suppress(RuntimeError):  # the loop is closed: so is the stream
-            self._loop.call_soon_threadsafe(call, *args)
 
 
 def _number(cursor: str) -> int:

@@ -18,7 +18,7 @@ from gateway.store import StoreReader
 from gateway.store.journal import ALARM
 from gateway.web.routes.history import FILE, JSON, CsvFile, HistoryQuery, TimeSpan, history_page, rest_of_page
 from gateway.web.routes.service_calls import AsShown, Shown
-from gateway.web.schemas import problem_responses
+from gateway.web.schemas import Page, problem_responses
 
 ENTRIES_AT_A_TIME: Final = 100  # chosen: in memory for each file that is being sent
 
@@ -121,28 +121,10 @@ class Alarm(BaseModel):
     detail: str | None = Field(description="which sensors are silent, or why batches are refused")
 
 
-class _Page(BaseModel):
-    next_cursor: str | None
-    last_cursor: str | None
-
-
-class EventsPage(_Page):
-    """Load events in the order in which their last revisions came."""
-
-    items: list[LoadEvent]
-
-
-class TripsPage(_Page):
-    """Trips in the order in which their last revisions came."""
-
-    items: list[Trip]
-
-
-class AlarmsPage(_Page):
+class AlarmsPage(Page[Alarm]):
     """The active alarms, the oldest first, and a piece of the history in the order of last revisions."""
 
     active: list[Alarm]
-    items: list[Alarm]
 
 
 def events_router(reader: StoreReader) -> APIRouter:
@@ -157,12 +139,12 @@ def events_router(reader: StoreReader) -> APIRouter:
         table = CsvFile(f"springscale-{name}", COLUMNS[kind], partial(cells_of, kind), ENTRIES_AT_A_TIME)
         return await table.sent(reader, (kind,), span, shown)
 
-    @router.get("/events", response_model=EventsPage, responses=problem_responses(422, 503))
+    @router.get("/events", response_model=Page[LoadEvent], responses=problem_responses(422, 503))
     async def events(query: Annotated[HistoryQuery, Query()], shown: AsShown) -> Response:
         """Loading and unloading. A revised event comes again, behind all earlier ones: follow next_cursor."""
         return await page(EntryKind.EVENT, query, shown)
 
-    @router.get("/trips", response_model=TripsPage, responses=problem_responses(422, 503))
+    @router.get("/trips", response_model=Page[Trip], responses=problem_responses(422, 503))
     async def trips(query: Annotated[HistoryQuery, Query()], shown: AsShown) -> Response:
         """Every drive with its load and tonne-kilometres. A revised trip comes again: follow next_cursor."""
         return await page(EntryKind.TRIP, query, shown)

@@ -2,57 +2,29 @@
 words.
 """
 
+from collections.abc import Mapping
+
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from gateway.estimates.budget import Remedy
-from gateway.estimates.reasons import EXPLANATIONS, REMEDIES, SOURCES, Cause
+from gateway.estimates.reasons import EXPLANATIONS, REMEDIES, SOURCES, Explanation
 from gateway.records import Why
 
 
-class ReasonInWords(BaseModel):
-    """Why a batch may give no estimate, and what to do. Names in backquotes are settings of [batch]."""
-
-    reason: Why = Field(examples=[Why.TOO_SLOW])
-    cause: Cause = Field(examples=[Cause.DRIVE])
-    happened: str = Field(
-        examples=["the speed was below `speed_min_mps` for too much of the window: town traffic, a queue, a yard"]
-    )
-    advice: str = Field(examples=["nothing; an open road is enough"])
-
-
-class SourceInWords(BaseModel):
-    """A cause of error."""
-
-    source: str = Field(examples=["load_length"])
-    words: str = Field(examples=["the length and height of this very load"])
-
-
-class RemedyInWords(BaseModel):
-    """Remedies that narrow an error."""
-
-    remedy: Remedy
-    advice: str = Field(examples=["drive another ten minutes with the same load"])
-
-
 class ReasonsInWords(BaseModel):
-    """All reasons, and all sources of error with their remedies."""
+    """All reasons, and all sources of error with their remedies, by name."""
 
-    items: list[ReasonInWords]
-    sources: list[SourceInWords]
-    remedies: list[RemedyInWords]
+    reasons: Mapping[Why, Explanation] = Field(
+        description="why a batch may give no estimate, and what to do; names in backquotes are settings of [batch]"
+    )
+    sources: Mapping[str, str] = Field(examples=[{"load_length": "the length and height of this very load"}])
+    remedies: Mapping[Remedy, str] = Field(examples=[{"drive_on": "drive another ten minutes with the same load"}])
 
 
 def reasons_router() -> APIRouter:
     router = APIRouter(prefix="/api/v1", tags=["api"])
-    explained = ReasonsInWords(
-        items=[
-            ReasonInWords(reason=why, cause=told.cause, happened=told.happened, advice=told.advice)
-            for why, told in EXPLANATIONS.items()
-        ],
-        sources=[SourceInWords(source=source, words=words) for source, words in SOURCES.items()],
-        remedies=[RemedyInWords(remedy=remedy, advice=advice) for remedy, advice in REMEDIES.items()],
-    )
+    explained = ReasonsInWords(reasons=EXPLANATIONS, sources=SOURCES, remedies=REMEDIES)
 
     @router.get("/reasons")
     async def reasons() -> ReasonsInWords:

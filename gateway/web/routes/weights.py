@@ -12,14 +12,14 @@ from pydantic import BaseModel, Field
 
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import unsprung_kg
-from gateway.estimates.batch_estimate import Weight
+from gateway.estimates.as_json import weights_to_json
 from gateway.estimates.quantities import QUANTITIES
 from gateway.records import iso_utc, rounded
 from gateway.stated.facts import Instant
 from gateway.status import Status
 from gateway.web.live.board import Board
 from gateway.web.routes.present_load import NOT_WEIGHED, Scales, VerdictTold
-from gateway.web.schemas import WeightFigure, WeightFigures
+from gateway.web.schemas import WeightFigures
 
 
 class LoadPlace(BaseModel):
@@ -62,21 +62,10 @@ def weights_router(board: Board, scales: Scales, status: Callable[[], Status]) -
             is_stale=shown.is_stale,
             load=None if place is None else LoadPlace(**{name: rounded(x, 3) for name, x in asdict(place).items()}),
             verdict=scales.present_load(board, status()).told(),
-            **{where: _figure(weight) for where, weight in scales.weigh(estimate).items()},
+            **weights_to_json(scales.weigh(estimate)),
         )
 
     return router
-
-
-def _figure(weight: Weight) -> WeightFigure:
-    return WeightFigure(
-        kg=rounded(weight.kg, 3),
-        std_kg=rounded(weight.std_kg, 3),
-        limit_kg=weight.limit_kg,
-        is_over_limit=weight.is_over_limit,
-        lacks=weight.lacks,
-        is_unsprung_estimated=weight.is_unsprung_estimated,
-    )
 
 
 _UINT16_LAST: Final = 65_535  # the greatest number of 16 bits

@@ -1,11 +1,10 @@
-// The engineer's page: why batches were refused, spectra, sensors, bus and calibration.
+// The engineer's page: why batches were refused, sensors, bus and calibration.
 
 import "./phrases.js"; // first: the others find its words in the page
 import "./fold.js";
 import "./state-view.js";
 import "./alarm-view.js";
 import "./health-view.js";
-import "./spectra-view.js";
 
 import { feed } from "./feed.js";
 

@@ -14,9 +14,6 @@ const GATHER_MS = 50; // chosen: shorter than a person notices
 const MOST_BATCHES = 1000; // the limit of a page of the API
 const BATCHES_BY_HOURS = { 3: 300, 24: 300, 168: MOST_BATCHES };
 
-/** Whether this page shows it: a dashboard asks for no spectra, an engineer's page for no day. */
-const has = (card) => element(card) !== null;
-
 async function askNow() {
   try {
     const [status, latest] = await Promise.all([load("api/v1/status"), load("api/v1/estimates/latest")]);
@@ -37,7 +34,7 @@ async function askBatches() {
 const ENTRIES = "order=newest_first&limit=200";
 
 async function askDay() {
-  if (!has("day")) return;
+  if (element("day") === null) return; // an engineer's page
   const [events, trips] = await Promise.all([load(`api/v1/events?${ENTRIES}`), load(`api/v1/trips?${ENTRIES}`)]);
   learn({ events: events.items, trips: trips.items });
 }
@@ -49,10 +46,6 @@ function revised(entries, entry) {
   const before = (entries ?? []).find((one) => one.id === entry.id);
   if (before && before.revision >= entry.revision) return entries;
   return [entry, ...(entries ?? []).filter((one) => one.id !== entry.id)];
-}
-
-async function askSpectra() {
-  if (has("spectra")) learn({ spectra: await load("api/v1/spectra/latest") });
 }
 
 async function askOnce() {
@@ -73,7 +66,7 @@ let asking = null;
 function askSoon() {
   asking ??= setTimeout(() => {
     asking = null;
-    Promise.all([askNow(), askSpectra(), askTruth()]).catch(giveUpUntilNext);
+    Promise.all([askNow(), askTruth()]).catch(giveUpUntilNext);
   }, GATHER_MS);
 }
 
@@ -99,7 +92,7 @@ const giveUpUntilNext = (error) => console.info(error.message);
 /** What the page needs to be complete; fetched again whenever the stream comes back. */
 async function catchUp() {
   await askNow();
-  await Promise.all([askOnce(), askSpectra(), askTruth()]);
+  await Promise.all([askOnce(), askTruth()]);
   await Promise.all([askAlarms(), askDay()]);
 }
 

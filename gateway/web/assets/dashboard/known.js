@@ -7,7 +7,6 @@ export const known = {
   status: null,
   vehicle: null,
   weights: null,
-  spectra: null,
   learning: null, // GET /learning
   alarms: null, // newest first, those that stand among them
   events: null, // load events, newest first

@@ -9,16 +9,13 @@ import { REASONS_DE, REMEDIES_DE, SOURCES_DE } from "../words/reasons.js";
 export const phrase = speaker(COMMON, DASHBOARD, HELPS);
 
 /** The gateway's English texts of reasons, sources and remedies, by name, in the reader's language. */
-export function explained({ items, sources, remedies }) {
-  const isGerman = language === "de";
-  const inGerman = (told) => {
-    const [happened, advice] = (isGerman && REASONS_DE[told.reason]) || [told.happened, told.advice];
-    return { ...told, happened, advice };
-  };
+export function explained({ reasons, sources, remedies }) {
+  const inGerman = (german, told) => new Map(Object.entries(language === "de" ? { ...told, ...german } : told));
+  const reasonsDe = Object.entries(REASONS_DE).map(([reason, [happened, advice]]) => [reason, { happened, advice }]);
   return {
-    reasons: new Map(items.map((told) => [told.reason, inGerman(told)])),
-    sources: new Map(sources.map((told) => [told.source, (isGerman && SOURCES_DE[told.source]) || told.words])),
-    remedies: new Map(remedies.map((told) => [told.remedy, (isGerman && REMEDIES_DE[told.remedy]) || told.advice])),
+    reasons: inGerman(Object.fromEntries(reasonsDe), reasons),
+    sources: inGerman(SOURCES_DE, sources),
+    remedies: inGerman(REMEDIES_DE, remedies),
   };
 }
 

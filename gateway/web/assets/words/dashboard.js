@@ -216,28 +216,6 @@ export const DASHBOARD = {
   webhook_dead: ["Messages it refused", "Abgelehnte Nachrichten"],
   running: ["Running for", "Läuft seit"],
 
-  spectra: ["Spectra of the suspension", "Spektren der Federung"],
-  spectra_acceleration: ["Vertical acceleration [m/s²/√Hz], log scale", "Vertikalbeschleunigung [m/s²/√Hz], logarithmisch"],
-  spectra_pitch: ["Pitch rate [rad/s/√Hz], log scale", "Nickrate [rad/s/√Hz], logarithmisch"],
-  spectra_coherence: ["Coherence of the two", "Kohärenz der beiden"],
-  spectra_phase: ["Phase of pitch rate against acceleration [rad]", "Phase der Nickrate gegen die Beschleunigung [rad]"],
-  spectra_chart: ["{title}. The API has the numbers.", "{title}. Die Zahlen stehen in der API."],
-  spectra_model: [
-    "Batch until {time}. Model: the calibrated vehicle with {kg} on board and {share} on its front axle.",
-    "Abschnitt bis {time}. Modell: das kalibrierte Fahrzeug mit {kg} Ladung und {share} auf der Vorderachse.",
-  ],
-  spectra_refused: [
-    "Batch until {time}, not weighed: {reasons}. Without an estimate there is no model.",
-    "Abschnitt bis {time}, nicht gewogen: {reasons}. Ohne Ergebnis gibt es kein Modell.",
-  ],
-  spectra_none: ["Batch until {time}. This estimator has no model of the spectra.", "Abschnitt bis {time}. Dieser Schätzer hat kein Modell der Spektren."],
-  measured: ["measured", "gemessen"],
-  model: ["model", "Modell"],
-  fitted: ["fitted model", "angepasstes Modell"],
-  bands: ["bands of the ratio index: over, under", "Bänder des Verhältnisindex: oben, unten"],
-  band_over: ["over", "oben"],
-  band_under: ["under", "unten"],
-
   calibration: ["Vehicle and calibration", "Fahrzeug und Kalibrierung"],
   vehicle: ["Vehicle", "Fahrzeug"],
   vin: ["VIN", "FIN"],

@@ -1,8 +1,7 @@
-"""Base class of the senders: one thread that takes messages from an outbox, back-off, and a status report."""
+"""Base class of the senders: one thread that delivers an outbox, pauses after failures, and a status report."""
 
 import time
 from abc import abstractmethod
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from typing import Final, Generic, TypeVar
@@ -16,7 +15,6 @@ from gateway.uplink.outbox import Outbox, OutboxMessage
 
 LOOK_S: Final = 5.0  # chosen: how often what waits is counted
 IDLE_S: Final = 5.0  # chosen: likewise where nothing comes; a new message is seen at once
-PAGE: Final = 100  # chosen: messages asked for at once
 
 Report = TypeVar("Report", UplinkStatus, WebhookStatus)
 
@@ -29,10 +27,10 @@ class NotTakenError(Exception):
         self.wait_s = wait_s
 
 
-class Forwarder(ThreadPart, Generic[Report]):
-    """Owns the thread, which alone writes the report; a sender implements ``_work`` and ``_note``.
+class Sender(ThreadPart, Generic[Report]):
+    """Delivers one message after the other until stopped, and again from the first undelivered one after a failure.
 
-    Messages that are undelivered at a stop are sent after the next start. Failures are in the report, not ``fault``.
+    Its thread alone writes the report. Failures are in the report, not in ``fault``.
     """
 
     def __init__(self, outbox: Outbox, report: Report, back_off: BackOff | None, back_off_max_s: float) -> None:
@@ -51,36 +49,36 @@ class Forwarder(ThreadPart, Generic[Report]):
         """The present report; safe from any thread. Its counts of waiting and pruned records are a few seconds old."""
         return self._report
 
-    def _deliver_all(
-        self, deliver: Callable[[OutboxMessage], bool], at_each_turn: Callable[[], None] = lambda: None
-    ) -> None:
-        """Deliver one message after the other until stopped; ``deliver`` returns False at a stop before its end."""
+    def _work(self) -> None:
         while not self._stopping.is_set():
-            messages = self._outbox.next_messages(PAGE)
+            message = self._outbox.next() if self._is_ready() else None
             self._look()
-            at_each_turn()
-            for message in messages:
-                if self._stopping.is_set() or not deliver(message):
-                    return
-                if not message.is_extra:
-                    self._outbox.delivered(message)
-            if not messages:
+            if message is None:
                 self._outbox.wait(IDLE_S)
+            elif self._deliver(message):
+                self._outbox.delivered()
 
-    def _failed(self, failure: Exception) -> None:
-        """Put the failure into the report, and try again after a pause in which what waits is counted."""
-        self._note(str(failure) or repr(failure))
-        self._outbox.rewind()
-        wait_s = failure.wait_s if isinstance(failure, NotTakenError) else 0.0
-        end_s = time.monotonic() + max(self._back_off.next_s(), wait_s)
-        while not self._stopping.is_set() and (left_s := end_s - time.monotonic()) > 0.0:
-            with suppress(StoreError, TimeoutError, OSError):  # next_messages reports them
-                self._look()
-            self._stopping.wait(min(left_s, LOOK_S))
+    def _is_ready(self) -> bool:
+        """Whether messages can be delivered; asked before each, and when there is none. Raises NotTakenError."""
+        return True
+
+    @abstractmethod
+    def _deliver(self, message: OutboxMessage) -> bool:
+        """Deliver a message; True if nothing more is to be done for it. Raises NotTakenError."""
 
     @abstractmethod
     def _note(self, fault: str) -> None:
         """Put a failure into the report, and log it if it is new."""
+
+    def _failed(self, failure: Exception) -> None:
+        """Report the failure, and pause; what waits is counted meanwhile."""
+        self._note(str(failure) or repr(failure))
+        wait_s = failure.wait_s if isinstance(failure, NotTakenError) else 0.0
+        end_s = time.monotonic() + max(self._back_off.next_s(), wait_s)
+        while not self._stopping.is_set() and (left_s := end_s - time.monotonic()) > 0.0:
+            with suppress(StoreError, TimeoutError, OSError):  # the outbox's next message reports them
+                self._look()
+            self._stopping.wait(min(left_s, LOOK_S))
 
     def _n_pruned(self, found: Delivery) -> int:
         """Number of records that retention removed before this sender delivered them."""
