@@ -284,7 +284,10 @@ def why_not_ready(status: Status) -> str | None:
     if status.state is State.READER_FAULT:
         return status.bus.last_fault or "the bus cannot be read"
     if status.calibration_id is None:
-        return "no calibration: batches carry spectra only; name a calibration file in the configuration"
+        return (
+            "no calibration: batches carry spectra only; teach the vehicle on /teach, or name a calibration file in "
+            "the configuration"
+        )
     if status.store.state != StoreState.OK:
         return f"estimates do not reach the disk: {status.store.reason}"
     return None

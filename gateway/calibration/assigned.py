@@ -234,9 +234,9 @@ def _named(which: Sequence[int], records: Sequence[StatementRecord]) -> str:
 
 def _why_waiting(one: StatementRecord, span: _Span) -> str:
     if one.until_ns is None and span.drive == -1:
-        return f"no drive within {MOST_WAIT_S / 3600.0:g} hours of {iso_utc(one.from_ns)[:16]}Z"
+        return f"no drive within {MOST_WAIT_S / 3600.0:g} hours of {iso_utc(one.from_ns)[:16]}Z is over yet"
     if one.until_ns is None:
-        return "another statement began before the drive"
+        return "another statement began before the middle of the drive"
     return f"no drive from {iso_utc(one.from_ns)[:16]}Z to {iso_utc(one.until_ns)[:16]}Z"
 
 

@@ -25,6 +25,7 @@ from gateway.estimates.batch_estimate import Estimate
 from gateway.estimates.reasons import EXPLANATIONS
 from gateway.offline.estimates import with_remainders
 from gateway.records import Why, json_line
+from gateway.service.calibration_in_use import with_learnt
 from gateway.setup import Setup, load_setup, setup_of
 from gateway.units import NS_PER_S, si_factor
 
@@ -159,11 +160,11 @@ def prepared(
     estimator: str | None,
     window_s: float | None,
 ) -> tuple[Setup, BatchSettings]:
-    """The estimator and the batch settings."""
+    """The estimator and the batch settings; with settings, the calibration that their service uses, learnt or not."""
     if config_path is not None:
         if signals is not None:
             raise click.UsageError("give --config or --signals, not both")
-        configured = load_settings(config_path)
+        configured = with_learnt(load_settings(config_path))
         if calibration is not None:
             configured = configured.model_copy(update={"calibration": calibration})
         batch = replace(configured.batch.for_core(window_s=window_s), position_decimals=configured.position.decimals)

@@ -176,9 +176,10 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         ),
         Why.OUT_OF_RANGE: Explanation(
             Cause.ANSWER,
-            "the 95 % interval lies entirely outside the loads or shares of the calibration plus a margin; for the "
-            "ratio index this holds of R itself, whose intervals grow as fast as its errors",
-            "calibrate with such loads, or check the vehicle and the sensor",
+            "the 95 % interval lies entirely above half as much again as the vehicle may carry, below nothing, or at a "
+            "share that no load between the axles gives; for the ratio index: outside the loads and shares of the "
+            "calibration",
+            "check the vehicle, its stated limits and the sensor; for the ratio index calibrate with such loads",
         ),
         Why.TOO_UNCERTAIN: Explanation(
             Cause.ANSWER,

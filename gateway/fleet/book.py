@@ -60,7 +60,7 @@ AWAY: Final = sql.exc.SQLAlchemyError
 """What :meth:`Book.write` raises while the database is away or full: it takes not even a record that is set aside."""
 
 BRANCH: Final = "springscale/+"  # of all vehicles, + where each has its name, as deploy/fleet/mosquitto/acl has it
-DOWN: Final = "/statements"  # what is stated to a vehicle is not from it
+NOT_KEPT: Final = ("/statements", "/latest")  # what is stated to a vehicle, and its last estimate a second time
 _LATEST: Final = (
     sql.select(ESTIMATE.c.record)
     .where(ESTIMATE.c.vehicle_id == VEHICLE.c.vehicle_id, ESTIMATE.c.is_weighed)
@@ -116,7 +116,7 @@ class Book:
         counts, told = Counter[str](), []
         with self._begun() as database:
             for arrival in arrivals:
-                if arrival.topic.endswith(DOWN):
+                if arrival.topic.endswith(NOT_KEPT):
                     continue
                 try:
                     found = read(arrival.topic, arrival.payload)

@@ -10,9 +10,11 @@ from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung
 from gateway.model.vehicle_model import VehicleModel
 
-RANGE_MARGIN: Final = 0.25  # chosen: share of the calibrated span, added at either end
+RANGE_MARGIN: Final = 0.25  # chosen: share of the believed span, added at either end
+OVERLOAD: Final = 1.5  # chosen: times what the vehicle may carry, of loads that must be seen because they are too heavy
 RATE_MARGIN: Final = 0.25
 """Of a sampling rate: devices of one setting differ by 1 %, settings by a factor of 2; chosen."""
+BY_MODEL: Final = "cross_spectrum"
 ONE_LOAD_SHARE: Final = 0.05  # chosen: of the empty mass; loads that differ by less are one load
 
 
@@ -69,33 +71,41 @@ class CalibratedVehicle:
         low, high = self.payload_seen_kg
         return high - low <= ONE_LOAD_SHARE * self.vehicle.empty_mass_kg
 
-    @property
-    def payload_believed_kg(self) -> tuple[float, float]:
-        """The payloads in which answers are trusted: the calibrated range plus a quarter of its span at either end.
+    def payload_believed_kg(self, estimator: str) -> tuple[float, float]:
+        """The payloads in which answers are trusted, a quarter of their span added at either end.
 
-        A calibration of one load has no range: then it is what the vehicle may carry, likewise widened.
+        The ratio index is trusted where it was calibrated. The model of the vehicle says itself how its error grows
+        beyond: it is trusted in what the vehicle may carry, and half as much again.
         """
         low, high = self.payload_seen_kg
-        if self.is_of_one_load:
-            low, high = min(low, self.vehicle.payload_range_kg[0]), max(high, self.vehicle.largest_payload_kg)
+        if estimator == BY_MODEL:
+            low = min(low, self.vehicle.payload_range_kg[0])
+            high = max(high, OVERLOAD * self.vehicle.largest_payload_kg)
         return _widened(low, high)
 
-    @property
-    def front_share_believed_pct(self) -> tuple[float, float] | None:
-        """The believed range of the front share; None if calibration saw one load or place, which sets no limit."""
+    def front_share_believed_pct(self, estimator: str) -> tuple[float, float] | None:
+        """The same of the front share, where the most that the vehicle may carry lies between the axles. None if
+        calibration saw one share only.
+        """
         low, high = self.front_share_seen_pct
-        return None if self.is_of_one_load or low == high else _widened(low, high)
+        if estimator == BY_MODEL:
+            vehicle, payload_kg = self.vehicle, self.vehicle.largest_payload_kg
+            front_kg, whole_kg = vehicle.empty_front_share * vehicle.empty_mass_kg, vehicle.empty_mass_kg + payload_kg
+            low = min(low, 100.0 * front_kg / whole_kg)
+            high = max(high, 100.0 * (front_kg + payload_kg) / whole_kg)
+        return None if low == high else _widened(low, high)
 
-    def is_out_of_range(self, payload95_kg: tuple[float, float], front_share95_pct: tuple[float, float]) -> bool:
+    def is_out_of_range(
+        self, estimator: str, payload95_kg: tuple[float, float], front_share95_pct: tuple[float, float]
+    ) -> bool:
         """Whether a 95 % interval lies entirely outside the believed range, or that of the payload is wider than it.
 
         An interval of NaN is not outside.
         """
-        low, high = self.payload_believed_kg
-        is_too_wide = payload95_kg[1] - payload95_kg[0] > high - low
-        of_share = self.front_share_believed_pct
+        low, high = self.payload_believed_kg(estimator)
+        of_share = self.front_share_believed_pct(estimator)
         return (
-            is_too_wide
+            payload95_kg[1] - payload95_kg[0] > high - low
             or _is_outside(payload95_kg, (low, high))
             or (of_share is not None and _is_outside(front_share95_pct, of_share))
         )

@@ -17,7 +17,7 @@ from gateway.estimates.posterior import FRONT_SHARE, Posterior, Source
 from gateway.model.checks import MOST_PAYLOAD_STD_SHARE
 from gateway.model.weigh import by_cross_spectrum
 from gateway.records import Batch, Why
-from gateway.weighing.calibrated import CalibratedVehicle
+from gateway.weighing.calibrated import BY_MODEL, CalibratedVehicle
 
 
 class Estimator(Protocol):
@@ -49,7 +49,7 @@ def estimate(batch: Batch, calibrated: CalibratedVehicle | None, estimator: str)
             found = weigh(batch, calibrated, blank)
             if not found.counted:
                 return found
-            if calibrated.is_out_of_range(found.payload.interval95, found.front_share.interval95):
+            if calibrated.is_out_of_range(estimator, found.payload.interval95, found.front_share.interval95):
                 return found.refused(Why.OUT_OF_RANGE)  # without the stated share's error, which known loads share
             answer = _as_stated(found, calibrated.vehicle)
             return answer if _is_sound(answer.posterior) else answer.refused(Why.NO_SOLUTION)
@@ -127,5 +127,5 @@ def _by_ratio_index(batch: Batch, calibrated: CalibratedVehicle, blank: Estimate
 
 
 ESTIMATORS: Mapping[str, Estimator] = MappingProxyType(
-    {"cross_spectrum": _by_cross_spectrum, "ratio_index": _by_ratio_index}  # the better first
+    {BY_MODEL: _by_cross_spectrum, "ratio_index": _by_ratio_index}  # the better first
 )

@@ -17,7 +17,7 @@ from support.known_load_logs import START_NS, van_toml, write_known_loads
 from support.patience import wait_until
 from support.ports import first_answer, free_port
 from support.process import running_service
-from support.running_service import Running, serve
+from support.running_service import Running, estimated, serve
 
 from gateway.calibration.file import load_calibration
 from gateway.records import iso_utc
@@ -113,6 +113,8 @@ def test_from_no_configuration_to_the_calibration_that_the_logs_give(config: Pat
     assert "found without it" in said["listed"]
     file = learnt_file(tmp_path, version["id"])
     assert learnt_at_a_desk(drives, file, said["statements"]) == file.read_bytes()
+    again = [json.loads(line) for line in estimated(config, drives[1])]
+    assert {one["calibration_id"] for one in again} == {version["id"]}  # a recorded drive is weighed as the service does
 
 
 def learnt_at_a_desk(drives: list[Path], file: Path, statements: Any, *more: object) -> bytes:

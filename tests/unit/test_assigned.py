@@ -81,7 +81,7 @@ FATES: dict[str, tuple[list[StatementRecord], list[Fate], str]] = {
     "loaded before it drove": (
         [told("06:00", source="empty"), noted("07:00", 310.0)],
         [WAITING, MATCHED],
-        "another statement began before the drive",
+        "another statement began before the middle of the drive",
     ),
     "one ref twice": (ONE_REF, [Fate.REPLACED, MATCHED], "replaced by a later one with the ref A"),
     "two notes for one load": (ONE_LOAD, [OVERLAPPING] * 2, "of the same time as B"),

@@ -221,29 +221,46 @@ def test_out_of_range_is_an_interval_wholly_beyond_what_was_seen(
     assert (estimate_to_json(found)["front_share_interval95_pct"] is None) == is_outside
 
 
+@pytest.mark.parametrize("seen_kg", [(0.0, 0.4), (0.0, 190.0)])
 @pytest.mark.parametrize(
     ("payload95_kg", "is_refused"),
     [
         ((-1348.0, 218.0), True),  # -565 +- 783 kg says nothing
         ((100.0, 700.0), False),  # wide, but some of it can be
-        ((700.0, 750.0), True),
+        ((560.0, 620.0), False),  # half as much again as it may carry: too heavy, and to be told
+        ((780.0, 850.0), True),
         ((-300.0, -200.0), True),
     ],
 )
-def test_a_calibration_of_one_load_believes_what_the_vehicle_may_carry(
-    payload95_kg: tuple[float, float], is_refused: bool
+def test_the_model_is_believed_up_to_half_as_much_again_as_the_vehicle_may_carry(
+    payload95_kg: tuple[float, float], is_refused: bool, seen_kg: tuple[float, float]
 ) -> None:
-    """Up to a third of its own mass, and a quarter of that more at either end; a single share sets no limit."""
-    one = CalibratedVehicle("id", VAN, (0.0, 0.4), (50.0, 50.1))
-    assert one.payload_believed_kg == pytest.approx((-102.3, 511.5))
-    assert one.is_out_of_range(payload95_kg, (1.0, 2.0)) is is_refused
+    """It may carry a third of its own mass; what was learnt of light loads alone hides no heavy one."""
+    one = CalibratedVehicle("id", VAN, seen_kg, (50.0, 50.1))
+    assert one.payload_believed_kg("cross_spectrum") == pytest.approx((-153.45, 767.25))
+    assert one.is_out_of_range("cross_spectrum", payload95_kg, (45.0, 50.0)) is is_refused
+
+
+def test_the_model_is_believed_for_any_load_between_the_axles() -> None:
+    one = CalibratedVehicle("id", VAN, (0.0, 190.0), (50.0, 50.1))
+    low, high = one.front_share_believed_pct("cross_spectrum") or (np.nan, np.nan)
+    for share95_pct, is_outside in (((low, 45.0), False), ((high - 1.0, 99.0), False), ((high + 1.0, 99.0), True)):
+        assert one.is_out_of_range("cross_spectrum", (100.0, 150.0), share95_pct) is is_outside
+    assert low < 100.0 * VAN.empty_front_share / 1.33 < high
+
+
+def test_the_ratio_index_is_believed_where_it_was_calibrated() -> None:
+    one = CalibratedVehicle("id", VAN, (0.0, 200.0), (45.0, 55.0))
+    assert one.payload_believed_kg("ratio_index") == pytest.approx((-50.0, 250.0))
+    assert one.front_share_believed_pct("ratio_index") == pytest.approx((42.5, 57.5))
+    assert one.is_out_of_range("ratio_index", (260.0, 300.0), (50.0, 51.0))
 
 
 def test_an_interval_is_outside_if_it_is_wider_than_the_believed_range_but_not_if_it_is_unknown() -> None:
     calibrated = calibration_file().for_core()
-    low, high = calibrated.payload_believed_kg
+    low, high = calibrated.payload_believed_kg("ratio_index")
     for interval, is_outside in (((low + 1.0, high), False), ((low - 1.0, high), True), ((np.nan, np.nan), False)):
-        assert calibrated.is_out_of_range(interval, (47.0, 49.0)) is is_outside
+        assert calibrated.is_out_of_range("ratio_index", interval, (47.0, 49.0)) is is_outside
 
 
 def test_without_calibration_there_are_spectra_and_a_reason() -> None:

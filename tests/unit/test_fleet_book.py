@@ -102,9 +102,11 @@ def test_unreadable_records_are_set_aside_without_delaying_others(book: Book, tm
     assert kept == [(one.topic, one.payload) for one in poison]
 
 
-def test_statements_that_go_down_to_a_vehicle_are_no_records_of_it(book: Book) -> None:
-    assert book.write([Message("springscale/van-1/statements", b"from;source\n")]) == []
-    assert book.fleet().n_unreadable == 0
+def test_statements_to_a_vehicle_and_the_copy_of_its_last_estimate_are_no_records(book: Book) -> None:
+    copy = estimate("van-1", 1, 200.0).payload
+    sent = [Message("springscale/van-1/statements", b"from;source\n"), Message("springscale/van-1/latest", copy)]
+    assert book.write(sent) == []
+    assert (book.fleet().n_unreadable, book.fleet().items) == (0, [])
 
 
 def test_a_record_that_the_database_alone_refuses_is_set_aside(book: Book, monkeypatch: pytest.MonkeyPatch) -> None:

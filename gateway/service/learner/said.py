@@ -15,7 +15,10 @@ from gateway.service.learner.van import StatedVan
 from gateway.stated.learning import ImportTold, StatementPage, StatementTold
 from gateway.stated.statement import StatementRecord
 
-NO_VEHICLE: Final = "the vehicle is not stated yet: its axle weights, wheelbase and the sensor's place are needed"
+NO_VEHICLE: Final = (
+    "the vehicle is not known yet: state its axle weights, its wheelbase and the sensor's place, and answer what is "
+    "asked of them"
+)
 NEXT_FIT: Final = "its drive is there: it is learnt from with the next fit"
 
 

@@ -13,7 +13,7 @@ from gateway.stated.learning import SisterTold, StatedVehicle
 from gateway.status import SignalHealth, Status
 from gateway.web.routes.service_calls import By, LearnerBackend
 from gateway.web.schemas import problem_responses, utf8_only
-from gateway.weighing.calibrated import CalibratedVehicle
+from gateway.weighing.calibrated import BY_MODEL, CalibratedVehicle
 
 
 class CalibrationFigures(BaseModel):
@@ -27,7 +27,7 @@ class CalibrationFigures(BaseModel):
         description="an interval that lies outside, or is wider, is rejected as out_of_range"
     )
     front_share_believed_pct: tuple[float, float] | None = Field(
-        description="an interval that lies outside is rejected as out_of_range; null: one load seen, no limit"
+        description="an interval that lies outside is rejected as out_of_range; null: one share seen, no limit"
     )
     speed_seen_mps: tuple[float, float] | None = Field(description="batch means", examples=[[13.5, 14.1]])
 
@@ -74,7 +74,7 @@ def vehicle_router(
             vehicle_id=now.vehicle_id,
             vin=now.vin,
             estimator=now.estimator,
-            calibration=None if calibrated is None else _calibration(calibrated),
+            calibration=None if calibrated is None else _calibration(calibrated, now.estimator or BY_MODEL),
             figures=None if calibrated is None else calibrated.vehicle,
             signals=now.signals,
             stated=None if learner is None else learner.van.told(),
@@ -117,15 +117,15 @@ def vehicle_router(
     return router
 
 
-def _calibration(calibrated: CalibratedVehicle) -> CalibrationFigures:
+def _calibration(calibrated: CalibratedVehicle, estimator: str) -> CalibrationFigures:
     by_estimator = {"cross_spectrum": calibrated.cross_spectrum, "ratio_index": calibrated.ratio_index}
     return CalibrationFigures(
         id=calibrated.id,
         estimators=tuple(name for name, part in by_estimator.items() if part is not None),
         payload_seen_kg=calibrated.payload_seen_kg,
         front_share_seen_pct=calibrated.front_share_seen_pct,
-        payload_believed_kg=calibrated.payload_believed_kg,
-        front_share_believed_pct=calibrated.front_share_believed_pct,
+        payload_believed_kg=calibrated.payload_believed_kg(estimator),
+        front_share_believed_pct=calibrated.front_share_believed_pct(estimator),
         speed_seen_mps=_speed_seen_mps(calibrated),
     )
 
