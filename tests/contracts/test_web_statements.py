@@ -67,7 +67,7 @@ def test_a_statement_comes_before_its_drive_and_waits_for_it(local: Client, benc
 
 
 def test_a_statement_without_a_vehicle_waits_and_names_what_is_missing(local: Client) -> None:
-    assert "vehicle is not stated" in post(local)["reason"]
+    assert "vehicle is not known yet" in post(local)["reason"]
     assert local.get(LEARNING).json()["lacks"] == ["vehicle", "drives"]
 
 
