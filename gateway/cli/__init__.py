@@ -43,8 +43,14 @@ _COMMANDS = {
 
 INTERRUPTED = 130  # 128 and the number of SIGINT, as shells have it
 
-# Commands that a vehicle does not need: the extra "workbench", in Debian a package of its own.
-_WORKBENCH = frozenset({"matplotlib", "numba"})
+# What a vehicle does not need, and the extra that has it; in Debian the workbench is a package of its own.
+_EXTRAS = {
+    "matplotlib": "workbench",
+    "numba": "workbench",
+    "distributed": "archive",
+    "obstore": "archive",
+    "polars": "archive",
+}
 _DEBIAN_TREE = Path("/usr/lib/springscale")
 
 
@@ -127,9 +133,10 @@ def _call(arguments: list[str] | None) -> None:
         click.echo(f"springscale: {fault}", err=True)
         sys.exit(fault.exit_code)
     except ModuleNotFoundError as fault:
-        if fault.name is None or fault.name.partition(".")[0] not in _WORKBENCH:
+        extra = _EXTRAS.get((fault.name or "").partition(".")[0])
+        if extra is None:
             raise
-        click.echo(f"springscale: this command needs {fault.name}: {_workbench_install()}", err=True)
+        click.echo(f"springscale: this command needs {fault.name}: {_install(extra)}", err=True)
         sys.exit(1)
     except BrokenPipeError:  # the reader of our output has gone, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -148,7 +155,8 @@ def _leave_threads_behind(leaving: SystemExit) -> None:
     os._exit(code)
 
 
-def _workbench_install() -> str:
-    """The command that installs the workbench beside this installation."""
-    is_debian = Path(__file__).is_relative_to(_DEBIAN_TREE)
-    return "apt install springscale-workbench" if is_debian else "pip install 'springscale[workbench]'"
+def _install(extra: str) -> str:
+    """The command that installs an extra beside this installation."""
+    if extra == "workbench" and Path(__file__).is_relative_to(_DEBIAN_TREE):
+        return "apt install springscale-workbench"
+    return f"pip install 'springscale[{extra}]'"

@@ -91,18 +91,21 @@ def config(tmp_path: Path, port: int) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "needs"),
+    ("arguments", "needs", "extra"),
     [
-        (("demo", "--once"), "numba"),
-        (("simulate", "campaign", "experiment", "a"), "numba"),
-        (("reproduce",), "(matplotlib|numba)"),
+        (("demo", "--once"), "numba", "workbench"),
+        (("simulate", "campaign", "experiment", "a"), "numba", "workbench"),
+        (("reproduce",), "(matplotlib|numba)", "workbench"),
+        (("reprocess",), "(distributed|obstore|polars)", "archive"),
     ],
     ids=lambda each: each[0] if isinstance(each, tuple) else "",
 )
-def test_a_command_of_the_workbench_names_its_extra(vehicle: Command, arguments: tuple[str, ...], needs: str) -> None:
+def test_a_command_that_needs_an_extra_names_it(
+    vehicle: Command, arguments: tuple[str, ...], needs: str, extra: str
+) -> None:
     asked = vehicle(*arguments)
     assert asked.returncode == 1
-    said = rf"springscale: this command needs {needs}: pip install 'springscale\[workbench\]'\n"
+    said = rf"springscale: this command needs {needs}: pip install 'springscale\[{extra}\]'\n"
     assert re.fullmatch(said, asked.stderr)
 
 

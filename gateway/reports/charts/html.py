@@ -6,7 +6,8 @@ The pages have no scripts and load nothing from other hosts.
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
+from datetime import date
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -53,9 +54,16 @@ def write_report(
     on_chart: OnChart = lambda done, of: None,
 ) -> Path:
     """Write report.html, its numbers as report.json and the charts' figures; return the path of report.html."""
-    text = json.dumps(numbers, indent=1, allow_nan=False, ensure_ascii=False)
+    text = json.dumps(numbers, indent=1, allow_nan=False, ensure_ascii=False, default=_as_json)
     (directory / "report.json").write_text(text + "\n", encoding="utf-8")
     return write_page(directory / "report.html", page, sections, on_chart)
+
+
+def _as_json(told: Any) -> Any:
+    """Records as objects of their fields, frames as lists of rows, dates as text."""
+    if is_dataclass(told):
+        return {one.name: getattr(told, one.name) for one in fields(told)}
+    return str(told) if isinstance(told, date) else told.to_dicts()
 
 
 def write_page(path: Path, page: Page, sections: Sequence[Section], on_chart: OnChart = lambda done, of: None) -> Path:
