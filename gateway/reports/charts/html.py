@@ -23,26 +23,30 @@ OnChart = Callable[[int, int], None]  # (charts drawn, charts in all)
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A document: its head and the contents of ``main`` (HTML). ``skip_to`` is the anchor of the main content."""
+    """The top of a document: its title, what stands below it (HTML), and the anchor of the main content.
+
+    ``summary`` (HTML) stands before the sections.
+    """
 
     title: str
     header: str
-    main: str
-    skip_to: tuple[str, str]
+    skip_to: str
+    summary: str = ""
 
 
-def document(page: Page) -> str:
+def document(page: Page, sections: Sequence[Section]) -> str:
     """The complete document; it loads nothing from other hosts."""
-    anchor, words = page.skip_to
+    links = "".join(f'<li><a href="#{one.anchor}">{escape(one.heading)}</a></li>' for one in sections)
+    contents = f'<nav aria-label="Contents"><ul>{links}</ul></nav>{"".join(map(section_html, sections))}'
     style = files("gateway.reports").joinpath("assets", "report.css").read_text(encoding="utf-8")
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         '<meta name="color-scheme" content="light dark">'
         f"<title>{escape(page.title)}</title><style>{style}</style></head><body>"
-        f'<a class="skip" href="#{anchor}">{escape(words)}</a>'
+        f'<a class="skip" href="#{page.skip_to}">Skip to the content</a>'
         f"<header><h1>{escape(page.title)}</h1>{page.header}</header>"
-        f"<main>{page.main}</main></body></html>\n"
+        f"<main>{page.summary}{contents}</main></body></html>\n"
     )
 
 
@@ -72,7 +76,7 @@ def write_page(path: Path, page: Page, sections: Sequence[Section], on_chart: On
     for done, chart in enumerate(charts, 1):
         save_still(chart, path.parent / FIGURES)
         on_chart(done, len(charts))
-    path.write_text(document(page), encoding="utf-8")
+    path.write_text(document(page, sections), encoding="utf-8")
     return path
 
 
@@ -90,13 +94,6 @@ def charts_of(sections: Sequence[Section]) -> Iterator[Chart]:
     for section in sections:
         yield from section.charts
         yield from (item for _, inside in section.folded for item in inside if isinstance(item, Chart))
-
-
-def sections_html(sections: Sequence[Section]) -> str:
-    """The table of contents and the sections."""
-    links = "".join(f'<li><a href="#{one.anchor}">{escape(one.heading)}</a></li>' for one in sections)
-    body = "".join(map(section_html, sections))
-    return f'<nav aria-label="Contents"><ul>{links}</ul></nav>{body}'
 
 
 def prose(text: str) -> str:

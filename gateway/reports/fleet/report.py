@@ -5,16 +5,14 @@
 The pages are self-contained: they load nothing from other hosts and can be read without scripts.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from gateway.archive.fleet.fleet import FleetSummary, FleetVehicle
-from gateway.reports.charts import Section
 from gateway.reports.charts.html import (
     Page,
     made_folder,
     prose,
-    sections_html,
     write_page,
     write_report,
 )
@@ -34,14 +32,14 @@ def write_fleet_report(
     for done, vehicle in enumerate(fleet.vehicles):
         on_page(done, len(fleet.vehicles) + 1)
         sections = vehicle_sections(vehicle)
-        write_page(directory / "vehicles" / page_of(vehicle.name), _vehicle_page(vehicle, sections), sections)
+        write_page(directory / "vehicles" / page_of(vehicle.name), _vehicle_page(vehicle), sections)
     looks = looks_of(fleet)
     sections = fleet_sections(fleet, looks)
     in_short = (
         f"{fleet.first} to {fleet.last}: {whole(fleet.n)} batches, {percent(fleet.n_answered, fleet.n)} of them "
         f"answered. {counted(len(looks), 'thing') if looks else 'Nothing'} to look at. From {source}."
     )
-    overview = _page(counted(len(fleet.vehicles), "vehicle"), f"<p>{prose(in_short)}</p>", sections, "look")
+    overview = Page(counted(len(fleet.vehicles), "vehicle"), f"<p>{prose(in_short)}</p>", skip_to="look")
     numbers = {
         "dataset": source,
         "from": fleet.first,
@@ -58,16 +56,11 @@ def write_fleet_report(
     return report
 
 
-def _vehicle_page(vehicle: FleetVehicle, sections: Sequence[Section]) -> Page:
+def _vehicle_page(vehicle: FleetVehicle) -> Page:
     calibrated = ", ".join(vehicle.calibrations) or "without a calibration"
     text = (
         f"{vehicle.first} to {vehicle.last}: {whole(vehicle.n)} batches, {percent(vehicle.n_answered, vehicle.n)} of "
         f"them answered. Calibration: {calibrated}."
     )
     head = f'<p><a href="../report.html">The fleet</a></p><p>{prose(text)}</p>'
-    return _page(vehicle.name, head, sections, "loads")
-
-
-def _page(title: str, head: str, sections: Sequence[Section], first: str) -> Page:
-    heading = next(section.heading for section in sections if section.anchor == first)
-    return Page(title, head, sections_html(sections), (first, f"Skip to: {heading}"))
+    return Page(vehicle.name, head, skip_to="loads")

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from gateway.calibration.campaign_file import Campaign, load_campaign
 from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
@@ -155,3 +157,28 @@ def with_paper_bands(calibrated: CalibratedVehicle, driven: DrivenCampaign) -> C
             front_share=fit_regression(MODEL_11_FRONT_SHARE, rows.ra, rows.rg, rows.front_share_pct, rows.run).model,
         ),
     )
+
+
+def condition_of(run: KnownRun) -> str:
+    """ "08_L225_D50.0_50kmh_iri2/can.log.gz" -> "50kmh iri2"."""
+    return " ".join(run.name.split("/", maxsplit=1)[0].split("_")[3:])
+
+
+def mean_errors(run: KnownRun, method: Method) -> tuple[float, float]:
+    """Mean error of payload [kg] and share [points] over a run's batches, with the ratio index's gates disabled."""
+    if method.estimator == RATIO_INDEX and method.calibrated.ratio_index is not None:
+        calibration = method.calibrated.ratio_index
+        rows = index_rows([run], calibration)
+        models = (calibration.payload, calibration.front_share)
+        errors = [
+            [m.predict(a, g)[0] - true if m else np.nan for m, true in zip(models, truth, strict=True)]
+            for a, g, *truth in zip(rows.ra, rows.rg, rows.payload_kg, rows.front_share_pct, strict=True)
+        ]
+    else:
+        errors = [
+            [one.estimate.payload.number - one.payload_kg, one.estimate.front_share.number - one.front_share_pct]
+            for one in method.judge([run])
+            if one.estimate.counted
+        ]
+    payload_kg, share_pp = np.mean(errors, axis=0).tolist() if errors else (np.nan, np.nan)
+    return payload_kg, share_pp
