@@ -235,10 +235,10 @@ def _over_time(experiments: Experiments, kind: str) -> Iterator[Panel]:
     judged = [
         (method.label, [one for one in method.judge(runs) if one.estimate.counted]) for method in experiments.simulated
     ]
-    ends = np.array([(run.batches[0].t_start_ns, run.batches[-1].t_end_ns) for run in runs])
+    ends_ns = np.array([(run.batches[0].t_start_ns, run.batches[-1].t_end_ns, np.nan) for run in runs])  # with gaps
     true = {"payload": [run.payload_kg for run in runs], "front_share": [run.front_share_pct for run in runs]}
     for target, title in _TITLES.items():
-        marks: list[Mark] = [LineMark(_minutes(ends, start_ns).ravel(), np.repeat(true[target], 2), "truth", GREY)]
+        marks: list[Mark] = [LineMark(_minutes(ends_ns, start_ns).ravel(), np.repeat(true[target], 3), "truth", GREY)]
         for k, (label, told) in enumerate(judged):
             _, found, low, high = _compared(told, target)
             middle_ns = np.array([(one.estimate.t_start_ns + one.estimate.t_end_ns) / 2.0 for one in told])
