@@ -20,7 +20,6 @@ from gateway.model.allocator import keep_freed_memory
 
 _COMMANDS = {
     "calibrate": "Make a calibration file from drives with known loads.",
-    "calibration": "Show a calibration file, and find the sprung mass.",
     "campaign": "Pack known-load drives into one archive, to pass on or to contribute.",
     "check-config": "Check a configuration, without opening the bus.",
     "demo": "Run the whole service on a simulated drive: no hardware, no configuration.",

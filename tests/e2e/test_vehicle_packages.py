@@ -119,14 +119,6 @@ def test_calibrated_drives_are_weighed_and_judged(campaign: Path, calibrated: Pa
     assert "cross_spectrum" in judged.stdout
 
 
-def test_a_calibration_is_shown(campaign: Path, calibrated: Path, vehicle: Command) -> None:
-    for arguments in (("show", calibrated),):
-        asked = vehicle("calibration", *arguments)
-        assert "Traceback" not in asked.stderr
-        assert asked.returncode in (0, 1), asked.stderr
-        assert asked.stdout
-
-
 def test_a_report_names_the_extra(campaign: Path, vehicle: Command) -> None:
     asked = vehicle("calibrate", campaign, *WINDOW, "--output", campaign.parent / "b.json", "--report", "report")
     assert asked.returncode == 1

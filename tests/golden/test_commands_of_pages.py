@@ -48,7 +48,6 @@ OWN_RUN_BY = {  # how a command of ours begins: what runs it
     "springscale calibrate my-van.zip": PACK,
     "springscale evaluate my-van.zip": PACK,
     "springscale calibrate": "tests/golden/test_recorded_roll.py",
-    "springscale calibration": "tests/unit/test_calibration_commands.py",
     "springscale campaign pack": PACK,
     "springscale check-config": "tests/unit/test_command_line.py",
     "springscale demo": DEMO,
