@@ -25,7 +25,6 @@ _COMMANDS = {
     "demo": "Run the whole service on a simulated drive: no hardware, no configuration.",
     "estimate": "Weigh from log files, one line per batch.",
     "evaluate": "Compare estimates with known loads: the error table.",
-    "events": "What was loaded and unloaded where and when, and the trips between, from log files.",
     "feed": "Send an IMU of Linux IIO and a receiver behind gpsd onto a CAN interface.",
     "fleet-report": "A fleet's data set as pages: each vehicle and what needs attention.",
     "learn": "Learn a vehicle from the logs of ordinary drives and from delivery notes.",

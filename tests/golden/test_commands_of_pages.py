@@ -53,7 +53,6 @@ OWN_RUN_BY = {  # how a command of ours begins: what runs it
     "springscale demo": DEMO,
     "springscale estimate": "tests/unit/test_estimate_command.py",
     "springscale evaluate": "tests/golden/test_recorded_roll.py",
-    "springscale events": "tests/unit/test_events_command.py",
     "springscale feed": FEED,
     "springscale fleet-report": "tests/e2e/test_archive_to_report.py",
     "springscale learn": "tests/e2e/test_learn.py",
