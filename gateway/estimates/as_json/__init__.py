@@ -21,9 +21,6 @@ from gateway.estimates.as_json.kinds import (
     SPECTRA,
     WEIGHTS,
     FieldKind,
-    posterior_from_json,
-    posterior_to_json,
-    weights_to_json,
     without_dates,
     without_places,
 )
@@ -42,11 +39,8 @@ __all__ = [
     "csv_cells",
     "estimate_from_json",
     "estimate_to_json",
-    "posterior_from_json",
-    "posterior_to_json",
     "read_estimate",
     "table_row",
-    "weights_to_json",
     "without_dates",
     "without_places",
 ]

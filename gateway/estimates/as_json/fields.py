@@ -29,7 +29,6 @@ from gateway.estimates.as_json.kinds import (
     WEIGHTS,
     WHOLE,
     FieldKind,
-    weights_to_json,
     without_dates,
 )
 from gateway.estimates.batch_estimate import UNKNOWN_INTERVAL, Epoch, Estimate, Quantity, Weight, Weights
@@ -167,7 +166,7 @@ FIELDS: Final = (
         "weights",
         WEIGHTS,
         "on the road, standing on level ground, unsprung masses included",
-        weights_to_json(_WEIGHTS),
+        WEIGHTS.write(_WEIGHTS),
         columns=WEIGHT_COLUMNS,
     ),
     _column("roll_usable_share", NUMBER, "share of `usable_share` with a known roll rate", 0.99),

@@ -14,7 +14,7 @@ from typing import Any, Final
 from gateway.calibration.from_drives import Outcome
 from gateway.calibration.judgement.advice import GRADE_TEXT, Grade, Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import Assessment, stated_budget
-from gateway.estimates.as_json.kinds import budget_to_json
+from gateway.estimates.as_json.kinds import BUDGET
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.fitted_vehicle import fitted_vehicle_section
 from gateway.reports.calibration.ratio_index import ratio_index_section
@@ -87,7 +87,7 @@ def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...]) -> dict[s
             one.estimator: {str(part): table.to_json() for part, table in one.tables.items()}
             for one in assessment.judgements
         },
-        "error_budget": {one.estimator: budget_to_json(stated_budget(one)) for one in assessment.judgements},
+        "error_budget": {one.estimator: BUDGET.write(stated_budget(one)) for one in assessment.judgements},
     }
 
 
