@@ -14,9 +14,21 @@ import polars as pl
 
 from gateway.archive.places import Location
 from gateway.archive.receipts import Slot
-from gateway.estimates.as_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, WEIGHTS, EstimateField, FieldKind
-from gateway.estimates.as_json.kinds import COUNT, INTERVAL, OVER_LIMIT, TEXT, WHOLE, places_over_limit
+from gateway.estimates.as_json import FIELDS, EstimateField
 from gateway.estimates.budget import OWN
+from gateway.estimates.field_kinds import (
+    COUNT,
+    INSTANT,
+    INTERVAL,
+    NUMBERS_BY_NAME,
+    OVER_LIMIT,
+    REASONS,
+    TEXT,
+    WEIGHTS,
+    WHOLE,
+    FieldKind,
+    places_over_limit,
+)
 
 SCHEMA_VERSION: Final = 1  # of the columns
 SCHEMA_KEY: Final = "springscale_schema"  # its name in the metadata of every file

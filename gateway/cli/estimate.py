@@ -20,8 +20,9 @@ from gateway.config import load_settings
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import NothingWeighedError
-from gateway.estimates.as_json import COLUMNS, estimate_to_json, table_row, without_dates
+from gateway.estimates.as_json import COLUMNS, estimate_to_json, table_row
 from gateway.estimates.batch_estimate import Estimate
+from gateway.estimates.field_kinds import without_dates
 from gateway.estimates.reasons import EXPLANATIONS
 from gateway.offline.estimates import with_remainders
 from gateway.records import Why, json_line

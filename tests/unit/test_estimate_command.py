@@ -25,8 +25,9 @@ from gateway.bus.logs.packed import zstd
 from gateway.bus.signals import load_signal_map
 from gateway.cli.estimate import sentence
 from gateway.errors import LogUnreadableError, SpringscaleError
-from gateway.estimates.as_json import estimate_to_json, without_dates
+from gateway.estimates.as_json import estimate_to_json
 from gateway.estimates.batch_estimate import UNKNOWN, Estimate, Quantity, Weight, Weights
+from gateway.estimates.field_kinds import without_dates
 from gateway.records import F64, Signal, Why
 from gateway.units import NS_PER_S
 

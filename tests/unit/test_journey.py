@@ -9,8 +9,8 @@ from support.drives import T0_NS, drive, joined, later, without_rows
 
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.estimates.as_json.kinds import WAY
 from gateway.estimates.batch_estimate import Place, Watched, Way
+from gateway.estimates.field_kinds import WAY
 from gateway.records import Motion, SensorTraits, Signal
 
 JOURNEY = (Signal.LATITUDE, Signal.LONGITUDE, Signal.ODOMETER, Signal.DOOR, Signal.IGNITION)

@@ -30,8 +30,8 @@ from gateway.core.loads import (
     loads_of,
     weighings_of,
 )
-from gateway.estimates.as_json.kinds import PLACE
 from gateway.estimates.batch_estimate import NOWHERE, Estimate, Quantity, Way
+from gateway.estimates.field_kinds import PLACE
 from gateway.estimates.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD
 from gateway.records import iso_utc
 from gateway.units import NS_PER_S

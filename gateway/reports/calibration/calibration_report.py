@@ -14,7 +14,7 @@ from typing import Any, Final
 from gateway.calibration.from_drives import Outcome
 from gateway.calibration.judgement.advice import GRADE_TEXT, Grade, Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import Assessment, stated_budget
-from gateway.estimates.as_json.kinds import BUDGET
+from gateway.estimates.field_kinds import BUDGET
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.fitted_vehicle import fitted_vehicle_section
 from gateway.reports.calibration.ratio_index import ratio_index_section

@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.campaign_file import Campaign, load_campaign
+from gateway.calibration.campaign_file import Campaign, file_sha256, load_campaign
+from gateway.calibration.from_drives import calibrate_inspected
 from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun
@@ -18,7 +19,7 @@ from gateway.config import ESTIMATOR_NAMES
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.ratio_index.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
-from gateway.offline.campaigns import calibrate, split_runs
+from gateway.offline.campaigns import inspect, split_runs
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.workbench.simulated_drives import bench_of, write_campaign
 
@@ -125,8 +126,15 @@ def gather(output: Path, extent: Extent, on_step: OnStep = lambda what, done, of
 
 def _methods(driven: DrivenCampaign, extent: Extent, path: Path) -> tuple[Method, ...]:
     """Every estimator calibrated on the identification part, and the ratio index with the bands of Table 2."""
-    outcome = calibrate(driven.campaign, extent.settings, estimators=ESTIMATOR_NAMES, command="springscale reproduce")
-    held = outcome.file
+    campaign = driven.campaign
+    held = calibrate_inspected(
+        campaign.vehicle,
+        inspect(campaign, extent.settings),
+        where=str(campaign.path),
+        sha256=file_sha256(campaign.path),
+        estimators=ESTIMATOR_NAMES,
+        command="springscale reproduce",
+    ).file
     path.write_text(held.to_json(), encoding="utf-8")
     calibrated = held.for_core()
     others = [name for name in held.estimators if name != RATIO_INDEX]

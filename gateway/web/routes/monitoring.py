@@ -15,7 +15,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, ProcessCol
 from prometheus_client.core import Metric, UnknownMetricFamily
 from starlette.responses import JSONResponse, Response
 
-from gateway.estimates.as_json import WEIGHTS
+from gateway.estimates.field_kinds import WEIGHTS
 from gateway.status import Status
 from gateway.web.access.problems import problem_response
 from gateway.web.live.board import Board

@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field
 
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import unsprung_kg
-from gateway.estimates.as_json import WEIGHTS
+from gateway.estimates.field_kinds import WEIGHTS
 from gateway.estimates.quantities import QUANTITIES
 from gateway.records import iso_utc, rounded
 from gateway.stated.facts import Instant

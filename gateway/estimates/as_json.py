@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
 
-from gateway.estimates.as_json.kinds import (
+from gateway.estimates.batch_estimate import UNKNOWN_INTERVAL, Epoch, Estimate, Quantity, Weight, Weights
+from gateway.estimates.field_kinds import (
     BUDGET,
     COUNT,
     EXAMPLE,
@@ -31,7 +32,6 @@ from gateway.estimates.as_json.kinds import (
     FieldKind,
     without_dates,
 )
-from gateway.estimates.batch_estimate import UNKNOWN_INTERVAL, Epoch, Estimate, Quantity, Weight, Weights
 from gateway.estimates.quantities import BY_NAME
 
 _INTERVAL95: Final = "95 % interval [low, high]"
