@@ -48,6 +48,7 @@ _EXTRAS = {
     "distributed": "archive",
     "obstore": "archive",
     "polars": "archive",
+    "sqlalchemy": "fleet",
 }
 _DEBIAN_TREE = Path("/usr/lib/springscale")
 

@@ -62,8 +62,8 @@ def prints(command: Callable[..., Told]) -> Callable[..., None]:
     """Print what the command returns: in words, or with --json the object on one line."""
 
     @functools.wraps(command)
-    def printing(*services: Any, as_json: bool, **options: Any) -> None:
-        record, text = command(*services, **options)
+    def printing(*, as_json: bool, **options: Any) -> None:
+        record, text = command(**options)
         click.echo(json_line(record) if as_json else text)
 
     return as_json(printing)
