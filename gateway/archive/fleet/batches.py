@@ -1,8 +1,7 @@
 """The batches of one vehicle as a polars frame, read table by table."""
 
 import io
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
@@ -41,12 +40,6 @@ DAYS_BEFORE: Final = 3  # of the week that holds 1970-01-01, a Thursday
 REASONS_OF: Final[Mapping[Cause, list[str]]] = {
     cause: [str(why) for why, told in EXPLANATIONS.items() if told.cause is cause] for cause in Cause
 }
-
-
-def by_vehicle(slots: Sequence[Slot]) -> Iterator[tuple[str, list[Slot]]]:
-    """The jobs of each vehicle, in order."""
-    for vehicle, jobs in groupby(sorted(slots), lambda slot: slot.vehicle):
-        yield vehicle, list(jobs)
 
 
 def read_batches(dataset: Location, jobs: Sequence[Slot]) -> pl.DataFrame:

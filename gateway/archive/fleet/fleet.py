@@ -9,10 +9,11 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import date
+from itertools import groupby
 
 import polars as pl
 
-from gateway.archive.fleet.batches import DRIFTING, by_vehicle, read_batches
+from gateway.archive.fleet.batches import DRIFTING, read_batches
 from gateway.archive.fleet.drift import Drift, drifts_of, medians_of
 from gateway.archive.fleet.faulty_sensors import Health, Trouble, date_of, troubles_of
 from gateway.archive.fleet.weeks import weeks_of
@@ -92,7 +93,7 @@ def fleet_of(dataset: Location, on_vehicle: OnVehicle = lambda done, of: None) -
 
     Raises ConfigurationError if there is nothing, or it is invalid; PlaceError if it cannot be read.
     """
-    jobs = list(by_vehicle(slots_done(dataset)))
+    jobs = [(vehicle, list(slots)) for vehicle, slots in groupby(slots_done(dataset), lambda slot: slot.vehicle)]
     if not jobs:
         raise ConfigurationError(
             f"{dataset}: holds no receipt of `springscale reprocess`: name the folder that was its --output"
