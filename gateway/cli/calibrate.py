@@ -22,7 +22,6 @@ from gateway.cli.options import (
     Parsed,
     as_json,
     batch_settings,
-    require_output_place,
     run_numbers,
     window,
 )
@@ -217,8 +216,10 @@ def _tell_inspection(inspection: Inspection, *, as_json: bool, is_all: bool) -> 
 
 def require_places(output: Path | None, report: Path | None) -> None:
     """Checked before minutes of work: the file and the directory can be written."""
-    if output is not None:
-        require_output_place(output)
+    if output is not None and output.is_dir():
+        raise click.UsageError(f"--output {output}: is a folder, not a file")
+    if output is not None and not output.parent.is_dir():
+        raise click.UsageError(f"--output {output}: there is no folder {output.parent}; make it first")
     if report is not None and report.exists() and not report.is_dir():
         raise click.UsageError(f"--report {report}: is a file, not a directory")
 

@@ -24,7 +24,7 @@ from gateway.estimates.as_json import COLUMNS, estimate_to_json, table_row
 from gateway.estimates.batch_estimate import Estimate
 from gateway.estimates.field_kinds import without_dates
 from gateway.estimates.reasons import EXPLANATIONS
-from gateway.offline.estimates import with_remainders
+from gateway.offline.estimates import estimates_of_logs
 from gateway.records import Why, json_line
 from gateway.setup import Setup, load_setup, setup_of
 from gateway.units import NS_PER_S, si_factor
@@ -68,7 +68,7 @@ def estimate(
 
     def found() -> Found:
         for log in logs:
-            for weighed in with_remainders([log], setup, settings, on_read=on_read):
+            for weighed in estimates_of_logs([log], setup, settings, on_read=on_read, with_remainders=True):
                 reasons.update(weighed.rejected or [None])
                 if setup.calibration is not None and _is_at_seen_speed(weighed, setup.calibration):
                     unlike.update(UNLIKE.intersection(weighed.rejected))

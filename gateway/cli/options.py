@@ -20,8 +20,8 @@ from gateway.units import zone_of
 FILE = click.Path(path_type=Path)
 
 
-class Number(click.types.FloatParamType):
-    """A finite number: click accepts nan, whatever the range, and inf."""
+class NumberRange(click.FloatRange):
+    """A finite number within a range: click accepts nan, whatever the range, and inf."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Raises a usage error for a typed text that is not a finite number."""
@@ -29,13 +29,6 @@ class Number(click.types.FloatParamType):
         if isinstance(value, str) and not math.isfinite(number):
             self.fail(f"{value!r} is no number", param, ctx)
         return number
-
-
-class NumberRange(Number, click.FloatRange):
-    """A finite number within a range."""
-
-
-NUMBER = Number()
 
 
 class CampaignFile(click.Path):
@@ -133,14 +126,6 @@ ZONE = Parsed("zone", zone_of)
 def batch_settings(window_s: float | None) -> BatchSettings:
     """The default settings of a batch, with another window length where one is given."""
     return BatchSection().for_core(window_s=window_s)
-
-
-def require_output_place(output: Path) -> None:
-    """Check before minutes of work that --output can be written. Raises click.UsageError."""
-    if output.is_dir():
-        raise click.UsageError(f"--output {output}: is a folder, not a file")
-    if not output.parent.is_dir():
-        raise click.UsageError(f"--output {output}: there is no folder {output.parent}; make it first")
 
 
 interface = click.option(

@@ -25,30 +25,21 @@ def estimates_of_logs(
     settings: BatchSettings = AS_THE_SERVICE,
     *,
     on_read: Callable[[LogReport], None] = lambda report: None,
+    with_remainders: bool = False,
 ) -> Iterator[Estimate]:
     """Every batch of every log in turn; each log is a drive. Raises LogUnreadableError.
 
-    ``on_read`` gets the reader's report of each log. Stretches too short for a batch are left out.
+    ``on_read`` gets the reader's report of each log. Stretches too short for a batch (``is_remainder``) are left out
+    unless they are asked for.
     """
-    return (one for one in with_remainders(logs, setup, settings, on_read=on_read) if not one.is_remainder)
-
-
-def with_remainders(
-    logs: Sequence[Path | str],
-    setup: Setup,
-    settings: BatchSettings = AS_THE_SERVICE,
-    *,
-    on_read: Callable[[LogReport], None] = lambda report: None,
-) -> Iterator[Estimate]:
-    """These batches with the stretches too short for a batch (``is_remainder``), which have a way."""
     for log in logs:
         flow = setup.flow(settings)
         motions, report = motion_of_log(log, setup.signal_map)
         for motion in motions:
-            yield from flow.feed(motion)
+            yield from (one for one in flow.feed(motion) if with_remainders or not one.is_remainder)
         report.require_frames()
         on_read(report)
-        yield from flow.flush()
+        yield from (one for one in flow.flush() if with_remainders or not one.is_remainder)
 
 
 MOST_S: Final = 9e9  # to the year 2255; a little later nanoseconds no longer fit into 64 bits

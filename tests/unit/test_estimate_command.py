@@ -40,7 +40,7 @@ def said(monkeypatch: pytest.MonkeyPatch, log: Path, *batches: Estimate) -> Spri
     def weighed(*_: Any, **__: Any) -> Iterator[Estimate]:
         yield from batches
 
-    monkeypatch.setattr(command, "with_remainders", weighed)
+    monkeypatch.setattr(command, "estimates_of_logs", weighed)
     done = called("estimate", log, "--signals", "springscale:reference", "--calibration", DEMO)
     assert done.exception is None or isinstance(done.exception, SpringscaleError), done.exception
     return done.exception
@@ -79,7 +79,7 @@ def test_without_a_calibration_the_advice_is_how_to_get_one(monkeypatch: pytest.
     def weighed(*_: Any, **__: Any) -> Iterator[Estimate]:
         yield from (make_estimate(n, Why.NO_CALIBRATION) for n in range(7))
 
-    monkeypatch.setattr(command, "with_remainders", weighed)
+    monkeypatch.setattr(command, "estimates_of_logs", weighed)
     done = called("estimate", log, "--signals", "springscale:reference")
     assert done.exit_code == 1
     assert "no_calibration (7 batches)" in str(done.exception)
