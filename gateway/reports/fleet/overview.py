@@ -15,7 +15,6 @@ from gateway.archive.fleet.fleet import FleetSummary, FleetVehicle
 from gateway.reports.charts import Axis, Chart, ChartLink, LineMark, Mark, Panel, Points, Ribbon, Section, Table
 from gateway.reports.fleet.text import (
     NAMES,
-    NONE,
     day,
     drift_told,
     every_week,
@@ -29,6 +28,7 @@ from gateway.reports.fleet.text import (
     whole,
 )
 from gateway.reports.fleet.vehicle_page import refusals_section
+from gateway.words import NONE
 
 SILENT_DAYS: Final = 28  # chosen: without a batch, before the last of the fleet's
 LITTLE_ANSWERED: Final = 0.5  # chosen: of a vehicle's batches

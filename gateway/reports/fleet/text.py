@@ -13,8 +13,8 @@ from gateway.archive.fleet.faulty_sensors import Share, Trouble
 from gateway.archive.fleet.weeks import monday_of
 from gateway.estimates.reasons import EXPLANATIONS
 from gateway.reports.charts import Axis
+from gateway.words import NONE
 
-NONE: Final = "–"
 MOST_TICKS: Final = 8  # chosen: more labels overlap
 LEAST_WEEKS_APART: Final = 3  # names that would else lie on one another
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")

@@ -14,7 +14,6 @@ from gateway.estimates.reasons import Cause
 from gateway.reports.charts import Axis, Chart, LineMark, Mark, Panel, Points, Ribbon, Rule, Section, Table
 from gateway.reports.fleet.text import (
     NAMES,
-    NONE,
     day,
     drift_told,
     every_week,
@@ -29,6 +28,7 @@ from gateway.reports.fleet.text import (
     trouble_told,
     whole,
 )
+from gateway.words import NONE
 
 _SHOWN: Final = 250  # px a row of panels
 _PAYLOAD: Final = (
