@@ -15,8 +15,9 @@ from pydantic.json_schema import GenerateJsonSchema
 from gateway.archive.dataset import DIAGNOSTICS
 from gateway.calibration.file import CalibrationFile
 from gateway.config import Settings
-from gateway.estimates.as_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, SPECTRA, WEIGHTS, EstimateField
+from gateway.estimates.as_json import FIELDS, EstimateField
 from gateway.estimates.batch_estimate import Lack
+from gateway.estimates.field_kinds import INSTANT, NUMBERS_BY_NAME, REASONS, SPECTRA, WEIGHTS
 from gateway.estimates.reasons import EXPLANATIONS, REMEDIES, SOURCES, Cause
 
 # -- an estimate --

@@ -1,7 +1,6 @@
-"""Numbers with their units and nouns, names, and texts in sections, for people."""
+"""Numbers with their units and nouns, and names, for people."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 NONE: Final = "–"
@@ -15,14 +14,6 @@ def counted(n: int, noun: str) -> str:
 def one_or_more(n: int, one: str, more: str) -> str:
     """ "one batch", "2 batches"."""
     return f"one {one}" if n == 1 else f"{n} {more}"
-
-
-def in_sections(head: Sequence[str], sections: Mapping[str, Iterable[str]]) -> str:
-    """The lines of ``head``, then each section: its title with its rows below it, indented."""
-    lines = list(head)
-    for title, rows in sections.items():
-        lines += ["", title, *(f"  {row}" for row in rows)]
-    return "\n".join(lines)
 
 
 def decimal(number: float | None, unit: str = "", digits: int = 2) -> str:

@@ -1,7 +1,7 @@
 """Reprocesses a fleet's archive of logs: every vehicle's drives become one data set of verified estimates.
 
 Logs in local folders or object stores and a manifest go in; Parquet tables and their receipts come out. Only this
-package imports pyarrow, obstore and Dask, and only when needed: a vehicle has none of them.
+package imports obstore and Dask, and with the fleet's report polars: a vehicle has none of them.
 """
 
 from gateway.archive.dataset import SCHEMA_VERSION, columns, rows_of

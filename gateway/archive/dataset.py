@@ -8,19 +8,30 @@ kind.
 import io
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from gateway.archive.places import MISSING, Location
+import polars as pl
+
+from gateway.archive.places import Location
 from gateway.archive.receipts import Slot
-from gateway.errors import ConfigurationError
-from gateway.estimates.as_json import FIELDS, INSTANT, NUMBERS_BY_NAME, REASONS, WEIGHTS, EstimateField, FieldKind
-from gateway.estimates.as_json.kinds import COUNT, INTERVAL, OVER_LIMIT, TEXT, WHOLE, places_over_limit
+from gateway.estimates.as_json import FIELDS, EstimateField
 from gateway.estimates.budget import OWN
-
-if TYPE_CHECKING:
-    import pyarrow as pa
+from gateway.estimates.field_kinds import (
+    COUNT,
+    INSTANT,
+    INTERVAL,
+    NUMBERS_BY_NAME,
+    OVER_LIMIT,
+    REASONS,
+    TEXT,
+    WEIGHTS,
+    WHOLE,
+    FieldKind,
+    places_over_limit,
+)
 
 SCHEMA_VERSION: Final = 1  # of the columns
+SCHEMA_KEY: Final = "springscale_schema"  # its name in the metadata of every file
 
 DIAGNOSTICS: Final[Mapping[str, str]] = {
     "reach": "distance of the load beyond the known ones, in parts of the empty sprung mass; 0 among them",
@@ -69,13 +80,16 @@ OWN_STD: Final[Mapping[str, tuple[str, str]]] = {
 """Columns of `error_budget`: its line of the batch's own error, and what it means."""
 
 
-def columns() -> dict[str, str]:
-    """Name and kind of every column, in order: text, whole, number, instant, texts, numbers by name."""
-    found: dict[str, str] = {}
+ColumnType = pl.DataType | type[pl.DataType]
+
+
+def columns() -> dict[str, ColumnType]:
+    """Name and type of every column, in order."""
+    found: dict[str, ColumnType] = {}
     for one in FIELDS:
         if one.name not in _LEFT_OUT:
             found |= _columns_of(one)
-    return found | dict.fromkeys(PROVENANCE, "text")
+    return found | dict.fromkeys(PROVENANCE, pl.String)
 
 
 def row_of(record: Mapping[str, Any]) -> dict[str, Any]:
@@ -90,55 +104,36 @@ def row_of(record: Mapping[str, Any]) -> dict[str, Any]:
 
 def parquet_of(rows: Sequence[Mapping[str, Any]]) -> bytes:
     """Rows as one Parquet file: the same rows give the same bytes on any computer."""
-    pa, pq = pyarrow_and_parquet()
-    table = pa.Table.from_pylist([dict(row) for row in rows], schema=schema())
-    sink = io.BytesIO()
-    pq.write_table(table, sink, compression="zstd")
+    table, sink = pl.DataFrame(rows, schema=columns()), io.BytesIO()
+    table.write_parquet(sink, compression="zstd", metadata={SCHEMA_KEY: str(SCHEMA_VERSION)})
     return sink.getvalue()
 
 
-def rows_of(dataset: Location, slot: Slot, wanted: Sequence[str] | None = None) -> list[dict[str, Any]]:
+def rows_of(dataset: Location, slot: Slot, wanted: list[str] | None = None) -> list[dict[str, Any]]:
     """The rows of one receipt, with these columns or all; instants are aware datetimes, UTC."""
-    _, pq = pyarrow_and_parquet()
-    table = pq.read_table(io.BytesIO(dataset.read(slot.table)), columns=None if wanted is None else list(wanted))
-    rows: list[dict[str, Any]] = table.to_pylist()
-    return rows
+    return pl.read_parquet(dataset.read(slot.table), columns=wanted).to_dicts()
 
 
-def schema() -> "pa.Schema":
-    """The table's schema in Arrow's terms; its version is in the metadata."""
-    pa, _ = pyarrow_and_parquet()
-    kinds = {
-        "text": pa.string(),
-        "whole": pa.int64(),
-        "number": pa.float64(),
-        "instant": pa.timestamp("us", tz="UTC"),
-        "texts": pa.list_(pa.string()),
-        "numbers by name": pa.map_(pa.string(), pa.float64()),
-    }
-    fields = [pa.field(name, kinds[kind]) for name, kind in columns().items()]
-    return pa.schema(fields, metadata={"springscale_schema": str(SCHEMA_VERSION)})
-
-
-def _columns_of(one: EstimateField) -> dict[str, str]:
-    if one.name == "diagnostics":
-        return dict.fromkeys(DIAGNOSTICS, "number")
-    if one.name == "error_budget":
-        return dict.fromkeys(OWN_STD, "number")
-    if one.kind is WEIGHTS:
-        return dict.fromkeys(one.columns, "number") | {OVER_LIMIT: "texts"}
-    kind = next((name for of, name in _KINDS if one.kind is of), "number")
-    return dict.fromkeys(one.columns or (one.name,), kind)
-
-
-_KINDS: Final = (
-    (TEXT, "text"),
-    (WHOLE, "whole"),
-    (COUNT, "whole"),
-    (INSTANT, "instant"),
-    (REASONS, "texts"),
-    (NUMBERS_BY_NAME, "numbers by name"),
+_TEXTS: Final = pl.List(pl.String)
+_TYPES: Final[Sequence[tuple[FieldKind, ColumnType]]] = (
+    (TEXT, pl.String),
+    (WHOLE, pl.Int64),
+    (COUNT, pl.Int64),
+    (INSTANT, pl.Datetime("us", "UTC")),
+    (REASONS, _TEXTS),
+    (NUMBERS_BY_NAME, pl.List(pl.Struct({"key": pl.String, "value": pl.Float64}))),
 )
+
+
+def _columns_of(one: EstimateField) -> dict[str, ColumnType]:
+    if one.name == "diagnostics":
+        return dict.fromkeys(DIAGNOSTICS, pl.Float64)
+    if one.name == "error_budget":
+        return dict.fromkeys(OWN_STD, pl.Float64)
+    if one.kind is WEIGHTS:
+        return {**dict.fromkeys(one.columns, pl.Float64), OVER_LIMIT: _TEXTS}
+    kept = next((kept for kind, kept in _TYPES if one.kind is kind), pl.Float64)
+    return dict.fromkeys(one.columns or (one.name,), kept)
 
 
 def _cells(one: EstimateField, told: Any) -> Sequence[Any]:
@@ -159,14 +154,4 @@ def _cell(kind: FieldKind, told: Any) -> Any:
         return datetime.fromisoformat(told)
     if kind is COUNT:
         return int(told)
-    return list(told.items()) if kind is NUMBERS_BY_NAME else told
-
-
-def pyarrow_and_parquet() -> tuple[Any, Any]:
-    """pyarrow and pyarrow.parquet, loaded when a table is made or read; a vehicle does not have them."""
-    try:
-        import pyarrow  # noqa: PLC0415 - an extra
-        import pyarrow.parquet  # noqa: PLC0415 - likewise
-    except ModuleNotFoundError:
-        raise ConfigurationError(MISSING) from None
-    return pyarrow, pyarrow.parquet
+    return [{"key": name, "value": x} for name, x in told.items()] if kind is NUMBERS_BY_NAME else told

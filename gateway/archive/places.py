@@ -13,18 +13,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 from urllib.parse import unquote, urlsplit
+
+import obstore
+from obstore.exceptions import AlreadyExistsError, BaseError
+from obstore.store import LocalStore, ObjectStore, from_url
 
 from gateway.errors import ConfigurationError, SpringscaleError
 
-if TYPE_CHECKING:
-    from obstore.store import ObjectStore
-
 SCHEMES: Final = ("file", "s3")
-MISSING: Final = (
-    "reading and writing archives needs packages that a vehicle does not: pip install 'springscale[archive]'"
-)
 CHUNK_BYTES: Final = 8 << 20  # chosen: of a large object, in memory at a time
 _URL: Final = re.compile(r"^[a-z][a-z0-9]+://")
 
@@ -69,11 +67,11 @@ class Location:
 
     def items(self, below: str = "") -> list[Item]:
         """Every file below one of its folders, in order of path; none if the folder is absent."""
-        obs, here = _obstore(), self.local("")
+        here = self.local("")
         if here is not None and not here.is_dir():
             return []
         with self._faults(below):
-            found = [one for page in obs.list(self._store(), below.strip("/") or None) for one in page]
+            found = [one for page in obstore.list(self._store(), below.strip("/") or None) for one in page]
         items = (Item(one["path"], one["size"], one["e_tag"] or one["last_modified"].isoformat()) for one in found)
         return sorted(items, key=lambda item: item.path)
 
@@ -83,15 +81,14 @@ class Location:
         if here is not None and not here.is_file():
             raise FileNotFoundError(f"{here}: no such file")
         with self._faults(path):
-            return bytes(_obstore().get(self._store(), path).bytes())
+            return bytes(obstore.get(self._store(), path).bytes())
 
     def create(self, path: str, content: bytes) -> bool:
         """Write a new file atomically; False if it exists, which is then kept."""
-        obs = _obstore()
         with self._faults(path):
             try:
-                obs.put(self._store(), path, content, mode="create", use_multipart=False)
-            except obs.exceptions.AlreadyExistsError:
+                obstore.put(self._store(), path, content, mode="create", use_multipart=False)
+            except AlreadyExistsError:
                 return False
             self._settle(path)
         return True
@@ -99,13 +96,13 @@ class Location:
     def replace(self, path: str, content: bytes) -> None:
         """Write a file atomically, replacing an existing one."""
         with self._faults(path):
-            _obstore().put(self._store(), path, content, use_multipart=False)
+            obstore.put(self._store(), path, content, use_multipart=False)
             self._settle(path)
 
     def remove(self, path: str) -> None:
         with self._faults(path):
             try:
-                _obstore().delete(self._store(), path)
+                obstore.delete(self._store(), path)
             except FileNotFoundError:
                 return
 
@@ -123,7 +120,7 @@ class Location:
             copy = Path(folder) / path.rpartition("/")[2]  # its suffixes tell what it is
             digest = hashlib.sha256()
             with self._faults(path), copy.open("wb") as file:
-                for chunk in _obstore().get(self._store(), path).stream(min_chunk_size=CHUNK_BYTES):
+                for chunk in obstore.get(self._store(), path).stream(min_chunk_size=CHUNK_BYTES):
                     digest.update(chunk)
                     file.write(chunk)
             yield Fetched(copy, digest.hexdigest())
@@ -140,19 +137,18 @@ class Location:
             finally:
                 os.close(handle)
 
-    def _store(self) -> "ObjectStore":
+    def _store(self) -> ObjectStore:
         return _store_of(self.url)
 
     @contextmanager
     def _faults(self, path: str) -> Iterator[None]:
         """Turn the library's exceptions into one line that names the place."""
-        obs = _obstore()
         where = f"{self}/{path}".rstrip("/")
         try:
             yield
         except FileNotFoundError:
             raise FileNotFoundError(f"{where}: no such file") from None
-        except (obs.exceptions.BaseError, OSError) as fault:
+        except (BaseError, OSError) as fault:
             first_line = str(fault).strip().partition("\n")[0]  # a debug dump follows it
             raise PlaceError(f"{where}: {first_line[:400]}") from None
 
@@ -176,20 +172,9 @@ def place_of(named: str | Path) -> Location:
     return Location(text.rstrip("/"))
 
 
-def _obstore() -> Any:
-    """Import obstore at the first use: a vehicle does not have it installed."""
-    try:
-        import obstore  # noqa: PLC0415 - an extra, see above
-    except ModuleNotFoundError:
-        raise ConfigurationError(MISSING) from None
-    return obstore
-
-
 @functools.lru_cache(maxsize=64)
-def _store_of(url: str) -> "ObjectStore":
+def _store_of(url: str) -> ObjectStore:
     """One connection per process and place. Credentials come from the environment, as for the clouds' own tools."""
-    from obstore.store import LocalStore, from_url  # noqa: PLC0415 - an extra; _obstore() has told if it is missing
-
     parts = urlsplit(url)
     if parts.scheme == "file":
         return LocalStore(unquote(parts.path), mkdir=True)

@@ -18,12 +18,13 @@ from gateway.archive.jobs import ArchiveJob
 from gateway.archive.manifest import Manifest
 from gateway.archive.places import Location
 from gateway.archive.receipts import Slot, failure_files, slots_done, slots_failed
-from gateway.archive.survey import Facts, LogFile, SurveyedLog, survey
+from gateway.archive.survey import Facts, LogFile, survey
 from gateway.archive.workers import WorkerKilledError, Workers, answer_of
 from gateway.errors import ConfigurationError
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
+Piece = TypeVar("Piece", LogFile, ArchiveJob)
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,13 +159,24 @@ def reprocess(
     return summary
 
 
+def _answers(
+    what: str, workers: Workers, fn: Callable[[Piece], Answer], pieces: Sequence[Piece], on_progress: OnProgress
+) -> "Iterator[tuple[Piece, Future[Answer]]]":
+    """Yields each piece of work with its answer as they come, and reports how far the run is."""
+    total, done, begun_s = sum(piece.size for piece in pieces), 0, time.monotonic()
+    for n, (piece, answer) in enumerate(done_by(workers, fn, pieces), 1):
+        yield piece, answer
+        done += piece.size
+        on_progress(Progress(what, done, total, n, len(pieces), time.monotonic() - begun_s))
+
+
 def _survey(inventory: Inventory, workers: Workers, on_progress: OnProgress) -> None:
     """Survey every new log; each vehicle's facts are stored when it is complete."""
-    new = [(vehicle, log) for vehicle, logs in inventory.unknown() for log in logs]
-    total, done, begun_s = sum(log.size for _, log in new), 0, time.monotonic()
-    left = Counter(vehicle for vehicle, _ in new)
+    vehicle_of = {log: vehicle for vehicle, logs in inventory.unknown() for log in logs}
+    left = Counter(vehicle_of.values())
     found: defaultdict[str, Facts] = defaultdict(dict)
-    for n, ((vehicle, log), answer) in enumerate(done_by(workers, _surveyed, new), 1):
+    for log, answer in _answers("looking", workers, survey, list(vehicle_of), on_progress):
+        vehicle = vehicle_of[log]
         try:
             found[vehicle][log.key] = answer_of(answer)
         except ConfigurationError:
@@ -174,23 +186,14 @@ def _survey(inventory: Inventory, workers: Workers, on_progress: OnProgress) -> 
         left[vehicle] -= 1
         if not left[vehicle]:
             inventory.learn(vehicle, found.pop(vehicle, {}))
-        done += log.size
-        on_progress(Progress("looking", done, total, n, len(new), time.monotonic() - begun_s))
-
-
-def _surveyed(new: tuple[str, LogFile]) -> SurveyedLog:
-    return survey(new[1])
 
 
 def _weigh(jobs: Sequence[ArchiveJob], workers: Workers, summary: Summary, on_progress: OnProgress) -> None:
-    total, done, begun_s = sum(job.size for job in jobs), 0, time.monotonic()
-    for n, (job, answer) in enumerate(done_by(workers, run, jobs), 1):
+    for job, answer in _answers("weighing", workers, run, jobs, on_progress):
         outcome = _outcome(job, answer)
         summary.outcomes.append(outcome)
         if outcome.status is JobStatus.LOST:
             summary.lost[f"{job.slot.folder}/{job.slot.job}"] = outcome.failures[0]
-        done += job.size
-        on_progress(Progress("weighing", done, total, n, len(jobs), time.monotonic() - begun_s))
 
 
 def _outcome(job: ArchiveJob, answer: "Future[JobOutcome]") -> JobOutcome:

@@ -11,7 +11,9 @@ from concurrent.futures import CancelledError, Executor, Future
 from types import TracebackType
 from typing import Any, Final, TypeVar
 
-from gateway.archive.places import MISSING, PlaceError
+import distributed
+
+from gateway.archive.places import PlaceError
 from gateway.errors import ConfigurationError, SpringscaleError
 
 Answer = TypeVar("Answer")
@@ -56,11 +58,7 @@ class Workers(Executor):
 
 
 def local_workers(n_workers: int | None = None) -> Workers:
-    """Processes of this computer, one for each core available to this process unless stated, each with one thread.
-
-    Raises ConfigurationError without Dask.
-    """
-    distributed = _distributed()
+    """Processes of this computer, one for each core available to this process unless stated, each with one thread."""
     cluster = distributed.LocalCluster(
         n_workers=n_workers or len(os.sched_getaffinity(0)),
         threads_per_worker=1,
@@ -72,8 +70,7 @@ def local_workers(n_workers: int | None = None) -> Workers:
 
 
 def workers_of(address: str) -> Workers:
-    """The workers of a scheduler. Raises ConfigurationError without Dask, PlaceError if nobody answers."""
-    distributed = _distributed()
+    """The workers of a scheduler. Raises ConfigurationError for another address, PlaceError if nobody answers."""
     try:
         client = distributed.Client(address, timeout=CONNECT_WITHIN_S, set_as_default=False)
     except ValueError as fault:
@@ -99,17 +96,8 @@ def answer_of(task: Future[Answer]) -> Answer:
         return task.result()
     except CancelledError:
         raise PlaceError("the cluster dropped the job: its scheduler went away, or was stopped") from None
-    except _distributed().KilledWorker:
+    except distributed.KilledWorker:
         raise WorkerKilledError(
             "several processes died over it without a word: out of memory, or killed; "
             "see the system's log, and try fewer workers"
         ) from None
-
-
-def _distributed() -> Any:
-    """The library, loaded when workers are asked for; a vehicle does not have it."""
-    try:
-        import distributed  # noqa: PLC0415 - an extra
-    except ModuleNotFoundError:
-        raise ConfigurationError(MISSING) from None
-    return distributed

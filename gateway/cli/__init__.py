@@ -20,13 +20,11 @@ from gateway.model.allocator import keep_freed_memory
 
 _COMMANDS = {
     "calibrate": "Make a calibration file from drives with known loads.",
-    "calibration": "Show a calibration file, and find the sprung mass.",
     "campaign": "Pack known-load drives into one archive, to pass on or to contribute.",
     "check-config": "Check a configuration, without opening the bus.",
     "demo": "Run the whole service on a simulated drive: no hardware, no configuration.",
     "estimate": "Weigh from log files, one line per batch.",
     "evaluate": "Compare estimates with known loads: the error table.",
-    "events": "What was loaded and unloaded where and when, and the trips between, from log files.",
     "feed": "Send an IMU of Linux IIO and a receiver behind gpsd onto a CAN interface.",
     "fleet-report": "A fleet's data set as pages: each vehicle and what needs attention.",
     "learn": "Learn a vehicle from the logs of ordinary drives and from delivery notes.",
@@ -43,8 +41,15 @@ _COMMANDS = {
 
 INTERRUPTED = 130  # 128 and the number of SIGINT, as shells have it
 
-# Commands that a vehicle does not need: the extra "workbench", in Debian a package of its own.
-_WORKBENCH = frozenset({"matplotlib", "numba"})
+# What a vehicle does not need, and the extra that has it; in Debian the workbench is a package of its own.
+_EXTRAS = {
+    "matplotlib": "workbench",
+    "numba": "workbench",
+    "distributed": "archive",
+    "obstore": "archive",
+    "polars": "archive",
+    "sqlalchemy": "fleet",
+}
 _DEBIAN_TREE = Path("/usr/lib/springscale")
 
 
@@ -127,9 +132,10 @@ def _call(arguments: list[str] | None) -> None:
         click.echo(f"springscale: {fault}", err=True)
         sys.exit(fault.exit_code)
     except ModuleNotFoundError as fault:
-        if fault.name is None or fault.name.partition(".")[0] not in _WORKBENCH:
+        extra = _EXTRAS.get((fault.name or "").partition(".")[0])
+        if extra is None:
             raise
-        click.echo(f"springscale: this command needs {fault.name}: {_workbench_install()}", err=True)
+        click.echo(f"springscale: this command needs {fault.name}: {_install(extra)}", err=True)
         sys.exit(1)
     except BrokenPipeError:  # the reader of our output has gone, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -148,7 +154,8 @@ def _leave_threads_behind(leaving: SystemExit) -> None:
     os._exit(code)
 
 
-def _workbench_install() -> str:
-    """The command that installs the workbench beside this installation."""
-    is_debian = Path(__file__).is_relative_to(_DEBIAN_TREE)
-    return "apt install springscale-workbench" if is_debian else "pip install 'springscale[workbench]'"
+def _install(extra: str) -> str:
+    """The command that installs an extra beside this installation."""
+    if extra == "workbench" and Path(__file__).is_relative_to(_DEBIAN_TREE):
+        return "apt install springscale-workbench"
+    return f"pip install 'springscale[{extra}]'"

@@ -16,14 +16,22 @@ from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
 from gateway.calibration.judgement.advice import Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
 from gateway.calibration.ratio_index.bands import BandChoice
-from gateway.cli.options import CAMPAIGN, FILE, RunNumbers, as_json, batch_settings, require_output_place, window
+from gateway.cli.options import (
+    CAMPAIGN,
+    FILE,
+    Parsed,
+    as_json,
+    batch_settings,
+    run_numbers,
+    window,
+)
 from gateway.cli.progress import counted, on_share
 from gateway.config import ESTIMATOR_NAMES
 from gateway.errors import CalibrationImpossibleError, ConfigurationError
 from gateway.files.whole import refusal_told, write_whole
 from gateway.offline.campaigns import inspect
 from gateway.records import json_line
-from gateway.words import known
+from gateway.words import known, span
 
 
 def inspection_sentences(inspection: Inspection) -> str:
@@ -45,14 +53,9 @@ def _in_all(inspection: Inspection) -> str:
     if not runs:
         return counted
     payloads_kg, shares_pct = [run.payload_kg for run in runs], [run.front_share_pct for run in runs]
-    loads, shares = _from_to(payloads_kg, "g"), _from_to(shares_pct, ".1f")
-    return f"{counted}: {loads} kg, {shares} % in front"
-
-
-def _from_to(numbers: Sequence[float], form: str) -> str:
-    """Least and greatest; one number if they print alike."""
-    least, greatest = format(min(numbers), form), format(max(numbers), form)
-    return least if least == greatest else f"{least} to {greatest}"
+    loads = span(min(payloads_kg), max(payloads_kg), "kg")
+    shares = span(min(shares_pct), max(shares_pct), "%", 1)
+    return f"{counted}: {loads}, {shares} in front"
 
 
 def _run_line(one: SplitRun, verdict: RunVerdict) -> str:
@@ -93,7 +96,13 @@ def inspection_json(inspection: Inspection) -> dict[str, object]:
 @click.argument("campaign", type=CAMPAIGN)
 @click.option("--output", type=FILE, default=None, help="calibration file to write; not needed with --check")
 @click.option("--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, help="[default: all]")
-@click.option("--runs", "numbers", type=RunNumbers(), default=None, help="these runs only, counted from 1: 1,5,10")
+@click.option(
+    "--runs",
+    "numbers",
+    type=Parsed("numbers", run_numbers),
+    default=None,
+    help="these runs only, counted from 1: 1,5,10",
+)
 @click.option(
     "--like",
     "like",
@@ -207,8 +216,10 @@ def _tell_inspection(inspection: Inspection, *, as_json: bool, is_all: bool) -> 
 
 def require_places(output: Path | None, report: Path | None) -> None:
     """Checked before minutes of work: the file and the directory can be written."""
-    if output is not None:
-        require_output_place(output)
+    if output is not None and output.is_dir():
+        raise click.UsageError(f"--output {output}: is a folder, not a file")
+    if output is not None and not output.parent.is_dir():
+        raise click.UsageError(f"--output {output}: there is no folder {output.parent}; make it first")
     if report is not None and report.exists() and not report.is_dir():
         raise click.UsageError(f"--report {report}: is a file, not a directory")
 

@@ -3,7 +3,6 @@
 import asyncio
 import json
 import threading
-from collections.abc import Callable
 from importlib.resources import as_file, files
 from itertools import count, takewhile
 from pathlib import Path
@@ -16,7 +15,6 @@ from gateway.bus.sink import BusSink, replay_frames
 from gateway.cli.estimate import sentence
 from gateway.cli.options import NumberRange
 from gateway.config import BusSection, Settings, StoreSection, VehicleSection, WebSection
-from gateway.errors import ConfigurationError
 from gateway.log import set_up_log
 from gateway.records import iso_utc, json_line
 from gateway.service.gateway import Gateway
@@ -59,7 +57,9 @@ def demo(once: bool, as_json: bool, port: int, speed: float, fleet: int | None) 
             store=StoreSection(directory=Path(folder)),
         )
         if fleet is not None:
-            _fleet_demo()(fleet, setup_of(settings), port, speed, once=once)
+            from gateway.cli.demo_fleet import fleet_demo  # noqa: PLC0415 - an extra
+
+            fleet_demo(fleet, setup_of(settings), port, speed, once=once)
             return
         driver = _Driver(speed, is_endless=not once)
         try:
@@ -70,16 +70,6 @@ def demo(once: bool, as_json: bool, port: int, speed: float, fleet: int | None) 
             raise driver.fault
         if once:
             _print_estimates(Path(folder), as_json)
-
-
-def _fleet_demo() -> Callable[..., None]:
-    try:
-        from gateway.cli.demo_fleet import fleet_demo  # noqa: PLC0415 - an extra
-    except ModuleNotFoundError as missing:
-        raise ConfigurationError(
-            f"--fleet needs a package that a vehicle does not: pip install 'springscale[fleet]' ({missing})"
-        ) from None
-    return fleet_demo
 
 
 class _Driver:

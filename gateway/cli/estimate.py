@@ -20,10 +20,11 @@ from gateway.config import load_settings
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.errors import NothingWeighedError
-from gateway.estimates.as_json import COLUMNS, estimate_to_json, table_row, without_dates
+from gateway.estimates.as_json import COLUMNS, estimate_to_json, table_row
 from gateway.estimates.batch_estimate import Estimate
+from gateway.estimates.field_kinds import without_dates
 from gateway.estimates.reasons import EXPLANATIONS
-from gateway.offline.estimates import with_remainders
+from gateway.offline.estimates import estimates_of_logs
 from gateway.records import Why, json_line
 from gateway.service.calibration_in_use import with_learnt
 from gateway.setup import Setup, load_setup, setup_of
@@ -57,17 +58,18 @@ def estimate(
     """
     if as_json and as_csv:
         raise click.UsageError("give --json or --csv, not both")
-    setup, settings = prepared(config_path, signals, calibration, estimator, window_s)
+    setup, settings = _prepared(config_path, signals, calibration, estimator, window_s)
     lines = partial(_csv, has_logs=len(logs) > 1) if as_csv else _json_lines if as_json else _sentences
     reasons, unlike, refused = Counter[Why | None](), Counter[Why](), list[str]()
 
     def on_read(report: LogReport) -> None:
-        tell(report)
+        for remark in report.remarks():  # unreadable parts of the log and refused frames, beside the estimates
+            click.echo(remark, err=True)
         refused.extend(f"{report.path}: {cause.text}" for cause in report.causes())
 
     def found() -> Found:
         for log in logs:
-            for weighed in with_remainders([log], setup, settings, on_read=on_read):
+            for weighed in estimates_of_logs([log], setup, settings, on_read=on_read, with_remainders=True):
                 reasons.update(weighed.rejected or [None])
                 if setup.calibration is not None and _is_at_seen_speed(weighed, setup.calibration):
                     unlike.update(UNLIKE.intersection(weighed.rejected))
@@ -147,13 +149,7 @@ def _csv(found: Found, *, has_logs: bool) -> Iterator[str]:
         yield text.getvalue()
 
 
-def tell(report: LogReport) -> None:
-    """Unreadable parts of the log and refused frames, beside the estimates."""
-    for remark in report.remarks():
-        click.echo(remark, err=True)
-
-
-def prepared(
+def _prepared(
     config_path: Path | None,
     signals: str | None,
     calibration: Path | None,
@@ -176,7 +172,7 @@ def prepared(
 
 def sentence(record: Mapping[str, Any]) -> str:
     """One line of the object of ``estimate_to_json``: when, how much, with its interval; or why not."""
-    when = when_told(record, "t_start")
+    when = _begun(record)
     if record["rejected"]:
         return f"{when}  no estimate: {', '.join(record['rejected'])}"
     payload = _told(record, "payload", "kg", "7.1f", "5.1f")
@@ -185,11 +181,11 @@ def sentence(record: Mapping[str, Any]) -> str:
     return f"{when}  {payload}   {front_share}   {_aside(record)}{speed_kmh:5.1f} km/h{_too_much(record)}"
 
 
-def when_told(record: Mapping[str, Any], name: str) -> str:
-    """An instant of ``without_dates``, to the second: 2026-11-21T03:50:00Z, or the time in a log without a date."""
-    if record[name] is not None:
-        return f"{record[name][:19]}Z"
-    return f"no date, {timedelta(seconds=record[f'{name}_ns'] // NS_PER_S)}"
+def _begun(record: Mapping[str, Any]) -> str:
+    """The start to the second: 2026-11-21T03:50:00Z, or the time in a log without a date."""
+    if record["t_start"] is not None:
+        return f"{record['t_start'][:19]}Z"
+    return f"no date, {timedelta(seconds=record['t_start_ns'] // NS_PER_S)}"
 
 
 def _told(record: Mapping[str, Any], name: str, unit: str, form: str, half_form: str) -> str:
@@ -197,7 +193,7 @@ def _told(record: Mapping[str, Any], name: str, unit: str, form: str, half_form:
     words, number = name.replace("_", " "), record[f"{name}_{unit}"]
     if number is None:
         return f"{words} unknown"
-    half = half_width(record[f"{name}_interval95_{unit}"])
+    half = _half_width(record[f"{name}_interval95_{unit}"])
     return f"{words} {number:{form}} {'%' if unit == 'pct' else unit} ± {half:{half_form}} (95 %)"
 
 
@@ -205,7 +201,7 @@ def _aside(record: Mapping[str, Any]) -> str:
     """The lateral position of the sprung mass, if known."""
     if record["cg_left_m"] is None:
         return ""
-    half_mm = 1000.0 * half_width(record["cg_left_interval95_m"])
+    half_mm = 1000.0 * _half_width(record["cg_left_interval95_m"])
     return f"{1000.0 * record['cg_left_m']:+5.0f} mm left ± {half_mm:3.0f} (95 %)   "
 
 
@@ -214,6 +210,6 @@ def _too_much(record: Mapping[str, Any]) -> str:
     return f"   over the limit: {', '.join(over)}" if over else ""
 
 
-def half_width(interval95: Sequence[float]) -> float:
+def _half_width(interval95: Sequence[float]) -> float:
     """Half the width of the interval: the number after ±."""
     return (interval95[1] - interval95[0]) / 2.0

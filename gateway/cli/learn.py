@@ -19,32 +19,16 @@ from gateway.calibration.learning.told import drives_record, learning_record, st
 from gateway.calibration.statements_csv import ToldRow, ToldRows, read_statements
 from gateway.cli import options
 from gateway.cli.calibrate import require_places, written_and_judged
-from gateway.cli.options import FILE, as_json, batch_settings, window
+from gateway.cli.options import FILE, ZONE, as_json, batch_settings, window
 from gateway.cli.progress import counted, on_share
 from gateway.errors import ConfigurationError
 from gateway.offline.drives_of_logs import Drives, read_drives
 from gateway.records import json_line, rounded
 from gateway.stated.statement import StatementRecord
-from gateway.units import zone_of
 from gateway.words import counted as n_of
 from gateway.words import one_or_more
 
 Record = dict[str, Any]
-
-
-class Zone(click.ParamType[ZoneInfo]):
-    """Europe/Berlin."""
-
-    name = "zone"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> ZoneInfo:
-        """Raises a usage error for a zone that this computer does not know."""
-        if isinstance(value, ZoneInfo):
-            return value
-        try:
-            return zone_of(str(value))
-        except ValueError as fault:
-            self.fail(str(fault), param, ctx)
 
 
 @click.command("learn")
@@ -52,7 +36,7 @@ class Zone(click.ParamType[ZoneInfo]):
 @click.option("--vehicle", "vehicle_path", type=FILE, required=True, help="[vehicle] as in a campaign file")
 @options.signals
 @click.option("--statements", type=FILE, default=None, help="what is said of the loads: CSV or JSON")
-@click.option("--timezone", "zone", type=Zone(), default=None, help="of times without one [default: UTC]")
+@click.option("--timezone", "zone", type=ZONE, default=None, help="of times without one [default: UTC]")
 @click.option("--output", type=FILE, default=None, help="calibration file to write; not needed with --dry-run")
 @click.option("--like", type=FILE, default=None, help="calibration of a vehicle of the same model, as the prior")
 @click.option("--dry-run", "only_matches", is_flag=True, help="say which rows match a drive, and write nothing")

@@ -3,9 +3,11 @@
 import functools
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
+from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
@@ -13,12 +15,13 @@ from gateway.bus.frames import Speed
 from gateway.config import ESTIMATOR_NAMES, BatchSection
 from gateway.core.batch_settings import BatchSettings
 from gateway.records import json_line
+from gateway.units import zone_of
 
 FILE = click.Path(path_type=Path)
 
 
-class Number(click.types.FloatParamType):
-    """A finite number: click accepts nan, whatever the range, and inf."""
+class NumberRange(click.FloatRange):
+    """A finite number within a range: click accepts nan, whatever the range, and inf."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Raises a usage error for a typed text that is not a finite number."""
@@ -26,13 +29,6 @@ class Number(click.types.FloatParamType):
         if isinstance(value, str) and not math.isfinite(number):
             self.fail(f"{value!r} is no number", param, ctx)
         return number
-
-
-class NumberRange(Number, click.FloatRange):
-    """A finite number within a range."""
-
-
-NUMBER = Number()
 
 
 class CampaignFile(click.Path):
@@ -62,8 +58,8 @@ def prints(command: Callable[..., Told]) -> Callable[..., None]:
     """Print what the command returns: in words, or with --json the object on one line."""
 
     @functools.wraps(command)
-    def printing(*services: Any, as_json: bool, **options: Any) -> None:
-        record, text = command(*services, **options)
+    def printing(*, as_json: bool, **options: Any) -> None:
+        record, text = command(**options)
         click.echo(json_line(record) if as_json else text)
 
     return as_json(printing)
@@ -78,32 +74,58 @@ calibration = click.option("--calibration", type=FILE, default=None, help="calib
 one_estimator = click.option("--estimator", type=click.Choice(ESTIMATOR_NAMES), default=None, help="which estimator")
 
 
-class RunNumbers(click.ParamType[tuple[int, ...]]):
-    """1,5,10 -> (1, 5, 10)."""
+Value = TypeVar("Value")
 
-    name = "numbers"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, ...]:
-        """Raises a usage error for anything but whole numbers with commas."""
-        if isinstance(value, tuple):
-            return value
+class Parsed(click.ParamType[Value]):
+    """What ``parse`` makes of a word; what its ValueError says becomes the usage error."""
+
+    def __init__(self, name: str, parse: Callable[[str], Value]) -> None:
+        self.name = name
+        self._parse = parse
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Value:
+        """Raises a usage error for a word that means nothing."""
         try:
-            return tuple(int(number) for number in str(value).split(","))
-        except ValueError:
-            self.fail(f"{value!r} is not a list of run numbers such as 1,5,10", param, ctx)
+            parsed: Value = self._parse(value) if isinstance(value, str) else value
+        except ValueError as fault:
+            self.fail(str(fault), param, ctx)
+        return parsed
+
+
+def run_numbers(text: str) -> tuple[int, ...]:
+    """1,5,10 -> (1, 5, 10)."""
+    try:
+        return tuple(int(number) for number in text.split(","))
+    except ValueError:
+        raise ValueError(f"{text!r} is not a list of run numbers such as 1,5,10") from None
+
+
+def speed_factor(text: str) -> Speed:
+    """2.5 -> 2.5; max -> "max"."""
+    if text == "max":
+        return "max"
+    with suppress(ValueError):
+        if 0.0 < (factor := float(text)) < math.inf:
+            return factor
+    raise ValueError(f"{text!r} is neither a number above 0 nor max")
+
+
+def moment(text: str) -> datetime:
+    """2026-11-26T07:40:00Z; without a zone the time of this computer."""
+    try:
+        return datetime.fromisoformat(text).astimezone(UTC)
+    except ValueError:
+        raise ValueError(f"{text!r} is no time; write it as 2026-11-26T07:40") from None
+
+
+MOMENT = Parsed("time", moment)
+ZONE = Parsed("zone", zone_of)
 
 
 def batch_settings(window_s: float | None) -> BatchSettings:
     """The default settings of a batch, with another window length where one is given."""
     return BatchSection().for_core(window_s=window_s)
-
-
-def require_output_place(output: Path) -> None:
-    """Check before minutes of work that --output can be written. Raises click.UsageError."""
-    if output.is_dir():
-        raise click.UsageError(f"--output {output}: is a folder, not a file")
-    if not output.parent.is_dir():
-        raise click.UsageError(f"--output {output}: there is no folder {output.parent}; make it first")
 
 
 interface = click.option(
@@ -114,30 +136,10 @@ interface = click.option(
 channel = click.option("--channel", required=True, help="of that interface: can0, vcan0, ...")
 
 
-class SpeedFactor(click.ParamType[Speed]):
-    """2.5 -> 2.5; max -> "max"."""
-
-    name = "speed"
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
-        return "NUMBER|max"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Speed:
-        """Raises a usage error for anything but a positive number or max."""
-        if value == "max":
-            return "max"
-        try:
-            factor = float(value)
-        except ValueError:
-            factor = math.nan
-        if not 0.0 < factor < math.inf:
-            self.fail(f"{value!r} is neither a number above 0 nor max", param, ctx)
-        return factor
-
-
 speed = click.option(
     "--speed",
-    type=SpeedFactor(),
+    type=Parsed("speed", speed_factor),
+    metavar="NUMBER|max",
     default=1.0,
     show_default=True,
     help="2 is twice as fast as the time stamps, max as fast as the bus takes it",

@@ -31,5 +31,4 @@ def reproduce(output: Path, seed: int, quick: bool, workers: int) -> Told:
     with counted("starting") as on_step:
         report = write_report(output, extent, lambda what, done, of: on_step(done, of, what))
         on_step(N_STEPS, N_STEPS)
-    written = {"report": report, "results": output / "results.json"}
-    return {name: str(path) for name, path in written.items()}, str(report)
+    return {"report": str(report), "results": str(output / "report.json")}, str(report)

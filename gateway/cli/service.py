@@ -51,10 +51,6 @@ class Service:
         """Post a file of this media type -> the answer as JSON. Raises as ``ask`` does."""
         return _json_of(self._answer(path, "POST", content, kind))
 
-    def page(self, path: str) -> bytes:
-        """A page as the service sends it. Raises as ``ask`` does."""
-        return self._answer(path).content
-
     def _answer(
         self, path: str, method: str = "GET", content: bytes | None = None, kind: str = "application/json"
     ) -> httpx.Response:
@@ -99,35 +95,30 @@ def only_one(ids: Iterable[str], begin: str, what: str, command: str) -> str:
     return found[0]
 
 
-def asks_service(command: Command) -> Command:
-    """The options that name the service; passed to ``command`` as one argument, first."""
-
-    @functools.wraps(command)
-    def asking(**options: Any) -> None:
-        service = Service(**{each.name: options.pop(each.name) for each in fields(Service)})
-        command(service, **options)
-
-    decorated: Command = asking
-    for option in (
-        click.option("--ca", type=FILE, default=None, help="PEM file of the authority that signed its certificate"),
-        click.option("--token", envvar="SPRINGSCALE_TOKEN", default=None, help="token, if the service requires one"),
-        click.option("--url", default=None, help="address of the service, such as http://127.0.0.1:8000"),
-        config,
-    ):
-        decorated = option(decorated)
-    return decorated
+_OF_SERVICE: Final = (
+    config,
+    click.option("--url", default=None, help="address of the service, such as http://127.0.0.1:8000"),
+    click.option("--token", envvar="SPRINGSCALE_TOKEN", default=None, help="token, if the service requires one"),
+    click.option("--ca", type=FILE, default=None, help="PEM file of the authority that signed its certificate"),
+)
 
 
 def prints_answer(text: Callable[[Answer], str]) -> Callable[[Command], Command]:
-    """The options of ``asks_service``, and --json; what the command returns is printed by ``text`` or as JSON."""
+    """The options that name the service, which becomes the command's first argument, and --json; what the command
+    returns is printed by ``text`` or as JSON.
+    """
 
     def decorate(command: Command) -> Command:
         @functools.wraps(command)
-        def told(service: Service, **options: Any) -> Told:
+        def told(**options: Any) -> Told:
+            service = Service(**{each.name: options.pop(each.name) for each in fields(Service)})
             answer: Answer = command(service, **options)
             return answer, text(answer)
 
-        return asks_service(prints(told))
+        decorated: Command = prints(told)
+        for option in reversed(_OF_SERVICE):
+            decorated = option(decorated)
+        return decorated
 
     return decorate
 

@@ -9,8 +9,7 @@ from zoneinfo import ZoneInfo
 
 import click
 
-from gateway.cli.learn import Zone
-from gateway.cli.options import FILE
+from gateway.cli.options import FILE, MOMENT, ZONE
 from gateway.cli.service import Answer, Command, Service, only_one, prints_answer
 from gateway.errors import ConfigurationError
 from gateway.stated.learning import STATES
@@ -18,21 +17,6 @@ from gateway.stated.learning import STATES
 PATH: Final = "/api/v1/statements"
 LEARNING: Final = "/api/v1/learning"
 _HELD: Final = "it is not learnt from: `springscale state confirm {id}` if it is right, `... withdraw {id}` if not"
-
-
-class Moment(click.ParamType[datetime]):
-    """2026-11-26T07:40:00Z; without a zone the time of this computer."""
-
-    name = "time"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> datetime:
-        """Raises a usage error for what is no time."""
-        if isinstance(value, datetime):
-            return value
-        try:
-            return datetime.fromisoformat(str(value)).astimezone(UTC)
-        except ValueError:
-            self.fail(f"{value!r} is no time; write it as 2026-11-26T07:40", param, ctx)
 
 
 def _kg(load: Answer) -> str:
@@ -92,10 +76,8 @@ def _statement(command: Command) -> Command:
         click.option(
             "--ref", default=None, help="your own name for it, such as a note's number; the same one replaces"
         ),
-        click.option(
-            "--until", type=Moment(), default=None, help="until when it is aboard [default: until it changes]"
-        ),
-        click.option("--from", "since", type=Moment(), default=None, help="from when it is aboard [default: now]"),
+        click.option("--until", type=MOMENT, default=None, help="until when it is aboard [default: until it changes]"),
+        click.option("--from", "since", type=MOMENT, default=None, help="from when it is aboard [default: now]"),
     ):
         command = option(command)
     return command
@@ -150,7 +132,7 @@ def _looking_empty(learning: Answer) -> list[Answer]:
 
 
 @state.command("not-empty")
-@click.argument("begins", metavar="[FROM]...", nargs=-1, type=Moment())
+@click.argument("begins", metavar="[FROM]...", nargs=-1, type=MOMENT)
 @prints_answer(_left_text)
 def state_not_empty(service: Service, begins: tuple[datetime, ...]) -> Answer:
     """Drives that look empty were not: those that begin at FROM, as they are asked about, or all of them."""
@@ -196,7 +178,7 @@ def state_axles(service: Service, front: float, rear: float, plus_minus: float |
 
 @state.command("list")
 @click.option("--state", "wanted", type=click.Choice(STATES), default=None, help="only those in this state")
-@click.option("--since", type=Moment(), default=None, help="only those that hold then or begin later")
+@click.option("--since", type=MOMENT, default=None, help="only those that hold then or begin later")
 @prints_answer(_list_text)
 def state_list(service: Service, wanted: str | None, since: datetime | None) -> Answer:
     """Every statement, the newest first, with what the vehicle said without it."""
@@ -224,7 +206,7 @@ def state_confirm(service: Service, statement_id: str) -> Answer:
 @state.command("import")
 @click.argument("file", type=FILE)
 @click.option("--dry-run", is_flag=True, help="say which rows match a drive, and store nothing")
-@click.option("--timezone", "zone", type=Zone(), default=None, help="of times without one [default: UTC]")
+@click.option("--timezone", "zone", type=ZONE, default=None, help="of times without one [default: UTC]")
 @prints_answer(_import_text)
 def state_import(service: Service, file: Path, dry_run: bool, zone: ZoneInfo | None) -> Answer:
     """Take a table of delivery notes (CSV) or a list of statements (JSON)."""

@@ -12,12 +12,10 @@ from gateway.bus.signals import Decoder, SignalMap, load_signal_map
 from gateway.bus.signals.decode import SignalCounts
 from gateway.bus.signals.mapping import MappedMessage, id_name
 from gateway.calibration.campaign_file import Campaign, OnRun, RunTable, chosen_runs, file_sha256
-from gateway.calibration.from_drives import Outcome, calibrate_inspected
 from gateway.calibration.inspection.across_runs import Inspection, inspect_drives
 from gateway.calibration.inspection.drive import LogFacts, SplitRun, row_facts
 from gateway.calibration.judgement.evaluation import Judged, judge
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
 from gateway.errors import CalibrationImpossibleError, LogUnreadableError
@@ -176,32 +174,6 @@ def inspect(
     signal_map = load_signal_map(campaign.signals)
     has_roll_rate = Signal.ROLL_RATE in signal_map.signals
     return inspect_drives(split, campaign.vehicle, settings, has_roll_rate=has_roll_rate)
-
-
-def calibrate(
-    campaign: Campaign,
-    settings: BatchSettings,
-    *,
-    estimators: Sequence[str],
-    numbers: Sequence[int] | None = None,
-    bands: BandChoice = "campaign",
-    command: str = "",
-    on_run: OnRun = lambda done, of: None,
-) -> Outcome:
-    """Inspect the chosen runs and fit every named estimator on the identification parts of those without a fault.
-
-    Raises as :func:`calibrate_inspected` does.
-    """
-    inspection = inspect(campaign, settings, numbers=numbers, on_run=on_run)
-    return calibrate_inspected(
-        campaign.vehicle,
-        inspection,
-        where=str(campaign.path),
-        sha256=file_sha256(campaign.path),
-        estimators=estimators,
-        bands=bands,
-        command=command,
-    )
 
 
 def judge_campaign(

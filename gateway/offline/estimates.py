@@ -1,23 +1,17 @@
 """Estimates of logs, as `springscale estimate` prints them, and of arrays, for measurements without a CAN log."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from gateway.bus.logs import LogReport, motion_of_log
-from gateway.bus.logs.open import open_log
-from gateway.bus.signals import SignalMap
 from gateway.calibration.file import CalibrationFile
 from gateway.core.batch_settings import BatchSettings
-from gateway.core.change import Rules
-from gateway.core.events.entry import Entry
-from gateway.core.events.ledger import Ledger
-from gateway.errors import ArraysError, LogUnreadableError
+from gateway.errors import ArraysError
 from gateway.estimates.batch_estimate import Estimate
-from gateway.records import F64, FIRST_DATED_NS, Motion, Signal
+from gateway.records import F64, Motion, Signal
 from gateway.setup import Setup
 from gateway.units import NS_PER_S
 from gateway.weighing.flow import Flow, Identity
@@ -31,77 +25,21 @@ def estimates_of_logs(
     settings: BatchSettings = AS_THE_SERVICE,
     *,
     on_read: Callable[[LogReport], None] = lambda report: None,
+    with_remainders: bool = False,
 ) -> Iterator[Estimate]:
     """Every batch of every log in turn; each log is a drive. Raises LogUnreadableError.
 
-    ``on_read`` gets the reader's report of each log. Stretches too short for a batch are left out.
+    ``on_read`` gets the reader's report of each log. Stretches too short for a batch (``is_remainder``) are left out
+    unless they are asked for.
     """
-    return (one for one in with_remainders(logs, setup, settings, on_read=on_read) if not one.is_remainder)
-
-
-def with_remainders(
-    logs: Sequence[Path | str],
-    setup: Setup,
-    settings: BatchSettings = AS_THE_SERVICE,
-    *,
-    on_read: Callable[[LogReport], None] = lambda report: None,
-) -> Iterator[Estimate]:
-    """These batches with the stretches too short for a batch (``is_remainder``), which have a way."""
     for log in logs:
         flow = setup.flow(settings)
         motions, report = motion_of_log(log, setup.signal_map)
         for motion in motions:
-            yield from flow.feed(motion)
+            yield from (one for one in flow.feed(motion) if with_remainders or not one.is_remainder)
         report.require_frames()
         on_read(report)
-        yield from flow.flush()
-
-
-def require_order(logs: Sequence[Path], signal_map: SignalMap) -> None:
-    """Raises LogUnreadableError if a log begins before the preceding one, or one of several has no date.
-
-    Loads and trips depend on the order of drives; logs out of order would give false changes of load.
-    """
-    begun = [(log, start_ns) for log in logs if (start_ns := _start_ns(log, signal_map)) is not None]
-    undated = next((log for log, start_ns in begun if start_ns < FIRST_DATED_NS), None)
-    if undated is not None and len(begun) > 1:
-        raise LogUnreadableError(f"{undated}: has no date: nothing tells which log came first; name it alone")
-    for (before, before_ns), (log, start_ns) in pairwise(begun):
-        if start_ns < before_ns:
-            raise LogUnreadableError(f"{log}: begins before {before}: name the logs in order of time")
-
-
-def _start_ns(log: Path, signal_map: SignalMap) -> int | None:
-    """The time of the first mapped frame; None without one, which the reader reports."""
-    try:
-        chunks, _ = open_log(log, signal_map)
-        return next((int(chunk.t_ns[0]) for chunk in chunks if len(chunk)), None)
-    except LogUnreadableError:
-        return None
-
-
-def entries_of_logs(
-    logs: Sequence[Path | str],
-    setup: Setup,
-    settings: BatchSettings = AS_THE_SERVICE,
-    *,
-    on_read: Callable[[LogReport], None] = lambda report: None,
-) -> Iterator[Entry]:
-    """Every event and trip of the logs, in its last revision; ``on_read`` gets the reader's report of each log.
-
-    Raises LogUnreadableError at the first unreadable log, after yielding those of the logs before.
-    """
-    ledger = Ledger(Rules.of(setup.calibrated.vehicle) if setup.calibrated else Rules())
-    told: dict[str, Entry] = {}
-    unreadable: LogUnreadableError | None = None
-    try:
-        for estimate in with_remainders(logs, setup, settings, on_read=on_read):
-            told |= {entry.id: entry for entry in ledger.add(estimate)}
-    except LogUnreadableError as fault:
-        unreadable = fault
-    yield from sorted(told.values(), key=lambda entry: (entry.t_end_ns, entry.kind, entry.id))
-    if unreadable is not None:
-        raise unreadable
+        yield from (one for one in flow.flush() if with_remainders or not one.is_remainder)
 
 
 MOST_S: Final = 9e9  # to the year 2255; a little later nanoseconds no longer fit into 64 bits

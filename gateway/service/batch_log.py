@@ -10,8 +10,9 @@ from pydantic import BaseModel
 from gateway.core.change import Rules
 from gateway.core.events.entry import Entry, EntryKind
 from gateway.core.events.ledger import HORIZON, Ledger
-from gateway.estimates.as_json import INSTANT, read_estimate
+from gateway.estimates.as_json import read_estimate
 from gateway.estimates.batch_estimate import Estimate
+from gateway.estimates.field_kinds import INSTANT
 from gateway.log import Event, log_event
 from gateway.records import Why, json_line, rounded
 from gateway.service.journal_reader import WINDOWS, place_of

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from gateway.estimates.as_json import without_places
+from gateway.estimates.field_kinds import without_places
 from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.store import Store

@@ -6,8 +6,9 @@ from typing import Annotated, Any, Final, Generic, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model, model_validator
 
-from gateway.estimates.as_json import FIELDS, INSTANT, NUMBERS_BY_NAME, SPECTRA, WEIGHTS, EstimateField, Presence
+from gateway.estimates.as_json import FIELDS, EstimateField, Presence
 from gateway.estimates.batch_estimate import Lack
+from gateway.estimates.field_kinds import INSTANT, NUMBERS_BY_NAME, SPECTRA, WEIGHTS
 from gateway.stated.statement import HALF_CHARACTER, is_text
 
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)

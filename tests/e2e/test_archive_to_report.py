@@ -34,7 +34,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_an_archive_becomes_a_report(report: Path) -> None:
     told = json.loads((report / "report.json").read_text())
-    assert [vehicle["vehicle"] for vehicle in told["vehicles"]] == ["van-1", "van-2"]
+    assert [vehicle["name"] for vehicle in told["vehicles"]] == ["van-1", "van-2"]
     assert told["n"] == sum(vehicle["n"] for vehicle in told["vehicles"]) >= 6
     [failure] = told["failures"]
     assert (failure["vehicle"], failure["log"]) == ("van-2", "van-2/2.log")

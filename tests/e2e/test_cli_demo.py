@@ -4,9 +4,9 @@ import json
 import sys
 
 import pytest
-from support.commands import called, run
+from support.commands import run
 
-from gateway.errors import ConfigurationError
+from gateway.cli import main
 
 
 def test_the_demo_weighs_the_van_before_and_after_loading() -> None:
@@ -34,10 +34,12 @@ def test_a_fleet_is_shown_by_one_command() -> None:
     assert heavy["used_share"] > 1.0 > light["used_share"] > 0.0
 
 
-def test_the_fleet_demo_names_the_missing_package(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fleet_demo_names_the_missing_package(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     for name in [name for name in sys.modules if name.startswith(("gateway.fleet", "gateway.cli.demo_fleet"))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "sqlalchemy", None)
-    found = called("demo", "--fleet", "1", "--once")
-    assert isinstance(found.exception, ConfigurationError)
-    assert "pip install 'springscale[fleet]'" in str(found.exception)
+    with pytest.raises(SystemExit):
+        main(["demo", "--fleet", "1", "--once"])
+    assert "this command needs sqlalchemy: pip install 'springscale[fleet]'" in capsys.readouterr().err

@@ -91,18 +91,21 @@ def config(tmp_path: Path, port: int) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "needs"),
+    ("arguments", "needs", "extra"),
     [
-        (("demo", "--once"), "numba"),
-        (("simulate", "campaign", "experiment", "a"), "numba"),
-        (("reproduce",), "(matplotlib|numba)"),
+        (("demo", "--once"), "numba", "workbench"),
+        (("simulate", "campaign", "experiment", "a"), "numba", "workbench"),
+        (("reproduce",), "(matplotlib|numba)", "workbench"),
+        (("reprocess",), "(distributed|obstore|polars)", "archive"),
     ],
     ids=lambda each: each[0] if isinstance(each, tuple) else "",
 )
-def test_a_command_of_the_workbench_names_its_extra(vehicle: Command, arguments: tuple[str, ...], needs: str) -> None:
+def test_a_command_that_needs_an_extra_names_it(
+    vehicle: Command, arguments: tuple[str, ...], needs: str, extra: str
+) -> None:
     asked = vehicle(*arguments)
     assert asked.returncode == 1
-    said = rf"springscale: this command needs {needs}: pip install 'springscale\[workbench\]'\n"
+    said = rf"springscale: this command needs {needs}: pip install 'springscale\[{extra}\]'\n"
     assert re.fullmatch(said, asked.stderr)
 
 
@@ -114,14 +117,6 @@ def test_calibrated_drives_are_weighed_and_judged(campaign: Path, calibrated: Pa
     judged = vehicle("evaluate", campaign, "--calibration", calibrated, *WINDOW)
     assert judged.returncode == 0, judged.stderr
     assert "cross_spectrum" in judged.stdout
-
-
-def test_a_calibration_is_shown(campaign: Path, calibrated: Path, vehicle: Command) -> None:
-    for arguments in (("show", calibrated),):
-        asked = vehicle("calibration", *arguments)
-        assert "Traceback" not in asked.stderr
-        assert asked.returncode in (0, 1), asked.stderr
-        assert asked.stdout
 
 
 def test_a_report_names_the_extra(campaign: Path, vehicle: Command) -> None:

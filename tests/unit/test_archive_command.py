@@ -103,18 +103,6 @@ def test_tasks_run_in_processes_with_one_numeric_thread(workers: Workers) -> Non
     assert workers.submit(os.getenv, "OPENBLAS_NUM_THREADS").result() == "1"
 
 
-def test_an_exception_is_returned_and_the_process_survives(workers: Workers) -> None:
-    with pytest.raises(ZeroDivisionError):
-        workers.submit(truediv, 1, 0).result()
-    assert workers.submit(truediv, 6, 3).result() == 2.0
-
-
-def test_a_task_is_retried_after_its_process_was_killed(workers: Workers, tmp_path: Path) -> None:
-    others = [workers.submit(truediv, n, 1) for n in range(8)]
-    assert workers.submit(die, str(tmp_path / "once")).result() is None
-    assert [one.result() for one in others] == list(range(8))
-
-
 def test_a_task_that_kills_every_process_is_given_up_and_the_others_go_on(workers: Workers) -> None:
     killer = workers.submit(die, "")
     with pytest.raises(WorkerKilledError, match="several processes died over it without a word"):

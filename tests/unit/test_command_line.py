@@ -91,7 +91,7 @@ def test_a_failing_drive_ends_the_command_with_its_error(monkeypatch: pytest.Mon
     assert isinstance(said.exception, BusError)  # as with every command, main makes one line of it
 
 
-HEAVY = ("scipy", "asammdf", "pandas", "matplotlib", "numba", "pyarrow")
+HEAVY = ("scipy", "asammdf", "pandas", "matplotlib", "numba", "polars")
 
 
 FITTING = ("gateway.calibration.ratio_index", "gateway.calibration.inspection", "gateway.calibration.from_drives")

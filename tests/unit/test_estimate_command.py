@@ -1,6 +1,7 @@
 """What springscale estimate says of each batch, of logs that are not quite sound, and of broken sensors."""
 
 import csv
+import gzip
 import json
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,7 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.bus_drive import white_noise
+from support.calibrated import calibration_file
 from support.commands import called, run
+from support.configured import service_config
 from support.encoded import encode_signals
 from support.estimates import make_estimate, posterior_of
 
@@ -20,10 +24,12 @@ from gateway.bus.logs.candump_write import write_candump
 from gateway.bus.logs.packed import zstd
 from gateway.bus.signals import load_signal_map
 from gateway.cli.estimate import sentence
-from gateway.errors import SpringscaleError
-from gateway.estimates.as_json import estimate_to_json, without_dates
+from gateway.errors import LogUnreadableError, SpringscaleError
+from gateway.estimates.as_json import estimate_to_json
 from gateway.estimates.batch_estimate import UNKNOWN, Estimate, Quantity, Weight, Weights
+from gateway.estimates.field_kinds import without_dates
 from gateway.records import F64, Signal, Why
+from gateway.units import NS_PER_S
 
 DEMO = str(files("gateway") / "demo" / "paper_van.json")
 
@@ -34,7 +40,7 @@ def said(monkeypatch: pytest.MonkeyPatch, log: Path, *batches: Estimate) -> Spri
     def weighed(*_: Any, **__: Any) -> Iterator[Estimate]:
         yield from batches
 
-    monkeypatch.setattr(command, "with_remainders", weighed)
+    monkeypatch.setattr(command, "estimates_of_logs", weighed)
     done = called("estimate", log, "--signals", "springscale:reference", "--calibration", DEMO)
     assert done.exception is None or isinstance(done.exception, SpringscaleError), done.exception
     return done.exception
@@ -73,7 +79,7 @@ def test_without_a_calibration_the_advice_is_how_to_get_one(monkeypatch: pytest.
     def weighed(*_: Any, **__: Any) -> Iterator[Estimate]:
         yield from (make_estimate(n, Why.NO_CALIBRATION) for n in range(7))
 
-    monkeypatch.setattr(command, "with_remainders", weighed)
+    monkeypatch.setattr(command, "estimates_of_logs", weighed)
     done = called("estimate", log, "--signals", "springscale:reference")
     assert done.exit_code == 1
     assert "no_calibration (7 batches)" in str(done.exception)
@@ -274,7 +280,6 @@ def commands(log: Path) -> Iterator[list[str]]:
     yield ["look", str(log)]
     for estimator in ("cross_spectrum", "ratio_index"):
         yield ["estimate", str(log), *MAP, "--calibration", DEMO, "--window-s", "20", "--estimator", estimator]
-    yield ["events", str(log), *MAP, "--calibration", DEMO, "--window-s", "20"]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -283,3 +288,28 @@ def test_every_log_gives_an_answer_or_a_clear_error(logs: dict[str, Path], name:
         done = called(*asked)
         assert done.exception is None or isinstance(done.exception, SpringscaleError), (asked[0], done.exception)
         assert "Warning" not in done.output
+
+
+UNREADABLE = {
+    "missing": None,
+    "empty": b"",
+    "garbage": b"\0\xff no log\n" * 40,
+    "gzip cut in its header": gzip.compress(b"(1.0) can0 123#00\n")[:8],
+}
+
+
+@pytest.mark.parametrize("content", UNREADABLE.values(), ids=UNREADABLE.keys())
+def test_a_log_that_cannot_be_read_takes_nothing_from_those_before_it(tmp_path: Path, content: bytes | None) -> None:
+    """The last window of the log before is still open when its end is reached."""
+    service_config(tmp_path, calibration_file().to_json(), estimator="ratio_index", batch__window_s=20.0)
+    drives, bad = [tmp_path / "1.log", tmp_path / "2.log"], tmp_path / "bad.log"
+    for n, drive in enumerate(drives):
+        write_candump(white_noise(21.0, (1_790_000_000 + 3600 * n) * NS_PER_S, seed=n), "can0", drive)
+    if content is not None:
+        bad.write_bytes(content)
+    options = ("--config", str(tmp_path / "springscale.toml"))
+    alone, found = called("estimate", *drives, *options), called("estimate", *drives, bad, *options)
+    assert alone.stdout.count("\n") == 2  # a batch a log
+    assert found.stdout == alone.stdout
+    assert isinstance(found.exception, LogUnreadableError)
+    assert str(found.exception).startswith(f"{bad}: ")

@@ -1,115 +1,56 @@
-"""A vehicle week by week, against the plain way of counting; its sensors day by day."""
+"""A vehicle week by week, its batches counted and averaged; its sensors day by day."""
 
 import math
-import statistics
-from datetime import UTC, date, datetime, timedelta
+from datetime import date, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import polars as pl
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from support.fleet import DAY_S, MONDAY_S, row, week, write_table
 
 from gateway.archive import place_of
-from gateway.archive.fleet.batches import Batches, read_batches
+from gateway.archive.fleet.batches import read_batches
 from gateway.archive.fleet.faulty_sensors import Health, Share, troubles_of
 from gateway.archive.fleet.weeks import monday_of, weeks_of
 from gateway.estimates.batch_estimate import Z95
-from gateway.estimates.reasons import EXPLANATIONS, Cause
-
-REASONS = ["acceleration_stuck", "time_stamps", "too_slow", "model_misfit", "a_reason_of_tomorrow"]
-CAUSE_OF = {str(why): told.cause for why, told in EXPLANATIONS.items()}
-KNOWN = st.none() | st.floats(-50.0, 500.0)
-ROWS = st.lists(
-    st.builds(
-        lambda hour, rejected, payload, std, own, damper, is_over: row(
-            MONDAY_S + 3600.0 * hour,
-            *rejected,
-            **({} if rejected else {"payload_kg": payload, "payload_std_kg": std, "payload_own_std_kg": own}),
-            damper_front_ratio=damper,
-            over_limit=["gross"] if is_over else [],
-        ),
-        st.integers(0, 24 * 30),
-        st.lists(st.sampled_from(REASONS), max_size=2, unique=True),
-        st.floats(-50.0, 500.0),
-        st.floats(1.0, 20.0),
-        st.none() | st.floats(0.0, 30.0),
-        KNOWN,
-        st.booleans(),
-    ),
-    min_size=1,
-    max_size=25,
-    unique_by=lambda one: one["t_end_ns"],
-)
+from gateway.estimates.reasons import Cause
 
 
-def batches_of(rows: list[dict[str, Any]]) -> Batches:
+def batches_of(rows: list[dict[str, Any]]) -> pl.DataFrame:
     """Through Parquet and back."""
     with TemporaryDirectory() as folder:
         slot = write_table(Path(folder), "van", rows)
         return read_batches(place_of(folder), [slot])
 
 
-def by_hand(rows: list[dict[str, Any]]) -> dict[date, dict[str, Any]]:
-    """The naive reference: a dictionary of lists, one pass."""
-    found: dict[date, list[dict[str, Any]]] = {}
-    for one in rows:
-        day = datetime.fromtimestamp(one["t_end_ns"] / 1e9, UTC).date()
-        found.setdefault(day - timedelta(days=day.weekday()), []).append(one)
-    return {monday: _week_by_hand(inside) for monday, inside in sorted(found.items())}
-
-
-def _week_by_hand(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    answered = [one for one in rows if not one["rejected"]]
-    common, own = [], []
-    for one in answered:
-        mine = min(one["payload_own_std_kg"] or 0.0, one["payload_std_kg"])
-        own.append(mine)
-        common.append(math.sqrt(one["payload_std_kg"] ** 2 - mine**2))
-    dampers = [one["damper_front_ratio"] for one in rows if one["damper_front_ratio"] is not None]
-    causes = {cause: sum(any(CAUSE_OF.get(why) is cause for why in one["rejected"]) for one in rows) for cause in Cause}
-    mean = statistics.fmean(one["payload_kg"] for one in answered) if answered else math.nan
-    reach = Z95 * math.hypot(statistics.fmean(common), math.hypot(*own) / len(own)) if answered else math.nan
-    return {
-        "n": len(rows),
-        "n_answered": len(answered),
-        "n_over_limit": sum(bool(one["over_limit"]) for one in answered),
-        "mean": mean,
-        "interval": (mean - reach, mean + reach),
-        "damper": statistics.median(dampers) if dampers else math.nan,
-        "n_damper": len(dampers),
-        "causes": causes,
-    }
-
-
-@settings(max_examples=25, deadline=None)
-@given(ROWS)
-def test_weeks_are_counted_as_by_hand(rows: list[dict[str, Any]]) -> None:
-    weeks, expected = weeks_of(batches_of(rows)), by_hand(rows)
-    assert weeks.mondays == tuple(expected)
-    for k, told in enumerate(expected.values()):
-        for name in ("n", "n_answered", "n_over_limit"):
-            assert getattr(weeks, name)[k] == told[name]
-        assert weeks.payload_mean_kg[k] == pytest.approx(told["mean"], nan_ok=True)
-        found = (weeks.payload_low_kg[k], weeks.payload_high_kg[k])
-        assert found == pytest.approx(told["interval"], nan_ok=True)
-        assert weeks.medians["damper_front_ratio"][k] == pytest.approx(told["damper"], nan_ok=True)
-        assert weeks.n_medians["damper_front_ratio"][k] == told["n_damper"]
-        assert {cause: weeks.n_refused_by[cause][k] for cause in Cause} == told["causes"]
+def test_a_week_counts_its_batches_by_answer_limit_and_cause() -> None:
+    """Refused batches are in no mean load and over no limit, but their parameters are in the medians."""
+    answered = {"payload_kg": 200.0, "payload_std_kg": 5.0, "over_limit": ["gross"], "damper_front_ratio": 1.0}
+    rows = [
+        row(MONDAY_S + 300, **answered),
+        row(MONDAY_S + 600, payload_kg=100.0, payload_std_kg=5.0, damper_front_ratio=None),
+        row(MONDAY_S + 900, "time_stamps", "acceleration_stuck", over_limit=["gross"], damper_front_ratio=1.2),
+        row(MONDAY_S + 1200, "too_slow", "a_reason_of_tomorrow", damper_front_ratio=1.4),
+    ]
+    [week] = weeks_of(batches_of(rows)).to_dicts()
+    assert (week["n"], week["n_answered"], week["n_over_limit"]) == (4, 2, 1)
+    assert {cause: week[cause] for cause in Cause if week[cause]} == {Cause.SENSORS: 1, Cause.DRIVE: 1}
+    assert (week["payload_mean_kg"], week["payload_lower_quartile_kg"]) == (150.0, 125.0)
+    assert week["damper_front_ratio"] == 1.2
 
 
 def test_a_batch_without_a_payload_leaves_the_weekly_mean() -> None:
     told = row(MONDAY_S + 3600.0, payload_kg=200.0, payload_std_kg=10.0, payload_own_std_kg=None)
     share_alone = row(MONDAY_S + 7200.0, payload_kg=None, payload_std_kg=None, payload_own_std_kg=None)
     weeks = weeks_of(batches_of([told, share_alone]))
-    assert (weeks.n_answered.tolist(), weeks.payload_mean_kg.tolist()) == ([2], [200.0])
-    assert weeks.payload_high_kg[0] == pytest.approx(200.0 + Z95 * 10.0)
+    assert weeks.select("n_answered", "payload_mean_kg").rows() == [(2, 200.0)]
+    assert weeks["payload_high_kg"][0] == pytest.approx(200.0 + Z95 * 10.0)
 
 
 def test_a_mean_is_no_surer_than_its_common_error() -> None:
-    [one], [many] = (weeks_of(batches_of(week(0, n))).payload_high_kg - 100.0 for n in (1, 200))
+    [one], [many] = (weeks_of(batches_of(week(0, n)))["payload_high_kg"] - 100.0 for n in (1, 200))
     assert one == pytest.approx(Z95 * 5.0)
     assert many == pytest.approx(Z95 * math.hypot(4.0, 3.0 / math.sqrt(200)))
 
@@ -117,11 +58,12 @@ def test_a_mean_is_no_surer_than_its_common_error() -> None:
 def test_a_week_begins_on_monday() -> None:
     sunday, monday = row(MONDAY_S - 1), row(MONDAY_S)
     weeks = weeks_of(batches_of([sunday, monday]))
-    assert weeks.mondays == (date(2025, 12, 29), date(2026, 1, 5))
+    assert weeks["monday"].to_list() == [date(2025, 12, 29), date(2026, 1, 5)]
+    assert [monday_of(number) for number in weeks["week"]] == weeks["monday"].to_list()
     assert monday_of(0) == date(1969, 12, 29)
 
 
-def days(*bad: bool, reason: str = "acceleration_stuck", n: int = 4) -> Batches:
+def days(*bad: bool, reason: str = "acceleration_stuck", n: int = 4) -> pl.DataFrame:
     """A day of four batches each; all of a bad one's refused."""
     rows = [
         row(MONDAY_S + day * DAY_S + 300 * (k + 1), *([reason] if is_bad else []))
@@ -134,7 +76,7 @@ def days(*bad: bool, reason: str = "acceleration_stuck", n: int = 4) -> Batches:
 def test_a_sensor_that_fails_for_good_is_bad_since_that_day() -> None:
     [trouble] = troubles_of(days(*[False] * 60, *[True] * 20))
     assert (trouble.health, trouble.since) == (Health.BAD, date(2026, 1, 5) + timedelta(days=60))
-    assert (trouble.recent, trouble.days, trouble.n_batches) == (Share(14, 14), Share(20, 80), 80)
+    assert (trouble.recent, trouble.days, trouble.n_batches) == (Share.of(14, 14), Share.of(20, 80), 80)
 
 
 def test_a_sensor_that_fails_again_is_bad_since_it_did_so_and_not_since_it_was_mended() -> None:
@@ -167,10 +109,3 @@ def test_a_few_days_are_no_proof_and_one_batch_makes_no_bad_day() -> None:
 
 def test_only_reasons_of_the_sensors_are_troubles() -> None:
     assert troubles_of(days(True, True, True, reason="too_slow")) == ()
-
-
-@pytest.mark.parametrize(
-    ("n_bad", "n", "low", "high"), [(0, 10, 0.0, 0.2775), (10, 10, 0.7225, 1.0), (5, 10, 0.2366, 0.7634)]
-)
-def test_the_interval_of_a_share_is_wilsons(n_bad: int, n: int, low: float, high: float) -> None:
-    assert Share(n_bad, n).interval95 == pytest.approx((low, high), abs=1e-4)  # as R's binom.confint has them

@@ -9,8 +9,8 @@ from support.drives import T0_NS, drive, joined, later, without_rows
 
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
-from gateway.estimates.as_json.kinds import way_from_json, way_to_json
 from gateway.estimates.batch_estimate import Place, Watched, Way
+from gateway.estimates.field_kinds import WAY
 from gateway.records import Motion, SensorTraits, Signal
 
 JOURNEY = (Signal.LATITUDE, Signal.LONGITUDE, Signal.ODOMETER, Signal.DOOR, Signal.IGNITION)
@@ -123,9 +123,9 @@ def test_a_coarse_odometer_is_passed_over():
 def test_json_and_back():
     rows = beside(drive(150.0, lambda t_s: np.where((t_s > 20.0) & (t_s < 90.0), 0.0, 15.0)), 150.0)
     for way in ways(rows, decimals=4):
-        again = way_from_json(way_to_json(way))
-        assert way_to_json(again) == way_to_json(way)
-    assert way_to_json(Way())["distance_m"] is None
+        again = WAY.read(WAY.write(way))
+        assert WAY.write(again) == WAY.write(way)
+    assert WAY.write(Way())["distance_m"] is None
 
 
 def test_a_clock_that_steps_back_starts_a_new_journey():

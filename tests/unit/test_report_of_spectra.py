@@ -18,8 +18,7 @@ from gateway.core.ratio_index.index import Band
 from gateway.core.spectrum import spectra_of
 from gateway.estimates.batch_estimate import Quantity
 from gateway.model.displayed import Fitted, modelled_spectra
-from gateway.model.spectra import Reading, cross_spectra_of
-from gateway.model.table import INDEX, NAMES, ROWS, UPRIGHT, prior_of
+from gateway.model.table import INDEX, NAMES, ROWS, prior_of
 from gateway.model.vehicle_model import VehicleModel
 from gateway.records import Batch, Spectra, Why
 from gateway.reports.calibration.accuracy import accuracy_section
@@ -150,15 +149,6 @@ def test_a_payload_on_pallets_is_drawn_as_it_was_found(calibration: VehicleModel
     assert amplitude_misfit(ringing, as_calibrated) > 1.1 * amplitude_misfit(ringing, as_found)
 
 
-@pytest.mark.parametrize(("payload_kg", "front_share_pct"), [(0.0, 52.0), (270.0, 52.0), (420.0, 47.0)])
-def test_another_load_lies_beside_them(
-    seen: Spectra, calibration: VehicleModel, payload_kg: float, front_share_pct: float
-) -> None:
-    other = replace(LOADED, payload_kg=payload_kg, front_share_pct=front_share_pct)
-    right = amplitude_misfit(seen, modelled_spectra(seen, calibration, LOADED))
-    assert amplitude_misfit(seen, modelled_spectra(seen, calibration, other)) > 1.1 * right
-
-
 def test_spectra_of_the_fitted_model_give_the_same_figures(seen: Spectra, calibration: VehicleModel) -> None:
     """The level is a line through the model's own spectra: nothing is left to move."""
     once = modelled_spectra(seen, calibration, LOADED)
@@ -183,13 +173,6 @@ def test_varied_speeds_blur_the_wheelbase(seen: Spectra, calibration: VehicleMod
     assert np.ptp(np.log(varied.pitch_rate[is_high])) < np.ptp(np.log(steady.pitch_rate[is_high]))
 
 
-def test_the_delays_of_a_batch_are_those_of_its_speed() -> None:
-    batch = batch_over_road(0.0, 52.0, seed=4, duration_s=60.0, speed_mps=SPEED_MPS)
-    spectra = cross_spectra_of([batch], Reading(VAN.wheelbase_m, (1.1, 14.0), 256))
-    assert spectra.delay_mean_s == pytest.approx(DELAY_S)
-    assert spectra.delay_std_s == pytest.approx(0.0, abs=1e-9)
-
-
 WIDE = replace(VAN, track_width_m=1.5, sensor_offset_left_m=0.3)
 ROLL_MEAN, ROLL_STD = prior_of(ROWS, WIDE)
 
@@ -208,11 +191,6 @@ def test_the_report_has_the_roll_of_the_drives() -> None:
     assert set(rows) == {name for name in NAMES if not name.startswith("slack_")}
     before = float(rows["roll_inertia_kgm2"][1])
     assert before == pytest.approx(1240.0 * (0.42 * 1.5) ** 2, rel=1e-3)  # in its unit, not its logarithm
-
-
-def test_a_report_without_a_roll_rate_does_not_mention_roll() -> None:
-    known = knowledge_of(as_if_fitted(*prior_of(UPRIGHT, WIDE), WIDE), WIDE)
-    assert [one.name for one in known] == [row.name for row in UPRIGHT]
 
 
 def judged(cg_left: CgLeftErrors | None, wheels: WheelErrors | None) -> Judgement:

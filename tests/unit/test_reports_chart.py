@@ -20,7 +20,7 @@ from gateway.reports.charts import (
     Table,
 )
 from gateway.reports.charts.html import table_html
-from gateway.reports.charts.still import draw, panels, save, save_still
+from gateway.reports.charts.still import draw, save_still
 
 X = np.linspace(1.0, 3.0, 5)
 MARKS: tuple[Mark, ...] = (
@@ -92,32 +92,3 @@ def test_named_positions_are_on_the_chart() -> None:
 def test_a_cell_may_lead_to_another_page_and_nothing_breaks_out_of_it() -> None:
     cells = table_html(Table("of vans", ("Van",), ((ChartLink("<b>", 'a"b.html'),),)))
     assert '<th scope="row"><a href="a&quot;b.html">&lt;b&gt;</a></th>' in cells
-
-
-def drawn(directory: Path, last: float) -> str:
-    figure, (left, right) = panels(1, 2)
-    left.plot(np.arange(5.0), np.arange(5.0) ** 2, label="payload [kg] < 300")
-    right.plot([0.0, 1.0], [0.0, last])
-    left.legend()
-    return save(figure, directory, "one")
-
-
-def test_the_same_numbers_draw_the_same_bytes(tmp_path: Path) -> None:
-    one, same, other = (drawn(tmp_path / name, last) for name, last in (("a", 1.0), ("b", 1.0), ("c", 2.0)))
-    assert one == same
-    assert one != other
-    assert (tmp_path / "a" / "one.png").read_bytes() == (tmp_path / "b" / "one.png").read_bytes()
-
-
-def test_the_element_can_stand_in_a_page(tmp_path: Path) -> None:
-    element = drawn(tmp_path, 1.0)
-    assert element.startswith("<svg")
-    assert element.rstrip().endswith("</svg>")
-    assert "payload [kg] &lt; 300" in element
-
-
-@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (2, 1), (1, 3)])
-def test_panels_come_row_by_row(rows: int, columns: int) -> None:
-    figure, axes = panels(rows, columns)
-    assert len(axes) == rows * columns
-    assert figure.axes == axes

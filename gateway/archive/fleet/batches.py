@@ -1,22 +1,18 @@
-"""The batches of one vehicle as columns for the fleet's report, read file by file."""
+"""The batches of one vehicle as a polars frame, read table by table."""
 
 import io
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import compress, groupby
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
-import numpy as np
+import polars as pl
 
-from gateway.archive.dataset import SCHEMA_VERSION, pyarrow_and_parquet
+from gateway.archive.dataset import SCHEMA_KEY, SCHEMA_VERSION
 from gateway.archive.places import Location, PlaceError
 from gateway.archive.receipts import Slot
 from gateway.errors import ConfigurationError
-from gateway.records import F64, I64, Bool
-
-if TYPE_CHECKING:
-    import pyarrow as pa
+from gateway.estimates.reasons import EXPLANATIONS, Cause
+from gateway.units import NS_PER_DAY
 
 OF_VEHICLE: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -35,136 +31,72 @@ OF_SENSOR: Final[Mapping[str, str]] = MappingProxyType(
     }
 )
 DRIFTING: Final = (*OF_VEHICLE, *OF_SENSOR)
-_NUMBERS: Final = ("payload_kg", "payload_std_kg", "payload_own_std_kg", *DRIFTING)
-_COLUMNS: Final = ("t_end_ns", "calibration_id", "rejected", "over_limit", *_NUMBERS)
+_READ: Final = (
+    "t_end_ns", "calibration_id", "rejected", "over_limit",
+    "payload_kg", "payload_std_kg", "payload_own_std_kg", *DRIFTING,
+)  # fmt: skip
+DAYS_BEFORE: Final = 3  # of the week that holds 1970-01-01, a Thursday
+
+REASONS_OF: Final[Mapping[Cause, list[str]]] = {
+    cause: [str(why) for why, told in EXPLANATIONS.items() if told.cause is cause] for cause in Cause
+}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Batches:
-    """Batches of one vehicle, in order of time: arrays (n,), NaN where unknown.
+def read_batches(dataset: Location, jobs: Sequence[Slot]) -> pl.DataFrame:
+    """Every batch of some jobs of one vehicle in order of time. Raises PlaceError, or ConfigurationError for an invalid
+    table.
 
-    ``numbers`` are columns of the data set by name; ``rejected`` has for each reason the batches that it refused. A
-    batch is answered if no reason refused it.
+    Besides columns of the data set a row has its ``day`` and its ``week``, counted from 1970-01-01 and from the Monday
+    before it (UTC), whether it ``is_answered`` (no reason refused it), and for each cause whether a reason of that
+    cause refused it. Unknown is null.
     """
-
-    t_end_ns: I64
-    calibration_id: tuple[str, ...]
-    numbers: Mapping[str, F64]
-    rejected: Mapping[str, Bool]
-    is_over_limit: Bool
-
-    def __len__(self) -> int:
-        return len(self.t_end_ns)
-
-    @property
-    def is_answered(self) -> Bool:
-        answered: Bool = ~np.any([np.zeros(len(self), dtype=bool), *self.rejected.values()], axis=0)
-        return answered
-
-    def rows(self, chosen: Bool) -> "Batches":
-        return Batches(
-            self.t_end_ns[chosen],
-            tuple(compress(self.calibration_id, chosen)),
-            {name: numbers[chosen] for name, numbers in self.numbers.items()},
-            {reason: refused[chosen] for reason, refused in self.rejected.items()},
-            self.is_over_limit[chosen],
-        )
-
-
-def by_vehicle(slots: Sequence[Slot]) -> Iterator[tuple[str, list[Slot]]]:
-    """The jobs of each vehicle, in order."""
-    for vehicle, jobs in groupby(sorted(slots), lambda slot: slot.vehicle):
-        yield vehicle, list(jobs)
-
-
-def read_batches(dataset: Location, jobs: Sequence[Slot]) -> Batches:
-    """Every batch of some jobs of one vehicle. Raises PlaceError, or ConfigurationError for an invalid table.
-
-    The memory needed is that of these columns of these jobs.
-    """
-    parts = [_read(dataset, slot) for slot in jobs]
-    t_end_ns = np.concatenate([part.t_end_ns for part in parts])
-    order = np.argsort(t_end_ns, kind="stable")
-    _require_once(t_end_ns[order], np.repeat(np.arange(len(jobs)), [len(part) for part in parts])[order], jobs)
-    ids = [one for part in parts for one in part.calibration_id]
-    reasons = sorted({reason for part in parts for reason in part.rejected})
-    return Batches(
-        t_end_ns[order],
-        tuple(ids[n] for n in order),
-        {name: np.concatenate([part.numbers[name] for part in parts])[order] for name in _NUMBERS},
-        {
-            reason: np.concatenate([part.rejected.get(reason, np.zeros(len(part), dtype=bool)) for part in parts])[
-                order
-            ]
-            for reason in reasons
+    read = [_read(dataset, slot).with_columns(receipt=pl.lit(slot.receipt)) for slot in jobs]
+    batches = pl.concat(read).sort("t_end_ns", maintain_order=True)
+    _require_once(batches)
+    day = pl.col("t_end_ns") // NS_PER_DAY
+    return batches.with_columns(
+        day=day,
+        week=(day + DAYS_BEFORE) // 7,
+        is_answered=pl.col("rejected").list.len() == 0,
+        **{
+            str(cause): pl.col("rejected").list.eval(pl.element().is_in(reasons)).list.any()
+            for cause, reasons in REASONS_OF.items()
         },
-        np.concatenate([part.is_over_limit for part in parts])[order],
     )
 
 
-def _require_once(t_end_ns: I64, job: I64, jobs: Sequence[Slot]) -> None:
+def _require_once(batches: pl.DataFrame) -> None:
     """Raises ConfigurationError if two jobs have the same batch, which would count twice."""
-    again = np.flatnonzero((np.diff(t_end_ns) == 0) & (np.diff(job) != 0))
-    if again.size:
-        one, other = (jobs[job[again[0] + k]].receipt for k in (0, 1))
+    again = batches.group_by("t_end_ns").agg(pl.col("receipt").unique().sort()).filter(pl.col("receipt").list.len() > 1)
+    if len(again):
         raise ConfigurationError(
-            f"{one} and {other} vouch for the same {again.size} batches, which would count twice: remove the receipt "
-            "whose inputs are no longer those of the archive"
+            f"{' and '.join(again['receipt'][0])} vouch for the same {len(again)} batches, which would count twice: "
+            "remove the receipt whose inputs are no longer those of the archive"
         )
 
 
-def _read(dataset: Location, slot: Slot) -> Batches:
-    pa, pq = pyarrow_and_parquet()
+def _read(dataset: Location, slot: Slot) -> pl.DataFrame:
     where = f"{dataset}/{slot.table}"
     try:
-        file = pq.ParquetFile(io.BytesIO(dataset.read(slot.table)))
-        _require_known(file.schema_arrow, where)
-        return _batches_of(file.read(columns=list(_COLUMNS)))
+        file = io.BytesIO(dataset.read(slot.table))
+        _require_known(pl.read_parquet_metadata(file).get(SCHEMA_KEY, ""), where)
+        return pl.read_parquet(file, columns=list(_READ))
     except FileNotFoundError:
         raise PlaceError(
             f"{where}: is missing, though a receipt vouches for it: remove {slot.receipt} and run "
             "`springscale reprocess` again, which writes it again"
         ) from None
-    except pa.ArrowInvalid as fault:
+    except pl.exceptions.PolarsError as fault:
         raise PlaceError(
             f"{where}: is no Parquet file ({str(fault).splitlines()[0]}): remove it and {slot.receipt}, and run "
             "`springscale reprocess` again"
         ) from None
 
 
-def _require_known(schema: "pa.Schema", where: str) -> None:
-    told = (schema.metadata or {}).get(b"springscale_schema", b"").decode()
-    if not told.isdigit():
-        raise ConfigurationError(f"{where}: is no table of `springscale reprocess`: it names no springscale_schema")
-    if int(told) > SCHEMA_VERSION:
+def _require_known(version: str, where: str) -> None:
+    if not version.isdigit():
+        raise ConfigurationError(f"{where}: is no table of `springscale reprocess`: it names no {SCHEMA_KEY}")
+    if int(version) > SCHEMA_VERSION:
         raise ConfigurationError(
-            f"{where}: has schema {told}, this springscale knows up to {SCHEMA_VERSION}: install a newer one"
+            f"{where}: has schema {version}, this springscale knows up to {SCHEMA_VERSION}: install a newer one"
         )
-
-
-def _batches_of(table: "pa.Table") -> Batches:
-    return Batches(
-        table["t_end_ns"].to_numpy(),
-        tuple(one or "" for one in table["calibration_id"].to_pylist()),
-        {name: table[name].to_numpy().astype(np.float64) for name in _NUMBERS},
-        _reasons(table["rejected"].combine_chunks()),
-        _lengths(table["over_limit"].combine_chunks()) > 0,
-    )
-
-
-def _lengths(lists: Any) -> I64:
-    counts: I64 = np.asarray(lists.value_lengths().fill_null(0)).astype(np.int64)
-    return counts
-
-
-def _reasons(lists: Any) -> dict[str, Bool]:
-    """Finds, for each text in a column of lists, the rows that contain it."""
-    row = np.repeat(np.arange(len(lists)), _lengths(lists))
-    told = lists.flatten().dictionary_encode()
-    code = np.asarray(told.indices)
-    found = {}
-    for n, reason in enumerate(told.dictionary.to_pylist()):
-        of_rows = np.zeros(len(lists), dtype=bool)
-        of_rows[row[code == n]] = True
-        found[str(reason)] = of_rows
-    return found

@@ -7,23 +7,25 @@ those among the flagged ones is bounded under any dependence (Y. Benjamini and D
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Final
 
 import numpy as np
-from scipy.special import ndtr
-from scipy.stats import rankdata
+import polars as pl
+from scipy.special import ndtr, ndtri
+from scipy.stats import false_discovery_control, kendalltau, rankdata, theilslopes
 
 from gateway.archive.fleet.batches import DRIFTING
-from gateway.archive.fleet.weeks import Weeks
 from gateway.estimates.batch_estimate import Z95
-from gateway.records import F64, I64, Bool
+from gateway.records import F64, Bool
 
 LEAST_POINTS: Final = 8  # chosen: with fewer points S is not approximately normal
 MOST_ALIKE: Final = 0.95  # chosen: bound of the autocorrelation, for a finite variance
 FALSE_SHARE: Final = 0.05  # chosen: of the flagged, those that may be there by chance
+LEAST_IN_WEEK: Final = 5  # chosen: batches with a number for the median of a week
+LEAST_VEHICLES: Final = 20  # chosen: with fewer, common movement cannot be separated from a single vehicle's
+WEEKS_PER_YEAR: Final = 365.25 / 7.0  # Julian year
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,54 +39,73 @@ class DriftTrend:
     n: int
 
 
-def pair_slopes(x: F64, y: F64) -> F64:
-    """Slopes between any two points (n,) that differ in x, rising."""
-    first, second = np.triu_indices(len(x), 1)
-    apart, rise = x[second] - x[first], y[second] - y[first]
-    slopes: F64 = np.sort(rise[apart != 0.0] / apart[apart != 0.0])
-    return slopes
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """The drift of one vehicle's parameter, in its unit per year, since its last calibration.
+
+    ``found`` is the raw trend; ``beyond`` is the trend without the median movement of the fleet, None if the fleet is
+    too small. ``is_believed`` refers to ``beyond``, or to ``found`` without it.
+    """
+
+    found: DriftTrend
+    beyond: DriftTrend | None
+    is_believed: bool
+
+    @property
+    def judged(self) -> DriftTrend:
+        return self.beyond or self.found
 
 
-def variance_of_s(x: F64, y: F64) -> float:
-    """Variance of Kendall's S without a trend, with its correction for ties; below 0 with hardly anything but ties."""
-    ties = [int(n) for values in (x, y) for n in np.unique(values, return_counts=True)[1]]
-    free, *tied = (n * (n - 1) * (2 * n + 5) for n in (len(x), *ties))
-    return (free - sum(tied)) / 18.0
+def medians_of(batches: pl.DataFrame) -> pl.DataFrame:
+    """The ``median`` of each parameter by ``name`` and ``week``, of the weeks with enough batches that know it."""
+    return (
+        batches.unpivot(DRIFTING, index="week", variable_name="name", value_name="number")
+        .drop_nulls()
+        .group_by("name", "week")
+        .agg(pl.len().alias("n"), pl.median("number").alias("median"))
+        .filter(pl.col("n") >= LEAST_IN_WEEK)
+        .sort("week")
+    )
 
 
-def around_the_median(slopes: F64, reach: float) -> tuple[float, float]:
-    """The slopes ``reach`` ranks of S on either side of the median, or the outermost ones."""
-    low = max(round((len(slopes) - reach) / 2.0) - 1, 0)
-    high = min(round((len(slopes) + reach) / 2.0), len(slopes) - 1)
-    return float(slopes[low]), float(slopes[high])
+def drifts_of(medians: pl.DataFrame) -> dict[tuple[str, str], Drift]:
+    """By vehicle and parameter, the drifts with enough data, judged together.
+
+    ``medians`` has a row for each ``vehicle``, ``name`` and ``week`` (``medians_of``). The movement of the fleet in a
+    week is the median, over at least LEAST_VEHICLES, of how far each vehicle is from its own median then.
+    """
+    away = pl.col("median") - pl.col("median").median().over("vehicle", "name")
+    moved = medians.with_columns(away=away).with_columns(
+        common=pl.when(pl.len().over("name", "week") >= LEAST_VEHICLES).then(pl.median("away").over("name", "week"))
+    )
+    found: dict[tuple[str, str], tuple[DriftTrend, DriftTrend | None]] = {}
+    for (vehicle, name), weeks in moved.partition_by("vehicle", "name", as_dict=True).items():
+        shared = weeks.drop_nulls("common")
+        if (trend := _per_year(weeks, weeks["median"])) is not None:
+            found[vehicle, name] = trend, _per_year(shared, shared["median"] - shared["common"])
+    flags = believed([(beyond or trend).p for trend, beyond in found.values()]).tolist()
+    return {key: Drift(*trends, is_believed) for (key, trends), is_believed in zip(found.items(), flags, strict=True)}
+
+
+def _per_year(weeks: pl.DataFrame, numbers: pl.Series) -> DriftTrend | None:
+    return trend_of(weeks["week"].to_numpy() / WEEKS_PER_YEAR, numbers.to_numpy())
 
 
 def trend_of(x: F64, y: F64) -> DriftTrend | None:
     """The trend of y over x (n,), both finite, x rising; None with too few points."""
-    n = len(x)
-    if n < LEAST_POINTS:
+    if len(x) < LEAST_POINTS:
         return None
-    slopes = pair_slopes(x, y)
-    slope = float(np.median(slopes))
-    std = math.sqrt(variance_of_s(x, y) * _repeated(y - slope * x))
-    low, high = around_the_median(slopes, Z95 * std)
-    excess = max(0.0, abs(float(np.sign(slopes).sum())) - 1.0)  # of S, with continuity correction
-    p = 1.0 if std == 0.0 else min(1.0, 2.0 * float(ndtr(-excess / std)))
-    return DriftTrend(slope, low, high, p, n)
+    slope = float(theilslopes(y, x).slope)
+    wider = math.sqrt(_repeated(y - slope * x))  # than if neighbouring weeks did not follow each other
+    _, _, low, high = theilslopes(y, x, alpha=float(2.0 * ndtr(-Z95 * wider)))
+    chance = kendalltau(x, y, method="asymptotic").pvalue
+    p = 1.0 if math.isnan(chance) else 2.0 * float(ndtr(ndtri(chance / 2.0) / wider))
+    return DriftTrend(slope, float(low), float(high), p, len(x))
 
 
 def believed(p: Sequence[float]) -> Bool:
     """Which of these p-values (n,) are significant, with at most FALSE_SHARE of them by chance."""
-    chances = np.asarray(p, dtype=float)
-    n = len(chances)
-    if n == 0:
-        return np.zeros(0, dtype=bool)
-    order = np.argsort(chances)
-    allowed = FALSE_SHARE * np.arange(1, n + 1) / (n * np.sum(1.0 / np.arange(1, n + 1)))
-    below = np.flatnonzero(chances[order] <= allowed)
-    chosen = np.zeros(n, dtype=bool)
-    if below.size:
-        chosen[order[: below[-1] + 1]] = True
+    chosen: Bool = np.asarray(false_discovery_control(p, method="by") if p else []) <= FALSE_SHARE
     return chosen
 
 
@@ -105,70 +126,3 @@ def _repeated(left: F64) -> float:
     lags = np.arange(1, n - 2)
     counts = (n - lags) * (n - lags - 1.0) * (n - lags - 2.0) * alike**lags
     return 1.0 + 2.0 / (n * (n - 1.0) * (n - 2.0)) * float(np.sum(counts))
-
-
-LEAST_IN_WEEK: Final = 5  # chosen: batches with a number for the median of a week
-LEAST_VEHICLES: Final = 20  # chosen: with fewer, common movement cannot be separated from a single vehicle's
-WEEKS_PER_YEAR: Final = 365.25 / 7.0  # Julian year
-
-
-@dataclass(frozen=True, slots=True)
-class Drift:
-    """The drift of one vehicle's parameter, in its unit per year, since its last calibration.
-
-    ``found`` is the raw trend; ``beyond`` is the trend without the median movement of the fleet, None if the fleet is
-    too small. ``is_believed`` refers to ``beyond``, or to ``found`` without it.
-    """
-
-    found: DriftTrend
-    beyond: DriftTrend | None
-    is_believed: bool
-
-    @property
-    def judged(self) -> DriftTrend:
-        return self.beyond or self.found
-
-
-Series = Mapping[str, tuple[I64, F64]]  # by parameter: numbers of weeks and their medians, both (m,)
-
-
-def series_of(weeks: Weeks) -> Series:
-    """The weeks with a sufficiently known median of each parameter."""
-    known = {name: weeks.n_medians[name] >= LEAST_IN_WEEK for name in DRIFTING}
-    return {name: (weeks.number[rows], weeks.medians[name][rows]) for name, rows in known.items()}
-
-
-def drifts_of(fleet: Mapping[str, Series]) -> dict[str, dict[str, Drift]]:
-    """By vehicle and parameter, the drifts with enough data, judged together."""
-    found: dict[tuple[str, str], tuple[DriftTrend, DriftTrend | None]] = {}
-    common = {name: common_movement([series[name] for series in fleet.values()]) for name in DRIFTING}
-    for vehicle, name in product(fleet, DRIFTING):
-        number, medians = fleet[vehicle][name]
-        trend = trend_of(number / WEEKS_PER_YEAR, medians)
-        if trend is not None:
-            found[vehicle, name] = (trend, _beyond(number, medians, common[name]))
-    chances = [(beyond or trend).p for trend, beyond in found.values()]
-    drifts: dict[str, dict[str, Drift]] = {vehicle: {} for vehicle in fleet}
-    for ((vehicle, name), (trend, beyond)), is_believed in zip(found.items(), believed(chances), strict=True):
-        drifts[vehicle][name] = Drift(trend, beyond, bool(is_believed))
-    return drifts
-
-
-def common_movement(series: Sequence[tuple[I64, F64]]) -> dict[int, float]:
-    """By week: the median over vehicles of the difference between each one's week and its own median.
-
-    Only weeks with LEAST_VEHICLES.
-    """
-    moved: dict[int, list[float]] = {}
-    for number, medians in series:
-        if medians.size:
-            for week, away in zip(number.tolist(), (medians - np.median(medians)).tolist(), strict=True):
-                moved.setdefault(week, []).append(away)
-    return {week: float(np.median(away)) for week, away in moved.items() if len(away) >= LEAST_VEHICLES}
-
-
-def _beyond(number: I64, medians: F64, common: Mapping[int, float]) -> DriftTrend | None:
-    """The trend without the fleet's common movement; None if too few weeks have that."""
-    rows = np.array([week in common for week in number.tolist()], dtype=bool)
-    shared = np.array([common[week] for week in number[rows].tolist()])
-    return trend_of(number[rows] / WEEKS_PER_YEAR, medians[rows] - shared)

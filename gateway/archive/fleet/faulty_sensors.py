@@ -1,17 +1,17 @@
 """Faulty sensors: the days on which a sensor's reason refused most of the driving, and the start of the fault."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import date
+from datetime import date, timedelta
 from enum import StrEnum
 from typing import Final
 
 import numpy as np
+import polars as pl
+from scipy.special import xlogy
+from scipy.stats import binomtest
 
-from gateway.archive.fleet.batches import Batches
-from gateway.archive.fleet.weeks import CAUSES, DAY_NS, date_of
-from gateway.estimates.batch_estimate import Z95
+from gateway.archive.fleet.batches import REASONS_OF
 from gateway.estimates.reasons import Cause
 from gateway.records import F64, I64, Bool
 
@@ -36,16 +36,12 @@ class Share:
 
     n_bad: int
     n: int
+    interval95: tuple[float, float]
 
-    @property
-    def interval95(self) -> tuple[float, float]:
-        """(0, 1) without data."""
-        if self.n == 0:
-            return 0.0, 1.0
-        share, z2 = self.n_bad / self.n, Z95**2
-        middle = (share + z2 / (2 * self.n)) / (1 + z2 / self.n)
-        reach = Z95 / (1 + z2 / self.n) * math.sqrt(share * (1 - share) / self.n + z2 / (4 * self.n**2))
-        return max(0.0, middle - reach), min(1.0, middle + reach)
+    @classmethod
+    def of(cls, n_bad: int, n: int) -> "Share":
+        interval = binomtest(n_bad, n).proportion_ci(method="wilson")
+        return cls(n_bad, n, (float(interval.low), float(interval.high)))
 
     @property
     def is_surely_bad(self) -> bool:
@@ -66,28 +62,34 @@ class Trouble:
     since: date | None = None
 
 
-def troubles_of(batches: Batches) -> tuple[Trouble, ...]:
-    """Every reason of the sensors that refused a batch, the worst first."""
+def date_of(day: int) -> date:
+    """The date so many days after 1970-01-01."""
+    return date(1970, 1, 1) + timedelta(days=day)
+
+
+def troubles_of(batches: pl.DataFrame) -> tuple[Trouble, ...]:
+    """Every reason of the sensors that refused a batch (``read_batches``), the worst first."""
     return tuple(sorted(_troubles(batches), key=lambda one: (list(Health).index(one.health), -one.n_batches)))
 
 
-def _troubles(batches: Batches) -> Iterator[Trouble]:
-    day_of = batches.t_end_ns // DAY_NS
-    days, first, n = np.unique(day_of, return_index=True, return_counts=True)
-    for reason, refused in batches.rejected.items():
-        if CAUSES.get(reason) is Cause.SENSORS and refused.any():
-            is_bad = np.add.reduceat(refused.astype(np.int64), first) >= BAD_DAY_SHARE * n
-            met = day_of[refused]
-            yield _trouble(reason, int(refused.sum()), days, is_bad, (date_of(met[0]), date_of(met[-1])))
+def _troubles(batches: pl.DataFrame) -> Iterator[Trouble]:
+    for reason in REASONS_OF[Cause.SENSORS]:
+        refused = pl.col("rejected").list.contains(reason)
+        days = batches.group_by("day", maintain_order=True).agg(refused.sum().alias("n"), refused.mean().alias("share"))
+        met = days.filter(pl.col("n") > 0)
+        if len(met):
+            is_bad = days["share"].to_numpy() >= BAD_DAY_SHARE
+            ends = date_of(met["day"][0]), date_of(met["day"][-1])
+            yield _trouble(reason, int(met["n"].sum()), days["day"].to_numpy(), is_bad, ends)
 
 
 def _trouble(reason: str, n_batches: int, days: I64, is_bad: Bool, met: tuple[date, date]) -> Trouble:
-    recent = Share(int(is_bad[-RECENT_DAYS:].sum()), len(is_bad[-RECENT_DAYS:]))
+    recent = Share.of(int(is_bad[-RECENT_DAYS:].sum()), len(is_bad[-RECENT_DAYS:]))
     n_bad = np.convolve(is_bad, np.ones(RECENT_DAYS, dtype=np.int64))[RECENT_DAYS - 1 :]  # from each day on
-    was_bad = len(is_bad) >= RECENT_DAYS and Share(int(n_bad.max()), RECENT_DAYS).is_surely_bad
+    was_bad = len(is_bad) >= RECENT_DAYS and Share.of(int(n_bad.max()), RECENT_DAYS).is_surely_bad
     health = Health.BAD if recent.is_surely_bad else Health.WAS_BAD if was_bad else Health.SOME
-    since = date_of(days[_first_of_the_bad(is_bad)]) if health is Health.BAD else None
-    return Trouble(reason, n_batches, Share(int(is_bad.sum()), len(is_bad)), recent, health, *met, since)
+    since = date_of(int(days[_first_of_the_bad(is_bad)])) if health is Health.BAD else None
+    return Trouble(reason, n_batches, Share.of(int(is_bad.sum()), len(is_bad)), recent, health, *met, since)
 
 
 def _first_of_the_bad(is_bad: Bool) -> int:
@@ -108,10 +110,4 @@ def _first_of_the_bad(is_bad: Bool) -> int:
 
 def _log_likelihood(n_bad: I64, n: I64) -> F64:
     """Log likelihood of n_bad among n with its most likely share."""
-    share = n_bad / n
-    with np.errstate(divide="ignore", invalid="ignore"):
-        parts = np.where(n_bad > 0, n_bad * np.log(share), 0.0) + np.where(
-            n_bad < n, (n - n_bad) * np.log1p(-share), 0.0
-        )
-    likelihood: F64 = parts
-    return likelihood
+    return np.asarray(xlogy(n_bad, n_bad / n) + xlogy(n - n_bad, 1.0 - n_bad / n), float)

@@ -5,16 +5,18 @@
 Only one vehicle's batches are in memory at a time; a few numbers per week are kept of it.
 """
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import date
+from itertools import groupby
 
-import numpy as np
+import polars as pl
 
-from gateway.archive.fleet.batches import Batches, by_vehicle, read_batches
-from gateway.archive.fleet.drift import Drift, Series, drifts_of, series_of
-from gateway.archive.fleet.faulty_sensors import Health, Trouble, troubles_of
-from gateway.archive.fleet.weeks import DAY_NS, Weeks, date_of, weeks_of
+from gateway.archive.fleet.batches import DRIFTING, read_batches
+from gateway.archive.fleet.drift import Drift, drifts_of, medians_of
+from gateway.archive.fleet.faulty_sensors import Health, Trouble, date_of, troubles_of
+from gateway.archive.fleet.weeks import weeks_of
 from gateway.archive.places import Location
 from gateway.archive.receipts import failures, slots_done
 from gateway.errors import ConfigurationError
@@ -35,7 +37,7 @@ class FleetVehicle:
     n_over_limit: int
     first: date
     last: date
-    weeks: Weeks
+    weeks: pl.DataFrame
     n_refused: Mapping[str, int]
     troubles: tuple[Trouble, ...]
     calibrations: tuple[str, ...]
@@ -91,51 +93,51 @@ def fleet_of(dataset: Location, on_vehicle: OnVehicle = lambda done, of: None) -
 
     Raises ConfigurationError if there is nothing, or it is invalid; PlaceError if it cannot be read.
     """
-    jobs = list(by_vehicle(slots_done(dataset)))
+    jobs = [(vehicle, list(slots)) for vehicle, slots in groupby(slots_done(dataset), lambda slot: slot.vehicle)]
     if not jobs:
         raise ConfigurationError(
             f"{dataset}: holds no receipt of `springscale reprocess`: name the folder that was its --output"
         )
     found: list[FleetVehicle] = []
-    series: dict[str, Series] = {}
+    medians: list[pl.DataFrame] = []
     for done, (name, slots) in enumerate(jobs):
         on_vehicle(done, len(jobs))
         batches = read_batches(dataset, slots)
         if len(batches):
-            vehicle, series[name] = _vehicle(name, batches)
-            found.append(vehicle)
+            last = batches["calibration_id"][-1]  # parameters are relative to it
+            since = batches.filter(pl.col("calibration_id").eq_missing(last))
+            found.append(_vehicle(name, batches, since))
+            medians.append(medians_of(since).with_columns(vehicle=pl.lit(name)))
     on_vehicle(len(jobs), len(jobs))
     if not found:
         raise ConfigurationError(f"{dataset}: its tables hold no batch at all: were the drives long enough for one?")
-    drifts = drifts_of(series)
+    drifts = drifts_of(pl.concat(medians))
     failed = tuple(
         Failure(str(one.get("vehicle")), str(one.get("month")), one.get("log"), str(one.get("reason")))
         for one in failures(dataset)
     )
-    vehicles = tuple(replace(one, drifts=drifts[one.name]) for one in found)
+    vehicles = tuple(
+        replace(one, drifts={name: drifts[one.name, name] for name in DRIFTING if (one.name, name) in drifts})
+        for one in found
+    )
     named = {name for name, _ in jobs} | {failure.vehicle for failure in failed}
-    return FleetSummary(vehicles, tuple(sorted(named - series.keys())), failed)
+    return FleetSummary(vehicles, tuple(sorted(named - {one.name for one in found})), failed)
 
 
-def _vehicle(name: str, batches: Batches) -> tuple[FleetVehicle, Series]:
-    """The summary of a vehicle with its drifts still to be judged, and the series for that."""
-    answered, ids = batches.is_answered, batches.calibration_id
-    since = weeks_of(
-        batches.rows(np.array([one == ids[-1] for one in ids]))
-    )  # parameters are relative to a calibration
-    first, last = (date_of(t // DAY_NS) for t in batches.t_end_ns[[0, -1]])
-    vehicle = FleetVehicle(
+def _vehicle(name: str, batches: pl.DataFrame, since: pl.DataFrame) -> FleetVehicle:
+    """The summary of a vehicle, its drifts still to be judged; ``since`` are its batches since it was calibrated."""
+    weeks = weeks_of(batches)
+    return FleetVehicle(
         name,
         len(batches),
-        int(answered.sum()),
-        int((batches.is_over_limit & answered).sum()),
-        first,
-        last,
-        weeks_of(batches),
-        {reason: int(refused.sum()) for reason, refused in batches.rejected.items()},
+        int(weeks["n_answered"].sum()),
+        int(weeks["n_over_limit"].sum()),
+        date_of(batches["day"][0]),
+        date_of(batches["day"][-1]),
+        weeks,
+        Counter(batches["rejected"].explode().drop_nulls()),
         troubles_of(batches),
-        tuple(dict.fromkeys(one for one in ids if one)),
-        int(since.number[0]),
+        tuple(batches["calibration_id"].drop_nulls().unique(maintain_order=True)),
+        since["week"][0],
         {},
     )
-    return vehicle, series_of(since)

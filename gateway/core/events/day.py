@@ -30,8 +30,8 @@ from gateway.core.loads import (
     loads_of,
     weighings_of,
 )
-from gateway.estimates.as_json.kinds import place_to_json
 from gateway.estimates.batch_estimate import NOWHERE, Estimate, Quantity, Way
+from gateway.estimates.field_kinds import PLACE
 from gateway.estimates.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD
 from gateway.records import iso_utc
 from gateway.units import NS_PER_S
@@ -90,7 +90,7 @@ class Day:
             **quantity_json(change_of(before.posterior, after.posterior), "change", "kg", 1),
             "probability": round(probability, 4),
             "is_withdrawn": False,
-            "place": place_to_json(place),
+            "place": PLACE.write(place),
             "stops": [_stop_json(halt) for halt in halts],
             "before": self._load_json(before),
             "after": self._load_json(after),
@@ -111,7 +111,7 @@ def _stop_json(halt: Halt) -> dict[str, Any]:
         "t_end": iso_utc(halt.t_end_ns),
         "door_opened": halt.watched.door_opened,
         "ignition_off": halt.watched.ignition_off,
-        "place": place_to_json(halt.place),
+        "place": PLACE.write(halt.place),
     }
 
 
@@ -196,8 +196,8 @@ def _trip(day: Day, first: int, last: int, loads: Sequence[FusedLoad | None]) ->
         "t_start": iso_utc(begin_ns),
         "t_end": iso_utc(end_ns),
         "is_over": last + 1 < len(day.estimates),
-        "from": place_to_json(ways[0].start),
-        "to": place_to_json(ways[-1].end if ways[-1].end.is_known else NOWHERE),
+        "from": PLACE.write(ways[0].start),
+        "to": PLACE.write(ways[-1].end if ways[-1].end.is_known else NOWHERE),
         "distance_m": rounded(distance_m, 0),
         "distance_by": source,
         "unknown_s": rounded(max(0.0, duration_s - known_s), 1),

@@ -14,7 +14,7 @@ from typing import Any, Final
 from gateway.calibration.from_drives import Outcome
 from gateway.calibration.judgement.advice import GRADE_TEXT, Grade, Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import Assessment, stated_budget
-from gateway.estimates.as_json.kinds import budget_to_json
+from gateway.estimates.field_kinds import BUDGET
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.fitted_vehicle import fitted_vehicle_section
 from gateway.reports.calibration.ratio_index import ratio_index_section
@@ -26,7 +26,6 @@ from gateway.reports.charts.html import (
     Page,
     made_folder,
     prose,
-    sections_html,
     write_report,
 )
 from gateway.words import counted, estimator_name, span
@@ -36,7 +35,12 @@ def write_report_of(directory: Path, assessment: Assessment, on_chart: OnChart =
     """Writes how a calibration weighs, and how it was made if this is known; returns the path of report.html."""
     made = list(_calibration_sections(assessment.outcome)) if assessment.outcome else []
     accuracy = [accuracy_section(one, stated_budget(one)) for one in assessment.judgements]
-    return _write(directory, assessment, [*made, *accuracy, provenance_section(assessment)], on_chart)
+    sections = [*made, *accuracy, provenance_section(assessment)]
+    made_folder(directory)
+    verdicts = verdicts_of(assessment)
+    header = f"<p>{prose(_subtitle(assessment))}</p>"
+    page = Page(assessment.title, header, skip_to="verdict", summary=_verdict_html(verdicts))
+    return write_report(directory, page, sections, report_json(assessment, verdicts), on_chart)
 
 
 def _calibration_sections(outcome: Outcome) -> Iterator[Section]:
@@ -50,19 +54,6 @@ def _calibration_sections(outcome: Outcome) -> Iterator[Section]:
         yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in outcome.split])
     if outcome.cross_spectrum is not None:
         yield fitted_vehicle_section(identification, outcome.cross_spectrum, outcome.file.vehicle)
-
-
-def _write(directory: Path, assessment: Assessment, sections: list[Section], on_chart: OnChart) -> Path:
-    made_folder(directory)
-    verdicts = verdicts_of(assessment)
-    verdict = _verdict_html(verdicts)
-    page = Page(
-        assessment.title,
-        f"<p>{prose(_subtitle(assessment))}</p>",
-        verdict + sections_html(sections),
-        ("verdict", "Skip to the verdict"),
-    )
-    return write_report(directory, page, sections, report_json(assessment, verdicts), on_chart)
 
 
 def _subtitle(assessment: Assessment) -> str:
@@ -82,17 +73,7 @@ def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...]) -> dict[s
         "calibration_id": assessment.file.id,
         "vehicle": assessment.vehicle.name,
         "grade": str(verdicts[0].grade),
-        "verdicts": [
-            {
-                "estimator": verdict.estimator,
-                "grade": str(verdict.grade),
-                "advice": verdict.advice,
-                "reasons": [
-                    {"rule": reason.rule, "grade": str(reason.grade), "text": reason.text} for reason in verdict.reasons
-                ],
-            }
-            for verdict in verdicts
-        ],
+        "verdicts": [{"estimator": verdict.estimator, **verdict.to_json()} for verdict in verdicts],
         "runs": [
             {
                 "run": one.number,
@@ -106,7 +87,7 @@ def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...]) -> dict[s
             one.estimator: {str(part): table.to_json() for part, table in one.tables.items()}
             for one in assessment.judgements
         },
-        "error_budget": {one.estimator: budget_to_json(stated_budget(one)) for one in assessment.judgements},
+        "error_budget": {one.estimator: BUDGET.write(stated_budget(one)) for one in assessment.judgements},
     }
 
 

@@ -1,6 +1,7 @@
 """Spectra of both sensors for every load, with the scatter expected for the driven time."""
 
-from collections.abc import Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -62,22 +63,37 @@ def spectra_section(runs: Sequence[KnownRun], ratio_index: RatioIndexCalibration
 
     Runs of which the load is not known are left out. None where there is no spectrum at all.
     """
-    runs = [run for run in runs if run.has_payload and run.has_place]
-    bands_a = ratio_index.acceleration_bands if ratio_index else None
-    bands_g = ratio_index.pitch_rate_bands if ratio_index else None
-    payloads = [(f"{kg:g} kg", kg) for kg in sorted({run.payload_kg for run in runs})]
-    shares = [(f"{pct:.1f} %", pct) for pct in sorted({_share(run) for run in runs})]
+    by_payload, by_share = defaultdict(list), defaultdict(list)
+    for run in runs:
+        if run.has_payload and run.has_place:
+            by_payload[run.payload_kg].append(run)
+            by_share[round(run.front_share_pct, 1)].append(run)
+    loads = {f"{kg:g} kg": by_payload[kg] for kg in sorted(by_payload)}
+    shares = {f"{pct:.1f} %": by_share[pct] for pct in sorted(by_share)}
     drawn = (
-        _chart(ACCELERATION, "for each payload", _panel(runs, ACCELERATION, payloads, bands_a), bands_a),
-        _chart(PITCH_RATE, "for front shares", _panel(runs, PITCH_RATE, shares, bands_g), bands_g),
+        _chart(ACCELERATION, "for each payload", loads, ratio_index.acceleration_bands if ratio_index else None),
+        _chart(PITCH_RATE, "for front shares", shares, ratio_index.pitch_rate_bands if ratio_index else None),
     )
     charts = tuple(chart for chart in drawn if chart is not None)
     return Section("spectra", "Spectra", (), charts) if charts else None
 
 
-def _chart(sensor: str, by: str, panel: Panel | None, bands: tuple[Band, Band] | None) -> Chart | None:
-    if panel is None:
+def _chart(sensor: str, by: str, groups: Mapping[str, list[KnownRun]], bands: tuple[Band, Band] | None) -> Chart | None:
+    """A curve for each group of runs, or for some of many; None without a spectrum."""
+    labels = list(groups)
+    some = sorted({round(at) for at in np.linspace(0, len(labels) - 1, MOST_CURVES).tolist()}) if labels else []
+    marks: list[Mark] = []
+    for colour, label in enumerate(labels[i] for i in some):
+        density = density_of((b for run in groups[label] for b in run.batches if not b.rejected), sensor)
+        if density is not None:
+            marks.append(Ribbon(density.freq_hz, density.low, density.high, "", colour))
+            marks.append(LineMark(density.freq_hz, density.amplitude, label, colour))
+    if not marks:
         return None
+    spans = [
+        Span(band.centre_hz - 0.5 * band.width_hz, band.centre_hz + 0.5 * band.width_hz, name, colour)
+        for band, name, colour in zip(bands or (), ("numerator of the index", "denominator"), (6, 7), strict=False)
+    ]
     name = sensor.replace("_", " ")
     return Chart(
         f"spectra_{sensor}",
@@ -85,36 +101,6 @@ def _chart(sensor: str, by: str, panel: Panel | None, bands: tuple[Band, Band] |
         "over that much driving on the same road; roads differ besides."
         + (" Shaded upright: the bands whose ratio is the index." if bands else ""),
         f"Spectra of the {name} {by}: more load lowers and moves the resonances of body and wheels.",
-        (panel,),
+        (Panel(Axis("frequency [Hz]"), Axis(_AXIS[sensor], is_log=True), (*spans, *marks)),),
         row_height_px=380,
-    )
-
-
-def _share(run: KnownRun) -> float:
-    return round(run.front_share_pct, 1)
-
-
-def _panel(
-    runs: Sequence[KnownRun], sensor: str, groups: Sequence[tuple[str, float]], bands: tuple[Band, Band] | None
-) -> Panel | None:
-    chosen = [groups[i] for i in np.unique(np.linspace(0, len(groups) - 1, MOST_CURVES).round().astype(int))]
-    marks: list[Mark] = []
-    for colour, (label, level) in enumerate(chosen):
-        alike = [run for run in runs if (run.payload_kg if sensor == ACCELERATION else _share(run)) == level]
-        density = density_of((b for run in alike for b in run.batches if not b.rejected), sensor)
-        if density is not None:
-            marks.append(Ribbon(density.freq_hz, density.low, density.high, "", colour))
-            marks.append(LineMark(density.freq_hz, density.amplitude, label, colour))
-    if not marks:
-        return None
-    return Panel(Axis("frequency [Hz]"), Axis(_AXIS[sensor], is_log=True), (*_spans(bands), *marks))
-
-
-def _spans(bands: tuple[Band, Band] | None) -> tuple[Span, ...]:
-    if bands is None:
-        return ()
-    names = ("numerator of the index", "denominator")
-    return tuple(
-        Span(band.centre_hz - 0.5 * band.width_hz, band.centre_hz + 0.5 * band.width_hz, name, colour)
-        for band, name, colour in zip(bands, names, (6, 7), strict=True)
     )

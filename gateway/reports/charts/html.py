@@ -6,7 +6,8 @@ The pages have no scripts and load nothing from other hosts.
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
+from datetime import date
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -22,26 +23,30 @@ OnChart = Callable[[int, int], None]  # (charts drawn, charts in all)
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A document: its head and the contents of ``main`` (HTML). ``skip_to`` is the anchor of the main content."""
+    """The top of a document: its title, what stands below it (HTML), and the anchor of the main content.
+
+    ``summary`` (HTML) stands before the sections.
+    """
 
     title: str
     header: str
-    main: str
-    skip_to: tuple[str, str]
+    skip_to: str
+    summary: str = ""
 
 
-def document(page: Page) -> str:
+def document(page: Page, sections: Sequence[Section]) -> str:
     """The complete document; it loads nothing from other hosts."""
-    anchor, words = page.skip_to
+    links = "".join(f'<li><a href="#{one.anchor}">{escape(one.heading)}</a></li>' for one in sections)
+    contents = f'<nav aria-label="Contents"><ul>{links}</ul></nav>{"".join(map(section_html, sections))}'
     style = files("gateway.reports").joinpath("assets", "report.css").read_text(encoding="utf-8")
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         '<meta name="color-scheme" content="light dark">'
         f"<title>{escape(page.title)}</title><style>{style}</style></head><body>"
-        f'<a class="skip" href="#{anchor}">{escape(words)}</a>'
+        f'<a class="skip" href="#{page.skip_to}">Skip to the content</a>'
         f"<header><h1>{escape(page.title)}</h1>{page.header}</header>"
-        f"<main>{page.main}</main></body></html>\n"
+        f"<main>{page.summary}{contents}</main></body></html>\n"
     )
 
 
@@ -53,9 +58,16 @@ def write_report(
     on_chart: OnChart = lambda done, of: None,
 ) -> Path:
     """Write report.html, its numbers as report.json and the charts' figures; return the path of report.html."""
-    text = json.dumps(numbers, indent=1, allow_nan=False, ensure_ascii=False)
+    text = json.dumps(numbers, indent=1, allow_nan=False, ensure_ascii=False, default=_as_json)
     (directory / "report.json").write_text(text + "\n", encoding="utf-8")
     return write_page(directory / "report.html", page, sections, on_chart)
+
+
+def _as_json(told: Any) -> Any:
+    """Records as objects of their fields, frames as lists of rows, dates as text."""
+    if is_dataclass(told):
+        return {one.name: getattr(told, one.name) for one in fields(told)}
+    return str(told) if isinstance(told, date) else told.to_dicts()
 
 
 def write_page(path: Path, page: Page, sections: Sequence[Section], on_chart: OnChart = lambda done, of: None) -> Path:
@@ -64,7 +76,7 @@ def write_page(path: Path, page: Page, sections: Sequence[Section], on_chart: On
     for done, chart in enumerate(charts, 1):
         save_still(chart, path.parent / FIGURES)
         on_chart(done, len(charts))
-    path.write_text(document(page), encoding="utf-8")
+    path.write_text(document(page, sections), encoding="utf-8")
     return path
 
 
@@ -82,13 +94,6 @@ def charts_of(sections: Sequence[Section]) -> Iterator[Chart]:
     for section in sections:
         yield from section.charts
         yield from (item for _, inside in section.folded for item in inside if isinstance(item, Chart))
-
-
-def sections_html(sections: Sequence[Section]) -> str:
-    """The table of contents and the sections."""
-    links = "".join(f'<li><a href="#{one.anchor}">{escape(one.heading)}</a></li>' for one in sections)
-    body = "".join(map(section_html, sections))
-    return f'<nav aria-label="Contents"><ul>{links}</ul></nav>{body}'
 
 
 def prose(text: str) -> str:

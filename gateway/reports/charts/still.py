@@ -1,9 +1,8 @@
-"""Charts by matplotlib: SVG for pages, and PNG beside it for the paper's figures.
+"""Charts by matplotlib: SVG files for pages.
 
 The figures have no global state and are saved reproducibly: the same numbers give the same bytes.
 """
 
-import io
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,32 +25,6 @@ _STYLE: Final[Any] = {  # matplotlib types its keys one by one
 }
 
 
-def panels(n_rows: int = 1, n_columns: int = 1, height_in: float = 3.2) -> tuple[Figure, list[Axes]]:
-    """Create a figure 9 inches wide; return it and its panels, row by row."""
-    with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(9.0, height_in * n_rows), layout="constrained")
-        grid = figure.subplots(n_rows, n_columns, squeeze=False)
-    return figure, list(grid.ravel())
-
-
-def save(figure: Figure, directory: Path, name: str) -> str:
-    """Write NAME.svg and NAME.png; return the SVG element for use in a page."""
-    directory.mkdir(parents=True, exist_ok=True)
-    drawn = _svg_of(figure, name)
-    (directory / f"{name}.svg").write_text(drawn, encoding="utf-8")
-    with mpl.rc_context(_STYLE):
-        figure.savefig(directory / f"{name}.png", dpi=110, metadata={"Software": None})
-    return drawn[drawn.index("<svg") :]
-
-
-def _svg_of(figure: Figure, name: str) -> str:
-    text = io.StringIO()
-    style: Any = {**_STYLE, "svg.hashsalt": name}
-    with mpl.rc_context(style):
-        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
-    return text.getvalue()
-
-
 _INCHES_PER_PX: Final = 1.0 / 105.0  # chosen: size of letters in print
 _DASHES: Final = {"solid": "-", "dash": "--", "dot": ":"}
 _MARKERS: Final = {"circle": "o", "square": "s", "diamond": "D", "x": "x"}
@@ -61,12 +34,17 @@ _LEGEND_COLUMNS: Final = 5  # chosen
 def save_still(chart: Chart, directory: Path) -> None:
     """Write NAME.svg; the same bytes for the same chart."""
     directory.mkdir(parents=True, exist_ok=True)
-    (directory / f"{chart.name}.svg").write_text(_svg_of(draw(chart), chart.name), encoding="utf-8")
+    style: Any = {**_STYLE, "svg.hashsalt": chart.name}
+    with mpl.rc_context(style):
+        draw(chart).savefig(directory / f"{chart.name}.svg", metadata={"Date": None, "Creator": None})
 
 
 def draw(chart: Chart) -> Figure:
     """Draw the chart with one common legend below all panels."""
-    figure, axes_of = panels(chart.n_rows, chart.n_columns, chart.row_height_px * _INCHES_PER_PX)
+    size_in = (9.0, chart.row_height_px * _INCHES_PER_PX * chart.n_rows)
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=size_in, layout="constrained")
+        axes_of = list(figure.subplots(chart.n_rows, chart.n_columns, squeeze=False).ravel())
     n_drawn = len(chart.panels)
     for panel, axes in zip(chart.panels, axes_of[:n_drawn], strict=True):
         _draw_panel(axes, panel)

@@ -7,6 +7,7 @@ from datetime import timedelta
 from typing import Final
 
 import numpy as np
+import polars as pl
 
 from gateway.archive.fleet.batches import DRIFTING, OF_VEHICLE
 from gateway.archive.fleet.drift import FALSE_SHARE, Drift
@@ -14,18 +15,20 @@ from gateway.archive.fleet.fleet import FleetSummary, FleetVehicle
 from gateway.reports.charts import Axis, Chart, ChartLink, LineMark, Mark, Panel, Points, Ribbon, Section, Table
 from gateway.reports.fleet.text import (
     NAMES,
-    NONE,
     day,
     drift_told,
+    every_week,
     kg,
     over_limit,
     page_of,
     percent,
+    reason_told,
     time_axis,
     trouble_told,
     whole,
 )
-from gateway.reports.fleet.vehicle_page import reason_told, refusals_section, runs_of
+from gateway.reports.fleet.vehicle_page import refusals_section
+from gateway.words import NONE
 
 SILENT_DAYS: Final = 28  # chosen: without a batch, before the last of the fleet's
 LITTLE_ANSWERED: Final = 0.5  # chosen: of a vehicle's batches
@@ -65,12 +68,7 @@ def looks_of(fleet: FleetSummary) -> list[Look]:
 
 
 def fleet_sections(fleet: FleetSummary, looks: Sequence[Look]) -> list[Section]:
-    refusals = refusals_section(
-        "refused",
-        [vehicle.weeks for vehicle in fleet.vehicles],
-        [vehicle.n_refused for vehicle in fleet.vehicles],
-        fleet.n_answered,
-    )
+    refusals = refusals_section("refused", fleet.vehicles)
     failed = [_failed(fleet)] if fleet.failures else []
     return [_look_section(looks), _vehicles(fleet), _loads(fleet), refusals, _drift(fleet), *failed, _how()]
 
@@ -113,13 +111,11 @@ def _vehicles(fleet: FleetSummary) -> Section:
 
 
 def _vehicle_row(vehicle: FleetVehicle) -> tuple[ChartLink | str, ...]:
-    weeks, known = vehicle.weeks, np.flatnonzero(vehicle.weeks.n_answered)
     most = max(vehicle.n_refused.items(), key=lambda one: one[1], default=None)
     last = NONE
-    if known.size:
-        k = known[-1]
-        load = kg(weeks.payload_mean_kg[k], weeks.payload_low_kg[k], weeks.payload_high_kg[k])
-        last = f"{load}, n = {whole(int(weeks.n_answered[k]))}"
+    for week in vehicle.weeks.filter(pl.col("n_answered") > 0).tail(1).iter_rows(named=True):
+        load = kg(week["payload_mean_kg"], week["payload_low_kg"], week["payload_high_kg"])
+        last = f"{load}, n = {whole(week['n_answered'])}"
     return (
         _name(vehicle.name),
         whole(vehicle.n),
@@ -135,32 +131,31 @@ def _vehicle_row(vehicle: FleetVehicle) -> tuple[ChartLink | str, ...]:
 
 
 def _loads(fleet: FleetSummary) -> Section:
-    means: dict[int, list[float]] = {}
-    for vehicle in fleet.vehicles:
-        answered = vehicle.weeks.n_answered > 0
-        for week, mean in zip(vehicle.weeks.number[answered], vehicle.weeks.payload_mean_kg[answered], strict=True):
-            means.setdefault(int(week), []).append(float(mean))
-    number = np.array(sorted(means), dtype=np.int64)
-    if number.size == 0:
-        return Section("loads", "Loads over time", ("No batch was answered.",))
-    low, middle, high = np.array([np.quantile(means[week], [0.25, 0.5, 0.75]) for week in number.tolist()]).T
-    counts = [len(means[week]) for week in number.tolist()]
-    axis, x = time_axis(number.tolist()), number.astype(float)
-    runs = runs_of(np.isfinite(middle), number)
-    marks: tuple[Mark, ...] = (
-        *(Ribbon(x[run], low[run], high[run], "middle half of the vehicles") for run in runs),
-        *(LineMark(x[run], middle[run], "median of the vehicles") for run in runs),
+    mean = pl.col("payload_mean_kg")
+    weeks = (
+        pl.concat([vehicle.weeks.drop_nulls("payload_mean_kg") for vehicle in fleet.vehicles])
+        .group_by("week")
+        .agg(
+            pl.len().alias("n").cast(pl.Float64),
+            mean.quantile(0.25, "linear").alias("low"),
+            mean.median().alias("middle"),
+            mean.quantile(0.75, "linear").alias("high"),
+        )
     )
+    if weeks.is_empty():
+        return Section("loads", "Loads over time", ("No batch was answered.",))
+    shown = every_week(weeks)
+    axis, x = time_axis(weeks["week"]), shown["week"].cast(float).to_numpy()
+    n, low, middle, high = (shown[name].to_numpy() for name in ("n", "low", "middle", "high"))
+    marks = (Ribbon(x, low, high, "middle half of the vehicles"), LineMark(x, middle, "median of the vehicles"))
     chart = Chart(
         "loads",
-        f"Weekly mean loads of the vehicles, and how many vehicles had an answer that week ({min(counts)} to "
-        f"{max(counts)} of {len(fleet.vehicles)}). {whole(fleet.n_answered)} batches.",
+        f"Weekly mean loads of the vehicles, and how many vehicles had an answer that week ({min(weeks['n']):.0f} to "
+        f"{max(weeks['n']):.0f} of {len(fleet.vehicles)}). {whole(fleet.n_answered)} batches.",
         "Median and middle half over the vehicles of each one's weekly mean load, and the number of vehicles by week.",
         (
             Panel(axis, Axis("load [kg]"), marks, "Weekly mean loads"),
-            Panel(
-                axis, Axis("vehicles"), (LineMark(x, np.array(counts, dtype=float), "vehicles", 7),), "With an answer"
-            ),
+            Panel(axis, Axis("vehicles"), (LineMark(x, n, "vehicles", 7),), "With an answer"),
         ),
     )
     return Section("loads", "Loads over time", (), (chart,))

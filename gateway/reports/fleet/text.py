@@ -1,19 +1,20 @@
 """Text formatting of the fleet report: numbers, weeks and findings."""
 
 import hashlib
-import math
 import re
-from collections.abc import Sequence
 from datetime import date
 from typing import Final
+
+import polars as pl
 
 from gateway.archive.fleet.batches import OF_SENSOR, OF_VEHICLE
 from gateway.archive.fleet.drift import Drift, DriftTrend
 from gateway.archive.fleet.faulty_sensors import Share, Trouble
 from gateway.archive.fleet.weeks import monday_of
+from gateway.estimates.reasons import EXPLANATIONS
 from gateway.reports.charts import Axis
+from gateway.words import NONE
 
-NONE: Final = "–"
 MOST_TICKS: Final = 8  # chosen: more labels overlap
 LEAST_WEEKS_APART: Final = 3  # names that would else lie on one another
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
@@ -36,11 +37,11 @@ def percent(part: float, of: float) -> str:
     return NONE if of == 0 else f"{100.0 * part / of:.{0 if 10 * part >= of else 1}f} %"
 
 
-def kg(mean: float, low: float, high: float) -> str:
+def kg(mean: float | None, low: float | None, high: float | None) -> str:
     """A load [kg] with its 95 % interval; a dash if unknown."""
-    if not math.isfinite(mean):
+    if mean is None:
         return NONE
-    return f"{mean:.0f} kg" + (f" ({low:.0f} to {high:.0f})" if math.isfinite(low) and math.isfinite(high) else "")
+    return f"{mean:.0f} kg" + ("" if low is None or high is None else f" ({low:.0f} to {high:.0f})")
 
 
 def slope(trend: DriftTrend) -> str:
@@ -76,12 +77,25 @@ def drift_told(drift: Drift) -> str:
     return f"{slope(drift.judged)}, {against}; {drift.judged.n} weeks"
 
 
-def time_axis(weeks: Sequence[int]) -> Axis:
+def every_week(weeks: pl.DataFrame) -> pl.DataFrame:
+    """The weeks with a row for those in between too, unknown, so that no band or line spans a gap."""
+    first, last = min(weeks["week"]), max(weeks["week"])
+    return pl.select(week=pl.int_range(first, last + 1)).join(weeks, on="week", how="left")
+
+
+def time_axis(weeks: pl.Series) -> Axis:
     """An axis of week numbers, labelled with the months."""
-    first, last = min(weeks), max(weeks)
-    months = [(number, f"{monday_of(number):%Y-%m}") for number in range(first, last + 1)]
+    months = [(number, f"{monday_of(number):%Y-%m}") for number in range(min(weeks), max(weeks) + 1)]
     begun = [one for k, one in enumerate(months) if k == 0 or one[1] != months[k - 1][1]]
     if len(begun) > 1 and begun[1][0] - begun[0][0] < LEAST_WEEKS_APART:
         del begun[0]
     every = -(-len(begun) // MOST_TICKS)
     return Axis("week", ticks=tuple((float(number), name) for number, name in begun[::every]))
+
+
+def reason_told(reason: str) -> tuple[str, str]:
+    """The cause and the remedy in words; dashes for a reason unknown to this version."""
+    told = next((told for why, told in EXPLANATIONS.items() if why == reason), None)
+    if told is None:
+        return NONE, NONE
+    return told.happened.replace("`", ""), told.advice.replace("`", "")

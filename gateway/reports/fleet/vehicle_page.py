@@ -1,41 +1,49 @@
 """The page of one vehicle: its loads, rejections, parameters and sensors by week."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+import polars as pl
 
 from gateway.archive.fleet.batches import DRIFTING
+from gateway.archive.fleet.drift import WEEKS_PER_YEAR
 from gateway.archive.fleet.fleet import FleetVehicle
-from gateway.archive.fleet.weeks import Weeks, known_reason
-from gateway.estimates.reasons import EXPLANATIONS, Cause
-from gateway.records import I64, Bool
+from gateway.estimates.reasons import Cause
 from gateway.reports.charts import Axis, Chart, LineMark, Mark, Panel, Points, Ribbon, Rule, Section, Table
 from gateway.reports.fleet.text import (
     NAMES,
-    NONE,
     day,
     drift_told,
+    every_week,
     kg,
     over_limit,
     page_of,
     percent,
+    reason_told,
     share,
     slope,
     time_axis,
     trouble_told,
     whole,
 )
+from gateway.words import NONE
 
-WEEKS_PER_YEAR: Final = 365.25 / 7.0  # Julian year
 _SHOWN: Final = 250  # px a row of panels
+_PAYLOAD: Final = (
+    "payload_mean_kg", "payload_low_kg", "payload_high_kg", "payload_lower_quartile_kg", "payload_upper_quartile_kg",
+)  # fmt: skip
 
 
 def vehicle_sections(vehicle: FleetVehicle) -> list[Section]:
     """All sections of the page; every figure states its number of batches."""
-    refusals = refusals_section(_named(vehicle, "refused"), [vehicle.weeks], [vehicle.n_refused], vehicle.n_answered)
-    return [_loads(vehicle), refusals, _parameters(vehicle), _sensors(vehicle)]
+    return [
+        _loads(vehicle),
+        refusals_section(_named(vehicle, "refused"), [vehicle]),
+        _parameters(vehicle),
+        _sensors(vehicle),
+    ]
 
 
 def _named(vehicle: FleetVehicle, what: str) -> str:
@@ -44,24 +52,20 @@ def _named(vehicle: FleetVehicle, what: str) -> str:
 
 
 def _loads(vehicle: FleetVehicle) -> Section:
-    weeks = vehicle.weeks
-    x, known = weeks.number.astype(float), np.isfinite(weeks.payload_mean_kg)
-    mean, low, high = weeks.payload_mean_kg, weeks.payload_low_kg, weeks.payload_high_kg
-    lower, upper = weeks.payload_lower_quartile_kg, weeks.payload_upper_quartile_kg
-    marks: list[Mark] = [
-        *(Ribbon(x[run], lower[run], upper[run], "middle half") for run in runs_of(known, weeks.number)),
-        Points(x[known], mean[known], "mean, 95 %", 0, "circle", low[known], high[known]),
-    ]
+    weeks = every_week(vehicle.weeks)
+    x = weeks["week"].cast(float).to_numpy()
+    mean, low, high, lower, upper = (weeks[name].to_numpy() for name in _PAYLOAD)
+    marks = (Ribbon(x, lower, upper, "middle half"), Points(x, mean, "mean, 95 %", 0, "circle", low, high))
     rows = tuple(
         (
-            day(monday),
-            whole(int(weeks.n[k])),
-            whole(int(weeks.n_answered[k])),
-            kg(mean[k], low[k], high[k]),
-            f"{lower[k]:.0f} to {upper[k]:.0f} kg" if np.isfinite(lower[k]) else NONE,
-            over_limit(int(weeks.n_over_limit[k]), int(weeks.n_answered[k])),
+            day(week["monday"]),
+            whole(week["n"]),
+            whole(week["n_answered"]),
+            kg(*(week[name] for name in _PAYLOAD[:3])),
+            NONE if week[_PAYLOAD[3]] is None else f"{week[_PAYLOAD[3]]:.0f} to {week[_PAYLOAD[4]]:.0f} kg",
+            over_limit(week["n_over_limit"], week["n_answered"]),
         )
-        for k, monday in enumerate(weeks.mondays)
+        for week in vehicle.weeks.iter_rows(named=True)
     )
     columns = ("Week of", "batches", "answered", "mean load (95 %)", "middle half", "over a limit")
     chart = Chart(
@@ -69,7 +73,7 @@ def _loads(vehicle: FleetVehicle) -> Section:
         f"Load by week: the mean over the answered batches with its 95 % interval, and the middle half of what was "
         f"carried. {whole(vehicle.n_answered)} batches of {whole(vehicle.n)}.",
         "Mean load of each week with its interval; the table below holds the numbers.",
-        (Panel(time_axis(weeks.number.tolist()), Axis("load [kg]"), tuple(marks)),),
+        (Panel(time_axis(weeks["week"]), Axis("load [kg]"), marks),),
         1,
     )
     text = (
@@ -82,48 +86,36 @@ def _loads(vehicle: FleetVehicle) -> Section:
     return Section("loads", "Loads over time", (text,), (chart,), (), (("The numbers", (table,)),))
 
 
-def refusals_section(
-    name: str,
-    all_weeks: Sequence[Weeks],
-    totals: Sequence[Mapping[str, int]],
-    n_answered: int,
-) -> Section:
+def refusals_section(name: str, vehicles: Sequence[FleetVehicle]) -> Section:
     """The refused batches of one vehicle or of several, by week and cause, and by reason. ``name`` is the chart's."""
-    by_week: dict[int, Counter[str]] = {}
-    for weeks in all_weeks:
-        for k, week in enumerate(weeks.number.tolist()):
-            of_cause = {str(cause): int(numbers[k]) for cause, numbers in weeks.n_refused_by.items()}
-            by_week.setdefault(week, Counter()).update(of_cause, n=int(weeks.n[k]))
-    number = sorted(by_week)
-    x, n = np.array(number, dtype=float), np.array([by_week[week]["n"] for week in number])
-    share = {cause: 100.0 * np.array([by_week[week][cause] for week in number]) / n for cause in Cause}
-    lines = tuple(Points(x, share[cause], str(cause), k) for k, cause in enumerate(Cause) if share[cause].any())
-    n_batches = int(n.sum())
+    weeks = pl.concat([one.weeks for one in vehicles]).group_by("week").agg(pl.col("n", *map(str, Cause)).sum())
+    weeks = weeks.sort("week")
+    x = weeks["week"].cast(float).to_numpy()
+    shares = {cause: (100.0 * weeks[str(cause)] / weeks["n"]).to_numpy() for cause in Cause}
+    lines = tuple(Points(x, shares[cause], str(cause), k) for k, cause in enumerate(Cause) if shares[cause].any())
+    n_batches = sum(one.n for one in vehicles)
     chart = Chart(
         name,
         f"Share of each week's batches that were refused, by where the reason lies; {whole(n_batches)} batches.",
         "Share of all batches refused in each week, by cause; the table below holds the sums.",
-        (Panel(time_axis(number), Axis("refused [%]"), lines),),
+        (Panel(time_axis(weeks["week"]), Axis("refused [%]"), lines),),
         1,
         _SHOWN,
     )
-    total, vehicles = Counter[str](), Counter[str]()
-    for refused in totals:
-        total.update(refused)
-        vehicles.update(reason for reason, times in refused.items() if times)
-    has_several = len(totals) > 1
+    total = sum((Counter(one.n_refused) for one in vehicles), Counter[str]())
+    has_several = len(vehicles) > 1
     rows = tuple(
         (
             reason,
             whole(times),
             percent(times, n_batches),
-            *([whole(vehicles[reason])] if has_several else []),
+            *([whole(sum(reason in one.n_refused for one in vehicles))] if has_several else []),
             *reason_told(reason),
         )
         for reason, times in total.most_common()
     )
     columns = ("Reason", "batches", "share", *(["vehicles"] if has_several else []), "what happened", "what to do")
-    n_refused = n_batches - n_answered
+    n_refused = n_batches - sum(one.n_answered for one in vehicles)
     text = (
         f"{whole(n_refused)} of {whole(n_batches)} batches were refused ({percent(n_refused, n_batches)}). A batch "
         "with several reasons stands with each of them."
@@ -133,9 +125,7 @@ def refusals_section(
 
 
 def _parameters(vehicle: FleetVehicle) -> Section:
-    weeks = vehicle.weeks
-    shown = [name for name in DRIFTING if np.isfinite(weeks.medians[name]).any()]
-    panels = tuple(_parameter_panel(vehicle, name) for name in shown)
+    panels = tuple(_parameter_panel(vehicle, name) for name in DRIFTING if vehicle.weeks[name].count())
     rows = tuple(
         (
             NAMES[name],
@@ -167,19 +157,18 @@ def _parameters(vehicle: FleetVehicle) -> Section:
 
 
 def _parameter_panel(vehicle: FleetVehicle, name: str) -> Panel:
-    weeks = vehicle.weeks
-    medians, known = weeks.medians[name], np.isfinite(weeks.medians[name])
-    x = weeks.number.astype(float)
-    marks: list[Mark] = [Points(x[known], medians[known], "weekly median", 0)]
+    weeks = vehicle.weeks.drop_nulls(name)
+    x, medians = weeks["week"].cast(float).to_numpy(), weeks[name].to_numpy()
+    marks: list[Mark] = [Points(x, medians, "weekly median", 0)]
     if (drift := vehicle.drifts.get(name)) is not None:
-        judged = known & (weeks.number >= vehicle.calibrated_week)
+        judged = x >= vehicle.calibrated_week
         ends = x[judged][[0, -1]]
         line = np.median(medians[judged]) + drift.found.slope * (ends - np.median(x[judged])) / WEEKS_PER_YEAR
         label, colour = ("slope, believed", 1) if drift.is_believed else ("slope", 7)
         marks.append(LineMark(ends, line, label, colour, "solid" if drift.is_believed else "dash"))
-    if vehicle.calibrated_week > weeks.number[0]:
+    if vehicle.calibrated_week > vehicle.weeks["week"][0]:
         marks.append(Rule(float(vehicle.calibrated_week), is_vertical=True, label="last calibration", dash="dot"))
-    return Panel(time_axis(weeks.number.tolist()), Axis(""), tuple(marks), NAMES[name])
+    return Panel(time_axis(vehicle.weeks["week"]), Axis(""), tuple(marks), NAMES[name])
 
 
 def _sensors(vehicle: FleetVehicle) -> Section:
@@ -203,18 +192,3 @@ def _sensors(vehicle: FleetVehicle) -> Section:
     table = Table("What the sensors were refused for", columns, rows)
     none = () if rows else ("No batch was refused because of a sensor.",)
     return Section("sensors", "Sensors", (text, *none), (), (table,) if rows else ())
-
-
-def reason_told(reason: str) -> tuple[str, str]:
-    """The cause and the remedy in words; dashes for a reason unknown to this version."""
-    why = known_reason(reason)
-    if why is None:
-        return NONE, NONE
-    return EXPLANATIONS[why].happened.replace("`", ""), EXPLANATIONS[why].advice.replace("`", "")
-
-
-def runs_of(known: Bool, number: I64) -> list[slice]:
-    """Runs of consecutive weeks with known values, so that a band does not span gaps."""
-    at = np.flatnonzero(known)
-    runs = np.split(at, np.flatnonzero(np.diff(at) + np.diff(number[at]) > 2) + 1)
-    return [slice(int(run[0]), int(run[-1]) + 1) for run in runs if run.size]

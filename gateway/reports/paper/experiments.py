@@ -6,7 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from gateway.calibration.campaign_file import Campaign, load_campaign
+import numpy as np
+
+from gateway.calibration.campaign_file import Campaign, file_sha256, load_campaign
+from gateway.calibration.from_drives import calibrate_inspected
 from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
 from gateway.calibration.known_run import KnownRun
@@ -16,7 +19,7 @@ from gateway.config import ESTIMATOR_NAMES
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.ratio_index.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
-from gateway.offline.campaigns import calibrate, split_runs
+from gateway.offline.campaigns import inspect, split_runs
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.workbench.simulated_drives import bench_of, write_campaign
 
@@ -123,8 +126,15 @@ def gather(output: Path, extent: Extent, on_step: OnStep = lambda what, done, of
 
 def _methods(driven: DrivenCampaign, extent: Extent, path: Path) -> tuple[Method, ...]:
     """Every estimator calibrated on the identification part, and the ratio index with the bands of Table 2."""
-    outcome = calibrate(driven.campaign, extent.settings, estimators=ESTIMATOR_NAMES, command="springscale reproduce")
-    held = outcome.file
+    campaign = driven.campaign
+    held = calibrate_inspected(
+        campaign.vehicle,
+        inspect(campaign, extent.settings),
+        where=str(campaign.path),
+        sha256=file_sha256(campaign.path),
+        estimators=ESTIMATOR_NAMES,
+        command="springscale reproduce",
+    ).file
     path.write_text(held.to_json(), encoding="utf-8")
     calibrated = held.for_core()
     others = [name for name in held.estimators if name != RATIO_INDEX]
@@ -155,3 +165,28 @@ def with_paper_bands(calibrated: CalibratedVehicle, driven: DrivenCampaign) -> C
             front_share=fit_regression(MODEL_11_FRONT_SHARE, rows.ra, rows.rg, rows.front_share_pct, rows.run).model,
         ),
     )
+
+
+def condition_of(run: KnownRun) -> str:
+    """ "08_L225_D50.0_50kmh_iri2/can.log.gz" -> "50kmh iri2"."""
+    return " ".join(run.name.split("/", maxsplit=1)[0].split("_")[3:])
+
+
+def mean_errors(run: KnownRun, method: Method) -> tuple[float, float]:
+    """Mean error of payload [kg] and share [points] over a run's batches, with the ratio index's gates disabled."""
+    if method.estimator == RATIO_INDEX and method.calibrated.ratio_index is not None:
+        calibration = method.calibrated.ratio_index
+        rows = index_rows([run], calibration)
+        models = (calibration.payload, calibration.front_share)
+        errors = [
+            [m.predict(a, g)[0] - true if m else np.nan for m, true in zip(models, truth, strict=True)]
+            for a, g, *truth in zip(rows.ra, rows.rg, rows.payload_kg, rows.front_share_pct, strict=True)
+        ]
+    else:
+        errors = [
+            [one.estimate.payload.number - one.payload_kg, one.estimate.front_share.number - one.front_share_pct]
+            for one in method.judge([run])
+            if one.estimate.counted
+        ]
+    payload_kg, share_pp = np.mean(errors, axis=0).tolist() if errors else (np.nan, np.nan)
+    return payload_kg, share_pp

@@ -7,7 +7,7 @@ from fastapi import HTTPException, Request, Security
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
 from gateway.config.permission import LOCAL_NAMES, Encryption, Holder, Kind, is_loopback, may_leave, name_in
-from gateway.estimates.as_json import without_places
+from gateway.estimates.field_kinds import without_places
 from gateway.web.access.tokens import Scope, Token, TokenFile
 
 _SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})

@@ -15,7 +15,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, ProcessCol
 from prometheus_client.core import Metric, UnknownMetricFamily
 from starlette.responses import JSONResponse, Response
 
-from gateway.estimates.as_json import weights_to_json
+from gateway.estimates.field_kinds import WEIGHTS
 from gateway.status import Status
 from gateway.web.access.problems import problem_response
 from gateway.web.live.board import Board
@@ -108,7 +108,7 @@ class StatusCollector:
         return {
             **self.status().model_dump(mode="json", exclude={"state_in_words", "warnings"}),
             "estimate": {name: figure for name, figure in latest.items() if isinstance(figure, int | float)},
-            "weights": weights_to_json(self.scales.weigh(self.board.shown().estimate)),
+            "weights": WEIGHTS.write(self.scales.weigh(self.board.shown().estimate)),
             "http_responses": self.responses,
             "stream_clients": self.board.fanout.n_subscribers,
         }

@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field
 
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import unsprung_kg
-from gateway.estimates.as_json import weights_to_json
+from gateway.estimates.field_kinds import WEIGHTS
 from gateway.estimates.quantities import QUANTITIES
 from gateway.records import iso_utc, rounded
 from gateway.stated.facts import Instant
@@ -62,7 +62,7 @@ def weights_router(board: Board, scales: Scales, status: Callable[[], Status]) -
             is_stale=shown.is_stale,
             load=None if place is None else LoadPlace(**{name: rounded(x, 3) for name, x in asdict(place).items()}),
             verdict=scales.present_load(board, status()).told(),
-            **weights_to_json(scales.weigh(estimate)),
+            **WEIGHTS.write(scales.weigh(estimate)),
         )
 
     return router

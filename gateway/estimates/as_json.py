@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
 
-from gateway.estimates.as_json.kinds import (
+from gateway.estimates.batch_estimate import UNKNOWN_INTERVAL, Epoch, Estimate, Quantity, Weight, Weights
+from gateway.estimates.field_kinds import (
     BUDGET,
     COUNT,
     EXAMPLE,
@@ -29,10 +30,8 @@ from gateway.estimates.as_json.kinds import (
     WEIGHTS,
     WHOLE,
     FieldKind,
-    weights_to_json,
     without_dates,
 )
-from gateway.estimates.batch_estimate import UNKNOWN_INTERVAL, Epoch, Estimate, Quantity, Weight, Weights
 from gateway.estimates.quantities import BY_NAME
 
 _INTERVAL95: Final = "95 % interval [low, high]"
@@ -167,7 +166,7 @@ FIELDS: Final = (
         "weights",
         WEIGHTS,
         "on the road, standing on level ground, unsprung masses included",
-        weights_to_json(_WEIGHTS),
+        WEIGHTS.write(_WEIGHTS),
         columns=WEIGHT_COLUMNS,
     ),
     _column("roll_usable_share", NUMBER, "share of `usable_share` with a known roll rate", 0.99),
