@@ -116,7 +116,7 @@ def test_from_no_configuration_to_the_calibration_that_the_logs_give(config: Pat
     again = [json.loads(line) for line in estimated(config, drives[1])]
     assert {one["calibration_id"] for one in again} == {
         version["id"]
-    }  # a recorded drive is weighed as the service does
+    }
 
 
 def learnt_at_a_desk(drives: list[Path], file: Path, statements: Any, *more: object) -> bytes:
