@@ -61,7 +61,7 @@ _KNOWN_LINES: Final = (
      "this is candump's output for the screen: record with candump -L"),
     (r"\S.*\(\d+\.\d+\) \S+ [0-9A-F]{3,8}#", "something is written before the stamp, as in a system's log: cut it off"),
     (r"date \S|;|\d+\)\s+\d", "this is the text of an .asc or a .trc log: name it so"),
-    (r"[^,;]+([,;][^,;]*){3,}", "this is a table: only python-can's own can be read, as .csv"),
+    (r"[^,;]+([,;][^,;]*){3,}", "this is a table: record with candump -L"),
     (r"\d+\.\d+\s+\S+\s+\w+\s+[RT]x\b", "messages have names instead of identifiers: export the log with numbers"),
 )  # fmt: skip
 """Lines that other tools and settings write, and what to do: the first that fits is told."""
@@ -280,7 +280,7 @@ class LogReport:
             yield
         except LogUnreadableError:
             raise
-        except Exception as fault:  # noqa: BLE001 # whatever a damaged file makes struct, zlib, numpy or SQLite raise
+        except Exception as fault:  # noqa: BLE001 # whatever a damaged file makes struct, zlib or numpy raise
             why = str(fault) or type(fault).__name__
             if self.frames == 0:
                 raise LogUnreadableError(f"{self.path}: cannot be read as {kind}: {why}") from None
@@ -342,7 +342,7 @@ class Selection:
         """Whether frames of this channel are wanted; if not, they are counted.
 
         A number, as python-can counts channels, is also that of a name that ends in it (1 and "can1"). None, of a
-        format that keeps no channel (.csv, .db), has every name.
+        format that keeps no channel, has every name.
         """
         if channel is not None and n_frames and len(self.report.channels) < KEPT_CHANNELS:
             self.report.channels.add(str(channel))
