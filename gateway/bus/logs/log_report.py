@@ -206,21 +206,17 @@ class LogReport:
             "ended_early": self.ended_early,
         }
 
-    def told_others(self) -> str:
-        """The frames that are none of the data frames wanted, in words: "1 remote frame, 3 error frames"; or ""."""
-        counts = (
-            (self.other_channel, "frame", " of other channels"),
-            (self.remote_frames, "remote frame", ""),
-            (self.error_frames, "error frame", ""),
-        )
-        return ", ".join(counted(n, noun) + rest for n, noun, rest in counts if n)
-
     def remarks(self) -> Iterator[str]:
         """Warnings for people, a sentence each; none if all was well."""
         if self.ended_early:
             yield f"{self.path}: {self.ended_early}; everything before was read"
-        if others := self.told_others():
-            yield f"{self.path}: left out: {others}"
+        others = (
+            (self.other_channel, "frame", " of other channels"),
+            (self.remote_frames, "remote frame", ""),
+            (self.error_frames, "error frame", ""),
+        )
+        if told := ", ".join(counted(n, noun) + rest for n, noun, rest in others if n):
+            yield f"{self.path}: left out: {told}"
         for reason, lines in self.rejects.items():
             yield f"{self.path}: {lines.told(reason, self.path)}"
         if len(self.channels) > 1 and not self.other_channel:

@@ -90,13 +90,14 @@ class _TextLog(ABC):
     """What the header of a text log says of the lines behind it."""
 
     reader: ClassVar[Callable[..., Any]]
-    header_form: ClassVar[re.Pattern[str]] = re.compile("(?!)")  # no line is a header
+    header_form: ClassVar[re.Pattern[str]]
 
     def __init__(self, selection: Selection) -> None:
         self.report, self.zone, self.start_ns = selection.report, selection.zone, 0
         self.header: dict[str, str] = {}  # lines that tell python-can's reader how to read those of frames
 
-    def read_header(self, told: re.Match[str]) -> None:  # noqa: B027 # most kinds have one, the table has none
+    @abstractmethod
+    def read_header(self, told: re.Match[str]) -> None:
         """Take a line that ``header_form`` matches."""
 
     @abstractmethod
