@@ -4,7 +4,6 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -50,15 +49,7 @@ class BusSink(AbstractContextManager["BusSink"]):
         self._bus.shutdown()
 
 
-@dataclass(frozen=True, slots=True)
-class ReplayProgress:
-    """Progress of a replay: frames sent, and the recorded time from the first frame."""
-
-    n_sent: int
-    recorded_s: float
-
-
-OnProgress = Callable[[ReplayProgress], None]
+OnProgress = Callable[[int, float], None]  # the frames sent, and the recorded seconds from the first of them
 
 
 def replay(
@@ -107,7 +98,7 @@ def replay_frames(
         sink.send(piece)
         n_sent += len(piece)
         if on_progress:
-            on_progress(ReplayProgress(n_sent, recorded_s))
+            on_progress(n_sent, recorded_s)
     return n_sent
 
 

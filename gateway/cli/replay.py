@@ -29,10 +29,12 @@ def replay(log: Path, interface: str, channel: str, from_channel: str | None, sp
             channel,
             from_channel=from_channel,
             speed=speed,
-            on_progress=lambda sent: status.show(f"{sent.recorded_s:.0f} s of the log, {sent.n_sent} frames sent"),
+            on_progress=lambda n_sent, recorded_s: status.show(f"{recorded_s:.0f} s of the log, {n_sent} frames sent"),
         )
     _require_sent(report, from_channel)
-    return {"sent": report.wanted, **report.to_json()}, _sentences(report)
+    return {"sent": report.wanted, **report.to_json()}, "\n".join(
+        [f"{log}: {report.wanted} frames sent", *report.remarks()]
+    )
 
 
 def _require_sent(report: LogReport, from_channel: str | None) -> None:
@@ -43,13 +45,3 @@ def _require_sent(report: LogReport, from_channel: str | None) -> None:
         seen = ", ".join(sorted(report.channels))
         raise LogUnreadableError(f"{report.path}: has no frame of {from_channel}; --from-channel may name {seen}")
     report.require_frames()
-
-
-def _sentences(report: LogReport) -> str:
-    lines = [f"{report.path}: {report.wanted} frames sent"]
-    lines += [f"not sent: {others}"] if (others := report.told_others()) else []
-    for reason, rejected in report.rejects.items():
-        first = f", first in line {rejected.first_lines[0]}" if rejected.first_lines else ""
-        lines.append(f"not read: {rejected.count} x {reason}{first}")
-    lines += [f"the log ended early: {report.ended_early}"] if report.ended_early else []
-    return "\n".join(lines)

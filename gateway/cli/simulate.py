@@ -95,6 +95,6 @@ def stream(interface: str, channel: str, speed: Speed, **bench_options: Any) -> 
             interface,
             channel,
             speed=speed,
-            on_progress=lambda sent: status.show(f"{sent.recorded_s:.0f} s driven, {sent.n_sent} frames sent"),
+            on_progress=lambda n_sent, recorded_s: status.show(f"{recorded_s:.0f} s driven, {n_sent} frames sent"),
         )
     return {"sent": n_sent}, f"{n_sent} frames sent"

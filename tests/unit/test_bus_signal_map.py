@@ -33,6 +33,7 @@ BO_ 258 WIDE: 8 A
 VAL_ 256 Status 0 "off" 1 "starting" 2 "ready" ;
 """
 ACCEL = '[signals.vertical_acceleration]\nmessage = "IMU"\nsignal = "AccelZ"\n'
+RATE = '[signals.pitch_rate]\nmessage = "IMU"\nsignal = "Rate"\n'
 SPEED = '[signals.speed]\nmessage = "GROUP"\nsignal = "Speed"\n'
 
 
@@ -55,28 +56,25 @@ def only_signal(signal_map):
 
 
 def test_units_and_sign_are_one_factor(write_map):
-    text = '[signals.pitch_rate]\nmessage = "IMU"\nsignal = "Rate"\nsign = -1\n'
-    assert only_signal(load_signal_map(write_map(text))).to_si == pytest.approx(-math.pi / 180)
+    assert only_signal(load_signal_map(write_map(RATE + "sign = -1\n"))).to_si == pytest.approx(-math.pi / 180)
 
 
 def test_a_unit_in_the_map_overrides_the_databases(write_map):
     assert only_signal(load_signal_map(write_map(ACCEL + 'unit = "g"\n'))).to_si == 9.80665
 
 
-def test_range_is_the_databases_in_si_and_turns_with_the_sign(write_map):
-    traits = load_signal_map(write_map(ACCEL + "sign = -1\n")).traits[Signal.VERTICAL_ACCELERATION]
-    assert (traits.minimum, traits.maximum, traits.resolution) == (-30.0, 20.0, 0.01)
+RANGES = {  # (least, greatest) in SI
+    "of the database, turned with the sign": (ACCEL + "sign = -1\n", (-30.0, 20.0)),
+    "of the map before the database's": (ACCEL + "minimum = 5.0\n", (5.0, 30.0)),
+    "of the bits, where the database states none": (RATE + 'unit = "rad/s"\n', (-16384.0, 16383.5)),
+}
 
 
-def test_range_of_a_database_that_says_none_is_what_the_bits_can_carry(write_map):
-    text = '[signals.pitch_rate]\nmessage = "IMU"\nsignal = "Rate"\nunit = "rad/s"\n'
-    traits = load_signal_map(write_map(text)).traits[Signal.PITCH_RATE]
-    assert (traits.minimum, traits.maximum) == (-16384.0, 16383.5)
-
-
-def test_range_in_the_map_overrides_the_databases(write_map):
-    traits = load_signal_map(write_map(ACCEL + "minimum = 5.0\n")).traits[Signal.VERTICAL_ACCELERATION]
-    assert (traits.minimum, traits.maximum) == (5.0, 30.0)
+@pytest.mark.parametrize("kind", RANGES)
+def test_the_valid_range_is(kind, write_map):
+    text, expected = RANGES[kind]
+    mapped = only_signal(load_signal_map(write_map(text)))
+    assert (mapped.minimum, mapped.maximum) == expected
 
 
 def test_conditions_are_given_by_number_name_or_list(write_map):
@@ -91,29 +89,26 @@ def test_signals_come_in_the_order_of_the_records(write_map):
     assert load_signal_map(write_map(SPEED + ACCEL)).signals == (Signal.VERTICAL_ACCELERATION, Signal.SPEED)
 
 
-def test_without_j1939_an_identifier_is_matched_whole(write_map):
-    (id_filter,) = load_signal_map(write_map(SPEED)).filters
-    ids = np.array([0x18FEF1FE, 0x18FEF100, 0x0CFEF1FE], np.uint32) | np.uint32(EXTENDED_ID)
-    assert id_filter.matches(ids).tolist() == [True, False, False]
+X = EXTENDED_ID
+MATCHED = {  # the map, and identifiers with whether each is one of its message
+    "an identifier, whole": (SPEED, {0x18FEF1FE | X: True, 0x18FEF100 | X: False, 0x0CFEF1FE | X: False}),
+    "a J1939 group of any priority and source": (
+        "j1939 = true\n" + SPEED,
+        {0x18FEF1FE | X: True, 0x0CFEF100 | X: True, 0x18FEF2FE | X: False, 0x19FEF1FE | X: False, 0x7F1: False},
+    ),
+    "an addressed J1939 group of any destination": (
+        "j1939 = true\n" + SPEED.replace("GROUP", "ADDRESSED"),
+        {0x18EEFFFF | X: True, 0x1CEE2103 | X: True, 0x18EFFFFF | X: False},
+    ),
+    "11 bits in a J1939 map, whole": ("j1939 = true\n" + ACCEL, {256: True, 257: False}),
+}
 
 
-def test_with_j1939_the_group_is_matched_whatever_priority_and_source(write_map):
-    (id_filter,) = load_signal_map(write_map("j1939 = true\n" + SPEED)).filters
-    ids = np.array([0x18FEF1FE, 0x0CFEF100, 0x18FEF2FE, 0x19FEF1FE], np.uint32) | np.uint32(EXTENDED_ID)
-    assert id_filter.matches(ids).tolist() == [True, True, False, False]
-    assert not id_filter.matches(np.array([0x7F1], np.uint32)).any()
-
-
-def test_with_j1939_an_addressed_group_is_matched_whatever_destination(write_map):
-    text = 'j1939 = true\n[signals.speed]\nmessage = "ADDRESSED"\nsignal = "Speed"\n'
+@pytest.mark.parametrize("kind", MATCHED)
+def test_a_map_matches(kind, write_map):
+    text, expected = MATCHED[kind]
     (id_filter,) = load_signal_map(write_map(text)).filters
-    ids = np.array([0x18EEFFFF, 0x1CEE2103, 0x18EFFFFF], np.uint32) | np.uint32(EXTENDED_ID)
-    assert id_filter.matches(ids).tolist() == [True, True, False]
-
-
-def test_with_j1939_an_11_bit_message_is_still_matched_whole(write_map):
-    (id_filter,) = load_signal_map(write_map("j1939 = true\n" + ACCEL)).filters
-    assert id_filter.matches(np.array([256, 257], np.uint32)).tolist() == [True, False]
+    assert id_filter.matches(np.array([*expected], np.uint32)).tolist() == [*expected.values()]
 
 
 FAULTS = {

@@ -2,7 +2,6 @@
 
 import errno
 import threading
-import time
 
 import can
 import pytest
@@ -81,14 +80,14 @@ def test_a_step_back_in_time_does_not_wait_and_keeps_the_order(clock):
 
 def test_progress_tells_frames_and_recorded_time(clock):
     told = []
-    replay_frames([frames(5.0, 6.0)], RecordingSink(clock), "max", told.append)
-    assert [(p.n_sent, p.recorded_s) for p in told] == [(1, 0.0), (2, 1.0)]
+    replay_frames([frames(5.0, 6.0)], RecordingSink(clock), "max", lambda *progress: told.append(progress))
+    assert told == [(1, 0.0), (2, 1.0)]
 
 
 def test_a_stop_ends_the_replay(clock):
     stop = ClockedEvent(clock)
     sink = RecordingSink(clock)
-    n_sent = replay_frames([frames(*range(100))], sink, 1.0, lambda p: p.n_sent == 3 and stop.set(), stop)
+    n_sent = replay_frames([frames(*range(100))], sink, 1.0, lambda n_sent, _: n_sent == 3 and stop.set(), stop)
     assert n_sent == 3
     assert len(sink.sent) == 3
 
@@ -133,13 +132,6 @@ def test_a_receiver_that_takes_nothing_is_told_not_waited_for_forever(monkeypatc
         pytest.raises(BusError, match="cannot send on virtual sink-4"),
     ):
         sink.send(frames(1.0, 2.0, 3.0))
-
-
-def test_pacing_holds_on_a_real_clock():
-    begun_s = time.monotonic()
-    with BusSink("virtual", "sink-5") as sink:
-        replay_frames([frames(1.0, 1.05)], sink, 1.0)
-    assert time.monotonic() - begun_s >= 0.05
 
 
 def test_a_channel_that_is_missing_is_explained_as_the_service_explains_it(monkeypatch):

@@ -128,13 +128,6 @@ def test_a_fault_while_receiving_is_told_and_the_channel_opened_again(fault, lis
     assert told in source_module.system_reason(error, source._channel)
 
 
-def test_a_channel_that_is_not_there_yet_is_waited_for(listen):
-    missing = AtOpening(OSError(errno.ENODEV, "No such device"))
-    source, interface = listen(*[missing] * 5, Burst(frames(4)))
-    assert interface.is_played.wait(PATIENCE_S)
-    assert (source.counts().frames, source.counts().reconnects) == (4, 5)
-
-
 def test_while_a_channel_is_missing_the_state_says_why(listen):
     source, _ = listen(*[AtOpening(OSError(errno.ENODEV, "No such device"))] * 100_000)
     assert source.state is SourceState.READER_FAULT
@@ -180,13 +173,6 @@ def test_a_bus_with_only_unmapped_frames_is_distinguished_from_a_silent_one(list
     source, _ = listen(Burst(frames(1)), silence_s=0.02)
     wait_for(lambda: source.reason and "none has a mapped identifier" in source.reason)
     assert source.state is SourceState.BUS_SILENT
-
-
-def test_a_bus_that_wakes_is_received_again(listen):
-    source, interface = listen(Burst(frames(1)), silence_s=0.02)
-    wait_for(lambda: source.state is SourceState.BUS_SILENT)
-    interface.script.append(Burst(frames(1)))
-    wait_for(lambda: source.counts().frames == 2)
 
 
 def test_bus_off_is_a_fault_until_frames_come_again(listen):
@@ -237,10 +223,6 @@ def test_stopping_closes_the_channel(listen):
     assert source.state is SourceState.STOPPED
     assert interface.n_closed == 1
     assert source.failure is None
-
-
-def test_stopping_before_starting_does_nothing():
-    LiveSource("virtual", "never-started", MAP).stop()
 
 
 def test_an_unknown_interface_names_the_known():

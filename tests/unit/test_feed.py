@@ -19,7 +19,6 @@ from support.patience import PATIENCE_S, wait_until
 from gateway.bus.feeder import AXES, Feeder, Gpsd, IioDevice, Numbering, find_devices, turned
 from gateway.bus.frames import frames_of
 from gateway.bus.signals import Decoder, load_signal_map
-from gateway.core.sample_clock import sample_times
 from gateway.errors import BusError, ConfigurationError
 from gateway.records import Motion, Signal
 from gateway.units import NS_PER_S
@@ -122,20 +121,6 @@ def test_frames_carry_the_kernels_stamps_and_counters_that_skip_what_was_lost(tm
     assert sorted(steps)[-2:] == [1, 8]
     stamps = frames_of(accel, 8).t_ns
     assert {int(wait) for wait in np.diff(stamps)} == {10_000_000, 80_000_000}
-
-
-def test_the_receiver_restores_the_sensors_clock_from_late_stamps(tmp_path: Path) -> None:
-    """A kernel bus stamps at arrival: the counter brings the steady clock back."""
-    fake, device = level_device(tmp_path)
-    with listening("feed-clock") as heard, fake.sampling(400.0, at_rest), feeding("feed-clock", [device]):
-        assert wait_until(lambda: len(heard) >= 1000)
-    gyro = frames_of([message for message in heard if message.arbitration_id == 0x121], 8)
-    late_ns = np.random.default_rng(1).exponential(4e6, len(gyro)).astype(np.int64)
-    arrived = np.maximum.accumulate(gyro.t_ns + late_ns)
-    timing = sample_times(arrived, gyro.payload[:, 6].astype(np.int64), 256)
-    assert timing.period_s == pytest.approx(0.01, rel=1e-3)
-    off_ns = timing.t_ns - gyro.t_ns
-    assert np.std(off_ns) < 0.2 * np.std(arrived - gyro.t_ns)
 
 
 def test_a_real_receivers_reports_become_speed_and_place() -> None:

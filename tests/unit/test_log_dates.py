@@ -160,8 +160,6 @@ REFUSED = {
     "symbolic asc": ("a.asc", asc("2023-03-10 15:06:12", "0.5 1 Engine Rx d 1 01\n"), "names instead of identifiers"),
     "asc as log": ("a.log", asc("2023-03-10 15:06:12"), "name it so"),
     "a table": ("a.log", "Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n1,123,0,Rx,0,1,01\n", "this is a table"),
-    "another tool's table": ("a.csv", "Time Stamp,ID,Extended,Dir\n1,123,0,Rx\n", "table is not python-can's"),
-    "a table of NULs": ("a.csv", bytes(70_000), "table is not python-can's"),
     "remote frames": ("a.log", "(1627274455.0125) can0 123#R\n" * 3, r"only remote frames \(3\), which carry no data"),
     "remote frames in asc": ("a.asc", asc("2023-03-10 15:06:12", "0.5 1 123 Rx r 1\n"), r"only remote frames \(1\)"),
     "error frames": ("a.log", "(1627274455.0125) can0 20000004#0000000000000000\n", r"error frames only \(1\): check"),

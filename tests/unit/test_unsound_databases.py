@@ -59,12 +59,14 @@ UNRELATED = {
     "a place a billion bits away": ' SG_ Bad : 1000000000|8@1+ (1,0) [0|0] "" A\n',
     "an identifier of 33 bits": 'BO_ 4294967296 WIDE: 8 A\n SG_ S : 0|8@1+ (1,0) [0|0] "" A\n',
     "a message of a billion bytes": 'BO_ 514 LONG: 1000000000 A\n SG_ S : 0|8@1+ (1,0) [0|0] "" A\n',
+    "a message of 400 digits": f"BO_ 514 LONG: {'9' * 400} A\n",
     "the type of no signal": "SIG_VALTYPE_ 513 Missing : 1;\n",
     "a type in another form": "SIG_VALTYPE_ 513, Good : 1;\n",
     "a line that means nothing": "what is this\n",
 }
 HARMLESS = {
     "names of values of no signal": 'VAL_ 513 Missing 1 "one" ;\nVAL_ 99 S 1 "one" ;\n',
+    "a start value of 400 digits": 'BA_DEF_ SG_ "Start" INT 0 1;\n' + f'BA_ "Start" SG_ 513 Good {"9" * 400};\n',
     "an attribute that nobody defined": 'BA_ "Nobody" BO_ 513 7;\n',
     "a definition that cantools cannot read": 'BA_DEF_ BO_ "A" ENUM "a" "b";\n',
     "a comment without its end": 'CM_ BO_ 513 "left open;\n',
@@ -94,6 +96,7 @@ def test_a_fault_elsewhere_does_not_affect_mapped_signals(kind: str, place: str,
         assert text.splitlines()[line - 1].startswith("BO_")
 
 
+HUGE = "9" * 400
 MAPPED = {
     "a signal without receivers": ("State : 48|8@1+ (1,0) [0|0] \"\" A", "State : 48|8@1+ (1,0) [0|0] \"\"", "syntax"),
     "a type without its colon": ("Ratio : 1;", "Ratio 1;", "syntax"),
@@ -105,6 +108,8 @@ MAPPED = {
     "65 bytes": ("BO_ 512 BOX: 8", "BO_ 512 BOX: 65", "'BOX', which has 65 bytes"),
     "a place before the first bit": ("State : 48|", "State : -1|", "'State' begins at bit -1"),
     "an infinite scale": ("16@1- (0.001,0)", "16@1- (1e999,0)", "'Accel' has scale inf and offset"),
+    "a scale of 400 digits": ("16@1- (0.001,0)", f"16@1- ({HUGE},0)", "'Accel' has scale inf and offset"),
+    "a place of 400 digits": ("State : 48|", f"State : {HUGE}|", "'State' is longer than any message"),
     "an infinite offset": ("16@1- (0.001,0)", "16@1- (1,-1e999)", "'Accel' has scale .* and offset -inf"),
     "the same name twice": (OTHER, OTHER.replace("OTHER", "BOX"), "'BOX' is twice in a.dbc"),
     "a wide range": (
@@ -139,6 +144,12 @@ SOUND = HEAD + BOX + TAIL + 'CM_ "the rest is of no message";\n'
 HARD = {
     "blank lines": "\n" * 500_000,
     "a line of a million letters": " SG_ " + "a" * 1_000_000,
+    "an endless start": OTHER + " SG_ Q : " + "1" * 300_000,
+    "endless zeros": OTHER + " SG_ Q : 0 | " + "0" * 300_000,
+    "colons": OTHER + " SG_ Q : " + " : " * 100_000,
+    "an endless line of names": OTHER + " SG_ " + "a " * 100_000,
+    "tabs": OTHER + "\n".join(["\t" * 1000] * 300) + "x",
+    "an open text": OTHER + 'CM_ "' + "a" * 300_000,
     "a long name without a colon": "BO_ 7 " + "a" * 1_000_000,
     "quotes that escape": 'CM_ "' + '\\"\n' * 200_000,
     "quotes": '"' * 1_000_001,
@@ -206,7 +217,8 @@ def test_reading_a_database_by_message_agrees_with_cantools(kind: str, tmp_path:
         for signal, theirs in zip(message.signals.values(), expected.signals, strict=True):
             assert (signal.field.start, signal.field.length, signal.unit) == (theirs.start, theirs.length, theirs.unit)
             assert (str(signal.field.coding) == "float") == theirs.is_float
-            assert (signal.minimum, signal.maximum) == (theirs.minimum, theirs.maximum)
+            if theirs.minimum is not None and theirs.minimum < theirs.maximum:
+                assert signal.limits == (theirs.minimum, theirs.maximum)
             assert signal.multiplexer == theirs.multiplexer_signal
             assert list(signal.multiplexer_ids) == (theirs.multiplexer_ids or [])
             assert sum(map(len, signal.choices.values())) == len(theirs.conversion.choices or {})

@@ -61,7 +61,7 @@ _KNOWN_LINES: Final = (
      "this is candump's output for the screen: record with candump -L"),
     (r"\S.*\(\d+\.\d+\) \S+ [0-9A-F]{3,8}#", "something is written before the stamp, as in a system's log: cut it off"),
     (r"date \S|;|\d+\)\s+\d", "this is the text of an .asc or a .trc log: name it so"),
-    (r"[^,;]+([,;][^,;]*){3,}", "this is a table: only python-can's own can be read, as .csv"),
+    (r"[^,;]+([,;][^,;]*){3,}", "this is a table: record with candump -L"),
     (r"\d+\.\d+\s+\S+\s+\w+\s+[RT]x\b", "messages have names instead of identifiers: export the log with numbers"),
 )  # fmt: skip
 """Lines that other tools and settings write, and what to do: the first that fits is told."""
@@ -206,21 +206,17 @@ class LogReport:
             "ended_early": self.ended_early,
         }
 
-    def told_others(self) -> str:
-        """The frames that are none of the data frames wanted, in words: "1 remote frame, 3 error frames"; or ""."""
-        counts = (
-            (self.other_channel, "frame", " of other channels"),
-            (self.remote_frames, "remote frame", ""),
-            (self.error_frames, "error frame", ""),
-        )
-        return ", ".join(counted(n, noun) + rest for n, noun, rest in counts if n)
-
     def remarks(self) -> Iterator[str]:
         """Warnings for people, a sentence each; none if all was well."""
         if self.ended_early:
             yield f"{self.path}: {self.ended_early}; everything before was read"
-        if others := self.told_others():
-            yield f"{self.path}: left out: {others}"
+        others = (
+            (self.other_channel, "frame", " of other channels"),
+            (self.remote_frames, "remote frame", ""),
+            (self.error_frames, "error frame", ""),
+        )
+        if told := ", ".join(counted(n, noun) + rest for n, noun, rest in others if n):
+            yield f"{self.path}: left out: {told}"
         for reason, lines in self.rejects.items():
             yield f"{self.path}: {lines.told(reason, self.path)}"
         if len(self.channels) > 1 and not self.other_channel:
@@ -280,7 +276,7 @@ class LogReport:
             yield
         except LogUnreadableError:
             raise
-        except Exception as fault:  # noqa: BLE001 # whatever a damaged file makes struct, zlib, numpy or SQLite raise
+        except Exception as fault:  # noqa: BLE001 # whatever a damaged file makes struct, zlib or numpy raise
             why = str(fault) or type(fault).__name__
             if self.frames == 0:
                 raise LogUnreadableError(f"{self.path}: cannot be read as {kind}: {why}") from None
@@ -342,7 +338,7 @@ class Selection:
         """Whether frames of this channel are wanted; if not, they are counted.
 
         A number, as python-can counts channels, is also that of a name that ends in it (1 and "can1"). None, of a
-        format that keeps no channel (.csv, .db), has every name.
+        format that keeps no channel, has every name.
         """
         if channel is not None and n_frames and len(self.report.channels) < KEPT_CHANNELS:
             self.report.channels.add(str(channel))

@@ -1,4 +1,4 @@
-"""Logs that python-can reads message by message (.blf .asc .trc .csv .db), as columns of the wanted frames.
+"""Logs that python-can reads message by message (.blf .asc .trc), as columns of the wanted frames.
 
 python-can reads the frames; the header of a text log (date, zone, number base, kind of stamps) is read here, because
 python-can takes the computer's own zone, knows two languages, and passes over what it does not understand.
@@ -18,7 +18,7 @@ from can.io import blf
 
 from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of, has_possible_id, message_id, stamp_to_ns
 from gateway.bus.logs.log_report import SHOWN_CHARS, LogReject, LogReport, Selection
-from gateway.bus.logs.packed import is_packed, open_log_file, unpacked_path, unpacked_suffix
+from gateway.bus.logs.packed import is_packed, open_log_file, unpacked_suffix
 from gateway.bus.logs.wall_clock import date_in, days_since_1899
 from gateway.bus.signals.mapping import CAN_FD_BYTES
 from gateway.bus.text_encoding import OR_CP1252
@@ -45,7 +45,7 @@ def read_message_log(selection: Selection) -> Iterator[Frames]:
     """The selected frames in order of arrival, in chunks.
 
     Stamps are good to the microsecond, absolute if the format is. A text line that cannot be read is rejected and
-    skipped; a damaged .blf or .db is read up to there, and the report says why. Raises LogUnreadableError if not even
+    skipped; a damaged .blf is read up to there, and the report says why. Raises LogUnreadableError if not even
     the beginning can be read.
     """
     ours = _ours(_MESSAGES[unpacked_suffix(selection.path)](selection), selection)
@@ -90,13 +90,14 @@ class _TextLog(ABC):
     """What the header of a text log says of the lines behind it."""
 
     reader: ClassVar[Callable[..., Any]]
-    header_form: ClassVar[re.Pattern[str]] = re.compile("(?!)")  # no line is a header
+    header_form: ClassVar[re.Pattern[str]]
 
     def __init__(self, selection: Selection) -> None:
         self.report, self.zone, self.start_ns = selection.report, selection.zone, 0
         self.header: dict[str, str] = {}  # lines that tell python-can's reader how to read those of frames
 
-    def read_header(self, told: re.Match[str]) -> None:  # noqa: B027 # most kinds have one, the table has none
+    @abstractmethod
+    def read_header(self, told: re.Match[str]) -> None:
         """Take a line that ``header_form`` matches."""
 
     @abstractmethod
@@ -169,24 +170,6 @@ class _TrcLog(_TextLog):
 
     def frame_in(self, line: str) -> str | None:
         return line
-
-
-class _CsvLog(_TextLog):
-    """python-can's table. Its first line names the columns."""
-
-    reader = can.CSVReader
-    COLUMNS: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
-
-    def frame_in(self, line: str) -> str | None:
-        if self.header:
-            return line
-        if line.strip().lower() != self.COLUMNS:
-            raise LogUnreadableError(
-                f"{self.report.path}: line {self.report.lines}: the table is not python-can's, whose columns are "
-                f"{self.COLUMNS}; it has {line.strip()[:SHOWN_CHARS]!r}: save it as a candump log"
-            )
-        self.header["columns"] = line
-        return None
 
 
 def _text_messages(log: _TextLog) -> Iterator[Found]:
@@ -302,17 +285,9 @@ def _blf_messages(selection: Selection) -> Iterator[Found]:
             raise EOFError("the file is cut off: shorter than its header says")
 
 
-def _database_messages(selection: Selection) -> Iterator[Found]:
-    path, until_damage = selection.path, selection.report.until_damage
-    with until_damage(".db"), unpacked_path(path) as unpacked, can.SqliteReader(unpacked) as reader:
-        yield from ((message, 0, None) for message in reader)
-
-
 _MESSAGES: Final[dict[str, Callable[[Selection], Iterator[Found]]]] = {
     ".asc": lambda selection: _text_messages(_AscLog(selection)),
     ".trc": lambda selection: _text_messages(_TrcLog(selection)),
-    ".csv": lambda selection: _text_messages(_CsvLog(selection)),
     ".blf": _blf_messages,
-    ".db": _database_messages,
 }
 MESSAGE_SUFFIXES: Final = tuple(_MESSAGES)

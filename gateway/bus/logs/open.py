@@ -24,8 +24,8 @@ READERS: Final = {
     **dict.fromkeys(MESSAGE_SUFFIXES, read_message_log),
     ".mf4": read_mf4,
 }
-TEXTS: Final = frozenset(READERS.keys() - {".blf", ".db", ".mf4"})
-UNMISTAKABLE: Final = frozenset(READERS.keys() - {".txt", "", ".csv", ".db"})
+TEXTS: Final = frozenset(READERS.keys() - {".blf", ".mf4"})
+UNMISTAKABLE: Final = frozenset(READERS.keys() - {".txt", ""})
 
 OTHER_KINDS: Final = {
     b"\xff\xfe\0\0": "UTF-32; save it as UTF-8",
@@ -40,7 +40,7 @@ OTHER_KINDS: Final = {
     b"7z\xbc\xaf": "a 7z archive",
     b"\xd4\xc3\xb2\xa1": "a capture of Wireshark or tcpdump; record with candump -L",
     b"\n\r\r\n": "a capture of Wireshark or tcpdump; record with candump -L",
-    b"SQLite format 3": "an SQLite database; name it .db if it is a log of python-can",
+    b"SQLite format 3": "an SQLite database",
     b"\x7fELF": "a program",
     b"LOGG": "a BLF log; name it .blf",
     b"MDF ": "an MDF log; name it .mf4",
@@ -50,7 +50,7 @@ LONGEST_START: Final = max(map(len, OTHER_KINDS))
 
 
 def is_named_as_log(path: Path | str) -> bool:
-    """Whether a file's name alone says that it is a log; .txt, .csv and .db may be anything."""
+    """Whether a file's name alone says that it is a log; .txt may be anything."""
     return unpacked_suffix(Path(path)) in UNMISTAKABLE
 
 
@@ -58,7 +58,7 @@ def open_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Frames],
     """The map's frames of a log in order of arrival, and a report that fills while they are read.
 
     candump text (.log, .txt, .candump) goes through a reader that takes thousands of frames at once, .mf4 through
-    asammdf, .blf .asc .trc .csv .db through python-can; each may be packed. Raises LogUnreadableError if the file is
+    asammdf, .blf .asc .trc through python-can; each may be packed. Raises LogUnreadableError if the file is
     missing or of an unknown kind.
     """
     return _open(Path(path), signal_map.filters, signal_map.channel, signal_map.payload_width, signal_map.zone)

@@ -60,18 +60,10 @@ class DatabaseSignal:
     name: str
     field: BitField
     unit: str | None
-    minimum: float | None
-    maximum: float | None
+    limits: tuple[float, float]  # least and greatest physical value: stated, or what the bits can carry
     choices: Mapping[str, tuple[int, ...]]
     multiplexer: str | None
     multiplexer_ids: tuple[int, ...]
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """Least and greatest physical value: of the database, or of the bits if it gives no range."""
-        if self.minimum is not None and self.maximum is not None and -math.inf < self.minimum < self.maximum < math.inf:
-            return self.minimum, self.maximum
-        return self.field.physical_range
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,12 +177,13 @@ def _signal(signal: CantoolsSignal) -> DatabaseSignal:
     # of a text, for an integer beyond a double is infinite
     scale, offset = float(str(conversion.scale)), float(str(conversion.offset))
     coding = Coding.FLOAT if conversion.is_float else Coding.SIGNED if signal.is_signed else Coding.UNSIGNED
+    field = BitField(signal.start, signal.length, signal.byte_order == "big_endian", coding, scale, offset)
+    low, high = (math.nan if end is None else float(str(end)) for end in (signal.minimum, signal.maximum))
     return DatabaseSignal(
         name=signal.name,
-        field=BitField(signal.start, signal.length, signal.byte_order == "big_endian", coding, scale, offset),
+        field=field,
         unit=signal.unit,
-        minimum=None if signal.minimum is None else float(str(signal.minimum)),
-        maximum=None if signal.maximum is None else float(str(signal.maximum)),
+        limits=(low, high) if -math.inf < low < high < math.inf else field.physical_range,
         choices=choices,
         multiplexer=signal.multiplexer_signal,
         multiplexer_ids=tuple(signal.multiplexer_ids or ()),

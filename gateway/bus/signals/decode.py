@@ -151,8 +151,12 @@ class _MessageReader:
 
     def remarks(self) -> Iterator[Remark]:
         if lengths := dict(self._wrong_lengths):
-            text = f"{self.name}: {told_lengths(lengths, self.n_frames, self.mapped.length)}"
-            yield Remark(text, sum(lengths.values()) / self.n_frames, self.signals)
+            n, have = sum(lengths.values()), f"{min(lengths)}" + (f" to {max(lengths)}" if len(lengths) > 1 else "")
+            text = (
+                f"{told_share(n, self.n_frames)} frames have {have} bytes, the database says {self.mapped.length}; "
+                "if the device sends so, correct the length there"
+            )
+            yield Remark(f"{self.name}: {text}", n / self.n_frames, self.signals)
         if mixed := {one.mapped.signal: one.of_source[0] for one in self.readers if one.is_mixed()}:
             n_of_source = next(iter(mixed.values()))
             addresses = np.argsort(-n_of_source, kind="stable")[: np.count_nonzero(n_of_source)]
@@ -165,8 +169,16 @@ class _MessageReader:
         for one in self.readers:
             said = f"{one.mapped.signal} ({self.mapped.name})"
             if n := one.rejected[Rejected.OUT_OF_RANGE]:
-                limits = one.mapped.minimum, one.mapped.maximum
-                text = f"{told_share(n, self.n_frames)} values read {told_range(one.beyond, limits, one.mapped.unit)}"
+                least, most = (f"{end:.4g}" for end in one.beyond)
+                ends = one.mapped.minimum, one.mapped.maximum
+                low, high = ("any" if np.isnan(end) else f"{end:.4g}" for end in ends)
+                read = (f"{least if least == most else f'{least} to {most}'} {one.mapped.unit}").rstrip()
+                text = (
+                    f"{told_share(n, self.n_frames)} values read {read}, beyond the range "
+                    f"{low} to {high} {one.mapped.unit}".rstrip()
+                    + "; if they are true, correct the range in the database, or set minimum and maximum "
+                    "in the signal map"
+                )
                 yield Remark(f"{said}: {text}", n / self.n_frames, frozenset({one.mapped.signal}))
             has_names = one.mapped.named_codes and not one.mapped.rejects_j1939_codes
             if has_names and (n := one.rejected[Rejected.NOT_AVAILABLE]) > TELLING_SHARE * self.n_frames:
@@ -269,26 +281,6 @@ def is_j1939_code(field: BitField, bits: U64) -> Bool:
         return np.asarray(bits >> np.uint64(field.length - 8) > J1939_LAST_VALID_BYTE)
     n_codes = 2 if field.length > 1 else 0
     return np.asarray(bits >= np.uint64((1 << field.length) - n_codes))
-
-
-def told_lengths(counts: Mapping[int, int], n_frames: int, length: int) -> str:
-    """ "1,708 of 1,720 frames have 8 bytes, the database says 4; ...", of the counts of every other length."""
-    have = f"{min(counts)}" + (f" to {max(counts)}" if len(counts) > 1 else "")
-    return (
-        f"{told_share(sum(counts.values()), n_frames)} frames have {have} bytes, the database says {length}; if the "
-        "device sends so, correct the length there"
-    )
-
-
-def told_range(read: tuple[float, float], limits: tuple[float, float], unit: str) -> str:
-    """ "31 to 80 m/s, beyond the range 0 to 30 m/s; ..."; an end that is NaN is no limit."""
-    least, most = (f"{end:.4g}" for end in read)
-    low, high = ("any" if np.isnan(end) else f"{end:.4g}" for end in limits)
-    return (
-        f"{least if least == most else f'{least} to {most}'} {unit}".rstrip()
-        + f", beyond the range {low} to {high} {unit}".rstrip()
-        + "; if they are true, correct the range in the database, or set minimum and maximum in the signal map"
-    )
 
 
 def told_share(n: int, n_all: int) -> str:
