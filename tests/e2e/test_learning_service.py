@@ -114,9 +114,7 @@ def test_from_no_configuration_to_the_calibration_that_the_logs_give(config: Pat
     file = learnt_file(tmp_path, version["id"])
     assert learnt_at_a_desk(drives, file, said["statements"]) == file.read_bytes()
     again = [json.loads(line) for line in estimated(config, drives[1])]
-    assert {one["calibration_id"] for one in again} == {
-        version["id"]
-    }
+    assert {one["calibration_id"] for one in again} == {version["id"]}
 
 
 def learnt_at_a_desk(drives: list[Path], file: Path, statements: Any, *more: object) -> bytes:
