@@ -366,14 +366,6 @@ def test_a_wrong_parameter_moves_the_answer_by_its_column(name: str) -> None:
     assert np.abs(moved) == pytest.approx(0.5 * np.abs(column), rel=0.15, abs=0.02)
 
 
-def test_errors_of_payload_and_share_correlate_as_stated() -> None:
-    found = [weighed(drive_of(LOAD, 300 + i, duration_s=100.0), taught()).posterior for i in range(12)]
-    told = float(np.mean([one.correlation(0, 1) for one in found]))
-    seen = float(np.corrcoef([one.mean[:2] for one in found], rowvar=False)[0, 1])
-    assert -1.0 < told < 1.0
-    assert abs(told) < 0.5 or np.sign(seen) == np.sign(told)
-
-
 def test_a_load_of_any_shape_is_less_sure_than_one_of_a_known_shape() -> None:
     model = taught(with_roll=True)
     spectra = spectra_of(drive_of((350.0, 48.0), 14, with_roll=True), model)
@@ -381,10 +373,3 @@ def test_a_load_of_any_shape_is_less_sure_than_one_of_a_known_shape() -> None:
     of_any = posterior_of(mixture_of(spectra, model, shape_hypotheses(VAN, *model.known_shape)), model, 1.0, GAIN_STD)
     assert of_any.std(0) > of_known.std(0)
     assert of_any.quantity(0).interval95[0] < 350.0 < of_any.quantity(0).interval95[1]
-
-
-def test_the_same_batch_gives_the_same_numbers() -> None:
-    batch = drive_of(LOAD, 15, with_roll=True)
-    once, again = (weighed(batch, taught(with_roll=True)) for _ in range(2))
-    assert once.posterior == again.posterior
-    assert once.signs.misfit == again.signs.misfit

@@ -1,13 +1,10 @@
-"""One short drive as many recorders and copies leave it, through look, estimate, record, reprocess and check-config.
+"""One short drive as many recorders and copies leave it, through look, estimate and reprocess.
 
 Every frame is used or counted with a reason, and no command names a cause that is not there.
 """
 
 import gzip
-import os
 import re
-import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,15 +18,12 @@ from support.bus_drive import white_noise
 from support.calibrated import calibration_file
 from support.commands import called
 from support.configured import service_config
-from support.patience import PATIENCE_S, wait_until
 
 from gateway.archive import place_of, receipts
 from gateway.bus.frames import take
-from gateway.bus.listen import LiveSource
 from gateway.bus.logs.candump_write import append_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import load_signal_map
-from gateway.cli import record
 from gateway.records import Frames
 from gateway.units import NS_PER_S
 
@@ -298,52 +292,6 @@ def test_reprocess(case: Case, folder: Path) -> None:
         assert sum(told["left_out"].values()) == case.n_left_out + case.n_others
         assert (told["ended_early"] is None) == ("cut" not in case.told)
         assert receipt["n_weighed"] == 1
-
-
-def test_record(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a replay of the log: the recording has every frame that could be read, at its time."""
-    log, recorded = written(folder, case), folder / "recorded.log"
-    monkeypatch.setattr(record, "FLUSH_S", 0.0)
-    monkeypatch.setattr("gateway.bus.listen.POLL_S", 0.05)
-    monkeypatch.setattr("gateway.bus.listen.ASLEEP_POLL_S", 0.05)
-    bus = ("--interface", "virtual", "--channel", folder.name)
-    signal_map = load_signal_map(MAP)
-    source = LiveSource("virtual", folder.name, signal_map, silence_s=0.05)
-    monkeypatch.setattr(record, "LiveSource", lambda *_: source)
-    n_used = 0 if case.refused else n_in(case, log) - case.n_left_out
-    sent: list[Result] = []
-
-    def play() -> None:
-        assert wait_until(lambda: source.state == "bus_silent")  # it is open, then
-        sent.append(called("replay", log, *bus, "--speed", "max"))
-        wait_until(lambda: source.counts().frames >= n_used)
-        os.kill(os.getpid(), signal.SIGTERM)
-
-    player = threading.Thread(target=play)
-    player.start()
-    done = called("record", recorded, "--signals", MAP, *bus, "--for-s", PATIENCE_S)
-    player.join()
-    if sent[0].exit_code:
-        assert case.refused
-        assert causes_in(all_said(sent[0])) == case.refused
-        assert "no mapped frame came" in all_said(done)
-        return
-    if case.refused:
-        return  # replay judges no stamps: the recording has what was sent until then
-    assert f"{n_used} frames, 0 lost" in done.output
-    chunks, report = open_log(recorded, signal_map)
-    kept_ns = np.concatenate([chunk.t_ns for chunk in chunks])
-    of_log_ns = np.concatenate([chunk.t_ns for chunk in open_log(log, signal_map)[0]])
-    assert np.array_equal(kept_ns, of_log_ns)
-    assert causes_in(" ".join(report.remarks())) <= {"undated"}
-
-
-def test_check_config(case: Case, folder: Path) -> None:
-    """Which log lies beside it is none of its business."""
-    written(folder, case)
-    found = called("check-config", folder / "springscale.toml")
-    assert found.exit_code == 0, found.output
-    assert causes_in(found.output) == said()
 
 
 SET = {  # the first stamp, by how much the clock is set midway, and what is told
