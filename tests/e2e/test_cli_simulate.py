@@ -8,15 +8,12 @@ import pytest
 from support.commands import called, run
 
 from gateway.bus.logs import motion_of_log
-from gateway.bus.signals import Decoder, load_signal_map
+from gateway.bus.signals import load_signal_map
 from gateway.calibration.campaign_file import load_campaign
 from gateway.cli import main
 from gateway.cli import reproduce as reproduce_command
 from gateway.cli.progress import StatusLine, counted
-from gateway.core.batch_settings import BatchSettings
-from gateway.core.scheduler import Scheduler
 from gateway.reports.paper.experiments import Extent
-from gateway.workbench.simulated_drives import LOADS, N_EMPTY_WINDOWS, N_LOADED_WINDOWS, demo_drive, frames_of
 
 LINE = "({t:.6f}) can1 101#0102030405060708\n"
 
@@ -163,17 +160,3 @@ def test_progress_is_seen_at_a_terminal(capsys: pytest.CaptureFixture[str], monk
     assert "working" in told.err
     assert "half way" in told.err
     assert "too soon" not in told.err
-
-
-def test_the_demos_windows_are_good_and_the_load_comes_between_them() -> None:
-    signal_map = load_signal_map("springscale:reference")
-    scheduler = Scheduler(BatchSettings(), signal_map.traits)
-    decoder = Decoder(signal_map)
-    driven = demo_drive()
-    good = [batch for batch in scheduler.feed(decoder.decode(frames_of(driven))) if not batch.rejected]
-    truth = driven.truth
-    loaded = [batch.t_start_ns > truth.t_ns[1] for batch in good]
-    assert loaded == [False] * N_EMPTY_WINDOWS + [True] * N_LOADED_WINDOWS
-    assert truth.payload_kg.tolist() == [0.0, LOADS[0].mass_kg]
-    assert [batch.usable_share for batch in good] == pytest.approx([1.0] * len(good), abs=0.03)
-    assert len({batch.drive_start_ns for batch in good}) == 2

@@ -15,6 +15,7 @@ import httpx
 import pytest
 from support.bus_drive import bus_drive
 from support.configured import service_config
+from support.learner import LearnerBench, at
 from support.paper_van import PAPER_VAN
 from support.patience import PATIENCE_S, wait_until
 from support.ports import first_answer, free_port
@@ -32,6 +33,7 @@ from gateway.offline.estimates import estimates_of_logs
 from gateway.records import Motion, json_line
 from gateway.service.gateway import Gateway, GatewayFailedError
 from gateway.setup import setup_of
+from gateway.stated.statement import StatementRecord
 from gateway.store import Latest
 
 WINDOW_S = 20.0
@@ -127,6 +129,7 @@ def test_a_taken_port_is_reported_in_one_line(config: Path) -> None:
     ("written", "replaced", "named"),
     [
         ("vehicle.id", "vehicle.colour = 1\nvehicle.id", "vehicle.colour"),
+        ("vehicle.id", 'uplink = {host = "localhost", topic = "fleet/#"}\nvehicle.id', "[uplink] topic 'fleet/#'"),
         ("vehicle.id", 'vehicle.calibrated_as = "another van"\nvehicle.id', "vehicle.calibrated_as says 'another van'"),
         ('"vehicle.json"', '"gone.json"', "gone.json"),
         ('"vehicle.json"', '"cut.json"', "was cut short; restore it or calibrate again"),
@@ -216,14 +219,19 @@ def test_a_database_that_cannot_even_be_read_at_the_start_does_not_keep_the_serv
 PATHS = ("/health/live", "/health/ready", "/api/v1/estimates/latest")
 
 
-@pytest.mark.parametrize("content", [b"{", None], ids=["broken", "a link"])
-def test_a_broken_side_file_is_reported_and_set_aside_without_stopping_the_weighing(
-    config: Path, content: bytes | None
-) -> None:
-    name = "learning.json"
-    state = config.parent / "state"
+def with_half_a_character(folder: Path) -> bytes:
+    """The file of a learner that was told something, with a text that no encoding holds."""
+    note = {"from": at(0), "source": "empty", "load": {"payload_kg": 0.0}, "note": "yard"}
+    LearnerBench(folder).learner.loads.state(StatementRecord.model_validate(note), "workshop")
+    return (folder / "learning.json").read_bytes().replace(b'"yard"', b'"\\ud800"')
+
+
+@pytest.mark.parametrize("kind", ["broken", "a link", "half a character"])
+def test_a_broken_side_file_is_reported_and_set_aside_without_stopping_the_weighing(config: Path, kind: str) -> None:
+    name, state = "learning.json", config.parent / "state"
     state.mkdir()
-    if content is None:
+    content = with_half_a_character(config.parent / "other") if kind == "half a character" else b"{"
+    if kind == "a link":
         (state / name).symlink_to("/etc/passwd")
     else:
         (state / name).write_bytes(content)
@@ -240,7 +248,7 @@ def test_a_broken_side_file_is_reported_and_set_aside_without_stopping_the_weigh
     seen, (warning,) = start()
     (aside,) = state.glob(f"{name}.broken-*")
     assert aside.name in warning
-    assert aside.is_symlink() if content is None else aside.read_bytes() == content
+    assert aside.is_symlink() if kind == "a link" else aside.read_bytes() == content
     assert seen == [200, 200, 200]
     again, warnings = start()
     assert (again, warnings) == (seen, ())

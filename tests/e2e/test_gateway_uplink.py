@@ -4,7 +4,6 @@ import json
 import signal
 from pathlib import Path
 
-import pytest
 from support.broker import Listener, needs_mosquitto, running_broker
 from support.configured import service_config
 from support.estimates import make_record
@@ -12,7 +11,6 @@ from support.patience import PATIENCE_S, wait_until
 from support.ports import first_answer, free_port
 from support.process import running_service
 
-from gateway.cli import main
 from gateway.store import Store
 
 pytestmark = needs_mosquitto
@@ -52,15 +50,3 @@ def test_the_service_forwards_its_history_and_reports_progress(tmp_path: Path) -
     assert said[0]["state"] == "online"
     assert [one["id"] for one in said[1:4]] == [record["id"] for record in records]
     assert said[4] == {"state": "offline", "reason": "stopped"}
-
-
-def test_a_broken_setting_stops_the_start_with_one_clear_line(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    path = configuration(tmp_path, 0, 1)
-    path.write_text(path.read_text() + 'uplink.topic = "fleet/#"')
-    for command in (["run", "--config"], ["check-config"]):
-        with pytest.raises(SystemExit) as ended:
-            main([*command, str(path)])
-        assert ended.value.code == 2
-        assert "[uplink] topic 'fleet/#'" in capfd.readouterr().err

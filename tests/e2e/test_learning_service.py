@@ -161,26 +161,6 @@ def test_with_a_sister_handed_in_it_learns_the_calibration_that_the_logs_give(co
     assert said["taken back"] == said["alone"]
 
 
-def test_a_withdrawn_statement_leaves_no_trace(config: Path, tmp_path: Path) -> None:
-    drives = logs(tmp_path, LOADS[:2])
-    said: dict[str, Any] = {}
-
-    def meet(running: Running) -> None:
-        state_and_drive(running, drives, "--ref", "E")
-        said["before"] = settle(running)["versions"][0]["id"]
-        said["file"] = learnt_file(tmp_path, said["before"]).read_bytes()
-        running.told("state", "note", "300", "--from", begun(2), "--ref", "N")
-        said["with"] = settle(running)["versions"][0]["id"]
-        running.told("state", "withdraw", "N")
-        said["after"] = settle(running)["versions"][0]["id"]
-
-    serve(config, meet)
-
-    assert said["with"] != said["before"]
-    assert said["after"] == said["before"]
-    assert learnt_file(tmp_path, said["after"]).read_bytes() == said["file"]
-
-
 def processes_of(pid: int) -> list[int]:
     """A process and its children."""
     children = Path(f"/proc/{pid}/task").glob("*/children")
@@ -227,33 +207,6 @@ def test_after_a_power_cut_during_learning_it_learns_the_same_once(config: Path,
     assert len(after["listed"]) == 2
     assert [(one["n_drives"], one["n_statements"]) for one in after["versions"]] == [(2, 2)]
     assert file == expected
-
-
-def test_half_a_character_in_the_file_costs_no_weighing(config: Path, tmp_path: Path) -> None:
-    """No way in lets it pass; a file with it is put aside whole, and the service learns from its drives anew."""
-    drives = logs(tmp_path, LOADS[:2])
-    serve(config, lambda running: running.told("state", "empty", "--from", begun(1), "--note", "yard"))
-    file = tmp_path / "state/learning.json"
-    file.write_text(file.read_text().replace('"yard"', '"\\ud800"'))
-    said: dict[str, Any] = {}
-
-    def meet(running: Running) -> None:
-        said["learning"] = running.http(LEARNING)
-        said["status"] = running.http("/api/v1/status")
-        state_and_drive(running, drives)
-        said["after"] = settle(running)
-
-    serve(config, meet)
-    assert "learning.json" in said["learning"]["fault"]
-    assert any("statements" in warning for warning in said["status"]["warnings"])
-    assert said["after"]["fault"] is None
-    assert said["after"]["statements"]["used"] == 1
-    (aside,) = [path for path in file.parent.iterdir() if path.name.startswith("learning") and "\\ud800" in _text(path)]
-    assert aside != file
-
-
-def _text(path: Path) -> str:
-    return path.read_text(errors="replace") if path.is_file() else ""
 
 
 def test_a_kill_during_learning_loses_nothing(config: Path, tmp_path: Path) -> None:

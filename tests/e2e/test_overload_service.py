@@ -15,8 +15,6 @@ from gateway.bus.logs import write_candump
 from gateway.bus.signals import shipped_map
 from gateway.log import LOGGER
 from gateway.records import Frames
-from gateway.service.alarm_reader import AlarmService
-from gateway.service.batch_log import BatchLog, LoadEventLog
 
 SATELLITES = """
 [signals.axle_weight] # stands in for a load sensor
@@ -104,29 +102,5 @@ def test_a_stop_makes_the_load_unknown_until_it_is_weighed_again(config: Path) -
         again = goes_on(45.0)
         assert again["load"] == "weighed"
         assert again["t_end"] > weighed_at
-
-    serve(config, play)
-
-
-@pytest.mark.parametrize(
-    ("broken", "told_as"),
-    [(AlarmService, "alarms failed"), (LoadEventLog, "load events failed"), (BatchLog, "log of batches failed")],
-)
-def test_a_failing_listener_does_not_stop_the_weighing(
-    config: Path, monkeypatch: pytest.MonkeyPatch, broken: type, told_as: str
-) -> None:
-    def fail(listener: object, found: object) -> None:
-        raise OverflowError("too much")
-
-    def play(service: Running) -> None:
-        with monkeypatch.context() as breaking:
-            breaking.setattr(broken, "__call__", fail)
-            cab = after(service, white_noise(45.0, START_NS, seed=3), config.parent / "drive.log")
-            assert cab["load"] == "weighed"
-            assert len(told(service, "/api/v1/estimates")["items"]) == 2
-            warnings = told(service, "/api/v1/status")["warnings"]
-            assert f"{told_as}: OverflowError('too much'); weighing goes on" in warnings
-        after(service, white_noise(25.0, START_NS + 60_000_000_000, seed=3), config.parent / "drive.log")
-        assert not [warning for warning in told(service, "/api/v1/status")["warnings"] if told_as in warning]
 
     serve(config, play)

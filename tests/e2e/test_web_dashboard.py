@@ -317,15 +317,6 @@ def test_every_text_has_contrast_in_light_and_dark(drawn: Watched, scheme: str) 
     assert [text for contrast, text in seen if contrast < LEAST_CONTRAST] == []
 
 
-def test_it_fits_a_phone(drawn: Watched) -> None:
-    page = drawn.page
-    usual = page.viewport_size
-    page.set_viewport_size({"width": 360, "height": 740})
-    drawn.wait_until("document.querySelector('#payload-chart .main-svg').clientWidth < 360")
-    drawn.wait_until("document.documentElement.scrollWidth <= 360")
-    page.set_viewport_size(usual)
-
-
 def test_the_keyboard_reaches_everything_in_order(site: str, watched: Watched) -> None:
     page = watched.page
     page.goto(site)

@@ -81,15 +81,6 @@ def test_a_search_ends_where_the_slope_is_zero(seed: int, bend: float) -> None:
     np.testing.assert_allclose(gradient, 0.0, atol=1e-3)
 
 
-@given(seed=st.integers(0, 1000), bend=st.floats(0.0, 1.0))
-def test_the_order_of_drives_does_not_matter(seed: int, bend: float) -> None:
-    prior, drives = drives_of(seed, [1, 2, 3], 3, bend)
-    there = fit.most_probable(np.zeros(3), prior, drives, tolerance=1e-12)
-    back = fit.most_probable(np.zeros(3), prior, drives[::-1], tolerance=1e-12)
-    np.testing.assert_allclose(there.common, back.common, atol=1e-6)
-    np.testing.assert_allclose(there.covariance, back.covariance, atol=1e-6)
-
-
 @given(seed=st.integers(0, 1000))
 def test_one_drive_alone_is_an_ordinary_search(seed: int) -> None:
     """With nothing in common, or with the common vector's prior moved into the drive's own."""

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from support.model_road import BAND_HZ, GROUND, LEFT, QUIET, VAN, batch_over_road, joined, theta_of
 
 from gateway.core.vehicle import Load
@@ -150,23 +148,6 @@ def test_a_group_s_speed_hardly_changes_what_parameters_do_to_the_driveline() ->
     assert np.max(np.abs(left_out)) < 0.5
     own = [INDEX["driveline_front_kg"], INDEX["driveline_rear_kg"], INDEX["rear_lag_s"]]
     np.testing.assert_allclose(found.gradient[own], slopes[own], rtol=0.03, atol=0.1)
-
-
-@settings(max_examples=20)
-@given(gain=st.floats(1e-3, 1e3))
-def test_the_level_of_the_road_does_not_matter(gain: float) -> None:
-    louder = ROLL_SPECTRA.showing(gain * ROLL_SPECTRA.parts)
-    here, there = Point(ROLLING, 0.0, 0.52, 0.0), Point(ROLLING, 300.0, 0.47, 0.05)
-    one, other = (Whittle(spectra, ON_LINE) for spectra in (ROLL_SPECTRA, louder))
-    assert other.cost(here) - other.cost(there) == pytest.approx(one.cost(here) - one.cost(there))
-
-
-def test_mirrored_spectra_cost_what_a_mirrored_load_does() -> None:
-    mirrored = ROLL_SPECTRA.with_sensors_times(1.0, 1.0, -1.0)
-    other = ROLLING.copy()
-    other[[INDEX[name] for name in ("gyro_yaw_rad", "empty_left_m", "sensor_left_m")]] *= -1.0
-    one = Whittle(ROLL_SPECTRA, ON_LINE).cost(Point(ROLLING, *LOADED))
-    assert Whittle(mirrored, ON_LINE).cost(Point(other, *LOADED[:2], -LOADED[2])) == pytest.approx(one, rel=1e-12)
 
 
 def test_two_sensors_of_a_car_that_is_level_are_those_of_the_half_car() -> None:

@@ -17,7 +17,6 @@ from support.model_road import (
     UNCOUPLED,
     VAN,
     batch_of,
-    motion_of,
     paths_of,
     theta_of,
 )
@@ -26,7 +25,6 @@ from gateway.core.vehicle import Load
 from gateway.model import car
 from gateway.model.car import LEAST_LEFT, LEVELS, MOST, MOST_APART, natural, numbers_about, numbers_of, roll_share_front
 from gateway.model.expected import Expected, Groups, log_stroke_speeds
-from gateway.model.response import Frequencies, Motion
 from gateway.model.spectra import Mount, Reading, cross_spectra_of, log_amplitude_of
 from gateway.model.table import INDEX, NAMES, N
 from gateway.model.tracks import MOST_X, coherence_of, coherence_slope_of
@@ -271,30 +269,6 @@ def test_twice_the_movement_is_one_logarithm_of_two_more(ratio: float) -> None:
     assert moved == pytest.approx(np.log(ratio))
 
 
-@pytest.mark.parametrize(("theta", "n_sensors"), [(HALF, 2), (ROLLING, 2), (ROLLING, 3)])
-def test_slopes_are_what_a_small_change_of_each_number_does(theta: F64, n_sensors: int) -> None:
-    loaded = LOADED if len(theta) > N else LOADED[:2]
-    numbers = numbers_of(natural(theta)[None], np.array(loaded)[:, None], GROUND)
-
-    def paths(moved: F64) -> C128:
-        return Motion(moved, GROUND, Frequencies(FREQ_HZ), n_sensors, 14.0).paths
-
-    slopes = Motion(numbers, GROUND, Frequencies(FREQ_HZ), n_sensors, 14.0).slopes(np.arange(len(numbers))).copy()
-    for i in range(len(numbers)):
-        step = np.zeros_like(numbers)
-        step[i] = 1e-5 * max(abs(numbers[i, 0, 0]), 0.1)
-        expected = (paths(numbers + step) - paths(numbers - step)) / (2.0 * step[i, 0, 0])
-        np.testing.assert_allclose(slopes[i], expected, rtol=1e-5, atol=2e-7 * np.abs(expected).max(), err_msg=str(i))
-
-
-def test_some_slopes_are_those_of_all() -> None:
-    numbers = numbers_of(natural(ROLLING)[None], np.array(LOADED)[:, None], GROUND)
-    motion = Motion(numbers, GROUND, Frequencies(FREQ_HZ), 3, 14.0)
-    every = motion.slopes(np.arange(len(numbers))).copy()
-    for wanted in ([1, 5, 14], [25, 28, 29, 30], [12, 35], [10, 33]):
-        np.testing.assert_array_equal(motion.slopes(np.array(wanted)), every[wanted])
-
-
 @pytest.mark.parametrize("theta", [HALF, ROLLING], ids=["upright", "rolling"])
 @pytest.mark.parametrize("payload_kg", [0.0, 320.0])
 def test_numbers_move_with_each_entry_as_a_small_change_does(theta: F64, payload_kg: float) -> None:
@@ -314,43 +288,6 @@ def test_numbers_move_with_each_entry_as_a_small_change_does(theta: F64, payload
         name = NAMES[entry] if entry < n else f"load {entry - n}"
         scale = np.abs(numbers(whole)) + 1.0
         np.testing.assert_allclose(slopes[..., column] / scale, expected / scale, rtol=1e-4, atol=1e-7, err_msg=name)
-
-
-def test_a_gain_multiplies_what_the_accelerometer_reads() -> None:
-    plain, louder = (paths_of(theta_of(accelerometer_gain=gain), LOADED[:2], FREQ_HZ) for gain in (0.0, 0.1))
-    np.testing.assert_allclose(louder[0], np.exp(0.1) * plain[0], rtol=1e-12)
-    np.testing.assert_array_equal(louder[1], plain[1])
-
-
-def test_spring_forces_equal_mass_times_acceleration() -> None:
-    """Newton's law, both axles together: a firm payload, a sensor over the centre of gravity, no driveline."""
-    share = 0.46
-    theta = theta_of(sensor_position_m=(1.0 - share) * GROUND.wheelbase_m, **FIRM, **UNCOUPLED)
-    motion = motion_of(theta, (400.0, share), FREQ_HZ)
-    numbers = natural(theta)
-    added_kn = np.array([share * 1640.0 - 0.52 * 1240.0, (1.0 - share) * 1640.0 - 0.48 * 1240.0]) * 9.80665e-3
-    push = np.zeros((2, len(FREQ_HZ)), complex)
-    for axle, end in enumerate(("front", "rear")):
-        spring, slope, damper, mount = (
-            numbers[INDEX[name]]
-            for name in (
-                f"spring_{end}_npm",
-                f"spring_slope_{end}_per_kn",
-                f"damper_{end}_nspm",
-                f"damper_mount_{end}_npm",
-            )
-        )
-        damped = 1j * OMEGA * damper
-        rate = spring * np.exp(slope * added_kn[axle]) + damped / (1.0 + damped / mount)
-        push -= rate * motion.strokes()[axle, :, 0, car.USUAL_LEVEL]
-    np.testing.assert_allclose(push, 1640.0 * motion.paths[0, :, 0, car.USUAL_LEVEL], rtol=1e-6)
-
-
-def test_on_a_road_of_long_waves_no_spring_moves() -> None:
-    """What stretches them then is the body's inertia, which vanishes with frequency squared."""
-    one = np.abs(motion_of(HALF, LOADED[:2], np.array([0.01, 0.1])).strokes()[0, 0, 0, car.USUAL_LEVEL])
-    assert one[1] < 0.01
-    assert one[0] / one[1] == pytest.approx(0.01, rel=0.1)
 
 
 @pytest.mark.parametrize("speed_mps", [7.0, 22.0])

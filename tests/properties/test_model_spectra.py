@@ -18,23 +18,14 @@ from gateway.model.spectra import (
     mount_of,
     noise_over,
     usual_floor,
-    why_no_spectra,
 )
 from gateway.model.table import INDEX, N
-from gateway.records import Batch, Why
+from gateway.records import Batch
 
 READING = Reading(VAN.wheelbase_m, BAND_HZ, 256)
 ROLL_READING = replace(READING, with_roll=True)
 HALF = theta_of()
 DENSITY = 8.7e-4  # rad/s/sqrt(Hz): a gyro of 0.05 deg/s/sqrt(Hz)
-
-
-def test_a_scaled_batch_gives_the_same_spectra() -> None:
-    batch = batch_over_road(HALF, Load(200.0, 50.0), 2, duration_s=60.0)
-    quieter = batch_of(0.5 * batch.vertical_acceleration_mps2, 0.5 * batch.pitch_rate_radps)
-    one, other = (cross_spectra_of([each], READING) for each in (batch, quieter))
-    np.testing.assert_allclose(one.parts, other.parts, rtol=1e-9, atol=1e-12)
-    assert other.acceleration_rms_mps2 == pytest.approx(0.5 * one.acceleration_rms_mps2)
 
 
 def test_masked_samples_leave_no_trace() -> None:
@@ -125,19 +116,3 @@ def test_a_sensor_is_where_the_parameters_say() -> None:
     assert mount_of(level(theta)) == Mount(0.0, 0.0, 0.004)
     assert theta[INDEX["sensor_left_m"]] == 0.25
     assert mount_of(theta[:N]) is None
-
-
-def test_why_a_batch_has_no_spectra() -> None:
-    batch = batch_over_road(HALF, Load(200.0, 50.0), 4, duration_s=60.0)
-    n = len(batch.usable)
-    nothing = np.full(n, np.nan)
-    rng = np.random.default_rng(1)
-    for spoilt, why in (
-        (replace(batch, usable=np.arange(n) < 700), Why.TOO_SHORT),
-        (replace(batch, usable=np.arange(n) % 250 != 0, shares={Why.TOO_SLOW: 0.1, Why.GAP: 0.01}), Why.TOO_SLOW),
-        (replace(batch, vertical_acceleration_mps2=nothing), Why.ACCELERATION_MISSING),
-        (replace(batch, pitch_rate_radps=nothing), Why.PITCH_RATE_MISSING),
-        (replace(batch, speed_mps=14.0 + 3.0 * rng.standard_normal(n)), Why.SPEED_SPREAD),
-    ):
-        assert cross_spectra_of([spoilt], READING) is None
-        assert why_no_spectra(spoilt, READING) is why

@@ -96,14 +96,6 @@ def test_lost_frames_are_distinguished_from_late_ones(lost: float, mean_s: float
     assert float(np.mean(np.abs(off_s(timing.t_ns, t_s)) > 0.001)) < 0.01
 
 
-def test_a_counter_shows_lost_frames_among_bunched_stamps() -> None:
-    rng = np.random.default_rng(5)
-    t_s, counter = taken(0.01), np.arange(round(DURATION_S / 0.01)) % 16
-    kept = rng.random(len(t_s)) > 0.2
-    timing = sample_times(ns(heaped(0.016)(t_s[kept], rng)), counter[kept], 16)
-    assert float(np.quantile(np.abs(off_s(timing.t_ns, t_s[kept])), 0.99)) < 2e-3
-
-
 def test_random_stamps_give_no_clock() -> None:
     rng = np.random.default_rng(6)
     assert sample_times(ns(np.sort(rng.uniform(0.0, DURATION_S, 12_000)))) is None
@@ -153,11 +145,3 @@ def test_a_batch_without_a_clock_is_refused_as_time_stamps() -> None:
     window = BatchWindow(T0_NS, T0_NS + 100_000_000_000, T0_NS)
     batch = build_batch(stamped(drive(100.0), shuffled), window, BatchSettings(window_s=100.0), {})
     assert batch.rejected[0] is Why.TIME_STAMPS
-
-
-@pytest.mark.parametrize("stamping", [bunched, lambda t_s, rng: np.floor(t_s / 10.0) * 10.0])
-def test_bunched_stamps_cost_no_more_than_even_ones(stamping: Stamping) -> None:
-    """The grid once followed the median interval, however short: 20 us made arrays of a gigabyte."""
-    window = BatchWindow(T0_NS, T0_NS + 100_000_000_000, T0_NS)
-    batch = build_batch(stamped(drive(100.0), stamping), window, BatchSettings(window_s=100.0), {})
-    assert len(batch.usable) == 5000

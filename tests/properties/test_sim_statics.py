@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.statics import static_axle_loads_kg
-from support.textbook import linearised
+from support.textbook import linearised, static_axle_loads_kg
 
 from gateway.sim.parameters import Load, axle_loads_kg, cg_left_m, front_share_pct, load_for_share, payload_kg
 from gateway.sim.ride import ride, wheel_loads_kg

@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import can
 import pytest
 from click.testing import Result
 from support.commands import called
 
-from gateway.bus.frames import message_of
-from gateway.bus.logs import open_whole_log
 from gateway.calibration.campaign_file import load_campaign
 from gateway.calibration.file import load_calibration
 from gateway.errors import CalibrationImpossibleError
@@ -143,26 +140,6 @@ def test_a_wrong_signal_map_is_named_and_nothing_is_written(mistake: str, folder
     assert not (tmp_path / "none.json").exists()
 
 
-def test_channels_mapped_to_each_others_place_are_named(folder: Path) -> None:
-    text = (folder / "signals.toml").read_text(encoding="utf-8")
-    text = text.replace('message = "IMU_ACCEL"\nsignal = "AccelZ"', "@acceleration", 1)
-    text = text.replace('message = "IMU_GYRO"\nsignal = "PitchRate"', "@pitch", 1)
-    text = (
-        text.replace("AccelValid", "@valid", 1).replace("GyroValid", "AccelValid", 1).replace("@valid", "GyroValid", 1)
-    )
-    text = (
-        text.replace("AccelCounter", "@counter", 1)
-        .replace("GyroCounter", "AccelCounter", 1)
-        .replace("@counter", "GyroCounter", 1)
-    )
-    text = text.replace("@acceleration", 'message = "IMU_GYRO"\nsignal = "PitchRate"\nunit = "m/s^2"')
-    text = text.replace("@pitch", 'message = "IMU_ACCEL"\nsignal = "AccelZ"\nunit = "deg/s"')
-    (folder / "channels-signals.toml").write_text(text, encoding="utf-8")
-    head = head_with(folder, '"signals.toml"', '"channels-signals.toml"')
-    exit_code, found = check(altered(folder, "channels", [1], head=head))
-    assert (exit_code, kinds(found)) == (1, {0: [], 1: ["fault:channels_swapped"]})
-
-
 def test_twenty_seconds_are_too_short_and_the_rest_goes_on(folder: Path, tmp_path: Path) -> None:
     short = table_of(folder, 4).rstrip() + "\nstart_s = 40.0\nend_s = 60.0\n\n"
     campaign = altered(folder, "short", run4=short)
@@ -211,27 +188,6 @@ def test_two_loads_swapped_in_the_file_are_found(folder: Path) -> None:
     faulty = {number: findings for number, findings in kinds(found).items() if number and findings}
     assert faulty == {place: ["warning:loads_swapped"] for place in places}
     assert f"exchanged with drive {places[1]}, both fit far better" in json.dumps(found)
-
-
-def test_a_wrong_sensor_position_is_reported(folder: Path) -> None:
-    head = head_with(folder, "sensor_position_m = 3.2", "sensor_position_m = 0.0")
-    _, found = check(altered(folder, "place", [1], head=head))
-    assert kinds(found)[1] == ["fault:sensor_position"]
-
-
-def test_a_campaign_may_hold_logs_of_another_kind(folder: Path) -> None:
-    """Every kind gives the same motion: tests/contracts."""
-    with can.Logger(folder / "kind.blf") as writer:
-        chunks, _ = open_whole_log(next(folder.glob("01_*/can.log.gz")))
-        for frames in chunks:
-            for row in range(len(frames)):
-                message = message_of(frames, row)
-                message.channel = 0
-                message.timestamp = float(message.timestamp)
-                writer.on_message_received(message)
-    table = '\nlog = "kind.blf"\npayload_kg = 0.0\nfront_share_pct = 50.0\nstart_s = 10.0\nend_s = 150.0\n'
-    exit_code, found = check(altered(folder, "blf", [1], run1=table))
-    assert (exit_code, kinds(found)) == (0, {0: ["warning:one_load_only", UNTOLD], 1: []})
 
 
 def test_the_share_may_be_stated_instead_of_the_position(folder: Path) -> None:

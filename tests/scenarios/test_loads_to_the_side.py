@@ -112,24 +112,6 @@ def test_without_a_roll_rate_the_interval_is_wider_and_holds(
     assert not np.isfinite(without.cg_left.number)
 
 
-def test_a_roll_rate_that_is_lost_is_done_without(
-    sideways: dict[tuple[float, float, float], KnownRun], rolling: VehicleModel
-) -> None:
-    """Known in a fifth of the batch, or in none of it: the same answer, wider than with it, that places nothing."""
-    side = SIDES[0]
-    batch = sideways[side].batches[0]
-    assert batch.roll_rate_radps is not None
-    n = len(batch.usable)
-    mostly = replace(batch, roll_rate_radps=np.where(np.arange(n) < n // 5, batch.roll_rate_radps, np.nan))
-    found, none = weighed(mostly, rolling), weighed(replace(batch, roll_rate_radps=None), rolling)
-    assert found.counted
-    assert found.payload == none.payload
-    assert holds(found.payload, side[0])
-    assert width(found.payload) > width(weighed(batch, rolling).payload)
-    assert not np.isfinite(found.cg_left.number)
-    assert not np.isfinite(found.left_share.number)
-
-
 def test_an_unseen_sideways_load_costs_surety_and_no_refusal_where_the_load_is_central(
     known: list[KnownRun], rolling: VehicleModel
 ) -> None:
@@ -138,18 +120,6 @@ def test_an_unseen_sideways_load_costs_surety_and_no_refusal_where_the_load_is_c
     assert {why for one in found for why in one.rejected} <= {Why.TOO_UNCERTAIN}
     assert sum(one.counted for one in found) >= len(known) - 1
     assert all(holds(one.payload, run.payload_kg) for one, run in zip(found, known, strict=True) if one.counted)
-
-
-def test_a_roll_rate_that_is_lost_for_a_moment_is_still_used(
-    sideways: dict[tuple[float, float, float], KnownRun], rolling: VehicleModel
-) -> None:
-    batch = sideways[SIDES[0]].batches[0]
-    assert batch.roll_rate_radps is not None
-    n = len(batch.usable)
-    briefly = replace(batch, roll_rate_radps=np.where(np.arange(n) > n // 10, batch.roll_rate_radps, np.nan))
-    found = weighed(briefly, rolling)
-    assert holds(found.payload, SIDES[0][0])
-    assert holds(found.cg_left, cg_left_m(VEHICLE, SIDES[0][0], SIDES[0][2]))
 
 
 @pytest.mark.parametrize("turned_deg", [-10.0, 10.0])

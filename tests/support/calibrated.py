@@ -5,9 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from gateway.calibration.file import CalibrationFile
+from gateway.calibration.file import CalibrationFile, DrivePart, ProvenancePart, SeenPart
+from gateway.calibration.statements import Statement
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
+from gateway.core.vehicle import Vehicle
+from gateway.stated.statement import StatementSource
 
 
 def constant_model(answer: float, std: float) -> RegressionModel:
@@ -39,44 +42,32 @@ def ratio_index_calibration(payload_kg: float = 200.0, front_share_pct: float = 
 
 def calibration_file(payload_kg: float = 200.0, front_share_pct: float = 48.0) -> CalibrationFile:
     """Loads of 0 to 400 kg and shares of 46 to 50 % were seen."""
-    vehicle = {
-        "name": "van",
-        "empty_mass_kg": 1240.0,
-        "wheelbase_m": 2.8,
-        "empty_front_share_pct": 50.0,
-        "sensor_position_m": 3.2,
-        "payload_range_kg": [0.0, 450.0],
-        "front_share_range_pct": [40.0, 60.0],
-        "sensor_position_std_m": 0.1,
-        "empty_front_share_std_pct": 0.5,
-        "sensor_offset_left_m": 0.0,
-        "sensor_offset_left_std_m": 0.3,
-        "empty_cg_left_m": 0.0,
-        "gross_limit_kg": 2000.0,
-    }
-    absent = ("unsprung_front_kg", "unsprung_rear_kg", "kerb_front_axle_kg", "kerb_rear_axle_kg", "wheel_radius_m")
-    absent += ("front_axle_limit_kg", "rear_axle_limit_kg", "front_wheel_limit_kg", "rear_wheel_limit_kg")
-    absent += ("track_width_m",)
-    drive = {"number": 1, "log": "a.log", "sha256": "0" * 64, "n_batches": 2, "found": None}
-    drive["statement"] = {"source": "known", "payload_kg": 0.0, "front_share_pct": 50.0}
-    return CalibrationFile.model_validate(
-        {
-            "vehicle": vehicle | dict.fromkeys(absent),
-            "seen": {
-                "payload_kg": [0.0, 400.0],
-                "front_share_pct": [46.0, 50.0],
-                "speed_mps": [14.0, 16.0],
-                "sensor_rate_hz": [100.0, 100.0],
-                "roughness_mps2": None,
-            },
-            "ratio_index": ratio_index_calibration(payload_kg, front_share_pct),
-            "provenance": {
-                "software": "springscale test",
-                "command": "springscale calibrate",
-                "campaign_sha256": "1" * 64,
-                "drives": [drive],
-            },
-        }
+    statement = Statement(source=StatementSource.KNOWN, payload_kg=0.0, front_share_pct=50.0)
+    drive = DrivePart(number=1, log="a.log", sha256="0" * 64, n_batches=2, statement=statement, found=None)
+    return CalibrationFile(
+        vehicle=Vehicle(
+            name="van",
+            empty_mass_kg=1240.0,
+            wheelbase_m=2.8,
+            sensor_position_m=3.2,
+            sensor_offset_left_m=0.0,
+            sensor_offset_left_std_m=0.3,
+            gross_limit_kg=2000.0,
+        ),
+        seen=SeenPart(
+            payload_kg=(0.0, 400.0),
+            front_share_pct=(46.0, 50.0),
+            speed_mps=(14.0, 16.0),
+            sensor_rate_hz=(100.0, 100.0),
+            roughness_mps2=None,
+        ),
+        ratio_index=ratio_index_calibration(payload_kg, front_share_pct),
+        provenance=ProvenancePart(
+            software="springscale test",
+            command="springscale calibrate",
+            campaign_sha256="1" * 64,
+            drives=(drive,),
+        ),
     )
 
 

@@ -66,15 +66,6 @@ def told(estimates: list[Estimate], rules: Rules = RULES) -> dict[str, Entry]:
     return {entry.id: entry for one in estimates for entry in ledger.add(one)}
 
 
-def assert_a_restart_changes_nothing(whole: list[Estimate]) -> None:
-    """Between any two batches: a ledger that takes up what another has told goes on as that one would have."""
-    straight = told(whole)
-    for cut in range(1, len(whole)):
-        first = told(whole[:cut])
-        ledger = Ledger(RULES, whole[:cut], first.values())
-        assert {**first, **{e.id: e for one in whole[cut:] for e in ledger.add(one)}} == straight
-
-
 def events(estimates: list[Estimate]) -> list[dict]:
     return [entry.record for entry in told(estimates).values() if entry.kind == "event"]
 

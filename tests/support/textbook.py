@@ -7,6 +7,7 @@ import numpy as np
 
 from gateway.records import C128, F64
 from gateway.sim.parameters import Axle, Damper, Load, Vehicle
+from gateway.sim.ride import wheel_loads_kg
 
 
 def linearised(vehicle: Vehicle) -> Vehicle:
@@ -25,6 +26,12 @@ def _linear(axle: Axle) -> Axle:
         damper=Damper(mean, mean),
         wheel=replace(axle.wheel, imbalance_kgm=0.0, runout_m=0.0),
     )
+
+
+def static_axle_loads_kg(vehicle: Vehicle, loads: tuple[Load, ...]) -> tuple[float, float]:
+    """Front and rear axle load on level ground, from the equilibrium of the whole model."""
+    front_left, front_right, rear_left, rear_right = wheel_loads_kg(vehicle, loads).tolist()
+    return front_left + front_right, rear_left + rear_right
 
 
 def half_car(vehicle: Vehicle, load: Load, speed_mps: float, freq_hz: F64) -> C128:

@@ -82,16 +82,6 @@ def test_several_batches_give_a_smaller_error() -> None:
     assert joined_gains([None]) is None
 
 
-def test_a_gain_is_changed_beyond_chance_and_temperature() -> None:
-    calibrated = (1.002, 0.002)
-    model, batch = of_gain(calibrated), batch_of(drive(100.0))
-    assert is_changed(replace(batch, gyro_gain=(1.002 * 1.05, 0.006)), model)
-    assert not is_changed(replace(batch, gyro_gain=(1.002 * 1.02, 0.006)), model)
-    assert gyro_gain_ratio(None, calibrated) is None
-    assert not is_changed(batch, model)
-    assert not is_changed(replace(batch, gyro_gain=(1.5, 0.006)), of_gain(None))
-
-
 def test_bends_of_a_country_road_show_the_gyros_gain() -> None:
     """Through sensors, frames and map; a gyro whose three rates are 5 % too large is told as such."""
     van = next(iter(VANS.values()))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.calibrated import calibration_file
-from support.drives import T0_NS, drive, joined, later
+from support.drives import T0_NS, drive
 from support.paper_van import paper_van
 
 from gateway.calibration.judgement.evaluation import Comparison, Judged, error_table, errors_of, judge
@@ -22,7 +22,6 @@ from gateway.estimates.posterior import exactly
 from gateway.records import Batch, Why
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.weighing.estimator import estimate
-from gateway.weighing.flow import Flow, Identity
 
 VAN = paper_van(payload_range_kg=(0.0, 400.0), unsprung_front_kg=60.0, unsprung_rear_kg=100.0)
 BATCH = build_batch(drive(100.0), BatchWindow(T0_NS, T0_NS + 100_000_000_000, T0_NS), BatchSettings(window_s=100.0), {})
@@ -289,21 +288,3 @@ def test_the_ratio_index_gates_on_speed() -> None:
 def test_too_few_segments_between_the_masks_are_no_answer() -> None:
     usable = BATCH.usable & (np.arange(len(BATCH.usable)) % 200 > 0)
     assert answer(batch=replace(BATCH, usable=usable)).rejected == (Why.NOT_ENOUGH_EXCITATION,)
-
-
-def test_flow_names_the_vehicle_and_does_not_depend_on_chunks() -> None:
-    rows = joined(drive(100.0), later(drive(90.0, seed=2), 115.0))
-    calibrated = calibration_file().for_core()
-
-    def run(n_chunk: int) -> list[Estimate]:
-        flow = Flow(
-            BatchSettings(window_s=50.0), {}, calibrated, "ratio_index", Identity("van-17", "WVWZZZ1JZXW000001")
-        )
-        parts = [rows.part(i, i + n_chunk) for i in range(0, len(rows), n_chunk)]
-        return [*(found for part in parts for found in flow.feed(part)), *flow.flush()]
-
-    whole, chunked = run(len(rows)), run(777)
-    assert [found.counted for found in whole] == [True, True, True, False]
-    assert [estimate_to_json(found) for found in chunked] == [estimate_to_json(found) for found in whole]
-    assert {(found.vehicle_id, found.vin) for found in whole} == {("van-17", "WVWZZZ1JZXW000001")}
-    assert len({found.id for found in whole}) == 4

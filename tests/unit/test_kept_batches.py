@@ -1,10 +1,11 @@
 """Batches kept for calibrations to come: bit for bit what they were, and damage is told."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from support.bus_drive import bus_drive
+from support.drives import assert_same_batch
 
 from gateway.bus.signals import Decoder, load_signal_map
 from gateway.calibration.inspection.drive import row_facts
@@ -41,15 +42,6 @@ def kept_of(motion: Motion, settings: BatchSettings = SETTINGS) -> list[KeptBatc
 @pytest.fixture(scope="module")
 def three() -> list[KeptBatch]:
     return kept_of(driven(65.0))[:3]
-
-
-def assert_same_batch(one: Batch, other: Batch) -> None:
-    for field in fields(Batch):
-        mine, its = getattr(one, field.name), getattr(other, field.name)
-        if isinstance(mine, np.ndarray):
-            assert mine.tobytes() == its.tobytes(), field.name
-        else:
-            assert mine == its, field.name
 
 
 def test_a_batch_comes_back_bit_for_bit(three: list[KeptBatch]) -> None:

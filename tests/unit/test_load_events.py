@@ -5,13 +5,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from support.days import (
     OWN_KG,
     RULES,
     T0_NS,
-    assert_a_restart_changes_nothing,
     at,
     batch,
     day,
@@ -21,12 +19,10 @@ from support.days import (
     trips,
 )
 
-from gateway.core.change import change_of
 from gateway.core.events import ledger
 from gateway.core.events.entry import Entry
 from gateway.core.events.ledger import Ledger
 from gateway.estimates.batch_estimate import Estimate, Place, Stop, Watched
-from gateway.estimates.posterior import Posterior, Source
 
 
 def test_a_delivery_has_its_weight_time_and_both_loads():
@@ -41,19 +37,6 @@ def test_a_delivery_has_its_weight_time_and_both_loads():
     assert found["probability"] > 0.999
     assert not found["is_withdrawn"]
     assert found["revision"] == 1
-
-
-def test_a_change_between_unlike_loads_has_a_larger_error():
-    """What grows with the load by a tenth errs by a tenth of the change."""
-    for after_kg in (320.0, 900.0):
-        loads = [
-            Posterior(
-                np.array([kg, 50.0]), np.diag([OWN_KG**2, 0.01]), {Source.CALIBRATION: np.array([[0.1 * kg, 0.0]])}
-            )
-            for kg in (120.0, after_kg)
-        ]
-        std_kg = math.sqrt(2.0 * OWN_KG**2 + (0.1 * (after_kg - 120.0)) ** 2)
-        assert change_of(*loads).std == pytest.approx(std_kg)
 
 
 def test_an_unchanged_load_gives_no_event():
@@ -226,10 +209,6 @@ def test_each_drive_that_begins_in_1970_hides_no_load():
     (found,) = events([*evening, first, *morning])
     for name in ("change_kg", "t_start", "t_end", "before", "after"):
         assert found[name] == expected[name]
-
-
-def test_a_restart_after_it_goes_on_as_if_it_had_not_been():
-    assert_a_restart_changes_nothing(put_right(0.0, 500.0, 500.0, 320.0, 200.0, ahead=5, batches=2))
 
 
 def test_old_entries_do_not_change_with_the_clock(monkeypatch):

@@ -195,38 +195,6 @@ def test_long_loads_are_taken_for_longer_than_compact_ones() -> None:
     assert found[1] > found[0] + 0.5
 
 
-def test_each_shape_is_a_hypothesis_with_its_own_prior() -> None:
-    model = taught()
-    shapes = shape_hypotheses(FLAT_VAN, *model.known_shape)
-    rows = hypotheses_of(model, shapes, (0.01, GAIN_STD), with_roll=False)
-    assert [one.name for one in rows] == ["compact", "spread"]
-    for row, shape in zip(rows, shapes, strict=True):
-        entry = INDEX["payload_gyration_m2"]
-        assert row.mean[entry] == shape.log_s
-        assert row.covariance[entry, entry] == pytest.approx(shape.std**2)
-        assert row.cost == pytest.approx(-np.log(shape.probability))
-        assert row.mean[INDEX["accelerometer_gain"]] == 0.01
-        others = [i for i in range(N) if i not in (entry, INDEX["accelerometer_gain"])]
-        np.testing.assert_array_equal(row.mean[others], model.parameters[others])
-        assert np.all(np.diag(row.covariance)[others] >= np.diag(model.covariance)[others])
-
-
-def test_a_soft_load_costs_more_and_differs_in_its_mode_alone() -> None:
-    (firm,) = hypotheses_of(taught(), known_shape(0.1, 0.3), (0.0, GAIN_STD), with_roll=False)
-    soft, worn = firm.soft(), firm.worn()
-    mode = INDEX["payload_mode_hz"]
-    assert np.exp(soft.mean[mode]) < 0.5 * np.exp(firm.mean[mode])
-    np.testing.assert_array_equal(np.delete(soft.mean, mode), np.delete(firm.mean, mode))
-    np.testing.assert_array_equal(soft.covariance, firm.covariance)
-    assert soft.cost > firm.cost
-    assert worn.cost > firm.cost
-    more = worn.covariance - firm.covariance
-    dampers = [INDEX["damper_front_nspm"], INDEX["damper_rear_nspm"]]
-    assert np.all(more[dampers, dampers] > 0.04)
-    more[dampers, dampers] = 0.0
-    assert not more.any()
-
-
 def peak(payload_kg: float, front_share: float, log_evidence: float, hypothesis: Hypothesis | None = None) -> Peak:
     (known,) = hypotheses_of(taught(), known_shape(*taught().known_shape), (0.0, GAIN_STD), with_roll=False)
     hypothesis = hypothesis or known

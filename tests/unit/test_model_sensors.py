@@ -45,13 +45,6 @@ CLEAN = 0.0
 """The slack of drives whose sensors are as alike as a model can have them, but for noise."""
 
 
-def moved(moved_m: float, *, with_roll: bool, slack: float = USUAL_SLACK) -> Estimate:
-    theta = car(with_roll=with_roll)
-    theta[INDEX["sensor_position_m"]] += moved_m
-    batch = drive_of(LOAD, 61, with_roll=with_roll, theta=theta, slack=slack)
-    return estimated(batch, taught(with_roll=with_roll, slack=slack))
-
-
 @pytest.mark.parametrize(
     ("moved_m", "with_roll"),
     [
@@ -70,23 +63,11 @@ def moved(moved_m: float, *, with_roll: bool, slack: float = USUAL_SLACK) -> Est
     ],
 )
 def test_a_sensor_moved_along_the_vehicle_is_refused(moved_m: float, with_roll: bool) -> None:
-    found = moved(moved_m, with_roll=with_roll)
+    theta = car(with_roll=with_roll)
+    theta[INDEX["sensor_position_m"]] += moved_m
+    found = told(drive_of(LOAD, 61, with_roll=with_roll, theta=theta), with_roll=with_roll)
     assert set(found.rejected) & REFUSED_AS_CHANGED
     assert np.sign(found.diagnostics["sensor_position_deviation"]) == np.sign(moved_m)
-
-
-@pytest.mark.parametrize(
-    ("moved_m", "with_roll"),
-    [
-        (-0.2, False),
-        (0.2, False),
-        pytest.param(0.3, False, marks=lost("weighed, 390 +- 37 kg for 200")),
-        (-0.2, True),
-        (0.2, True),
-    ],
-)
-def test_clear_sensors_show_that_one_was_moved(moved_m: float, with_roll: bool) -> None:
-    assert moved(moved_m, with_roll=with_roll, slack=CLEAN).rejected == (Why.SENSOR_CHANGED,)
 
 
 @pytest.mark.parametrize("changed", [{"sensor_left_m": 0.5}, {"sensor_left_m": 0.1}, {"gyro_yaw_rad": 0.15}], ids=str)
@@ -158,10 +139,6 @@ def off(name: str, by: float) -> F64:
     found = np.zeros(N)
     found[INDEX[name]] = by
     return found
-
-
-def test_nothing_refuses_a_healthy_answer() -> None:
-    assert disbelieved(signs()) is None
 
 
 @pytest.mark.parametrize(
@@ -337,33 +314,19 @@ def test_a_lag_between_the_sensors_costs_nothing(lag_s: float, with_roll: bool) 
     assert found.front_share.number == pytest.approx(prompt.front_share.number, abs=0.4)
 
 
-def late_by(lag_s: float, *, with_roll: bool, slack: float) -> Estimate:
+def late_by(lag_s: float, *, with_roll: bool) -> Estimate:
     theta = car(with_roll=with_roll, gyro_lag_s=lag_s)
-    batch = drive_of(LOAD, 66, with_roll=with_roll, theta=theta, slack=slack)
-    return estimated(batch, taught(with_roll=with_roll, slack=slack))
-
-
-@pytest.mark.parametrize(
-    ("lag_s", "with_roll"),
-    [
-        pytest.param(-0.05, False, marks=lost("refused as model_misfit")),
-        (0.05, False),
-        pytest.param(-0.05, True, marks=lost("refused as model_misfit: the search finds another vehicle instead")),
-        (0.05, True),
-    ],
-)
-def test_clear_sensors_show_a_far_too_late_gyro(lag_s: float, with_roll: bool) -> None:
-    assert late_by(lag_s, with_roll=with_roll, slack=CLEAN).rejected == (Why.SENSOR_CHANGED,)
+    return told(drive_of(LOAD, 66, with_roll=with_roll, theta=theta), with_roll=with_roll)
 
 
 @ROLL
 @pytest.mark.parametrize("lag_s", [-0.05, 0.05])
 def test_a_gyro_that_is_far_too_late_is_refused(lag_s: float, with_roll: bool) -> None:
-    assert set(late_by(lag_s, with_roll=with_roll, slack=USUAL_SLACK).rejected) & REFUSED_AS_CHANGED
+    assert set(late_by(lag_s, with_roll=with_roll).rejected) & REFUSED_AS_CHANGED
 
 
 def test_without_a_roll_rate_a_gyro_that_is_far_too_late_is_a_changed_sensor() -> None:
-    assert late_by(0.05, with_roll=False, slack=USUAL_SLACK).rejected == (Why.SENSOR_CHANGED,)
+    assert late_by(0.05, with_roll=False).rejected == (Why.SENSOR_CHANGED,)
 
 
 def noisy(density: float, *, with_roll: bool = False) -> Batch:

@@ -12,6 +12,7 @@ from support.drives import drive, joined, later, without_rows
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.pool import Part, spanned
 from gateway.core.scheduler import Scheduler
+from gateway.estimates.as_json import estimate_to_json
 from gateway.estimates.batch_estimate import Estimate, Way
 from gateway.estimates.posterior import Posterior, Source
 from gateway.records import F64, Batch, Motion, Why
@@ -166,10 +167,13 @@ def test_a_sensor_at_fault_is_refused_and_never_pooled() -> None:
 
 def test_batches_are_the_same_however_the_rows_are_chunked() -> None:
     motion = drive(420.0, driven_with_stops(*((t_s, t_s + 45.0) for t_s in (20.0, 100.0, 180.0, 260.0))))
-    flow = Flow(SETTINGS, {}, CALIBRATED, "cross_spectrum", Identity("van-17"))
+    flow = Flow(SETTINGS, {}, CALIBRATED, "cross_spectrum", Identity("van-17", "WVWZZZ1JZXW000001"))
     cuts = [0, 100, 7_000, 31_000, len(motion)]
-    found = [one for a, b in pairwise(cuts) for one in flow.feed(motion.part(a, b))]
-    assert spans(iter([*found, *flow.flush()]), motion) == spans(told(motion), motion)
+    chunked = [*(one for a, b in pairwise(cuts) for one in flow.feed(motion.part(a, b))), *flow.flush()]
+    assert {(one.vehicle_id, one.vin) for one in chunked} == {("van-17", "WVWZZZ1JZXW000001")}
+    batches = [estimate_to_json(replace(one, vin=None)) for one in chunked if not one.is_remainder]
+    assert batches == [estimate_to_json(one) for one in told(motion) if not one.is_remainder]
+    assert spans(iter(chunked), motion) == spans(told(motion), motion)
 
 
 def test_missing_s_shrinks_with_every_usable_stretch() -> None:

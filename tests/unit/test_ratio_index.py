@@ -33,14 +33,6 @@ def test_gain_is_the_modulus_of_the_transfer_function(band: Band, freq_hz: float
     assert band_pass_gain(np.array([freq_hz]), band)[0] == pytest.approx(expected, rel=1e-6)
 
 
-@given(band=bands)
-def test_half_power_points_lie_the_width_apart_about_a_peak_of_one(band: Band) -> None:
-    middle = np.hypot(band.centre_hz, band.width_hz / 2.0)
-    low, high = middle - band.width_hz / 2.0, middle + band.width_hz / 2.0
-    gains = band_pass_gain(np.array([band.centre_hz, low, high]), band)
-    np.testing.assert_allclose(gains, [1.0, np.sqrt(0.5), np.sqrt(0.5)], rtol=1e-6)
-
-
 def test_two_lines_give_the_ratio_of_their_heights() -> None:
     pair = PAPER_BANDS["acceleration"]
     freq_hz = np.arange(1, 201) * 0.05
@@ -61,14 +53,6 @@ def test_the_index_knows_no_scale_and_swapped_bands_invert_it(scale: float, swap
     plain = ratio_index(freq_hz, spectrum, pair, "amplitude")
     other = ratio_index(freq_hz, scale * spectrum, pair[::-1] if swap else pair, "amplitude")
     assert other == pytest.approx(1.0 / plain if swap else plain, rel=1e-9)
-
-
-def test_integral_of_a_flat_power_spectrum_is_the_noise_bandwidth() -> None:
-    # over all frequencies the square of (6) integrates to pi w / 2 whatever its centre: the ratio is that of the widths
-    freq_hz = np.arange(1, 2_000_000) * 1e-4
-    wide, narrow = Band(3.0, 0.5), Band(5.0, 0.1)
-    assert np.sum(band_pass_gain(freq_hz, wide) ** 2) * 1e-4 == pytest.approx(np.pi * 0.5 / 2.0, rel=2e-3)
-    assert ratio_index(freq_hz, np.ones_like(freq_hz), (wide, narrow), "power") == pytest.approx(5.0, rel=2e-3)
 
 
 def test_spectrum_needs_six_unbroken_segments() -> None:
@@ -109,6 +93,7 @@ def test_a_noiseless_model_is_recovered(terms: tuple[str, ...]) -> None:
     target = 200.0 + term_columns(terms, ra, rg) @ weights
     fitted = fit_regression(terms, ra, rg, target, run)
     np.testing.assert_allclose(fitted.held_out_errors, 0.0, atol=1e-6)
+    assert fitted.model.dof == 11.0
     unseen = np.array([0.7, 1.3]), np.array([1.1, 0.9])
     for i in range(2):
         centre, std, _ = fitted.model.predict(unseen[0][i], unseen[1][i])
@@ -135,28 +120,6 @@ def test_prediction_interval_is_the_textbook_one() -> None:
         assert (low, high) == pytest.approx(stats.t.interval(0.95, 18, centre, expected_std), rel=1e-9)
 
 
-@pytest.mark.parametrize("terms", STRUCTURES)
-def test_neither_the_order_of_batches_nor_the_names_of_runs_matter(terms: tuple[str, ...]) -> None:
-    ra, rg, run = indexes()
-    target = 100.0 * ra - 30.0 * rg + np.random.default_rng(13).standard_normal(len(ra))
-    mixed = np.random.default_rng(14).permutation(len(ra))
-    one = fit_regression(terms, ra, rg, target, run)
-    other = fit_regression(terms, ra[mixed], rg[mixed], target[mixed], (100 - run)[mixed])
-    np.testing.assert_allclose(other.held_out_errors, one.held_out_errors[mixed], rtol=1e-6, atol=1e-9)
-    assert other.model.predict(1.1, 0.9)[:2] == pytest.approx(one.model.predict(1.1, 0.9)[:2], rel=1e-6)
-
-
-def test_held_out_errors_come_from_fits_that_never_saw_the_run() -> None:
-    ra, rg, run = indexes()
-    target = 100.0 * ra + 3.0 * np.random.default_rng(15).standard_normal(len(ra))
-    fitted = fit_regression(("ra",), ra, rg, target, run)
-    for number in (1, 7):
-        out = run == number
-        line = stats.linregress(ra[~out], target[~out])
-        np.testing.assert_allclose(fitted.held_out_errors[out], line.intercept + line.slope * ra[out] - target[out])
-    assert fitted.model.dof == 11.0
-
-
 def test_spread_is_that_of_the_noise() -> None:
     rng = np.random.default_rng(16)
     ra, rg = rng.uniform(0.5, 2.0, 400), rng.uniform(0.6, 1.8, 400)
@@ -164,9 +127,3 @@ def test_spread_is_that_of_the_noise() -> None:
     assert fit_regression(MODEL_9_PAYLOAD, ra, rg, target, np.arange(400)).model.residual_std == pytest.approx(
         4.0, rel=0.1
     )
-
-
-def test_seen_range_scales_to_one() -> None:
-    x = np.array([2.0, 3.0, 6.0])
-    columns = scaled_columns(("ra", "ra2"), x, x, np.array([2.0, 4.0]), np.array([6.0, 36.0]))
-    np.testing.assert_allclose(columns, [[1, -1, -1], [1, -0.5, -0.6875], [1, 1, 1]])

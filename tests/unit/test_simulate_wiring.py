@@ -1,18 +1,13 @@
 """A recording goes onto the bus and comes back as it was, to half a step of the DBC."""
 
-from pathlib import Path
-
 import cantools.database
 import numpy as np
 import pytest
 
-from gateway.bus.logs import write_candump
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
-from gateway.core.batch_settings import BatchSettings
 from gateway.errors import ConfigurationError
-from gateway.offline.campaigns import batches_of_motion, read_whole_log
-from gateway.records import EXTENDED_ID, Motion, Signal
-from gateway.sim.instruments import REFERENCE, Clock, Gps, Imu, Recording, Sensors
+from gateway.records import EXTENDED_ID, Signal
+from gateway.sim.instruments import Clock, Gps, Imu, Recording, Sensors
 from gateway.sim.parameters import Load
 from gateway.sim.road import PaperRoad
 from gateway.sim.scenario import simulate_drive
@@ -81,51 +76,6 @@ def test_unrelated_traffic_shares_no_identifier_with_the_sensors() -> None:
 def test_a_map_without_simulated_sensors_is_refused() -> None:
     with pytest.raises(ConfigurationError, match="choose reference, canmod_gps, j1939"):
         Wiring("xsens_mti")
-
-
-def test_batches_from_the_log_are_those_from_the_arrays(tmp_path: Path) -> None:
-    """What the estimators see differs by the rounding of the DBC and by nothing else."""
-    drive = constant(14.0, 130.0, np.random.default_rng(1))
-    recording = simulate_drive(PAPER_VAN, (Load(200.0, 2.0),), PaperRoad(), drive, REFERENCE, 3).recording
-    signal_map = load_signal_map("springscale:reference")
-    settings = BatchSettings(window_s=60.0)
-    write_candump(Wiring("reference").frames_of(recording), "can0", tmp_path / "can.log")
-    from_log = batches_of_motion(read_whole_log(tmp_path / "can.log", signal_map)[0], signal_map, settings)
-    from_arrays = batches_of_motion(motion_of_arrays(recording), signal_map, settings)
-    assert len(from_log) == len(from_arrays) == 3
-    for read, direct in zip(from_log, from_arrays, strict=True):
-        assert read.rejected == direct.rejected
-        assert np.array_equal(read.usable, direct.usable)
-        assert read.gravity_mps2 == pytest.approx(direct.gravity_mps2, abs=1e-4)
-        known = read.usable
-        for name, tolerance in (
-            ("vertical_acceleration_mps2", 3e-3),
-            ("pitch_rate_radps", 1e-4),
-            ("roll_rate_radps", 1e-4),
-            ("speed_mps", 2e-3),
-        ):
-            apart = np.abs(getattr(read, name)[known] - getattr(direct, name)[known])
-            assert np.max(apart) < tolerance
-
-
-def motion_of_arrays(recording: Recording) -> Motion:
-    """Rows as the decoder would make them, of the recording's own numbers, stamped in microseconds as a log is."""
-    signals = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.ROLL_RATE, Signal.SPEED)
-    fixed = recording.gps_fix
-    parts = (
-        (recording.imu_t_ns, recording.accel_mps2[:, 2]),
-        (recording.imu_t_ns + 250_000, recording.gyro_radps[:, 1]),
-        (recording.imu_t_ns + 250_000, recording.gyro_radps[:, 0]),
-        (recording.gps_t_ns[fixed], recording.gps_speed_mps[fixed]),
-    )
-    columns = np.full((sum(len(t_ns) for t_ns, _ in parts), len(signals)), np.nan)
-    begin = 0
-    for column, (t_ns, samples) in enumerate(parts):
-        columns[begin : begin + len(t_ns), column] = samples
-        begin += len(t_ns)
-    stamps = np.concatenate([t_ns for t_ns, _ in parts]) // 1000 * 1000
-    order = np.argsort(stamps, kind="stable")
-    return Motion(signals, stamps[order], columns[order])
 
 
 @pytest.mark.parametrize("name", WIRED_MAPS)

@@ -64,13 +64,6 @@ def test_wheel_loads_follow_from_the_moments(van: Vehicle, load_kg: float, left_
     assert moment_kgm == pytest.approx(van.empty_mass_kg * empty_left_m + load_kg * left_m, abs=1e-6)
 
 
-def test_a_load_over_the_left_wheels_rests_on_them_alone() -> None:
-    van = paper_van()
-    assert left_share_pct(cg_left_m(van, 0.0, 0.0), 1.5) == 50.0
-    assert left_share_pct(cg_left_m(van, 310.0, 0.75), 1.5) == pytest.approx(100.0 * (620.0 + 310.0) / 1550.0)
-    assert left_share_pct(cg_left_m(van, 310.0, -0.75), 1.5) == pytest.approx(100.0 * 620.0 / 1550.0)
-
-
 masses_kg = st.floats(400.0, 5000.0)
 shares = st.floats(0.3, 0.7)
 unsprung_shares = st.floats(0.03, 0.1)
