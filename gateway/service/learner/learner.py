@@ -26,7 +26,7 @@ from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, BackOff, ThreadPart
 from gateway.records import Batch, Motion, iso_utc, ns_of, rounded
 from gateway.service.learner.kept_drives import FOLDER, DriveFiles, Window
-from gateway.service.learner.learning_file import MOST_LADEN, MOST_VERSIONS, Book, Laden, LearningRecord, Outcome
+from gateway.service.learner.learning_file import MOST_LADEN, MOST_VERSIONS, Book, Laden, LearningRecord
 from gateway.service.learner.learning_file import Version as LearntVersion
 from gateway.service.learner.said import StatedLoads
 from gateway.service.learner.van import LearnerVehicle, StatedVan
@@ -264,16 +264,8 @@ class Learner(ThreadPart):
 
     def _take_result(self, job: LearnJob, result: LearnResult) -> None:
         record = self._book.record
-        outcome = Outcome(
-            key=job.key,
-            at=self._book.now(),
-            learning=result.learning,
-            statements={str(one["id"]): one for one in result.statements},
-            drives=result.drives,
-            looks_empty=result.looks_empty,
-            fault=result.fault,
-        )
-        changed = record.model_copy(update={"last": outcome})
+        last = result.model_copy(update={"key": job.key, "calibration": None})
+        changed = record.model_copy(update={"last": last})
         if result.calibration is None or result.calibration_id is None:
             self._book.save(changed)
             self._book.tell(Event.NOT_LEARNT, {"fault": result.fault}, level=logging.WARNING)
@@ -365,7 +357,7 @@ class Learner(ThreadPart):
         if not windows:
             yield "drives"
 
-    def _questions(self, told: Sequence[StatementTold], last: Outcome | None) -> Iterator[Question]:
+    def _questions(self, told: Sequence[StatementTold], last: LearnResult | None) -> Iterator[Question]:
         for one in told:
             if one.question and one.state in ("held", "weak"):
                 kind = "held" if one.state == "held" else "weak"
@@ -381,7 +373,7 @@ class Learner(ThreadPart):
         propose = tuple({"from": one["t_start"], "until": one["t_end"], "source": source} for one in drives)
         yield Question(kind="looks_empty", text=f"{which} empty{listed}. Is that right?", propose=propose)
 
-    def _looking_empty(self, last: Outcome | None) -> list[dict[str, Any]]:
+    def _looking_empty(self, last: LearnResult | None) -> list[dict[str, Any]]:
         """The drives that look empty, without those of which somebody said that they were not."""
         laden = [one.span for one in self._book.record.laden]
         found = [one for one in last.drives if one["number"] in last.looks_empty] if last else []

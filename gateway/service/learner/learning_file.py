@@ -7,9 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import ValidationError
 
 from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.learning.job import LearnResult
 from gateway.calibration.learning.spans import standing
 from gateway.core.vehicle import Vehicle
 from gateway.errors import NOT_STORED, CalibrationFileError, ConfigurationError, RefusedError
@@ -96,20 +97,9 @@ class Laden(Part):
         return self.begin_ns, self.end_ns
 
 
-class Outcome(Part):
-    """What the last fit found, and of what: ``key`` is that of its job."""
-
-    key: str
-    at: str
-    learning: dict[str, Any] = Field(default_factory=dict)
-    statements: dict[str, dict[str, Any]] = Field(default_factory=dict, description="by id")
-    drives: tuple[dict[str, Any], ...] = ()
-    looks_empty: tuple[int, ...] = ()
-    fault: str | None = None
-
-
 class LearningRecord(Part):
-    """Statements in order of arrival, the vehicle, the versions oldest first, and the last fit.
+    """Statements in order of arrival, the vehicle, the versions oldest first, and the last fit without
+    the text of its calibration, which is a file of its own.
 
     ``held`` is the version that somebody chose, or ``file`` for that of the settings; None: the newest good one.
     """
@@ -122,7 +112,7 @@ class LearningRecord(Part):
     versions: tuple[Version, ...] = ()
     held: str | None = None
     laden: tuple[Laden, ...] = ()
-    last: Outcome | None = None
+    last: LearnResult | None = None
 
     @property
     def active(self) -> Version | None:
