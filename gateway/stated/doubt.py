@@ -1,9 +1,8 @@
-"""What is asked about a stated fact that is unlikely to be true: a question with numbers, and what was probably meant.
+"""What is asked about a stated fact that is unlikely to be true: a question with numbers, and what to do.
 
 A doubt is no refusal. Whoever knows better confirms it, and it stays with the calibration as a warning.
 """
 
-from collections.abc import Sequence
 from enum import StrEnum
 from typing import Final, Self
 
@@ -106,17 +105,11 @@ class Doubt(BaseModel):
 
     kind: DoubtKind
     numbers: dict[str, float]
-    meant: dict[str, float | tuple[float, float]] = {}
 
     @classmethod
     def of(cls, kind: DoubtKind, **numbers: float) -> Self:
         """The doubt with its numbers rounded to what people read."""
         return cls(kind=kind, numbers={name: round(number, 4) for name, number in numbers.items()})
-
-    @property
-    def is_of_drive(self) -> bool:
-        """Whether the drive contradicts the stated facts; else a stated fact is unusual."""
-        return self.kind.startswith("driven_")
 
     @property
     def text(self) -> str:
@@ -130,16 +123,5 @@ class Doubt(BaseModel):
 
     @property
     def sentence(self) -> str:
-        """All of it; ``meant`` by the names of the answers."""
-        return f"{self.text}: {self.advice}{meant_by((self,))}"
-
-
-def meant_by(doubts: Sequence[Doubt]) -> str:
-    """The question that ends a sentence; nothing where no slip explains the doubts."""
-    meant = doubts[0].meant if doubts else {}
-    said = " and ".join(f"{name} = {_said(number)}" for name, number in meant.items())
-    return f"; did you mean {said}?" if said else ""
-
-
-def _said(number: float | tuple[float, float]) -> str:
-    return f"{number[1] if isinstance(number, tuple) else number:g}"
+        """All of it."""
+        return f"{self.text}: {self.advice}"

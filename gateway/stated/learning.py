@@ -130,7 +130,6 @@ class DoubtOfVehicle(Part):
     kind: DoubtKind
     text: str
     advice: str
-    meant: dict[str, float | tuple[float, float]] = Field(description="figures that would leave no doubt")
 
 
 class SisterTold(Part):

@@ -11,7 +11,6 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, CampaignError, NoSisterError, RefusedError
 from gateway.log import Event
 from gateway.service.learner.learning_file import Book, Sister, Stated
-from gateway.stated.doubt import meant_by
 from gateway.stated.facts import VehicleAnswers
 from gateway.stated.learning import DoubtOfVehicle, SisterTold, StatedVehicle
 
@@ -80,7 +79,7 @@ class StatedVan:
 
     def _doubts(self, stated: Stated) -> list[DoubtOfVehicle]:
         return [
-            DoubtOfVehicle(kind=one.kind, text=one.text, advice=one.advice, meant=one.meant)
+            DoubtOfVehicle(kind=one.kind, text=one.text, advice=one.advice)
             for one in doubts_of(stated.figures, self.named.sister)
         ]
 
@@ -105,8 +104,7 @@ class StatedVan:
         except NoSisterError as fault:
             raise RefusedError("not_its_sister", str(fault)) from None
         except CampaignError as fault:
-            meant = meant_by(doubts_of(answers, self.named.sister))
-            raise RefusedError("vehicle_unusable", f"{fault}{meant}") from None
+            raise RefusedError("vehicle_unusable", str(fault)) from None
         with self._book.lock:
             act = self._book.act(by)
             stated = Stated(figures=answers, at=act.at, by=by, confirmed=act if is_confirmed else None)
