@@ -6,7 +6,7 @@ A doubt is no refusal. Whoever knows better confirms it, and it stays with the c
 from enum import StrEnum
 from typing import Final, Self
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field, computed_field
 
 _MEASURE: Final = "measure from the middle of the front wheel to the middle of the rear wheel"
 _SCALES: Final = "read the ticket of the scales again, axle by axle, in kilograms"
@@ -99,23 +99,25 @@ class DoubtKind(StrEnum):
 
 
 class Doubt(BaseModel):
-    """One question. ``numbers`` are those of its words, in the units their names end in."""
+    """A stated figure that is unlikely: correct it, or confirm it; until then nothing is learnt."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     kind: DoubtKind
-    numbers: dict[str, float]
+    numbers: dict[str, float] = Field(exclude=True, description="of its words, in the units their names end in")
 
     @classmethod
     def of(cls, kind: DoubtKind, **numbers: float) -> Self:
         """The doubt with its numbers rounded to what people read."""
         return cls(kind=kind, numbers={name: round(number, 4) for name, number in numbers.items()})
 
+    @computed_field  # type: ignore[prop-decorator]  # as pydantic asks for
     @property
     def text(self) -> str:
         """The fact, as part of a sentence."""
         return self.kind.text.format(**self.numbers)
 
+    @computed_field  # type: ignore[prop-decorator]  # as pydantic asks for
     @property
     def advice(self) -> str:
         """Advice on what to do, as part of a sentence."""

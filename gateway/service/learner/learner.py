@@ -26,12 +26,11 @@ from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, BackOff, ThreadPart
 from gateway.records import Batch, Motion, iso_utc, ns_of, rounded
 from gateway.service.learner.kept_drives import FOLDER, DriveFiles, Window
-from gateway.service.learner.learning_file import MOST_LADEN, MOST_VERSIONS, Book, Laden, LearningRecord
-from gateway.service.learner.learning_file import Version as LearntVersion
+from gateway.service.learner.learning_file import MOST_LADEN, MOST_VERSIONS, Book, Laden, LearningRecord, LearntVersion
 from gateway.service.learner.said import StatedLoads
 from gateway.service.learner.van import LearnerVehicle, StatedVan
 from gateway.service.learner.worker import OnResult, Worker
-from gateway.stated.learning import STATES, Help, LearningState, Question, StatementTold, VersionTold
+from gateway.stated.learning import STATES, Help, LearningState, Question, StatementTold, Version, VersionTold
 from gateway.stated.statement import StatementRecord, StatementSource
 from gateway.units import BYTES_PER_MB, NS_PER_S
 from gateway.words import counted
@@ -401,19 +400,11 @@ class Learner(ThreadPart):
         state = "earlier"
         if is_active:
             state = "in_use" if one.id == self._started_with else "next_drive"
-        elif one.withdrawn is not None:
-            state = "withdrawn"
         elif one.worse is not None:
             state = "worse"
-        return VersionTold(
-            id=one.id,
-            at=one.at,
-            text=one.text + (f"; not used: {one.worse}" if one.worse else ""),
-            plus_minus_kg=one.plus_minus_kg,
-            n_drives=one.n_drives,
-            n_statements=one.n_statements,
-            state=state,
-        )
+        told = {name: getattr(one, name) for name in Version.model_fields}
+        text = one.text + (f"; not used: {one.worse}" if one.worse else "")
+        return VersionTold.model_validate({**told, "text": text, "state": state})
 
     def use(self, version: str, by: str) -> str:
         """Use this version from the next drive on, or the newest, or the file of the settings; JSON: LearningState."""

@@ -19,6 +19,7 @@ from gateway.files.toml_file import describe_faults
 from gateway.log import Event, OnEvent, tell_event
 from gateway.records import iso_utc
 from gateway.stated.facts import Part, VehicleAnswers
+from gateway.stated.learning import Version
 from gateway.stated.statement import StatementRecord
 
 FILE_NAME: Final = "learning.json"
@@ -70,18 +71,11 @@ class Sister(Part):
     said: Act
 
 
-class Version(Part):
-    """A calibration that was learnt here; ``worse`` says why it is not used."""
+class LearntVersion(Version):
+    """A calibration with its file; ``worse`` says why it is not used."""
 
-    id: str
     file_name: str
-    at: str
-    text: str
-    plus_minus_kg: float | None
-    n_drives: int
-    n_statements: int
     worse: str | None = None
-    withdrawn: Act | None = None
 
 
 class Laden(Part):
@@ -109,18 +103,17 @@ class LearningRecord(Part):
     said: tuple[Said, ...] = ()
     vehicle: Stated | None = None
     sister: Sister | None = None
-    versions: tuple[Version, ...] = ()
+    versions: tuple[LearntVersion, ...] = ()
     held: str | None = None
     laden: tuple[Laden, ...] = ()
     last: LearnResult | None = None
 
     @property
-    def active(self) -> Version | None:
+    def active(self) -> LearntVersion | None:
         """The calibration to use; None: the one that the settings name."""
         if self.held is not None:
             return next((one for one in self.versions if one.id == self.held), None)
-        good = (one for one in reversed(self.versions) if one.worse is None and one.withdrawn is None)
-        return next(good, None)
+        return next((one for one in reversed(self.versions) if one.worse is None), None)
 
     @property
     def records(self) -> list[StatementRecord]:
