@@ -30,7 +30,7 @@ def kept_of(motion: Motion, settings: BatchSettings = SETTINGS) -> list[KeptBatc
 
     def keep(batch: Batch, rows: Motion) -> None:
         if not batch.rejected:
-            found.append(kept_batch_of(MAP.id, batch, rows, MAP.traits))
+            found.append(kept_batch_of(batch, rows, MAP.traits))
 
     flow.on_window = keep
     list(flow.feed(motion))
@@ -55,7 +55,6 @@ def assert_same_batch(one: Batch, other: Batch) -> None:
 def test_a_batch_comes_back_bit_for_bit(three: list[KeptBatch]) -> None:
     for kept in three:
         same = unpacked(packed(kept))
-        assert (same.id, same.signals_id) == (kept.id, MAP.id)
         assert same.facts == kept.facts
         assert_same_batch(same.batch, kept.batch)
 

@@ -12,12 +12,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from gateway.bus.signals import SignalMap
 from gateway.calibration.assigned import Piece, assign, moments
 from gateway.calibration.kept import kept_batch_of
 from gateway.calibration.learning.job import LearnJob, LearnResult
 from gateway.calibration.learning.spans import can_teach, spans_of, teaching_most
 from gateway.config.sections import LearningSection
+from gateway.core.batch import Traits
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
 from gateway.core.vehicle import Vehicle
@@ -64,7 +64,7 @@ class Learner(ThreadPart):
         settings: LearningSection,
         batch: BatchSettings,
         drives: Scheduler,
-        signal_map: SignalMap,
+        traits: Traits,
         vehicle: LearnerVehicle,
         *,
         on_event: OnEvent,
@@ -74,7 +74,7 @@ class Learner(ThreadPart):
         """``make_worker`` replaces the process that learns (tests)."""
         super().__init__("learner")
         self._settings, self._batch, self._scheduler = settings, batch, drives
-        self._signal_map = signal_map
+        self._traits = traits
         self._clock_ns = clock_ns
         self._book = Book(directory, on_event, clock_ns)
         self._files = DriveFiles(directory / FOLDER, round(settings.size_mb * BYTES_PER_MB))
@@ -131,8 +131,7 @@ class Learner(ThreadPart):
                 self._waiting.task_done()
 
     def _keep(self, handed: _Handed) -> None:
-        signal_map, batch = self._signal_map, handed.batch
-        kept = kept_batch_of(signal_map.id, batch, handed.rows, signal_map.traits)
+        kept = kept_batch_of(handed.batch, handed.rows, self._traits)
         try:
             self._files.add(kept, self._is_stated)
         except OSError as refusal:
