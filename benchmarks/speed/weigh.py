@@ -114,7 +114,7 @@ def kept_of(motion: Motion, signal_map: SignalMap) -> list[KeptBatch]:
 
     def keep(batch: Batch, rows: Motion) -> None:
         if not batch.rejected and not batch.is_provisional:
-            found.append(kept_batch_of(signal_map.id, batch, rows, signal_map.traits))
+            found.append(kept_batch_of(batch, rows, signal_map.traits))
 
     flow.on_window = keep
     for _ in (*flow.feed(motion), *flow.flush()):

@@ -9,7 +9,7 @@ vehicle's parameters (C^-1 + I)^-1, with which another ideal drive is weighed. I
 order: errors of the model itself enter as calibration states them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Final
@@ -62,25 +62,21 @@ def steady_drive(model: VehicleModel, load: Load, duration_s: float, speed_mps: 
 
 
 class Ahead:
-    """Batches of ``loads`` that the vehicle has not carried yet; by default one of the reference load."""
+    """A batch of the reference load, which the vehicle has not carried yet."""
 
-    def __init__(self, model: VehicleModel, vehicle: Vehicle, loads: Sequence[Load] = ()) -> None:
+    def __init__(self, model: VehicleModel, vehicle: Vehicle) -> None:
         self._model, self._vehicle = model, vehicle
         self.speed_mps = float(np.mean(model.speed_seen_mps))
-        loads = loads or (_placed(vehicle, *REFERENCE),)
-        self._drives = [steady_drive(model, load, BATCH_S, self.speed_mps) for load in loads]
+        self._batch = steady_drive(model, _placed(vehicle, *REFERENCE), BATCH_S, self.speed_mps)
 
     def stds(self, covariance: F64) -> tuple[float, float]:
-        """Root mean square standard deviation of payload (kg) and front share (%), with this covariance (n, n) of the
-        vehicle's parameters.
+        """Standard deviations of payload (kg) and front share (%), with this covariance (n, n) of the vehicle's
+        parameters.
         """
         model = replace(self._model, covariance=covariance, directions=np.zeros((len(covariance), 0)))
         shapes = shape_hypotheses(self._vehicle, *model.known_shape)
-        variances = []
-        for drive in self._drives:
-            posterior = posterior_of(mixture_of(drive, model, shapes), model, 1.0, GAIN_STD)
-            variances.append(np.diag(posterior.covariance))
-        payload_var, share_var, *_ = np.mean(variances, axis=0).tolist()
+        posterior = posterior_of(mixture_of(self._batch, model, shapes), model, 1.0, GAIN_STD)
+        payload_var, share_var, *_ = np.diag(posterior.covariance).tolist()
         return sqrt(payload_var), sqrt(share_var)
 
     def after(

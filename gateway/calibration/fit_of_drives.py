@@ -50,7 +50,6 @@ class FitOfDrives:
     """The result of one fit: the half-car with its drives, and roll."""
 
     seen: list[ReadDrive]
-    own_priors: list[fit.Gaussian]
     causes: tuple[str, ...]
     half_car: fit.Found
     rolling: fit.Found | None
@@ -149,8 +148,8 @@ class FitOfDrives:
 
         A statement that is held is a gross error: any payload that the vehicle may carry, with a small probability.
         """
-        own = [prior.precision[np.ix_(free, free)] for prior in self.own_priors
-               if (free := np.flatnonzero(np.diag(prior.precision)).tolist())]  # fmt: skip
+        own = [one.own_prior.precision[np.ix_(free, free)] for one in self.seen
+               if (free := np.flatnonzero(np.diag(one.own_prior.precision)).tolist())]  # fmt: skip
         volume = 0.5 * sum(float(np.linalg.slogdet(precision)[1]) for precision in own) - self.half_car.log_volume
         words = -sum(float(np.sum(np.log(one.terms.own_kg * sqrt(2.0 * pi)))) for one in self.seen)
         most_kg = self.seen[0].vehicle.largest_payload_kg
@@ -184,13 +183,13 @@ class FitOfDrives:
     def again(self, drives: list[ReadDrive]) -> "FitOfDrives":
         """A rough fit of the same drives with other statements, from here and from a usual vehicle; roll stays."""
         upright = self.prior.upright(len(self.causes))
-        priors = [own_prior(one.stated, one.vehicle, is_said=bool(one.terms.names)) for one in drives]
-        starts = ((self.half_car.common, self.half_car.own), (upright.mean, [prior.mean for prior in priors]))
+        usual = [one.own_prior.mean for one in drives]
+        starts = ((self.half_car.common, self.half_car.own), (upright.mean, usual))
         tried = [
-            _lifted(drives, priors, upright, fit.most_probable(common, upright, _at(drives, priors, own), ROUGH))
+            _lifted(drives, upright, fit.most_probable(common, upright, _at(drives, own), ROUGH))
             for common, own in starts
         ]
-        return replace(self, seen=drives, own_priors=priors, half_car=min(tried, key=lambda found: found.cost))
+        return replace(self, seen=drives, half_car=min(tried, key=lambda found: found.cost))
 
     def _model_error(self, i: int) -> tuple[float, float]:
         """Standard deviations of payload (kg) and front share (0..1) of drive i that the model's own error causes, and
@@ -207,7 +206,7 @@ class FitOfDrives:
         information = np.linalg.inv(self.half_car.own_covariances[i] - by_vehicle)
         information[N_OWN, N_OWN] -= np.sum(one.terms.own_kg**-2.0)
         if one.drive.statement.has_place:
-            information[N_OWN + 1, N_OWN + 1] -= self.own_priors[i].precision[N_OWN + 1, N_OWN + 1]
+            information[N_OWN + 1, N_OWN + 1] -= one.own_prior.precision[N_OWN + 1, N_OWN + 1]
         values, vectors = np.linalg.eigh(information)
         free = (vectors / np.maximum(values, LEAST_PRECISION)) @ vectors.T
         n = len(point.theta)
@@ -267,12 +266,12 @@ class FitOfDrives:
         mean and the covariance of the common causes.
         """
         others = [i for i, each in enumerate(self.seen) if each is not one]
-        start = [fit.Drive(self.seen[i], self.own_priors[i], self.half_car.own[i]) for i in others]
-        found = fit.most_probable(self.half_car.common, self.prior.upright(len(self.causes)), start, FINE)
+        seen, own = [self.seen[i] for i in others], [self.half_car.own[i] for i in others]
+        found = fit.most_probable(self.half_car.common, self.prior.upright(len(self.causes)), _at(seen, own), FINE)
         theta, covariance = self.theta, self.covariance.copy()
         theta[:N], covariance[:N, :N] = found.common[:N], found.covariance[:N, :N]
         covariance[N:, :N] = covariance[:N, N:] = 0.0
-        fitted = replace(self, seen=[self.seen[i] for i in others], half_car=found)
+        fitted = replace(self, seen=seen, half_car=found)
         return fitted._model(vehicle, theta, covariance), found.common[N:], found.covariance[N:, N:]
 
     def _model(self, vehicle: Vehicle, theta: F64, covariance: F64) -> VehicleModel:
@@ -342,10 +341,8 @@ def fit_drives(
     """The most probable vehicle of all drives together: the best of several starts, or from the fit ``before``; then
     roll and half-car in turn.
     """
-    vehicle = known[0].vehicle
     with_roll = known[0].spectra.has_roll
     upright = prior.upright(len(causes))
-    priors = [own_prior(one.stated, vehicle, is_said=bool(one.terms.names)) for one in known]
     seen = list(known)
     if with_roll:
         theta, usual_mps = (prior.mean, None) if before is None else (before.theta, before.usual_mps)
@@ -358,16 +355,16 @@ def fit_drives(
             for end in ("front", "rear"):
                 common[INDEX[f"spring_{end}_npm"]] += springs
                 common[INDEX[f"damper_{end}_nspm"]] += dampers
-            tried.append(fit.most_probable(common, upright, _at(seen, priors, [one.mean for one in priors]), ROUGH))
+            tried.append(fit.most_probable(common, upright, _at(seen, [one.own_prior.mean for one in seen]), ROUGH))
             step()
         found = min(tried, key=lambda one: one.cost)
     else:
-        start = _at(seen, priors, before.half_car.own)
+        start = _at(seen, before.half_car.own)
         found = fit.most_probable(before.half_car.common, upright, start, ROUGH)
-    found = _lifted(seen, priors, upright, found)
+    found = _lifted(seen, upright, found)
     if not with_roll:
-        found = fit.most_probable(found.common, upright, _at(seen, priors, found.own), FINE)
-        return FitOfDrives(seen, priors, causes, found, None, prior, None)
+        found = fit.most_probable(found.common, upright, _at(seen, found.own), FINE)
+        return FitOfDrives(seen, causes, found, None, prior, None)
     of_roll = fit.Gaussian.of(prior.mean[N:], prior.covariance[N:, N:])
     usual_mps = prior.like.usual_stroke_mps if prior.like else None
     rolling = _roll(seen, found, of_roll, prior.mean[N:])
@@ -382,39 +379,37 @@ def fit_drives(
         for one, moment in zip(seen, rolling.own, strict=True):
             one.moment_kgm = float(moment[0])
         seen = [one.seen_by(theta, usual_mps, load_of(own)) for one, own in zip(seen, found.own, strict=True)]
-        found = fit.most_probable(found.common, upright, _at(seen, priors, found.own), FINE)
+        found = fit.most_probable(found.common, upright, _at(seen, found.own), FINE)
         rolling = _roll(seen, found, of_roll, rolling.common)
-    return FitOfDrives(seen, priors, causes, found, rolling, prior, usual_mps)
+    return FitOfDrives(seen, causes, found, rolling, prior, usual_mps)
 
 
-def _at(seen: Sequence[ReadDrive], priors: Sequence[fit.Gaussian], own: Sequence[F64]) -> list[fit.Drive]:
-    return [fit.Drive(one, prior, x) for one, prior, x in zip(seen, priors, own, strict=True)]
+def _at(seen: Sequence[ReadDrive], own: Sequence[F64]) -> list[fit.Drive]:
+    return [fit.Drive(one, one.own_prior, x) for one, x in zip(seen, own, strict=True)]
 
 
-def _lifted(
-    seen: Sequence[ReadDrive], priors: Sequence[fit.Gaussian], upright: fit.Gaussian, found: fit.Found
-) -> fit.Found:
+def _lifted(seen: Sequence[ReadDrive], upright: fit.Gaussian, found: fit.Found) -> fit.Found:
     """The peak that was found, its drives lifted out of false peaks of their own: another load, a softer mount."""
     for _ in range(RESEEDS):
-        own, n_moved = _reseeded(seen, priors, found)
+        own, n_moved = _reseeded(seen, found)
         if not n_moved:
             break
-        found = fit.most_probable(found.common, upright, _at(seen, priors, own), ROUGH)
+        found = fit.most_probable(found.common, upright, _at(seen, own), ROUGH)
     return found
 
 
-def _reseeded(seen: Sequence[ReadDrive], priors: Sequence[fit.Gaussian], found: fit.Found) -> tuple[list[F64], int]:
+def _reseeded(seen: Sequence[ReadDrive], found: fit.Found) -> tuple[list[F64], int]:
     """The drives' own vectors, each at the best of the peaks that a grid of loads, firm and soft, leads to; and how
     many moved.
     """
     every, n_moved = [], 0
     soft = log(SOFT_HZ) - float(found.common[INDEX["payload_mode_hz"]])
-    for one, prior, here in zip(seen, priors, found.own, strict=True):
-        least, best = one.cost(found.common, here) + prior.cost(here), here
+    for one, here in zip(seen, found.own, strict=True):
+        least, best = one.cost(found.common, here) + one.own_prior.cost(here), here
         if not one.stated.is_compact:
             for mode in (0.0, soft):
-                start = _seed(one, prior, found.common, mode)
-                there = fit.climb(OfVehicle(one, found.common), prior, start, ROUGH, least)
+                start = _seed(one, found.common, mode)
+                there = fit.climb(OfVehicle(one, found.common), one.own_prior, start, ROUGH, least)
                 if there.cost < least - RESEED_GAIN:
                     least, best = there.cost, there.own[0]
         n_moved += best is not here
@@ -422,9 +417,9 @@ def _reseeded(seen: Sequence[ReadDrive], priors: Sequence[fit.Gaussian], found: 
     return every, n_moved
 
 
-def _seed(one: ReadDrive, prior: fit.Gaussian, theta: F64, mode: float) -> F64:
+def _seed(one: ReadDrive, theta: F64, mode: float) -> F64:
     """The start of a drive's own vector: of a grid of loads the one that fits a vehicle best."""
-    start = prior.mean.copy()
+    start = one.own_prior.mean.copy()
     start[MODE] = mode
     if not one.is_unknown:
         return start
@@ -438,7 +433,7 @@ def _seed(one: ReadDrive, prior: fit.Gaussian, theta: F64, mode: float) -> F64:
             front_kg = vehicle.empty_front_share * vehicle.empty_mass_kg + (1.0 - place) * payload_kg
             own[N_OWN:] = payload_kg, front_kg / (vehicle.empty_mass_kg + payload_kg)
             starts.append(own)
-    costs = one.whittle.costs([one.point(theta, own) for own in starts]) + [prior.cost(own) for own in starts]
+    costs = one.whittle.costs([one.point(theta, own) for own in starts]) + [one.own_prior.cost(own) for own in starts]
     return starts[int(np.argmin(costs))]
 
 

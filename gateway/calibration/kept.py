@@ -17,7 +17,7 @@ from gateway.core.batch import Traits
 from gateway.errors import KeptBatchError
 from gateway.records import Batch, Motion
 
-VERSION: Final = 4  # of the format
+VERSION: Final = 5  # of the format
 MOST_SAMPLES: Final = 1_000_000  # chosen: an hour at 200 Hz has 720 000
 _FLOATS: Final = ("vertical_acceleration_mps2", "pitch_rate_radps", "speed_mps", "roll_rate_radps")
 _DIGEST_BYTES: Final = 32  # of SHA-256
@@ -33,9 +33,7 @@ class _Header(BaseModel):
     model_config = _JSON
 
     format: Literal["springscale-batch"] = "springscale-batch"
-    version: Literal[4] = VERSION
-    id: str
-    signals_id: str
+    version: Literal[5] = VERSION
     n: int = Field(ge=0, le=MOST_SAMPLES)
     has_roll: bool
     batch: _Numbers
@@ -44,19 +42,16 @@ class _Header(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class KeptBatch:
-    """A batch, the id of its estimate, the facts of its rows, and the id of their signal map."""
+    """A batch and the facts of its rows."""
 
-    id: str
-    signals_id: str
     batch: Batch
     facts: RowFacts
 
 
-def kept_batch_of(signals_id: str, batch: Batch, rows: Motion, traits: Traits) -> KeptBatch:
-    """Named by its time. ``rows`` are those of the batch's window, possibly with some before and after it."""
+def kept_batch_of(batch: Batch, rows: Motion, traits: Traits) -> KeptBatch:
+    """``rows`` are those of the batch's window, possibly with some before and after it."""
     inside = (rows.t_ns >= batch.t_start_ns) & (rows.t_ns < batch.t_end_ns)
-    name = f"{batch.t_end_ns}-{batch.t_start_ns:012x}"
-    return KeptBatch(name, signals_id, batch, row_facts(rows.rows(inside), traits))
+    return KeptBatch(batch, row_facts(rows.rows(inside), traits))
 
 
 def packed(kept: KeptBatch) -> bytes:
@@ -64,8 +59,6 @@ def packed(kept: KeptBatch) -> bytes:
     batch = kept.batch
     arrays = [array for name in _FLOATS if (array := getattr(batch, name)) is not None]
     header = _Header.model_construct(
-        id=kept.id,
-        signals_id=kept.signals_id,
         n=len(batch.usable),
         has_roll=batch.roll_rate_radps is not None,
         batch=_Numbers.model_construct(**{name: getattr(batch, name) for name in _Numbers.model_fields}),
@@ -97,4 +90,4 @@ def unpacked(content: bytes) -> KeptBatch:
     usable = np.unpackbits(np.frombuffer(raw[n_floats:], np.uint8), count=header.n).astype(bool)
     numbers = {name: getattr(header.batch, name) for name in _Numbers.model_fields}
     batch = Batch(usable=usable, **numbers, **dict(zip(names, arrays, strict=True)))
-    return KeptBatch(header.id, header.signals_id, batch, header.facts)
+    return KeptBatch(batch, header.facts)

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from gateway.calibration.prior import own_prior
 from gateway.calibration.statements import Claim, Statement, Terms, load_prior_of
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model.car import Ground
@@ -55,6 +56,7 @@ class ReadDrive:
         self.drive, self.vehicle, self._segments = drive, vehicle, segments
         self.stated = load_prior_of(drive.statement, vehicle)
         self.terms = NO_TERMS
+        self.own_prior = own_prior(self.stated, vehicle)
         self.spectra = grouped(segments, reading)
         self.ground = Ground.of(vehicle, with_roll=self.spectra.has_roll)
         self.roll: F64 = np.empty(0)
@@ -96,6 +98,7 @@ class ReadDrive:
         one.drive = replace(self.drive, statement=statement)
         one.stated = load_prior_of(statement, self.vehicle)
         one.terms = Terms.of(statement.claims, causes)
+        one.own_prior = own_prior(one.stated, self.vehicle, is_said=bool(one.terms.names))
         return one
 
     @property

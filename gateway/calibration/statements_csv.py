@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, tzinfo
 from difflib import get_close_matches
-from enum import StrEnum
 from typing import Any, Final
 
 from pydantic import ValidationError
@@ -117,7 +116,7 @@ def _read_each(rows: Iterable[tuple[int, Any]], read: Callable[[Any], tuple[str 
 
 def _by_columns(number: int, fault: ValidationError) -> tuple[str, ...]:
     """The faults of a record by the names of its columns."""
-    names = {path: name for name, (path, _) in COLUMNS.items()}
+    names = {path: name for name, path in COLUMNS.items()}
     told = []
     for line in describe_faults(f"row {number}", fault, StatementRecord).splitlines():
         where, key, what = line.split(": ", 2)
@@ -167,16 +166,15 @@ def _of_table(text: str, where: str, zone: tzinfo | None) -> ToldRows:
     (header, names), *rows = _rows(text, where)
     if faults := list(_faults_of_header(names)):
         raise StatementsFileError("\n".join(f"{where}: row {header}: {fault}" for fault in faults))
-    cells = [
-        (COLUMNS[name][1], cell) for _, row in rows for name, cell in zip(names, row, strict=False) if name in COLUMNS
-    ]
-    signs = {sign for read, cell in cells if read is _number and (sign := _decimal_sign(_bare(cell)))}
-    orders = {order for read, cell in cells if read is _time and (order := _order(cell))}
+    cells = [(name, cell) for _, row in rows for name, cell in zip(names, row, strict=False) if name in COLUMNS]
+    times = [cell for name, cell in cells if name in TIMES]
+    signs = {sign for name, cell in cells if name.endswith(UNITS) and (sign := _decimal_sign(_bare(cell)))}
+    orders = {order for cell in times if (order := _order(cell))}
     habits = _Habits(_only(signs), _only(orders), zone or UTC)
     told = _read_each(rows, lambda row: _of_cells(names, row, habits))
     unread = [name for name in names if name and name not in COLUMNS]
     notes = [f"columns that are not read: {', '.join(unread)}"] if unread else []
-    if zone is None and any(read is _time and _is_local(cell) for read, cell in cells):
+    if zone is None and any(map(_is_local, times)):
         notes.append("times without a zone are read as UTC; if that is wrong, state --timezone, such as Europe/Berlin")
     return ToldRows(told.rows, told.faults, tuple(notes))
 
@@ -239,10 +237,9 @@ def _of_cells(names: Sequence[str], cells: Sequence[str], habits: _Habits) -> tu
     faults = []
     for name, cell in zip(names, cells, strict=False):
         if cell and name in COLUMNS:
-            path, read = COLUMNS[name]
-            *table, key = path.split(".")
+            *table, key = COLUMNS[name].split(".")
             try:
-                (told.setdefault(table[0], {}) if table else told)[key] = read(name, cell, habits)
+                (told.setdefault(table[0], {}) if table else told)[key] = _read(name, cell, habits)
             except _CellError as fault:
                 faults.append(f"{name}: {fault}")
     if "from" not in told and not any(fault.startswith("from: ") for fault in faults):
@@ -273,6 +270,15 @@ def _only(found: set[str]) -> str | None:
 
 
 # -- cells --
+
+
+def _read(name: str, cell: str, habits: _Habits) -> Any:
+    """What a cell of this column says."""
+    if name in TIMES:
+        return _time(name, cell, habits)
+    if name.endswith(UNITS):
+        return _number(name, cell, habits)
+    return _word(name, cell) if name in WORDS else cell
 
 
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:([.,])\d{3})(?:\1\d{3})*)(?:(?!\1)([.,])\d+)?")
@@ -309,27 +315,13 @@ def _number(name: str, cell: str, habits: _Habits) -> float:
     raise _CellError(f"{cell}: not a number: write it in {unit}, such as 310 or 12.5")
 
 
-def _truth(name: str, cell: str, habits: _Habits) -> bool:
-    words = {"true": True, "yes": True, "1": True, "ja": True, "oui": True}
-    words |= {"false": False, "no": False, "0": False, "nein": False, "non": False}
-    if cell.lower() not in words:
-        raise _CellError(f"{cell}: write true or false")
-    return words[cell.lower()]
-
-
-def _one_of(kind: type[StrEnum]) -> Callable[[str, str, _Habits], str]:
-    def read(name: str, cell: str, habits: _Habits) -> str:
-        known, word = [str(one) for one in kind], re.sub(r"[\s-]+", "_", cell.lower())
-        if word in known:
-            return word
-        meant = get_close_matches(word, known, 1, 0.6)
-        raise _CellError(f"{cell}: did you mean {meant[0]}?" if meant else f"{cell}: write one of {', '.join(known)}")
-
-    return read
-
-
-def _words(name: str, cell: str, habits: _Habits) -> str:
-    return cell
+def _word(name: str, cell: str) -> str | bool:
+    """One of the words that a column knows."""
+    known, word = WORDS[name], re.sub(r"[\s-]+", "_", cell.lower())
+    if word in known:
+        return known[word]
+    meant = get_close_matches(word, known, 1, 0.6)
+    raise _CellError(f"{cell}: did you mean {meant[0]}?" if meant else f"{cell}: write one of {', '.join(known)}")
 
 
 _ISO: Final = re.compile(r"\d{4}-\d\d-\d\d([ T]\d\d.*)?")
@@ -409,27 +401,24 @@ def _require_one_moment(when: datetime, cell: str) -> None:
     )
 
 
-COLUMNS: Final[Mapping[str, tuple[str, Callable[[str, str, _Habits], Any]]]] = {
-    "vehicle": ("vehicle", _words),
-    "id": ("id", _words),
-    "ref": ("ref", _words),
-    "from": ("from", _time),
-    "until": ("until", _time),
-    "source": ("source", _one_of(StatementSource)),
-    "payload_kg": ("load.payload_kg", _number),
-    "gross_kg": ("load.gross_kg", _number),
-    "front_axle_kg": ("load.front_axle_kg", _number),
-    "rear_axle_kg": ("load.rear_axle_kg", _number),
-    "change_kg": ("load.change_kg", _number),
-    "plus_minus_kg": ("load.plus_minus_kg", _number),
-    "behind_front_axle_m": ("place.behind_front_axle_m", _number),
-    "place_plus_minus_m": ("place.plus_minus_m", _number),
-    "left_m": ("place.left_m", _number),
-    "carries": ("shape.carries", _one_of(Carries)),
-    "learn": ("learn", _truth),
-    "confirmed": ("confirmed", _truth),
-    "by": ("by", _words),
-    "note": ("note", _words),
-}
-"""Columns, with the place of each in a record and the reader of its cells."""
 LOADS: Final = ("payload_kg", "gross_kg", "front_axle_kg", "rear_axle_kg", "change_kg")
+COLUMNS: Final[Mapping[str, str]] = {
+    **{name: name for name in ("vehicle", "id", "ref", "from", "until", "source", "learn", "confirmed", "by", "note")},
+    **{name: f"load.{name}" for name in (*LOADS, "plus_minus_kg")},
+    "behind_front_axle_m": "place.behind_front_axle_m",
+    "place_plus_minus_m": "place.plus_minus_m",
+    "left_m": "place.left_m",
+    "carries": "shape.carries",
+}
+"""Columns, with the place of each in a record."""
+TIMES: Final = ("from", "until")
+UNITS: Final = ("_kg", "_m")  # how the names of columns of numbers end
+TRUTHS: Final = {"true": True, "false": False, "yes": True, "no": False, "1": True, "0": False,
+                 "ja": True, "nein": False, "oui": True, "non": False}  # fmt: skip
+WORDS: Final[Mapping[str, Mapping[str, str | bool]]] = {
+    "source": {str(one): str(one) for one in StatementSource},
+    "carries": {str(one): str(one) for one in Carries},
+    "learn": TRUTHS,
+    "confirmed": TRUTHS,
+}
+"""Columns of words, with what each word means."""

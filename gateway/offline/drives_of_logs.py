@@ -87,7 +87,7 @@ def windows_of_motion(motion: Motion, signal_map: SignalMap, settings: BatchSett
     scheduler = Scheduler(settings, signal_map.traits)
     windows = []
     for steps in (scheduler.feed(motion), scheduler.flush()):
-        windows += [kept_batch_of(signal_map.id, one, scheduler.take_rows(), signal_map.traits) for one in steps]
+        windows += [kept_batch_of(one, scheduler.take_rows(), signal_map.traits) for one in steps]
     return windows
 
 

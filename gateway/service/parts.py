@@ -95,7 +95,7 @@ def learner_of(settings: Settings, by_file: Path | None, setup: Setup, flow: Flo
         settings.learning,
         settings.batch.for_core(),
         flow.scheduler,
-        setup.signal_map,
+        setup.signal_map.traits,
         LearnerVehicle(
             id=settings.vehicle.id,
             name=own_name or settings.vehicle.id,

@@ -1,13 +1,12 @@
-"""What is asked about a stated fact that is unlikely to be true: a question with numbers, and what was probably meant.
+"""What is asked about a stated fact that is unlikely to be true: a question with numbers, and what to do.
 
 A doubt is no refusal. Whoever knows better confirms it, and it stays with the calibration as a warning.
 """
 
-from collections.abc import Sequence
 from enum import StrEnum
 from typing import Final, Self
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field, computed_field
 
 _MEASURE: Final = "measure from the middle of the front wheel to the middle of the rear wheel"
 _SCALES: Final = "read the ticket of the scales again, axle by axle, in kilograms"
@@ -100,29 +99,25 @@ class DoubtKind(StrEnum):
 
 
 class Doubt(BaseModel):
-    """One question. ``numbers`` are those of its words, in the units their names end in."""
+    """A stated figure that is unlikely: correct it, or confirm it; until then nothing is learnt."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     kind: DoubtKind
-    numbers: dict[str, float]
-    meant: dict[str, float | tuple[float, float]] = {}
+    numbers: dict[str, float] = Field(exclude=True, description="of its words, in the units their names end in")
 
     @classmethod
     def of(cls, kind: DoubtKind, **numbers: float) -> Self:
         """The doubt with its numbers rounded to what people read."""
         return cls(kind=kind, numbers={name: round(number, 4) for name, number in numbers.items()})
 
-    @property
-    def is_of_drive(self) -> bool:
-        """Whether the drive contradicts the stated facts; else a stated fact is unusual."""
-        return self.kind.startswith("driven_")
-
+    @computed_field  # type: ignore[prop-decorator]  # as pydantic asks for
     @property
     def text(self) -> str:
         """The fact, as part of a sentence."""
         return self.kind.text.format(**self.numbers)
 
+    @computed_field  # type: ignore[prop-decorator]  # as pydantic asks for
     @property
     def advice(self) -> str:
         """Advice on what to do, as part of a sentence."""
@@ -130,16 +125,5 @@ class Doubt(BaseModel):
 
     @property
     def sentence(self) -> str:
-        """All of it; ``meant`` by the names of the answers."""
-        return f"{self.text}: {self.advice}{meant_by((self,))}"
-
-
-def meant_by(doubts: Sequence[Doubt]) -> str:
-    """The question that ends a sentence; nothing where no slip explains the doubts."""
-    meant = doubts[0].meant if doubts else {}
-    said = " and ".join(f"{name} = {_said(number)}" for name, number in meant.items())
-    return f"; did you mean {said}?" if said else ""
-
-
-def _said(number: float | tuple[float, float]) -> str:
-    return f"{number[1] if isinstance(number, tuple) else number:g}"
+        """All of it."""
+        return f"{self.text}: {self.advice}"

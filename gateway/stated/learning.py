@@ -4,7 +4,7 @@ from typing import Any, Final, Literal
 
 from pydantic import Field
 
-from gateway.stated.doubt import DoubtKind
+from gateway.stated.doubt import Doubt
 from gateway.stated.facts import Instant, Part, VehicleAnswers
 from gateway.stated.statement import StatementRecord, Text
 
@@ -85,7 +85,7 @@ class Question(Part):
     propose: tuple[dict[str, Any], ...] = ()
 
 
-class VersionTold(Part):
+class Version(Part):
     """A calibration that was learnt here."""
 
     id: str = Field(examples=["sha256:9f86d081"])
@@ -94,7 +94,12 @@ class VersionTold(Part):
     plus_minus_kg: float | None
     n_drives: int
     n_statements: int
-    state: Literal["in_use", "next_drive", "earlier", "worse", "withdrawn"] = Field(
+
+
+class VersionTold(Version):
+    """A calibration that was learnt here, and whether it is used."""
+
+    state: Literal["in_use", "next_drive", "earlier", "worse"] = Field(
         description="worse: it predicts statements that were left out worse than the one before, and is not used"
     )
 
@@ -124,15 +129,6 @@ class LearningState(Part):
     fault: str | None
 
 
-class DoubtOfVehicle(Part):
-    """A stated figure that is unlikely: correct it, or confirm it; until then nothing is learnt."""
-
-    kind: DoubtKind
-    text: str
-    advice: str
-    meant: dict[str, float | tuple[float, float]] = Field(description="figures that would leave no doubt")
-
-
 class SisterTold(Part):
     """The vehicle of the same model whose calibration is the prior of what is learnt."""
 
@@ -146,5 +142,5 @@ class StatedVehicle(Part):
     figures: VehicleAnswers
     by: Text
     at: Instant
-    doubts: list[DoubtOfVehicle]
+    doubts: list[Doubt]
     is_confirmed: bool = Field(description="somebody confirmed that unlikely figures are right")

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -56,8 +56,7 @@ def window(drive_s: float, begin_s: float, seconds: float = WINDOW_S) -> Batch:
 
 def kept_window(drive_s: float, begin_s: float, seconds: float = WINDOW_S) -> KeptBatch:
     """The same as it is kept."""
-    batch = window(drive_s, begin_s, seconds)
-    return KeptBatch(f"{batch.t_end_ns}-{batch.t_start_ns:012x}", "as mapped", batch, RowFacts())
+    return KeptBatch(window(drive_s, begin_s, seconds), RowFacts())
 
 
 class FakeDrives:
@@ -66,13 +65,6 @@ class FakeDrives:
     drive_start_ns: int | None = None
     newest_ns: int | None = None
     open_window_ns: tuple[int, int] | None = None
-
-
-class FakeMap:
-    """A signal map of no device."""
-
-    id = "as mapped"
-    traits: ClassVar[dict[str, Any]] = {}
 
 
 class FakeWorker:
@@ -113,7 +105,7 @@ class LearnerBench:
             LearningSection(**settings),
             BatchSettings(window_s=WINDOW_S),
             self.drives,  # type: ignore[arg-type]  # as much of a Scheduler as is asked
-            FakeMap(),  # type: ignore[arg-type]  # as much of a map as is asked
+            {},
             vehicle,
             on_event=lambda kind, detail: self.events.append(kind),
             clock_ns=lambda: NOW_NS,

@@ -31,7 +31,7 @@ def kept_of(motion: Motion, settings: BatchSettings = SETTINGS) -> list[KeptBatc
 
     def keep(batch: Batch, rows: Motion) -> None:
         if not batch.rejected:
-            found.append(kept_batch_of(MAP.id, batch, rows, MAP.traits))
+            found.append(kept_batch_of(batch, rows, MAP.traits))
 
     flow.on_window = keep
     list(flow.feed(motion))
@@ -47,7 +47,6 @@ def three() -> list[KeptBatch]:
 def test_a_batch_comes_back_bit_for_bit(three: list[KeptBatch]) -> None:
     for kept in three:
         same = unpacked(packed(kept))
-        assert (same.id, same.signals_id) == (kept.id, MAP.id)
         assert same.facts == kept.facts
         assert_same_batch(same.batch, kept.batch)
 

@@ -1,4 +1,4 @@
-"""Answers that are unlikely, or that a drive contradicts: asked about, with what was probably meant."""
+"""Answers that are unlikely, or that a drive contradicts: asked about, with what to do."""
 
 from dataclasses import replace
 from typing import Any
@@ -13,7 +13,7 @@ from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.fitter_answers import doubts_of
 from gateway.core.vehicle import Vehicle
 from gateway.model.vehicle_model import VehicleModel
-from gateway.stated.doubt import Doubt, DoubtKind, meant_by
+from gateway.stated.doubt import Doubt, DoubtKind
 from gateway.stated.facts import VehicleAnswers
 
 ANSWERED: dict[str, Any] = {
@@ -38,35 +38,28 @@ def axles(front_kg: float, rear_kg: float) -> dict[str, Any]:
     return {"kerb_front_axle_kg": front_kg, "kerb_rear_axle_kg": rear_kg}
 
 
-UNLIKELY: list[tuple[dict[str, Any], DoubtKind, dict[str, Any]]] = [  # what is answered, asked, and what is meant
-    ({"kerb_front_axle_kg": 71.3}, DoubtKind.MASS, {"kerb_front_axle_kg": 713.0}),
-    ({"kerb_rear_axle_kg": 7040.0}, DoubtKind.MASS, {"kerb_rear_axle_kg": 704.0}),
-    (axles(71.3, 70.4), DoubtKind.MASS, axles(713.0, 704.0)),
-    (axles(1572.0, 1552.0), DoubtKind.MASS, axles(713.0, 704.0)),
-    (axles(404.0, 1013.0), DoubtKind.FRONT_SHARE, {}),
-    (axles(460.0, 900.0), DoubtKind.FRONT_SHARE, axles(900.0, 460.0)),
-    ({"wheelbase_m": 9.19}, DoubtKind.WHEELBASE, {"wheelbase_m": 2.801}),
-    ({"sensor_position_m": 12.6}, DoubtKind.SENSOR_PLACE, {"sensor_position_m": 1.26}),
-    ({"sensor_offset_left_m": 1.4}, DoubtKind.SENSOR_SIDE, {"sensor_offset_left_m": 0.14}),
-    ({"track_width_m": 0.59}, DoubtKind.TRACK, {}),
-    ({"payload_range_kg": (0.0, 4500.0)}, DoubtKind.PAYLOAD, {"payload_range_kg": (0.0, 450.0)}),
-    ({"payload_range_kg": (0.0, 600.0)}, DoubtKind.PAYLOAD_LIMIT, {}),
-    ({"gross_limit_kg": 1.9}, DoubtKind.GROSS_LIMIT, {"gross_limit_kg": 1900.0}),
-    ({"front_axle_limit_kg": 700.0}, DoubtKind.AXLE_LIMIT, {}),
-    ({"unsprung_front_kg": 400.0}, DoubtKind.UNSPRUNG, {}),
-    ({"empty_mass_kg": 1500.0, "empty_front_share_pct": 50.0}, DoubtKind.SPRUNG, {}),
-    ({"payload_length_m": 18.0}, DoubtKind.LOAD_LENGTH, {"payload_length_m": 1.8}),
-    ({"payload_height_m": 4.0}, DoubtKind.LOAD_HEIGHT, {"payload_height_m": 0.4}),
+UNLIKELY: list[tuple[dict[str, Any], DoubtKind]] = [
+    ({"kerb_front_axle_kg": 71.3}, DoubtKind.MASS),
+    (axles(1572.0, 1552.0), DoubtKind.MASS),  # in pounds
+    (axles(404.0, 1013.0), DoubtKind.FRONT_SHARE),
+    ({"wheelbase_m": 9.19}, DoubtKind.WHEELBASE),  # in feet
+    ({"sensor_position_m": 12.6}, DoubtKind.SENSOR_PLACE),
+    ({"sensor_offset_left_m": 1.4}, DoubtKind.SENSOR_SIDE),
+    ({"track_width_m": 0.59}, DoubtKind.TRACK),
+    ({"payload_range_kg": (0.0, 4500.0)}, DoubtKind.PAYLOAD),
+    ({"payload_range_kg": (0.0, 600.0)}, DoubtKind.PAYLOAD_LIMIT),
+    ({"gross_limit_kg": 1.9}, DoubtKind.GROSS_LIMIT),  # in tonnes
+    ({"front_axle_limit_kg": 700.0}, DoubtKind.AXLE_LIMIT),
+    ({"unsprung_front_kg": 400.0}, DoubtKind.UNSPRUNG),
+    ({"empty_mass_kg": 1500.0, "empty_front_share_pct": 50.0}, DoubtKind.SPRUNG),
+    ({"payload_length_m": 18.0}, DoubtKind.LOAD_LENGTH),
+    ({"payload_height_m": 4.0}, DoubtKind.LOAD_HEIGHT),
 ]
 
 
-@pytest.mark.parametrize(("changes", "kind", "meant"), UNLIKELY)
-def test_unlikely_vehicle_figures_raise_questions(
-    changes: dict[str, Any], kind: DoubtKind, meant: dict[str, Any]
-) -> None:
-    found = asked(None, **changes)
-    assert kind in {one.kind for one in found}
-    assert all(one.meant == meant for one in found)
+@pytest.mark.parametrize(("changes", "kind"), UNLIKELY)
+def test_unlikely_vehicle_figures_raise_questions(changes: dict[str, Any], kind: DoubtKind) -> None:
+    assert kind in {one.kind for one in asked(None, **changes)}
 
 
 @pytest.mark.parametrize(
@@ -109,11 +102,10 @@ def test_cars_vans_and_trucks_pass(front_kg: float, rear_kg: float, wheelbase_m:
     assert doubts_of(VehicleAnswers(**said)) == ()
 
 
-def test_a_doubt_is_a_sentence_with_the_question_at_its_end() -> None:
+def test_a_doubt_says_what_is_usual_and_what_to_do() -> None:
     (first, *_) = asked(None, kerb_front_axle_kg=71.3)
     assert first.text == "775 kg empty on a wheelbase of 2.8 m: such vehicles weigh 862 to 2979 kg"
-    assert first.sentence.endswith("in kilograms; did you mean kerb_front_axle_kg = 713?")
-    assert meant_by(()) == ""
+    assert first.sentence.endswith(": read the ticket of the scales again, axle by axle, in kilograms")
 
 
 def test_every_kind_has_words() -> None:

@@ -149,7 +149,7 @@ def test_empty_needs_no_load() -> None:
         ("from;front_axle_kg", "2026-11-26T07:40Z;900", "front_axle_kg and rear_axle_kg belong together"),
         ("from;source;payload_kg", "2026-11-26T07:40Z;scales;310", "row 2: source: scales: did you mean scale?"),
         ("from;source;payload_kg", "2026-11-26T07:40Z;empty;310", "source empty with a load"),
-        ("from;payload_kg;learn", "2026-11-26T07:40Z;310;maybe", "row 2: learn: maybe: write true or false"),
+        ("from;payload_kg;learn", "2026-11-26T07:40Z;310;maybe", "row 2: learn: maybe: write one of true, false"),
     ],
 )  # fmt: skip
 def test_a_row_that_cannot_be_read_is_named_with_its_column_and_how_to_mend_it(

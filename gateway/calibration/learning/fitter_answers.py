@@ -1,16 +1,15 @@
 """A fitter's answers: questions about those that are unlikely, and the vehicle of a campaign that follows from them.
 
-    doubts_of(answers, sister) -> questions, each with the answer that was probably meant
+    doubts_of(answers, sister) -> questions
     vehicle_table(answers, name) -> the vehicle
 
 The questions compare the answers with ordinary road vehicles, and with a sister of its model. They use no drive;
 ``gateway.calibration.contradicted`` compares the same answers with a drive.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, replace
+from collections.abc import Iterator
+from dataclasses import asdict
 from math import inf
-from types import MappingProxyType
 from typing import Any, Final
 
 from pydantic import TypeAdapter, ValidationError
@@ -42,73 +41,13 @@ LEAST_SPRUNG: Final = 0.75  # of the empty vehicle
 MOST_MASS_OFF: Final = 0.12
 MOST_AXLE_OFF: Final = 0.18  # chosen: shelves and a tail lift act mostly on one axle
 MOST_TRACK_OFF: Final = 0.05  # chosen: other wheels
-MOST_WHEELBASE_OFF: Final = 0.01  # as calibration.sister asks for
 GROSS_ROUNDED: Final = 1.005  # papers round; of the sum of the axles' limits, which is the most
 MOST_LIMIT: Final = 5.0  # times what is there empty: the rear axle of a truck
 
-KG_PER_POUND: Final = 0.45359237  # international pound
-M_PER_INCH: Final = 0.0254  # international inch
-M_PER_FOOT: Final = 0.3048  # international foot
-_DECIMALS: Final = (10.0, 0.1, 1000.0, 100.0, 0.01, 0.001)  # slips of the decimal point and of tonnes
-_MASS_SLIPS: Final = (*_DECIMALS, KG_PER_POUND)
-_LENGTH_SLIPS: Final = (10.0, 0.1, 0.01, 0.001, M_PER_INCH, M_PER_FOOT)  # centimetres, millimetres, inches, feet
-AXLES: Final = ("kerb_front_axle_kg", "kerb_rear_axle_kg")
-_SLIPPED: Final[Mapping[tuple[str, ...], tuple[float, ...]]] = MappingProxyType(
-    {
-        AXLES[:1]: _DECIMALS,
-        AXLES[1:]: _DECIMALS,
-        AXLES: _MASS_SLIPS,
-        ("wheelbase_m",): _LENGTH_SLIPS,
-        ("sensor_position_m",): _LENGTH_SLIPS,
-        ("sensor_offset_left_m",): _LENGTH_SLIPS,
-        ("track_width_m",): _LENGTH_SLIPS,
-        ("payload_length_m",): _LENGTH_SLIPS,
-        ("payload_height_m",): _LENGTH_SLIPS,
-        ("gross_limit_kg",): _MASS_SLIPS,
-        ("front_axle_limit_kg",): _MASS_SLIPS,
-        ("rear_axle_limit_kg",): _MASS_SLIPS,
-    }
-)
-"""Answers that are typed together, and the factors from the typed to the probably meant number."""
-
-
-_ANSWERS: Final = TypeAdapter(VehicleAnswers)
-
 
 def doubts_of(said: VehicleAnswers, sister: Vehicle | None = None) -> tuple[Doubt, ...]:
-    """Unlikely answers; with the answers that leave no doubt if one slip explains all."""
-    found = (*_doubts(said), *(_beside(sister, said) if sister else ()))
-    meant = _meant(said, sister) if found else {}
-    return tuple(one.model_copy(update={"meant": meant}) for one in found) if meant else found
-
-
-def _meant(said: VehicleAnswers, sister: Vehicle | None) -> dict[str, Any]:
-    """The answers after which no doubt is left; empty if no single slip explains it."""
-    for changed in _candidates(said):
-        try:
-            fresh = _ANSWERS.validate_python(asdict(replace(said, **changed)))
-        except ValidationError:
-            continue
-        is_hers = sister is None or abs(fresh.wheelbase_m / sister.wheelbase_m - 1.0) <= MOST_WHEELBASE_OFF
-        if is_hers and not any((*_doubts(fresh), *(_beside(sister, fresh) if sister else ()))):
-            return changed
-    return {}
-
-
-def _candidates(said: VehicleAnswers) -> Iterator[dict[str, Any]]:
-    """Front and rear exchanged, then each slip that is usual."""
-    yield {AXLES[0]: said.kerb_rear_axle_kg, AXLES[1]: said.kerb_front_axle_kg}
-    for names, slips in _SLIPPED.items():
-        typed = [getattr(said, name) for name in names]
-        for slip in slips if None not in typed else ():
-            yield {name: _rounded(slip * number) for name, number in zip(names, typed, strict=True)}
-    if said.payload_range_kg is not None:
-        for slip in _DECIMALS:
-            yield {"payload_range_kg": (0.0, _rounded(slip * said.payload_range_kg[1]))}
-
-
-def _rounded(number: float) -> float:
-    return float(f"{number:.4g}")
+    """Unlikely answers."""
+    return (*_doubts(said), *(_beside(sister, said) if sister else ()))
 
 
 def _outside(

@@ -3,7 +3,7 @@
 A mean spectrum scatters about its expectation, and so does any integral of it. Transforms of half-overlapping Hann
 segments are correlated: neighbouring bins through their common main lobe, neighbouring segments through their common
 half. For a Gaussian signal the complex correlation of two transforms follows from the taper alone (Welch 1967; Percival
-and Walden, Spectral Analysis for Physical Applications, section 6.17), and that of their powers or magnitudes from it.
+and Walden, Spectral Analysis for Physical Applications, section 6.17), and that of their magnitudes from it.
 """
 
 from collections.abc import Sequence
@@ -13,9 +13,9 @@ from typing import Final, Literal
 
 import numpy as np
 
-from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, SPECTRUM, SpectrumTable
+from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, SpectrumTable
 from gateway.core.late import special, stats
-from gateway.core.ratio_index.index import PAPER_BANDS, UPPER_LIMIT_HZ, Band, SpectrumKind, band_pass_gain
+from gateway.core.ratio_index.index import PAPER_BANDS, UPPER_LIMIT_HZ, Band, band_pass_gain
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, I64
 
@@ -27,8 +27,7 @@ CENTRES_HZ: Final = np.arange(1.0, UPPER_LIMIT_HZ - 0.4, 0.25)
 N_CANDIDATES: Final = 12  # chosen: pairs per sensor and width
 
 
-# (standard deviation / mean)^2 of one transform's power (exponential law) or magnitude (Rayleigh's)
-RELATIVE_VARIANCE: Final[dict[SpectrumKind, float]] = {"power": 1.0, "amplitude": 4.0 / np.pi - 1.0}
+RELATIVE_VARIANCE: Final = 4.0 / np.pi - 1.0  # (standard deviation / mean)^2 of one transform's magnitude (Rayleigh)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,8 +133,9 @@ def _log_scatter(table: SpectrumTable, spectra: F64, weights: F64) -> F64:
     """Sum over runs of the covariance (b, b) of log band levels due to the scatter of spectra alone."""
     mean = spectra.mean(axis=0)
     level = weights @ mean
-    covariance = bin_covariance(N_SEGMENT, len(table.freq_hz), SPECTRUM)
-    of_one_segment = integral_covariance(weights, mean, 1.0, covariance) / np.outer(level, level)
+    covariance = bin_covariance(N_SEGMENT, len(table.freq_hz))
+    through = weights * mean
+    of_one_segment = through @ covariance @ through.T / np.outer(level, level)
     per_run = [table.n_segments[table.run == number].sum() for number in np.unique(table.run)]
     scatter: F64 = of_one_segment * np.sum(1.0 / np.array(per_run))
     return scatter
@@ -173,8 +173,8 @@ def _peaks(strength: F64, n_best: int) -> list[tuple[int, int]]:
     return peaks
 
 
-def bin_covariance(n_segment: int, n_bins: int, kind: SpectrumKind) -> F64:
-    """Covariance (n_bins, n_bins) of relative errors of a mean spectrum, times the number of its segments.
+def bin_covariance(n_segment: int, n_bins: int) -> F64:
+    """Covariance (n_bins, n_bins) of relative errors of a mean amplitude spectrum, times the number of its segments.
 
     For many segments in one unbroken stretch, overlapping by half as in core.ratio_index.mean_spectrum.
     """
@@ -183,28 +183,10 @@ def bin_covariance(n_segment: int, n_bins: int, kind: SpectrumKind) -> F64:
     same = np.fft.fft(taper**2)[:n_bins]
     next_one = np.fft.fft(taper[half:] * taper[: n_segment - half], n_segment)[:n_bins]
     coherence = np.abs(np.array([same, next_one])) / np.sum(taper**2)
-    alike = _correlation(coherence**2, kind)
-    by_distance = RELATIVE_VARIANCE[kind] * (alike[0] + 2.0 * alike[1])
+    # of two magnitudes of jointly Gaussian transforms
+    products = np.asarray(special.hyp2f1(-0.5, -0.5, 1.0, np.minimum(coherence**2, 1.0)), dtype=float)
+    alike = (products - 1.0) / RELATIVE_VARIANCE
+    by_distance = RELATIVE_VARIANCE * (alike[0] + 2.0 * alike[1])
     away = np.abs(np.subtract.outer(np.arange(n_bins), np.arange(n_bins)))
     covariance: F64 = by_distance[away]
     return covariance
-
-
-def _correlation(coherence2: F64, kind: SpectrumKind) -> F64:
-    """Correlation of powers or magnitudes of two jointly Gaussian transforms, from their squared complex
-    correlation.
-    """
-    if kind == "power":
-        return coherence2
-    products: F64 = np.asarray(special.hyp2f1(-0.5, -0.5, 1.0, np.minimum(coherence2, 1.0)), dtype=float)
-    return (products - 1.0) / RELATIVE_VARIANCE["amplitude"]
-
-
-def integral_covariance(weights: F64, spectrum: F64, n_segments: float, covariance: F64) -> F64:
-    """Covariance (b, b) of the integrals ``weights @ spectrum`` of a mean over n_segments; weights (b, m).
-
-    The effective degrees of freedom of one are twice the squared integral over its variance.
-    """
-    through = weights * spectrum
-    spread: F64 = through @ covariance @ through.T / n_segments
-    return spread

@@ -12,12 +12,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from gateway.bus.signals import SignalMap
 from gateway.calibration.assigned import Piece, assign, moments
 from gateway.calibration.kept import kept_batch_of
 from gateway.calibration.learning.job import LearnJob, LearnResult
 from gateway.calibration.learning.spans import can_teach, spans_of, teaching_most
 from gateway.config.sections import LearningSection
+from gateway.core.batch import Traits
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
 from gateway.core.vehicle import Vehicle
@@ -26,12 +26,11 @@ from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, BackOff, ThreadPart
 from gateway.records import Batch, Motion, iso_utc, ns_of, rounded
 from gateway.service.learner.kept_drives import FOLDER, DriveFiles, Window
-from gateway.service.learner.learning_file import MOST_LADEN, MOST_VERSIONS, Book, Laden, LearningRecord, Outcome
-from gateway.service.learner.learning_file import Version as LearntVersion
+from gateway.service.learner.learning_file import MOST_LADEN, MOST_VERSIONS, Book, Laden, LearningRecord, LearntVersion
 from gateway.service.learner.said import StatedLoads
 from gateway.service.learner.van import LearnerVehicle, StatedVan
 from gateway.service.learner.worker import OnResult, Worker
-from gateway.stated.learning import STATES, Help, LearningState, Question, StatementTold, VersionTold
+from gateway.stated.learning import STATES, Help, LearningState, Question, StatementTold, Version, VersionTold
 from gateway.stated.statement import StatementRecord, StatementSource
 from gateway.units import BYTES_PER_MB, NS_PER_S
 from gateway.words import counted
@@ -65,7 +64,7 @@ class Learner(ThreadPart):
         settings: LearningSection,
         batch: BatchSettings,
         drives: Scheduler,
-        signal_map: SignalMap,
+        traits: Traits,
         vehicle: LearnerVehicle,
         *,
         on_event: OnEvent,
@@ -75,7 +74,7 @@ class Learner(ThreadPart):
         """``make_worker`` replaces the process that learns (tests)."""
         super().__init__("learner")
         self._settings, self._batch, self._scheduler = settings, batch, drives
-        self._signal_map = signal_map
+        self._traits = traits
         self._clock_ns = clock_ns
         self._book = Book(directory, on_event, clock_ns)
         self._files = DriveFiles(directory / FOLDER, round(settings.size_mb * BYTES_PER_MB))
@@ -132,8 +131,7 @@ class Learner(ThreadPart):
                 self._waiting.task_done()
 
     def _keep(self, handed: _Handed) -> None:
-        signal_map, batch = self._signal_map, handed.batch
-        kept = kept_batch_of(signal_map.id, batch, handed.rows, signal_map.traits)
+        kept = kept_batch_of(handed.batch, handed.rows, self._traits)
         try:
             self._files.add(kept, self._is_stated)
         except OSError as refusal:
@@ -264,16 +262,8 @@ class Learner(ThreadPart):
 
     def _take_result(self, job: LearnJob, result: LearnResult) -> None:
         record = self._book.record
-        outcome = Outcome(
-            key=job.key,
-            at=self._book.now(),
-            learning=result.learning,
-            statements={str(one["id"]): one for one in result.statements},
-            drives=result.drives,
-            looks_empty=result.looks_empty,
-            fault=result.fault,
-        )
-        changed = record.model_copy(update={"last": outcome})
+        last = result.model_copy(update={"key": job.key, "calibration": None})
+        changed = record.model_copy(update={"last": last})
         if result.calibration is None or result.calibration_id is None:
             self._book.save(changed)
             self._book.tell(Event.NOT_LEARNT, {"fault": result.fault}, level=logging.WARNING)
@@ -365,7 +355,7 @@ class Learner(ThreadPart):
         if not windows:
             yield "drives"
 
-    def _questions(self, told: Sequence[StatementTold], last: Outcome | None) -> Iterator[Question]:
+    def _questions(self, told: Sequence[StatementTold], last: LearnResult | None) -> Iterator[Question]:
         for one in told:
             if one.question and one.state in ("held", "weak"):
                 kind = "held" if one.state == "held" else "weak"
@@ -381,7 +371,7 @@ class Learner(ThreadPart):
         propose = tuple({"from": one["t_start"], "until": one["t_end"], "source": source} for one in drives)
         yield Question(kind="looks_empty", text=f"{which} empty{listed}. Is that right?", propose=propose)
 
-    def _looking_empty(self, last: Outcome | None) -> list[dict[str, Any]]:
+    def _looking_empty(self, last: LearnResult | None) -> list[dict[str, Any]]:
         """The drives that look empty, without those of which somebody said that they were not."""
         laden = [one.span for one in self._book.record.laden]
         found = [one for one in last.drives if one["number"] in last.looks_empty] if last else []
@@ -409,19 +399,11 @@ class Learner(ThreadPart):
         state = "earlier"
         if is_active:
             state = "in_use" if one.id == self._started_with else "next_drive"
-        elif one.withdrawn is not None:
-            state = "withdrawn"
         elif one.worse is not None:
             state = "worse"
-        return VersionTold(
-            id=one.id,
-            at=one.at,
-            text=one.text + (f"; not used: {one.worse}" if one.worse else ""),
-            plus_minus_kg=one.plus_minus_kg,
-            n_drives=one.n_drives,
-            n_statements=one.n_statements,
-            state=state,
-        )
+        told = {name: getattr(one, name) for name in Version.model_fields}
+        text = one.text + (f"; not used: {one.worse}" if one.worse else "")
+        return VersionTold.model_validate({**told, "text": text, "state": state})
 
     def use(self, version: str, by: str) -> str:
         """Use this version from the next drive on, or the newest, or the file of the settings; JSON: LearningState."""

@@ -7,9 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import ValidationError
 
 from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.learning.job import LearnResult
 from gateway.calibration.learning.spans import standing
 from gateway.core.vehicle import Vehicle
 from gateway.errors import NOT_STORED, CalibrationFileError, ConfigurationError, RefusedError
@@ -18,6 +19,7 @@ from gateway.files.toml_file import describe_faults
 from gateway.log import Event, OnEvent, tell_event
 from gateway.records import iso_utc
 from gateway.stated.facts import Part, VehicleAnswers
+from gateway.stated.learning import Version
 from gateway.stated.statement import StatementRecord
 
 FILE_NAME: Final = "learning.json"
@@ -69,18 +71,11 @@ class Sister(Part):
     said: Act
 
 
-class Version(Part):
-    """A calibration that was learnt here; ``worse`` says why it is not used."""
+class LearntVersion(Version):
+    """A calibration with its file; ``worse`` says why it is not used."""
 
-    id: str
     file_name: str
-    at: str
-    text: str
-    plus_minus_kg: float | None
-    n_drives: int
-    n_statements: int
     worse: str | None = None
-    withdrawn: Act | None = None
 
 
 class Laden(Part):
@@ -96,20 +91,9 @@ class Laden(Part):
         return self.begin_ns, self.end_ns
 
 
-class Outcome(Part):
-    """What the last fit found, and of what: ``key`` is that of its job."""
-
-    key: str
-    at: str
-    learning: dict[str, Any] = Field(default_factory=dict)
-    statements: dict[str, dict[str, Any]] = Field(default_factory=dict, description="by id")
-    drives: tuple[dict[str, Any], ...] = ()
-    looks_empty: tuple[int, ...] = ()
-    fault: str | None = None
-
-
 class LearningRecord(Part):
-    """Statements in order of arrival, the vehicle, the versions oldest first, and the last fit.
+    """Statements in order of arrival, the vehicle, the versions oldest first, and the last fit without
+    the text of its calibration, which is a file of its own.
 
     ``held`` is the version that somebody chose, or ``file`` for that of the settings; None: the newest good one.
     """
@@ -119,18 +103,17 @@ class LearningRecord(Part):
     said: tuple[Said, ...] = ()
     vehicle: Stated | None = None
     sister: Sister | None = None
-    versions: tuple[Version, ...] = ()
+    versions: tuple[LearntVersion, ...] = ()
     held: str | None = None
     laden: tuple[Laden, ...] = ()
-    last: Outcome | None = None
+    last: LearnResult | None = None
 
     @property
-    def active(self) -> Version | None:
+    def active(self) -> LearntVersion | None:
         """The calibration to use; None: the one that the settings name."""
         if self.held is not None:
             return next((one for one in self.versions if one.id == self.held), None)
-        good = (one for one in reversed(self.versions) if one.worse is None and one.withdrawn is None)
-        return next(good, None)
+        return next((one for one in reversed(self.versions) if one.worse is None), None)
 
     @property
     def records(self) -> list[StatementRecord]:

@@ -1,6 +1,6 @@
 """What is said of loads: taken, kept, and told with what became of it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import tzinfo
 from typing import Any, Final
 
@@ -10,7 +10,7 @@ from gateway.calibration.statements_csv import StatementsFileError, ToldRow, Tol
 from gateway.errors import RefusedError
 from gateway.log import Event
 from gateway.service.learner.kept_drives import DriveFiles, Window
-from gateway.service.learner.learning_file import MOST_STATEMENTS, Book, LearningRecord, Outcome, Said
+from gateway.service.learner.learning_file import MOST_STATEMENTS, Book, LearningRecord, Said
 from gateway.service.learner.van import StatedVan
 from gateway.stated.learning import ImportTold, StatementPage, StatementTold
 from gateway.stated.statement import StatementRecord
@@ -168,21 +168,24 @@ class StatedLoads:
         if self._fates_of is None or self._fates_of[0] is not record or self._fates_of[1] != windows:
             self._fates_of = (record, windows, self._fates(record.records))
         fates = self._fates_of[2]
-        return [self._one_told(said, fates.get(said.record.id), record.last) for said in chosen]
+        found = {one["id"]: one for one in record.last.statements} if record.last is not None else {}
+        begun = {one["number"]: one["t_start"] for one in record.last.drives} if record.last is not None else {}
+        return [self._one_told(one, fates.get(one.record.id), found.get(one.record.id), begun) for one in chosen]
 
-    def _one_told(self, said: Said, fate: tuple[Fate, str] | None, last: Outcome | None) -> StatementTold:
-        found = last.statements.get(said.record.id) if last is not None else None
-        told: dict[str, Any] = {"state": "waiting"}
+    def _one_told(
+        self, said: Said, fate: tuple[Fate, str] | None, found: Mapping[str, Any] | None, begun: Mapping[int, str]
+    ) -> StatementTold:
+        """``found`` is what the last fit found of it, ``begun`` when each of its drives began."""
+        more: dict[str, Any] = {}
         if said.withdrawn is not None:
-            told = {"state": "withdrawn", "reason": f"withdrawn by {said.withdrawn.by}, {said.withdrawn.at[:16]}Z"}
+            state, why = "withdrawn", f"withdrawn by {said.withdrawn.by}, {said.withdrawn.at[:16]}Z"
         elif fate is None:
-            told = {"state": "withdrawn", "reason": f"replaced by a later one with the ref {said.record.ref}"}
+            state, why = "withdrawn", f"replaced by a later one with the ref {said.record.ref}"
         elif found is not None and found["confirmed"] == said.effective.confirmed and fate[0] is Fate.MATCHED:
-            drives = [one["t_start"] for one in last.drives if one["number"] in found["drives"]] if last else []
-            told = {name: found[name] for name in ("state", "found", "question")} | {"drives": drives}
-            told["reason"] = found.get("reason")
+            state, why = found["state"], found["reason"]
+            drives = [begin for number, begin in begun.items() if number in found["drives"]]
+            more = {"found": found["found"], "question": found["question"], "drives": drives}
         else:
-            told["state"] = STATES[fate[0]]
-            told["reason"] = fate[1] or (NO_VEHICLE if self._van.learnt is None else NEXT_FIT)
-        content = said.effective.model_dump(mode="json", by_alias=True)
-        return StatementTold.model_validate({**content, "vehicle": self._van.given.id, "at": said.at, **told})
+            state, why = STATES[fate[0]], fate[1] or (NO_VEHICLE if self._van.learnt is None else NEXT_FIT)
+        told = {**said.effective.model_dump(mode="json", by_alias=True), "at": said.at, "state": state, "reason": why}
+        return StatementTold.model_validate({**told, "vehicle": self._van.given.id, **more})

@@ -11,9 +11,9 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, CampaignError, NoSisterError, RefusedError
 from gateway.log import Event
 from gateway.service.learner.learning_file import Book, Sister, Stated
-from gateway.stated.doubt import meant_by
+from gateway.stated.doubt import Doubt
 from gateway.stated.facts import VehicleAnswers
-from gateway.stated.learning import DoubtOfVehicle, SisterTold, StatedVehicle
+from gateway.stated.learning import SisterTold, StatedVehicle
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,11 +78,8 @@ class StatedVan:
         """The vehicle that statements are compared with: as stated, else as in the file of the settings."""
         return self.learnt or self.given.in_file
 
-    def _doubts(self, stated: Stated) -> list[DoubtOfVehicle]:
-        return [
-            DoubtOfVehicle(kind=one.kind, text=one.text, advice=one.advice, meant=one.meant)
-            for one in doubts_of(stated.figures, self.named.sister)
-        ]
+    def _doubts(self, stated: Stated) -> list[Doubt]:
+        return list(doubts_of(stated.figures, self.named.sister))
 
     def told(self) -> StatedVehicle | None:
         """The vehicle as somebody stated it; None if nobody has."""
@@ -105,8 +102,7 @@ class StatedVan:
         except NoSisterError as fault:
             raise RefusedError("not_its_sister", str(fault)) from None
         except CampaignError as fault:
-            meant = meant_by(doubts_of(answers, self.named.sister))
-            raise RefusedError("vehicle_unusable", f"{fault}{meant}") from None
+            raise RefusedError("vehicle_unusable", str(fault)) from None
         with self._book.lock:
             act = self._book.act(by)
             stated = Stated(figures=answers, at=act.at, by=by, confirmed=act if is_confirmed else None)

@@ -70,7 +70,6 @@ export const SAID = [
   ["{where}: a thousand or a fraction? write {whole} or {part}", "{where}: Tausender oder Bruch? {whole} oder {part} schreiben"],
   ["{where}: is in {other}: write it in {unit}", "{where}: ist in {other}: in {unit} angeben"],
   ["{where}: not a number: write it in {unit}, such as {examples}", "{where}: keine Zahl: in {unit} angeben, etwa 310 oder 12,5"],
-  ["{where}: write true or false", "{where}: true oder false schreiben"],
   ["{where}: write one of {names}", "{where}: eines davon schreiben: {names}"],
   ["{where}: did you mean {name}?", "{where}: ist {name} gemeint?"],
   ["has {cells} cells, the header names {columns}: quote a cell that holds the separator, or separate cells by semicolons", "hat {cells} Zellen, der Kopf nennt {columns}: eine Zelle mit Trennzeichen in Anführungszeichen setzen, oder Zellen durch Strichpunkte trennen"],

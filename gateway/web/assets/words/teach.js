@@ -100,5 +100,4 @@ export const TEACH = {
   "version.next_drive": ["from the next drive on", "ab der nächsten Fahrt"],
   "version.earlier": ["earlier", "früher"],
   "version.worse": ["worse, not used", "schlechter, nicht verwendet"],
-  "version.withdrawn": ["withdrawn", "zurückgenommen"],
 };
