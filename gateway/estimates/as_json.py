@@ -126,6 +126,7 @@ _POSTERIOR: Final = {
     "own": [[10.2, 0.1], [0.1, 0.004]],
     "sources": {"load_length": [[5.2, 0.08]]},
     "tails": [1.96, 1.96],
+    "leans": [1.0, 1.1],
 }
 
 FIELDS: Final = (

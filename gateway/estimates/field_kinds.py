@@ -224,6 +224,7 @@ def _write_posterior(posterior: Posterior | None) -> dict[str, Any] | None:
         "own": _rows(posterior.own),
         "sources": {str(name): _rows(columns) for name, columns in posterior.sources.items()},
         "tails": [rounded(x, DIGITS) for x in posterior.tails],
+        "leans": [rounded(x, DIGITS) for x in posterior.leans],
     }
 
 
@@ -232,7 +233,7 @@ def _read_posterior(record: Mapping[str, Any]) -> Posterior:
     sources = {Source(name): np.array(rows, float) for name, rows in record["sources"].items()}
     if own.shape != mean.shape * 2 or any(rows.shape[1:] != mean.shape for rows in sources.values()):
         raise ValueError("mean, own covariance and sources are of different sizes")
-    return Posterior(mean, own, sources, _pair(record["tails"]))
+    return Posterior(mean, own, sources, _pair(record["tails"]), _pair(record["leans"]))
 
 
 def _rows(matrix: F64) -> list[list[float | None]]:

@@ -41,6 +41,7 @@ class Source(StrEnum):
 SHAPE: Final = (Source.GOODS, Source.LOAD_LENGTH)
 ONE_LOAD: Final = frozenset({Source.LOAD_LENGTH, Source.SIDEWAYS, Source.MODEL})
 NORMAL_TAILS: Final = (Z95, Z95)
+UPRIGHT: Final = (1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,14 +49,16 @@ class Posterior:
     """Mean (d,), own covariance (d, d) and columns (k, d) by source, d being 2, 3 with a lateral place, or 1 for a
     payload alone.
 
-    ``tails`` are the distances of the 2.5 and the 97.5 % point of the payload's error, in its standard deviations: a
-    load can be much longer than it is thought to be, but hardly shorter.
+    ``tails`` are the distances of the 2.5 and the 97.5 % point of the error from the load's shape, in its standard
+    deviations: a load can be much longer than it is thought to be, but hardly shorter. ``leans`` say how many times
+    farther than that of a normal error the payload's interval reaches towards lighter and towards heavier loads.
     """
 
     mean: F64
     own: F64
     sources: Mapping[Source, F64] = field(default_factory=dict)
     tails: tuple[float, float] = NORMAL_TAILS
+    leans: tuple[float, float] = UPRIGHT
 
     def __eq__(self, other: object) -> bool:
         """Whether all numbers are bit-identical."""
@@ -63,13 +66,14 @@ class Posterior:
             return False
         return (
             self.tails == other.tails
+            and self.leans == other.leans
             and np.array_equal(self.mean, other.mean)
             and np.array_equal(self.own, other.own)
             and all(np.array_equal(columns, other.sources[name]) for name, columns in self.sources.items())
         )
 
     def __hash__(self) -> int:
-        return hash((self.mean.tobytes(), self.own.tobytes(), self.tails))
+        return hash((self.mean.tobytes(), self.own.tobytes(), self.tails, self.leans))
 
     @property
     def size(self) -> int:
@@ -114,14 +118,33 @@ class Posterior:
             return Quantity(number)
         whole = np.zeros(self.size)
         whole[: len(slopes[: self.size])] = slopes[: self.size]
-        covariance = self.covariance
-        variance = float(whole @ covariance @ whole) + independent_std**2
-        with_payload = float(whole @ covariance[:, PAYLOAD])
-        of_payload = with_payload**2 / max(float(covariance[PAYLOAD, PAYLOAD]), 1e-300)
-        rest = Z95**2 * max(variance - of_payload, 0.0)
-        tails = self.tails if with_payload >= 0.0 else self.tails[::-1]
-        low, high = (math.sqrt(rest + tail**2 * of_payload) for tail in tails)
+        by_shape = sum(float(np.sum((self.sources[name] @ whole) ** 2)) for name in SHAPE if name in self.sources)
+        variance = float(whole @ self.covariance @ whole) + independent_std**2
+        rest = Z95**2 * max(variance - by_shape, 0.0)
+        low, high = (
+            lean * math.sqrt(rest + tail**2 * by_shape)
+            for tail, lean in zip(self._tails_along(whole), self._leans_along(whole, variance), strict=True)
+        )
         return Quantity(number, math.sqrt(max(variance, 0.0)), (number - low, number + high))
+
+    def _tails_along(self, slopes: F64) -> tuple[float, float]:
+        """Skewed interval; the tails are swapped for a quantity that falls as the payload rises."""
+        rises = sum(
+            float((self.sources[name] @ slopes) @ self.sources[name][:, PAYLOAD])
+            for name in SHAPE
+            if name in self.sources
+        )
+        return self.tails if rises >= 0.0 else (self.tails[1], self.tails[0])
+
+    def _leans_along(self, slopes: F64, variance: float) -> tuple[float, float]:
+        """The leans of a quantity, by the part of its variance that follows the payload; swapped where it falls as the
+        payload rises.
+        """
+        of_payload = self.covariance[PAYLOAD]
+        follows = float(of_payload @ slopes)
+        part = follows**2 / max(float(of_payload[PAYLOAD]) * variance, 1e-300)
+        low, high = (1.0 + part * (lean - 1.0) for lean in self.leans)
+        return (low, high) if follows >= 0.0 else (high, low)
 
     def covariance_of(self, slopes: Sequence[float] | F64, other_slopes: Sequence[float] | F64) -> float:
         """Covariance of two linear functions of the quantities."""
@@ -206,7 +229,7 @@ class _Sums:
             name: np.array([len(part.sources[name]) if name in part.sources else -1 for part in parts])
             for name in self._columns
         }
-        self._tails = np.array([part.tails for part in parts])
+        self._tails = np.array([(*part.tails, *part.leans) for part in parts])
 
     def _weighted(self, rows: Sequence[F64]) -> F64:
         """(n, c, size) rows (c, d) of each part times its precision; 0 if a part has fewer."""
@@ -229,9 +252,9 @@ class _Sums:
             if n_columns >= 0:
                 sources[name] = columns[some, :n_columns, :size].sum(axis=0) @ own
         weights = np.abs(precisions[:, :, PAYLOAD] @ own[PAYLOAD])
-        low, high = (weights @ self._tails[some] / weights.sum()).tolist()
+        *tails, lighter, heavier = (weights @ self._tails[some] / weights.sum()).tolist()
         mean = self._about[:size] + own @ self._means[some, :size].sum(axis=0)
-        return Posterior(mean, 0.5 * (own + own.T), sources, (low, high))
+        return Posterior(mean, 0.5 * (own + own.T), sources, (tails[0], tails[1]), (lighter, heavier))
 
 
 def difference(before: Posterior, after: Posterior, *, is_one_load: bool) -> tuple[F64, F64]:

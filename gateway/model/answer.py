@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from gateway.core.cargo import HABIT_PART
-from gateway.estimates.posterior import PAYLOAD, Posterior, Source
+from gateway.estimates.posterior import NORMAL_TAILS, Posterior, Source
 from gateway.estimates.quantity import Z95
 from gateway.model.fit import NOTHING
 from gateway.model.hypotheses import DAY
@@ -93,8 +93,7 @@ def posterior_of(mixture: Mixture, model: VehicleModel, unseen: float, gain_std:
         own[2, 2] += place.own_variance
     of_statistics = mixture.whittle.weight
     own = _definite(own) * (of_statistics + (1.0 - of_statistics) * unseen**2)
-    mean, apart = _median_of(mixture, outward, of_load)
-    shape = np.concatenate([apart[None], of_load])
+    shape, mean, tails = _shape_of(mixture, outward, of_load)
     spread = np.array(model.spread[:size])
     of_model = np.diag(np.array(model.model_std[:size]) * unseen)
     left_over = _root(of_calibration - calibrated.T @ calibrated).T
@@ -108,8 +107,7 @@ def posterior_of(mixture: Mixture, model: VehicleModel, unseen: float, gain_std:
     }
     if place is None:
         sources[Source.SIDEWAYS] = _of_sides(mixture, model, outward) * spread
-    found = Posterior(mean, own * np.outer(spread, spread), sources)
-    return replace(found, tails=_tails_of(found, mixture, float(spread[PAYLOAD]), float(apart[PAYLOAD])))
+    return Posterior(mean, own * np.outer(spread, spread), sources, tails, _leans_of(mixture))
 
 
 def _definite(own: F64) -> F64:
@@ -118,9 +116,11 @@ def _definite(own: F64) -> F64:
     return np.asarray(vectors * np.maximum(values, 1e-9 * max(values.max(), 1e-12)) @ vectors.T)
 
 
-def _median_of(mixture: Mixture, outward: F64, of_load: F64) -> tuple[F64, F64]:
-    """The answer (d,) at the median of the payload over the peaks, and the column (d,) of the error by the distance of
-    the peaks.
+def _shape_of(mixture: Mixture, outward: F64, of_load: F64) -> tuple[F64, F64, tuple[float, float]]:
+    """Columns (k, d) of the error by shape and mount of the load, the median answer (d,), and the tails of that error.
+
+    The first column holds the distance of the peaks; the tails are the 2.5 and 97.5 % points of peaks and columns
+    together, in their standard deviation (posterior.Posterior).
     """
     best, weights = mixture.best, mixture.weights
     answer = outward @ np.r_[np.zeros(N), best.x[N:]]
@@ -129,27 +129,15 @@ def _median_of(mixture: Mixture, outward: F64, of_load: F64) -> tuple[F64, F64]:
     away = np.array([outward[:, N:] @ (one.x[N:] - best.x[N:]) for one in mixture.peaks])
     mean = weights @ away
     off = away - mean
-    variance, within = float(weights @ off[:, PAYLOAD] ** 2), float(np.sum(of_load[:, PAYLOAD] ** 2))
-    if not variance > 1e-12 * max(variance + within, 1e-18):
-        return answer + mean, np.zeros(len(mean))
-    column = weights @ (off * off[:, :1]) / math.sqrt(variance)
-    std = math.sqrt(max(within, 1e-6 * variance))
-    _, middle, _ = _quantiles(off[:, PAYLOAD], weights, std, std)
-    return answer + mean + middle * column / math.sqrt(variance), column
-
-
-def _tails_of(posterior: Posterior, mixture: Mixture, spread: float, apart_kg: float) -> tuple[float, float]:
-    """The distances of the payload's 2.5 and 97.5 % point from the answer, in its standard deviations.
-
-    They are those of the peaks together, ``apart_kg`` (standard deviation) from each other, each of which leans as the
-    likeliest does. ``spread`` is the factor of all errors.
-    """
-    std_kg = posterior.std(PAYLOAD)
-    within_kg = math.sqrt(max(std_kg**2 - (spread * apart_kg) ** 2, (1e-3 * std_kg) ** 2))
-    off_kg = spread * (np.array([one.x[N] for one in mixture.peaks]) - posterior.mean[PAYLOAD])
-    below, above = _leans_of(mixture)
-    low, _, high = _quantiles(off_kg, mixture.weights, below * within_kg, above * within_kg)
-    return -low / std_kg, high / std_kg
+    variance = float(weights @ off[:, 0] ** 2)
+    column = weights @ (off * off[:, :1]) / math.sqrt(variance) if variance > 0.0 else np.zeros(len(mean))
+    shape = np.concatenate([column[None], of_load])
+    std = math.sqrt(float(np.sum(shape[:, 0] ** 2)))
+    if not variance > 1e-12 * max(std, 1e-9) ** 2:
+        return shape, answer + mean, NORMAL_TAILS
+    within = max(math.sqrt(float(np.sum(of_load[:, 0] ** 2))), 1e-3 * std)
+    low, middle, high = _quantiles(off[:, 0], weights, within)
+    return shape, answer + mean + middle * column / math.sqrt(variance), ((middle - low) / std, (high - middle) / std)
 
 
 def _leans_of(mixture: Mixture) -> tuple[float, float]:
@@ -157,7 +145,7 @@ def _leans_of(mixture: Mixture) -> tuple[float, float]:
 
     From the log posterior at two payloads on either side, the other parameters as they are most probable there, by one
     Newton step from where the peak's covariance puts them. A load can be much longer than it is thought to be, but
-    hardly shorter, and a vehicle that few loads have taught can be harder to bend.
+    hardly shorter, and the springs of a vehicle that few known loads have taught can be harder.
     """
     best = mixture.best
     own = BatchLikelihood(mixture.whittle, mixture.point.theta[N:], mixture.point.cg_left_m, np.inf)
@@ -180,17 +168,12 @@ def _leans_of(mixture: Mixture) -> tuple[float, float]:
     return lean(best.x - LEAN_AT * along), lean(best.x + LEAN_AT * along)
 
 
-def _quantiles(middles: F64, weights: F64, below: float, above: float) -> tuple[float, float, float]:
-    """The 2.5, 50 and 97.5 % points of a mixture of normal distributions that have one standard deviation ``below``
-    their middles and another ``above``.
-    """
-    z = np.linspace(-5.0, 5.0, 201)
-    at = np.sort((middles[:, None] + np.where(z < 0.0, below, above) * z).ravel())
-    off = at - middles[:, None]
-    z = np.clip(off / np.where(off < 0.0, below, above), -8.0, 8.0)
-    normal = 1.0 / (1.0 + np.exp(-z * (1.5976 + 0.070566 * z**2)))  # within 2e-4 (E. Page, 1977)
-    cumulated = weights @ np.where(off < 0.0, 2.0 * below * normal, below + above * (2.0 * normal - 1.0))
-    low, middle, high = np.interp((0.025, 0.5, 0.975), cumulated / (below + above), at)
+def _quantiles(middles: F64, weights: F64, std: float) -> tuple[float, float, float]:
+    """The 2.5, 50 and 97.5 % points of a mixture of normal distributions of one standard deviation."""
+    at = np.sort((middles[:, None] + std * np.linspace(-5.0, 5.0, 201)).ravel())
+    z = np.clip((at - middles[:, None]) / std, -8.0, 8.0)
+    cumulated = weights @ (1.0 / (1.0 + np.exp(-z * (1.5976 + 0.070566 * z**2))))  # within 2e-4 (E. Page, 1977)
+    low, middle, high = np.interp((0.025, 0.5, 0.975), cumulated, at)
     return float(low), float(middle), float(high)
 
 

@@ -61,7 +61,7 @@ def _is_sound(posterior: Posterior | None) -> bool:
     """Whether the posterior is finite and its own covariance is positive definite; True for None."""
     if posterior is None:
         return True
-    parts = (posterior.mean, posterior.own, np.array(posterior.tails), *posterior.sources.values())
+    parts = (posterior.mean, posterior.own, np.array([posterior.tails, posterior.leans]), *posterior.sources.values())
     return all(np.isfinite(part).all() for part in parts) and bool(np.all(np.linalg.eigvalsh(posterior.own) > 0.0))
 
 

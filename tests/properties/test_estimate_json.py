@@ -123,6 +123,7 @@ def test_a_posterior_is_read_back_to_seven_digits(posterior: Posterior) -> None:
     assert again.covariance / np.outer(std, std) == pytest.approx(posterior.covariance / np.outer(std, std), abs=1e-5)
     assert again.sources.keys() == posterior.sources.keys()
     assert again.tails == posterior.tails
+    assert again.leans == posterior.leans
 
 
 @given(estimates, st.integers(0, 999))

@@ -1,6 +1,7 @@
 """A posterior with its error by sources, and its budget: algebra held against Monte Carlo and closed forms."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -85,32 +86,40 @@ SKEWED = Posterior(
 )
 
 
-def test_the_payload_has_its_tails_and_other_quantities_as_far_as_they_follow_it() -> None:
+def test_an_interval_is_as_skewed_as_the_error_of_the_shape() -> None:
     payload = SKEWED.quantity(PAYLOAD)
-    std_kg = np.hypot(5.0, 20.0)
-    assert payload.std == pytest.approx(std_kg)
-    assert (300.0 - payload.interval95[0], payload.interval95[1] - 300.0) == pytest.approx((1.2 * std_kg, 2.6 * std_kg))
+    below, above = 300.0 - payload.interval95[0], payload.interval95[1] - 300.0
+    assert (below, above) == pytest.approx((np.hypot(Z95 * 5.0, 1.2 * 20.0), np.hypot(Z95 * 5.0, 2.6 * 20.0)))
+    assert payload.std == pytest.approx(np.hypot(5.0, 20.0))
     low, high = SKEWED.quantity(FRONT_SHARE).interval95  # falls as the payload rises: the other way round
-    follows = 20.0 * 0.2 / std_kg
-    rest = Z95 * np.sqrt(0.1**2 + 0.2**2 - follows**2)
-    assert (50.0 - low, high - 50.0) == pytest.approx((np.hypot(rest, 2.6 * follows), np.hypot(rest, 1.2 * follows)))
+    assert (50.0 - low, high - 50.0) == pytest.approx((np.hypot(Z95 * 0.1, 2.6 * 0.2), np.hypot(Z95 * 0.1, 1.2 * 0.2)))
 
 
 def test_skewed_intervals_cover_skewed_errors() -> None:
-    """A payload's error that is log-normal, and a front share's that follows it and has a normal part of its own."""
+    """A shape's error that is log-normal, of unit standard deviation, beside a normal one half as large."""
     rng = np.random.default_rng(3)
-    payload = np.exp(0.5 * rng.standard_normal(400_000))
-    payload = (payload - payload.mean()) / payload.std()
-    low, high = np.quantile(payload, [0.025, 0.975])
-    for follows in (1.0, -1.0):
-        column = np.array([[1.0, 0.01 * follows]])
-        own = np.diag([0.0, 0.005**2])
-        one = Posterior(np.zeros(2), own, {Source.GOODS: column}, (-low, high))
-        share = 0.01 * follows * payload + 0.005 * rng.standard_normal(400_000)
-        for quantity, error in ((PAYLOAD, payload), (FRONT_SHARE, share)):
-            begin, end = one.quantity(quantity).interval95
-            misses = np.mean(error < begin), np.mean(error > end)
-            assert misses == pytest.approx((0.025, 0.025), abs=0.012)  # tails add in quadrature only nearly
+    shape = np.exp(0.5 * rng.standard_normal(400_000))
+    shape = (shape - shape.mean()) / shape.std()
+    low, high = np.quantile(shape, [0.025, 0.975])
+    one = Posterior(np.zeros(1), 0.25 * np.eye(1), {Source.GOODS: np.ones((1, 1))}, (-low, high))
+    error = shape + 0.5 * rng.standard_normal(400_000)
+    begin, end = one.quantity(PAYLOAD).interval95
+    assert np.mean((begin <= error) & (error <= end)) == pytest.approx(0.95, abs=0.01)
+    assert (np.mean(error < begin), np.mean(error > end)) == pytest.approx(
+        (0.025, 0.025), abs=0.012
+    )  # tails add in quadrature only nearly
+
+
+def test_the_payload_leans_and_other_quantities_as_far_as_they_follow_it() -> None:
+    plain = Posterior(np.array([300.0, 50.0]), np.diag([25.0, 0.01]), {Source.DAY: np.array([[20.0, -0.2]])})
+    leaning = replace(plain, leans=(1.1, 1.4))
+    for quantity, follows in ((PAYLOAD, 1.0), (FRONT_SHARE, -plain.correlation(PAYLOAD, FRONT_SHARE))):
+        number, half = plain.quantity(quantity).number, Z95 * plain.std(quantity)
+        low, high = leaning.quantity(quantity).interval95
+        found = (number - low) / half, (high - number) / half
+        expected = 1.0 + 0.1 * follows**2, 1.0 + 0.4 * follows**2
+        assert found == pytest.approx(expected if quantity == PAYLOAD else expected[::-1])
+    assert fused([leaning, plain]).leans == pytest.approx((1.05, 1.2))
 
 
 def test_exactly_known_has_no_error() -> None:
