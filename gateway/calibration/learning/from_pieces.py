@@ -3,7 +3,7 @@
 import hashlib
 import json
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import isfinite, nan
 from statistics import median
@@ -167,8 +167,17 @@ def learn(
 def _nothing(faults: Mapping[str, Sequence[Finding]]) -> str:
     if not faults:
         return "nothing to learn from yet: a drive teaches from a minute of steady driving with both sensors on"
-    told = dict.fromkeys(f"{one.kind}: {one.text}: {one.advice}" for found in faults.values() for one in found)
-    return "nothing to learn from: every drive has a fault: " + "; ".join(told)
+    return "nothing to learn from: every drive has a fault: " + "; ".join(faults_told(faults))
+
+
+def faults_told(faults: Mapping[str, Sequence[Finding]]) -> Iterator[str]:
+    """A sentence for each kind of fault, with the numbers of the last drive that has it."""
+    by_kind: dict[Kind, list[Finding]] = {}
+    for one in (one for found in faults.values() for one in found):
+        by_kind.setdefault(one.kind, []).append(one)
+    for kind, found in by_kind.items():
+        of_several = f" ({len(found)} drives)" if len(found) > 1 else ""
+        yield f"{kind}{of_several}: {found[-1].text}: {kind.advice}"
 
 
 def _facts(one: Driven) -> LogFacts:

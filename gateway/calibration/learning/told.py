@@ -10,7 +10,7 @@ from gateway.calibration.ahead import Step
 from gateway.calibration.assigned import BIAS, Assigned
 from gateway.calibration.found import ClaimState, FoundClaim
 from gateway.calibration.judgement.advice import WORTH_SAYING, Verdict
-from gateway.calibration.learning.from_pieces import Learnt
+from gateway.calibration.learning.from_pieces import Learnt, faults_told
 from gateway.calibration.learning.spans import STATES
 from gateway.calibration.statements import Statement
 from gateway.core.vehicle import Vehicle
@@ -124,9 +124,7 @@ def _findings(found: Learnt) -> Iterator[str]:
     taught = found.outcome.cross_spectrum
     if taught is not None:
         yield from common_errors(taught.causes)
-    faults = dict.fromkeys(f"{one.text}: {one.advice}" for findings in found.findings.values() for one in findings)
-    for told in faults:
-        yield f"some drives are left out: {told}"
+    yield from (f"some drives are left out: {told}" for told in faults_told(found.findings))
 
 
 def question(claim: FoundClaim, record: StatementRecord, vehicle: Vehicle) -> str:
