@@ -60,7 +60,9 @@ CALIBRATED = CalibratedVehicle(
 def test_the_vehicle_is_shown_with_its_calibration_and_ranges(tmp_path: Path) -> None:
     health = SignalHealth(signal="speed", rate_hz=5.0)
     with Gateway(tmp_path, calibrated=CALIBRATED) as gateway:
-        gateway.status = gateway.status.model_copy(update={"vin": "VF1" + "0" * 14, "signals": (health,)})
+        gateway.status = gateway.status.model_copy(
+            update={"vin": "VF1" + "0" * 14, "estimator": "ratio_index", "signals": (health,)}
+        )
         told = Client(gateway.app).get("/api/v1/vehicle").json()
     assert (told["vehicle_id"], told["vin"]) == ("van-17", "VF1" + "0" * 14)
     assert told["calibration"] == {

@@ -249,5 +249,5 @@ def test_rows_that_cannot_be_read_are_told_in_german(page: Any, browser: Any) ->
             "Spalten, die nicht gelesen werden: price",
             "Zeile 2: from: sofort: keine Zeit; so schreiben: 2026-11-26 07:40",
             "Zeile 3: payload_kg: viel: keine Zahl: in kg angeben, etwa 310 oder 12,5",
-            re.compile("^Zeile 4: das Fahrzeug ist noch nicht angegeben"),
+            re.compile("^Zeile 4: das Fahrzeug ist noch nicht bekannt"),
         ])  # fmt: skip
