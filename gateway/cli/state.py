@@ -76,8 +76,8 @@ def _statement(command: Command) -> Command:
         click.option(
             "--ref", default=None, help="your own name for it, such as a note's number; the same one replaces"
         ),
-        click.option("--until", type=MOMENT, default=None, help="until when it is aboard [default: until it changes]"),
-        click.option("--from", "since", type=MOMENT, default=None, help="from when it is aboard [default: now]"),
+        click.option("--until", type=MOMENT, default=None, help="when this ended [default: when the load changes]"),
+        click.option("--from", "since", type=MOMENT, default=None, help="when this began [default: now]"),
     ):
         command = option(command)
     return command

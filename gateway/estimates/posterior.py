@@ -229,7 +229,7 @@ class _Sums:
             name: np.array([len(part.sources[name]) if name in part.sources else -1 for part in parts])
             for name in self._columns
         }
-        self._tails = np.array([(*part.tails, *part.leans) for part in parts])
+        self._skews = np.array([(*part.tails, *part.leans) for part in parts])
 
     def _weighted(self, rows: Sequence[F64]) -> F64:
         """(n, c, size) rows (c, d) of each part times its precision; 0 if a part has fewer."""
@@ -252,9 +252,9 @@ class _Sums:
             if n_columns >= 0:
                 sources[name] = columns[some, :n_columns, :size].sum(axis=0) @ own
         weights = np.abs(precisions[:, :, PAYLOAD] @ own[PAYLOAD])
-        *tails, lighter, heavier = (weights @ self._tails[some] / weights.sum()).tolist()
+        low, high, lighter, heavier = (weights @ self._skews[some] / weights.sum()).tolist()
         mean = self._about[:size] + own @ self._means[some, :size].sum(axis=0)
-        return Posterior(mean, 0.5 * (own + own.T), sources, (tails[0], tails[1]), (lighter, heavier))
+        return Posterior(mean, 0.5 * (own + own.T), sources, (low, high), (lighter, heavier))
 
 
 def difference(before: Posterior, after: Posterior, *, is_one_load: bool) -> tuple[F64, F64]:

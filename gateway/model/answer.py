@@ -143,7 +143,7 @@ def _shape_of(mixture: Mixture, outward: F64, of_load: F64) -> tuple[F64, F64, t
 def _leans_of(mixture: Mixture) -> tuple[float, float]:
     """How many times wider than a normal distribution the likeliest peak is towards lighter, and towards heavier loads.
 
-    From the log posterior at two payloads on either side, the other parameters as they are most probable there, by one
+    From the log posterior at a payload on either side, the other parameters as they are most probable there, by one
     Newton step from where the peak's covariance puts them. A load can be much longer than it is thought to be, but
     hardly shorter, and the springs of a vehicle that few known loads have taught can be harder.
     """

@@ -242,7 +242,7 @@ def _of_payload(payload_kg: float, load: Load, model: VehicleModel) -> tuple[flo
 
 
 def _front_share(payload_kg: float, in_front: float, model: VehicleModel) -> float:
-    """0..1, of the vehicle with a payload of which the part ``in_front`` rests on the front axle."""
+    """The vehicle's front share (0..1) when the part ``in_front`` of its payload rests on the front axle."""
     empty_kg, empty_share = model.empty_mass_kg, model.ground.empty_front_share
     return (empty_share * empty_kg + in_front * payload_kg) / (empty_kg + payload_kg)
 

@@ -220,7 +220,7 @@ PATHS = ("/health/live", "/health/ready", "/api/v1/estimates/latest")
 
 
 def with_half_a_character(folder: Path) -> bytes:
-    """The file of a learner that was told something, with a text that no encoding holds."""
+    """A learner's file whose statement has a note that no encoding can write."""
     note = {"from": at(0), "source": "empty", "load": {"payload_kg": 0.0}, "note": "yard"}
     LearnerBench(folder).learner.loads.state(StatementRecord.model_validate(note), "workshop")
     return (folder / "learning.json").read_bytes().replace(b'"yard"', b'"\\ud800"')

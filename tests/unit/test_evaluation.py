@@ -226,7 +226,7 @@ def test_out_of_range_is_an_interval_wholly_beyond_what_was_seen(
     [
         ((-1348.0, 218.0), True),  # -565 +- 783 kg says nothing
         ((100.0, 700.0), False),  # wide, but some of it can be
-        ((560.0, 620.0), False),  # half as much again as it may carry: too heavy, and to be told
+        ((560.0, 620.0), False),  # an overload of a half, which must be reported
         ((780.0, 850.0), True),
         ((-300.0, -200.0), True),
     ],

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, NamedTuple, cast
 
 import numpy as np
 from isal import igzip_lib
@@ -38,18 +38,24 @@ PACKED_SUFFIXES: Final = (".gz", ".zst", ".xz")
 
 
 class Packing(NamedTuple):
-    """A compression format: the first bytes of its members, and its decompressor."""
+    """A compression format: the first bytes of its members, its decompressor, and the exceptions of that."""
 
     name: str
     magics: tuple[bytes, ...]
     new_inflater: Callable[[], Any]  # as the standard library's decompressors are
+    fault: type[Exception]
 
 
 _ZSTD_SKIPPABLE: Final = tuple(bytes([0x50 + i]) + b"\x2a\x4d\x18" for i in range(16))  # RFC 8878, 3.1.2
 PACKINGS: Final = (
-    Packing("gzip", (b"\x1f\x8b",), lambda: igzip_lib.IgzipDecompressor(flag=igzip_lib.DECOMP_GZIP)),
-    Packing("zstd", (b"\x28\xb5\x2f\xfd", *_ZSTD_SKIPPABLE), zstd.ZstdDecompressor),
-    Packing("xz", (b"\xfd7zXZ\0",), lambda: lzma.LZMADecompressor(format=lzma.FORMAT_XZ)),
+    Packing(
+        "gzip",
+        (b"\x1f\x8b",),
+        lambda: igzip_lib.IgzipDecompressor(flag=igzip_lib.DECOMP_GZIP),
+        cast(type[Exception], igzip_lib.error),
+    ),
+    Packing("zstd", (b"\x28\xb5\x2f\xfd", *_ZSTD_SKIPPABLE), zstd.ZstdDecompressor, zstd.ZstdError),
+    Packing("xz", (b"\xfd7zXZ\0",), lambda: lzma.LZMADecompressor(format=lzma.FORMAT_XZ), lzma.LZMAError),
 )
 _LONGEST_MAGIC: Final = max(len(magic) for packing in PACKINGS for magic in packing.magics)
 
@@ -81,7 +87,7 @@ class InflatedStream(io.RawIOBase):
                     raise EOFError(f"the {self._packing.name} stream is cut off")
             try:
                 text = self._inflater.decompress(self._packed, min(len(room), INFLATED_BYTES))
-            except Exception as fault:  # noqa: BLE001 - each library has a class of its own
+            except self._packing.fault as fault:
                 raise OSError(f"the {self._packing.name} stream is damaged: {fault}") from None
             self._packed = b""
             if text:

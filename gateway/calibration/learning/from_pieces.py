@@ -5,6 +5,7 @@ import json
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import chain
 from math import isfinite, nan
 from statistics import median
 from typing import Final
@@ -167,17 +168,18 @@ def learn(
 def _nothing(faults: Mapping[str, Sequence[Finding]]) -> str:
     if not faults:
         return "nothing to learn from yet: a drive teaches from a minute of steady driving with both sensors on"
-    return "nothing to learn from: every drive has a fault: " + "; ".join(faults_told(faults))
+    told = "; ".join(f"{kind}: {sentence}" for kind, sentence in faults_told(faults))
+    return f"nothing to learn from: every drive has a fault: {told}"
 
 
-def faults_told(faults: Mapping[str, Sequence[Finding]]) -> Iterator[str]:
-    """A sentence for each kind of fault, with the numbers of the last drive that has it."""
+def faults_told(faults: Mapping[str, Sequence[Finding]]) -> Iterator[tuple[Kind, str]]:
+    """Each kind of fault with a sentence that has the numbers of the last drive with it."""
     by_kind: dict[Kind, list[Finding]] = {}
-    for one in (one for found in faults.values() for one in found):
+    for one in chain.from_iterable(faults.values()):
         by_kind.setdefault(one.kind, []).append(one)
     for kind, found in by_kind.items():
         of_several = f" ({len(found)} drives)" if len(found) > 1 else ""
-        yield f"{kind}{of_several}: {found[-1].text}: {kind.advice}"
+        yield kind, f"{found[-1].text}{of_several}: {kind.advice}"
 
 
 def _facts(one: Driven) -> LogFacts:

@@ -124,7 +124,7 @@ def _findings(found: Learnt) -> Iterator[str]:
     taught = found.outcome.cross_spectrum
     if taught is not None:
         yield from common_errors(taught.causes)
-    yield from (f"some drives are left out: {told}" for told in faults_told(found.findings))
+    yield from (f"some drives are left out: {told}" for _, told in faults_told(found.findings))
 
 
 def question(claim: FoundClaim, record: StatementRecord, vehicle: Vehicle) -> str:
