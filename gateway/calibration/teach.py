@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from itertools import combinations
-from math import isfinite
+from math import isfinite, log
 from typing import Final
 
 import numpy as np
@@ -39,6 +39,7 @@ from gateway.model.vehicle_model import VehicleModel
 MOST_DISAGREEMENT: Final = 3.7  # chosen: standard deviations; chance exceeds it for one statement in five thousand
 MOST_SUSPECTS: Final = 4  # chosen: statements compared before one is held
 MOST_PAIRS: Final = 2  # chosen: statements that may have been exchanged; each pair costs a rough fit
+EXCHANGED: Final = 0.01  # chosen: probability that a statement was exchanged with another; with each of them alike
 LEAST_WITNESSES: Final = 3  # chosen: two drives must remain for a scale
 UNTESTED: Final = "intervals_untested"
 
@@ -180,7 +181,8 @@ def _exchanged(
     others: Sequence[FoundClaim],
     tried: set[frozenset[str]],
 ) -> tuple[FoundClaim, FoundClaim] | None:
-    """Two of the ``others``, at least one of them held, that explain all drives better once they exchange their drives.
+    """Two of the ``others``, at least one of them held, that explain all drives better once they exchange their drives:
+    so much better as it is unlikely that just these two were exchanged.
 
     Those that promise most are tried, by what either drive says and by its likelihood with the other's load; ``tried``
     keeps which.
@@ -195,7 +197,7 @@ def _exchanged(
     gains = {pair: fitted.gain_of_exchange(known, *(places[one.drive] for one in pair)) for pair in pairs}
     likely = [pair for pair in sorted(pairs, key=lambda pair: -gains[pair])[:MOST_PAIRS] if gains[pair] > 0.0]
     near = [pair for pair in pairs if pair[0].distance(pair[1]) < MOST_DISAGREEMENT and pair not in likely]
-    best = fitted.log_evidence(found)
+    best = fitted.log_evidence(found) - log(EXCHANGED / max(1, len(alone) - 1))
     for pair in (*likely, *sorted(near, key=lambda pair: pair[0].distance(pair[1]))[:MOST_PAIRS]):
         tried.add(frozenset(one.name for one in pair))
         drives = list(fitted.seen)

@@ -41,12 +41,14 @@ def drifting() -> list[dict[str, Any]]:
 
 
 def failing() -> list[dict[str, Any]]:
-    """Answers for sixty days, then a sensor that is stuck."""
-    return [
+    """Answers for sixty days, of the first an overload; then a sensor that is stuck."""
+    batches = [
         row(MONDAY_S + day * DAY_S + 300 * k, *(["acceleration_stuck"] if day >= 60 else []))
         for day in range(80)
         for k in range(1, 5)
     ]
+    batches[0]["over_limit"] = ["gross"]
+    return batches
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +100,8 @@ def test_vehicles_that_need_attention_come_first_with_their_numbers(page: Page) 
     assert looks["van-3", "silent"] == "its last batch is of 2026-01-05"
     assert ("van-4", "no batch") in looks
     assert looks["van-4", "logs failed"].startswith("1,")
-    assert "sensor" in table(page, "what")[1][1]
+    assert looks["van-2", "over a limit"] == "0.4 % of 240 answered batches"
+    assert [look[1] for look in table(page, "what")[1:3]] == ["over a limit", "sensor: acceleration_stuck"]
 
 
 def test_no_refusal_is_dropped(page: Page, numbers: dict[str, Any]) -> None:

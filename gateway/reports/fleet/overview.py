@@ -48,12 +48,13 @@ class Look:
 
 
 def looks_of(fleet: FleetSummary) -> list[Look]:
-    """The findings in order of urgency: bad sensors, drift, no data, few estimates, failed logs."""
+    """The findings in order of urgency: overloads, bad sensors, drift, no data, few estimates, failed logs."""
     drifts = [_drifting(one, name, drift) for one in fleet.vehicles for name, drift in one.believed_drifts.items()]
     silent_since = fleet.last - timedelta(days=SILENT_DAYS)
     n_failed = sorted(Counter(failure.vehicle for failure in fleet.failures).items())
     with_page = {vehicle.name for vehicle in fleet.vehicles}
     return [
+        *(_overloaded(one) for one in fleet.vehicles if one.n_over_limit),
         *(Look(one.name, f"sensor: {bad.reason}", trouble_told(bad), reason_told(bad.reason)[1])
           for one in fleet.vehicles for bad in one.bad_sensors),
         *sorted(drifts, key=lambda look: look.what),
@@ -80,6 +81,11 @@ def _drifting(vehicle: FleetVehicle, name: str, drift: Drift) -> Look:
         else "look for a changed tyre, spring or sensor mount; calibrate again"
     )
     return Look(vehicle.name, f"drift: {NAMES[name]}", drift_told(drift), advice)
+
+
+def _overloaded(vehicle: FleetVehicle) -> Look:
+    told = f"{percent(vehicle.n_over_limit, vehicle.n_answered)} of {whole(vehicle.n_answered)} answered batches"
+    return Look(vehicle.name, "over a limit", told, "load less, or place it otherwise: its page has the weeks")
 
 
 def _little_answered(vehicle: FleetVehicle) -> Look:
