@@ -15,6 +15,7 @@ from gateway.calibration.inspection.drive import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
 from gateway.calibration.judgement.advice import Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
+from gateway.calibration.learning.fitter_answers import doubts_of_vehicle
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.cli.options import (
     CAMPAIGN,
@@ -140,8 +141,8 @@ def calibrate(
         raise click.UsageError("--like is for cross_spectrum: the ratio index has nothing to inherit")
     require_places(output, report)
     loaded = load_campaign(campaign)
-    _say_payload_range(loaded)
     sister = load_calibration(like) if like else None
+    tell_doubts(loaded, sister)
     with counted("reading drives") as on_run:
         inspection = inspect(loaded, batch_settings(window_s), numbers=numbers, on_run=on_run)
     if sister:
@@ -195,8 +196,10 @@ def _command(
     return shlex.join(words)
 
 
-def _say_payload_range(campaign: Campaign) -> None:
-    """Prints the payload range to which percentages refer: a van of 3.5 t carries far more than the default."""
+def tell_doubts(campaign: Campaign, sister: CalibrationFile | None) -> None:
+    """Prints what is unlikely of the vehicle, and the payload range to which percentages refer if none is stated: a van
+    of 3.5 t carries far more than the default.
+    """
     if not campaign.states_payload_range:
         low_kg, high_kg = campaign.vehicle.payload_range_kg
         click.echo(
@@ -204,6 +207,8 @@ def _say_payload_range(campaign: Campaign) -> None:
             "percent of it; write what the vehicle may carry, such as payload_range_kg = [0.0, 1200.0]",
             err=True,
         )
+    for doubt in doubts_of_vehicle(campaign.vehicle, sister.vehicle if sister else None):
+        click.echo(f"{campaign.path}: unlikely: {doubt.sentence}", err=True)
 
 
 def _tell_inspection(inspection: Inspection, *, as_json: bool, is_all: bool) -> None:

@@ -18,7 +18,7 @@ from gateway.calibration.learning.spans import rows_record, rows_told, standing
 from gateway.calibration.learning.told import drives_record, learning_record, statements_record
 from gateway.calibration.statements_csv import ToldRow, ToldRows, read_statements
 from gateway.cli import options
-from gateway.cli.calibrate import require_places, written_and_judged
+from gateway.cli.calibrate import require_places, tell_doubts, written_and_judged
 from gateway.cli.options import FILE, ZONE, as_json, batch_settings, window
 from gateway.cli.progress import counted, on_share
 from gateway.errors import ConfigurationError
@@ -66,6 +66,7 @@ def learn(
     campaign = load_campaign(vehicle_path, is_draft=True)
     signal_map = load_signal_map(_signals(signals, campaign))
     sister = load_calibration(like) if like else None
+    tell_doubts(campaign, sister)
     told = ToldRows((), {}, ()) if statements is None else _read(statements, zone)
     rows = [row for row in told.rows if row.is_of(campaign.vehicle.name)]
     numbers = {row.record.id: row.number for row in rows}

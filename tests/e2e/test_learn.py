@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from support.commands import called, printed
-from support.known_load_logs import write_known_loads
+from support.known_load_logs import SIGNALS, write_known_loads
 
 from gateway.calibration.file import load_calibration
 from gateway.calibration.judgement.advice import Grade
@@ -113,6 +113,15 @@ def test_a_table_that_cannot_be_read_is_refused_before_any_log_is(drives: Path, 
     with pytest.raises(StatementsFileError, match="no column from") as refused:
         printed("learn", drives / "01.log", "--vehicle", drives / "van.toml", "--statements", notes, "--dry-run")
     assert "did you mean payload_kg?" in str(refused.value)
+
+
+def test_unlikely_figures_of_the_vehicle_are_asked_about(drives: Path, tmp_path: Path) -> None:
+    in_pounds = {"kerb_front_axle_kg": 1572, "kerb_rear_axle_kg": 1552, "wheelbase_m": 2.8, "sensor_position_m": 1.2}
+    figures = "".join(f"{name} = {figure}\n" for name, figure in in_pounds.items())
+    (tmp_path / "van.toml").write_text(f'[vehicle]\nname = "van"\n{figures}', encoding="utf-8")
+    done = called("learn", drives / "01.log", "--vehicle", tmp_path / "van.toml", "--signals", SIGNALS, "--dry-run")
+    assert done.exit_code == 0, done.output
+    assert "van.toml: unlikely: 3124 kg empty on a wheelbase of 2.8 m: such vehicles weigh 862 to" in done.stderr
 
 
 def test_without_a_place_for_the_calibration_nothing_begins(drives: Path) -> None:

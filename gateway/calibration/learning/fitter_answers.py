@@ -1,6 +1,6 @@
 """A fitter's answers: questions about those that are unlikely, and the vehicle of a campaign that follows from them.
 
-    doubts_of(answers, sister) -> questions
+    doubts_of(answers, sister) -> questions; doubts_of_vehicle(vehicle, sister) likewise
     vehicle_table(answers, name) -> the vehicle
 
 The questions compare the answers with ordinary road vehicles, and with a sister of its model. They use no drive;
@@ -8,7 +8,7 @@ The questions compare the answers with ordinary road vehicles, and with a sister
 """
 
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from math import inf
 from typing import Any, Final
 
@@ -48,6 +48,14 @@ MOST_LIMIT: Final = 5.0  # times what is there empty: the rear axle of a truck
 def doubts_of(said: VehicleAnswers, sister: Vehicle | None = None) -> tuple[Doubt, ...]:
     """Unlikely answers."""
     return (*_doubts(said), *(_beside(sister, said) if sister else ()))
+
+
+def doubts_of_vehicle(vehicle: Vehicle, sister: Vehicle | None = None) -> tuple[Doubt, ...]:
+    """Unlikely figures of a vehicle whose axle weights are stated; none of another one."""
+    if vehicle.kerb_front_axle_kg is None or vehicle.kerb_rear_axle_kg is None:
+        return ()
+    names = {one.name for one in fields(VehicleAnswers)} - {"division_kg"}
+    return doubts_of(VehicleAnswers(**{name: getattr(vehicle, name) for name in names}), sister)
 
 
 def _outside(
