@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from math import isnan
@@ -121,8 +121,8 @@ def _what(fault: dict[str, Any], model: type) -> str:
         return _unknown(str(fault["input"]), re.findall("'([^']+)'", fault["ctx"]["expected"]))
     if fault["type"] in ("missing", "missing_keyword_only_argument", "missing_argument"):
         return "missing; it must be given"
-    if fault["type"] in _BEYOND:
-        return _beyond(fault)
+    if (told := beyond(fault)) is not None:
+        return told
     message = fault["msg"].removeprefix("Value error, ")
     shown = repr(fault.get("input"))
     return message if fault["type"] == "value_error" or len(shown) > 60 else f"{message} (it says {shown})"
@@ -157,8 +157,10 @@ def _models_in(annotation: Any) -> Iterator[type]:
         yield from _models_in(part)
 
 
-def _beyond(fault: dict[str, Any]) -> str:
-    """ "1240 is above 30: millimetres?" """
+def beyond(fault: Mapping[str, Any]) -> str | None:
+    """What pydantic found of a number out of its bounds: "1240 is above 30: millimetres?"; None of another fault."""
+    if fault["type"] not in _BEYOND or "ctx" not in fault:
+        return None
     said, name = _BEYOND[fault["type"]]
     number, bound = fault["input"], fault["ctx"][name]
     if isinstance(number, float) and isnan(number):

@@ -94,6 +94,37 @@ def test_a_place_before_the_front_axle_is_a_number_and_a_length_is_not_negative(
         assert field.evaluate("field => field.checkValidity()") is is_valid
 
 
+@pytest.mark.parametrize(
+    ("locale", "told"),
+    [
+        ("en", "Wheelbase [m]: 2750 is above 20: millimetres?"),
+        ("de", "Radstand [m]: 2750 ist größer als 20: Millimeter?"),
+    ],
+)
+def test_a_number_in_another_unit_is_named_by_its_field(browser: Any, page: Any, locale: str, told: str) -> None:
+    with read_in(browser, page, locale) as shown:
+        expect(shown.locator("#now")).to_be_visible()
+        for name, number in {**VAN, "wheelbase_m": "2750"}.items():
+            shown.locator(f"#{name}").fill(number)
+        shown.locator("#van > button").click()
+        expect(shown.locator("#fault")).to_have_text(told)
+        expect(shown.locator("#fault")).to_be_in_viewport()
+
+
+def test_a_statement_can_be_withdrawn_on_a_phone_without_scrolling_sideways(
+    browser: Any, page: Any, bench: LearnerBench
+) -> None:
+    page.get_by_role("button", name="It is empty").click()
+    with read_in(browser, page, "en", viewport={"width": 360, "height": 740}) as phone:
+        remove = phone.locator("#statements button")
+        remove.scroll_into_view_if_needed()
+        box = remove.bounding_box()
+        assert box["x"] >= 0.0
+        assert box["x"] + box["width"] <= 360.0
+        remove.click()
+        expect(phone.locator("#statements")).to_contain_text("withdrawn")
+
+
 def learn_two_drives(bench: LearnerBench) -> None:
     """Both look empty, and a weighing would help."""
     bench.learner.van.state(VehicleAnswers(**ANSWERS), "workshop", is_confirmed=False)
@@ -191,6 +222,9 @@ def sentences() -> Iterator[str]:
         yield from (fault.partition(": ")[2] for faults in told.faults.values() for fault in faults)
     yield _nothing({})
     yield "nothing to learn from: every drive has a fault: 12.5"
+    yield "sensor_position_m: 35 is above 30"
+    for unit in ("millimetres", "centimetres", "tonnes"):
+        yield from (f"2750 is {beyond} 20: {unit}?" for beyond in ("above", "below"))
     yield "learning was killed: the machine has not enough memory for it, or somebody ended it; it begins anew"
     yield "learning left the result of another job: it was killed, and begins anew"
     yield from ("learning took longer than 1800 s and was ended", "learning needs more than 300 MB")

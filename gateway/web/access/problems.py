@@ -11,6 +11,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from gateway.errors import RefusedError, StoreError
+from gateway.files.toml_file import beyond
 from gateway.web.schemas import PROBLEM_TYPE, Fault, Problem
 
 _PLAINER: Final = {  # replacements of pydantic's messages
@@ -71,7 +72,7 @@ async def _invalid(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     said: dict[str, str] = {}
     for fault in error.errors():  # all parameters are flat; deeper places are pydantic's own branches
-        what = _PLAINER.get(fault["type"], fault["msg"].removeprefix("Value error, "))
+        what = beyond(fault) or _PLAINER.get(fault["type"], fault["msg"].removeprefix("Value error, "))
         said.setdefault(".".join(map(str, fault["loc"][:2])), what)
     detail = "; ".join(f"{where}: {what}" for where, what in said.items())
     faults = [Fault(where=where, what=what) for where, what in said.items()]

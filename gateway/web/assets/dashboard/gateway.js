@@ -30,11 +30,11 @@ export async function ask(path, more = {}, signal = null) {
 
 export const load = async (path) => (await ask(path)).json();
 
-/** Sends a change and gives the answer; throws the gateway's words against it. */
+/** Sends a change and gives the answer; throws the gateway's words against it, with each wrong field as `errors`. */
 export async function send(method, path, body, type = "application/json") {
   const response = await fetch(path, { method, body, headers: { ...headers(), "Content-Type": type } });
   const told = await response.json();
-  if (!response.ok) throw new Error(told.detail);
+  if (!response.ok) throw Object.assign(new Error(told.detail), { errors: told.errors ?? [] });
   return told;
 }
 

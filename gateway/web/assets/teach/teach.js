@@ -23,13 +23,21 @@ const kg = (x) => figure(x, 0, "kg");
 let learning = null;
 let stated = null; // the figures that were sent last, with those that no field shows
 
+/** What the gateway says against a change, with the names of the form's fields. */
+function faultText({ message, errors = [] }) {
+  const named = errors.map(({ where, what }) => [where.split(".")[1], what]);
+  const isOfForm = named.length && named.every(([name]) => [...REQUIRED, ...MORE].includes(name));
+  return isOfForm ? named.map(([name, what]) => translated(`${phrase(`field.${name}`)}: ${what}`)).join("; ") : translated(message);
+}
+
 /** Waits for the answer to a change; what the gateway says against it becomes the page's fault, and the answer null. */
 async function attempt(change) {
   say("fault", "");
   try {
     return await change;
   } catch (error) {
-    say("fault", error.message);
+    say("fault", faultText(error));
+    element("fault").scrollIntoView({ block: "nearest" });
     return null;
   } finally {
     askNow();
@@ -172,8 +180,9 @@ function statementRow(one) {
   const found = one.found === null ? "" : phrase("with_plus_minus", { kg: figure(one.found.payload_kg, 0, ""), half: kg(one.found.plus_minus_kg) });
   const why = translated(one.question ?? one.reason ?? "");
   const built = row([clock(one.from), source, found, `${phrase(`state.${one.state}`)}${why ? `: ${why}` : ""}`]);
-  const isThere = one.state !== "withdrawn";
-  built.append(made("td", isThere ? [button(phrase("withdraw"), `${phrase("withdraw")}: ${clock(one.from)}, ${source}`, () => withdraw(one.id), "link")] : ""));
+  if (one.state === "withdrawn") return built;
+  const remove = button(phrase("withdraw"), `${phrase("withdraw")}: ${clock(one.from)}, ${source}`, () => withdraw(one.id), "link");
+  built.firstChild.append(made("br"), remove); // in the first column, which no narrow screen cuts off
   return built;
 }
 

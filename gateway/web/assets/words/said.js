@@ -35,6 +35,13 @@ export const SAID = [
   ["is it packaging, or what is always in the vehicle? One weighing on a scale tells", "ist es die Verpackung, oder was immer im Fahrzeug liegt? Einmal wiegen zeigt es"],
   ["is it packaging, or what is always in the vehicle? The scale is allowed for", "ist es die Verpackung, oder was immer im Fahrzeug liegt? Die Waage ist berücksichtigt"],
 
+  // a number that no vehicle has
+  ["{number} is above {bound}: {unit}?", "{number} ist größer als {bound}: {unit}?"],
+  ["{number} is below {bound}: {unit}?", "{number} ist kleiner als {bound}: {unit}?"],
+  ["millimetres", "Millimeter"],
+  ["centimetres", "Zentimeter"],
+  ["tonnes", "Tonnen"],
+
   // why a statement waits, is held or no longer stands
   ["replaced by a later one with the ref {ref}", "ersetzt durch eine spätere mit dem Zeichen {ref}"],
   ["withdrawn by {who}, {when}", "zurückgenommen von {who}, {when}"],
