@@ -10,10 +10,28 @@ from gateway.calibration.statements import LoadPrior
 from gateway.core.cargo import shape_hypotheses
 from gateway.core.vehicle import Vehicle
 from gateway.model import fit
-from gateway.model.table import INDEX, N_OWN, OWN, ROWS, UPRIGHT, N, covariance_of, prior_of
+from gateway.model.table import (
+    BEND_SHARES,
+    FRONT,
+    INDEX,
+    N_OWN,
+    OWN,
+    REAR,
+    REFERENCE_KG,
+    ROWS,
+    UPRIGHT,
+    N,
+    covariance_of,
+    prior_of,
+)
 from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64
 
+SOFTENING_STD: Final = 0.1
+"""Chosen: per kN, of a vehicle of REFERENCE_KG: by how much the logarithm of a spring's rate may fall under load.
+Coils, leaves, helper springs, bump stops and air springs become stiffer. A fit of loads far apart found springs between
+them nine times as stiff as empty, and three times at the heavier one.
+"""
 SHARED: Final = 1e-2  # chosen: what is left of the deviations among known loads: one day, one box, one road
 GYRATION, MODE = OWN.index(INDEX["payload_gyration_m2"]), OWN.index(INDEX["payload_mode_hz"])
 _COMPACT_LOG_S: Final = log(0.1)
@@ -21,24 +39,31 @@ _COMPACT_LOG_S: Final = log(0.1)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """What is assumed of a vehicle before its first drive: mean (n,) and covariance (n, n)."""
+    """What is assumed of a vehicle before its first drive: mean (n,) and covariance (n, n).
+
+    stiffening (m, N) are combinations that are hardly negative: the slope of each spring's rate from bend to bend.
+    """
 
     mean: F64
     covariance: F64
+    stiffening: F64
     like: VehicleModel | None = None
 
     @classmethod
     def of_any(cls, vehicle: Vehicle, *, with_roll: bool) -> "Prior":
         """Of any vehicle of this size, by the table."""
         mean, std = prior_of(ROWS if with_roll else UPRIGHT, vehicle)
-        return cls(mean, np.diag(std**2))
+        return cls(mean, np.diag(std**2), _stiffening(vehicle))
 
     def upright(self, n_causes: int) -> fit.Gaussian:
-        """Of the half-car (N,), and behind it of errors that claims have in common, each of unit variance."""
+        """Of the half-car (N,), whose springs do not soften under load, and behind it of errors that claims have in
+        common, each of unit variance.
+        """
         half_car = fit.Gaussian.of(self.mean[:N], self.covariance[:N, :N])
         precision = np.eye(N + n_causes)
         precision[:N, :N] = half_car.precision
-        return fit.Gaussian(np.r_[half_car.mean, np.zeros(n_causes)], precision)
+        rising = np.pad(self.stiffening, ((0, 0), (0, n_causes)))
+        return fit.Rising(np.r_[half_car.mean, np.zeros(n_causes)], precision, rising)
 
     @classmethod
     def of_sister(cls, sister: VehicleModel, vehicle: Vehicle, *, with_roll: bool) -> "Prior":
@@ -51,7 +76,17 @@ class Prior:
         scatter = np.diag([rows[i].line ** 2 for i in shared])
         mean[shared] = sister.parameters[shared]
         covariance[np.ix_(shared, shared)] = sister.covariance[np.ix_(shared, shared)] + scatter
-        return cls(mean, covariance, sister)
+        return cls(mean, covariance, any_one.stiffening, sister)
+
+
+def _stiffening(vehicle: Vehicle) -> F64:
+    """(2 b, N) slope of the logarithm of each spring's rate behind each of its b bends, in SOFTENING_STD."""
+    n = len(BEND_SHARES)
+    rows = np.zeros((2, n, N))
+    for at_axle, end in zip(rows, (FRONT, REAR), strict=True):
+        at_axle[:, INDEX[f"spring_slope_{end}_per_kn"]] = 1.0
+        at_axle[:, [INDEX[f"spring_bend_{end}_{i}_per_kn"] for i in range(n)]] = np.tri(n)
+    return np.asarray(rows.reshape(-1, N) * vehicle.empty_mass_kg / REFERENCE_KG / SOFTENING_STD)
 
 
 def own_prior(stated: LoadPrior, vehicle: Vehicle, *, is_said: bool = False) -> fit.Gaussian:

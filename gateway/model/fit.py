@@ -25,7 +25,9 @@ MET: Final = 2.0  # chosen: in log posterior; a step that ends nearer to a known
 
 @dataclass(frozen=True, slots=True)
 class Gaussian:
-    """A prior: mean (k,) and precision (k, k); zero precision is a flat prior."""
+    """A prior: mean (k,) and precision (k, k); zero precision is a flat prior. It may be cut off below:
+    :class:`Rising`.
+    """
 
     mean: F64
     precision: F64
@@ -43,6 +45,30 @@ class Gaussian:
     def pull(self, x: F64) -> F64:
         """(k,) its gradient."""
         return np.asarray(self.precision @ (x - self.mean), float)
+
+    def information(self, x: F64) -> F64:
+        """(k, k) its second derivative."""
+        return self.precision
+
+
+@dataclass(frozen=True, slots=True)
+class Rising(Gaussian):
+    """A prior of which each combination in ``rows`` (m, k) is hardly negative: half a normal distribution, of a
+    standard deviation of 1, is what lies below 0.
+    """
+
+    rows: F64
+
+    def cost(self, x: F64) -> float:
+        below = np.minimum(self.rows @ x, 0.0)
+        return Gaussian.cost(self, x) + 0.5 * float(below @ below)
+
+    def pull(self, x: F64) -> F64:
+        return Gaussian.pull(self, x) + self.rows.T @ np.minimum(self.rows @ x, 0.0)
+
+    def information(self, x: F64) -> F64:
+        falling = self.rows[self.rows @ x < 0.0]
+        return np.asarray(self.precision + falling.T @ falling, float)
 
 
 class Likelihood(Protocol):
@@ -209,13 +235,13 @@ def _damped(
 
 def _arrow(common: F64, own: Sequence[F64], prior: Gaussian, drives: Sequence[Drive]) -> _Arrow:
     n = len(common)
-    arrow = _Arrow(prior.pull(common), prior.precision.copy(), [], [], [])
+    arrow = _Arrow(prior.pull(common), prior.information(common).copy(), [], [], [])
     for drive, x in zip(drives, own, strict=True):
         gradient, information = drive.likelihood.curvature(common, x)
         arrow.gradient += gradient[:n]
         arrow.information += information[:n, :n]
         arrow.own_gradients.append(gradient[n:] + drive.prior.pull(x))
-        arrow.own_informations.append(information[n:, n:] + drive.prior.precision)
+        arrow.own_informations.append(information[n:, n:] + drive.prior.information(x))
         arrow.across.append(information[:n, n:])
     return arrow
 

@@ -115,6 +115,25 @@ def test_a_prior_without_precision_changes_nothing() -> None:
     np.testing.assert_allclose(here.common, there.common, atol=1e-8)
 
 
+@given(seed=st.integers(0, 1000), factor=st.floats(-50.0, 50.0))
+def test_a_rising_prior_is_the_gaussian_where_nothing_falls_and_pulls_up_where_it_does(seed: int, factor: float) -> None:
+    rng = np.random.default_rng(seed)
+    prior, drives = drives_of(seed, [2], 3)
+    rows, x = rng.standard_normal((2, 3)), factor * rng.standard_normal(3)
+    rising = fit.Rising(prior.mean, prior.precision, rows)
+    falls = np.minimum(rows @ x, 0.0)
+    assert rising.cost(x) - prior.cost(x) == pytest.approx(0.5 * float(falls @ falls))
+    steps = np.eye(3) * 1e-6
+    slope = [(rising.cost(x + step) - rising.cost(x - step)) / 2e-6 for step in steps]
+    assert rising.pull(x) == pytest.approx(np.array(slope), rel=1e-4, abs=1e-3)
+    if not falls.any():
+        assert (rising.information(x) == prior.information(x)).all()
+    steep = fit.Rising(prior.mean, prior.precision, 100.0 * rows)
+    found = fit.most_probable(prior.mean, steep, drives, 1e-8)
+    assert (rows @ found.common > -0.1).all()
+    assert found.cost >= fit.most_probable(prior.mean, prior, drives).cost - 1e-6
+
+
 def test_a_search_that_cannot_reach_what_is_worth_it_is_given_up() -> None:
     prior, drives = drives_of(3, [2], 2, bend=1.0)
     start = np.full(2, 300.0)
