@@ -27,7 +27,7 @@ from gateway.model.table import (
 from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64
 
-SOFTENING_STD: Final = 0.1
+SOFTENING_STD: Final = 0.3
 """Chosen: per kN, of a vehicle of REFERENCE_KG: by how much the logarithm of a spring's rate may fall under load.
 Coils, leaves, helper springs, bump stops and air springs become stiffer. A fit of loads far apart found springs between
 them nine times as stiff as empty, and three times at the heavier one.

@@ -27,7 +27,7 @@ from gateway.model.vehicle_model import VehicleModel
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64
 
-EVIDENCE: Final = 0.4
+EVIDENCE: Final = 0.3
 """Weight of a batch's evidence against the vehicle's prior, 1 being its statistical weight: a batch repeats one error
 of the model. Chosen on simulated vans that serve no other purpose.
 """
