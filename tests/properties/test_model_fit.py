@@ -116,7 +116,7 @@ def test_a_prior_without_precision_changes_nothing() -> None:
 
 
 @given(seed=st.integers(0, 1000), factor=st.floats(-50.0, 50.0))
-def test_a_rising_prior_is_the_gaussian_where_nothing_falls_and_pulls_up_where_it_does(seed: int, factor: float) -> None:
+def test_a_rising_prior_pulls_up_where_something_falls_and_nowhere_else(seed: int, factor: float) -> None:
     rng = np.random.default_rng(seed)
     prior, drives = drives_of(seed, [2], 3)
     rows, x = rng.standard_normal((2, 3)), factor * rng.standard_normal(3)

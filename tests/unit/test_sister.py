@@ -37,6 +37,7 @@ def test_individual_parameters_keep_the_general_prior(sister: VehicleModel) -> N
     generic = Prior.of_any(other, with_roll=False)
     assert prior.mean[~SHARED] == pytest.approx(generic.mean[~SHARED])
     assert np.diag(prior.covariance)[~SHARED] == pytest.approx(np.diag(generic.covariance)[~SHARED])
+    assert (prior.stiffening == generic.stiffening).all()
 
 
 def test_one_empty_drive_weighs_like_the_sister(sister: VehicleModel) -> None:
