@@ -17,18 +17,18 @@ from gateway.model.table import (
     N_OWN,
     OWN,
     REAR,
-    REFERENCE_KG,
     ROWS,
     UPRIGHT,
     N,
     covariance_of,
     prior_of,
+    scale_of,
 )
 from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64
 
 SOFTENING_STD: Final = 0.3
-"""Chosen: per kN, of a vehicle of REFERENCE_KG: by how much the logarithm of a spring's rate may fall under load.
+"""Chosen: per kN, of the table's vehicle: by how much the logarithm of a spring's rate may fall under load.
 Coils, leaves, helper springs, bump stops and air springs become stiffer. A fit of loads far apart found springs between
 them nine times as stiff as empty, and three times at the heavier one.
 """
@@ -41,7 +41,7 @@ _COMPACT_LOG_S: Final = log(0.1)
 class Prior:
     """What is assumed of a vehicle before its first drive: mean (n,) and covariance (n, n).
 
-    stiffening (m, N) are combinations that are hardly negative: the slope of each spring's rate from bend to bend.
+    stiffening (m, N) gives the slope of each spring's rate from bend to bend; a slope below 0 is penalised.
     """
 
     mean: F64
@@ -86,7 +86,7 @@ def _stiffening(vehicle: Vehicle) -> F64:
     for at_axle, end in zip(rows, (FRONT, REAR), strict=True):
         at_axle[:, INDEX[f"spring_slope_{end}_per_kn"]] = 1.0
         at_axle[:, [INDEX[f"spring_bend_{end}_{i}_per_kn"] for i in range(n)]] = np.tri(n)
-    return np.asarray(rows.reshape(-1, N) * vehicle.empty_mass_kg / REFERENCE_KG / SOFTENING_STD)
+    return np.asarray(rows.reshape(-1, N) * scale_of(vehicle) / SOFTENING_STD)
 
 
 def own_prior(stated: LoadPrior, vehicle: Vehicle, *, is_said: bool = False) -> fit.Gaussian:

@@ -25,9 +25,7 @@ MET: Final = 2.0  # chosen: in log posterior; a step that ends nearer to a known
 
 @dataclass(frozen=True, slots=True)
 class Gaussian:
-    """A prior: mean (k,) and precision (k, k); zero precision is a flat prior. It may be cut off below:
-    :class:`Rising`.
-    """
+    """A prior: mean (k,) and precision (k, k); zero precision is a flat prior."""
 
     mean: F64
     precision: F64
@@ -53,8 +51,8 @@ class Gaussian:
 
 @dataclass(frozen=True, slots=True)
 class Rising(Gaussian):
-    """A prior of which each combination in ``rows`` (m, k) is hardly negative: half a normal distribution, of a
-    standard deviation of 1, is what lies below 0.
+    """A Gaussian that penalises combinations below 0: where a row of ``rows`` (m, k) times x is negative, the cost
+    rises by half its square.
     """
 
     rows: F64

@@ -35,7 +35,8 @@ Usual = Callable[[Vehicle], float]
 """The middle of a prior in the unit that ends the parameter's name."""
 
 
-def _scale(vehicle: Vehicle) -> float:
+def scale_of(vehicle: Vehicle) -> float:
+    """Its mass in that of the vehicle to which the figures of this table refer."""
     return vehicle.empty_mass_kg / REFERENCE_KG
 
 
@@ -108,9 +109,9 @@ def _rows_of_suspension() -> Iterator[Row]:
     for end in (FRONT, REAR):
         yield Row(f"damper_{end}_nspm", LOG, _damper_nspm(end), 0.5, line=0.1, day=0.03, both_axles=0.05)
     for end in (FRONT, REAR):
-        yield Row(f"damper_mount_{end}_npm", LOG, lambda v: 500e3 * _scale(v), 1.0, line=0.15)
+        yield Row(f"damper_mount_{end}_npm", LOG, lambda v: 500e3 * scale_of(v), 1.0, line=0.15)
     for end in (FRONT, REAR):
-        yield Row(f"tyre_{end}_npm", LOG, lambda v: 400e3 * _scale(v), 0.3, line=0.04, day=0.015, both_axles=0.03)
+        yield Row(f"tyre_{end}_npm", LOG, lambda v: 400e3 * scale_of(v), 0.3, line=0.04, day=0.015, both_axles=0.03)
     for end in (FRONT, REAR):
         yield Row(f"unsprung_{end}_kg", LOG, _unsprung_kg(end), _unsprung_std(end), line=0.03)
 
@@ -124,11 +125,11 @@ def _rows_of_slack(sensor: str, *, needs_roll: bool = False) -> Iterator[Row]:
 def _rows_of_springs_and_friction() -> Iterator[Row]:
     for end in (FRONT, REAR):
         yield Row(
-            f"spring_slope_{end}_per_kn", LINEAR, lambda v: 0.03 / _scale(v), lambda v: 0.05 / _scale(v), line=0.01
+            f"spring_slope_{end}_per_kn", LINEAR, lambda v: 0.03 / scale_of(v), lambda v: 0.05 / scale_of(v), line=0.01
         )
     for end in (FRONT, REAR):
         for i in range(len(BEND_SHARES)):
-            yield Row(f"spring_bend_{end}_{i}_per_kn", LINEAR, 0.0, lambda v: BEND_STD / _scale(v), line=0.01)
+            yield Row(f"spring_bend_{end}_{i}_per_kn", LINEAR, 0.0, lambda v: BEND_STD / scale_of(v), line=0.01)
     for end in (FRONT, REAR):
         yield Row(f"damper_friction_{end}", LINEAR, 0.1, 0.3, line=0.05, day=0.03, both_axles=0.02)
     for end in (FRONT, REAR):
@@ -161,13 +162,13 @@ ROWS: Final = (
     Row("gyro_lag_s", LINEAR, 0.0, 0.01, batch=0.001),
     Row("delay_scale", LINEAR, 0.0, 0.003, batch=0.003),
     Row("rear_lag_s", LINEAR, 0.0, 0.005, line=0.001),
-    Row("driveline_front_kg", LOG, lambda v: 8.0 * _scale(v), 1.2, batch=0.5),  # the gear
-    Row("driveline_rear_kg", LOG, lambda v: 8.0 * _scale(v), 1.2, batch=0.5),
+    Row("driveline_front_kg", LOG, lambda v: 8.0 * scale_of(v), 1.2, batch=0.5),  # the gear
+    Row("driveline_rear_kg", LOG, lambda v: 8.0 * scale_of(v), 1.2, batch=0.5),
     Row("accelerometer_gain", LINEAR, 0.0, 1e-6, day=0.0042),
     Row("roll_inertia_kgm2", LOG, _roll_inertia_kgm2, 0.3, line=0.03, needs_roll=True),
     Row("payload_roll_gyration_m2", LOG, 0.15, 0.7, line=0.3, needs_roll=True),
-    Row("anti_roll_front_npm", LOG, lambda v: 15e3 * _scale(v), 1.0, line=0.1, needs_roll=True),
-    Row("anti_roll_rear_npm", LOG, lambda v: 7.5e3 * _scale(v), 1.0, line=0.1, needs_roll=True),
+    Row("anti_roll_front_npm", LOG, lambda v: 15e3 * scale_of(v), 1.0, line=0.1, needs_roll=True),
+    Row("anti_roll_rear_npm", LOG, lambda v: 7.5e3 * scale_of(v), 1.0, line=0.1, needs_roll=True),
     Row("damper_against_front", LOG, 1.0, 0.3, line=0.1, needs_roll=True),
     Row("damper_against_rear", LOG, 1.0, 0.3, line=0.1, needs_roll=True),
     *_rows_of_slack("roll_rate", needs_roll=True),
