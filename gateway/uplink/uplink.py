@@ -11,6 +11,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any, Final
@@ -188,15 +189,13 @@ class Uplink(Sender[UplinkStatus]):
         self._answer, end_s = None, time.monotonic() + ANSWER_TIMEOUT_S
         self._under_way = self._client.publish(topic, text.encode(), qos=1, retain=retain, properties=properties).mid
         while self._answer is None and not self._stopping.is_set():
-            try:
+            with suppress(queue.Empty):
                 self._heard.get(timeout=TURN_S)()
-            except queue.Empty:
-                self._look()  # a cut may last for hours
-                if not self._is_connected():
-                    end_s = time.monotonic() + ANSWER_TIMEOUT_S
-                elif time.monotonic() > end_s:
-                    told = f"{self._settings.broker} did not acknowledge for {ANSWER_TIMEOUT_S:g} s"
-                    raise NotTakenError(told) from None
+            self._look()  # a cut may last for hours
+            if not self._is_connected():
+                end_s = time.monotonic() + ANSWER_TIMEOUT_S
+            elif self._answer is None and time.monotonic() > end_s:
+                raise NotTakenError(f"{self._settings.broker} did not acknowledge for {ANSWER_TIMEOUT_S:g} s")
         return self._answer
 
     def _is_connected(self) -> bool:

@@ -88,9 +88,11 @@ def test_from_nothing_to_the_drive_it_takes_few_clicks(page: Any, bench: Learner
 
 
 def test_a_place_before_the_front_axle_is_a_number_and_a_length_is_not_negative(page: Any) -> None:
+    page.locator("#van details summary").click()
     for name, is_valid in (("sensor_position_m", True), ("sensor_offset_left_m", True), ("wheelbase_m", False)):
         field = page.locator(f"#{name}")
-        field.fill("-0.4", force=True)
+        field.fill("-0.4")
+        assert field.input_value() == "-0.4"
         assert field.evaluate("field => field.checkValidity()") is is_valid
 
 
