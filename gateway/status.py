@@ -17,6 +17,7 @@ class State(StrEnum):
     WAITING_FOR_SPEED = "waiting_for_speed"
     COLLECTING = "collecting"
     ESTIMATING = "estimating"
+    NOT_WEIGHED = "not_weighed"
     STALE = "stale"
     READER_FAULT = "reader_fault"
 
@@ -28,6 +29,7 @@ SENTENCES: Final[dict[State, str]] = {
     State.WAITING_FOR_SPEED: "Sensors are heard; waiting for the vehicle to drive fast enough.",
     State.COLLECTING: "Driving; collecting the first batch.",
     State.ESTIMATING: "Driving; the estimate is kept up to date.",
+    State.NOT_WEIGHED: "Driving; the last batch was not weighed, its reasons are in the history.",
     State.STALE: "No new estimate for a while: the shown one is old.",
     State.READER_FAULT: "The bus cannot be read: see the last fault.",
 }

@@ -32,7 +32,7 @@ from gateway.store import Store, StoreReader, restored
 from gateway.store.journal import up_to
 
 _AT_FAULT: Final = frozenset({State.SENSOR_FAULT, State.READER_FAULT})
-_HEARD: Final = frozenset({State.WAITING_FOR_SPEED, State.COLLECTING, State.ESTIMATING, State.STALE})
+_HEARD: Final = frozenset({State.WAITING_FOR_SPEED, State.COLLECTING, State.ESTIMATING, State.NOT_WEIGHED, State.STALE})
 
 
 class Silence:

@@ -98,8 +98,9 @@ class StatusReport:
                 State.WAITING_FOR_SPEED,
                 lambda: self.pipeline.flow.scheduler.is_parked or speed_age_s is None or speed_age_s > SPEED_LOST_S,
             ),
-            (State.COLLECTING, lambda: self.board.age_s() is None),
             (State.STALE, self.board.is_stale),
+            (State.NOT_WEIGHED, lambda: (heard := self.board.heard()) is not None and not heard.counted),
+            (State.COLLECTING, lambda: self.board.age_s() is None),
         )
         return next((state for state, holds in claims if holds()), State.ESTIMATING)
 

@@ -232,6 +232,7 @@ STATES = {
     State.WAITING_FOR_SPEED: ("Waiting for speed", "busy"),
     State.COLLECTING: ("First batch under way", "busy"),
     State.ESTIMATING: ("Estimating", "good"),
+    State.NOT_WEIGHED: ("Not weighed", "calm"),
     State.STALE: ("Stale", "warn"),
     State.READER_FAULT: ("Bus fault", "bad"),
 }

@@ -32,18 +32,20 @@ def report(
     is_parked: bool = False,
     estimate_age_s: float | None = 20.0,
     is_stale: bool = False,
+    is_last_batch_counted: bool | None = True,
 ) -> State:
     """The state of a service that has run for a minute and heard each signal so long ago (None: never)."""
     now = time.monotonic()
     heard = {signal: now - age_s for signal, age_s in ages_s.items() if age_s is not None}
     scheduler = SimpleNamespace(is_parked=is_parked)
+    heard_last = None if is_last_batch_counted is None else SimpleNamespace(counted=is_last_batch_counted)
     parts: dict[str, Any] = {
         "settings": None,
         "setup": SimpleNamespace(signal_map=SimpleNamespace(signals=dict.fromkeys(SIGNALS))),
         "source": SimpleNamespace(state=source),
         "pipeline": SimpleNamespace(watch=SimpleNamespace(last_heard=heard), flow=SimpleNamespace(scheduler=scheduler)),
         "store": None,
-        "board": SimpleNamespace(age_s=lambda: estimate_age_s, is_stale=lambda: is_stale),
+        "board": SimpleNamespace(age_s=lambda: estimate_age_s, is_stale=lambda: is_stale, heard=lambda: heard_last),
     }
     told = StatusReport(**cast(Any, parts))
     told.started_s = now - 60.0  # instead of waiting for a minute
@@ -67,8 +69,11 @@ STATES: list[tuple[State, dict[Signal, float | None], dict[str, Any]]] = [  # wh
     (State.READER_FAULT, dict.fromkeys(SIGNALS, LONG_S), {"source": SourceState.READER_FAULT}),
     (State.STARTING, dict.fromkeys(SIGNALS, LONG_S), {"source": SourceState.STARTING}),
     (State.WAITING_FOR_BUS, dict.fromkeys(SIGNALS, LONG_S), {"source": SourceState.BUS_SILENT}),
-    (State.COLLECTING, {}, {"estimate_age_s": None}),
+    (State.COLLECTING, {}, {"estimate_age_s": None, "is_last_batch_counted": None}),
+    (State.NOT_WEIGHED, {}, {"estimate_age_s": None, "is_last_batch_counted": False}),
+    (State.NOT_WEIGHED, {}, {"is_last_batch_counted": False}),
     (State.STALE, {}, {"is_stale": True}),
+    (State.STALE, {}, {"is_stale": True, "is_last_batch_counted": False}),
 ]
 
 

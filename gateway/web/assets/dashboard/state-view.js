@@ -8,7 +8,7 @@ import { language } from "../language.js";
 
 const TONES = {
   starting: "busy", waiting_for_bus: "warn", sensor_fault: "bad", waiting_for_speed: "busy", collecting: "busy",
-  estimating: "good", stale: "warn", reader_fault: "bad",
+  estimating: "good", not_weighed: "calm", stale: "warn", reader_fault: "bad",
 };
 
 const SILENT_AFTER_S = 5; // as gateway/status.py

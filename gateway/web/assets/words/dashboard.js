@@ -31,6 +31,7 @@ export const DASHBOARD = {
   "state.waiting_for_speed": ["Waiting for speed", "Wartet auf Fahrt"],
   "state.collecting": ["First batch under way", "Erster Abschnitt läuft"],
   "state.estimating": ["Estimating", "Wiegt"],
+  "state.not_weighed": ["Not weighed", "Nicht gewogen"],
   "state.stale": ["Stale", "Veraltet"],
   "state.reader_fault": ["Bus fault", "Bus gestört"],
   "sentence.starting": ["Starting.", "Der Dienst startet."],
@@ -42,6 +43,10 @@ export const DASHBOARD = {
   "sentence.waiting_for_speed": ["Sensors are heard; waiting for the vehicle to drive fast enough.", "Die Sensoren senden; das Fahrzeug fährt noch nicht schnell genug."],
   "sentence.collecting": ["Driving; collecting the first batch.", "Fahrt; der erste Abschnitt wird gesammelt."],
   "sentence.estimating": ["Driving; the estimate is kept up to date.", "Fahrt; die Schätzung wird laufend erneuert."],
+  "sentence.not_weighed": [
+    "Driving; the last batch was not weighed, its reasons are in the history.",
+    "Fahrt; der letzte Abschnitt wurde nicht gewogen, die Gründe stehen im Verlauf.",
+  ],
   "sentence.stale": ["No new estimate for a while: the shown one is old.", "Länger keine neue Schätzung: Die gezeigte ist alt."],
   "sentence.reader_fault": ["The bus cannot be read: see the last fault.", "Der Bus kann nicht gelesen werden."],
   silent_signals: ["Missing: {signals}.", "Ohne Daten: {signals}."],
