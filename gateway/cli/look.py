@@ -10,6 +10,7 @@ from gateway.bus.signals.mapping import id_name
 from gateway.cli.options import FILE, Told, prints
 from gateway.offline.look.heard import Heard
 from gateway.offline.look.log_look import Look, MapFit
+from gateway.units import STANDARD_GRAVITY_MPS2
 
 MOST_UNKNOWN: Final = 12  # chosen: lines of identifiers that nothing describes
 
@@ -67,9 +68,11 @@ def _identifier(one: Heard) -> str:
 
 
 def _fit(fit: MapFit) -> str:
-    told = "fits" if fit.fits else f"has {', '.join(fit.found)}"
+    told = "fits" if fit.fits else f"does not fit: has {', '.join(fit.found)}"
     told += f", lacks {', '.join(fit.missing)}" if fit.missing else ""
-    told += "" if fit.vertical_mps2 is None else f"; its vertical axis reads {fit.vertical_mps2:+.2f} m/s2"
+    if fit.vertical_mps2 is not None:
+        told += f"; its vertical axis reads {fit.vertical_mps2:+.2f} m/s2"
+        told += "" if fit.has_gravity else f", where gravity is {STANDARD_GRAVITY_MPS2:+.2f}"
     return f"  {fit.name}{f' on {fit.channel}' if fit.channel else ''}: {told}"
 
 

@@ -48,9 +48,13 @@ class MapFit:
     causes: list[str]
 
     @property
+    def has_gravity(self) -> bool:
+        """Whether gravity is on the mapped vertical axis."""
+        return abs((self.vertical_mps2 or 0.0) - STANDARD_GRAVITY_MPS2) < GRAVITY_TOLERANCE_MPS2
+
+    @property
     def fits(self) -> bool:
-        off_mps2 = abs((self.vertical_mps2 or 0.0) - STANDARD_GRAVITY_MPS2)
-        return off_mps2 < GRAVITY_TOLERANCE_MPS2 and {Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE} <= {*self.found}
+        return self.has_gravity and {Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE} <= {*self.found}
 
 
 def fits_of(heard: Sequence[Heard]) -> list[MapFit]:
