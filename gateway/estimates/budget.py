@@ -16,7 +16,6 @@ import numpy as np
 from gateway.estimates.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD, SHAPE, Posterior, Source
 
 OWN: Final = "own"  # what no other batch shares, among the sources
-WEIGHBRIDGE_STD_KG: Final = 5.0  # of a scale of class III (OIML R 76: 10 kg steps)
 
 
 class Remedy(StrEnum):
@@ -90,11 +89,11 @@ def _with_remedy(line: BudgetLine, posterior: Posterior, is_shape_said: bool, is
 def _remedies(source: str, is_shape_said: bool, is_empty_weighed: bool) -> Iterator[Remedy]:
     if source == OWN:
         yield Remedy.DRIVE_ON
-    elif source in SHAPE:
-        yield Remedy.WEIGH_ONCE if is_shape_said else Remedy.SAY_WHAT_IS_CARRIED
+    elif source in SHAPE and not is_shape_said:
+        yield Remedy.SAY_WHAT_IS_CARRIED
     elif source in (Source.DAY, Source.SENSOR) and not is_empty_weighed:
         yield Remedy.WEIGH_EMPTY
-    elif source in (Source.CALIBRATION, Source.MODEL):
+    elif source == Source.CALIBRATION:
         yield Remedy.WEIGH_ONCE
     elif source == Source.SIDEWAYS:
         yield Remedy.READ_ROLL_RATE
@@ -115,7 +114,7 @@ def _std_after(remedy: Remedy, posterior: Posterior) -> float:
     elif remedy is Remedy.SAY_WHAT_IS_CARRIED:
         saved = (1.0 - SAID_PART**2) * sum(by[name] for name in SHAPE)
     elif remedy is Remedy.WEIGH_ONCE:
-        saved = variance - own - min(WEIGHBRIDGE_STD_KG**2, variance - own)
+        saved = by[Source.CALIBRATION]  # at most
     elif remedy is Remedy.WEIGH_EMPTY:
         saved = by[Source.DAY] + by[Source.SENSOR]
     elif remedy is Remedy.READ_ROLL_RATE:

@@ -310,18 +310,25 @@ def test_each_source_has_the_remedy_that_helps_it() -> None:
     assert {found[name] for name in SHAPE} == {Remedy.SAY_WHAT_IS_CARRIED}
     assert found[Source.DAY] is found[Source.SENSOR] is Remedy.WEIGH_EMPTY
     assert found[Source.CALIBRATION] is Remedy.WEIGH_ONCE
+    assert found[Source.MODEL] is None
     assert found[Source.EMPTY_SHARE] is Remedy.WEIGH_AXLES_EMPTY
     assert found[Source.SIDEWAYS] is Remedy.READ_ROLL_RATE
 
 
 def test_a_remedy_that_was_applied_is_not_offered_again() -> None:
-    assert {remedies(is_shape_said=True)[name] for name in SHAPE} == {Remedy.WEIGH_ONCE}
+    assert {remedies(is_shape_said=True)[name] for name in SHAPE} == {None}
     assert {remedies(is_empty_weighed=True)[name] for name in (Source.DAY, Source.SENSOR)} == {None}
 
 
 def test_driving_on_leaves_a_third_of_the_batchs_own_error() -> None:
     (line,) = (line for line in budget_of(with_all(), is_shape_said=False) if line.source == OWN)
     assert line.payload_with_remedy_kg**2 == pytest.approx(with_all().covariance[0, 0] - 36.0 * 2.0 / 3.0)
+
+
+def test_a_scale_leaves_the_errors_of_the_model_and_of_the_day() -> None:
+    """It tells of the vehicle's parameters. What the model neglects differs from load to load."""
+    (line,) = (line for line in budget_of(with_all(), is_shape_said=False) if line.source == Source.CALIBRATION)
+    assert line.payload_with_remedy_kg**2 == pytest.approx(with_all().covariance[0, 0] - 20.0**2)
 
 
 def test_a_source_without_error_has_no_line() -> None:

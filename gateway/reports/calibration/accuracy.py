@@ -108,7 +108,7 @@ def summary_table(judgement: Judgement) -> Table:
         for label, cells in _labelled(table.errors)
     ]
     return Table(
-        "Errors (12): in kg and percentage points, and in percent of the campaign's ranges; of gross: in percent of "
+        "Errors (12): in kg and percentage points, and in percent of the vehicle's ranges; of gross: in percent of "
         "the loaded vehicle's mass; where the centre of gravity lies left of the centre line: in mm. ± is the mean "
         "of half the 95 % intervals; the score is their width and 40 times what the truth lies outside, in the mean, "
         f"and {IDEAL_SCORE:g} times the mean |e| where intervals are as wide as they should be; both in percent of the "

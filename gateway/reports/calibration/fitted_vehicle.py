@@ -142,7 +142,10 @@ def _misfit_table(fits: Sequence[RunFit], model: VehicleModel) -> Table:
         (str(fit.run.number), f"{fit.load.payload_kg:.0f} kg", f"{fit.load.front_share_pct:.1f} %", f"{fit.misfit:.2f}")
         for fit in sorted(fits, key=lambda fit: fit.run.number)
     )
-    caption = f"Misfit of every run; a batch beyond {model.misfit_limit:.2f} is not believed"
+    caption = (
+        "Misfit of every run by the one vehicle of all runs. Weighing lets each batch's springs, dampers and tyres "
+        f"deviate, so that its misfit is smaller; beyond {model.misfit_limit:.2f} there, no load is answered"
+    )
     return Table(caption, ("Run", "payload", "front share", "misfit"), rows)
 
 

@@ -30,8 +30,8 @@ def _run_row(verdict: RunVerdict, driven: SplitRun | None) -> tuple[str, ...]:
         str(run.number),
         run.name,
         _verdict(verdict),
-        known(run.payload_kg, " kg"),
-        known(run.front_share_pct, " %", ".1f"),
+        known(run.statement.payload_kg, " kg"),
+        known(run.statement.front_share_pct, " %", ".1f"),
         *(str(sum(not batch.rejected for batch in part.batches)) for part in (run, driven.validation)),
         str(len(refused)),
     )
@@ -84,7 +84,7 @@ def provenance_section(assessment: Assessment) -> Section:
         *((("prior from", file.sister_id),) if file.sister_id else ()),
         ("software", provenance.software),
         ("command", provenance.command),
-        ("campaign file", f"sha256:{provenance.campaign_sha256}"),
+        ("file of the vehicle", f"sha256:{provenance.campaign_sha256}"),
     )
     drives = tuple((str(one.number), one.log, *_stated_and_found(one), one.sha256) for one in provenance.drives)
     columns = ("Run", "log", "payload", "front share", "found", "sha256")
