@@ -49,7 +49,8 @@ class KnownRun:
         """Its load in words, such as "270 kg at 50.4 % front"."""
         if not self.has_payload:
             return "an unknown load"
-        return f"{round(self.payload_kg, 1):g} kg" + (f" at {self.front_share_pct:.1f} % front" if self.has_place else "")
+        place = f" at {self.front_share_pct:.1f} % front" if self.has_place else ""
+        return f"{round(self.payload_kg, 1):g} kg{place}"
 
     @property
     def statement(self) -> Statement:
