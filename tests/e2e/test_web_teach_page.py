@@ -23,6 +23,7 @@ from gateway.calibration.statements_csv import read_statements
 from gateway.service.learner.said import NEXT_FIT, NO_VEHICLE
 from gateway.stated.doubt import DoubtKind
 from gateway.stated.facts import VehicleAnswers
+from gateway.web.access.tokens import Scope, TokenFile
 
 MOST_CLICKS, MOST_NUMBERS = 12, 8
 VAN = {
@@ -111,6 +112,22 @@ def test_a_number_in_another_unit_is_named_by_its_field(browser: Any, page: Any,
         shown.locator("#van > button").click()
         expect(shown.locator("#fault")).to_have_text(told)
         expect(shown.locator("#fault")).to_be_in_viewport()
+
+
+def test_a_locked_page_asks_for_the_token(browser: Any, tmp_path: Path, bench: LearnerBench) -> None:
+    tokens = TokenFile(tmp_path / "tokens.json")
+    token = tokens.create("fitter", Scope.OPERATE)
+    page = browser.new_page(locale="en")
+    with Gateway(tmp_path / "store", tokens=tokens, learner=bench.learner) as gateway, serving(gateway.app) as server:
+        page.goto(f"{server.url}/teach")
+        expect(page.get_by_role("alert")).to_have_text("The gateway needs a token.")
+        expect(page.locator("#main")).to_be_hidden()
+        page.get_by_label("Token").fill(token)
+        page.get_by_role("button", name="Show the vehicle").click()
+        expect(page.locator("#now")).to_have_text("Next: state the van below.")
+        expect(page.locator("#token")).to_be_hidden()
+        page.close()
+        gateway.board.close()
 
 
 def test_a_statement_can_be_withdrawn_on_a_phone_without_scrolling_sideways(
