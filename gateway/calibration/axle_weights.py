@@ -1,10 +1,12 @@
-"""From a weighbridge to the sprung mass and its front share, as [vehicle] of a campaign states them.
+"""What follows from the empty vehicle's axle weights, as [vehicle] of a campaign states it: the sprung mass and its
+front share, and the payload that the gross limit leaves.
 
 sprung_keys(690.0, 710.0)            # unsprung masses unknown: estimated
+payload_range_keys(690.0, 710.0, 2000.0)
 """
 
 import math
-from typing import Final
+from typing import Any, Final
 
 from gateway.errors import CampaignError
 from gateway.model.table import ESTIMATED_UNSPRUNG_STD, UNSPRUNG_SHARE
@@ -57,3 +59,9 @@ def sprung_keys(
         "unsprung_rear_kg": unsprung_rear_kg,
     }
     return {name: number for name, number in keys.items() if number is not None}
+
+
+def payload_range_keys(front_kg: float, rear_kg: float, gross_limit_kg: float | None) -> dict[str, Any]:
+    """The payloads up to the gross limit; nothing without a limit, or with one that leaves no payload."""
+    most_kg = (gross_limit_kg or 0.0) - front_kg - rear_kg
+    return {"payload_range_kg": (0.0, most_kg)} if most_kg > 0.0 else {}

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from gateway.calibration.axle_weights import sprung_keys
+from gateway.calibration.axle_weights import payload_range_keys, sprung_keys
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.statements import (
     KNOWN_PLACE_PLUS_MINUS_M,
@@ -160,8 +160,8 @@ def load_campaign(path: Path, *, is_draft: bool = False) -> Campaign:
 
     A draft may lack signals and runs.
     """
-    tables = read_toml(path, CampaignError)
-    table = checked(_with_sprung(tables, path), path, DraftTable if is_draft else CampaignTable, CampaignError)
+    tables = _completed(read_toml(path, CampaignError), path)
+    table = checked(tables, path, DraftTable if is_draft else CampaignTable, CampaignError)
     campaign = Campaign(path, table, states_payload_range="payload_range_kg" in tables["vehicle"])
     faults = [f"{path}: vehicle.{fault}" for fault in _range_faults(campaign.vehicle)]
     faults += [
@@ -172,19 +172,22 @@ def load_campaign(path: Path, *, is_draft: bool = False) -> Campaign:
     return campaign
 
 
-def _with_sprung(tables: dict[str, Any], path: Path) -> dict[str, Any]:
-    """With the sprung mass and its share from the axle weights, if these alone are stated."""
+def _completed(tables: dict[str, Any], path: Path) -> dict[str, Any]:
+    """With what follows from the axle weights, where it is not stated itself."""
     vehicle = tables.get("vehicle")
-    if not isinstance(vehicle, dict) or "empty_mass_kg" in vehicle:
+    if not isinstance(vehicle, dict):
         return tables
     front_kg, rear_kg = (vehicle.get(f"kerb_{end}_axle_kg") for end in ("front", "rear"))
     if not (isinstance(front_kg, int | float) and isinstance(rear_kg, int | float)):
         return tables
-    try:
-        sprung = sprung_keys(front_kg, rear_kg, vehicle.get("unsprung_front_kg"), vehicle.get("unsprung_rear_kg"))
-    except CampaignError as fault:
-        raise CampaignError(f"{path}: vehicle.kerb_front_axle_kg: {fault}") from None
-    return {**tables, "vehicle": sprung | vehicle}
+    limit_kg = vehicle.get("gross_limit_kg")
+    follows = payload_range_keys(front_kg, rear_kg, limit_kg) if isinstance(limit_kg, int | float) else {}
+    if "empty_mass_kg" not in vehicle:
+        try:
+            follows |= sprung_keys(front_kg, rear_kg, vehicle.get("unsprung_front_kg"), vehicle.get("unsprung_rear_kg"))
+        except CampaignError as fault:
+            raise CampaignError(f"{path}: vehicle.kerb_front_axle_kg: {fault}") from None
+    return {**tables, "vehicle": follows | vehicle}
 
 
 def _range_faults(vehicle: Vehicle) -> Iterator[str]:

@@ -204,7 +204,7 @@ def tell_doubts(campaign: Campaign, sister: CalibrationFile | None) -> None:
         low_kg, high_kg = campaign.vehicle.payload_range_kg
         click.echo(
             f"{campaign.path}: vehicle.payload_range_kg: not stated: using {low_kg:g} to {high_kg:g} kg, errors are in "
-            "percent of it; write what the vehicle may carry, such as payload_range_kg = [0.0, 1200.0]",
+            "percent of it; write the axle weights with gross_limit_kg, or payload_range_kg = [0.0, 1200.0]",
             err=True,
         )
     for doubt in doubts_of_vehicle(campaign.vehicle, sister.vehicle if sister else None):

@@ -179,7 +179,10 @@ class Vehicle(VehicleFields):
     )
     payload_range_kg: tuple[Kilograms, Kilograms] = field(
         default=(0.0, 450.0),
-        metadata=described("payloads the vehicle may carry, rising; scales percentages, never clips"),
+        metadata=described(
+            "payloads the vehicle may carry, rising; scales percentages, never clips; absent: up to `gross_limit_kg`, "
+            "if it and the axle weights are stated"
+        ),
     )
     front_share_range_pct: tuple[Percent, Percent] = field(
         default=(40.0, 60.0),

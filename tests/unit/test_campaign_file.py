@@ -78,6 +78,24 @@ def test_axle_weights_give_the_sprung_mass(tmp_path: Path) -> None:
     assert "vehicle.empty_mass_kg: missing" in fault_of(tmp_path, text.replace("kerb_rear_axle_kg = 704.0\n", ""))
 
 
+@pytest.mark.parametrize(
+    ("stated", "range_kg", "is_told"),
+    [
+        ({"gross_limit_kg": "2000.0"}, (0.0, 583.0), True),
+        ({"gross_limit_kg": "2000.0", "payload_range_kg": "[0.0, 500.0]"}, (0.0, 500.0), True),
+        ({"gross_limit_kg": "1400.0"}, (0.0, 450.0), False),  # less than the empty vehicle weighs
+        ({}, (0.0, 450.0), False),
+    ],
+)
+def test_the_gross_limit_and_the_axle_weights_give_the_payload_range(
+    tmp_path: Path, stated: dict[str, str], range_kg: tuple[float, float], is_told: bool
+) -> None:
+    weights = {"kerb_front_axle_kg": "713.0", "kerb_rear_axle_kg": "704.0"}
+    campaign = loaded(tmp_path, campaign_text(vehicle=weights | stated))
+    assert campaign.vehicle.payload_range_kg == range_kg
+    assert campaign.states_payload_range is is_told
+
+
 def test_shares_follow_from_positions_unless_they_are_given(tmp_path: Path) -> None:
     given = {"log": '"a.log"', "payload_kg": "270.0", "front_share_pct": "47.5"}
     campaign = loaded(tmp_path, text_of_runs(EMPTY_RUN, LOADED_RUN, given))

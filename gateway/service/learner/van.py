@@ -4,6 +4,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from gateway.calibration.axle_weights import payload_range_keys
 from gateway.calibration.file import load_calibration
 from gateway.calibration.learning.fitter_answers import doubts_of, vehicle_table
 from gateway.calibration.sister import require_alike, sister_in
@@ -39,9 +40,9 @@ class LearnerVehicle:
 
         What it may carry follows from its limit unless it is stated.
         """
-        gross_kg = answers.kerb_front_axle_kg + answers.kerb_rear_axle_kg
-        if answers.payload_range_kg is None and (answers.gross_limit_kg or 0.0) > gross_kg:
-            answers = replace(answers, payload_range_kg=(0.0, (answers.gross_limit_kg or 0.0) - gross_kg))
+        if answers.payload_range_kg is None:
+            axles_kg = answers.kerb_front_axle_kg, answers.kerb_rear_axle_kg
+            answers = replace(answers, **payload_range_keys(*axles_kg, answers.gross_limit_kg))
         table = vehicle_table(answers, self.name, self.sister)
         if self.sister is not None and not doubts_of(answers, self.sister):
             require_alike(self.sister, table)
