@@ -1,7 +1,7 @@
 """The fitted vehicle against what was measured, run by run, and what the data told of each of its parameters."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,11 +10,9 @@ import numpy as np
 from gateway.calibration.found import Taught
 from gateway.calibration.from_drives import drive_name
 from gateway.calibration.known_run import KnownRun
-from gateway.core.spectrum import spectra_of
 from gateway.core.vehicle import Load, Vehicle
-from gateway.model.displayed import Fitted, modelled_spectra
 from gateway.model.expected import with_strokes
-from gateway.model.spectra import cross_spectra_of
+from gateway.model.spectra import CrossSpectra, cross_spectra_of
 from gateway.model.table import LOG, ROWS, UPRIGHT, prior_of
 from gateway.model.vehicle_model import VehicleModel
 from gateway.model.whittle import Point, Whittle
@@ -37,47 +35,49 @@ class RunFit:
         return f"Run {self.run.number}: {self.run.described}"
 
 
-def fits_of(runs: Sequence[KnownRun], taught: Taught) -> list[RunFit]:
-    """Every run with enough steady driving, at its load, with the parameters of all runs together."""
-    fits, model = [], taught.model
-    found = {one.name: one.load for one in taught.loads}
+def fits_of(runs: Sequence[KnownRun], model: VehicleModel, found: Mapping[str, Load]) -> list[RunFit]:
+    """Every run with enough steady driving, at the load that was found by the drive's name, else the stated one.
+
+    The vehicle is the same for all of them. Nothing is fitted but the road's level: a straight line in logarithms of
+    level and frequency (ISO 8608).
+    """
+    fits, theta = [], model.parameters[: len(UPRIGHT)]
     for run in runs:
-        load = found.get(drive_name(run.number), run.load)
-        batches = [batch for batch in run.batches if not batch.rejected]
-        cross = cross_spectra_of(batches, model.reading)
-        measured = _joined([spectra for batch in batches if (spectra := spectra_of(batch)) is not None])
-        if cross is None or measured is None:
+        cross = cross_spectra_of([batch for batch in run.batches if not batch.rejected], model.reading)
+        if cross is None:
             continue
-        fitted = Fitted(
-            load.payload_kg,
-            load.front_share_pct,
-            cross.delay_mean_s,
-            cross.delay_std_s,
-            amplitude_ratio=math.exp(cross.log_amplitude_mean),
-        )
-        point = Point.of(model.parameters[: len(UPRIGHT)], load)
-        moving = with_strokes(cross.without_roll, point.theta, load, model.ground)
-        misfit = Whittle(moving, model.ground).misfit(point)
-        fits.append(RunFit(run, load, measured, modelled_spectra(measured, model, fitted), misfit))
+        load = found.get(drive_name(run.number), run.load)
+        drive, point = with_strokes(cross.without_roll, theta, load, model.ground), Point.of(theta, load)
+        whittle = Whittle(drive, model.ground)
+        expected = whittle.expected(point)
+        measured = _mean(drive, drive.parts)
+        modelled = _mean(drive, expected * (_power(drive.parts) / _power(expected)))
+        log_level = 0.5 * np.log(measured[:2] / modelled[:2]).sum(axis=0)
+        log_f = np.log(drive.freq_hz[1:-1])
+        modelled *= np.exp(np.polyval(np.polyfit(log_f, log_level, 1), log_f))
+        seen, shown = (_spectra(drive.freq_hz[1:-1], parts) for parts in (measured, modelled))
+        fits.append(RunFit(run, load, seen, shown, whittle.misfit(point)))
     return fits
 
 
-def _joined(parts: Sequence[Spectra]) -> Spectra | None:
-    """Mean powers and mean cross-spectrum of a run's batches, as one Spectra."""
-    if not parts:
-        return None
-    s_aa = np.mean([part.vertical_acceleration**2 for part in parts], axis=0)
-    s_gg = np.mean([part.pitch_rate**2 for part in parts], axis=0)
-    s_ga = np.mean(
-        [p.vertical_acceleration * p.pitch_rate * np.sqrt(p.coherence) * np.exp(1j * p.phase_rad) for p in parts],
-        axis=0,
-    )
+def _power(parts: F64) -> F64:
+    """(b, 1) power of each group of segments, by which segments are divided."""
+    return np.asarray(np.sqrt(parts[0].mean(axis=-1) * parts[1].mean(axis=-1))[:, None])
+
+
+def _mean(drive: CrossSpectra, parts: F64) -> F64:
+    """(4, m) mean over the drive's groups of parts (4, b, m), in units of the sensors again."""
+    return np.asarray(np.sum(drive.n_segments / drive.inverse_power * parts, axis=1) / drive.n_total)
+
+
+def _spectra(freq_hz: F64, parts: F64) -> Spectra:
+    a, g, real, imaginary = parts
     return Spectra(
-        freq_hz=parts[0].freq_hz,
-        vertical_acceleration=np.sqrt(s_aa),
-        pitch_rate=np.sqrt(s_gg),
-        coherence=np.abs(s_ga) ** 2 / (s_aa * s_gg),
-        phase_rad=np.angle(s_ga),
+        freq_hz=freq_hz,
+        vertical_acceleration=np.sqrt(a),
+        pitch_rate=np.sqrt(g),
+        coherence=(real**2 + imaginary**2) / (a * g),
+        phase_rad=np.arctan2(imaginary, real),
     )
 
 
@@ -87,7 +87,8 @@ def fitted_vehicle_section(
     vehicle: Vehicle,
 ) -> Section:
     """Identifiability, and every run's spectra beside the model's; the worst run first."""
-    fits = sorted(fits_of(runs, taught), key=lambda fit: -fit.misfit)
+    found = {one.name: one.load for one in taught.loads}
+    fits = sorted(fits_of(runs, taught.model, found), key=lambda fit: -fit.misfit)
     known = knowledge_of(taught.model, vehicle)
     charts = [_fit_chart(fit) for fit in fits]
     return Section(
@@ -107,13 +108,9 @@ def fitted_vehicle_section(
 
 def _fit_chart(fit: RunFit) -> Chart:
     m, s = fit.measured, fit.modelled
-    band = (m.freq_hz >= s.freq_hz[0]) & (m.freq_hz <= s.freq_hz[-1])
 
     def panel(title: str, measured: F64, modelled: F64, *, is_log: bool = False) -> Panel:
-        marks = (
-            LineMark(m.freq_hz[band], measured[band], "measured", 0),
-            LineMark(s.freq_hz, modelled, "model", 2, "dash"),
-        )
+        marks = LineMark(m.freq_hz, measured, "measured", 0), LineMark(s.freq_hz, modelled, "model", 2, "dash")
         return Panel(Axis("frequency [Hz]"), Axis(title, is_log=is_log), marks)
 
     return Chart(
