@@ -99,6 +99,7 @@ class FitOfDrives:
         return FoundLoad(
             name=name,
             load=load_of(own),
+            deviations=own[:N_OWN],
             payload_std_kg=float(covariance[N_OWN, N_OWN]) ** 0.5,
             without_kg=without_kg,
             without_std_kg=without_std_kg,

@@ -12,6 +12,7 @@ from gateway.calibration.left_out import (
 )
 from gateway.core.vehicle import Load
 from gateway.model.vehicle_model import VehicleModel
+from gateway.records import F64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,13 +20,15 @@ class FoundLoad:
     """What a fit found of one drive: its load with what is stated of it, and what the drive says without.
 
     own_std_kg is the standard deviation that the payload would have if the vehicle were known: it tells the drives'
-    loads apart. without and its standard deviation (kg) are NaN if nothing was stated of the payload. stated (kg) is
-    what the statements say once their common errors are known, NaN if nothing is believed. ``is_held``: a statement
-    disagrees beyond chance and taught nothing.
+    loads apart. deviations (N_OWN,) are those of the vehicle's parameters on this drive. without and its standard
+    deviation (kg) are NaN if nothing was stated of the payload. stated (kg) is what the statements say once their
+    common errors are known, NaN if nothing is believed. ``is_held``: a statement disagrees beyond chance and taught
+    nothing.
     """
 
     name: str
     load: Load
+    deviations: F64
     payload_std_kg: float
     without_kg: float
     without_std_kg: float

@@ -9,6 +9,7 @@ from support.calibrated import ratio_index_calibration
 from support.estimates import make_estimate
 from support.half_car_road import CAR, RATE_HZ, VAN, as_if_fitted, batch_of, batch_over_road
 
+from gateway.calibration.found import FoundLoad
 from gateway.calibration.from_drives import drive_name
 from gateway.calibration.judgement.assessment import BatchSet, Judgement
 from gateway.calibration.judgement.evaluation import CgLeftErrors, Errors, ErrorTable, Judged, TargetErrors, WheelErrors
@@ -18,7 +19,7 @@ from gateway.calibration.teach import teach
 from gateway.core.ratio_index.index import Band
 from gateway.core.vehicle import Load
 from gateway.estimates.batch_estimate import Quantity
-from gateway.model.table import INDEX, NAMES, ROWS, prior_of
+from gateway.model.table import INDEX, N_OWN, NAMES, OWN, ROWS, prior_of
 from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64, Batch, Why
 from gateway.reports.calibration.accuracy import accuracy_section
@@ -97,7 +98,7 @@ def test_the_fitted_half_car_agrees_with_the_measured_spectra() -> None:
     runs = [run_of(0.0, 52.0, 1), run_of(300.0, 47.0, 2)]
     drives = [TaughtDrive(drive_name(one.number), one.batches, one.statement) for one in runs]
     taught = teach(drives, VAN)
-    fits = fits_of(runs, taught.model, {one.name: one.load for one in taught.loads})
+    fits = fits_of(runs, taught.model, taught.loads)
     assert [fit.run.number for fit in fits] == [1, 2]
     for fit in fits:
         logs, turned = differences(fit)
@@ -111,7 +112,7 @@ def calibration() -> VehicleModel:
 
 
 def test_the_model_lies_over_the_spectra_of_the_same_vehicle(calibration: VehicleModel) -> None:
-    (fit,) = fits_of([run_of(270.0, 47.0, noise=0.0)], calibration, {})
+    (fit,) = fits_of([run_of(270.0, 47.0, noise=0.0)], calibration, ())
     logs, turned = differences(fit)
     assert np.sqrt(np.mean(logs**2)) < 0.1  # some eighty half-overlapping segments scatter by about 8 %
     assert len(turned) > 20
@@ -119,20 +120,30 @@ def test_the_model_lies_over_the_spectra_of_the_same_vehicle(calibration: Vehicl
     assert np.abs(fit.modelled.coherence - fit.measured.coherence).mean() < 0.08
 
 
-def test_another_vehicle_lies_beside_them(calibration: VehicleModel) -> None:
-    car = CAR.copy()
+def found_of(load: Load, **deviations: float) -> tuple[FoundLoad]:
+    """What a fit found of the first drive: its load, and deviations of the vehicle by the parameter's name."""
+    own = np.zeros(N_OWN)
+    for name, by in deviations.items():
+        own[OWN.index(INDEX[name])] = by
+    return (FoundLoad(drive_name(1), load, own, 0.0, np.nan, np.nan, is_held=False),)
+
+
+def test_a_run_is_drawn_with_the_goods_that_were_found(calibration: VehicleModel) -> None:
+    """Its payload swings at 14 Hz on its pallets, unlike the vehicle's usual one."""
+    car, load = CAR.copy(), Load(270.0, 47.0)
     car[INDEX["payload_mode_hz"]] = np.log(14.0)
     ringing = run_of(270.0, 47.0, noise=0.0, car=car)
-    own, other = (fits_of([ringing], one, {})[0] for one in (as_if_fitted(car, np.zeros(len(car))), calibration))
-    assert np.mean(differences(other)[0] ** 2) > 1.2 * np.mean(differences(own)[0] ** 2)
-    assert other.misfit > own.misfit
+    by = np.log(14.0) - CAR[INDEX["payload_mode_hz"]]
+    (as_found,) = fits_of([ringing], calibration, found_of(load, payload_mode_hz=by))
+    (as_usual,) = fits_of([ringing], calibration, found_of(load))
+    assert np.mean(differences(as_usual)[0] ** 2) > 1.2 * np.mean(differences(as_found)[0] ** 2)
+    assert as_usual.misfit > as_found.misfit
 
 
 def test_a_load_that_was_found_takes_the_place_of_the_stated_one(calibration: VehicleModel) -> None:
-    said_wrong = run_of(270.0, 47.0, noise=0.0)
-    said_wrong = replace(said_wrong, payload_kg=100.0)
-    (as_said,) = fits_of([said_wrong], calibration, {})
-    (as_found,) = fits_of([said_wrong], calibration, {drive_name(1): Load(270.0, 47.0)})
+    said_wrong = replace(run_of(270.0, 47.0, noise=0.0), payload_kg=100.0)
+    (as_said,) = fits_of([said_wrong], calibration, ())
+    (as_found,) = fits_of([said_wrong], calibration, found_of(Load(270.0, 47.0)))
     assert as_found.misfit < as_said.misfit
     assert as_found.load == Load(270.0, 47.0)
 
@@ -146,7 +157,7 @@ def test_a_rougher_road_lifts_model_and_measurement_alike(calibration: VehicleMo
         vertical_acceleration_mps2=gain * batch.vertical_acceleration_mps2,
         pitch_rate_radps=gain * batch.pitch_rate_radps,
     )
-    one, other = (fits_of([replace(run, batches=(each,))], calibration, {})[0] for each in (batch, louder))
+    one, other = (fits_of([replace(run, batches=(each,))], calibration, ())[0] for each in (batch, louder))
     np.testing.assert_allclose(other.measured.pitch_rate, gain * one.measured.pitch_rate, rtol=0.03)
     np.testing.assert_allclose(other.measured.coherence, one.measured.coherence, atol=0.03)
     assert np.mean(differences(other)[0]) == pytest.approx(0.0, abs=0.02)

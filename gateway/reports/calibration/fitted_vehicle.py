@@ -1,19 +1,19 @@
 """The fitted vehicle against what was measured, run by run, and what the data told of each of its parameters."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from gateway.calibration.found import Taught
+from gateway.calibration.found import FoundLoad, Taught
 from gateway.calibration.from_drives import drive_name
 from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model.expected import with_strokes
 from gateway.model.spectra import CrossSpectra, cross_spectra_of
-from gateway.model.table import LOG, ROWS, UPRIGHT, prior_of
+from gateway.model.table import LOG, ROWS, UPRIGHT, of_drive, prior_of
 from gateway.model.vehicle_model import VehicleModel
 from gateway.model.whittle import Point, Whittle
 from gateway.records import F64, Spectra
@@ -35,18 +35,21 @@ class RunFit:
         return f"Run {self.run.number}: {self.run.described}"
 
 
-def fits_of(runs: Sequence[KnownRun], model: VehicleModel, found: Mapping[str, Load]) -> list[RunFit]:
-    """Every run with enough steady driving, at the load that was found by the drive's name, else the stated one.
+def fits_of(runs: Sequence[KnownRun], model: VehicleModel, found: Sequence[FoundLoad]) -> list[RunFit]:
+    """Every run with enough steady driving, at its load and with its deviations from the vehicle; where a drive is not
+    among the found ones, at the stated load and without.
 
-    The vehicle is the same for all of them. Nothing is fitted but the road's level: a straight line in logarithms of
-    level and frequency (ISO 8608).
+    Nothing is fitted but the road's level: a straight line in logarithms of level and frequency (ISO 8608).
     """
-    fits, theta = [], model.parameters[: len(UPRIGHT)]
+    fits, by_name = [], {one.name: one for one in found}
     for run in runs:
         cross = cross_spectra_of([batch for batch in run.batches if not batch.rejected], model.reading)
         if cross is None:
             continue
-        load = found.get(drive_name(run.number), run.load)
+        drive_found = by_name.get(drive_name(run.number))
+        load, theta = run.load, model.parameters[: len(UPRIGHT)]
+        if drive_found is not None:
+            load, theta = drive_found.load, of_drive(theta, drive_found.deviations)
         drive, point = with_strokes(cross.without_roll, theta, load, model.ground), Point.of(theta, load)
         whittle = Whittle(drive, model.ground)
         expected = whittle.expected(point)
@@ -87,21 +90,21 @@ def fitted_vehicle_section(
     vehicle: Vehicle,
 ) -> Section:
     """Identifiability, and every run's spectra beside the model's; the worst run first."""
-    found = {one.name: one.load for one in taught.loads}
-    fits = sorted(fits_of(runs, taught.model, found), key=lambda fit: -fit.misfit)
+    fits = sorted(fits_of(runs, taught.model, taught.loads), key=lambda fit: -fit.misfit)
     known = knowledge_of(taught.model, vehicle)
     charts = [_fit_chart(fit) for fit in fits]
     return Section(
         "half-car",
         "Half-car fitted to both sensors",
         (
-            "Measured spectra of every run beside those of the one vehicle fitted to all of them, each with its own "
-            "load. The road's level is a straight line drawn through the spectra; everything else is the model's. "
-            "Misfit is the likelihood ratio over what chance gives: about 1 if the model explains everything.",
+            "Measured spectra of every run beside those of the vehicle fitted to all of them, with the load that was "
+            "found of the run, and as far as springs, dampers, tyres and goods deviated on it. The road's level is a "
+            "straight line drawn through the spectra; everything else is the model's. Misfit is the likelihood ratio "
+            "over what chance gives: about 1 if the model explains everything.",
             told(known),
         ),
         tuple(charts[:1]),
-        (_misfit_table(fits, taught.model), knowledge_table(known)),
+        (_misfit_table(fits), knowledge_table(known)),
         tuple((fit.title, (chart,)) for fit, chart in zip(fits[1:], charts[1:], strict=True)),
     )
 
@@ -134,16 +137,12 @@ def _unbroken_deg(phase_rad: F64) -> F64:
     return np.where(leaps, np.nan, degrees)
 
 
-def _misfit_table(fits: Sequence[RunFit], model: VehicleModel) -> Table:
+def _misfit_table(fits: Sequence[RunFit]) -> Table:
     rows = tuple(
         (str(fit.run.number), f"{fit.load.payload_kg:.0f} kg", f"{fit.load.front_share_pct:.1f} %", f"{fit.misfit:.2f}")
         for fit in sorted(fits, key=lambda fit: fit.run.number)
     )
-    caption = (
-        "Misfit of every run by the one vehicle of all runs. Weighing lets each batch's springs, dampers and tyres "
-        f"deviate, so that its misfit is smaller; beyond {model.misfit_limit:.2f} there, no load is answered"
-    )
-    return Table(caption, ("Run", "payload", "front share", "misfit"), rows)
+    return Table("Misfit of every run, at the load that was found", ("Run", "payload", "front share", "misfit"), rows)
 
 
 UNTOLD_SHARE: Final = 0.9  # chosen: of the prior's standard deviation; with more remaining the data told little
