@@ -59,6 +59,5 @@ def test_error_sources_are_listed_largest_first(gateway: Gateway, watched: Watch
 
 
 def helps(line: BudgetLine, std_kg: float) -> bool:
-    """Whether a remedy leaves another number than the present one, as the page rounds both."""
-    then_kg = line.payload_with_remedy_kg
-    return line.remedy is not None and round(1.96 * then_kg) != round(1.96 * std_kg)
+    """Whether a remedy narrows the interval by a tenth."""
+    return line.remedy is not None and line.payload_with_remedy_kg < 0.9 * std_kg

@@ -3,7 +3,7 @@
 import { ageNow, known, show } from "./known.js";
 import { element, made, say, write } from "./page.js";
 import { phrase, taughtHere } from "./phrases.js";
-import { UNKNOWN, Z95, ago, between, capital, clock, figure, kmh, reasons as named, withStd } from "./words.js";
+import { UNKNOWN, USEFUL_HELP, Z95, ago, between, capital, clock, figure, kmh, reasons as named, withStd } from "./words.js";
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interval", { between: between(bounds, digits, unit) }));
 
@@ -92,7 +92,7 @@ show(({ latest, sources, remedies: advised }) => {
     built.style.setProperty("--part", `${(100 * line.payload_kg) / latest.payload_std_kg}%`);
     return built;
   }));
-  const helps = ({ remedy, payload_with_remedy_kg: then }) => advised.has(remedy) && half(then) !== half(latest.payload_std_kg);
+  const helps = ({ remedy, payload_with_remedy_kg: then }) => advised.has(remedy) && then < (1 - USEFUL_HELP) * latest.payload_std_kg;
   const remedies = new Map(shown.filter(helps).map((line) => [line.remedy, line.payload_with_remedy_kg]));
   element("budget-better").hidden = remedies.size === 0;
   element("budget-remedies").replaceChildren(...[...remedies].sort(([, one], [, other]) => one - other).map(([remedy, then]) =>

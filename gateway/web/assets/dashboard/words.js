@@ -7,6 +7,7 @@ const common = speaker(COMMON);
 
 export const UNKNOWN = common("unknown");
 export const Z95 = 1.96; // standard deviations to either side of the middle 95 %
+export const USEFUL_HELP = 0.1; // chosen: what narrows ± by less is not worth saying
 export const SURE = 0.99; // chosen: a change of load that is less probable says how probable
 const GLUE = "\u00a0"; // a number and its unit stay on one line
 

@@ -3,7 +3,7 @@
 import { LEARNING, Refused, STATEMENTS, acceptToken, load, send, stateLoad } from "../dashboard/gateway.js";
 import { acceptNumbers, element, made, numberText, say, typedNumber, write } from "../dashboard/page.js";
 import { button, row } from "../dashboard/parts.js";
-import { clock, duration, figure } from "../dashboard/words.js";
+import { USEFUL_HELP, clock, duration, figure } from "../dashboard/words.js";
 import { fill, speaker } from "../language.js";
 import { COMMON } from "../words/common.js";
 import { HELPS } from "../words/helps.js";
@@ -11,7 +11,6 @@ import { TEACH } from "../words/teach.js";
 import { finding, translated } from "./translated.js";
 
 const ASK_EVERY_MS = 5000; // chosen: as the cab page
-const USEFUL_HELP = 0.1; // chosen: what narrows ± by less is not worth saying
 const REQUIRED = ["kerb_front_axle_kg", "kerb_rear_axle_kg", "wheelbase_m", "sensor_position_m", "gross_limit_kg", "front_axle_limit_kg", "rear_axle_limit_kg"];
 const MORE = ["loading_begin_m", "loading_end_m", "sensor_offset_left_m", "track_width_m"];
 const SIGNED = ["sensor_position_m", "sensor_offset_left_m", "loading_begin_m"];
