@@ -341,7 +341,7 @@ def recorded(data: Path) -> tuple[Recorded, list[KnownRun]]:
 
 
 def recorded_of(vehicle: Vehicle, steady: KnownRun, mixed: Sequence[KnownRun]) -> Recorded:
-    """With notes that err by chance."""
+    """The drives with notes that err by chance."""
     rng = np.random.default_rng(SEED)
     drives = {STEADY: steady, **{name: mixed[i] for name, i in TEACH.items()}}
     notes = {

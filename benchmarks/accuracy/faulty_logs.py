@@ -163,7 +163,7 @@ def _held(every_s: float) -> Change:
 
 
 def _stuck(part_s: float) -> Change:
-    """For this many seconds of every minute the last sample is repeated."""
+    """Repeats the last sample for this many seconds of every minute."""
 
     def change(t_s: F64, x: F64, rng: np.random.Generator) -> F64:
         begin_s = np.floor(t_s / PERIOD_S) * PERIOD_S + (PERIOD_S - part_s)
@@ -241,7 +241,7 @@ def _two_devices(other: Rewrite, late_s: float) -> Rewrite:
 
 
 def _joined(log: Log, other: Log, rows: I64, late_ns: int) -> Log:
-    """With these rows of another log with as many frames, delayed."""
+    """The log with these rows of another log with as many frames, delayed."""
     one, more = log.frames, other.rows(rows).frames
     t_ns = np.r_[one.t_ns, more.t_ns + late_ns]
     both = Frames(

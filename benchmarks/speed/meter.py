@@ -94,7 +94,7 @@ def in_own_process(function: Callable[..., object] | str, *arguments: object) ->
 
 
 def print_answer(call: Callable[[], object]) -> None:
-    """In that process: the result as JSON, or the reason why there is none; nothing for None."""
+    """Print the result of ``call`` as JSON, or the reason why there is none; nothing for None."""
     try:
         found = call()
     except ModuleNotFoundError as fault:
@@ -109,7 +109,7 @@ def springscale(*arguments: object) -> dict[str, Any]:
 
 
 def run_command(arguments: list[str]) -> dict[str, Any]:
-    """The same, in the small process that starts it."""
+    """The same figures, from the small process that starts the command."""
     begun_s = time.perf_counter()
     process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None

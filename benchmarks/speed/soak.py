@@ -69,7 +69,7 @@ class Service:
         self.stop: Callable[[], object] = lambda: None
 
     def started(self, gateway: Gateway) -> None:
-        """In the event loop's thread."""
+        """Called in the event loop's thread, once it runs."""
         loop = asyncio.get_running_loop()
         self.gateway, self.n_starts = gateway, self.n_starts + 1
         self.stop = lambda: loop.call_soon_threadsafe(gateway.request_stop)
@@ -81,7 +81,7 @@ class Service:
         return self.gateway
 
     def ask(self, path: str, said: object = None) -> bytes:
-        """Its answer to a GET, or to a POST of ``said``."""
+        """The service's answer to a GET, or to a POST of ``said``."""
         content = None if said is None else json.dumps(said).encode()
         request = urllib.request.Request(self.now.url + path, content, {"Content-Type": "application/json"})
         with urllib.request.urlopen(request, timeout=30.0) as answer:

@@ -238,7 +238,7 @@ class Gpsd:
         self._socket: socket.socket | None = None
 
     def fileno(self) -> int:
-        """That of the connection; -1 while there is none."""
+        """The connection's file descriptor; -1 while there is none."""
         return -1 if self._socket is None else self._socket.fileno()
 
     def read(self) -> list[Rows]:

@@ -49,13 +49,13 @@ def stated_load(run: KnownRun, vehicle: Vehicle) -> Load:
 
 
 def stated_run(run: KnownRun, spectra: CrossSpectra, vehicle: Vehicle) -> StatedRun:
-    """One drive with its spectra; without the roll rate, which a known mount has removed from the others."""
+    """The likelihood of one drive; without the roll rate, which a known mount has removed from the other spectra."""
     ground = Ground.of(vehicle, with_roll=spectra.has_roll and spectra.reading.mount is not None)
     return StatedRun(stated_load(run, vehicle), Whittle(spectra.without_roll, ground, EVIDENCE))
 
 
 def stated_runs(runs: Sequence[KnownRun], vehicle: Vehicle, reading: Reading) -> list[StatedRun]:
-    """Those whose load is stated, with enough steady driving."""
+    """The runs whose load is stated, with enough steady driving."""
     stated = [run for run in runs if run.has_payload and run.has_place]
     each = [(run, segments_of([b for b in run.batches if not b.rejected], reading)) for run in stated]
     return [stated_run(run, grouped(segments, reading), vehicle) for run, segments in each if segments is not None]

@@ -147,7 +147,7 @@ def _drives(runs: Sequence[KnownRun]) -> list[TaughtDrive]:
 
 
 def with_statements_tested(inspection: Inspection, vehicle: Vehicle, like: CalibrationFile | None = None) -> Inspection:
-    """With a warning for each run whose statement the drives contradict, as a calibration would test it."""
+    """The inspection with a warning for each run whose statement the drives contradict, as a calibration tests it."""
     sister = None if like is None else sister_in(like)
     runs = [one.identification for one in inspection.usable if one.has_identification]
     return _with_disagreements(inspection, examined(_drives(runs), vehicle, sister))
@@ -159,7 +159,7 @@ def drive_name(number: int) -> str:
 
 
 def _with_disagreements(inspection: Inspection, claims: Sequence[FoundClaim]) -> Inspection:
-    """With a warning for each run whose statement was held, because the drives contradict it beyond chance."""
+    """The inspection with a warning for each run whose statement was held: the drives contradict it beyond chance."""
     runs = {drive_name(one.run.number): one.run for one in inspection.split}
     verdicts = {drive_name(one.number): one for one in inspection.verdicts}
     for claim in {one.drive: one for one in claims if one.state is ClaimState.HELD}.values():
@@ -175,7 +175,7 @@ def _with_disagreements(inspection: Inspection, claims: Sequence[FoundClaim]) ->
 
 
 def _as_believed(inspection: Inspection, claims: Sequence[FoundClaim], taught: Taught | None) -> Inspection:
-    """With the loads as the fit believes them: without statements that were held and errors that all of them share."""
+    """The inspection with the loads as the fit believes them, without held statements and without common errors."""
     held = {one.drive for one in claims if one.state is ClaimState.HELD}
 
     def believed(run: KnownRun) -> KnownRun:

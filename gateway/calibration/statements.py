@@ -275,5 +275,5 @@ class Terms:
 
 
 def shared_disagreement(mean: float, variance: float) -> float:
-    """Of a cause with its prior N(0, 1), in standard deviations: what its claims' drives say without the prior."""
+    """The size of a common error by its claims' drives alone, without its prior N(0, 1), in standard deviations."""
     return abs(mean) / float(np.sqrt(max(1.0 - variance, 1e-9)))

@@ -104,11 +104,11 @@ class Signs:
     rivalry: float
 
     def deviation(self, name: str) -> float:
-        """One parameter's, in standard deviations."""
+        """The deviation of one parameter, in standard deviations."""
         return float(self.deviations[INDEX[name]])
 
     def changed(self, name: str) -> float:
-        """One parameter's, in its unit or as a logarithm."""
+        """The found value of one parameter, in its unit or as a logarithm."""
         return float(self.off[INDEX[name]])
 
 

@@ -132,7 +132,7 @@ class _Arrow:
         return common, [-by_own[:, -1] - by_own[:, :-1] @ common for by_own in solved]
 
     def slope(self, common: F64, own: Sequence[F64]) -> float:
-        """By how much the cost rises along a step, to first order."""
+        """The rise of the cost along a step, to first order."""
         return float(self.gradient @ common) + sum(float(g @ s) for g, s in zip(self.own_gradients, own, strict=True))
 
 

@@ -80,7 +80,7 @@ class Hypothesis:
 def hypotheses_of(
     model: VehicleModel, shapes: Sequence[ShapeHypothesis], gain: tuple[float, float], *, with_roll: bool
 ) -> list[Hypothesis]:
-    """One for each shape of the load, firm and sound.
+    """One hypothesis for each shape of the load, firm and sound.
 
     ``gain`` is the logarithm of the accelerometer's gain and its standard deviation. ``with_roll``: each batch
     determines its sensors' noise.

@@ -262,7 +262,7 @@ def _distinct(peaks: Sequence[Peak]) -> list[Peak]:
 
 
 def _against(excess: F64) -> F64:
-    """Minus the log probability of each peak, whose evidence lies ``excess`` (k,) below that of the best."""
+    """Minus the log probability of each peak (k,), from how far its evidence lies below that of the best."""
     found: F64 = 0.5 * (EVIDENCE_DOF + 1.0) * np.log1p(2.0 * excess / EVIDENCE_DOF)
     return found
 

@@ -206,7 +206,7 @@ class Motion:
         return found[: len(wanted)] if is_wanted[: len(wanted)].all() else found[wanted]
 
     def _fill_in_by_masses(self, found: C128) -> None:
-        """By the masses, and by frequency and damping ratio of the payload on its floor."""
+        """Fill in the derivatives by the masses, and by frequency and damping ratio of the payload on its floor."""
         fixed, a, u = self._fixed, self._by_force * self._at.omega2, self.body
         pulled = a[:, :, None, None] * u[:, None].swapaxes(0, 1)  # (p, c, c, s, k, 5, m)
         carried = np.zeros_like(self.paths)
@@ -224,7 +224,9 @@ class Motion:
         np.multiply(carried, by_felt * (2j * self._ratio), out=found[car.DAMPING])
 
     def _fill_in_by_sensor(self, found: C128) -> None:
-        """By its position, the gyro's lag, the accelerometer's gain and, with roll, its place to the left and yaw."""
+        """Fill in those by the sensor's position, the gyro's lag, the accelerometer's gain and, with roll, the sensor's
+        place to the left and its yaw.
+        """
         fixed, ground = self._fixed, self._ground
         heave = -self._at.omega2 * fixed[car.GAIN]
         turned = self.body[1] - self.body[0]
@@ -241,7 +243,8 @@ class Motion:
             found[car.YAW, 2:] = (self._late / ground.wheelbase_m) * turned
 
     def _fill_in_by_axles(self, found: C128, is_wanted: Bool) -> None:
-        """By the numbers of both axles, which change the ratios q, q', q'' = ``per_tyre``, and by the drivelines.
+        """Fill in those by the drivelines and by the numbers of both axles, which change the ratios q, q', q'' =
+        ``per_tyre``.
 
         With h = t/T road - body, together and against, a ratio's change moves the sensors by dq g h + dq' g' h' + dq''
         (g h' + g' h), where g is what forces T on the body and the moment do to the sensors. What t and T change beside

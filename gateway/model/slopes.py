@@ -85,7 +85,7 @@ class _Plan:
 
     @cached_property
     def where_moving(self) -> list[int]:
-        """Their places in ``free``."""
+        """Places of ``moving`` in ``free``."""
         return [self.free.index(i) for i in self.moving]
 
     @cached_property

@@ -29,7 +29,7 @@ class Recording:
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """Where the inertial unit sits, and how far its axes are turned from the vehicle's."""
+    """The place of the inertial unit, and how far its axes are turned from the vehicle's."""
 
     position_m: float = 3.2  # behind the front axle: the rear of the trunk
     left_m: float = 0.0

@@ -27,7 +27,7 @@ class Felt:
 
 
 def joined(parts: list[Felt]) -> Felt:
-    """One after the other."""
+    """The parts as one recording, one after the other."""
     return Felt(
         parts[0].step_s,
         np.concatenate([part.force_mps2 for part in parts]),

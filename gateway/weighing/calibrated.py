@@ -84,8 +84,8 @@ class CalibratedVehicle:
         return _widened(low, high)
 
     def front_share_believed_pct(self, estimator: str) -> tuple[float, float] | None:
-        """The same of the front share, where the most that the vehicle may carry lies between the axles. None if
-        calibration saw one share only.
+        """The range of front shares that is believed, with the most that the vehicle may carry between the axles. None
+        if calibration saw one share only.
         """
         low, high = self.front_share_seen_pct
         if estimator == BY_MODEL:

@@ -69,7 +69,7 @@ def medians_of(batches: pl.DataFrame) -> pl.DataFrame:
 
 
 def drifts_of(medians: pl.DataFrame) -> dict[tuple[str, str], Drift]:
-    """By vehicle and parameter, the drifts with enough data, judged together.
+    """The drifts with enough data by vehicle and parameter, judged together.
 
     ``medians`` has a row for each ``vehicle``, ``name`` and ``week`` (``medians_of``). The movement of the fleet in a
     week is the median, over at least LEAST_VEHICLES, of how far each vehicle is from its own median then.

@@ -108,7 +108,7 @@ class Decoder:
         return tuple(remark for message in self._messages for remark in message.remarks())
 
     def causes(self) -> tuple[Remark, ...]:
-        """Those that explain why nothing is weighed: they concern a good part of a signal that weighing needs."""
+        """The causes that explain why nothing is weighed: they concern a good part of a signal that weighing needs."""
         return tuple(one for one in self.remarks() if one.share >= TELLING_SHARE and one.signals & NEEDED)
 
     def silent(self) -> tuple[str, ...]:

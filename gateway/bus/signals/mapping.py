@@ -62,7 +62,7 @@ class IdFilter:
         return not self.mask & SOURCE_ADDRESS and bool(self.can_id & EXTENDED_ID)
 
     def is_for(self, can_id: int) -> bool:
-        """The same of one identifier."""
+        """Whether a frame with this identifier counts."""
         return can_id & self.mask == self.can_id
 
 

@@ -66,7 +66,7 @@ class Judged:
         return self.compared(target).is_covered(self.payload_doubt_kg if target == "payload" else 0.0)
 
     def compared(self, target: Target) -> Comparison:
-        """One of the two quantities, truth and estimate."""
+        """Truth and estimate of one of the two quantities."""
         told = self.estimate
         if target == "payload":
             return Comparison(self.payload_kg, told.payload.number, *told.payload.interval95)
@@ -125,7 +125,7 @@ class TargetErrors:
 
 @dataclass(frozen=True, slots=True)
 class CgLeftErrors:
-    """Of the centre of gravity's lateral position, in m. None without an estimate."""
+    """Errors of the centre of gravity's lateral position, in m. None without an estimate."""
 
     mean_abs_m: float | None
     bias_m: float | None
@@ -138,7 +138,7 @@ class CgLeftErrors:
 
 @dataclass(frozen=True, slots=True)
 class WheelErrors:
-    """Of the four wheels' loads in percent of the gross weight. None if they are not known."""
+    """Errors of the four wheels' loads in percent of the gross weight. None if they are not known."""
 
     mean_abs_pct_of_gross: float | None
     max_abs_pct_of_gross: float | None
@@ -161,11 +161,11 @@ class Errors:
 
     @property
     def answered(self) -> str:
-        """As people read it: "7 of 9"."""
+        """The number of answered batches for people: "7 of 9"."""
         return f"{self.n_batches - self.n_rejected} of {self.n_batches}"
 
     def of(self, target: Target) -> TargetErrors:
-        """Those of one quantity."""
+        """The errors of one quantity."""
         return self.payload if target == "payload" else self.front_share
 
     def to_json(self) -> dict[str, Any]:
@@ -236,7 +236,7 @@ def errors_of(judged: Sequence[Judged], vehicle: Vehicle) -> Errors:
 def _target_errors(
     compared: F64, full_range: tuple[float, float], unit: Literal["kg", "pp"], unloaded_kg: float | None = None
 ) -> TargetErrors:
-    """Of the rows (n, 4) of Comparison whose truth is known."""
+    """The errors of the rows (n, 4) of Comparison whose truth is known."""
     low, high = full_range
     compared = compared[np.isfinite(compared[:, 0])]
     answered = np.isfinite(compared[:, 1])
@@ -257,7 +257,7 @@ def _target_errors(
 
 
 def _cg_left_errors(compared: F64) -> CgLeftErrors | None:
-    """Of the rows (n, 4) of Comparison; None if no truth is known."""
+    """The errors of the rows (n, 4) of Comparison; None if no truth is known."""
     known = compared[np.isfinite(compared[:, 0])]
     if not len(known):
         return None

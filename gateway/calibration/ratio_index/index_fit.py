@@ -57,7 +57,7 @@ class Choice:
 
     @property
     def models(self) -> Models:
-        """Of payload and of front share."""
+        """The regressions of payload and of front share."""
         return [one.model if one else None for one in self.regressions]
 
     def predict(self, table: SpectrumTable) -> tuple[F64, F64]:
@@ -238,7 +238,7 @@ def fit_ratio_index(
 
 
 def _models_without(choice: Choice, nested: Nested, table: SpectrumTable) -> dict[int, tuple[Pairs, Models]]:
-    """By run number, bands and regressions without that run."""
+    """Bands and regressions without each run, by its number."""
     is_answered = [model is not None for model in choice.models]
     if np.isfinite(nested.error[is_answered]).all():
         return {number: (again.pairs, again.models) for number, again in nested.without.items()}

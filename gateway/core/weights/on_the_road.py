@@ -22,7 +22,7 @@ class Unsprung:
 
     @property
     def both(self) -> Quantity:
-        """Their sum."""
+        """The sum of both axles."""
         one, other = self.front.std, self.rear.std
         variance = one**2 + other**2 + 2.0 * self.correlation * one * other
         return Quantity(self.front.number + self.rear.number, math.sqrt(max(0.0, variance)))

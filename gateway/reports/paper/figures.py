@@ -120,7 +120,7 @@ def spectrum_of(run: KnownRun, sensor: str) -> tuple[F64, F64]:
 
 
 def _spectra(experiments: Experiments) -> Iterator[Panel]:
-    """Of acceleration for several loads, and of pitch rate for several shares."""
+    """The spectra of acceleration for several loads, and of pitch rate for several shares."""
     by_load = [(f"{run.payload_kg:.0f} kg", run) for run in experiments.driven["load-sweep"].runs[::3]]
     by_share = [(f"{run.front_share_pct:.0f} %", run) for run in experiments.driven["share-sweep"].runs[::4]]
     for sensor, named in ((ACCELERATION, by_load), (PITCH_RATE, by_share)):

@@ -140,7 +140,7 @@ class KnownLoadsTold(BaseModel):
 
 
 def known_loads_router(known_loads: KnownLoads) -> APIRouter:
-    """Their route; a service on the road has no known loads."""
+    """The route of known loads; a service on the road has none."""
     router = APIRouter(tags=["api"])
 
     @router.get(KNOWN_LOADS_PATH)
