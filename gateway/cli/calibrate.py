@@ -32,6 +32,7 @@ from gateway.errors import CalibrationImpossibleError, ConfigurationError
 from gateway.files.whole import refusal_told, write_whole
 from gateway.offline.campaigns import inspect
 from gateway.records import json_line
+from gateway.stated.doubt import DoubtKind
 from gateway.words import known, span
 
 
@@ -208,6 +209,8 @@ def tell_doubts(campaign: Campaign, sister: CalibrationFile | None) -> None:
             err=True,
         )
     for doubt in doubts_of_vehicle(campaign.vehicle, sister.vehicle if sister else None):
+        if doubt.kind is DoubtKind.PAYLOAD and not campaign.states_payload_range:
+            continue  # said above
         click.echo(f"{campaign.path}: unlikely: {doubt.sentence}", err=True)
 
 
