@@ -122,6 +122,7 @@ def test_unlikely_figures_of_the_vehicle_are_asked_about(drives: Path, tmp_path:
     done = called("learn", drives / "01.log", "--vehicle", tmp_path / "van.toml", "--signals", SIGNALS, "--dry-run")
     assert done.exit_code == 0, done.output
     assert "van.toml: unlikely: 3124 kg empty on a wheelbase of 2.8 m: such vehicles weigh 862 to" in done.stderr
+    assert done.stderr.count("450 kg") == 1  # a default that does not fit it is told, and not doubted too
 
 
 def test_without_a_place_for_the_calibration_nothing_begins(drives: Path) -> None:
