@@ -115,14 +115,25 @@ def test_a_table_that_cannot_be_read_is_refused_before_any_log_is(drives: Path, 
     assert "did you mean payload_kg?" in str(refused.value)
 
 
-def test_unlikely_figures_of_the_vehicle_are_asked_about(drives: Path, tmp_path: Path) -> None:
-    in_pounds = {"kerb_front_axle_kg": 1572, "kerb_rear_axle_kg": 1552, "wheelbase_m": 2.8, "sensor_position_m": 1.2}
-    figures = "".join(f"{name} = {figure}\n" for name, figure in in_pounds.items())
-    (tmp_path / "van.toml").write_text(f'[vehicle]\nname = "van"\n{figures}', encoding="utf-8")
+@pytest.mark.parametrize(
+    ("axle_kg", "more", "told"),
+    [
+        (1562, {"wheelbase_m": 2.8}, ["3124 kg empty on a wheelbase of 2.8 m: such vehicles weigh 862 to"]),
+        (4600, {"wheelbase_m": 5.6}, []),  # 450 kg by default: said before, and not doubted too
+        (4600, {"wheelbase_m": 5.6, "payload_range_kg": [0, 450]}, ["450 kg"]),
+    ],
+)
+def test_unlikely_figures_of_the_vehicle_are_asked_about(
+    drives: Path, tmp_path: Path, axle_kg: int, more: dict[str, object], told: list[str]
+) -> None:
+    keys = {"kerb_front_axle_kg": axle_kg, "kerb_rear_axle_kg": axle_kg, "sensor_position_m": 1.2, **more}
+    lines = "".join(f"{name} = {figure}\n" for name, figure in keys.items())
+    (tmp_path / "van.toml").write_text(f'[vehicle]\nname = "van"\n{lines}', encoding="utf-8")
     done = called("learn", drives / "01.log", "--vehicle", tmp_path / "van.toml", "--signals", SIGNALS, "--dry-run")
     assert done.exit_code == 0, done.output
-    assert "van.toml: unlikely: 3124 kg empty on a wheelbase of 2.8 m: such vehicles weigh 862 to" in done.stderr
-    assert done.stderr.count("450 kg") == 1  # a default that does not fit it is told, and not doubted too
+    doubts = [line for line in done.stderr.splitlines() if "van.toml: unlikely: " in line]
+    assert len(doubts) == len(told)
+    assert all(part in line for part, line in zip(told, doubts, strict=True))
 
 
 def test_without_a_place_for_the_calibration_nothing_begins(drives: Path) -> None:
