@@ -31,7 +31,7 @@ def spectra_of_noise(is_coloured: bool) -> tuple[F64, F64, float]:
     x = np.random.default_rng(5).standard_normal((N_DRIVES, 5000))
     if is_coloured:
         x = signal.lfilter([1.0], [1.0, -1.2, 0.6], x, axis=1)
-    found = [mean_spectrum(row, np.ones(5000, bool), N_SEGMENT, RATE_HZ, "amplitude") for row in x]
+    found = [mean_spectrum(row, np.ones(5000, bool), N_SEGMENT, RATE_HZ) for row in x]
     whole = [one for one in found if one is not None]
     return whole[0][0], np.array([spectrum for _, spectrum in whole]), (5000 - N_SEGMENT) // (N_SEGMENT // 2) + 1.0
 

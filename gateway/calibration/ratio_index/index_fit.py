@@ -22,7 +22,7 @@ from gateway.calibration.ratio_index.least_squares import (
     scaled_design,
     without_each_run,
 )
-from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, SPECTRUM, SpectrumTable, spectrum_table
+from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, SpectrumTable, spectrum_table
 from gateway.core.late import special
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.ratio_index.regression import (
@@ -212,7 +212,7 @@ def fit_ratio_index(
             for model, factor in zip(models, widening, strict=True)
         )
         return RatioIndexCalibration(
-            spectrum=SPECTRUM,
+            spectrum="amplitude",
             n_segment=N_SEGMENT,
             acceleration_bands=of_a.bands if of_a else None,
             pitch_rate_bands=of_g.bands if of_g else None,

@@ -9,7 +9,6 @@ import numpy as np
 from gateway.calibration.known_run import KnownRun
 from gateway.core.ratio_index.index import (
     RatioIndexCalibration,
-    SpectrumKind,
     acceleration_segments,
     acceleration_spectrum,
     indexes_of,
@@ -20,7 +19,6 @@ from gateway.core.spectrum import segment_starts
 from gateway.errors import CalibrationImpossibleError
 from gateway.records import F64, I64, Batch, Bool
 
-SPECTRUM: Final[SpectrumKind] = "amplitude"
 N_SEGMENT: Final = 1024  # 20.5 s at 50 Hz: resolves 0.05 Hz and still fits between two traffic lights
 
 
@@ -109,8 +107,8 @@ def spectrum_table(runs: Sequence[KnownRun], sensor_offset_left_m: float = 0.0) 
 
 def _spectra(batch: Batch, roll_lever_m: float) -> tuple[tuple[F64, F64] | None, tuple[F64, F64] | None]:
     return (
-        acceleration_spectrum(batch, N_SEGMENT, SPECTRUM, roll_lever_m),
-        mean_spectrum(batch.pitch_rate_radps, batch.usable, N_SEGMENT, batch.rate_hz, SPECTRUM),
+        acceleration_spectrum(batch, N_SEGMENT, roll_lever_m),
+        mean_spectrum(batch.pitch_rate_radps, batch.usable, N_SEGMENT, batch.rate_hz),
     )
 
 

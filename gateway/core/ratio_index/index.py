@@ -18,8 +18,6 @@ from gateway.records import C128, F64, I64, Batch, Bool
 UPPER_LIMIT_HZ = 10.0  # of the integrals (7) and (8), as in the paper
 MIN_SEGMENTS = 6  # chosen: a mean of fewer segments scatters too much
 
-SpectrumKind = Literal["amplitude", "power"]
-
 
 class Band(NamedTuple):
     """A band-pass (6): centre and -3 dB width, both in Hz."""
@@ -45,7 +43,7 @@ class RatioIndexCalibration:
 
     __pydantic_config__ = STRICT
 
-    spectrum: SpectrumKind
+    spectrum: Literal["amplitude"]  # what the ratio is taken of: said in the file, for there are others
     n_segment: int = field(metadata={"ge": 64, "le": 65_536})
     acceleration_bands: tuple[Band, Band] | None
     pitch_rate_bands: tuple[Band, Band] | None
@@ -73,29 +71,24 @@ def band_pass_gain(freq_hz: F64, band: Band) -> F64:
     return gain
 
 
-def mean_spectrum(x: F64, usable: Bool, n_segment: int, rate_hz: float, kind: SpectrumKind) -> tuple[F64, F64] | None:
-    """Frequencies (m,) up to 10 Hz and the spectrum (m,) averaged over half-overlapping Hann segments.
+def mean_spectrum(x: F64, usable: Bool, n_segment: int, rate_hz: float) -> tuple[F64, F64] | None:
+    """Frequencies (m,) up to 10 Hz and the mean amplitude (m,) in u/sqrt(Hz) of half-overlapping Hann segments.
 
-    Amplitude: mean of |X| in u/sqrt(Hz); power: mean of |X|^2 in u^2/Hz. None where fewer than
-    MIN_SEGMENTS segments fit between the gaps.
+    None where fewer than MIN_SEGMENTS segments fit between the gaps.
     """
     starts = segment_starts(usable & np.isfinite(x), n_segment, n_segment // 2)
     if len(starts) < MIN_SEGMENTS:
         return None
-    return _mean(segment_transforms(x, starts, n_segment, rate_hz), n_segment, rate_hz, kind)
+    return _mean(segment_transforms(x, starts, n_segment, rate_hz), n_segment, rate_hz)
 
 
-def _mean(transforms: C128, n_segment: int, rate_hz: float, kind: SpectrumKind) -> tuple[F64, F64]:
+def _mean(transforms: C128, n_segment: int, rate_hz: float) -> tuple[F64, F64]:
     freq_hz = frequencies_hz(n_segment, rate_hz)
     wanted = (freq_hz > 0.0) & (freq_hz <= UPPER_LIMIT_HZ)
-    magnitude = np.abs(transforms[:, wanted])
-    spectrum = np.mean(magnitude if kind == "amplitude" else magnitude**2, axis=0)
-    return freq_hz[wanted], spectrum
+    return freq_hz[wanted], np.mean(np.abs(transforms[:, wanted]), axis=0)
 
 
-def acceleration_spectrum(
-    batch: Batch, n_segment: int, kind: SpectrumKind, roll_lever_m: float
-) -> tuple[F64, F64] | None:
+def acceleration_spectrum(batch: Batch, n_segment: int, roll_lever_m: float) -> tuple[F64, F64] | None:
     """The vertical acceleration's mean spectrum, moved to the centre line where the roll rate allows it.
 
     A point y metres left of the centre line of a rigid body moves up by heave + y roll (ISO 8855), so that on the line
@@ -105,11 +98,11 @@ def acceleration_spectrum(
     """
     x, usable = batch.vertical_acceleration_mps2, batch.usable
     if not is_moved(batch, n_segment, roll_lever_m) or batch.roll_rate_radps is None:
-        return mean_spectrum(x, usable, n_segment, batch.rate_hz, kind)
+        return mean_spectrum(x, usable, n_segment, batch.rate_hz)
     starts = acceleration_segments(batch, n_segment, roll_lever_m)
     sideways = segment_transforms(batch.roll_rate_radps, starts, n_segment, batch.rate_hz)
     sideways *= 2j * np.pi * roll_lever_m * frequencies_hz(n_segment, batch.rate_hz)
-    return _mean(segment_transforms(x, starts, n_segment, batch.rate_hz) - sideways, n_segment, batch.rate_hz, kind)
+    return _mean(segment_transforms(x, starts, n_segment, batch.rate_hz) - sideways, n_segment, batch.rate_hz)
 
 
 def is_moved(batch: Batch, n_segment: int, roll_lever_m: float) -> bool:
@@ -132,23 +125,22 @@ def _rolling(batch: Batch, n_segment: int) -> I64:
     return segment_starts(batch.usable & known, n_segment, n_segment // 2)
 
 
-def ratio_index(freq_hz: F64, spectrum: F64, bands: tuple[Band, Band], kind: SpectrumKind) -> float:
+def ratio_index(freq_hz: F64, spectrum: F64, bands: tuple[Band, Band]) -> float:
     """R, equations (7) and (8): integrals to 10 Hz of the two band-passed spectra, one over the other."""
-    order = 1 if kind == "amplitude" else 2
-    passed = [float(np.sum(band_pass_gain(freq_hz, band) ** order * spectrum)) for band in bands]
+    passed = [float(np.sum(band_pass_gain(freq_hz, band) * spectrum)) for band in bands]
     return passed[0] / passed[1]
 
 
 def indexes_of(batch: Batch, calibration: RatioIndexCalibration) -> tuple[float, float]:
     """R_a and R_g of a batch; NaN where the sensor is not calibrated or too few segments fit."""
-    n_segment, kind = calibration.n_segment, calibration.spectrum
+    n_segment = calibration.n_segment
     ra = rg = None
     if calibration.acceleration_bands is not None:
-        ra = acceleration_spectrum(batch, n_segment, kind, calibration.roll_lever_m)
+        ra = acceleration_spectrum(batch, n_segment, calibration.roll_lever_m)
     if calibration.pitch_rate_bands is not None:
-        rg = mean_spectrum(batch.pitch_rate_radps, batch.usable, n_segment, batch.rate_hz, kind)
-    return _index(ra, calibration.acceleration_bands, kind), _index(rg, calibration.pitch_rate_bands, kind)
+        rg = mean_spectrum(batch.pitch_rate_radps, batch.usable, n_segment, batch.rate_hz)
+    return _index(ra, calibration.acceleration_bands), _index(rg, calibration.pitch_rate_bands)
 
 
-def _index(seen: tuple[F64, F64] | None, bands: tuple[Band, Band] | None, kind: SpectrumKind) -> float:
-    return float("nan") if seen is None or bands is None else ratio_index(*seen, bands, kind)
+def _index(seen: tuple[F64, F64] | None, bands: tuple[Band, Band] | None) -> float:
+    return float("nan") if seen is None or bands is None else ratio_index(*seen, bands)

@@ -113,7 +113,7 @@ def spectrum_of(run: KnownRun, sensor: str) -> tuple[F64, F64]:
     freq_hz, total, n = np.arange(1.0, 205.0) * (50.0 / N_SEGMENT), np.zeros(204), 0
     for batch in run.batches:
         x = batch.vertical_acceleration_mps2 if sensor == ACCELERATION else batch.pitch_rate_radps
-        spectrum = mean_spectrum(x, batch.usable, N_SEGMENT, batch.rate_hz, "amplitude")
+        spectrum = mean_spectrum(x, batch.usable, N_SEGMENT, batch.rate_hz)
         if spectrum is not None:
             freq_hz, total, n = spectrum[0], total + spectrum[1], n + 1
     return freq_hz, total / n if n else np.full(len(freq_hz), np.nan)
