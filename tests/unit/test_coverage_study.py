@@ -14,18 +14,13 @@ from benchmarks.accuracy import coverage, drives
 from benchmarks.accuracy.coverage_table import coverage_table
 from benchmarks.accuracy.disturbed import half_of_the_time, missing, stuck
 from benchmarks.accuracy.drives import (
-    AS_CALIBRATED,
-    NEAR_M,
-    SIDEWAYS_M,
     TRIPS,
     Scope,
     Trip,
-    beside,
     draw_van,
     driven,
     known_loads,
     stated,
-    unseen_load,
     without_roll_rate,
 )
 from gateway.calibration.known_run import KnownRun
@@ -43,39 +38,12 @@ def van(number: int = 1) -> Van:
     return draw_van(number, np.random.default_rng([7, number]))
 
 
-def test_vans_differ_and_come_back_with_their_seed() -> None:
-    assert van(0) == van(0)
-    assert len({van(number).sprung_kg for number in range(6)}) == 6
-
-
 def test_stated_payloads_give_the_simulated_share() -> None:
     for number in range(3):
         one = van(number)
         for loads in known_loads(one, 6, np.random.default_rng(1))[1:]:
             found = stated_share_pct(stated(one), payload_kg(loads), loads[0].position_m)
             assert found == pytest.approx(front_share_pct(one, loads))
-
-
-def test_known_loads_are_empty_first_then_all_different() -> None:
-    loads = known_loads(van(), 6, np.random.default_rng(3))
-    assert loads[0] == ()
-    assert len(set(loads)) == 6
-    assert len(known_loads(van(), 99, np.random.default_rng(3))) == 10  # the whole grid
-    unseen = [unseen_load(van(), np.random.default_rng(seed)) for seed in range(60)]
-    assert 0 < unseen.count(()) < 25
-    assert all(payload_kg(one) <= van().rated_payload_kg for one in unseen)
-
-
-def test_a_drive_becomes_batches_with_its_truth() -> None:
-    scope = Scope(steady_s=310.0)
-    loads = (Load(200.0, 1.2),)
-    run = driven(van(), loads, AS_CALIBRATED, scope, np.random.SeedSequence([5]), 3)
-    again = driven(van(), loads, AS_CALIBRATED, scope, np.random.SeedSequence([5]), 3)
-    (counted,) = [batch for batch in run.batches if not batch.rejected]
-    assert counted.mean_speed_mps == pytest.approx(50.0 / 3.6, rel=0.05)
-    assert (run.number, run.payload_kg) == (3, 200.0)
-    assert run.front_share_pct == pytest.approx(front_share_pct(van(), loads))
-    assert np.array_equal(run.batches[0].pitch_rate_radps, again.batches[0].pitch_rate_radps)
 
 
 def test_every_van_is_put_to_every_kind_of_drive(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,14 +96,6 @@ def test_every_van_is_put_to_every_kind_of_drive(monkeypatch: pytest.MonkeyPatch
         ["cross_spectrum, without roll rate", "not today"],
     ] * 2
     assert done == [(0, 2), (1, 2), (2, 2)]
-
-
-def test_loads_have_the_lateral_offset_of_the_trip() -> None:
-    loads = (Load(100.0, 1.0), Load(50.0, 2.0))
-    for off_m in (NEAR_M, SIDEWAYS_M):
-        lefts_m = [beside(loads, off_m, np.random.default_rng(seed))[0].left_m for seed in range(50)]
-        assert all(off_m[0] <= abs(left_m) <= off_m[1] for left_m in lefts_m)
-        assert min(lefts_m) < 0.0 < max(lefts_m)
 
 
 def test_a_map_without_a_roll_rate_changes_nothing_else() -> None:

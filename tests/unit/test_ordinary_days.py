@@ -1,13 +1,9 @@
 """The study of ordinary days: what is told of each tour, and the figures of what was learnt."""
 
-from types import SimpleNamespace
-
 import numpy as np
-import pytest
 
 from benchmarks.accuracy import ordinary_days as study
 from gateway.calibration.known_run import KnownRun
-from gateway.model.table import UNSPRUNG_SHARE
 
 DAYS = [KnownRun(day, "tour", 0.0 if day % 5 == 0 else 100.0 + day, 55.0, (), 0.0) for day in range(1, 401)]
 
@@ -21,14 +17,6 @@ def test_simulated_notes_are_low_and_sometimes_swapped() -> None:
     assert len(told) == len(DAYS)
     wrong = sum(told[day] != right[day] for day in told)
     assert 0.02 < wrong / len(DAYS) < 0.08
-
-
-def test_axle_scales_show_the_load_its_place_and_the_unsprung_masses() -> None:
-    vehicle = SimpleNamespace(empty_mass_kg=1500.0)
-    load = study._scales(DAYS[0], SimpleNamespace(vehicle=vehicle))["load"]
-    below_kg = UNSPRUNG_SHARE * 1500.0
-    assert load["front_axle_kg"] + load["rear_axle_kg"] == pytest.approx(1500.0 + 101.0 + 2.0 * below_kg)
-    assert load["front_axle_kg"] - below_kg == pytest.approx(0.55 * 1601.0)
 
 
 def test_the_figures_count_errors_misses_and_refusals() -> None:
