@@ -261,12 +261,6 @@ def test_a_blf_that_starts_beyond_all_time_has_no_sound_stamp(year, tmp_path, dr
     assert (report.wanted, report.rejects[LogReject.BAD_TIME].count) == (0, len(truth))
 
 
-def test_a_blf_that_is_none_is_refused(tmp_path, signal_map):
-    (tmp_path / "a.blf").write_bytes(b"no such thing" * 100)
-    with pytest.raises(LogUnreadableError, match=r"a\.blf: cannot be read as \.blf"):
-        read(tmp_path / "a.blf", signal_map)
-
-
 def test_an_unknown_kind_of_log_names_the_known(tmp_path, signal_map):
     (tmp_path / "a.pcap").write_bytes(b"")
     with pytest.raises(LogUnreadableError, match=r"'\.pcap'; known are \.log .*\.asc .*\.blf"):

@@ -5,12 +5,11 @@ import struct
 import cantools
 import numpy as np
 import pytest
-from support.encoded import encode_signals, frames_of
+from support.encoded import frames_of
 
 from gateway.bus.signals import Decoder, Encoder, load_signal_map
 from gateway.bus.signals.bit_field import BitField
 from gateway.bus.signals.decode import Rejected, is_j1939_code
-from gateway.bus.signals.signal_map import shipped_maps
 from gateway.records import EXTENDED_ID, Signal
 
 G = 9.80665
@@ -41,14 +40,6 @@ def test_one_row_a_mapped_frame_in_order_of_arrival(reference):
     np.testing.assert_array_equal(speed, [10.0, np.nan, 0.0])
 
 
-def test_all_signals_of_a_message_share_its_row(reference):
-    motion = reference.decode(frames(accel()))
-    row = dict(zip(motion.signals, motion.columns[0], strict=True))
-    assert row[Signal.VERTICAL_ACCELERATION] == pytest.approx(9.81)
-    assert row[Signal.LONGITUDINAL_ACCELERATION] == 0.0
-    assert np.isnan(row[Signal.SPEED])
-
-
 @pytest.mark.parametrize(
     ("frame", "signal", "reason"),
     [
@@ -66,14 +57,6 @@ def test_a_rejected_frame_stays_as_a_row_of_nan_and_is_counted(reference, frame,
     assert len(motion) == 1
     assert reference.counts[signal].samples == 0
     assert reference.counts[signal].rejected == {reason: 1}
-
-
-def test_counts_add_up_over_calls(reference):
-    for _ in range(3):
-        reference.decode(frames(gps(), gps(fix=1), (0x130, b"\0")))
-    counts = reference.counts[Signal.SPEED]
-    assert counts.samples == 3
-    assert counts.rejected == {Rejected.WRONG_LENGTH: 3, Rejected.INVALID: 3}
 
 
 @pytest.fixture
@@ -182,49 +165,6 @@ def test_can_fd_payloads_are_read_to_their_end_and_too_narrow_rows_are_a_wrong_l
     assert decoder.decode(frames((6, payload), width=64)).columns[0, 0] == pytest.approx(G)
     assert np.isnan(decoder.decode(frames((6, bytes(8)))).columns).all()
     assert decoder.counts[Signal.VERTICAL_ACCELERATION].rejected == {Rejected.WRONG_LENGTH: 1}
-
-
-TYPICAL = {
-    Signal.VERTICAL_ACCELERATION: (9.81, 2.0),
-    Signal.PITCH_RATE: (0.0, 0.1),
-    Signal.ROLL_RATE: (0.0, 0.1),
-    Signal.SPEED: (15.0, 1.0),
-    Signal.LONGITUDINAL_ACCELERATION: (0.0, 1.0),
-    Signal.LATERAL_ACCELERATION: (0.0, 1.0),
-    Signal.YAW_RATE: (0.0, 0.1),
-    Signal.WHEEL_SPEED: (15.0, 1.0),
-    Signal.IGNITION: (1.0, 0.0),
-    Signal.LATITUDE: (47.0, 0.1),
-    Signal.LONGITUDE: (8.0, 0.1),
-    Signal.ODOMETER: (50_000.0, 100.0),
-    Signal.DOOR: (1.0, 0.0),
-    Signal.AIR_SPRING_PRESSURE: (300_000.0, 50_000.0),
-    Signal.TRAILER: (0.0, 0.0),
-    Signal.RIDE_HEIGHT: (0.0, 0.02),
-    Signal.AXLE_WEIGHT: (800.0, 100.0),
-}
-
-
-def samples_of(signal_map, n=200):
-    rng = np.random.default_rng(2)
-    samples = {s: rng.normal(*TYPICAL[s], n) for s in signal_map.signals}
-    t_ns = {s: np.arange(n, dtype=np.int64) * 10_000_000 for s in signal_map.signals}
-    return t_ns, samples
-
-
-@pytest.mark.parametrize("name", shipped_maps())
-def test_what_is_encoded_is_decoded_to_half_a_step(name):
-    signal_map = load_signal_map(f"springscale:{name}")
-    t_ns, samples = samples_of(signal_map)
-    decoder = Decoder(signal_map)
-    motion = decoder.decode(encode_signals(signal_map, t_ns, samples))
-    for signal in signal_map.signals:
-        found_ns, found = motion.of(signal)
-        resolution = signal_map.traits[signal].resolution
-        step = resolution if np.isfinite(resolution) else 1e-5
-        np.testing.assert_array_equal(found_ns, t_ns[signal])
-        np.testing.assert_allclose(found, samples[signal], atol=0.5001 * step)
-        assert decoder.counts[signal].rejected == {}
 
 
 def test_samples_beyond_the_bits_saturate():

@@ -6,12 +6,10 @@ import can
 import numpy as np
 import pytest
 from support.encoded import frames_of
-from support.patience import PATIENCE_S, wait_until
+from support.patience import PATIENCE_S
 
-from gateway.bus import listen as source_module
-from gateway.bus.listen import DRAINED_FRAMES, Inbox, LiveSource, SourceState
+from gateway.bus.listen import DRAINED_FRAMES, Inbox
 from gateway.bus.receiver import Receiver
-from gateway.bus.signals import load_signal_map
 
 
 def burst(first, n):
@@ -115,24 +113,3 @@ def test_what_came_before_a_fault_is_given_first(fault: Exception) -> None:
     assert receiver.receive(0.0).frames.can_id.tolist() == [0x120, 0x121]
     with pytest.raises((can.CanError, OSError)):
         receiver.receive(0.0)
-
-
-@pytest.mark.parametrize("fault", GARBLED, ids=lambda fault: type(fault).__name__)
-def test_an_adapter_that_garbles_a_line_is_opened_anew(fault: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
-    """slcan's parser raises whatever noise on the line makes int() raise: it ended the thread and the service."""
-    monkeypatch.setattr(source_module, "FIRST_PAUSE_S", 0.001)
-    buses = [FakeBus(message(0), fault), FakeBus(message(1))]
-    opened = iter(buses)
-    signal_map = load_signal_map("springscale:reference")
-    source = LiveSource(
-        "virtual",
-        "garbled",
-        signal_map,
-        open_receiver=lambda: Receiver(next(opened), 8),  # type: ignore[arg-type] # as above
-    )
-    source.start()
-    assert wait_until(lambda: source.counts().frames == 2)
-    assert source.failure is None
-    assert (source.counts().reconnects, buses[0].is_shut_down) == (1, True)
-    source.stop()
-    assert source.state is SourceState.STOPPED

@@ -91,15 +91,6 @@ def test_without_a_word_on_width_an_identifier_beyond_11_bits_has_29(tmp_path, f
     assert report.other_channel == 0
 
 
-def test_one_of_several_channels(tmp_path, frames):
-    channel = np.arange(N) % 3
-    write_mf4(tmp_path / "a.mf4", START_NS, [can_group(frames, START_NS, channel=channel)])
-    found, report = read(tmp_path / "a.mf4", channel="can2")
-    assert_same(found, take(frames, channel == 2))
-    assert (report.frames, report.wanted, report.other_channel) == (N, len(found), N - len(found))
-    assert report.channels == {"0", "1", "2"}
-
-
 def test_remote_and_error_frames_are_counted_not_read(tmp_path, frames):
     ten = take(frames, slice(0, 10))
     others = [can_group(ten, START_NS, name=name) for name in ("CAN_RemoteFrame", "CAN_ErrorFrame")]

@@ -6,7 +6,7 @@ import struct
 import pytest
 from support.encoded import frames_of
 
-from gateway.bus.signals import Decoder, load_signal_map, shipped_map
+from gateway.bus.signals import Decoder, load_signal_map
 from gateway.bus.signals.mapping import CLASSIC_BYTES
 from gateway.bus.signals.signal_map import shipped_maps
 from gateway.records import EXTENDED_ID, Signal
@@ -115,12 +115,3 @@ def test_hand_computed_frames(name):
         found = {s: x for s, x in zip(motion.signals, motion.columns[0], strict=True) if math.isfinite(x)}
         wanted = {s: x for s, x in expected.items() if s in signal_map.signals}
         assert found == pytest.approx(wanted), f"{name} {can_id:X}"
-
-
-@pytest.mark.parametrize("name", FRAMES)
-def test_every_shipped_map_says_which_axes_and_whence_its_signs(name):
-    text = shipped_map(name).read_text()
-    assert "Axes of the device" in text or "# Axes" in text
-    assert "Pitch sign" in text
-    assert "Roll sign" in text
-    assert Signal.ROLL_RATE in load_signal_map(f"springscale:{name}").signals

@@ -161,12 +161,6 @@ def test_a_failing_channel_is_retried_with_pauses(monkeypatch):
     assert pauses.asked_s == [0.5, 1.0, 2.0, 4.0, 5.0, 5.0, 5.0]
 
 
-def test_a_silent_bus_is_no_fault(listen):
-    source, _ = listen(Burst(frames(1)), silence_s=0.02)
-    wait_for(lambda: source.reason == "no frame for 0.02 s: the vehicle is asleep or the channel is not connected")
-    assert source.state is SourceState.BUS_SILENT
-
-
 def test_a_bus_with_only_unmapped_frames_is_distinguished_from_a_silent_one(listen, monkeypatch):
     packets = iter(range(1000, 10**9, 10))
     monkeypatch.setattr(source_module, "packets_received", lambda channel: next(packets))
@@ -184,16 +178,6 @@ def test_bus_off_is_a_fault_until_frames_come_again(listen):
     assert source.counts().error_frames == 1
     interface.script.append(Burst(frames(1)))
     wait_for(lambda: source.state is SourceState.RECEIVING)
-
-
-def test_bus_off_behind_frames_of_the_same_burst_is_no_silence(listen):
-    """The frames hid it, and soon the bus was called silent."""
-    source, interface = listen(Burst(frames(3), error_frames=1, is_bus_off=True), silence_s=0.02)
-    assert interface.is_played.wait(PATIENCE_S)
-    wait_for(lambda: source.state is SourceState.READER_FAULT)
-    time.sleep(0.1)
-    assert source.reason == "bus-off: ip link set can9 type can restart-ms 100"
-    assert source.counts().frames == 3
 
 
 def test_an_exception_in_the_thread_becomes_a_reader_fault(listen):
@@ -243,31 +227,6 @@ def test_options_an_interface_does_not_take_are_told():
     wait_for(lambda: source.reason)
     assert source.state is SourceState.READER_FAULT
     source.stop()
-
-
-@pytest.mark.parametrize("stamp", [0.0, 1e300, float("nan"), float("inf")])
-def test_frames_without_a_stamp_are_stamped_on_receipt(stamp):
-    source = LiveSource("virtual", "unstamped", MAP)
-    source.start()
-    before_ns = time.time_ns()
-    with can.Bus(interface="virtual", channel="unstamped", preserve_timestamps=True, ignore_config=True) as bus:
-        bus.send(can.Message(arbitration_id=0x130, is_extended_id=False, data=bytes(4), timestamp=stamp))
-    received = source.inbox.drain(PATIENCE_S)
-    source.stop()
-    assert before_ns <= int(received.t_ns[0]) <= time.time_ns()
-
-
-def test_other_identifiers_error_and_remote_frames_do_not_reach_the_inbox():
-    source = LiveSource("virtual", "mixed", MAP)
-    source.start()
-    with can.Bus(interface="virtual", channel="mixed", ignore_config=True) as bus:
-        bus.send(can.Message(arbitration_id=0x13F, is_extended_id=False, data=bytes(4)))
-        bus.send(can.Message(arbitration_id=0x130, is_extended_id=True, data=bytes(4)))
-        bus.send(can.Message(arbitration_id=0x130, is_extended_id=False, is_remote_frame=True))
-        bus.send(can.Message(arbitration_id=0x130, is_extended_id=False, data=b"\1\2\3\4"))
-    wait_for(lambda: source.counts().frames == 1)
-    source.stop()
-    assert source.inbox.drain(0.0).payload.tolist() == [[1, 2, 3, 4, 0, 0, 0, 0]]
 
 
 def test_the_log_tells_when_the_bus_goes_and_comes_and_why(listen, caplog):

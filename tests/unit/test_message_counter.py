@@ -169,9 +169,3 @@ def test_a_map_without_a_counter_is_reported(counter: str, words: str, tmp_path)
     with pytest.raises(SignalMapError, match=r"signals\.pitch_rate\.counter") as fault:
         load_signal_map(path)
     assert words in str(fault.value)
-
-
-def test_samples_without_a_counter_of_their_own_have_none() -> None:
-    motion = seen(TAKEN_S, EVEN)
-    swapped = Motion(motion.signals, motion.t_ns, motion.columns[:, [1, 0, 2, 3]], motion.counters)
-    assert swapped.counter_of(Signal.PITCH_RATE) is None

@@ -192,14 +192,6 @@ def test_any_channels_name_makes_a_line(tmp_path: Path, channel: str, written: b
     assert same(read(files(tmp_path)[0]), DRIVE)
 
 
-def test_a_fault_of_the_recorder_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> bytes:
-        raise ZeroDivisionError
-
-    monkeypatch.setattr(ring_log, "message_of", broken)
-    assert "ZeroDivisionError" in str(recorded(tmp_path, DRIVE).status().last_fault)
-
-
 @pytest.fixture
 def release(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
     """The disk hangs until this is set."""
