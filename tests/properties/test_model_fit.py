@@ -102,19 +102,6 @@ def test_one_drive_alone_is_an_ordinary_search(seed: int) -> None:
     np.testing.assert_allclose(alone.own_covariances[0][:2, :2], together.covariance, atol=1e-8)
 
 
-def test_a_prior_without_precision_changes_nothing() -> None:
-    """A statement with infinite doubt is no statement."""
-    prior, drives = drives_of(7, [2, 2], 2)
-    flat = [
-        fit.Drive(one.likelihood, fit.Gaussian(mean, np.zeros((2, 2))), one.start)
-        for one, mean in zip(drives, (np.zeros(2), np.full(2, 50.0)), strict=True)
-    ]
-    other = [fit.Drive(one.likelihood, fit.Gaussian(np.full(2, -9.0), np.zeros((2, 2))), one.start) for one in drives]
-    here = fit.most_probable(np.zeros(2), prior, flat, tolerance=1e-12)
-    there = fit.most_probable(np.zeros(2), prior, other, tolerance=1e-12)
-    np.testing.assert_allclose(here.common, there.common, atol=1e-8)
-
-
 @given(seed=st.integers(0, 1000), factor=st.floats(-50.0, 50.0))
 def test_a_rising_prior_pulls_up_where_something_falls_and_nowhere_else(seed: int, factor: float) -> None:
     rng = np.random.default_rng(seed)

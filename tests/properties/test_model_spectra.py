@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.model_road import BAND_HZ, RATE_HZ, VAN, batch_of, batch_over_road, theta_of
+from support.model_road import BAND_HZ, RATE_HZ, VAN, batch_over_road, theta_of
 
 from gateway.core.vehicle import Load
 from gateway.model.spectra import (
@@ -14,12 +14,8 @@ from gateway.model.spectra import (
     cross_spectra_of,
     expected_floor,
     floor_of,
-    level,
-    mount_of,
     noise_over,
-    usual_floor,
 )
-from gateway.model.table import INDEX, N
 from gateway.records import Batch
 
 READING = Reading(VAN.wheelbase_m, BAND_HZ, 256)
@@ -37,18 +33,6 @@ def test_masked_samples_leave_no_trace() -> None:
         cross_spectra_of([each], READING) for each in (masked, replace(masked, vertical_acceleration_mps2=spoilt))
     )
     np.testing.assert_array_equal(one.parts, other.parts)
-
-
-def test_several_stretches_are_one_drive() -> None:
-    batch = batch_over_road(HALF, Load(200.0, 50.0), 3, duration_s=120.0)
-    n = len(batch.usable) // 2
-    halves = [
-        batch_of(batch.vertical_acceleration_mps2[part], batch.pitch_rate_radps[part])
-        for part in (slice(0, n), slice(n, None))
-    ]
-    apart = cross_spectra_of(halves, READING)
-    cut = replace(batch, usable=np.arange(2 * n) != n)
-    assert apart.n_total in (cross_spectra_of([cut], READING).n_total, cross_spectra_of([cut], READING).n_total + 1)
 
 
 def noisy(density: float) -> Batch:
@@ -72,13 +56,6 @@ def test_vibration_grows_with_the_road_and_noise_does_not() -> None:
     np.testing.assert_allclose(expected_floor(usual, 0.5), (3.0, 1.0))
     np.testing.assert_allclose(expected_floor(usual, 4.0), (9.0, 1.0))
     np.testing.assert_allclose(noise_over(np.array([30.0, 5.0, 9.0]), expected_floor(usual, 4.0)), (0.0, 4.0, 0.0))
-
-
-def test_the_quietest_and_the_loudest_batch_are_the_usual_floor() -> None:
-    batches = [noisy(0.0), noisy(DENSITY)]
-    floors = np.array([floor_of(batch) for batch in batches])
-    assert usual_floor(batches, with_roll=True) == tuple(zip(floors.min(axis=0), floors.max(axis=0), strict=True))
-    assert usual_floor([], with_roll=True) is None
 
 
 def test_the_noise_of_the_roll_rate_reaches_a_sensor_that_is_brought_to_the_centre_line() -> None:
@@ -108,11 +85,3 @@ def test_fewer_frequencies_are_those_of_the_whole_band() -> None:
     np.testing.assert_array_equal(part.freq_hz[1:-1], whole.freq_hz[1:-1][inside])
     np.testing.assert_array_equal(part.parts, whole.parts[..., inside])
     np.testing.assert_array_equal(part.delay_phase[:, 1:-1], whole.delay_phase[:, 1:-1][:, inside])
-
-
-def test_a_sensor_is_where_the_parameters_say() -> None:
-    theta = theta_of(with_roll=True, sensor_left_m=0.25, gyro_yaw_rad=0.03, gyro_lag_s=0.004)
-    assert mount_of(theta) == Mount(0.25, 0.03, 0.004)
-    assert mount_of(level(theta)) == Mount(0.0, 0.0, 0.004)
-    assert theta[INDEX["sensor_left_m"]] == 0.25
-    assert mount_of(theta[:N]) is None

@@ -116,16 +116,6 @@ def test_left_less_right_is_the_moment_and_the_axles_divide_it(
     assert front_kgm == pytest.approx(roll_share * moment_kgm, abs=1e-6)
 
 
-@given(payloads, shares, offsets, roll_shares)
-def test_a_load_to_the_other_side_swaps_the_wheels(
-    payload_kg: float, share_pct: float, left_m: float, roll_share: float
-) -> None:
-    one, other = (on_wheels(payload_kg, share_pct, side * left_m, roll_share) for side in (1.0, -1.0))
-    for axle in ("front", "rear"):
-        left, right = getattr(one, f"{axle}_left"), getattr(other, f"{axle}_right")
-        assert (left.kg, left.std_kg) == pytest.approx((right.kg, right.std_kg))
-
-
 @given(payloads, offsets)
 def test_the_left_share_is_that_of_the_wheels_without_axles(payload_kg: float, left_m: float) -> None:
     bare = replace(TRACKED, unsprung_front_kg=0.0, unsprung_rear_kg=0.0)

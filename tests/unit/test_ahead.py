@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from support.half_car_road import VAN, batch_over_road
 
-from gateway.calibration.ahead import CANDIDATES, Ahead, next_steps, steady_drive
+from gateway.calibration.ahead import CANDIDATES, Ahead, next_steps
 from gateway.calibration.known_run import KnownRun
 from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import NOTHING_KNOWN, Statement
 from gateway.calibration.teach import teach
 from gateway.core.vehicle import Load
 from gateway.model.vehicle_model import VehicleModel
-from gateway.model.whittle import Point, Whittle
 from gateway.stated.statement import StatementSource
 
 EMPTY = Load(0.0, 52.0)
@@ -36,17 +35,6 @@ def known(load: Load) -> Statement:
     return Statement(
         source=StatementSource.KNOWN, payload_kg=load.payload_kg, front_share_pct=load.front_share_pct, is_compact=True
     )
-
-
-def test_an_ideal_drive_is_the_model_s_own() -> None:
-    """Its likelihood is steepest nowhere: the vehicle and the load that made it fit it best."""
-    model = after_one_empty_drive()
-    drive = steady_drive(model, LOADED, DRIVE_S, 14.0)
-    whittle = Whittle(drive, model.ground)
-    there = Point.of(model.parameters, LOADED)
-    n = len(model.parameters)
-    assert np.abs(whittle.curvature(there, [n, n + 1]).gradient).max() < 1e-6
-    assert whittle.cost(there) < whittle.cost(Point.of(model.parameters, Load(300.0, 54.0)))
 
 
 def test_every_candidate_narrows_or_leaves_the_answer() -> None:

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -22,10 +21,9 @@ from gateway.core.alarms.alarm import (
     alarm_to_json,
     sentence,
 )
-from gateway.core.alarms.rules import SENSORS, AlarmRules, Says
+from gateway.core.alarms.rules import AlarmRules, Says
 from gateway.core.alarms.watch import AlarmWatch
 from gateway.estimates.batch_estimate import Estimate, Quantity, Weight, Weights
-from gateway.estimates.reasons import EXPLANATIONS
 from gateway.records import Why, json_line
 
 RULES = AlarmRules()
@@ -130,15 +128,6 @@ def test_a_disabled_alarm_is_not_reported_and_ends(off: str) -> None:
     (active,) = overloaded().active()
     (ended,) = AlarmWatch(replace(RULES, off=(off,)), "van", [active]).end_switched_off(at(30))
     assert (ended.id, ended.is_active) == (active.id, False)
-
-
-@pytest.mark.parametrize("reasons", [*pairwise(sorted(SENSORS))])
-def test_the_sentence_of_refused_batches_has_their_reasons(reasons: tuple[Why, ...]) -> None:
-    watch = watching()
-    (raised,) = (alarm for n in range(2) for alarm in watch.weigh(refused(n, *reasons, Why.TOO_SLOW), VAN))
-    assert raised.figure.detail == ", ".join(reasons)
-    said = "; ".join(EXPLANATIONS[why].happened.replace("`", "") for why in reasons)
-    assert sentence(raised) == f"Batches are refused because of a sensor: {said}"
 
 
 VERDICTS = st.lists(st.tuples(st.sampled_from([GROSS, SILENT, REFUSED]), st.sampled_from([True, False, None])))

@@ -202,12 +202,6 @@ def roll_of(batch: Batch) -> F64:
     return batch.roll_rate_radps
 
 
-def test_a_map_without_a_roll_rate_gives_none() -> None:
-    batch = batch_of(WHOLE)
-    assert batch.roll_rate_radps is None
-    assert batch.roll_usable_share is None
-
-
 def test_a_roll_rate_comes_onto_the_same_grid() -> None:
     """What two sensors measure alike, sent at the same instants, is alike on the grid."""
     columns = np.column_stack([WHOLE.columns, WHOLE.columns[:, 1]])
@@ -234,16 +228,3 @@ def test_a_roll_rate_too_slow_for_the_grid_is_unknown() -> None:
     assert np.isnan(roll_of(batch)).all()
     assert batch.roll_usable_share == 0.0
     assert batch.rejected == ()
-
-
-@settings(max_examples=10, derandomize=True)
-@given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 1.0))
-def test_a_roll_rate_changes_no_other_number(seed: int, share: float) -> None:
-    rng = np.random.default_rng(seed)
-    wild = [np.nan, np.inf, -np.inf, 0.0, 1e300]
-
-    def spoilt(x: F64) -> F64:
-        return np.where(rng.random(len(x)) < share, rng.choice(wild, len(x)), x)
-
-    batch = batch_of(changed(with_roll(WHOLE), R, -1.0, LENGTH_S + 1.0, spoilt))
-    assert_same_batch(replace(batch, roll_rate_radps=None), batch_of(WHOLE))

@@ -15,7 +15,6 @@ from gateway.core.cargo import (
     Carries,
     ShapeHypothesis,
     is_said,
-    known_shape,
     shape_hypotheses,
 )
 
@@ -58,11 +57,6 @@ def test_a_longer_statement_moves_its_mean_up(length_m: float, factor: float) ->
     assert long.log_s > short.log_s
 
 
-def test_a_higher_statement_moves_its_mean_up() -> None:
-    low, high = (believed(payload_length_m=1.2, payload_height_m=each) for each in (0.5, 1.4))
-    assert high.log_s > low.log_s
-
-
 def test_s_of_a_box_by_hand() -> None:
     """2 m long and 1 m high on a floor 0.15 m below the body's centre: its own centre lies 0.35 m above that."""
     by_hand = (2.0**2 + 1.0**2) / 12.0 + 0.8 * 0.35**2
@@ -84,16 +78,6 @@ def test_unstated_shapes_are_half_like_known_loads_and_half_longer() -> None:
     assert (compact.probability, spread.probability) == (1.0 - SPREAD_PART, SPREAD_PART)
     assert exp(compact.log_s) == pytest.approx(KNOWN_S_M2)
     assert exp(spread.log_s) > 0.3
-
-
-def test_a_load_like_the_known_ones_has_their_shape() -> None:
-    (known,) = known_shape(KNOWN_S_M2, 0.2)
-    assert (exp(known.log_s), known.std, known.probability) == (pytest.approx(KNOWN_S_M2), 0.2, 1.0)
-
-
-def test_goods_are_in_order_of_their_length() -> None:
-    means = {kind: believed(carries=kind).log_s for kind in Carries}
-    assert means[Carries.PALLETS] < means[Carries.PARCELS] < means[Carries.LONG_GOODS]
 
 
 def test_a_floor_is_as_long_as_its_vehicle() -> None:

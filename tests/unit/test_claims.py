@@ -66,13 +66,6 @@ def test_two_claims_on_one_load_equal_one_with_their_combined_precision(
     np.testing.assert_allclose(both[0], swapped[0])
 
 
-def test_a_claim_without_weight_changes_nothing() -> None:
-    prior = np.array([250.0]), np.array([[30.0**2]])
-    mean, covariance = together(prior, Terms.of([claim("a", 900.0, 1e9)], ()))
-    np.testing.assert_allclose(mean, prior[0])
-    np.testing.assert_allclose(covariance, prior[1])
-
-
 def test_a_cause_counts_as_common_if_two_claims_have_it() -> None:
     claims = [claim("a", 1.0, 1.0, note=1.0, lone=2.0), claim("b", 2.0, 1.0, note=3.0)]
     assert common_causes(claims) == ("note",)

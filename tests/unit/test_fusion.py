@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.paper_van import paper_van
 
-from gateway.core.change import EVEN, ROLLING, Rules, change_of, probability
+from gateway.core.change import EVEN, ROLLING, Rules, probability
 from gateway.core.fusion import LoadEpoch, fused_epoch
 from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.estimates.posterior import CG_LEFT, PAYLOAD, Posterior, Source, difference
@@ -36,11 +35,6 @@ def together(*batches: Estimate) -> LoadEpoch:
         epoch = fused_epoch(epoch, one, RULES)
     assert epoch is not None
     return epoch
-
-
-def test_one_batch_is_its_own_epoch() -> None:
-    epoch = together(batch(270.0))
-    assert (epoch.posterior, epoch.n_batches, epoch.is_change) == (batch(270.0).posterior, 1, False)
 
 
 @given(st.lists(st.floats(262.0, 278.0), min_size=1, max_size=8), st.randoms(use_true_random=False))
@@ -144,12 +138,6 @@ def test_equal_loads_are_no_change(kg: float, share_pct: float, correlation: flo
     assert probability(one, one, ROLLING, RULES) < 0.001
 
 
-def test_further_apart_is_more_probable() -> None:
-    found = [probability(load(300.0), load(300.0 + kg), 0.5, RULES) for kg in (30.0, 45.0, 60.0, 120.0, 500.0)]
-    assert found == sorted(found)
-    assert found[-1] > 0.9999
-
-
 def test_errors_that_go_together_are_not_taken_for_a_change() -> None:
     """Payload too high and share too high: what these errors usually do together, or never."""
     pair = [(load(300.0, 50.0, correlation=c), load(324.0, 50.9, correlation=c)) for c in (0.8, 0.0, -0.8)]
@@ -157,17 +145,3 @@ def test_errors_that_go_together_are_not_taken_for_a_change() -> None:
     assert usual < EVEN
     assert usual < apart < never
     assert never > 0.99
-
-
-def test_a_change_is_stated_with_the_error_of_two_different_loads() -> None:
-    found = change_of(load(300.0), load(120.0))
-    assert found.number == -180.0
-    assert found.std == pytest.approx(np.hypot(8.0, 8.0))
-    low, high = found.interval95
-    assert (low + high) / 2.0 == pytest.approx(-180.0)
-
-
-def test_rules_follow_from_the_vehicle() -> None:
-    rules = Rules.of(paper_van(payload_range_kg=(0.0, 450.0)))
-    assert (rules.range_kg, rules.mass_kg, rules.spread_kg) == (450.0, 1465.0, 112.5)
-    assert Rules.of(paper_van(payload_range_kg=(0.0, 1.0))).range_kg == 100.0

@@ -10,7 +10,6 @@ from support.drives import T0_NS, drive, joined, later, without_rows
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
 from gateway.estimates.batch_estimate import Place, Watched, Way
-from gateway.estimates.field_kinds import WAY
 from gateway.records import Motion, SensorTraits, Signal
 
 JOURNEY = (Signal.LATITUDE, Signal.LONGITUDE, Signal.ODOMETER, Signal.DOOR, Signal.IGNITION)
@@ -118,14 +117,6 @@ def test_a_coarse_odometer_is_passed_over():
     way = ways(rows, traits={Signal.ODOMETER: SensorTraits(resolution=5.0)})[0]
     assert (way.odometer_start_m, way.odometer_end_m) == (1000.0, pytest.approx(1885.0))
     assert math.isnan(ways(rows, traits={Signal.ODOMETER: SensorTraits(resolution=1000.0)})[0].odometer_end_m)
-
-
-def test_json_and_back():
-    rows = beside(drive(150.0, lambda t_s: np.where((t_s > 20.0) & (t_s < 90.0), 0.0, 15.0)), 150.0)
-    for way in ways(rows, decimals=4):
-        again = WAY.read(WAY.write(way))
-        assert WAY.write(again) == WAY.write(way)
-    assert WAY.write(Way())["distance_m"] is None
 
 
 def test_a_clock_that_steps_back_starts_a_new_journey():

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ndtr
-from support.model_road import times
 from support.taught_van import FLAT_VAN, ROLL, VAN, car, drive_of, estimated, lost, spectra_of, taught
 
 from gateway.core.cargo import known_shape, shape_hypotheses
@@ -76,20 +75,6 @@ def test_a_firm_load_is_not_taken_for_soft(load: tuple[float, float], seed: int,
     assert one.diagnostics["payload_mode_hz"] > 0.6 * FIRM_HZ
 
 
-def test_only_a_soft_hypothesis_finds_a_load_that_rings(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without it the load is further off, less sure or refused."""
-    load = (400.0, 44.0)
-    rightly = told(load, 41, payload_mode_hz=9.0, payload_damping_ratio=0.1)
-    monkeypatch.setattr(Hypothesis, "soft", lambda self: self)
-    firmly = told(load, 41, payload_mode_hz=9.0, payload_damping_ratio=0.1)
-    off = abs(rightly.payload.number - load[0])
-    assert (
-        not firmly.counted
-        or abs(firmly.payload.number - load[0]) > 2.0 * off
-        or firmly.payload.std > (2.0 * rightly.payload.std)
-    )
-
-
 @ROLL
 @pytest.mark.parametrize("firmer", [0.96, 1.04])
 def test_tyres_of_another_day_stay_within_the_interval(firmer: float, with_roll: bool) -> None:
@@ -143,24 +128,6 @@ def test_it_is_found_how_far_dampers_have_worn(front: float, rear: float, with_r
     found = with_dampers(front, rear, 43, with_roll=with_roll).diagnostics
     assert found["damper_front_ratio"] == pytest.approx(front, rel=0.1)
     assert found["damper_rear_ratio"] == pytest.approx(rear, rel=0.1)
-
-
-@ROLL
-def test_healthy_dampers_are_as_they_were_taught(with_roll: bool) -> None:
-    one = told((250.0, 52.0), 43, with_roll=with_roll)
-    for axle in ("front", "rear"):
-        assert one.diagnostics[f"damper_{axle}_ratio"] == pytest.approx(1.0, abs=0.06)
-
-
-def test_worn_dampers_are_tried_only_where_they_deviate() -> None:
-    model = taught(with_roll=True)
-    load = (250.0, 52.0)
-    healthy, worn = (
-        found(load, 43, theta, model)
-        for theta in (car(with_roll=True), times(car(with_roll=True), damper_front_nspm=0.6, damper_rear_nspm=0.6))
-    )
-    assert not any(peak.hypothesis.is_worn for peak in healthy.peaks)
-    assert any(peak.hypothesis.is_worn for peak in worn.peaks)
 
 
 @pytest.mark.parametrize("rate", [0.7, 1.4])

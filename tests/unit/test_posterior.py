@@ -23,7 +23,6 @@ from gateway.estimates.posterior import (
     fused,
 )
 from gateway.estimates.quantity import Z95, Quantity
-from gateway.records import F64
 
 SCALE = np.array([10.0, 0.5, 0.01])  # kg, %, m
 
@@ -37,13 +36,6 @@ def drawn(seed: int, size: int = 3, sources: tuple[Source, ...] = tuple(Source))
 
 
 posteriors = st.builds(drawn, st.integers(0, 2**32 - 1), st.sampled_from([2, 3]))
-
-
-def samples(posterior: Posterior, z: dict[Source, F64], rng: np.random.Generator, n: int) -> F64:
-    """(n, d) as the model has it: mean, own error, and each source's z (n, k) times its columns."""
-    own = rng.multivariate_normal(np.zeros(posterior.size), posterior.own, n)
-    by_source = (z[name] @ columns for name, columns in posterior.sources.items())
-    return np.asarray(posterior.mean + own + sum(by_source, np.zeros((n, posterior.size))))
 
 
 @given(posteriors)
@@ -147,25 +139,6 @@ def test_fusion_does_not_depend_on_the_order(drawn_of: list[tuple[int, int]], ra
     one, other = fused(parts), fused(shuffled)
     assert one.mean == pytest.approx(other.mean, rel=1e-6, abs=1e-6)
     assert one.covariance == pytest.approx(other.covariance, rel=1e-6, abs=1e-6)
-
-
-def test_fused_errors_against_monte_carlo() -> None:
-    """Two batches with one place known, over common z: mean and covariance as the fusion says."""
-    rng = np.random.default_rng(4)
-    n = 200_000
-    three, two = drawn(1, sources=(Source.DAY, Source.CALIBRATION)), drawn(2, 2, sources=(Source.DAY,))
-    z = {name: rng.standard_normal((n, 3)) for name in Source}
-    together = fused([three, two])
-    errors = []
-    for part in (three, two):
-        its_z = {name: z[name][:, : len(columns)] for name, columns in part.sources.items()}
-        errors.append(samples(part, its_z, rng, n) - part.mean)
-    weight_three = together.own @ np.linalg.inv(three.own)
-    weight_two = together.own @ np.pad(np.linalg.inv(two.own), (0, 1))
-    of_both = errors[0] @ weight_three.T + errors[1] @ weight_two[:, :2].T
-    scale = np.sqrt(np.diag(together.covariance))
-    found = np.cov(of_both.T) / np.outer(scale, scale)
-    assert found == pytest.approx(together.covariance / np.outer(scale, scale), abs=0.015)
 
 
 def test_fusion_needs_a_batch_and_leaves_one_alone() -> None:

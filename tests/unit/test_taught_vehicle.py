@@ -11,7 +11,7 @@ from gateway.calibration.found import Taught
 from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.statements import NOTHING_KNOWN, Statement, empty, load_prior_of
 from gateway.calibration.teach import teach
-from gateway.core.cargo import known_shape, shape_hypotheses
+from gateway.core.cargo import known_shape
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimates.batch_estimate import Estimate
 from gateway.model.weigh import by_cross_spectrum
@@ -110,8 +110,3 @@ def test_a_place_that_is_not_known_leaves_the_share_wide() -> None:
     unknown = load_prior_of(Statement(payload_kg=300.0), VAN)
     placed = load_prior_of(Statement(payload_kg=300.0, position_m=1.4), VAN)
     assert unknown.front_share_std > 5.0 * placed.front_share_std
-
-
-def test_stated_goods_have_one_shape() -> None:
-    assert [one.name for one in shape_hypotheses(VAN, 0.1, 0.3)] == ["compact", "spread"]
-    assert [one.name for one in shape_hypotheses(replace(VAN, payload_length_m=2.0), 0.1, 0.3)] == ["stated"]

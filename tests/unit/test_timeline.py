@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 from gateway.core.spline import between, smooth_slopes
-from gateway.core.timeline import onto_grid, sample_rate_hz, sort_by_time, speed_onto_grid
+from gateway.core.timeline import onto_grid, sort_by_time, speed_onto_grid
 from gateway.records import F64, I64
 
 T0_NS = 1_790_000_000_000_000_000
@@ -86,16 +86,6 @@ def test_speed_is_linear_between_samples_and_held_no_longer_than_allowed() -> No
     assert np.isnan([at[5.0], at[9.0], at[15.1]]).all()  # six seconds apart, and past the hold
 
 
-def test_without_samples_the_speed_is_unknown() -> None:
-    assert np.isnan(speed_onto_grid(np.empty(0, np.int64), np.empty(0), T0_NS, 10, RATE_HZ, 3.0)).all()
-
-
-def test_rate_is_the_median_rate() -> None:
-    _, t_ns = stamps(104.0)
-    assert sample_rate_hz(np.r_[t_ns, t_ns[-1] + 10**10]) == pytest.approx(104.0, rel=1e-6)
-    assert sample_rate_hz(t_ns[:1]) == 0.0
-
-
 def test_samples_of_one_stamp_stay_in_the_order_they_came_in() -> None:
     times, x = sort_by_time(np.array([3, 1, 3, 2]), np.array([30.0, 10.0, 31.0, 20.0]))
     assert times.tolist() == [1, 2, 3, 3]
@@ -128,8 +118,3 @@ def test_a_smooth_curve_is_the_cubic_spline(n: int, seed: int) -> None:
     t, x = np.cumsum(rng.uniform(0.5, 2.0, n)), rng.standard_normal(n)
     at = rng.uniform(t[0], t[-1], 50)
     np.testing.assert_allclose(between(at, t, x, smooth_slopes(t, x)), CubicSpline(t, x)(at), rtol=1e-9, atol=1e-9)
-
-
-def test_nan_samples_are_an_error() -> None:
-    with pytest.raises(ValueError, match="infs or NaNs"):
-        smooth_slopes(np.arange(5.0), np.array([0.0, np.nan, 1.0, 2.0, 3.0]))

@@ -1,7 +1,6 @@
 """Statics of the sprung mass: front share, payload position, and what axle weights say."""
 
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -9,7 +8,7 @@ from hypothesis import strategies as st
 from support.paper_van import paper_van
 
 from gateway.calibration.axle_weights import sprung_keys
-from gateway.core.vehicle import Vehicle, cg_left_m, front_share_pct, left_share_pct, payload_position_m
+from gateway.core.vehicle import Vehicle, front_share_pct, payload_position_m
 from gateway.errors import CampaignError
 from gateway.model.table import UNSPRUNG_SHARE
 
@@ -37,31 +36,12 @@ def test_share_and_position_are_inverse(van: Vehicle, load_kg: float, position_m
     assert payload_position_m(van, load_kg, share) == pytest.approx(position_m, abs=1e-6)
 
 
-@given(van=vehicles, load_kg=loads_kg)
-def test_a_load_over_an_axle_rests_on_it_alone(van: Vehicle, load_kg: float) -> None:
-    def front_kg(payload_kg: float, position_m: float) -> float:
-        return front_share_pct(van, payload_kg, position_m) / 100.0 * (van.empty_mass_kg + payload_kg)
-
-    empty_kg = front_kg(0.0, 0.0)
-    assert front_kg(load_kg, 0.0) - empty_kg == pytest.approx(load_kg, rel=1e-6)
-    assert front_kg(load_kg, van.wheelbase_m) == pytest.approx(empty_kg, rel=1e-9)
-
-
 @given(van=vehicles)
 def test_without_payload_the_share_is_the_empty_one(van: Vehicle) -> None:
     assert front_share_pct(van, 0.0, None) == van.empty_front_share_pct
     assert front_share_pct(van, 0.0, 1.0) == van.empty_front_share_pct
     with pytest.raises(ZeroDivisionError):
         payload_position_m(van, 0.0, 50.0)
-
-
-@given(van=vehicles, load_kg=loads_kg, left_m=st.floats(-0.7, 0.7), empty_left_m=st.floats(-0.05, 0.05))
-def test_wheel_loads_follow_from_the_moments(van: Vehicle, load_kg: float, left_m: float, empty_left_m: float) -> None:
-    van = replace(van, empty_cg_left_m=empty_left_m)
-    track_m, total_kg = 1.5, van.empty_mass_kg + load_kg
-    left_kg = left_share_pct(cg_left_m(van, load_kg, left_m), track_m) / 100.0 * total_kg
-    moment_kgm = (left_kg - (total_kg - left_kg)) * track_m / 2.0
-    assert moment_kgm == pytest.approx(van.empty_mass_kg * empty_left_m + load_kg * left_m, abs=1e-6)
 
 
 masses_kg = st.floats(400.0, 5000.0)

@@ -33,8 +33,6 @@ from gateway.estimates.posterior import Posterior, Source
 from gateway.setup import Setup, setup_of
 from gateway.uplink.outbox import Outbox
 
-KG = st.floats(0.0, 50_000.0)
-STD_KG = st.floats(0.01, 500.0)
 UNSPRUNG = {"unsprung_front_kg": 80.0, "unsprung_rear_kg": 80.0}
 
 
@@ -55,19 +53,6 @@ UNSPRUNG = {"unsprung_front_kg": 80.0, "unsprung_rear_kg": 80.0}
 def test_the_probability_is_the_tables(kg: float, std_kg: float, limit_kg: float | None, probability: float) -> None:
     """Abramowitz and Stegun, table 26.1; without an error it is 0 or 1, and NaN for what is unknown."""
     assert over_limit_probability(kg, std_kg, limit_kg) == pytest.approx(probability, abs=1e-6, nan_ok=True)
-
-
-@given(STD_KG, KG, st.floats(-100.0, 100.0))
-def test_the_probability_is_symmetric(std_kg: float, limit_kg: float, by_kg: float) -> None:
-    above, below = (over_limit_probability(limit_kg + x, std_kg, limit_kg) for x in (by_kg, -by_kg))
-    assert above + below == pytest.approx(1.0, abs=1e-9)
-
-
-def test_stated_limits_override_the_vehicles_own() -> None:
-    vehicle = paper_van(gross_limit_kg=2000.0, rear_axle_limit_kg=1100.0)
-    limited = Limits(gross_limit_kg=1900.0, front_wheel_limit_kg=500.0).on(vehicle)
-    assert Limits.of(limited) == Limits(gross_limit_kg=1900.0, rear_axle_limit_kg=1100.0, front_wheel_limit_kg=500.0)
-    assert Limits().on(vehicle) == vehicle
 
 
 def configured(folder: Path, vehicle: str = "") -> Path:
@@ -190,11 +175,6 @@ def test_the_tightest_room_fits_anywhere_between_the_axles(
     assert min(tightest.values()) >= -1e-6
 
 
-def test_an_overloaded_axle_has_negative_room() -> None:
-    assert rooms_of(aboard(500.0, 40.0))[0].place == "rear_axle"
-    assert rooms_of(aboard(500.0, 40.0))[0].left.number == pytest.approx(1050.0 - 0.6 * 1740.0 - 80.0)
-
-
 def test_without_limit_or_weight_the_room_is_unknown() -> None:
     assert rooms_of(Weights()) == ()
     assert rooms_of(Weights(gross=Weight(1700.0, 6.0, None, None))) == ()
@@ -289,7 +269,3 @@ def test_errors_of_the_place_propagate() -> None:
     found = place(State())
     assert (found.std_m, found.left_std_m) == pytest.approx(tuple(np.sqrt(np.diag(covariance))), rel=1e-6)
     assert found.correlation * found.std_m * found.left_std_m == pytest.approx(covariance[0, 1], rel=1e-6)
-
-
-def test_the_place_is_the_one_that_statics_put_it_at() -> None:
-    assert (place(State()).position_m, place(State()).left_m) == pytest.approx((1.9, -0.25))
