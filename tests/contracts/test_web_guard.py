@@ -150,11 +150,6 @@ def test_an_open_address_needs_tokens_and_tls(host: str) -> None:
     refuse_open_address(host, has_tokens=True, has_tls=True)
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.1", "::1", "localhost"])
-def test_a_local_address_needs_none(host: str) -> None:
-    refuse_open_address(host, has_tokens=False, has_tls=False)
-
-
 def test_tls(tmp_path: Path) -> None:
     authority = trustme.CA()
     authority.cert_pem.write_to_path(str(tmp_path / "authority.pem"))

@@ -1,6 +1,5 @@
 """Our weights in the words of others: VSS, and our own figures behind it."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +26,6 @@ VAN = paper_van(
     track_width_m=1.5,
     front_wheel_limit_kg=400.0,
 )
-Ask = Callable[..., Any]
 
 
 @pytest.fixture

@@ -98,22 +98,6 @@ def test_a_read_estimate_is_written_identically(estimate: Estimate) -> None:
             assert json_line({name: again[name]}) == json_line({name: x})
 
 
-@given(estimates)
-def test_instants_and_identity_are_exact(estimate: Estimate) -> None:
-    again = read_back(estimate_to_json(estimate))
-    assert (again.t_start_ns, again.t_end_ns, again.id) == (estimate.t_start_ns, estimate.t_end_ns, estimate.id)
-
-
-@given(estimates)
-def test_records_of_an_early_version_are_read(estimate: Estimate) -> None:
-    told = estimate_to_json(estimate)
-    early = {name: x for name, x in told.items() if name not in ("roughness_mps2", "diagnostics")}
-    again = estimate_to_json(read_back(early))
-    assert {**again, "roughness_mps2": told["roughness_mps2"], "diagnostics": told["diagnostics"]} | dict.fromkeys(
-        FOLLOWING & told.keys()
-    ) == told | dict.fromkeys(FOLLOWING & told.keys())
-
-
 @given(posteriors())
 def test_a_posterior_is_read_back_to_seven_digits(posterior: Posterior) -> None:
     again = read_back(estimate_to_json(Estimate(0, 1, "x", posterior=posterior))).posterior

@@ -101,13 +101,6 @@ def test_a_reason_names_its_figure_and_its_limits() -> None:
     assert "26.7 % (fit to 25 %, no use beyond 50 %)" in text
 
 
-def test_batches_of_one_run_count_once_for_coverage() -> None:
-    """Two of five runs missed in every batch: forty batches make it no surer than ten."""
-    rows = [judged(run, 30.0 if run <= 2 else 1.0) for run in range(1, 6)]
-    once, often = verdict(rows * 2), verdict(rows * 8)
-    assert grade_of(once, "payload_coverage") == grade_of(often, "payload_coverage")
-
-
 def test_without_anything_unseen_there_is_no_unreserved_verdict() -> None:
     found = verdict([])
     assert (found.grade, grade_of(found, "unseen")) == (Grade.RESERVED, Grade.RESERVED)

@@ -198,8 +198,3 @@ def test_a_drive_is_cut_where_a_statement_begins_or_ends_inside_it() -> None:
     pieces = [Piece(*span, 1) for span in cut(ns("07:50"), ns("08:30"), moments(records))]
     assert [(one.begin_ns, one.end_ns) for one in pieces] == [(ns("07:50"), ns("08:10")), (ns("08:10"), ns("08:30"))]
     assert payloads(assign(records, pieces, VAN)) == [310.0, 200.0]
-
-
-def test_ids_are_of_the_content() -> None:
-    assert told("07:40", payload_kg=310.0).id == told("07:40", payload_kg=310.0).id
-    assert told("07:40", payload_kg=310.0).id != told("07:41", payload_kg=310.0).id

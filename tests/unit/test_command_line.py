@@ -10,7 +10,7 @@ from support.commands import called, ended, run
 
 import gateway.cli
 from gateway.cli import INTERRUPTED
-from gateway.errors import BusError, SpringscaleError
+from gateway.errors import SpringscaleError
 
 
 @pytest.mark.parametrize(("typed", "meant"), [("estmate", "estimate"), ("check_config", "check-config")])
@@ -35,12 +35,6 @@ def test_ctrl_c_ends_quietly_with_the_code_of_an_interrupted_process(monkeypatch
     said = called("run")
     assert said.exit_code == INTERRUPTED
     assert said.output == ""
-
-
-def test_both_names_print_the_version() -> None:
-    short, long = (called(name).output for name in ("-V", "--version"))
-    assert short == long
-    assert short.startswith("springscale, version ")
 
 
 @pytest.mark.parametrize("text", ["nan", "inf", "-inf", "much"])
@@ -80,15 +74,6 @@ def test_unreadable_and_unreachable_things_are_reported_in_one_line(
     Path("long.toml").write_text("a = " + "1" * 5000)
     with pytest.raises(SpringscaleError, match=re.escape(said)):
         run(*command)
-
-
-def test_a_failing_drive_ends_the_command_with_its_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    def drive(*_: object) -> None:
-        raise BusError("springscale-demo: the bus has gone")
-
-    monkeypatch.setattr("gateway.cli.demo.demo_drive", drive)
-    said = called("demo", "--once", "--json")
-    assert isinstance(said.exception, BusError)  # as with every command, main makes one line of it
 
 
 HEAVY = ("scipy", "asammdf", "pandas", "matplotlib", "numba", "polars")

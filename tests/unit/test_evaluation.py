@@ -4,8 +4,6 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from support.calibrated import calibration_file
 from support.drives import T0_NS, drive
 from support.paper_van import paper_van
@@ -89,17 +87,6 @@ def test_every_run_has_figures_of_its_own() -> None:
     assert runs[1]["rejected_by_reason"] == {"too_slow": 1}
 
 
-@given(errors_kg=st.lists(st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=4), min_size=1, max_size=4))
-def test_the_table_is_its_runs_weighed_by_their_batches(errors_kg: list[list[float]]) -> None:
-    rows = [replace(judged(200.0, 200.0 + e), run=n) for n, run in enumerate(errors_kg, 1) for e in run]
-    table = error_table(rows, VAN, "ratio_index").to_json()
-    weights = [run["n_batches"] for run in table["runs"]]
-    for name in ("bias_kg", "mean_abs_kg", "coverage95"):
-        of_runs = np.average([run["payload"][name] for run in table["runs"]], weights=weights)
-        assert table["payload"][name] == pytest.approx(of_runs, abs=1e-9)
-    assert table["payload"]["max_abs_kg"] == max(run["payload"]["max_abs_kg"] for run in table["runs"])
-
-
 def test_figures_without_answers_are_null() -> None:
     table = errors_of([judged(100.0, None)], VAN).payload.to_json()
     assert table.pop("mean_abs_pct_with_misses") == pytest.approx(25.0)
@@ -161,13 +148,6 @@ def test_without_a_place_that_was_noted_nothing_sideways_is_judged() -> None:
     assert (errors.cg_left, errors.wheels) == (None, None)
     table = error_table([judged(100.0, 100.0)], ROLLING, "x").to_json()
     assert (table["cg_left"], table["wheels"], table["batches"][0]["true_cg_left_m"]) == (None, None, None)
-
-
-def test_a_noted_place_without_an_answer_is_null() -> None:
-    errors = errors_of([replace(judged(100.0, 100.0), cg_left_m=0.02)], ROLLING)
-    assert errors.cg_left is not None
-    assert set(asdict(errors.cg_left).values()) == {None}
-    assert errors.wheels is None
 
 
 def test_the_truth_beside_the_centre_line_follows_from_where_the_payload_was_noted() -> None:
@@ -246,20 +226,6 @@ def test_the_model_is_believed_for_any_load_between_the_axles() -> None:
     for share95_pct, is_outside in (((low, 45.0), False), ((high - 1.0, 99.0), False), ((high + 1.0, 99.0), True)):
         assert one.is_out_of_range("cross_spectrum", (100.0, 150.0), share95_pct) is is_outside
     assert low < 100.0 * VAN.empty_front_share / 1.33 < high
-
-
-def test_the_ratio_index_is_believed_where_it_was_calibrated() -> None:
-    one = CalibratedVehicle("id", VAN, (0.0, 200.0), (45.0, 55.0))
-    assert one.payload_believed_kg("ratio_index") == pytest.approx((-50.0, 250.0))
-    assert one.front_share_believed_pct("ratio_index") == pytest.approx((42.5, 57.5))
-    assert one.is_out_of_range("ratio_index", (260.0, 300.0), (50.0, 51.0))
-
-
-def test_an_interval_is_outside_if_it_is_wider_than_the_believed_range_but_not_if_it_is_unknown() -> None:
-    calibrated = calibration_file().for_core()
-    low, high = calibrated.payload_believed_kg("ratio_index")
-    for interval, is_outside in (((low + 1.0, high), False), ((low - 1.0, high), True), ((np.nan, np.nan), False)):
-        assert calibrated.is_out_of_range("ratio_index", interval, (47.0, 49.0)) is is_outside
 
 
 def test_without_calibration_there_are_spectra_and_a_reason() -> None:

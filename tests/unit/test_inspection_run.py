@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.drives import T0_NS, changed, drive, without_rows
+from support.drives import T0_NS, drive, without_rows
 from support.half_car_road import VAN
 from support.inspected import (
     ACCELERATION,
@@ -218,25 +218,6 @@ def told_of(kinds: tuple[Kind, ...], facts: RowFacts | None = None, log: LogFact
     return inspect_run(split, VAN, BatchSettings(), kinds).findings
 
 
-def test_facts_are_those_of_the_rows_in_any_order() -> None:
-    motion = drive(60.0)
-    facts = row_facts(motion, TRAITS)
-    shuffled = np.random.default_rng(1).permutation(len(motion))
-    other = row_facts(Motion(motion.signals, motion.t_ns[shuffled], motion.columns[shuffled]), TRAITS)
-    assert facts.duration_s == other.duration_s == pytest.approx(60.0, abs=0.1)
-    assert facts.streams[Signal.PITCH_RATE].rate_hz == pytest.approx(100.0)
-    assert facts.streams[Signal.SPEED].rate_hz == pytest.approx(10.0)
-    assert facts.mean(Signal.VERTICAL_ACCELERATION) == pytest.approx(9.81, abs=0.05)
-    assert np.isnan(facts.mean(Signal.AXLE_WEIGHT))
-    for signal, stream in facts.streams.items():
-        assert other.streams[signal].rate_hz == stream.rate_hz
-        assert other.streams[signal].mean == pytest.approx(stream.mean)
-
-
-def test_a_slow_sensor_is_named() -> None:
-    assert rate_kinds(drive(30.0, rate_hz=30.0)) == ["rate_low", "rate_low"]
-
-
 def test_stamps_in_bursts_are_named() -> None:
     motion = drive(30.0)
     since_ns = motion.t_ns - T0_NS
@@ -244,13 +225,6 @@ def test_stamps_in_bursts_are_named() -> None:
     in_burst_ns = since_ns % burst_ns // 100  # three samples of each sensor, a tenth of a millisecond apart
     bursts = replace(motion, t_ns=T0_NS + since_ns // burst_ns * burst_ns + in_burst_ns)
     assert rate_kinds(bursts) == ["jitter", "jitter"]
-
-
-def test_a_silent_sensor_is_named_and_one_that_is_not_mapped_is_not() -> None:
-    motion = drive(30.0)
-    silent = changed(motion, Signal.PITCH_RATE, 0.0, 99.0, lambda x: np.full(len(x), np.nan))
-    assert rate_kinds(silent) == ["sensor_silent"]
-    assert rate_kinds(Motion((motion.signals[0], motion.signals[2]), motion.t_ns, motion.columns[:, [0, 2]])) == []
 
 
 @pytest.mark.parametrize(
@@ -304,11 +278,6 @@ UNLADEN, LOADED = (0.0, 50.0), (420.0, 58.0)
 def test_the_report_says_how_a_log_was_read(facts: LogFacts, kinds: list[Kind]) -> None:
     of_log = (Kind.LOG_UNREADABLE, Kind.CUT_AWAY, Kind.LOG_DAMAGED)
     assert [finding.kind for finding in told_of(of_log, log=facts)] == kinds
-
-
-def test_a_piece_beyond_the_end_says_where_the_log_ends() -> None:
-    (finding,) = told_of((Kind.CUT_AWAY,), log=replace(SOUND, start_s=2000.0, span_ns=None))
-    assert finding.text == "the log lasts 900 s, and the run begins at 2000 s"
 
 
 @pytest.mark.parametrize(

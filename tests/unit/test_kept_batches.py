@@ -17,7 +17,6 @@ from gateway.weighing.flow import Flow, Identity
 
 MAP = load_signal_map("springscale:reference")
 SETTINGS = BatchSettings(window_s=20.0)
-EMPTY = ((0.0, None),)
 
 
 def driven(duration_s: float) -> Motion:

@@ -28,7 +28,6 @@ from gateway.offline.look import heard as heard_module
 from gateway.offline.look.heard import MOST_IDENTIFIERS
 from gateway.offline.look.roles import axis_of
 from gateway.records import EXTENDED_ID, Frames, Signal
-from gateway.status import DecodeCount, SignalHealth, State, Status
 
 T0_NS = 1_790_000_000_000_000_000
 DBC = """VERSION ""
@@ -342,23 +341,3 @@ def test_a_silent_sensor_has_a_reason(alter: Alter, words: str, tmp_path: Path) 
     assert pitch.text == f"pitch_rate has 0 samples in the whole run: {words}"
     assert (pitch.severity, roll.severity) == (Severity.FAULT, Severity.WARNING)
     assert roll.text == f"roll_rate has 0 samples in the whole run: {words}"
-
-
-@pytest.mark.parametrize(
-    ("counts", "words"),
-    [
-        ({"ok": 0}, "Missing: pitch rate (no frame of its message)."),
-        ({"ok": 0, "invalid": 900}, "Missing: pitch rate (900 frames came, all invalid)."),
-        ({"ok": 900}, "Missing: pitch rate."),
-    ],
-)
-def test_the_service_reports_the_same_reason(counts: dict[str, int], words: str) -> None:
-    status = Status(
-        version="1",
-        state=State.SENSOR_FAULT,
-        uptime_s=90.0,
-        calibration_id="sha256:ab",
-        signals=(SignalHealth(signal="pitch_rate", last_age_s=None),),
-        decode=tuple(DecodeCount(signal="pitch_rate", reason=reason, n=n) for reason, n in counts.items()),
-    )
-    assert words in status.state_in_words

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from gateway.estimates.as_json import estimate_to_json
 from gateway.estimates.batch_estimate import Epoch, Estimate, Quantity
-from gateway.records import Motion, Signal, Why, iso_utc, json_line
+from gateway.records import Why, iso_utc, json_line
 
 FULL = Estimate(
     t_start_ns=1_790_000_000_000_000_000,
@@ -62,10 +62,3 @@ def test_the_id_depends_on_the_input_and_not_on_the_answer() -> None:
         {"t_end_ns": 2},
     ]
     assert len({FULL.id, *(replace(FULL, **other).id for other in changes)}) == 6
-
-
-def test_a_signal_of_rows_is_its_known_samples() -> None:
-    rows = Motion((Signal.SPEED,), np.array([1, 2, 3]), np.array([[5.0], [np.nan], [7.0]]))
-    t_ns, speed_mps = rows.of(Signal.SPEED)
-    assert (t_ns.tolist(), speed_mps.tolist()) == ([1, 3], [5.0, 7.0])
-    assert rows.of(Signal.PITCH_RATE)[1].size == 0

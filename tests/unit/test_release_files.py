@@ -47,16 +47,6 @@ def test_the_citation_is_valid() -> None:
     assert checked.returncode == 0, checked.stdout
 
 
-def test_hooks_before_a_commit_call_locked_tools_offline() -> None:
-    (repository,) = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"]
-    assert repository["repo"] == "local"
-    called = {Path(hook["entry"].split()[0]) for hook in repository["hooks"]}
-    assert {path.parent for path in called} == {Path(".venv/bin")}
-    assert {hook["language"] for hook in repository["hooks"]} == {"system"}
-    packages = {"import-linter" if path.name == "lint-imports" else path.name for path in called}
-    assert packages <= pins("requirements-dev.txt").keys()
-
-
 def test_the_image_copies_existing_files_that_are_not_ignored() -> None:
     kept = [line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if line.startswith("!")]
     copied = [source for copy in of("COPY") if "--from" not in copy for source in copy.split()[:-1]]
@@ -105,12 +95,6 @@ UNIT = (DEPLOY / "springscale.service").read_text()
 COMMENTED_KEY = re.compile(r"^# (?=[a-z_]+ = )", re.MULTILINE)
 
 
-def test_the_shipped_configuration_is_good_as_it_is() -> None:
-    settings = load_settings(DEPLOY / "springscale.toml")
-    assert settings.bus.interface == "socketcan"
-    assert settings.store.directory == Path("/var/lib/springscale")
-
-
 def test_every_commented_key_of_the_shipped_configuration_is_a_setting(tmp_path: Path) -> None:
     text, n_keys = COMMENTED_KEY.subn("", (DEPLOY / "springscale.toml").read_text())
     assert n_keys > 10
@@ -146,22 +130,8 @@ def test_the_sandbox_scores_below_one_and_a_half_and_what_remains_is_explained()
     assert [name for name in remaining if name.removeprefix("✗ ") not in explained] == []
 
 
-def test_a_configuration_fault_is_not_tried_again() -> None:
-    assert "\nRestartPreventExitStatus=2\n" in UNIT
-
-
 VEHICLE = pins("requirements.txt")
 FOR_DESKS = ("matplotlib", "numba", "llvmlite", "pillow")
-UNUSED = ("watchfiles", "websockets")
-
-
-@pytest.mark.parametrize("name", [*FOR_DESKS, *UNUSED])
-def test_a_vehicle_does_without(name: str) -> None:
-    assert name not in VEHICLE
-
-
-def test_modules_that_the_service_loads_by_name_are_locked() -> None:
-    assert {"h11", "uvloop"} <= VEHICLE.keys()
 
 
 def test_the_workbench_has_all_of_a_vehicle_and_the_extra_at_the_same_versions() -> None:
@@ -184,25 +154,6 @@ def test_the_debian_packages_part_along_the_locks() -> None:
     assert VEHICLE.keys() >= UNIMPORTED
 
 
-def planned(*arguments: str) -> str:
-    """The commands of a set-up from nothing, not run."""
-    if shutil.which("make") is None:
-        pytest.skip("needs make")
-    return ended("make", "--no-print-directory", "--dry-run", "--always-make", *arguments, cwd=ROOT).stdout
-
-
-def test_the_demonstration_takes_a_port() -> None:
-    assert "springscale demo --port 8123" in planned("demo", "PORT=8123")
-    assert "springscale demo --port 8000" in planned("demo")
-
-
-def test_an_installation_reports_progress() -> None:
-    commands = planned("test")
-    assert commands.startswith('echo "Setting up .venv')
-    assert commands.count("pip install") + commands.count("pip --disable-pip-version-check install") >= 4
-    assert "--quiet" not in commands
-
-
 def elf(architecture: str) -> bytes:
     """The head of an ELF file."""
     return ELF_MAGIC.ljust(18, b"\0") + PROCESSORS[architecture].elf_machine.to_bytes(2, "little") + bytes(44)
@@ -216,10 +167,6 @@ def tree(tmp_path: Path) -> Path:
     (tmp_path / "numpy/dangling.so").symlink_to("nowhere")
     (tmp_path / "empty").write_bytes(b"")
     return tmp_path
-
-
-def test_a_tree_of_one_processor_is_good(tree: Path) -> None:
-    require_own_code(tree, "arm64")
 
 
 def test_foreign_machine_code_is_named(tree: Path) -> None:

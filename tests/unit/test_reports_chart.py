@@ -82,13 +82,6 @@ def test_the_same_chart_gives_the_same_bytes(tmp_path: Path) -> None:
     assert one.read_bytes() == other.read_bytes()
 
 
-def test_named_positions_are_on_the_chart() -> None:
-    weeks = Axis("week", ticks=((1.0, "2026-01"), (3.0, "2026-02")))
-    named = chart(Panel(weeks, Axis("y"), (LineMark(X, X),)))
-    [axes, *_] = draw(named).axes
-    assert [label.get_text() for label in axes.get_xticklabels()] == ["2026-01", "2026-02"]
-
-
 def test_a_cell_may_lead_to_another_page_and_nothing_breaks_out_of_it() -> None:
     cells = table_html(Table("of vans", ("Van",), ((ChartLink("<b>", 'a"b.html'),),)))
     assert '<th scope="row"><a href="a&quot;b.html">&lt;b&gt;</a></th>' in cells

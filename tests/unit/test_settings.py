@@ -37,16 +37,6 @@ def fault_of(tmp_path: Path, text: str) -> str:
     return str(caught.value)
 
 
-def test_a_signal_map_is_the_only_required_setting(tmp_path: Path) -> None:
-    settings = loaded(tmp_path)
-    assert settings.signals == str(tmp_path / "signals.toml")
-    assert settings.calibration is None
-    assert (settings.bus.interface, settings.bus.channel) == ("socketcan", "can0")
-    assert (settings.batch.window_s, settings.batch.standstill_s, settings.batch.silence_s) == (300.0, 60.0, 10.0)
-    assert settings.batch.last_batch_share_min == 0.95
-    assert (settings.web.host, settings.web.port) == ("127.0.0.1", 8000)
-
-
 def test_every_estimator_there_is_can_be_chosen_the_better_one_first() -> None:
     assert tuple(ESTIMATORS) == ESTIMATOR_NAMES
 

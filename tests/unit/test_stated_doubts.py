@@ -108,10 +108,6 @@ def test_a_doubt_says_what_is_usual_and_what_to_do() -> None:
     assert first.sentence.endswith(": read the ticket of the scales again, axle by axle, in kilograms")
 
 
-def test_every_kind_has_words() -> None:
-    assert all(kind.text and kind.advice for kind in DoubtKind)
-
-
 OTHER_MODEL = times(CAR, spring_front_npm=0.7, damper_front_nspm=0.8, spring_rear_npm=1.4, tyre_rear_npm=0.8)
 
 

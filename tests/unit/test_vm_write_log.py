@@ -3,7 +3,6 @@
 import random
 from pathlib import Path
 
-import pytest
 from vm.harness.write_log import HEADER, MAGIC, SECTOR_BYTES, SUPERBLOCK, Flag, cut, entries_of
 
 N_SECTORS = 8
@@ -43,16 +42,6 @@ def disks(folder: Path, *entries: bytes) -> set[str]:
     return seen
 
 
-def test_entries_are_read_with_their_marks(tmp_path: Path) -> None:
-    log = log_of(tmp_path, write(3, "ab"), FLUSH, mark("here"), write(1, "c", Flag.FUA | Flag.METADATA))
-    assert [(entry.sector, entry.n_sectors, entry.mark) for entry in entries_of(log)] == [
-        (3, 2, ""),
-        (0, 0, ""),
-        (0, 0, "here"),
-        (1, 1, ""),
-    ]
-
-
 def test_a_log_that_has_not_begun_is_empty(tmp_path: Path) -> None:
     (tmp_path / "log").write_bytes(b"")
     assert entries_of(tmp_path / "log") == []
@@ -76,13 +65,6 @@ def test_the_power_goes_at_any_moment_after_the_mark(tmp_path: Path) -> None:
     seen = disks(tmp_path, write(0, "a"), mark("here"), write(1, "b"), FLUSH, write(2, "c"))
     assert {"........", "a.......", "ab......", "abc....."} <= seen
     assert not {disk for disk in seen if disk[2] == "c" and disk[:2] != "ab"}  # not behind what a flush came between
-
-
-def test_a_cut_with_nothing_to_lose_is_refused(tmp_path: Path) -> None:
-    log = log_of(tmp_path, write(0, "a"), FLUSH, mark("here"), write(1, "b", Flag.FUA))
-    (tmp_path / "disk").write_bytes(bytes(N_SECTORS * SECTOR_BYTES))
-    with pytest.raises(AssertionError, match="nothing was written after here"):
-        cut(tmp_path / "disk", log, "here", random.Random(1))
 
 
 def test_the_superblock_of_ext4_comes_whole_or_not_at_all(tmp_path: Path) -> None:

@@ -59,15 +59,6 @@ def test_before_any_estimate_a_calibrated_vehicle_lacks_only_an_estimate(clock: 
     assert latest(board)["weights"]["gross"] == nothing | known
 
 
-def test_it_becomes_stale_after_the_time_set(board: Board, clock: Clock) -> None:
-    board.publish(make_estimate(3))
-    clock.now_s += 900.0
-    assert not board.is_stale()
-    clock.now_s += 0.1
-    assert board.is_stale()
-    assert latest(board)["is_stale"] is True
-
-
 def test_a_rejection_is_shown_beside_the_estimate_without_renewing_it(board: Board, clock: Clock) -> None:
     board.publish(make_estimate(3))
     clock.now_s += 300.0
@@ -77,15 +68,6 @@ def test_a_rejection_is_shown_beside_the_estimate_without_renewing_it(board: Boa
     assert told["age_s"] == 300.0
     expected = make_record(4, Why.TOO_SLOW)
     assert told["last_rejection"] == expected
-
-
-def test_a_rejection_before_any_estimate_leaves_the_nulls(board: Board) -> None:
-    board.publish(make_estimate(0, Why.NO_CALIBRATION))
-    told = latest(board)
-    assert told["rejected"] == ["no_estimate_yet"]
-    rejection = told["last_rejection"]
-    assert isinstance(rejection, dict)
-    assert rejection["rejected"] == ["no_calibration"]
 
 
 def test_a_provisional_estimate_stands_in_until_the_drive_has_a_good_one(board: Board) -> None:
@@ -111,13 +93,6 @@ def test_an_early_look_without_an_answer_is_not_shown(board: Board) -> None:
     told = latest(board)
     assert told["payload_kg"] == 100.0
     assert told["last_rejection"] is None
-
-
-def test_an_estimate_of_an_earlier_run_is_shown_with_its_age(board: Board) -> None:
-    board.restore(json.dumps(make_record(2)), json.dumps(make_record(3, Why.GAP)), age_s=3600.0)
-    told = latest(board)
-    assert (told["payload_kg"], told["age_s"], told["is_stale"]) == (102.0, 3600.0, True)
-    assert told["last_rejection"] is not None
 
 
 def test_the_tag_changes_with_all_but_the_age(board: Board, clock: Clock) -> None:
