@@ -7,27 +7,22 @@ from functools import partial
 import numpy as np
 import pytest
 from support.calibrated import ratio_index_calibration
-from support.drives import assert_same_batch, drive, with_roll
 from support.half_car_road import batch_over_road
 
 from benchmarks.accuracy import coverage, drives
 from benchmarks.accuracy.coverage_table import coverage_table
-from benchmarks.accuracy.disturbed import half_of_the_time, missing, stuck
 from benchmarks.accuracy.drives import (
     TRIPS,
     Scope,
     Trip,
     draw_van,
-    driven,
     known_loads,
     stated,
-    without_roll_rate,
 )
 from gateway.calibration.known_run import KnownRun
 from gateway.core.vehicle import Vehicle
 from gateway.core.vehicle import front_share_pct as stated_share_pct
 from gateway.errors import CalibrationImpossibleError
-from gateway.records import Signal
 from gateway.sim.instruments import Sensors
 from gateway.sim.parameters import Load, front_share_pct, payload_kg
 from gateway.sim.parameters import Vehicle as Van
@@ -96,28 +91,3 @@ def test_every_van_is_put_to_every_kind_of_drive(monkeypatch: pytest.MonkeyPatch
         ["cross_spectrum, without roll rate", "not today"],
     ] * 2
     assert done == [(0, 2), (1, 2), (2, 2)]
-
-
-def test_a_map_without_a_roll_rate_changes_nothing_else() -> None:
-    scope = Scope(steady_s=60.0)
-    run = driven(
-        van(), (Load(200.0, 1.2),), TRIPS["as calibrated, load sideways"], scope, np.random.SeedSequence([5]), 3
-    )
-    assert run.payload_left_m is not None
-    assert 0.15 <= abs(run.payload_left_m) <= 0.35
-    (batch,), (silent,) = run.batches, without_roll_rate(run).batches
-    assert batch.roll_usable_share == pytest.approx(1.0, abs=0.01)
-    assert silent.roll_rate_radps is None
-    assert_same_batch(replace(batch, roll_rate_radps=None), silent)
-
-
-def test_every_other_minute_of_a_signal_is_lost_or_stuck() -> None:
-    motion = with_roll(drive(300.0))
-    for fault, n_known in ((missing, 0), (stuck, 1)):
-        spoilt = half_of_the_time(Signal.ROLL_RATE, fault)(motion, np.random.default_rng(1))
-        t_s = (spoilt.of(Signal.ROLL_RATE)[0] - motion.t_ns[0]) / 1e9
-        second = spoilt.of(Signal.ROLL_RATE)[1][(t_s >= 60.0) & (t_s < 120.0)]
-        third = spoilt.of(Signal.ROLL_RATE)[1][(t_s >= 120.0) & (t_s < 180.0)]
-        assert len(set(second)) == n_known
-        assert len(set(third)) > 5000
-        np.testing.assert_array_equal(spoilt.of(Signal.PITCH_RATE)[1], motion.of(Signal.PITCH_RATE)[1])

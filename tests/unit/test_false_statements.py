@@ -10,7 +10,6 @@ from benchmarks.accuracy.false_statements import (
     Kind,
     Recorded,
     recorded_of,
-    section,
     stated,
     told_by,
 )
@@ -60,15 +59,3 @@ def test_a_statement_that_cannot_be_true_is_refused_before_any_fit(recorded: Rec
         assert all(fate is not Fate.MATCHED and REFUSED[kind.title] in reason for fate, reason in of_false)
     else:
         assert all(fate is Fate.MATCHED for fate, _ in of_false)
-
-
-def test_the_table_counts_states_and_names_true_statements_that_were_accused() -> None:
-    line = {"title": "exchanged", "payload": {"error": 2.25, "held": 100.0, "half": 10.9}}
-    worse = {"title": "half", "payload": {"error": 4.0, "held": 100.0, "half": 12.0}}
-    states = {"false": ["held", "used", "held"], "true": ["used", "weak"]}
-    one = {"states": states, "asked": ["is it gross?"], "weighs": line}
-    other = {"states": {"false": ["used"], "true": ["used"]}, "asked": [], "weighs": worse}
-    every = {"title": "all", "states": {"false": [], "true": ["used"]}, "asked": [], "error_kg": 12.4, "held_pct": 87.5}
-    found = section({"kinds": [one, other], "all": [every]}).splitlines()
-    assert found[2] == "| used | exchanged; half | 1 weak | 2.2 to 4.0 | 10.9 to 12.0 |"
-    assert found[-1] == "| all | – | – | 12 | 88 |"

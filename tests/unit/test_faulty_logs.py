@@ -64,31 +64,6 @@ def test_a_gain_a_bias_and_a_sign(log: Log) -> None:
     np.testing.assert_allclose(over, -before, atol=step(log, PITCH_RATE))
 
 
-def test_a_stuck_piece_repeats_one_number_to_the_end_of_its_minute(log: Log) -> None:
-    before, stuck = both(log, ACCELERATION, "acceleration stuck each minute for", "5 s")
-    t_s = log.samples(ACCELERATION)[0]
-    is_stuck = t_s % 60.0 >= 55.0
-    assert len(np.unique(stuck[is_stuck & (t_s < 60.0)])) == 1
-    np.testing.assert_array_equal(stuck[~is_stuck], before[~is_stuck])
-
-
-def test_a_sensor_further_back_feels_the_pitch_acceleration(log: Log) -> None:
-    before, back = both(log, ACCELERATION, "sensor moved back", "1 m")
-    t_s = log.samples(ACCELERATION)[0]
-    expected = 0.2 * 2.0 * np.pi * 2.0 * np.cos(2.0 * np.pi * 2.0 * t_s)  # of the pitch rate, per metre
-    np.testing.assert_allclose((back - before)[500:-500], expected[500:-500], atol=0.15)
-
-
-def test_a_sensor_turned_by_a_right_angle_takes_roll_for_pitch(log: Log) -> None:
-    turned = after(log, "sensor turned", "90 degrees")
-    np.testing.assert_allclose(
-        turned.samples(PITCH_RATE)[1], -log.samples(ROLL_RATE)[1], atol=2.0 * step(log, PITCH_RATE)
-    )
-    np.testing.assert_allclose(
-        turned.samples(ROLL_RATE)[1], log.samples(PITCH_RATE)[1], atol=2.0 * step(log, PITCH_RATE)
-    )
-
-
 def test_frames_are_lost_doubled_and_sent_by_two(log: Log) -> None:
     n = len(log.frames)
     assert len(after(log, "frames dropped", "20%").frames) == pytest.approx(0.8 * n, rel=0.02)

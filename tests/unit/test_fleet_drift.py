@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.fleet import week, write_table
+from support.fleet import row, week, write_table
 
 from gateway.archive import PlaceError, place_of
 from gateway.archive.dataset import SCHEMA_VERSION
@@ -107,6 +107,13 @@ def test_an_empty_data_set_is_reported(tmp_path: Path, is_there: bool, told: str
         write_table(tmp_path, "van", [])
     with pytest.raises(ConfigurationError, match=told):
         fleet_of(place_of(tmp_path))
+
+
+def test_several_jobs_are_one_vehicle(tmp_path: Path) -> None:
+    write_table(tmp_path, "van", [row(1_768_000_000.0)])
+    write_table(tmp_path, "van", [row(1_767_900_000.0)], month="2026-02")
+    [vehicle] = fleet_of(place_of(tmp_path)).vehicles
+    assert vehicle.n == 2
 
 
 X = np.arange(52.0) / 52.0

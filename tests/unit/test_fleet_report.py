@@ -2,11 +2,13 @@
 
 import json
 import re
+from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
 
 import duckdb
 import numpy as np
+import polars as pl
 import pytest
 from click.testing import Result
 from support.commands import called
@@ -15,8 +17,11 @@ from support.html_page import Page, assert_self_contained, assert_well_formed
 
 from gateway.archive import place_of
 from gateway.archive.fleet.fleet import FleetSummary, fleet_of
+from gateway.archive.fleet.weeks import monday_of
 from gateway.cli import main
-from gateway.reports.fleet.text import page_of
+from gateway.reports.charts import Rule
+from gateway.reports.fleet.text import page_of, time_axis
+from gateway.reports.fleet.vehicle_page import vehicle_sections
 
 EVIL = "<script>alert(1)</script>\"'&"
 N_WEEKS = 26
@@ -126,6 +131,15 @@ def test_a_vehicles_page_has_every_week_with_its_number_of_batches(made: Path) -
     assert [line[-1] for line in slopes[1:]] == ["yes", "no"]
 
 
+def test_a_new_calibration_is_marked_and_the_slope_begins_there(tmp_path: Path) -> None:
+    rows = [one for number in range(20) for one in week(number, calibration_id=f"sha256:{number // 12}", misfit=1.0)]
+    write_table(tmp_path / "dataset", "van", rows)
+    [van] = fleet_of(place_of(str(tmp_path / "dataset"))).vehicles
+    charts = [chart for section in vehicle_sections(van) for chart in section.charts]
+    [rule] = [mark for panel in charts[-1].panels for mark in panel.marks if isinstance(mark, Rule)]
+    assert monday_of(int(rule.at)) == date(2026, 1, 5) + timedelta(weeks=12)
+
+
 def test_every_page_is_well_formed_and_links_only_to_files_beside_it(made: Path) -> None:
     """No name breaks out of a page, and every chart is a picture with words."""
     for path in pages(made):
@@ -146,6 +160,12 @@ def test_every_page_is_well_formed_and_links_only_to_files_beside_it(made: Path)
 def test_a_vehicles_page_is_a_file_of_its_folder(name: str) -> None:
     assert re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.html", page_of(name))
     assert page_of("van-17") == "van-17.html"
+
+
+def test_months_are_named_where_they_begin() -> None:
+    axis = time_axis(pl.Series(range(2922, 2930)))  # from 2025-12-29 on
+    assert axis.ticks == ((2923.0, "2026-01"), (2927.0, "2026-02"))
+    assert time_axis(pl.Series([2923])).ticks == ((2923.0, "2026-01"),)
 
 
 def test_an_invalid_data_set_is_reported_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -120,13 +120,6 @@ def test_loads_and_sensor_stand_beside_the_centre_line_where_asked(tmp_path: Pat
         )
 
 
-def test_a_campaign_is_not_written_over(tmp_path: Path) -> None:
-    (tmp_path / "campaign.toml").write_text("mine")
-    with pytest.raises(ConfigurationError, match="there is a campaign already"):
-        write_campaign(bench_of("ident"), tmp_path)
-    assert (tmp_path / "campaign.toml").read_text() == "mine"
-
-
 @pytest.mark.parametrize(
     ("names", "complaint"),
     [

@@ -1,6 +1,5 @@
 """python -m benchmarks.accuracy: what is printed and written, with stand-ins for the minutes of work."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,30 +17,6 @@ def run(*arguments: str) -> str:
     found = CliRunner().invoke(command.studies, list(arguments), catch_exceptions=False)
     assert found.exit_code == 0, found.output
     return found.stdout
-
-
-@pytest.mark.parametrize(
-    ("n_missed", "verdict"), [(0, "agrees with 90 to 99 %"), (100, "too narrow, the limits lie below 90 to 99 %")]
-)
-def test_the_coverage_study_reports_a_shortfall(
-    n_missed: int, verdict: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    told = {"payload_half_width_pct": 3.0, "payload_score_pct": 6.5}
-    batches = [
-        JudgedBatch("a", f"a {i}", "mixed", "cross_spectrum", (), 1.0, 1.0, i >= n_missed, i % 20 > 0, **told)
-        for i in range(200)
-    ]
-    refused = [
-        JudgedBatch("b", "b 1", "mixed", name, ("gap",), 9.0, 9.0, False, False)
-        for name in ("cross_spectrum", "ratio_index")
-    ]
-    monkeypatch.setattr(Study, "cases", lambda *_, **__: [([*batches, *refused], [])])
-    page = run("coverage", "--output", str(tmp_path / "out"))
-    assert f"cross spectrum, with roll rate, all drives, payload: {100 - n_missed // 2} %" in page
-    assert verdict in page
-    assert "| mixed, with roll rate | none / none | **1.0 / 1.0** |" in page
-    assert "| 3.0 / none | 6 (6) / none | 1 of 201 |" in page
-    assert json.loads((tmp_path / "out/coverage.json").read_text(encoding="utf-8"))["vans"] == ["a", "b"]
 
 
 N_COMPUTED: list[int] = []
