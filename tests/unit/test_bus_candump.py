@@ -42,21 +42,6 @@ def rows(frames: Frames):
     ]
 
 
-def test_a_plain_log(read):
-    frames, report = read(
-        b"(1627274455.012500) can1 120#0011223344556677\n"
-        b"(1627274455.023950) can1 7E8#03412F8C00000000\n"
-        b"(1627274455.044400) can1 18FEF100#FFFF\n"
-        b"(1627274455.044400) can1 120#\n"
-    )
-    assert rows(frames) == [
-        (GOOD_NS, 0x120, bytes.fromhex("0011223344556677")),
-        (1627274455_044400_000, 0x18FEF100 | EXTENDED_ID, b"\xff\xff"),
-        (1627274455_044400_000, 0x120, b""),
-    ]
-    assert (report.lines, report.frames, report.wanted, report.n_rejected) == (4, 4, 3, 0)
-
-
 SOUND_LINES = {
     "nanoseconds": (b"(1627274455.012500001) can1 120#0011223344556677\n", GOOD_NS + 1),
     "few decimals": (b"(1627274455.0125) can1 120#0011223344556677\n", GOOD_NS),
@@ -158,11 +143,6 @@ def test_can_fd_lines(read):
     assert [len(p) for _, _, p in rows(frames)] == [64, 0, 1, 8]
     assert frames.payload[0].tolist() == [0xAB] * 64
     assert (report.frames, report.n_rejected) == (4, 0)
-
-
-def test_a_can_fd_frame_in_a_classic_table_keeps_its_true_length(read):
-    frames, _ = read(b"(1.000001) can1 120##1" + b"AB" * 12 + b"\n")
-    assert (frames.length.tolist(), frames.payload.tolist()) == ([12], [[0xAB] * 8])
 
 
 def test_j1939_frames_are_found_by_group(read):

@@ -33,13 +33,6 @@ def reference():
     return Decoder(load_signal_map("springscale:reference"))
 
 
-def test_one_row_a_mapped_frame_in_order_of_arrival(reference):
-    motion = reference.decode(frames(gps(), (0x7FF, b"\1"), accel(), (0x130 | EXTENDED_ID, b"\0" * 4), gps(0)))
-    assert motion.t_ns.tolist() == [0, 2_000_000, 4_000_000]
-    speed = motion.columns[:, motion.signals.index(Signal.SPEED)]
-    np.testing.assert_array_equal(speed, [10.0, np.nan, 0.0])
-
-
 @pytest.mark.parametrize(
     ("frame", "signal", "reason"),
     [

@@ -142,3 +142,12 @@ def test_payloads_kept_apart_from_the_records(tmp_path):
     assert found.can_id.tolist() == [can_id | (EXTENDED_ID if is_29 else 0) for _, can_id, is_29, _ in frames]
     np.testing.assert_array_equal(found.t_ns, START_NS + 10_000_000 * np.arange(len(frames)))
     assert report.channels == {"1"}
+
+
+def test_one_of_several_channels(tmp_path, frames):
+    channel = np.arange(N) % 3
+    write_mf4(tmp_path / "a.mf4", START_NS, [can_group(frames, START_NS, channel=channel)])
+    found, report = read(tmp_path / "a.mf4", channel="can2")
+    assert_same(found, take(frames, channel == 2))
+    assert (report.frames, report.wanted, report.other_channel) == (N, len(found), N - len(found))
+    assert report.channels == {"0", "1", "2"}

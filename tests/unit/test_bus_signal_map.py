@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from gateway.bus.signals import load_signal_map, shipped_map
-from gateway.bus.signals.signal_map import shipped_maps
+from gateway.bus.signals import load_signal_map
 from gateway.errors import SignalMapError
 from gateway.records import EXTENDED_ID, Signal
 
@@ -178,11 +177,6 @@ def test_a_message_in_two_databases_is_refused(write_map, tmp_path):
     (tmp_path / "copy.dbc").write_text(DBC)
     with pytest.raises(SignalMapError, match=r"'IMU' is in car\.dbc and in copy\.dbc"):
         load_signal_map(write_map(ACCEL, head='dbc = ["car.dbc", "copy.dbc"]\n'))
-
-
-def test_shipped_maps_are_found_by_name():
-    assert "reference" in shipped_maps()
-    assert load_signal_map("springscale:reference").messages == load_signal_map(shipped_map("reference")).messages
 
 
 def test_an_unknown_shipped_map_names_those_there_are():

@@ -209,18 +209,6 @@ def test_stopping_closes_the_channel(listen):
     assert source.failure is None
 
 
-def test_an_unknown_interface_names_the_known():
-    with pytest.raises(BusError, match=r"'sockercan' is unknown; known are .*socketcan"):
-        LiveSource("sockercan", "can0", MAP)
-
-
-def test_a_missing_driver_package_is_named_before_anything_starts(monkeypatch):
-    """The receive thread died of it, and with it the service, some time after the start."""
-    monkeypatch.setattr("gateway.bus.receiver.importlib.util.find_spec", lambda name: None)
-    with pytest.raises(BusError, match="'gs_usb' needs the Python package gs-usb: pip install gs-usb"):
-        LiveSource("gs_usb", "0", MAP)
-
-
 def test_options_an_interface_does_not_take_are_told():
     source = LiveSource("socketcand", "can0", MAP)
     source.start()
@@ -259,3 +247,8 @@ def test_the_log_tells_when_the_bus_goes_and_comes_and_why(listen, caplog):
         "the interface does not exist (not plugged in, or removed)",
     ]
     assert all((fields["interface"], fields["channel"]) == ("socketcan", "can9") for fields in told)
+
+
+def test_an_unknown_interface_names_the_known():
+    with pytest.raises(BusError, match=r"'sockercan' is unknown; known are .*socketcan"):
+        LiveSource("sockercan", "can0", MAP)

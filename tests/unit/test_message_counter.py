@@ -13,13 +13,12 @@ from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.sample_clock import sample_times
 from gateway.errors import SignalMapError
-from gateway.records import F64, I64, Batch, Bool, Frames, Motion, Signal, joined
+from gateway.records import F64, I64, Batch, Bool, Frames, Motion, joined
 
 REFERENCE = load_signal_map("springscale:reference")
 DURATION_S = 100.0
 N = round(DURATION_S * 100.0)
 TAKEN_S = np.arange(N) * 0.01
-SENSED = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
 Counting = Callable[[I64], I64]
 
 
@@ -140,15 +139,6 @@ def test_a_frame_sent_twice_or_overtaken_costs_no_round() -> None:
     stamped_s = np.maximum.accumulate(TAKEN_S[arrived])
     timing = sample_times(ns(stamped_s), arrived % 256, 256)
     assert float(np.max(np.abs(timing.t_ns - ns(TAKEN_S[arrived])))) < 1e6
-
-
-def test_the_counter_is_that_of_the_sample_s_own_frame() -> None:
-    motion = seen(TAKEN_S, LOSSES)
-    for signal in SENSED:
-        counter = motion.counter_of(signal)
-        assert counter is not None
-        np.testing.assert_array_equal(counter, np.flatnonzero(LOSSES) % 256)
-    assert motion.counter_of(Signal.SPEED) is None
 
 
 MAP = '[signals.pitch_rate]\nmessage = "IMU_GYRO"\nsignal = "PitchRate"\n'

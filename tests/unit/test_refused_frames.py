@@ -105,15 +105,6 @@ def spoiled(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Case, Path,
     return case, folder / "drive.log", folder / "signals.toml"
 
 
-def test_the_decoder_counts_them_for_every_signal(spoiled: tuple[Case, Path, Path]) -> None:
-    case, log, signals = spoiled
-    _, report = read_whole_log(log, load_signal_map(signals))
-    (cause,) = report.causes()
-    assert cause.text.startswith(case.told)
-    assert (cause.share, cause.signals) == (1.0, case.signals)
-    assert [remark for remark in report.remarks() if case.told in remark]
-
-
 def test_a_single_refused_frame_is_reported_but_not_blamed() -> None:
     decoder = Decoder(load_signal_map("springscale:reference"))
     frames = bus_drive(100.0, seed=3)
