@@ -187,14 +187,6 @@ def test_springs_stiffen_by_the_exponential_of_slope_and_bends() -> None:
         assert rear == pytest.approx(np.exp(0.1 * added_kn + 0.5 * max(added_kn - bend_kn, 0.0)))
 
 
-@pytest.mark.parametrize(("payload_kg", "felt"), [(3000.0, 0.9999), (car.INVERSE_PAYLOAD_KG, 0.5), (0.0, 0.0)])
-def test_the_place_of_a_load_fades_with_its_mass(payload_kg: float, felt: float) -> None:
-    """All of it over the rear axle: (R - F)^2 / 4 L would be L / 4, and the mass felt between the axles nothing."""
-    share = GROUND.empty_front_share * GROUND.empty_mass_kg / (GROUND.empty_mass_kg + payload_kg)
-    numbers = numbers_of(natural(HALF)[None], np.array([[payload_kg], [share]]), GROUND)
-    assert numbers[car.CARRIED][2, 0, 0] == pytest.approx(payload_kg / 4.0 * (1.0 - felt), abs=1e-3)
-
-
 def rates_at_levels(**units: float) -> tuple[F64, F64]:
     """(5,) rear damper and rear spring at each of LEVELS, over those without friction and digression."""
     numbers, plain = (

@@ -1,7 +1,6 @@
 """Load epochs: fused while the load is the same; the detector of changes held against brute force."""
 
 from dataclasses import replace
-from random import Random
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from hypothesis import strategies as st
 from gateway.core.change import EVEN, ROLLING, Rules, probability
 from gateway.core.fusion import LoadEpoch, fused_epoch
 from gateway.estimates.batch_estimate import Estimate, Quantity
-from gateway.estimates.posterior import CG_LEFT, PAYLOAD, Posterior, Source, difference
+from gateway.estimates.posterior import PAYLOAD, Posterior, Source, difference
 from gateway.records import Why
 
 RULES = Rules(range_kg=1000.0, mass_kg=2000.0)
@@ -35,15 +34,6 @@ def together(*batches: Estimate) -> LoadEpoch:
         epoch = fused_epoch(epoch, one, RULES)
     assert epoch is not None
     return epoch
-
-
-@given(st.lists(st.floats(262.0, 278.0), min_size=1, max_size=8), st.randoms(use_true_random=False))
-def test_order_does_not_matter_within_an_epoch(payloads_kg: list[float], random: Random) -> None:
-    shuffled = payloads_kg.copy()
-    random.shuffle(shuffled)
-    one, other = (together(*map(batch, order)).posterior for order in (payloads_kg, shuffled))
-    assert one.mean == pytest.approx(other.mean)
-    assert one.mean[PAYLOAD] == pytest.approx(np.mean(payloads_kg))
 
 
 def test_a_change_is_detected_not_averaged() -> None:
@@ -82,13 +72,6 @@ def test_a_batch_without_an_answer_keeps_the_epoch_unless_the_load_could_have_ch
     epoch = together(batch(100.0))
     assert fused_epoch(epoch, silent, RULES) is epoch
     assert fused_epoch(epoch, silent, RULES, could_have_changed=True) is None
-
-
-def test_the_lateral_place_is_fused_of_the_batches_that_know_it() -> None:
-    posterior = together(batch(270.0, left_m=0.020), batch(270.0), batch(270.0, left_m=0.026)).posterior
-    assert posterior.mean[CG_LEFT] == pytest.approx(0.023)
-    assert posterior.std(CG_LEFT) == pytest.approx(0.004 / np.sqrt(2.0))
-    assert together(batch(270.0), batch(271.0)).posterior.size == 2
 
 
 def test_batches_of_one_load_hardly_ever_look_like_two() -> None:

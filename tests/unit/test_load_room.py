@@ -132,16 +132,6 @@ def test_no_limit_is_passed_after_the_advised_removal(
     assert rear_kg + off_rear >= -1e-6
 
 
-def test_empty_van_may_take_more_than_its_tightest_axle_alone_allows() -> None:
-    """Empty: 700 and 700 kg on the axles, 600 kg below the gross limit, 300 and 350 kg below those of the axles.
-
-    With the loading area from the middle to the rear axle, x / 2 + y / 4 = 300 and 3 x / 4 + y = 350 meet beyond y = 0:
-    350 / 0.75 kg in the front half would be 467 kg. All in one place is 350 kg.
-    """
-    room = found(aboard(0.0, 50.0, std_kg=0.0))
-    assert room.most.number == pytest.approx(350.0 / 0.75, rel=1e-6)
-
-
 def test_room_is_safe_by_the_unfavourable_ends_and_has_an_interval() -> None:
     room = found(aboard(300.0, 48.0))
     low, high = room.most.interval95

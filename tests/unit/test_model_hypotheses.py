@@ -153,16 +153,6 @@ def test_a_load_of_unstated_shape_is_held(gyration_m2: float, with_roll: bool) -
     assert holds(told.quantity(1), 47.0)
 
 
-def test_long_loads_are_taken_for_longer_than_compact_ones() -> None:
-    model = taught(with_roll=True)
-    found = []
-    for gyration_m2 in (0.1, 1.5):
-        theta = car(with_roll=True, payload_gyration_m2=gyration_m2)
-        mixture = shapes_of(model, drive_of((400.0, 47.0), 52, with_roll=True, theta=theta))
-        found.append(mixture.best.x[INDEX["payload_gyration_m2"]])
-    assert found[1] > found[0] + 0.5
-
-
 def peak(payload_kg: float, front_share: float, log_evidence: float, hypothesis: Hypothesis | None = None) -> Peak:
     (known,) = hypotheses_of(taught(), known_shape(*taught().known_shape), (0.0, GAIN_STD), with_roll=False)
     hypothesis = hypothesis or known
@@ -174,11 +164,6 @@ def test_peaks_of_one_hypothesis_that_coincide_are_one() -> None:
     best = peak(200.0, 0.5, -10.0)
     (only,) = mixture._distinct([peak(201.0, 0.5, -10.5), best])
     assert only is best
-
-
-def test_peaks_that_coincide_under_two_hypotheses_are_two() -> None:
-    best = peak(200.0, 0.5, -10.0)
-    assert len(mixture._distinct([best, peak(200.0, 0.5, -11.0, best.hypothesis.soft())])) == 2
 
 
 def test_a_peak_far_below_the_best_is_none() -> None:
@@ -279,15 +264,6 @@ def test_an_interval_reaches_as_far_as_the_posterior_does() -> None:
     assert posterior_of(alone, model, 1.0, GAIN_STD).leans == answer._leans_of(alone)
 
 
-def test_a_rival_on_one_side_makes_the_interval_longer_there() -> None:
-    model = taught()
-    for apart_kg in (200.0, -200.0):
-        told = posterior_of(two(apart_kg, (0.85, 0.15)), model, 1.0, GAIN_STD).quantity(0)
-        low, high = told.number - told.interval95[0], told.interval95[1] - told.number
-        assert (high > 1.2 * low) == (apart_kg > 0.0)
-        assert (low > 1.2 * high) == (apart_kg < 0.0)
-
-
 @given(
     middles=st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=4),
     std=st.floats(0.5, 50.0),
@@ -301,14 +277,3 @@ def test_quantiles_of_a_mixture_are_where_its_distribution_has_them(
     at = np.array(answer._quantiles(np.array(middles), weights, std))
     cumulated = weights @ ndtr((at - np.array(middles)[:, None]) / std)
     np.testing.assert_allclose(cumulated, [0.025, 0.5, 0.975], atol=3e-3)
-
-
-def test_the_days_tyre_error_hardly_moves_the_share() -> None:
-    """Front and rear pull it to opposite sides: both firmer moves it by less than each firmer alone."""
-    shares = [
-        told((200.0, 50.0), 45, tyre_front_npm=front * 3.6e5, tyre_rear_npm=rear * 3.8e5).front_share.number
-        for front, rear in ((1.0, 1.0), (1.05, 1.05), (1.05, 1.0), (1.0, 1.05))
-    ]
-    both, front, rear = np.array(shares[1:]) - shares[0]
-    assert np.sign(front) != np.sign(rear)
-    assert abs(both) < 0.7 * max(abs(front), abs(rear))

@@ -87,21 +87,6 @@ def test_an_interval_is_as_skewed_as_the_error_of_the_shape() -> None:
     assert (50.0 - low, high - 50.0) == pytest.approx((np.hypot(Z95 * 0.1, 2.6 * 0.2), np.hypot(Z95 * 0.1, 1.2 * 0.2)))
 
 
-def test_skewed_intervals_cover_skewed_errors() -> None:
-    """A shape's error that is log-normal, of unit standard deviation, beside a normal one half as large."""
-    rng = np.random.default_rng(3)
-    shape = np.exp(0.5 * rng.standard_normal(400_000))
-    shape = (shape - shape.mean()) / shape.std()
-    low, high = np.quantile(shape, [0.025, 0.975])
-    one = Posterior(np.zeros(1), 0.25 * np.eye(1), {Source.GOODS: np.ones((1, 1))}, (-low, high))
-    error = shape + 0.5 * rng.standard_normal(400_000)
-    begin, end = one.quantity(PAYLOAD).interval95
-    assert np.mean((begin <= error) & (error <= end)) == pytest.approx(0.95, abs=0.01)
-    assert (np.mean(error < begin), np.mean(error > end)) == pytest.approx(
-        (0.025, 0.025), abs=0.012
-    )  # tails add in quadrature only nearly
-
-
 def test_the_payload_leans_and_other_quantities_as_far_as_they_follow_it() -> None:
     plain = Posterior(np.array([300.0, 50.0]), np.diag([25.0, 0.01]), {Source.DAY: np.array([[20.0, -0.2]])})
     leaning = replace(plain, leans=(1.1, 1.4))
@@ -112,12 +97,6 @@ def test_the_payload_leans_and_other_quantities_as_far_as_they_follow_it() -> No
         expected = 1.0 + 0.1 * follows**2, 1.0 + 0.4 * follows**2
         assert found == pytest.approx(expected if quantity == PAYLOAD else expected[::-1])
     assert fused([leaning, plain]).leans == pytest.approx((1.05, 1.2))
-
-
-def test_exactly_known_has_no_error() -> None:
-    assert exactly(300.0, 48.0, 0.02).quantity(CG_LEFT) == Quantity(0.02, 0.0, (0.02, 0.02))
-    assert exactly(300.0).size == 1
-    assert np.isnan(exactly(300.0, 48.0).correlation(PAYLOAD, FRONT_SHARE))
 
 
 @given(st.lists(st.integers(0, 2**32 - 1), min_size=1, max_size=5))

@@ -20,13 +20,6 @@ def spans_s(batches: list[Batch]) -> list[tuple[float, float]]:
     return [((b.t_start_ns - T0_NS) / 1e9, (b.t_end_ns - T0_NS) / 1e9) for b in batches]
 
 
-def test_fifteen_minutes_are_three_batches_that_count() -> None:
-    batches = batches_of(drive(900.0, None, RATE_HZ))
-    assert [batch.rejected for batch in batches] == [(), (), ()]
-    assert spans_s(batches)[:2] == [(0.0, 300.0), (300.0, 600.0)]
-    assert [batch.drive_start_ns for batch in batches] == [T0_NS] * 3
-
-
 @pytest.mark.parametrize(("last_s", "rejected"), [(286.0, ()), (284.0, (Why.TOO_SHORT,))])
 def test_the_last_batch_counts_from_95_percent_of_the_window(last_s: float, rejected: tuple[Why, ...]) -> None:
     batches = batches_of(drive(300.0 + last_s, None, RATE_HZ))

@@ -9,35 +9,15 @@ from support.half_car_road import VAN, taught_by
 from support.known_runs import SIBLING, calibrated_on_loads, known_run
 
 from gateway.calibration.fit_of_drives import SPRINGS_FROM_PRIORS
-from gateway.calibration.prior import Prior
 from gateway.calibration.sister import require_alike, sister_in
 from gateway.errors import NoSisterError
-from gateway.model.table import INDEX, UPRIGHT
+from gateway.model.table import INDEX
 from gateway.model.vehicle_model import VehicleModel
-
-SHARED = np.array([bool(row.line) for row in UPRIGHT])
-SCATTER = np.array([row.line for row in UPRIGHT])
 
 
 @pytest.fixture(scope="module")
 def sister() -> VehicleModel:
     return calibrated_on_loads(seed=1)
-
-
-def test_parameters_shared_by_a_model_come_from_the_sister_with_more_scatter(sister: VehicleModel) -> None:
-    prior = Prior.of_sister(sister, VAN, with_roll=False)
-    variances = np.diag(sister.covariance) + SCATTER**2
-    assert prior.mean[SHARED] == pytest.approx(sister.parameters[SHARED])
-    assert np.diag(prior.covariance)[SHARED] == pytest.approx(variances[SHARED])
-
-
-def test_individual_parameters_keep_the_general_prior(sister: VehicleModel) -> None:
-    other = replace(VAN, sensor_position_m=1.0)
-    prior = Prior.of_sister(sister, other, with_roll=False)
-    generic = Prior.of_any(other, with_roll=False)
-    assert prior.mean[~SHARED] == pytest.approx(generic.mean[~SHARED])
-    assert np.diag(prior.covariance)[~SHARED] == pytest.approx(np.diag(generic.covariance)[~SHARED])
-    assert (prior.stiffening == generic.stiffening).all()
 
 
 def test_one_empty_drive_weighs_like_the_sister(sister: VehicleModel) -> None:

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from functools import cache
 
-import numpy as np
 import pytest
 from support.half_car_road import KNOWN, VAN, batch_over_road
 
@@ -37,23 +36,6 @@ def known() -> Taught:
 def estimated(batch: Batch, taught: Taught) -> Estimate:
     blank = Estimate(batch.t_start_ns, batch.t_end_ns, "cross_spectrum")
     return by_cross_spectrum(batch, taught.model, known_shape(*taught.model.known_shape), blank)
-
-
-@pytest.mark.parametrize("load", [(60.0, 51.0), (200.0, 50.0), (350.0, 46.0)])
-def test_known_loads_teach_a_vehicle_that_weighs_others(load: tuple[float, float]) -> None:
-    told = estimated(batch_over_road(*load, seed=99), known())
-    assert told.counted, told.rejected
-    assert told.payload.interval95[0] < load[0] < told.payload.interval95[1]
-    assert told.payload.number == pytest.approx(load[0], abs=25.0)
-    assert told.front_share.number == pytest.approx(load[1], abs=0.8)
-
-
-def test_an_unlabelled_drive_is_weighed_by_the_other_drives() -> None:
-    drives = [drive(i, stated(*load), load) for i, load in enumerate(KNOWN)]
-    drives.append(drive(9, NOTHING_KNOWN, (180.0, 49.0)))
-    found = teach(drives, VAN).loads[-1]
-    assert found.load.payload_kg == pytest.approx(180.0, abs=30.0)
-    assert np.isnan(found.without_kg)
 
 
 def test_one_empty_drive_and_unlabelled_drives_teach_a_vehicle() -> None:

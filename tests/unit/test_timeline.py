@@ -62,16 +62,6 @@ def test_order_and_repeated_stamps_do_not_matter() -> None:
     np.testing.assert_array_equal(again, gridded(t_ns, x))
 
 
-@pytest.mark.parametrize("rate_hz", [50.0, 100.0])
-def test_a_gap_is_unknown_and_its_surroundings_are_known(rate_hz: float) -> None:
-    t_s, t_ns = stamps(rate_hz)
-    kept = (t_s < 10.0) | (t_s > 10.3)
-    back = gridded(t_ns[kept], np.ones(int(kept.sum())))
-    assert np.isnan(back[(GRID_S > 10.0) & (GRID_S < 10.3)]).all()
-    far = (GRID_S < 9.8) | ((GRID_S > 10.5) & (GRID_S < 29.9))
-    np.testing.assert_allclose(back[far], 1.0, atol=1e-9)
-
-
 @pytest.mark.parametrize("count", [0, 1, 3])
 def test_too_few_samples_are_unknown_throughout(count: int) -> None:
     assert np.isnan(gridded(T0_NS + np.arange(count), np.ones(count))).all()

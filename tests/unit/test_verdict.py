@@ -42,16 +42,6 @@ def test_each_weight_has_its_light_and_sentence(
     assert (found.light, found.says, found.about) == (light, says, about)
 
 
-def test_before_the_first_weighing_a_calibrated_vehicle_is_ready() -> None:
-    states = [said(Weights(), is_calibrated=is_calibrated, is_weighed=False).says for is_calibrated in (True, False)]
-    assert states == [Says.READY, Says.NOT_CALIBRATED]
-
-
-def test_doubt_takes_back_everything_but_an_overload() -> None:
-    light, heavy = (said(Weights(gross=weight), is_doubted=True).says for weight in (LIGHT, HEAVY))
-    assert (light, heavy) == (Says.DOUBTED, Says.OVER)
-
-
 @pytest.mark.parametrize(("is_calibrated", "is_weighed", "is_doubted"), list(product([True, False], repeat=3)))
 @pytest.mark.parametrize("weight", [LIGHT, NEAR, HEAVY, UNKNOWN, UNLIMITED])
 def test_green_never_stands_beside_an_active_overload_alarm(
@@ -61,12 +51,3 @@ def test_green_never_stands_beside_an_active_overload_alarm(
     found = said(Weights(gross=weight), **known, alarmed=("gross",))
     assert found.light is not Light.GO
     assert (found.light is Light.OVER) == (found.says is Says.OVER)
-
-
-@pytest.mark.parametrize(
-    ("weight", "says"), [(LIGHT, Says.VAGUE), (NEAR, Says.NEAR), (HEAVY, Says.OVER), (UNKNOWN, Says.WEIGHT_UNKNOWN)]
-)
-def test_a_useless_weighing_warns_and_is_never_green(weight: Weight, says: Says) -> None:
-    found = said(Weights(gross=weight), is_vague=True)
-    assert found.says is says
-    assert found.light is not Light.GO

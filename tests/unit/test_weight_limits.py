@@ -87,14 +87,6 @@ def test_a_limit_that_no_vehicle_has_is_named(wrong: str, tmp_path: Path) -> Non
         loaded(tmp_path, f"rear_axle_limit_kg = {wrong}")
 
 
-def test_another_limit_is_the_same_batch_with_another_verdict(tmp_path: Path) -> None:
-    as_calibrated, as_set = batch(loaded(tmp_path / "a")), batch(loaded(tmp_path / "b", "gross_limit_kg = 1850.0"))
-    assert (as_calibrated.weights.gross.limit_kg, as_calibrated.weights.gross.is_over_limit) == (2000.0, False)
-    assert (as_set.weights.gross.limit_kg, as_set.weights.gross.is_over_limit) == (1850.0, True)
-    assert as_set.weights.gross.kg == as_calibrated.weights.gross.kg == pytest.approx(1900.0)
-    assert as_set.id == as_calibrated.id
-
-
 def test_the_table_shows_limits_and_exceeded_ones(tmp_path: Path) -> None:
     row = table_row(batch(loaded(tmp_path, "gross_limit_kg = 1850.0\nfront_axle_limit_kg = 900.0")))
     assert [row[f"{place}_limit_kg"] for place in ("gross", "front_axle", "rear_axle")] == [1850.0, 900.0, 1100.0]
@@ -149,15 +141,6 @@ def test_an_archive_is_judged_by_its_manifests_limits(tmp_path: Path) -> None:
 
 
 WITHIN = st.floats(0.0, 1.0)
-
-
-def test_rooms_of_all_limits_are_sorted_tightest_first() -> None:
-    """300 kg, 48 % of 1540 kg in front: 819 and 881 kg on the axles, 1700 kg in all."""
-    rooms = rooms_of(aboard(300.0, 48.0))
-    assert [room.place for room in rooms] == ["rear_axle", "front_axle", "gross"]
-    assert [room.left.number for room in rooms] == pytest.approx([169.2, 180.8, 300.0])
-    assert rooms[2].left.std == pytest.approx(6.0)
-    assert rooms[2].surely_kg == pytest.approx(300.0 - Z95 * 6.0)
 
 
 @given(WITHIN, st.floats(0.0, 450.0), st.floats(44.0, 54.0))
