@@ -128,11 +128,6 @@ def test_unknown_weights_are_null(gateway: Gateway, vehicle: Vehicle | None) -> 
     assert (told["rear_axle"]["kg"] is None) is (vehicle is None)
 
 
-def test_before_any_estimate_there_are_no_weights(gateway: Gateway) -> None:
-    told = client(gateway).get("/api/v1/weights/latest").json()
-    assert (told["id"], told["gross"]["kg"], told["gross"]["is_over_limit"]) == (None, None, False)
-
-
 def test_vss_has_core_paths_and_every_quantity_with_its_unit(gateway: Gateway) -> None:
     gateway.publish(to_the_left(0))
     told = client(gateway).get("/api/v1/vss").json()

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.estimates.as_json import COLUMNS, FIELDS, csv_cells, estimate_from_json, estimate_to_json
+from gateway.estimates.as_json import COLUMNS, FIELDS, estimate_from_json, estimate_to_json
 from gateway.estimates.batch_estimate import PLACES, Epoch, Estimate, Lack, Quantity, Weight, Weights
 from gateway.estimates.budget import BudgetLine, Remedy
 from gateway.estimates.posterior import Posterior, Source
@@ -119,22 +119,6 @@ def test_the_start_is_read_and_not_sought_by_hashes(estimate: Estimate, ns: int)
         assert read_back(told).t_start_ns == start_ns
         del told["t_start_ns"]
         assert read_back(told).t_start_ns == 1_790_000_000_000_000_000
-
-
-@given(estimates)
-def test_a_line_of_csv_has_the_columns_and_no_other(estimate: Estimate) -> None:
-    told = estimate_to_json(estimate)
-    cells = csv_cells(told)
-    assert set(cells) <= set(COLUMNS)
-    assert cells["rejected"] == " ".join(estimate.rejected)
-    if (interval := told["payload_interval95_kg"]) is not None:
-        assert [cells["payload_low95_kg"], cells["payload_high95_kg"]] == interval
-    assert [cells["rear_left_kg"], cells["rear_left_std_kg"]] == [
-        told["weights"]["rear_left"]["kg"],
-        told["weights"]["rear_left"]["std_kg"],
-    ]
-    if (interval := told["cg_left_interval95_m"]) is not None:
-        assert [cells["cg_left_low95_m"], cells["cg_left_high95_m"]] == interval
 
 
 @given(estimates, st.sampled_from(Why))

@@ -95,12 +95,6 @@ def test_each_rule_has_its_limits(rule: str, rows: list[Judged], grade: Grade) -
     assert found.grade.rank >= grade.rank
 
 
-def test_a_reason_names_its_figure_and_its_limits() -> None:
-    found = verdict([judged(run, half_kg=120.0) for run in FIVE])
-    text = next(one.text for one in found.reasons if one.rule == "payload_half_width")
-    assert "26.7 % (fit to 25 %, no use beyond 50 %)" in text
-
-
 def test_without_anything_unseen_there_is_no_unreserved_verdict() -> None:
     found = verdict([])
     assert (found.grade, grade_of(found, "unseen")) == (Grade.RESERVED, Grade.RESERVED)

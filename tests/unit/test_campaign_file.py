@@ -5,13 +5,10 @@ from pathlib import Path
 import pytest
 
 from gateway.calibration.campaign_file import Campaign, load_campaign
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.fitter_answers import vehicle_table
 from gateway.calibration.statements import KNOWN_SHARE_PLUS_MINUS_PCT
 from gateway.core.vehicle import (
     MEASURED_OFFSET_STD_M,
-    PAYLOAD_LEFT_NOTED_STD_M,
-    PAYLOAD_LEFT_STD_M,
     UNKNOWN_OFFSET_STD_M,
 )
 from gateway.errors import CampaignError
@@ -96,15 +93,6 @@ def test_the_gross_limit_and_the_axle_weights_give_the_payload_range(
     assert campaign.states_payload_range is is_told
 
 
-def test_shares_follow_from_positions_unless_they_are_given(tmp_path: Path) -> None:
-    given = {"log": '"a.log"', "payload_kg": "270.0", "front_share_pct": "47.5"}
-    campaign = loaded(tmp_path, text_of_runs(EMPTY_RUN, LOADED_RUN, given))
-    empty, positioned, stated = (campaign.front_share_pct(run) for run in campaign.runs)
-    assert empty == 50.0
-    assert positioned == pytest.approx(100.0 * (620.0 + (1.0 - 0.5 / 2.8) * 270.0) / 1510.0)
-    assert stated == 47.5
-
-
 def test_a_run_without_a_load_has_an_unknown_load(tmp_path: Path) -> None:
     campaign = loaded(tmp_path, text_of_runs(EMPTY_RUN, {"log": '"a.log"'}))
     run = campaign.known_run(2, campaign.runs[1], ())
@@ -151,22 +139,6 @@ def test_no_place_of_a_sensor_is_known_to_less_than_a_millimetre(tmp_path: Path,
     fault = fault_of(tmp_path, campaign_text(vehicle={name: "1e-320"}))
     assert f"vehicle.{name}" in fault
     assert "0.001" in fault
-
-
-def test_the_stated_goods_reach_the_vehicle(tmp_path: Path) -> None:
-    said = {"carries": '"long_goods"', "payload_height_m": "0.6", "tow_bar": "true"}
-    vehicle = loaded(tmp_path, campaign_text(vehicle=said)).vehicle
-    assert (vehicle.carries, vehicle.payload_height_m, vehicle.payload_length_m) == ("long_goods", 0.6, None)
-    assert (vehicle.roof_rack, vehicle.tow_bar) == (False, True)
-
-
-def test_a_payload_without_a_lateral_place_is_near_the_middle(tmp_path: Path) -> None:
-    noted = LOADED_RUN | {"payload_left_m": "-0.25"}
-    campaign = loaded(tmp_path, campaign_text('signals = "s"', {"track_width_m": "1.5"}, LOADED_RUN, noted))
-    somewhere, there = (KnownRun(1, "a.log", 270.0, 57.0, (), run.payload_left_m) for run in campaign.runs)
-    assert campaign.vehicle.track_width_m == 1.5
-    assert (somewhere.payload_left_m, somewhere.payload_left_std_m) == (None, PAYLOAD_LEFT_STD_M)
-    assert (there.payload_left_m, there.payload_left_std_m) == (-0.25, PAYLOAD_LEFT_NOTED_STD_M)
 
 
 def of_vehicle(**keys: str) -> str:

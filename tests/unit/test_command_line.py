@@ -20,12 +20,6 @@ def test_a_mistyped_command_gets_a_suggestion(typed: str, meant: str) -> None:
     assert f"No such command {typed!r}: did you mean {meant}?" in said.output
 
 
-def test_a_name_that_resembles_none_is_only_refused() -> None:
-    said = called("frobnicate")
-    assert said.exit_code == 2
-    assert "did you mean" not in said.output
-
-
 def test_ctrl_c_ends_quietly_with_the_code_of_an_interrupted_process(monkeypatch: pytest.MonkeyPatch) -> None:
     @click.command()
     def stopped() -> None:

@@ -78,27 +78,6 @@ def test_runs_of_unknown_load_are_inspected_but_not_compared(runs: list[KnownRun
 
 
 FAULT = Finding.of(Kind.PITCH_RATE_SIGN, "it is turned")
-WARNING = Finding.of(Kind.SMOOTH_ROAD, "it is smooth")
-
-
-def inspection(*findings: tuple[Finding, ...]) -> Inspection:
-    """The runs of support.known_runs with these findings."""
-    split = campaign()
-    return Inspection(split, tuple(RunVerdict(n, "a.log", one) for n, one in enumerate(findings, 1)), ())
-
-
-def test_a_calibration_is_refused_only_where_faults_leave_no_scale() -> None:
-    assert inspection((), (), (), ()).refusal is None
-    assert inspection((FAULT,), (WARNING,), (FAULT,), ()).refusal is None
-    assert inspection((FAULT,), (FAULT,), (FAULT,), (FAULT,)).refusal == "no run can be used"
-    alone = inspection((WARNING,), (FAULT,), (FAULT,), (FAULT,))
-    assert alone.refusal == "faults leave only runs with 0 kg, which is no scale"
-
-
-def test_the_calibration_file_remembers_faults_of_runs_left_out_and_warnings_of_the_others() -> None:
-    found_in = inspection((FAULT, WARNING), (WARNING,), (), ())
-    assert [one.identification.number for one in found_in.usable] == [2, 3, 4]
-    assert found_in.warnings == ("run 1 left out: pitch_rate_sign: it is turned", "run 2: smooth_road: it is smooth")
 
 
 def test_a_campaign_without_identification_is_reported() -> None:

@@ -185,14 +185,6 @@ def test_a_position_that_is_only_guessed_is_not_held_against_the_fitter(sound: M
     assert kinds(verdict_on(sound, guessed, traits_of_reference())) == []
 
 
-@pytest.mark.parametrize("duration_s", [20.0, 110.0])
-def test_a_drive_shorter_than_a_batch_is_too_short(duration_s: float, sound: Motion) -> None:
-    cut = sound.part(0, int(np.searchsorted(sound.t_ns, sound.t_ns[0] + int(duration_s * 1e9))))
-    verdict = verdict_on(cut, EMPTY, traits_of_reference())
-    assert kinds(verdict) == ["fault:too_short"]
-    assert "a batch needs 114 s" in verdict.findings[0].text
-
-
 def test_coarse_steps_are_a_warning(sound: Motion) -> None:
     step_mps2 = 2.0
     columns = sound.columns.copy()
@@ -264,20 +256,6 @@ def test_a_drive_that_is_kept_for_validation_has_lost_nothing_that_it_has() -> N
 
 SOUND = LogFacts("a" * 64, 900.0, 0.0, (0, 900))
 UNLADEN, LOADED = (0.0, 50.0), (420.0, 58.0)
-
-
-@pytest.mark.parametrize(
-    ("facts", "kinds"),
-    [
-        (SOUND, []),
-        (LogFacts(unreadable="a.log: holds no CAN frame"), [Kind.LOG_UNREADABLE]),
-        (replace(SOUND, start_s=2000.0, span_ns=None), [Kind.CUT_AWAY]),
-        (replace(SOUND, damage="the log ends early: the file is cut off"), [Kind.LOG_DAMAGED]),
-    ],
-)
-def test_the_report_says_how_a_log_was_read(facts: LogFacts, kinds: list[Kind]) -> None:
-    of_log = (Kind.LOG_UNREADABLE, Kind.CUT_AWAY, Kind.LOG_DAMAGED)
-    assert [finding.kind for finding in told_of(of_log, log=facts)] == kinds
 
 
 @pytest.mark.parametrize(

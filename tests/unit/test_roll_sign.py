@@ -76,13 +76,6 @@ def test_lateral_loads_show_the_roll_sign(sign: int) -> None:
     assert told(SOMEWHERE, runs(SOMEWHERE, *LOADS, roll_times=float(sign))) == sign
 
 
-def test_an_undetermined_roll_sign_stays_open() -> None:
-    amidships = replace(PLACED, sensor_offset_left_m=0.0)
-    assert told(amidships, runs(amidships, (0.0, None), sensor_left_m=0.0)) == 0
-    not_noted = runs(SOMEWHERE, *LOADS, sensor_left_m=0.0, are_places_noted=False)
-    assert told(SOMEWHERE, not_noted) == 0
-
-
 def test_a_place_stated_on_the_wrong_side_contradicts_the_loads() -> None:
     other_side = replace(PLACED, sensor_offset_left_m=-0.35)
     found = roll_sign_of([one.identification for one in runs(PLACED, *LOADS)], other_side)

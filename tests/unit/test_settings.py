@@ -14,7 +14,7 @@ from support.patience import PATIENCE_S
 from gateway.config import ESTIMATOR_NAMES, Settings, load_settings
 from gateway.config.sections import SettingsSection
 from gateway.core.scheduler import Scheduler
-from gateway.errors import ConfigurationError, SignalMapError
+from gateway.errors import ConfigurationError
 from gateway.files.toml_file import checked
 from gateway.service.parts import store_of
 from gateway.units import si_factor
@@ -111,17 +111,6 @@ def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
     assert {line.split(": ")[1] for line in faults.splitlines()} == {"signals", "colour", "web.port", "batch.rate_hz"}
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match=r"absent\.toml: no such file"):
-        load_settings(tmp_path / "absent.toml")
-
-
-def test_an_early_look_may_come_every_second_or_never(tmp_path: Path) -> None:
-    for every_s in (0.0, 1.0):
-        batch = loaded(tmp_path, f"{LEAST}[batch]\nprovisional_every_s = {every_s}").batch
-        assert batch.for_core(is_live=True).provisional_every_s == every_s
-
-
 def test_only_the_live_service_looks_early(tmp_path: Path) -> None:
     batch = loaded(tmp_path).batch
     assert batch.for_core(is_live=True).provisional_every_s == 60.0
@@ -147,13 +136,6 @@ def test_only_the_live_service_looks_early(tmp_path: Path) -> None:
 )
 def test_units(quantity: str, unit: str, factor: float) -> None:
     assert si_factor(quantity, unit) == pytest.approx(factor, rel=1e-12)
-
-
-@pytest.mark.parametrize(("unit", "said"), [(None, "no unit"), ("", "no unit"), ("furlong/fortnight", "not known")])
-def test_an_unknown_unit_is_an_error_with_the_known_ones(unit: str | None, said: str) -> None:
-    with pytest.raises(SignalMapError, match=said) as caught:
-        si_factor("speed", unit)
-    assert "km/h" in str(caught.value)
 
 
 NUMBERS = ("inf", "-inf", "nan", "1e308", "-1e308", "1e18", "1e10", "-1", "0", "5e-324", "9" * 40)

@@ -159,13 +159,6 @@ def test_a_row_that_cannot_be_read_is_named_with_its_column_and_how_to_mend_it(
     assert fault in only_fault(found)
 
 
-def test_bad_rows_do_not_affect_good_ones() -> None:
-    found = told("from;payload_kg\n2026-11-26T07:40Z;310\nnever;200\n2026-11-27T07:40Z;120\n")
-    assert [row.number for row in found.rows] == [2, 4]
-    assert list(found.faults) == [3]
-    assert found.n_rows == 3
-
-
 @pytest.mark.parametrize(
     ("local", "why"),
     [
@@ -201,13 +194,6 @@ def test_json_of_the_service_and_csv_give_the_same_statements() -> None:
     answer = csv.model_dump_json(by_alias=True)
     (row,) = told(f'{{"items": [{answer}]}}').rows
     assert row.record == csv
-
-
-def test_the_same_row_has_the_same_id_in_every_file_and_another_row_another() -> None:
-    row = "2026-11-26T07:40:00Z;310"
-    first, again = (told(f"from;payload_kg\n{row}\n").rows[0].record for _ in range(2))
-    other = told("from;payload_kg\n2026-11-26T07:40:00Z;311\n").rows[0].record
-    assert first.id == again.id != other.id
 
 
 def test_withdrawn_statements_are_left_out() -> None:

@@ -3,13 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from math import nan
-from pathlib import Path
 
 import pytest
 from support.half_car_road import VAN
 from support.known_runs import campaign as known_campaign
 
-from gateway.calibration.file import load_calibration
 from gateway.calibration.from_drives import Outcome, calibrate_inspected
 from gateway.calibration.inspection.across_runs import Inspection
 from gateway.calibration.inspection.drive import SplitRun
@@ -85,16 +83,6 @@ def test_the_ratio_index_is_left_out_where_no_load_is_known() -> None:
     outcome = calibrated(split(run_1=NOTE, run_2=UNKNOWN, run_3=UNKNOWN, run_4=UNKNOWN), "ratio_index")
     assert outcome.file.estimators == ("cross_spectrum",)
     assert "ratio_index: no run has a known payload and place" in outcome.file.warnings
-
-
-def test_the_file_is_read_back_as_it_was_written(tmp_path: Path) -> None:
-    outcome = calibrated(split(run_3=UNKNOWN))
-    path = tmp_path / "van.json"
-    path.write_text(outcome.file.to_json())
-    held = load_calibration(path)
-    assert held.id == outcome.file.id
-    assert held.provenance == outcome.file.provenance
-    assert held.for_core().payload_seen_kg == outcome.file.seen.payload_kg
 
 
 def test_the_verdict_says_what_to_drive_next() -> None:

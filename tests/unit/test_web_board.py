@@ -39,17 +39,6 @@ def latest(board: Board) -> dict[str, Any]:
     return told
 
 
-def test_before_any_estimate_all_is_null_with_a_reason(board: Board) -> None:
-    board.restore(None, None, None)
-    told = latest(board)
-    assert told["rejected"] == ["no_estimate_yet"]
-    assert told["age_s"] is None
-    assert told["is_stale"] is False
-    assert told["last_rejection"] is None
-    assert {told[name] for name in ("id", "payload_kg", "front_share_pct", "t_end", "payload_interval95_kg")} == {None}
-    assert set(make_record(0)) - {"posterior"} <= set(told)
-
-
 def test_before_any_estimate_a_calibrated_vehicle_lacks_only_an_estimate(clock: Clock) -> None:
     gross = Weight(limit_kg=2000.0, lacks=Lack.ESTIMATE)
     board = Board(stale_after_s=900.0, clock=clock, unweighed=Weights(gross=gross))
@@ -125,13 +114,6 @@ def test_latest_is_the_same_before_and_after_a_restart(board: Board, clock: Cloc
     again.restore(json.dumps(estimate_to_json(thirds)), None, age_s=12.34)
     assert again.shown() == before
     assert again.latest() == board.latest()
-
-
-def test_a_record_of_another_version_is_not_shown(board: Board) -> None:
-    strange = make_record(3, Why.GAP) | {"rejected": ["a_reason_of_tomorrow"]}
-    with pytest.raises(ValueError, match="a_reason_of_tomorrow"):
-        board.restore(json.dumps(make_record(2)), json.dumps(strange), age_s=1.0)
-    assert board.shown().estimate is None
 
 
 US_LAST = 253_402_300_799_999_999  # the end of 9999
