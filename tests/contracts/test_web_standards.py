@@ -89,21 +89,6 @@ def test_wheels_are_weighed_where_the_load_is_known_to_lie_sideways(gateway: Gat
     assert (told["load"]["left_m"], told["load"]["left_std_m"]) == (0.67, 0.065)
 
 
-def test_each_known_wheel_has_a_metric(gateway: Gateway) -> None:
-    ask = client(gateway)
-    gateway.publish(loaded(0))
-    before = ask.get("/metrics").text
-    assert "springscale_weights_front_left_kg" not in before
-    assert "springscale_estimate_cg_left_m" not in before
-    gateway.publish(to_the_left(1))
-    told = ask.get("/metrics").text.splitlines()
-    assert "springscale_weights_front_left_kg 406.8" in told
-    assert "springscale_weights_front_left_is_over_limit 1.0" in told
-    assert "springscale_weights_front_right_is_over_limit 0.0" in told
-    assert "springscale_estimate_cg_left_m 0.05" in told
-    assert "springscale_estimate_left_share_pct 53.3" in told
-
-
 def test_every_record_brings_its_weights_to_the_history(gateway: Gateway) -> None:
     gateway.publish(weighed(to_the_left(0), VAN), make_estimate(1, Why.GAP))
     answer, refusal = client(gateway).get("/api/v1/estimates").json()["items"]

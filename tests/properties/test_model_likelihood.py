@@ -150,14 +150,6 @@ def test_a_group_s_speed_hardly_changes_what_parameters_do_to_the_driveline() ->
     np.testing.assert_allclose(found.gradient[own], slopes[own], rtol=0.03, atol=0.1)
 
 
-def test_two_sensors_of_a_car_that_is_level_are_those_of_the_half_car() -> None:
-    level = ROLLING.copy()
-    level[[INDEX[name] for name in ("gyro_yaw_rad", "empty_left_m", "sensor_left_m")]] = 0.0
-    flat = Whittle(ROLL_SPECTRA.without_roll, ON_LINE)
-    half = flat.cost(Point(HALF, *LOADED[:2]))
-    assert flat.cost(Point(level, *LOADED[:2], 0.0)) == pytest.approx(half, rel=1e-10)
-
-
 @EVERY
 def test_points_cost_together_what_each_costs_alone(which: str) -> None:
     whittle, point = seen(which)

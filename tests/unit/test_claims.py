@@ -74,13 +74,6 @@ def test_a_cause_counts_as_common_if_two_claims_have_it() -> None:
     np.testing.assert_allclose(terms.own_kg, [np.hypot(1.0 / Z95, 2.0), 1.0 / Z95])
 
 
-@pytest.mark.parametrize(("off_kg", "expected"), [(0.0, 0.0), (50.0, 50.0 / np.hypot(30.0, 12.0))])
-def test_disagreement_is_the_difference_over_its_standard_deviation(off_kg: float, expected: float) -> None:
-    terms = Terms.of([claim("a", 300.0 + off_kg, 12.0 * Z95)], ())
-    posterior = together((np.array([300.0]), np.array([[30.0**2]])), terms)
-    assert terms.disagreement(0, *posterior, 12.0) == pytest.approx(expected, abs=1e-6)
-
-
 @given(st.floats(-5.0, 5.0), st.floats(0.05, 3.0))
 def test_a_common_cause_is_tested_as_a_claim_is(seen: float, std: float) -> None:
     """The drives say the cause is ``seen`` +- std, its prior N(0, 1)."""

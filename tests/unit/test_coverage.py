@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
-from benchmarks.accuracy.coverage_table import ALL_KINDS, JudgedBatch, coverage_table
 from gateway.calibration.judgement.coverage import coverage_of, interval_scores
 
 
@@ -52,37 +51,6 @@ def test_the_limits_hold_the_true_share_when_runs_differ() -> None:
 def test_one_run_has_no_scatter_between_runs() -> None:
     with pytest.raises(ValueError, match="at least two runs"):
         coverage_of([True, False], ["a", "a"])
-
-
-def batch(
-    van: str, run: str, kind: str, error_pct: float, *, is_covered: bool, rejected: tuple[str, ...] = ()
-) -> JudgedBatch:
-    return JudgedBatch(van, run, kind, "cross_spectrum", rejected, error_pct, -error_pct, is_covered, is_covered)
-
-
-def test_a_line_for_every_kind_and_one_for_all() -> None:
-    table = coverage_table(
-        [
-            batch("a", "a 1", "town", 2.0, is_covered=True),
-            batch("a", "a 2", "town", -4.0, is_covered=False),
-            batch("b", "b 1", "town", 30.0, is_covered=False, rejected=("gap",)),
-            batch("b", "b 2", "country", 6.0, is_covered=True),
-        ],
-        seed=3,
-        refused=("b: ratio_index: too few",),
-    )
-    town, country, everything = table["lines"]
-    assert [line["kind"] for line in table["lines"]] == ["town", "country", ALL_KINDS]
-    assert (town["n_batches"], town["n_rejected"], town["n_vans"], town["n_runs"]) == (3, 1, 2, 3)
-    assert town["rejected_by_reason"] == {"gap": 1}
-    assert town["payload_mean_abs_pct"] == pytest.approx(3.0)  # the rejected batch gave no answer
-    assert town["payload_mean_abs_pct_with_misses"] == pytest.approx(12.0)
-    assert town["payload_coverage"]["share"] == 0.5
-    assert town["payload_coverage_by_van"] is None  # only one van answered
-    assert country["front_share_coverage"] is None
-    assert everything["payload_coverage"]["n"] == 3
-    assert everything["payload_coverage_by_van"]["n_clusters"] == 2
-    assert table["refused"] == ["b: ratio_index: too few"]
 
 
 def test_an_interval_score_by_hand() -> None:

@@ -107,19 +107,6 @@ def test_no_limit_is_passed_for_any_place_in_the_half(
     assert on_rear <= rear_kg + 1e-6
 
 
-@given(SPARES, SPARES, SPARES, st.floats(0.0, 0.9), st.floats(0.2, 1.0), INSIDE)
-def test_no_limit_is_passed_by_a_load_in_one_place(
-    gross_kg: float, front_kg: float, rear_kg: float, begin: float, length: float, place: float
-) -> None:
-    kg = LoadingArea(begin, begin + length).anywhere_kg(Spare(gross_kg, front_kg, rear_kg))
-    if math.isinf(kg):
-        return
-    on_rear = kg * (begin + place * length)
-    assert kg <= gross_kg + 1e-6
-    assert kg - on_rear <= front_kg + 1e-6
-    assert on_rear <= rear_kg + 1e-6
-
-
 @given(st.floats(-300.0, 300.0), st.floats(-100.0, 300.0), st.floats(-100.0, 300.0), INSIDE, INSIDE)
 def test_no_limit_is_passed_after_the_advised_removal(
     gross_kg: float, front_kg: float, rear_kg: float, one: float, other: float

@@ -1,22 +1,6 @@
 """The study of ordinary days: what is told of each tour, and the figures of what was learnt."""
 
-import numpy as np
-
 from benchmarks.accuracy import ordinary_days as study
-from gateway.calibration.known_run import KnownRun
-
-DAYS = [KnownRun(day, "tour", 0.0 if day % 5 == 0 else 100.0 + day, 55.0, (), 0.0) for day in range(1, 401)]
-
-
-def test_simulated_notes_are_low_and_sometimes_swapped() -> None:
-    told = study._notes(DAYS, np.random.SeedSequence(1))
-    right = {
-        day: study.EMPTY if not run.payload_kg else study.note(study.LOW * run.payload_kg)
-        for day, run in enumerate(DAYS, 1)
-    }
-    assert len(told) == len(DAYS)
-    wrong = sum(told[day] != right[day] for day in told)
-    assert 0.02 < wrong / len(DAYS) < 0.08
 
 
 def test_the_figures_count_errors_misses_and_refusals() -> None:

@@ -3,7 +3,7 @@
 import random
 from pathlib import Path
 
-from vm.harness.write_log import HEADER, MAGIC, SECTOR_BYTES, SUPERBLOCK, Flag, cut, entries_of
+from vm.harness.write_log import HEADER, MAGIC, SECTOR_BYTES, SUPERBLOCK, Flag, cut
 
 N_SECTORS = 8
 SEEDS = range(60)
@@ -40,11 +40,6 @@ def disks(folder: Path, *entries: bytes) -> set[str]:
         assert all(sector == sector[:1] * SECTOR_BYTES for sector in sectors)
         seen.add(b"".join(sector[:1] for sector in sectors).decode())
     return seen
-
-
-def test_a_log_that_has_not_begun_is_empty(tmp_path: Path) -> None:
-    (tmp_path / "log").write_bytes(b"")
-    assert entries_of(tmp_path / "log") == []
 
 
 def test_flushed_writes_stay_and_others_are_kept_lost_or_torn(tmp_path: Path) -> None:

@@ -69,13 +69,6 @@ def test_a_provisional_estimate_stands_in_until_the_drive_has_a_good_one(board: 
     assert "provisional" not in latest(board)
 
 
-def test_a_new_drive_shows_its_early_value_at_once(board: Board) -> None:
-    board.publish(make_estimate(0))
-    board.publish(make_estimate(7, is_provisional=True))
-    told = latest(board)
-    assert (told["payload_kg"], told.get("provisional")) == (107.0, True)
-
-
 def test_an_early_look_without_an_answer_is_not_shown(board: Board) -> None:
     board.publish(make_estimate(0))
     board.publish(make_estimate(7, Why.NOT_ENOUGH_EXCITATION, is_provisional=True))
