@@ -12,7 +12,6 @@ from gateway.estimates.budget import OWN, Remedy, budget_of, typical_budget
 from gateway.estimates.posterior import (
     CG_LEFT,
     FRONT_SHARE,
-    NORMAL_TAILS,
     ONE_LOAD,
     PAYLOAD,
     SHAPE,
@@ -181,15 +180,6 @@ def test_a_source_may_be_added_to_and_taken_away() -> None:
     assert len(more.sources[Source.DAY]) == len(one.sources[Source.DAY]) + 1
     assert more.without(Source.MODEL, Source.DAY).covariance == pytest.approx(one.own)
     assert not one.share_of(Source.MODEL).any()
-
-
-def test_the_first_quantities_alone_are_as_they_were() -> None:
-    one = drawn(8)
-    two = one.first(2)
-    assert one.first(3) is one
-    assert two.size == 2
-    assert two.covariance == pytest.approx(one.covariance[:2, :2])
-    assert two.tails == NORMAL_TAILS
 
 
 @pytest.mark.parametrize(

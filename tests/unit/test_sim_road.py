@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gateway.sim.obstacles import Bump, ObstacleRoad, UnevenRoad, with_bumps
-from gateway.sim.road import PaperRoad, Road, SpectralRoad, iso_road
+from gateway.sim.obstacles import Bump, ObstacleRoad, with_bumps
+from gateway.sim.road import PaperRoad, Road, SpectralRoad
 from gateway.sim.speed_profile import Leg, constant, drive_of, motorway, rural, standstill, urban
 
 
@@ -59,16 +59,6 @@ def test_a_tyre_averages_over_its_patch() -> None:
     assert sine.enveloped(0.0) is sine
 
 
-def test_stretches_differ_in_roughness() -> None:
-    even = iso_road("B").lay(20_000.0, np.random.default_rng(8))
-    uneven = UnevenRoad(iso_road("B"), spread=0.6).lay(20_000.0, np.random.default_rng(8))
-    n = round(100.0 / even.step_m)
-    scatter = [np.std(np.log(np.diff(road.left_m)[: 199 * n].reshape(199, n).std(axis=1))) for road in (even, uneven)]
-    assert scatter[1] > 3.0 * scatter[0]
-    assert np.array_equal(UnevenRoad(iso_road("B"), spread=0.0).lay(900.0, np.random.default_rng(8)).left_m,
-                          iso_road("B").lay(900.0, np.random.default_rng(8)).left_m)  # fmt: skip
-
-
 def test_a_pothole_lies_under_one_wheel_and_a_hump_under_both() -> None:
     flat = Road(0.05, np.zeros(400), np.zeros(400))
     built = with_bumps(flat, [Bump(5.0, 0.5, -0.04, is_right=False), Bump(12.0, 3.7, 0.08)])
@@ -92,16 +82,6 @@ def test_random_drives_keep_to_their_speeds_and_stop_at_the_end(kind: str) -> No
     assert 0.75 * high_kmh < np.max(drive.speed_mps) * 3.6 <= high_kmh
     assert drive.speed_mps[0] == drive.speed_mps[-1] == 0.0
     assert drive.duration_s == pytest.approx(900.0, abs=300.0)
-
-
-def test_urban_driving_stops_and_motorway_driving_does_not() -> None:
-    stops = [
-        np.count_nonzero(np.diff((make(1800.0, np.random.default_rng(3)).speed_mps == 0.0).astype(int)) == 1)
-        for make in (urban, rural, motorway)
-    ]
-    assert stops[0] >= 10
-    assert 1 <= stops[1] < stops[0]
-    assert stops[2] == 1  # the end
 
 
 def test_curves_are_driven_only_in_motion() -> None:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 from gateway.core.spline import between, smooth_slopes
-from gateway.core.timeline import onto_grid, sort_by_time, speed_onto_grid
+from gateway.core.timeline import onto_grid, speed_onto_grid
 from gateway.records import F64, I64
 
 T0_NS = 1_790_000_000_000_000_000
@@ -74,12 +74,6 @@ def test_speed_is_linear_between_samples_and_held_no_longer_than_allowed() -> No
     assert at[3.0] == pytest.approx(11.0)
     assert (at[0.0], at[2.0], at[11.0], at[15.0]) == (10.0, 10.0, 20.0, 20.0)  # held at either end
     assert np.isnan([at[5.0], at[9.0], at[15.1]]).all()  # six seconds apart, and past the hold
-
-
-def test_samples_of_one_stamp_stay_in_the_order_they_came_in() -> None:
-    times, x = sort_by_time(np.array([3, 1, 3, 2]), np.array([30.0, 10.0, 31.0, 20.0]))
-    assert times.tolist() == [1, 2, 3, 3]
-    assert x.tolist() == [10.0, 20.0, 30.0, 31.0]
 
 
 @pytest.mark.parametrize(("n_lost", "is_known"), [(1, True), (3, False)])
