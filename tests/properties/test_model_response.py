@@ -8,18 +8,7 @@ import scipy.special
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.four_wheels import FourWheels
-from support.model_road import (
-    BAND_HZ,
-    GROUND,
-    LEFT,
-    QUIET,
-    RATE_HZ,
-    UNCOUPLED,
-    VAN,
-    batch_of,
-    paths_of,
-    theta_of,
-)
+from support.model_road import BAND_HZ, GROUND, LEFT, QUIET, RATE_HZ, UNCOUPLED, VAN, batch_of, paths_of, theta_of
 
 from gateway.core.vehicle import Load
 from gateway.model import car

@@ -7,15 +7,7 @@ import pytest
 from support.model_road import BAND_HZ, RATE_HZ, VAN, batch_over_road, theta_of
 
 from gateway.core.vehicle import Load
-from gateway.model.spectra import (
-    Mount,
-    Reading,
-    as_read,
-    cross_spectra_of,
-    expected_floor,
-    floor_of,
-    noise_over,
-)
+from gateway.model.spectra import Mount, Reading, as_read, cross_spectra_of, expected_floor, floor_of, noise_over
 from gateway.records import Batch
 
 READING = Reading(VAN.wheelbase_m, BAND_HZ, 256)

@@ -57,12 +57,6 @@ def grade_of(found: Verdict, rule: str) -> Grade:
     return next(reason.grade for reason in found.reasons if reason.rule == rule)
 
 
-def test_a_calibration_that_errs_little_is_fit() -> None:
-    found = verdict([judged(run, error_kg=5.0) for run in range(1, 11)])
-    assert found.grade is Grade.FIT
-    assert {reason.grade for reason in found.reasons} == {Grade.FIT}
-
-
 TEN, FIVE = range(1, 11), range(1, 6)
 LIMITS = [
     # errors of a tenth and a fifth of the range

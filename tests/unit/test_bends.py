@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.drives import drive
 from support.half_car_road import CAR, as_if_fitted
 
 from gateway.bus.signals import Decoder, load_signal_map
@@ -110,8 +109,3 @@ def batch_of(rows: Motion) -> Batch:
     t_ns = int(rows.t_ns[0])
     settings = BatchSettings(window_s=360.0)
     return build_batch(rows, BatchWindow(t_ns, t_ns + 360 * NS_PER_S, t_ns), settings, {})
-
-
-def test_missing_signals_leave_the_gain_unknown() -> None:
-    rows = drive(100.0)
-    assert batch_of(rows).gyro_gain is None

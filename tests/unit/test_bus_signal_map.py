@@ -7,7 +7,7 @@ import pytest
 
 from gateway.bus.signals import load_signal_map
 from gateway.errors import SignalMapError
-from gateway.records import EXTENDED_ID, Signal
+from gateway.records import EXTENDED_ID
 
 DBC = """VERSION ""
 NS_ :
@@ -82,10 +82,6 @@ def test_conditions_are_given_by_number_name_or_list(write_map):
         for allowed in ("2", '"ready"', "[1, 2]")
     ]
     assert [condition.allowed_bits for (condition,) in conditions] == [(2,), (2,), (1, 2)]
-
-
-def test_signals_come_in_the_order_of_the_records(write_map):
-    assert load_signal_map(write_map(SPEED + ACCEL)).signals == (Signal.VERTICAL_ACCELERATION, Signal.SPEED)
 
 
 X = EXTENDED_ID

@@ -1,4 +1,4 @@
-"""What springscale estimate says of each batch, of logs that are not quite sound, and of broken sensors."""
+"""What springscale estimate says of each batch, of refusals and their likely cause, and of logs not quite sound."""
 
 import csv
 import gzip

@@ -6,18 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
-from support.days import (
-    OWN_KG,
-    RULES,
-    T0_NS,
-    at,
-    batch,
-    day,
-    events,
-    posterior,
-    told,
-    trips,
-)
+from support.days import OWN_KG, RULES, T0_NS, at, batch, day, events, posterior, told, trips
 
 from gateway.core.events import ledger
 from gateway.core.events.entry import Entry

@@ -137,20 +137,6 @@ def test_messages_are_listed_with_rate_and_length(box: Path) -> None:
     assert {one["channel"] for one in heard.values()} == {"can3"}
 
 
-@pytest.mark.parametrize(("n_unknown", "last"), [(12, None), (15, "... and 3 identifiers more")])
-def test_of_many_identifiers_that_nothing_describes_a_dozen_are_shown(
-    n_unknown: int, last: str | None, tmp_path: Path
-) -> None:
-    t_ns = T0_NS + np.arange(20) * 1_000_000_000
-    frames = merge_frames([packed(0x6A0 + n, 8, t_ns + n) for n in range(n_unknown)])
-    write_candump(frames, "can0", tmp_path / "a.log")
-    told = run(tmp_path / "a.log").splitlines()
-    assert len([line for line in told if line.startswith("can0")]) == 12
-    assert [line for line in told if line.startswith("...")] == (
-        [] if last is None else [f"{last} that no database describes"]
-    )
-
-
 def test_more_identifiers_than_a_bus_has_are_counted_and_left_out(tmp_path: Path) -> None:
     """A million and a half of them took two gigabytes and a minute."""
     n, seconds = 300_000, 60.0

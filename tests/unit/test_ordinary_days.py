@@ -1,4 +1,4 @@
-"""The study of ordinary days: what is told of each tour, and the figures of what was learnt."""
+"""The study of ordinary days: the figures of what was learnt."""
 
 from benchmarks.accuracy import ordinary_days as study
 

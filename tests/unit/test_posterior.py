@@ -1,4 +1,4 @@
-"""A posterior with its error by sources, and its budget: algebra held against Monte Carlo and closed forms."""
+"""A posterior with its error by sources, and its budget: algebra held against closed forms."""
 
 import math
 from dataclasses import replace

@@ -11,10 +11,7 @@ from support.calibrated import ratio_index_calibration
 from support.half_car_road import batch_of
 
 from gateway.core.ratio_index.index import PAPER_BANDS, Band, band_pass_gain, indexes_of, mean_spectrum, ratio_index
-from gateway.core.ratio_index.regression import (
-    RegressionModel,
-    scaled_columns,
-)
+from gateway.core.ratio_index.regression import RegressionModel, scaled_columns
 
 bands = st.builds(Band, st.floats(0.5, 9.5), st.floats(0.05, 2.0))
 

@@ -11,14 +11,13 @@ from pydantic import BaseModel, Field
 from support.drives import drive
 from support.patience import PATIENCE_S
 
-from gateway.config import ESTIMATOR_NAMES, Settings, load_settings
+from gateway.config import Settings, load_settings
 from gateway.config.sections import SettingsSection
 from gateway.core.scheduler import Scheduler
 from gateway.errors import ConfigurationError
 from gateway.files.toml_file import checked
 from gateway.service.parts import store_of
 from gateway.units import si_factor
-from gateway.weighing.estimator import ESTIMATORS
 
 LEAST = 'signals = "signals.toml"\n'
 
@@ -35,10 +34,6 @@ def fault_of(tmp_path: Path, text: str) -> str:
     assert caught.value.exit_code == 2
     assert all(line.startswith(f"{tmp_path / 'springscale.toml'}: ") for line in str(caught.value).splitlines())
     return str(caught.value)
-
-
-def test_every_estimator_there_is_can_be_chosen_the_better_one_first() -> None:
-    assert tuple(ESTIMATORS) == ESTIMATOR_NAMES
 
 
 def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:

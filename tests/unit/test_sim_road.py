@@ -43,11 +43,6 @@ def test_the_tracks_coherence_falls_at_short_waves() -> None:
         assert np.mean(coherence[band]) == pytest.approx(expected, abs=0.04)
 
 
-def test_a_road_of_no_length_is_refused() -> None:
-    with pytest.raises(ValueError, match="positive length"):
-        PaperRoad().lay(0.0, np.random.default_rng(1))
-
-
 def test_a_tyre_averages_over_its_patch() -> None:
     way_m = np.arange(4001) * 0.05
     sine = Road(0.05, np.sin(2.0 * np.pi * way_m / 1.0), 0.3 * way_m)

@@ -1,4 +1,4 @@
-"""The front door of the simulator: seeds, load steps, truth, vans drawn about a type, loads of the studies."""
+"""The front door of the simulator: a moving start, load steps, and the truth of them."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The table of speeds: what is beside what, and which goals are met. No speed is asserted anywhere."""
+"""The table of speeds: every path reads the same frames, and a busy machine writes none. No speed is asserted."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""python -m benchmarks.accuracy: what is printed and written, with stand-ins for the minutes of work."""
+"""Cases of the studies are kept: a study that was broken off goes on where it stopped."""
 
 from dataclasses import replace
 from pathlib import Path
