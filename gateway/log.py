@@ -56,7 +56,7 @@ class Event(StrEnum):
     STORE_HOLDS = "store keeps rows in memory"
     STORE_RECOVERED = "store is on disk again"
     STORE_DAMAGED = "database set aside"
-    STORE_BAD_RECORD = "bad record set aside"
+    STORE_BAD_RECORD = "bad record left out"
     STORE_FORGETS = "old damaged database removed"
     CLOCK_DOUBTED = "clock far ahead, age removes nothing"
     CLOCK_BELIEVED = "clock believed again"

@@ -138,7 +138,7 @@ class StoreStatus:
     n_duplicates: int = 0
     n_pruned: Annotated[int, Field(description="rows removed by age or size")] = 0
     size_bytes: int = 0
-    n_bad_records: Annotated[int, Field(description="records that failed their checksum and were set aside")] = 0
+    n_bad_records: Annotated[int, Field(description="records that cannot be used, since the start")] = 0
     set_aside: Annotated[str | None, Field(description="damaged database that the service renamed")] = None
     is_reserve_in_use: Annotated[
         bool, Field(description="true: the disk is full, and records go to the room that was kept for them")

@@ -144,7 +144,7 @@ class AlarmService:
             event, level = (Event.ALARM, logging.WARNING) if alarm.is_active else (Event.ALARM_ENDED, logging.INFO)
             log_event(event, level=level, id=alarm.id, alarm=alarm.cause.name, says=sentence(alarm))
             self._n_raised += alarm.is_active
-            self._store.write_entry(ENTRY_KIND, alarm.id, alarm.t_last_ns, _text(alarm), alarm.revision)
+            self._store.write_entry(ENTRY_KIND, alarm.id, alarm.t_last_ns, _text(alarm))
 
 
 def remembered(reader: StoreReader, place: str | None) -> tuple[list[Alarm], list[Estimate]]:

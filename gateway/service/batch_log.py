@@ -86,7 +86,7 @@ class LoadEventLog:
     def __call__(self, found: Estimate) -> None:
         for entry in self._ledger.add(found):
             text = json_line(entry.record)
-            self._store.write_entry(entry.kind, entry.id, entry.t_end_ns, text, entry.revision)
+            self._store.write_entry(entry.kind, entry.id, entry.t_end_ns, text)
             log_event(Event.ENTRY, level=logging.DEBUG, id=entry.id, revision=entry.revision)
 
 

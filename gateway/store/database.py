@@ -5,17 +5,16 @@ import itertools
 import logging
 import os
 import sqlite3
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final
 
 from gateway.errors import StoreError
 from gateway.log import Event, log_event
 from gateway.store.journal import BATCHES, ESTIMATE, KINDS, REMAINDER
-from gateway.store.queries import INSERT, Stored, is_good, stored_row
+from gateway.store.queries import INSERT
 from gateway.store.retention import AgeClock, Retention, remove_old, remove_share
 from gateway.store.schema import (
     TABLES,
@@ -28,16 +27,12 @@ from gateway.store.schema import (
     pragma,
 )
 
-T = TypeVar("T")
-_KEEP_DAMAGED: Final = "INSERT INTO damaged (seq, found_ns, id, text) VALUES (?, ?, ?, ?)"
-
 FILE_NAME: Final = "springscale.db"
 LOCK_NAME: Final = "springscale.lock"
 _DAMAGED: Final = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
 MOST_SET_ASIDE: Final = 3  # chosen: damaged databases that are kept, the newest
-MOST_BAD_RECORDS: Final = 1000  # chosen: bad records that are kept, the newest
 
-
+OnRefused = Callable[[Row, Exception], None]
 # epoch, last number, last batch's number, and the newest number of each kind, of an opened database
 Opened = tuple[str, int, int, dict[str, int]]
 
@@ -92,9 +87,8 @@ class Database:
         self._connection: sqlite3.Connection | None = None
         self._opened_identity: tuple[tuple[int, int] | None, ...] = ()
         self._age: AgeClock | None = None
-        self._is_reindexed = False
+        self._is_mended = False
         self.chain = Chain()  # replaced with every commit, never changed: any thread may copy it
-        self.n_bad_records = 0
         self._lock_fd: int | None = None
 
     @property
@@ -112,18 +106,17 @@ class Database:
             self.require_tables()
             opened = self._identify(self._connection, new_epoch)
             self._age = AgeClock(self._connection)
-            self.n_bad_records = _last_number(self._connection, "damaged")
-            self._is_reindexed = False
+            self._is_mended = False
             self._opened_identity = self._identities()
             return opened
         except (OSError, sqlite3.Error):
             self.disconnect()
             raise
 
-    def add(self, rows: Sequence[Row], boot_id: str) -> tuple[list[JournalRow], int]:
+    def add(self, rows: Sequence[Row], boot_id: str, on_refused: OnRefused) -> tuple[list[JournalRow], int]:
         """Commit rows in one transaction -> (new records, number of batches that were already stored).
 
-        A row that SQLite refuses is set aside as it came; if SQLite refuses that too, the database is at fault.
+        A row that SQLite refuses, though the database is sound, is passed to ``on_refused`` and left out.
         """
         connection = self._connected()
         stored: list[JournalRow] = []
@@ -138,7 +131,7 @@ class Database:
                 except Exception as fault:
                     if not connection.in_transaction or is_damaged(fault) or missing_tables(connection):
                         raise
-                    _set_refused_aside(connection, linked, fault)
+                    on_refused(linked, fault)
                     is_new = False
                 if isinstance(linked, JournalRow):
                     if is_new:
@@ -147,8 +140,7 @@ class Database:
                         chain.skip(linked)
                         n_known += 1
             _keep_receipt(connection, stored, boot_id)
-            n_bad_records = _last_number(connection, "damaged")
-        self.chain, self.n_bad_records = chain, n_bad_records
+        self.chain = chain
         return stored, n_known
 
     def prune(self, now_ns: int) -> int:
@@ -156,9 +148,9 @@ class Database:
         connection = self._connected()
         n_removed = 0
         if self._age is not None and self._age.is_believed(now_ns):
-            n_removed = self._mending(lambda: remove_old(connection, self._retention, now_ns))
+            n_removed = remove_old(connection, self._retention, now_ns)
         while self.size_bytes() > self._retention.max_bytes:
-            n = self._mending(lambda: remove_share(connection))
+            n = remove_share(connection)
             if n == 0:
                 break
             n_removed += n
@@ -177,50 +169,19 @@ class Database:
         if missing := missing_tables(self._connected()):
             raise DamagedError(f"it has no table {' and no '.join(missing)}")
 
-    def check(self) -> None:
-        """Check the whole file after a reader reported damage, and rebuild its indexes. Raises DamagedError."""
-        verdict = self._connected().execute("PRAGMA quick_check(1)").fetchone()[0]
-        if verdict != "ok":
-            raise DamagedError(verdict)
-        self._reindex("a reader met damage that a look at the whole file did not find")
-
-    def set_records_aside(self, seqs: Iterable[int], now_ns: int) -> list[int]:
-        """Move those of these rows that fail their checksum into the table ``damaged`` -> their numbers."""
-        connection = self._connected()
-        rows = [row for seq in sorted(seqs) if (row := stored_row(connection, seq)) is not None and not is_good(row)]
-        if rows:
-            self._mending(lambda: self._move_aside(connection, rows, now_ns))
-            self.n_bad_records = _last_number(connection, "damaged")
-        return [row[0] for row in rows]
-
-    @staticmethod
-    def _move_aside(connection: sqlite3.Connection, rows: Sequence[Stored], now_ns: int) -> None:
-        with _transaction(connection):
-            for seq, _kind, record_id, *_, text, _crc, _is_object in rows:
-                connection.execute(_KEEP_DAMAGED, (seq, now_ns, record_id, text))
-                connection.execute("DELETE FROM journal WHERE seq = ?", (seq,))
-            newest = _last_number(connection, "damaged")
-            connection.execute("DELETE FROM damaged WHERE n <= ?", (newest - MOST_BAD_RECORDS,))
-
-    def _mending(self, work: Callable[[], T]) -> T:
-        """Run ``work``; if an index disagrees with the table, rebuild the indexes and run it again."""
+    def mend(self) -> bool:
+        """Rebuild the indexes of a file that is otherwise sound, once for each opening -> whether it was done."""
+        connection = self._connection
+        if connection is None or self._is_mended:
+            return False
+        self._is_mended = True
         try:
-            return work()
-        except sqlite3.DatabaseError as error:
-            if not is_damaged(error):
-                raise
-            self._reindex(str(error))
-            return work()
-
-    def _reindex(self, why: str) -> None:
-        """Rebuild the indexes, once for each opening. Raises DamagedError if that did not help before."""
-        if self._is_reindexed:
-            raise DamagedError(why)
-        self._is_reindexed = True
-        try:
-            self._connected().execute("REINDEX")
-        except sqlite3.IntegrityError as error:  # two rows with one id
-            raise DamagedError(str(error)) from None
+            if connection.execute("PRAGMA quick_check(1)").fetchone()[0] != "ok":
+                return False
+            connection.execute("REINDEX")
+        except sqlite3.DatabaseError:  # two rows with one id are among it
+            return False
+        return True
 
     def disconnect(self) -> None:
         """Close the connection and keep the lock."""
@@ -282,9 +243,9 @@ class Database:
 
     @staticmethod
     def _identify(connection: sqlite3.Connection, new_epoch: str) -> Opened:
-        known = connection.execute("SELECT id, last_batch FROM epochs").fetchone()
+        known = connection.execute("SELECT epoch, last_batch FROM state").fetchone()
         if known is None:
-            connection.execute("INSERT INTO epochs (id) VALUES (?)", (new_epoch,))
+            connection.execute("INSERT INTO state (epoch) VALUES (?)", (new_epoch,))
         epoch, last_batch = known or (new_epoch, 0)
         sql = "SELECT max(seq) FROM journal WHERE kind = ?"
         newest = {kind: connection.execute(sql, (kind,)).fetchone()[0] or 0 for kind in (*KINDS, REMAINDER)}
@@ -295,14 +256,6 @@ def missing_tables(connection: sqlite3.Connection) -> list[str]:
     """Tables that the file should have and has not."""
     found = {name for (name,) in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
     return sorted(TABLES - found)
-
-
-def _set_refused_aside(connection: sqlite3.Connection, row: Row, fault: Exception) -> None:
-    """Keep what SQLite did not take."""
-    name = row.id if isinstance(row, JournalRow) else row.name
-    text = repr(row).encode("ascii", "backslashreplace")
-    connection.execute(_KEEP_DAMAGED, (0, time.time_ns(), repr(name), text))
-    log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, record=repr(row)[:200], fault=repr(fault)[:200])
 
 
 def _add_row(connection: sqlite3.Connection, row: Row) -> bool:
@@ -321,9 +274,8 @@ def _keep_receipt(connection: sqlite3.Connection, stored: Sequence[JournalRow], 
     """Store the time of receipt of the newest estimate, and the number of the newest batch."""
     batches = [row for row in stored if row.kind in BATCHES]
     if batches:
-        connection.execute("UPDATE epochs SET last_batch = ?", (batches[-1].seq,))
+        connection.execute("UPDATE state SET last_batch = ?", (batches[-1].seq,))
     estimates = [row for row in batches if row.kind == ESTIMATE]
     if estimates:
-        newest = estimates[-1]
-        sql = "INSERT OR REPLACE INTO receipts (kind, seq, boot_id, boot_ns) VALUES (?, ?, ?, ?)"
-        connection.execute(sql, (ESTIMATE, newest.seq, boot_id, newest.boot_ns))
+        receipt = estimates[-1].seq, boot_id, estimates[-1].boot_ns
+        connection.execute("UPDATE state SET estimate = ?, boot_id = ?, boot_ns = ?", receipt)

@@ -13,13 +13,13 @@ from gateway.store.schema import JOURNAL_COLUMNS, JournalRow, checksum
 LAST: Final = (1 << 63) - 1  # SQLite's largest integer
 # Read texts as bytes: a flipped bit may break UTF-8, and the checksum covers the bytes on disk.
 _STORED: Final = (
-    "seq, CAST(kind AS BLOB), CAST(id AS BLOB), revision, t_end_ns, previous, received_ns, CAST(text AS BLOB), crc, "
+    "seq, CAST(kind AS BLOB), CAST(id AS BLOB), t_end_ns, previous, received_ns, CAST(text AS BLOB), crc, "
     f"kind = '{SERVICE}' OR (json_valid(text) AND substr(text, 1, 1) = '{{')"
 )
 # SQLite would abort the whole query at a text that is not JSON.
 _WITHOUT_SPECTRA: Final = "CASE WHEN json_valid(text) THEN CAST(json_remove(text, '$.spectra') AS BLOB) END"
 
-OnBad = Callable[[Sequence[int]], None]
+OnBad = Callable[[int], None]
 Stored = tuple[Any, ...]  # a row of the journal as SQLite gives it
 
 
@@ -50,10 +50,9 @@ def is_good(row: Stored) -> bool:
 def page(
     connection: sqlite3.Connection, window: JournalQuery, limit: int, on_bad: OnBad, *, with_spectra: bool = True
 ) -> list[JournalRow]:
-    """Up to ``limit`` records with a valid checksum; the numbers of the others are passed to ``on_bad``."""
+    """Up to ``limit`` records with a valid checksum; the number of each other one is passed to ``on_bad``."""
     shown = "NULL" if with_spectra else _WITHOUT_SPECTRA
     good: list[JournalRow] = []
-    bad: list[int] = []
     after = window.after_seq
     while len(good) < limit:
         wanted = limit - len(good)
@@ -63,23 +62,16 @@ def page(
             if is_good(row):
                 good.append(_decoded(row if bare is None else (*row[:-3], bare, *row[-2:])))
             else:
-                bad.append(row[0])
+                on_bad(row[0])
         if len(found) < wanted:
             break
         after = found[-1][0]
-    if bad:
-        on_bad(bad)
     return good
-
-
-def stored_row(connection: sqlite3.Connection, seq: int) -> Stored | None:
-    found: Stored | None = connection.execute(f"SELECT {_STORED} FROM journal WHERE seq = ?", (seq,)).fetchone()
-    return found
 
 
 def delivery(connection: sqlite3.Connection, uplink: str, kinds: Sequence[str]) -> Delivery:
     """The position of an uplink on disk, with the number of waiting records of these kinds."""
-    epoch = connection.execute("SELECT id FROM epochs").fetchone()
+    epoch = connection.execute("SELECT epoch FROM state").fetchone()
     sql = "SELECT seq, n_pruned, n_pruned_entries FROM uplinks WHERE name = ?"
     found = connection.execute(sql, (uplink,)).fetchone()
     seq, n_pruned, n_pruned_entries = found or (-1, 0, 0)
@@ -139,8 +131,8 @@ def _rows_behind(
 
 
 def _decoded(row: Stored) -> JournalRow:
-    seq, kind, record_id, revision, t_end_ns, previous, received_ns, text, *_ = row
-    return JournalRow(seq, kind.decode(), record_id.decode(), revision, t_end_ns, previous, received_ns, text.decode())
+    seq, kind, record_id, t_end_ns, previous, received_ns, text, *_ = row
+    return JournalRow(seq, kind.decode(), record_id.decode(), t_end_ns, previous, received_ns, text.decode())
 
 
-INSERT: Final = f"INSERT INTO journal ({JOURNAL_COLUMNS}, crc) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)"
+INSERT: Final = f"INSERT INTO journal ({JOURNAL_COLUMNS}, crc) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"

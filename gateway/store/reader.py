@@ -148,7 +148,7 @@ class StoreReader:
         """Records on disk; none if there is no database yet."""
         if connection is None:
             return []
-        return queries.page(connection, window, limit, self._store.suspect_records, with_spectra=with_spectra)
+        return queries.page(connection, window, limit, self._store.note_failed_sum, with_spectra=with_spectra)
 
     def _newest(
         self, connection: sqlite3.Connection | None, held: Sequence[JournalRow], kind: str
@@ -165,8 +165,8 @@ class StoreReader:
             return (now_ns - answer.boot_ns) / NS_PER_S
         if connection is None:
             return None
-        sql = "SELECT boot_ns FROM receipts WHERE kind = ? AND seq = ? AND boot_id = ?"
-        found = connection.execute(sql, (ESTIMATE, answer.seq, boot_id)).fetchone()
+        sql = "SELECT boot_ns FROM state WHERE estimate = ? AND boot_id = ?"
+        found = connection.execute(sql, (answer.seq, boot_id)).fetchone()
         age_s = -1.0 if found is None else (now_ns - int(found[0])) / NS_PER_S
         return age_s if age_s >= 0.0 else None
 

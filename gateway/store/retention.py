@@ -89,7 +89,7 @@ def boot_ns() -> int:
 
 
 class AgeClock:
-    """Decides for one open database whether the wall clock is plausible; the table ``clock`` stores the distrust."""
+    """Decides for one open database whether the wall clock is plausible; the database stores the distrust."""
 
     def __init__(self, connection: sqlite3.Connection) -> None:
         """Reads the newest stamp by a clock that was set; create the clock before any row is added."""
@@ -98,8 +98,7 @@ class AgeClock:
         sql = "SELECT received_ns FROM journal WHERE received_ns >= ? ORDER BY seq DESC LIMIT 1"
         newest = connection.execute(sql, (CLOCK_UNSET_NS,)).fetchone()
         self._newest_ns: int | None = None if newest is None else newest[0]
-        found = connection.execute("SELECT doubted_since_ns FROM clock").fetchone()
-        self._doubted_since_ns: int | None = None if found is None else found[0]
+        self._doubted_since_ns: int | None = connection.execute("SELECT doubted_since_ns FROM state").fetchone()[0]
 
     def is_believed(self, now_ns: int) -> bool:
         """Whether ``now_ns`` is plausible. Raises sqlite3.Error if the distrust cannot be stored."""
@@ -121,5 +120,5 @@ class AgeClock:
         return self._doubted_since_ns is None
 
     def _keep(self, since_ns: int | None) -> None:
-        self._connection.execute("INSERT OR REPLACE INTO clock (one, doubted_since_ns) VALUES (1, ?)", (since_ns,))
+        self._connection.execute("UPDATE state SET doubted_since_ns = ?", (since_ns,))
         self._doubted_since_ns = since_ns

@@ -13,16 +13,23 @@ from typing import Any, Final
 from gateway.errors import StoreRefusedError
 
 APPLICATION_ID: Final = 0x53505253  # "SPRS" in the file's header
-VERSION: Final = 7  # of the tables; a file of another version is refused
+VERSION: Final = 8  # of the tables; a file of another version is refused
 
 _TABLES: Final = f"""
 BEGIN IMMEDIATE;
-CREATE TABLE epochs (id TEXT NOT NULL, last_batch INTEGER NOT NULL DEFAULT 0);
+-- one row: what is true of the whole database
+CREATE TABLE state (
+    epoch TEXT NOT NULL,
+    last_batch INTEGER NOT NULL DEFAULT 0,  -- number of the newest batch
+    estimate INTEGER,                       -- number of the newest estimate, and when it was received
+    boot_id TEXT,                           -- in which boot of the machine
+    boot_ns INTEGER,                        -- how long after it, by a clock that never steps
+    doubted_since_ns INTEGER                -- since when the wall clock is doubted
+);
 CREATE TABLE journal (
     seq INTEGER PRIMARY KEY AUTOINCREMENT,
     kind TEXT NOT NULL,
     id TEXT NOT NULL UNIQUE,
-    revision INTEGER NOT NULL,
     t_end_ns INTEGER NOT NULL,
     previous INTEGER NOT NULL,      -- number of the batch before this one, 0 where there is none
     received_ns INTEGER NOT NULL,
@@ -38,12 +45,6 @@ CREATE TABLE uplinks (
     n_pruned INTEGER NOT NULL DEFAULT 0,
     n_pruned_entries INTEGER NOT NULL DEFAULT 0
 );
--- when the newest record of a kind was received, by a clock that never steps within one boot of the machine
-CREATE TABLE receipts (kind TEXT PRIMARY KEY, seq INTEGER NOT NULL, boot_id TEXT NOT NULL, boot_ns INTEGER NOT NULL);
--- records that failed their checksum
-CREATE TABLE damaged (n INTEGER PRIMARY KEY AUTOINCREMENT, seq INTEGER NOT NULL, found_ns INTEGER NOT NULL, id, text);
--- since when the wall clock is doubted
-CREATE TABLE clock (one INTEGER PRIMARY KEY CHECK (one = 1), doubted_since_ns INTEGER);
 PRAGMA application_id = {APPLICATION_ID};
 PRAGMA user_version = {VERSION};
 COMMIT;
@@ -119,13 +120,12 @@ def _is_new(connection: sqlite3.Connection, path: Path) -> bool:
 class JournalRow:
     """One record. ``seq`` orders all records and never repeats; ``previous`` links batches into a chain.
 
-    ``boot_ns`` is the time of receipt on a monotonic clock (table ``receipts``); it is no column of the journal.
+    ``boot_ns`` is the time of receipt on a monotonic clock (table ``state``); it is no column of the journal.
     """
 
     seq: int
     kind: str
     id: str
-    revision: int
     t_end_ns: int
     previous: int
     received_ns: int
@@ -134,9 +134,7 @@ class JournalRow:
 
     def columns(self) -> tuple[Any, ...]:
         """All but the checksum, in the order of the table."""
-        return (
-            self.seq, self.kind, self.id, self.revision, self.t_end_ns, self.previous, self.received_ns, self.text
-        )  # fmt: skip
+        return self.seq, self.kind, self.id, self.t_end_ns, self.previous, self.received_ns, self.text
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +147,7 @@ class DeliveryRow:
 
 Row = JournalRow | DeliveryRow
 
-JOURNAL_COLUMNS: Final = "seq, kind, id, revision, t_end_ns, previous, received_ns, text"
+JOURNAL_COLUMNS: Final = "seq, kind, id, t_end_ns, previous, received_ns, text"
 
 
 def checksum(columns: Sequence[Any]) -> int:

@@ -5,9 +5,7 @@ import secrets
 import sqlite3
 import threading
 import time
-import zlib
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,18 +17,18 @@ from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, ServicePart
 from gateway.records import json_line
 from gateway.status import StoreState, StoreStatus
-from gateway.store.database import FILE_NAME, Database, is_damaged
+from gateway.store.database import FILE_NAME, DamagedError, Database, is_damaged
 from gateway.store.journal import BATCHES, ENTRIES, ESTIMATE, REJECTION, REMAINDER, SERVICE, Delivery
 from gateway.store.reader import Follower, StoreReader
 from gateway.store.retention import Retention, boot_ns
-from gateway.store.schema import Chain, JournalRow
+from gateway.store.schema import Chain, JournalRow, Row
 from gateway.store.write_buffer import Held, WriteBuffer
 
 IDLE_S: Final = 900.0  # chosen: without new rows: how often age is looked at
 RETRY_FIRST_S: Final = 0.5  # chosen: pause after a fault of the disk; doubles up to the last
 RETRY_LAST_S: Final = 30.0  # chosen: how late a disk that works again is noticed
 BOOT_ID: Final = Path("/proc/sys/kernel/random/boot_id")
-PAGE_OF_BAD: Final = 1000  # chosen: numbers of bad records that wait to be set aside; readers name them again
+MOST_BAD: Final = 1000  # chosen: bad records that are counted
 
 
 class Store(ServicePart):
@@ -53,8 +51,7 @@ class Store(ServicePart):
         self._closing = threading.Event()
         self._suspect = threading.Event()
         self._lost = threading.Event()
-        self._bad_seqs: deque[int] = deque(maxlen=PAGE_OF_BAD)
-        self._unread: set[int] = set()  # checksums of records that this program cannot read
+        self._bad: set[int] = set()  # hashes of the records that this program cannot use
         self._reason: str | None = None
         self._set_aside: str | None = None
         self._n_written = self._n_duplicates = self._n_pruned = self._size_bytes = 0
@@ -97,9 +94,9 @@ class Store(ServicePart):
         else:
             self.write_estimate(record)
 
-    def write_entry(self, kind: str, entry_id: str, t_end_ns: int, text: str, revision: int = 1) -> str:
+    def write_entry(self, kind: str, entry_id: str, t_end_ns: int, text: str) -> str:
         """Accept a new revision of a load event, trip or alarm -> its cursor; it replaces the earlier revision."""
-        return self._append(kind, entry_id, t_end_ns, text, revision)
+        return self._append(kind, entry_id, t_end_ns, text)
 
     def write_event(self, kind: str, detail: Mapping[str, Any]) -> None:
         self._append(SERVICE, "", self._clock_ns(), f"{kind}\n{json_line(detail)}")
@@ -147,7 +144,7 @@ class Store(ServicePart):
             size_bytes=self._size_bytes,
             set_aside=self._set_aside,
             is_reserve_in_use=self._reserve.is_in_use,
-            n_bad_records=self._database.n_bad_records + len(self._unread),
+            n_bad_records=len(self._bad),
         )
 
     def is_alive(self) -> bool:
@@ -181,20 +178,26 @@ class Store(ServicePart):
         (self._suspect if is_damaged else self._lost).set()
         self._buffer.wake()
 
-    def suspect_records(self, seqs: Sequence[int]) -> None:
-        """A reader found that these records fail their checksum."""
-        self._bad_seqs.extend(seqs)
-        self._buffer.wake()
+    def note_failed_sum(self, seq: int) -> None:
+        """A reader found that this record is not as it was written."""
+        self._note_bad(seq, seq=seq)
 
     def note_unread(self, text: str, fault: Exception) -> None:
-        """A record that is whole, but that this program cannot read: it stays where it is, is logged and counted."""
-        mark = zlib.crc32(text.encode("utf-8", "surrogateescape"))
-        if mark not in self._unread and len(self._unread) < PAGE_OF_BAD:
-            self._unread.add(mark)
-            log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, record=text[:80], fault=repr(fault)[:200])
+        """A record is whole, but this program cannot read it."""
+        self._note_bad(text, record=text[:80], fault=repr(fault)[:200])
 
-    def _append(self, kind: str, record_id: str, t_end_ns: int, text: str, revision: int = 1) -> str:
-        row = JournalRow(0, kind, record_id, revision, t_end_ns, 0, self._clock_ns(), text, boot_ns())
+    def _note_refused(self, row: Row, fault: Exception) -> None:
+        self._note_bad(repr(row), record=repr(row), fault=repr(fault)[:200])  # the whole record: it is nowhere else
+
+    def _note_bad(self, which: Hashable, **told: object) -> None:
+        """Log and count a record that cannot be used, once. One that is in the journal stays there."""
+        mark = hash(which)
+        if mark not in self._bad and len(self._bad) < MOST_BAD:
+            self._bad.add(mark)
+            log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, **told)
+
+    def _append(self, kind: str, record_id: str, t_end_ns: int, text: str) -> str:
+        row = JournalRow(0, kind, record_id, t_end_ns, 0, self._clock_ns(), text, boot_ns())
         return self._buffer.append(row)
 
     def _write_until_closed(self) -> None:
@@ -214,7 +217,7 @@ class Store(ServicePart):
         self._database.close()
 
     def _has_other_work(self) -> bool:
-        return self._closing.is_set() or self._suspect.is_set() or self._lost.is_set() or bool(self._bad_seqs)
+        return self._closing.is_set() or self._suspect.is_set() or self._lost.is_set()
 
     def _try(self) -> bool:
         try:
@@ -233,8 +236,7 @@ class Store(ServicePart):
                 self._database.require_tables()
             if self._suspect.is_set():
                 self._suspect.clear()
-                self._database.check()
-            self._set_bad_records_aside()
+                raise DamagedError("a reader met damage")
             self._commit()
         except StoreError:
             raise
@@ -242,7 +244,7 @@ class Store(ServicePart):
             self._buffer.give_back()
             self._lost.set()  # what failed may be a table that is missing: the next attempt looks
             if is_damaged(error):
-                return self._set_damaged_aside(error)
+                return self._attempt() if self._database.mend() else self._set_damaged_aside(error)
             if self._reserve.give_up():
                 log_event(Event.STORE_RESERVE, level=logging.WARNING, reason=str(error))
                 return self._attempt()
@@ -257,17 +259,10 @@ class Store(ServicePart):
             self._buffer.rebase(*opened)
             self._has_numbers = True
 
-    def _set_bad_records_aside(self) -> None:
-        seqs = set()
-        while self._bad_seqs:
-            seqs.add(self._bad_seqs.popleft())
-        for seq in self._database.set_records_aside(seqs, self._clock_ns()):
-            log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, seq=seq)
-
     def _commit(self) -> None:
         rows = self._buffer.take()
         if rows:
-            stored, n_known = self._database.add(rows, self._boot_id)
+            stored, n_known = self._database.add(rows, self._boot_id, self._note_refused)
             self._n_written += sum(row.kind != SERVICE for row in stored)
             self._n_duplicates += n_known
         if self._reason is not None:

@@ -1,7 +1,6 @@
 """The outbox of a sender. The journal is the queue; the outbox keeps the place up to which it is delivered."""
 
 import json
-import logging
 import threading
 import time
 from collections import deque
@@ -10,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.estimates.field_kinds import without_places
-from gateway.log import Event, log_event
 from gateway.records import json_line
 from gateway.store import Store
 from gateway.store.journal import ALARM, ESTIMATE, KINDS, Delivery, JournalRecord
@@ -69,7 +67,7 @@ class Outbox:
                 self._journal.write_delivery(self._name, known)  # from here on, what retention removes is counted
             self._go_to(known)
         while not self._page and (records := self._follower.read(PAGE)):
-            self._page.extend(message for record in records if (message := self._message(record)) is not None)
+            self._page.extend(message for record in records for message in self._messages(record))
         if self._page:
             return self._page[0]
         if self._delivered != self._follower.place:  # nothing before it is to be sent
@@ -115,17 +113,17 @@ class Outbox:
         self._page.clear()
         self._follower.go_to(cursor)
 
-    def _message(self, record: JournalRecord) -> OutboxMessage | None:
-        """The message of a record: without spectra, and with positions only if they are wanted. None, and logged, for a
-        record that this program cannot read.
+    def _messages(self, record: JournalRecord) -> list[OutboxMessage]:
+        """The message of a record: without spectra, and with positions only if they are wanted. None of a record that
+        this program cannot read.
         """
-        try:
-            shown: dict[str, Any] = json.loads(record.text if self._with_places else without_places(record.text))
+
+        def read(text: str) -> OutboxMessage:
+            shown: dict[str, Any] = json.loads(text if self._with_places else without_places(text))
             shown.pop("spectra", None)
             return message_of_record(record, shown)
-        except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as fault:
-            log_event(Event.STORE_BAD_RECORD, level=logging.ERROR, seq=record.number, fault=repr(fault))
-            return None
+
+        return self._journal.reader().understood([record.text], read)
 
 
 def message_of_record(record: JournalRecord, shown: dict[str, Any]) -> OutboxMessage:

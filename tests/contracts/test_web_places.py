@@ -31,7 +31,7 @@ def gateway(tmp_path: Path) -> Gateway:
         load = {"payload_kg": 1.0, "payload_std_kg": 1.0, "payload_interval95_kg": [0.0, 2.0]}
         for kind in ("event", "trip"):
             whole = record | {"from": told, "to": told, "before": load, "after": load}
-            opened.store.write_entry(kind, f"{kind}-1-abc", 1, json_line(whole | {"id": f"{kind}-1-abc"}), 1)
+            opened.store.write_entry(kind, f"{kind}-1-abc", 1, json_line(whole | {"id": f"{kind}-1-abc"}))
         opened.store.flush(60.0)
         opened.board.close()  # so that the stream has an end
         opened.first = first

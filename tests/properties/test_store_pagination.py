@@ -66,7 +66,7 @@ def test_two_readers_beside_a_writer_see_the_same_once(tmp_path: Path) -> None:
 
 
 def row(n: int) -> JournalRow:
-    return JournalRow(0, "estimate", str(n), 1, n, 0, 0, "{}")
+    return JournalRow(0, "estimate", str(n), n, 0, 0, "{}")
 
 
 @given(

@@ -24,7 +24,7 @@ DAY_S = 86_400.0
 
 def entry(store: Store, n: int, kind: str = "event", revision: int = 1) -> str:
     record = {"id": f"{kind}-{n}", "revision": revision, "kind": "drift", "where": None}
-    return store.write_entry(kind, record["id"], n, json.dumps(record), revision)
+    return store.write_entry(kind, record["id"], n, json.dumps(record))
 
 
 def refuse(*_: object) -> NoReturn:

@@ -42,7 +42,7 @@ def store(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mo
         monkeypatch.undo()
 
 
-def _refuse(rows: Any, boot_id: str) -> Any:
+def _refuse(*_: Any) -> Any:
     raise OSError("no disk")
 
 
