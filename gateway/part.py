@@ -4,7 +4,8 @@ import logging
 import random
 import threading
 from abc import ABC, abstractmethod
-from typing import ClassVar, Final
+from collections.abc import Callable
+from typing import Final
 
 from gateway.log import Event, log_event
 
@@ -38,8 +39,8 @@ class BackOff:
 class ServicePart:
     """One part of the service. ``NAME`` is its name for people; the service ends with a part that ``IS_VITAL``."""
 
-    NAME: ClassVar[str]
-    IS_VITAL: ClassVar[bool] = False
+    NAME: str
+    IS_VITAL = False
 
     def start(self) -> None:
         """Begin."""
@@ -118,3 +119,16 @@ class ThreadPart(ServicePart, ABC):
         if self.is_alive() or self._thread.ident is None or self._stopping.is_set():
             return None
         return f"died: {self.failure!r}" if self.failure is not None else "died"
+
+
+class Repeated(ThreadPart):
+    """Does the same again and again: ``do`` after every ``pause_s``."""
+
+    def __init__(self, name: str, do: Callable[[], object], pause_s: Callable[[], float]) -> None:
+        super().__init__(name)
+        self.NAME, self._do, self._pause_s = name, do, pause_s
+
+    def _work(self) -> None:
+        while not self._stopping.wait(self._pause_s()):
+            self._do()
+            self._succeeded()

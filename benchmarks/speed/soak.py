@@ -6,7 +6,6 @@ frame is recorded. The bus is replaced by a receiver that repeats the frames of 
 everything behind it is the service as in a vehicle.
 """
 
-import asyncio
 import json
 import shutil
 import sys
@@ -69,10 +68,9 @@ class Service:
         self.stop: Callable[[], object] = lambda: None
 
     def started(self, gateway: Gateway) -> None:
-        """Called in the event loop's thread, once it runs."""
-        loop = asyncio.get_running_loop()
+        """Called once it runs."""
         self.gateway, self.n_starts = gateway, self.n_starts + 1
-        self.stop = lambda: loop.call_soon_threadsafe(gateway.request_stop)
+        self.stop = gateway.request_stop
 
     @property
     def now(self) -> Gateway:

@@ -1,6 +1,5 @@
 """springscale demo: the whole service on a simulated drive, with no hardware and no configuration."""
 
-import asyncio
 import json
 import threading
 from importlib.resources import as_file, files
@@ -89,12 +88,11 @@ class _Driver:
         return self._known_loads
 
     def start(self, gateway: Gateway) -> None:
-        """Begin to drive; called in the service's event loop once it is ready."""
+        """Begin to drive; called once the service is ready."""
         if self._is_endless:
             click.echo(f"Dashboard: {gateway.url}   (Ctrl-C ends)")
             click.echo(f"It fills once the first drive is simulated; later ones run {self._speed:g} times real time.")
-        loop = asyncio.get_running_loop()
-        self._thread = threading.Thread(target=self._drive, args=(gateway, loop), name="demo-drive", daemon=True)
+        self._thread = threading.Thread(target=self._drive, args=(gateway,), name="demo-drive", daemon=True)
         self._thread.start()
 
     def end(self) -> None:
@@ -102,7 +100,7 @@ class _Driver:
         if self._thread is not None:
             self._thread.join(5.0)
 
-    def _drive(self, gateway: Gateway, loop: asyncio.AbstractEventLoop) -> None:
+    def _drive(self, gateway: Gateway) -> None:
         try:
             with BusSink("virtual", CHANNEL) as sink:
                 for seed in takewhile(self._goes_on, count(1)):
@@ -112,7 +110,7 @@ class _Driver:
             self.fault = fault
         finally:
             if not self._stop.is_set():
-                loop.call_soon_threadsafe(gateway.request_stop)
+                gateway.request_stop()
 
     def _goes_on(self, seed: int) -> bool:
         return not self._stop.is_set() and (self._is_endless or seed <= N_QUICK_ROUNDS)

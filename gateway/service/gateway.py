@@ -1,11 +1,12 @@
 """The service itself: starts its parts in order, supervises them, and stops them in reverse order."""
 
-import asyncio
 import contextlib
 import logging
+import queue
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from gateway.bus.listen import OpenReceiver, SourceState
@@ -13,7 +14,7 @@ from gateway.bus.signals import Decoder
 from gateway.config import Settings
 from gateway.errors import SpringscaleError
 from gateway.log import Event, log_event
-from gateway.part import ServicePart
+from gateway.part import Repeated, ServicePart
 from gateway.service.alarm_reader import AlarmService, rules_of
 from gateway.service.batch_log import BatchLog, LoadEventLog, StateLog
 from gateway.service.journal_reader import JournalReader
@@ -30,7 +31,7 @@ from gateway.service.parts import (
 )
 from gateway.service.pipeline import Beside, Pipeline
 from gateway.service.status_of_parts import StatusReport
-from gateway.service.stopping import CLOSE_WITHIN_S, Deadline, Periodic, Questions, in_own_thread, stop_in_turn
+from gateway.service.stopping import CLOSE_WITHIN_S, Deadline, stop_in_turn
 from gateway.setup import Setup
 from gateway.uplink.settings import uplink_settings, webhook_settings
 from gateway.web.access.serving import WebServer, refuse_open_address, server_config
@@ -133,17 +134,21 @@ class Gateway:
         self._server = WebServer(server_config(app, settings.web.host, settings.web.port, tls))
         self._notifier = Notifier()
         self._checks = Beside()
-        self._stopping = asyncio.Event()
+        self._stop_requests: queue.SimpleQueue[None] = queue.SimpleQueue()  # whose put a signal may interrupt
         self._failure: str | None = None
+        self._progress = -1  # of the pipeline, when systemd was last told of it
+        look, pause_s = partial(self.look, StateLog(self.board)), partial(self._pause_s, LOOK_S, ASLEEP_LOOK_S)
+        watchdog = Repeated("watchdog", self._feed_watchdog, lambda: ASK_S)
+        self._checking = [Repeated("check of the status", look, pause_s), watchdog]
         beside = (self.learner, *self.readers, self.ring_log, self.uplink, self.webhook)
         self._beside = [part for part in beside if part is not None]
-        self.parts: list[ServicePart] = [self.store, *self._beside, self.pipeline, self.source]  # in order of start
+        self.parts: list[ServicePart] = [self.store, *self._beside, self.pipeline, self.source]
+        self.parts += [self._server, *self._checking]
         self.needs_restart = False  # with the calibration that was learnt meanwhile; see lifecycle.py
 
     def _faults(self) -> tuple[str, ...]:
         """Faults of parts that the status does not tell of, as sentences for people."""
-        faults = [self._tokens.fault, self._setup_fault, self._server.fault]
-        faults += [self._checks.fault, *(part.fault for part in self.parts)]
+        faults = [self._tokens.fault, self._setup_fault, self._checks.fault, *(part.fault for part in self.parts)]
         return tuple(fault for fault in faults if fault)
 
     @property
@@ -159,78 +164,75 @@ class Gateway:
         return all(reader.has_caught_up for reader in self.readers)
 
     def request_stop(self) -> None:
-        """Request a stop, from the thread of the event loop (other threads: loop.call_soon_threadsafe)."""
-        self._stopping.set()
+        """Request a stop, from any thread or signal handler."""
+        self._stop_requests.put(None)
 
     def run(self) -> None:
         """Serve until SIGTERM or SIGINT. Raises GatewayFailedError with a clear line when a part dies."""
-        with asyncio.Runner(loop_factory=self._server.loop_factory()) as runner:
-            runner.run(self._serve())
+        with _signals_taken(self.request_stop):
+            try:
+                self._start_parts()
+                self._supervise()
+            except Exception as failure:  # noqa: BLE001 - accepted records still have to reach the disk
+                self._failure = f"the supervisor died: {failure!r}"
+            try:
+                self._stop_parts()
+            except Exception as failure:  # noqa: BLE001 - the process has to end all the same
+                self._failure = self._failure or f"the stop failed: {failure!r}"
+            self._server.stop()
+            self._notifier.close()
         if self._failure is not None:
             raise GatewayFailedError(self._failure)
 
-    async def _serve(self) -> None:
-        loop = asyncio.get_running_loop()
-        loop.set_default_executor(Questions(thread_name_prefix="question"))
-        for number in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(number, self.request_stop)
+    def _start_parts(self) -> None:
         bus = self._settings.bus
         log_event(Event.STARTED, version=self.status().version, interface=bus.interface, channel=bus.channel)
         for part in self.parts:
             part.start()
-        self.store.write_event("started", {"interface": self._settings.bus.interface})
-        serving = asyncio.create_task(self._server.serve())
-        try:
-            await self._supervise(serving)
-        except Exception as failure:  # noqa: BLE001 - accepted records still have to reach the disk
-            self._failure = f"the supervisor died: {failure!r}"
-        try:
-            await in_own_thread(self._stop_parts)
-        except Exception as failure:  # noqa: BLE001 - the process has to end all the same
-            self._failure = self._failure or f"the stop failed: {failure!r}"
-        self._server.end()
-        await serving
-        self._notifier.close()
+        self.store.write_event("started", {"interface": bus.interface})
 
-    async def _supervise(self, serving: asyncio.Task[None]) -> None:
-        """Report readiness, watchdog and status to systemd until a stop request or the death of a vital part."""
-        is_ready, seen, log_state = False, -1, StateLog(self.board)
-        look = Periodic(lambda: in_own_thread(lambda: self._checks.call("check of the status", self.look, log_state)))
-        ask = Periodic(self._server.is_answering)
-        while not self._stopping.is_set() and self._failure is None:
-            self._failure = self._dead_part(serving)
+    def _supervise(self) -> None:
+        """Report the start to systemd, and wait for a stop request, a new calibration, or the death of a vital part."""
+        is_ready = False
+        while self._failure is None:
+            self._failure = self._dead_part()
             if self._server.is_started and not is_ready:
                 is_ready = True
                 self._notifier.send(READY="1")
                 log_event(Event.READY, url=self.url)
                 self._on_started(self)
-            is_asked = is_ready and (self._notifier.is_heard or self._server.fault is not None)
-            if is_asked and ask.go_on(ASK_S) and self.pipeline.progress != seen:
-                seen = self.pipeline.progress
-                self._notifier.send(WATCHDOG="1")
-            is_asleep = is_ready and self.source.state is SourceState.BUS_SILENT
-            look.go_on(ASLEEP_LOOK_S if is_asleep else LOOK_S)
             if self.learner.is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
                 self.needs_restart = True
-                self.request_stop()
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._stopping.wait(), ASLEEP_SUPERVISE_S if is_asleep else SUPERVISE_S)
+                return
+            with contextlib.suppress(queue.Empty):
+                self._stop_requests.get(timeout=self._pause_s(SUPERVISE_S, ASLEEP_SUPERVISE_S))
+                return
+
+    def _pause_s(self, awake_s: float, asleep_s: float) -> float:
+        """Seconds until the next turn of a check."""
+        return asleep_s if self.source.state is SourceState.BUS_SILENT else awake_s
+
+    def _feed_watchdog(self) -> None:
+        """Tell systemd that the service works: its web server answers, and its pipeline has gone on since."""
+        if not self._notifier.is_heard and self._server.fault is None:
+            return
+        if self._server.is_answering() and self.pipeline.progress != self._progress:
+            self._progress = self.pipeline.progress
+            self._notifier.send(WATCHDOG="1")
 
     def look(self, log_state: StateLog) -> None:
-        """One check of the service's state, in a thread because it may wait for a lock or a disk."""
+        """One check of the service's state."""
         now = self.status()
         self._checks.call("log of states", log_state, now)
         causes = [cause.text for cause in self.pipeline.decoder.causes()]
         self._checks.call("alarms", self.alarms.watch, now, causes)
         self._notifier.send_status(now.sentence())
 
-    def _dead_part(self, serving: asyncio.Task[None]) -> str | None:
+    def _dead_part(self) -> str | None:
         """Which vital part died, and why; None while all work."""
         for part in self.parts:
             if part.IS_VITAL and (death := part.death()) is not None:
                 return f"the {part.NAME} {death}"
-        if serving.done():
-            return f"the web server could not run on {self._settings.web.host}:{self._settings.web.port}: is it taken?"
         return None
 
     def _stop_parts(self) -> None:
@@ -249,6 +251,8 @@ class Gateway:
             steps.callback(lambda: self.store.flush(deadline.left_s(FLUSH_WITHIN_S)))
             steps.callback(lambda: self.pipeline.stop(deadline.left_s(PIPELINE_WITHIN_S)))
             steps.callback(lambda: self.source.stop(deadline.left_s(BUS_WITHIN_S)))
+            for check in self._checking:
+                check.stop(within_s=0.0)
 
     def _close_store(self, deadline: Deadline, late: Sequence[str]) -> None:
         self.store.write_event("stopped", {"failure": self._failure})
@@ -257,3 +261,14 @@ class Gateway:
             self._failure = f"{n_lost} records could not be stored: {self.store.health().reason or 'there was no time'}"
         level = logging.ERROR if n_lost or late or self._failure else logging.INFO
         log_event(Event.STOPPED, level=level, failure=self._failure, rows_lost=n_lost)
+
+
+@contextlib.contextmanager
+def _signals_taken(request_stop: Callable[[], None]) -> Iterator[None]:
+    """SIGTERM and SIGINT request a stop meanwhile."""
+    before = [(number, signal.signal(number, lambda *_: request_stop())) for number in (signal.SIGTERM, signal.SIGINT)]
+    try:
+        yield
+    finally:
+        for number, handler in before:
+            signal.signal(number, handler)

@@ -25,8 +25,7 @@ class JournalReader(ThreadPart):
 
     def __init__(self, name: str, store: Store, take: Callable[[Estimate], None]) -> None:
         super().__init__(f"journal {name}")
-        self.NAME = name  # type: ignore[misc]  # several of one class
-        self._store, self._take = store, take
+        self.NAME, self._store, self._take = name, store, take
         self._news = threading.Event()
         self._is_waiting = False
         self._follower = store.follow(WINDOWS, place_of(store, name) or store.head(), self._news.set)

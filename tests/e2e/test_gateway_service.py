@@ -1,6 +1,5 @@
 """The real service end to end: bus, pipeline, database and web together."""
 
-import asyncio
 import importlib.metadata
 import os
 import signal
@@ -278,7 +277,7 @@ def test_the_status_is_answered_when_no_file_can_be_opened(config: Path, monkeyp
 
     def on_started(gateway: Gateway) -> None:
         monkeypatch.setattr(importlib.metadata.PathDistribution, "read_text", refuse)
-        seen.append((type(asyncio.get_running_loop()).__module__, gateway.status().version))
+        seen.append((type(gateway._server._loop).__module__, gateway.status().version))
         gateway.request_stop()
 
     version = importlib.metadata.version("springscale")

@@ -1,6 +1,5 @@
 """One part's failure is its own: weighing goes on, the status names it, and the part begins anew."""
 
-import asyncio
 import socket
 import threading
 import time
@@ -19,7 +18,7 @@ from support.running_service import Running, configuration, estimated, serve, st
 from gateway.bus.logs import write_candump
 from gateway.bus.ring_log import RingLog
 from gateway.config import load_settings
-from gateway.part import BackOff, ThreadPart
+from gateway.part import BackOff, ServicePart, ThreadPart
 from gateway.service import gateway as service
 from gateway.service.alarm_reader import AlarmService
 from gateway.service.batch_log import BatchLog, LoadEventLog, StateLog
@@ -97,12 +96,15 @@ def test_a_follower_of_the_journal_that_raises_costs_no_record(config: Path, log
 
 
 def test_a_status_that_cannot_be_made_ends_nothing(config: Path, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def check(running: Running) -> ServicePart:
+        return next(part for part in running.gateway.parts if part.NAME == "check of the status")
+
     def drive(running: Running) -> None:
         with monkeypatch.context() as breaking:
             breaking.setattr(StatusReport, "state", fail)
             running.play(log)
-            assert wait_until(lambda: running.gateway._checks.fault is not None)
-        assert wait_until(lambda: running.gateway._checks.fault is None)
+            assert wait_until(lambda: check(running).fault is not None)
+        assert wait_until(lambda: check(running).fault is None)
 
     serve(config, drive)
     assert stored(config)[:3] == estimated(config, log)[:3]
@@ -125,7 +127,7 @@ class Clumsy(ThreadPart):
 
     def __init__(self, *failures: BaseException, is_vital: bool = False) -> None:
         super().__init__("clumsy", BackOff(0.001, 0.002))
-        self.IS_VITAL = is_vital  # type: ignore[misc]  # both of one class
+        self.IS_VITAL = is_vital
         self._failures = list(failures)
         self.n_works = 0
         self.may_succeed = threading.Event()
@@ -225,19 +227,17 @@ def test_the_watchdog_is_fed_only_while_the_web_answers(
         heard = heard_by(notifications)
 
         def on_started(running: Gateway) -> None:
-            loop = asyncio.get_running_loop()
-
             def watch() -> None:
                 if wait_until(lambda: "WATCHDOG=1" in heard()):
                     server = running._server._server
-                    loop.call_soon_threadsafe(server.servers[-1].close)  # it takes nobody any more
+                    running._server._loop.call_soon_threadsafe(server.servers[-1].close)  # it takes nobody any more
                     wait_until(lambda: not server.servers[-1].is_serving())
                     n_turns = running.pipeline.progress
                     wait_until(lambda: running.pipeline.progress > n_turns + 1)  # what was asked before is answered
                     heard()
                     wait_until(lambda: running.pipeline.progress > n_turns + 3)
                     seen.append(heard())
-                loop.call_soon_threadsafe(running.request_stop)
+                running.request_stop()
 
             threading.Thread(target=watch, daemon=True).start()
 
@@ -247,20 +247,11 @@ def test_the_watchdog_is_fed_only_while_the_web_answers(
 
 
 def test_a_web_server_that_dies_begins_anew(config: Path, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.web.access.serving.FIRST_PAUSE_S", 0.01)
     monkeypatch.setattr(service, "ASK_S", 0.05)
-    loops: list[asyncio.AbstractEventLoop] = []
-    serve_web = service.WebServer.serve
-
-    async def noted(self: service.WebServer) -> None:
-        loops.append(asyncio.get_running_loop())
-        await serve_web(self)
-
-    monkeypatch.setattr(service.WebServer, "serve", noted)
 
     def drive(running: Running) -> None:
         server = running.gateway._server
-        loops[0].call_soon_threadsafe(server._server.ending.set)
+        server._loop.call_soon_threadsafe(server._server.ending.set)
         assert wait_until(lambda: server.fault is not None)
         assert wait_until(lambda: server.is_started)
         running.play(log)
@@ -280,17 +271,10 @@ def test_a_stop_while_the_web_server_pauses_ends_the_process(config: Path, monke
         return 10.0 * PATIENCE_S
 
     monkeypatch.setattr(BackOff, "next_s", long_pause)
-    loops: list[asyncio.AbstractEventLoop] = []
-    serve_web = service.WebServer.serve
-
-    async def noted(self: service.WebServer) -> None:
-        loops.append(asyncio.get_running_loop())
-        await serve_web(self)
-
-    monkeypatch.setattr(service.WebServer, "serve", noted)
 
     def drive(running: Running) -> None:
-        loops[0].call_soon_threadsafe(running.gateway._server._server.ending.set)
+        server = running.gateway._server
+        server._loop.call_soon_threadsafe(server._server.ending.set)
         assert pause.wait(PATIENCE_S)
 
     begun_s = time.monotonic()

@@ -80,7 +80,7 @@ def test_parts_stop_in_reverse_order_and_a_hanging_one_does_not_block(
 
     class Named(ServicePart):
         def __init__(self, name: str) -> None:
-            self.NAME = name  # type: ignore[misc]  # two of one class
+            self.NAME = name
 
         def stop(self, within_s: float = 0.0) -> None:
             stopped.append(self.NAME)

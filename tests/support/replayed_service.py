@@ -1,6 +1,5 @@
 """``python -m support.replayed_service CONFIG LOG [later]``: the service and a drive on its bus, in one process."""
 
-import asyncio
 import sys
 import threading
 from pathlib import Path
@@ -21,17 +20,16 @@ def main(config: Path, log: Path, *, is_later: bool) -> None:
     set_up_log(settings.log.level, under_journald=True)
 
     def on_started(gateway: Gateway) -> None:
-        loop = asyncio.get_running_loop()
-        threading.Thread(target=play, args=(gateway, loop), daemon=True).start()
+        threading.Thread(target=play, args=(gateway,), daemon=True).start()
 
-    def play(gateway: Gateway, loop: asyncio.AbstractEventLoop) -> None:
+    def play(gateway: Gateway) -> None:
         try:
             if is_later:
                 sys.stdin.readline()
             replay(log, settings.bus.interface, settings.bus.channel, speed="max")
             sys.stdin.readline()  # whoever started us has seen enough
         finally:
-            loop.call_soon_threadsafe(gateway.request_stop)
+            gateway.request_stop()
 
     Gateway(settings, setup_of(settings), on_started=on_started).run()
 

@@ -1,6 +1,5 @@
 """A running service as a test's other thread meets it, and what it left behind."""
 
-import asyncio
 import json
 import threading
 from collections.abc import Callable
@@ -66,12 +65,10 @@ def serve(config: Path, meet: Callable[[Running], None]) -> None:
     settings = load_settings(config)
     running = Running(settings)
     failures: list[BaseException] = []
-    loops: list[asyncio.AbstractEventLoop] = []
 
     def on_started(gateway: Gateway) -> None:
         running.gateway = gateway
         running.n_starts += 1
-        loops.append(asyncio.get_running_loop())
         if running.n_starts == 1:
             threading.Thread(target=part, daemon=True).start()
 
@@ -80,7 +77,7 @@ def serve(config: Path, meet: Callable[[Running], None]) -> None:
             meet(running)
         except BaseException as failure:  # noqa: BLE001 - raised again in the test's own thread
             failures.append(failure)
-        loops[-1].call_soon_threadsafe(running.gateway.request_stop)
+        running.gateway.request_stop()
 
     while live(settings, on_started=on_started):
         pass

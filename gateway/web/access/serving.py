@@ -6,10 +6,10 @@ reach stands behind a reverse proxy, which limits each of them (deploy/Caddyfile
 
 import asyncio
 import contextlib
-import logging
 import socket
 import ssl
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -19,8 +19,7 @@ from starlette.types import ASGIApp
 
 from gateway.config.permission import Holder, Kind, encryption_to, is_loopback, may_leave
 from gateway.errors import ConfigurationError
-from gateway.log import Event, log_event
-from gateway.part import FIRST_PAUSE_S, LAST_PAUSE_S, BackOff
+from gateway.part import ThreadPart
 
 CONNECTIONS: Final = 100  # chosen: of all clients together, streams among them; beyond them the answer is 503
 HEAD_BYTES: Final = 32_768  # chosen: request line and headers
@@ -94,6 +93,11 @@ class _Server(uvicorn.Server):
         """Signals are the gateway's."""
         yield
 
+    def end(self) -> None:
+        """Begin to shut down; from the event loop's thread."""
+        self.should_exit = True
+        self.ending.set()
+
     async def main_loop(self) -> None:
         """Until ``ending``. uvicorn's own wakes ten times a second, parked vehicle or not, to see whether it is to
         end.
@@ -101,81 +105,88 @@ class _Server(uvicorn.Server):
         await self.ending.wait()
 
 
-class WebServer:
-    """Serves the application until :meth:`end`; a server that dies begins anew after a pause. ``fault`` says why."""
+class Questions(ThreadPoolExecutor):
+    """Threads for requests that may wait for a lock or a disk. A stop does not wait for them."""
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Abandon the requests that hang, because the event loop would wait for its executor forever."""
+        super().shutdown(wait=False, cancel_futures=True)
+
+
+class WebServer(ThreadPart):
+    """Serves the application in a thread of its own. It is vital until it has started once."""
+
+    NAME = "web server"
 
     def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__("web server")
+        self.IS_VITAL = True
         self._config = config
-        self._server = _Server(config)
-        self._ending = asyncio.Event()
+        self._server: _Server | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._own: tuple[str, int] = ("", 0)  # where this machine can ask, whatever the address of the settings
         self.port = 0
-        self.fault: str | None = None
 
     @property
     def is_started(self) -> bool:
-        return bool(self._server.started)
-
-    def loop_factory(self) -> Callable[[], asyncio.AbstractEventLoop] | None:
-        """How uvicorn makes its event loop."""
-        return self._config.get_loop_factory()
+        return self._server is not None and self._server.started
 
     @property
     def scheme(self) -> str:
         return "https" if self._config.is_ssl else "http"
 
-    async def serve(self) -> None:
-        """Returns after :meth:`end`, and at once if not even the first server can start."""
-        back_off = BackOff(FIRST_PAUSE_S, LAST_PAUSE_S)
-        while True:
-            died = "it ended"
-            try:
-                await self._server.serve(self._listening())
-            except SystemExit:  # uvicorn's way to say that the address cannot be used
-                died = "its address cannot be used"
-            except Exception as failure:  # noqa: BLE001 - weighing does not depend on it
-                died = repr(failure)
-            if self._ending.is_set() or not self.port:
-                return
-            if self.fault is None:
-                log_event(Event.PART_FAILED, level=logging.ERROR, part="web server", failure=died)
-            self.fault = f"the web server failed: {died}; weighing goes on"
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._ending.wait(), back_off.next_s())
-                return
-            self._server = _Server(self._config)
+    def _work(self) -> None:
+        listening = self._listening()
+        with asyncio.Runner(loop_factory=self._config.get_loop_factory()) as runner:
+            runner.run(self._serve(listening))
+        if not self._stopping.is_set():
+            raise RuntimeError("it ended")
 
-    def end(self) -> None:
-        """Begin to shut down; from the event loop's thread."""
-        self._server.should_exit = True
-        self._server.ending.set()
-        self._ending.set()
+    async def _serve(self, listening: list[socket.socket]) -> None:
+        self._server, self._loop = _Server(self._config), asyncio.get_running_loop()
+        self._loop.set_default_executor(Questions(thread_name_prefix="question"))
+        if self._stopping.is_set():  # whoever stops it has seen no loop yet
+            self._server.end()
+        await self._server.serve(listening)
 
-    async def is_answering(self) -> bool:
+    def stop(self, within_s: float = 2.0 * STOP_WITHIN_S) -> None:
+        self._stopping.set()
+        if self._loop is not None and self._server is not None:
+            with contextlib.suppress(RuntimeError):  # the loop is closed
+                self._loop.call_soon_threadsafe(self._server.end)
+        super().stop(within_s)
+
+    def death(self) -> str | None:
+        told = super().death()
+        return told and f"could not run on {self._config.host}:{self._config.port}: is it taken?"
+
+    def is_answering(self) -> bool:
         """Whether a request to this very server is answered in time."""
-        context = None
-        if self._config.is_ssl:
-            context = ssl.create_default_context()
-            context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
         try:
-            async with asyncio.timeout(ANSWER_WITHIN_S):
-                reader, writer = await asyncio.open_connection(*self._own, ssl=context)
-                with contextlib.closing(writer):
-                    writer.write(b"GET /health/live HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n")
-                    is_answered = bool(await reader.read(1))
+            with contextlib.ExitStack() as ends:
+                asking = ends.enter_context(socket.create_connection(self._own, ANSWER_WITHIN_S))
+                if self._config.is_ssl:
+                    context = ssl.create_default_context()
+                    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+                    asking = ends.enter_context(context.wrap_socket(asking))
+                asking.sendall(b"GET /health/live HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n")
+                is_answered = bool(asking.recv(1))
         except OSError:  # a timeout is one
-            is_answered = False
+            return False
         if is_answered:
-            self.fault = None
+            self._succeeded()
         return is_answered
 
     def _listening(self) -> list[socket.socket]:
         """At the address of the settings and, if that is not this machine's own, also at one that is. A client that
-        takes nothing for a while is closed by the kernel. Raises SystemExit.
+        takes nothing for a while is closed by the kernel. Raises OSError.
         """
-        listening = [self._config.bind_socket()]
+        try:
+            listening = [self._config.bind_socket()]
+        except SystemExit:  # uvicorn's way to say it
+            raise OSError("its address cannot be used") from None
         host, port, *_ = listening[0].getsockname()
-        self.port, self._own = port, (host, port)
+        self.port, self._own, self.IS_VITAL = port, (host, port), False
         if not is_loopback(host):
             listening.append(socket.create_server(("127.0.0.1", 0)))
             self._own = listening[1].getsockname()
