@@ -2,7 +2,8 @@
 
     outcome = run(job)        # on any worker, any number of times: a finished job is skipped
 
-The table is written first and its receipt last, and only if there is none.
+The table is written first and its receipt last, and only if there is none. A log that cannot be read is listed in the
+receipt.
 """
 
 import hashlib
@@ -26,7 +27,7 @@ from gateway.model.allocator import keep_freed_memory
 from gateway.units import NS_PER_S
 
 OVERLAP_NS: Final = NS_PER_S  # chosen: longer than two logs of one recorder share
-TOLD_FAILURES: Final = 5  # chosen: in the outcome; the data set has all of them
+MOST_TOLD: Final = 5  # chosen: of each kind in the outcome; the receipt has all failures
 
 
 class JobStatus(StrEnum):
@@ -34,9 +35,6 @@ class JobStatus(StrEnum):
 
     DONE = "done"
     ALREADY = "already"  # by an earlier run, or by another worker
-    FAILED = (
-        "failed"  # no log was readable and no window was left open by the month before: recorded, without a receipt
-    )
     LOST = "lost"  # a store or a worker failed: retry
 
 
@@ -88,30 +86,19 @@ def run(job: ArchiveJob) -> JobOutcome:
         if report.wanted and report.span_ns[1] > end_ns:
             longest, end_ns = one.log.name, report.span_ns[1]
         refused += (f"{one.log.name}: {cause.text}" for cause in report.causes())
-    for one, reason in failures.items():
-        _keep_failure(job, one, reason)
     outcome = JobOutcome(
         slot=job.slot,
-        status=JobStatus.DONE if told or rows else JobStatus.FAILED,
+        status=JobStatus.DONE,
         size=job.size,
         took_s=time.monotonic() - begun_s,
         n_batches=len(rows),
         n_weighed=sum(not row["rejected"] for row in rows),
         n_failed_logs=len(failures),
-        failures=tuple(failures.values())[:TOLD_FAILURES],
-        refused=tuple(refused)[:TOLD_FAILURES],
-        overlaps=tuple(overlaps)[:TOLD_FAILURES],
+        failures=tuple(failures.values())[:MOST_TOLD],
+        refused=tuple(refused)[:MOST_TOLD],
+        overlaps=tuple(overlaps)[:MOST_TOLD],
     )
-    if told or rows:
-        return _written(job, outcome, rows, told, failures)
-    fail(job, f"none of its {len(job.logs)} logs could be read; the first: {outcome.failures[0]}")
-    return outcome
-
-
-def fail(job: ArchiveJob, reason: str) -> JobOutcome:
-    """Record in the data set that a job failed, and why."""
-    _keep_failure(job, None, reason)
-    return JobOutcome(job.slot, JobStatus.FAILED, job.size, failures=(reason,))
+    return _written(job, outcome, rows, told, failures)
 
 
 def _is_done(job: ArchiveJob) -> bool:
@@ -138,13 +125,6 @@ def _told(one: JobLog, report: LogReport) -> dict[str, Any]:
     told = {"log": one.log.name, "sha256": one.facts.sha256, "bytes": one.log.size, "frames": report.wanted}
     remarks = [remark.replace(str(report.path), one.log.name) for remark in report.remarks()]
     return told | {"left_out": report.left_out, "ended_early": report.ended_early, "remarks": remarks}
-
-
-def _keep_failure(job: ArchiveJob, one: JobLog | None, reason: str) -> None:
-    """Keeps the failure of one log, or of the whole job."""
-    slot, log = job.slot, None if one is None else one.log.name
-    content = {"vehicle": slot.vehicle, "month": slot.month, "job": slot.job, "log": log, "reason": reason}
-    job.dataset.replace(slot.failure(log), text_of(content | ({"sha256": one.facts.sha256} if one else {})))
 
 
 def _written(

@@ -13,13 +13,13 @@ from itertools import islice
 from typing import Any, TypeVar
 
 from gateway.archive.inventory import Inventory, look
-from gateway.archive.job_run import JobOutcome, JobStatus, fail, run
+from gateway.archive.job_run import JobOutcome, JobStatus, run
 from gateway.archive.jobs import ArchiveJob
 from gateway.archive.manifest import Manifest
 from gateway.archive.places import Location
-from gateway.archive.receipts import Slot, failure_files, slots_done, slots_failed
+from gateway.archive.receipts import Slot, slots_done
 from gateway.archive.survey import Facts, LogFile, survey
-from gateway.archive.workers import WorkerKilledError, Workers, answer_of
+from gateway.archive.workers import Workers, answer_of
 from gateway.errors import ConfigurationError
 
 Task = TypeVar("Task")
@@ -79,7 +79,6 @@ class Summary:
     size: int
     n_jobs: int
     n_already: int
-    n_failed_before: int
     outcomes: list[JobOutcome] = field(default_factory=list)
     lost: dict[str, str] = field(default_factory=dict)  # logs and jobs to retry, with reasons
     copies: dict[str, str] = field(default_factory=dict)  # logs left out, each with the log whose content it has
@@ -93,8 +92,6 @@ class Summary:
         return {
             "done": self.count(JobStatus.DONE),
             "already": self.n_already + self.count(JobStatus.ALREADY),
-            "failed": self.count(JobStatus.FAILED),
-            "failed_before": self.n_failed_before,
             "lost": self.count(JobStatus.LOST),
         }
 
@@ -105,7 +102,7 @@ class Summary:
     @property
     def is_good(self) -> bool:
         """Whether nothing failed in this run, and nothing remains to do."""
-        return not (self.count(JobStatus.FAILED) or self.n_failed_logs or self.lost)
+        return not (self.n_failed_logs or self.lost)
 
     def to_json(self) -> dict[str, Any]:
         return {
@@ -141,15 +138,14 @@ def reprocess(
     inventory = look(manifest, dataset)
     _survey(inventory, workers, on_progress)
     jobs = inventory.jobs()
-    done, failed = set(slots_done(dataset)), set(slots_failed(dataset))
-    to_do = [job for job in jobs if job.slot not in done | failed]
+    done = set(slots_done(dataset))
+    to_do = [job for job in jobs if job.slot not in done]
     summary = Summary(
         n_vehicles=inventory.n_vehicles,
         n_logs=len(inventory.all_logs),
         size=inventory.size,
         n_jobs=len(jobs),
         n_already=sum(job.slot in done for job in jobs),
-        n_failed_before=sum(job.slot in failed - done for job in jobs),
         lost=dict(inventory.lost),
         copies=inventory.copies(),
     )
@@ -199,8 +195,6 @@ def _weigh(jobs: Sequence[ArchiveJob], workers: Workers, summary: Summary, on_pr
 def _outcome(job: ArchiveJob, answer: "Future[JobOutcome]") -> JobOutcome:
     try:
         return answer_of(answer)
-    except WorkerKilledError as fault:
-        return fail(job, str(fault))
     except ConfigurationError:  # a missing library or another version: no worker would do better
         raise
     except Exception as fault:  # noqa: BLE001 - a store, a cluster or a bug: the other jobs go on, this one is reported
@@ -217,7 +211,3 @@ def _retire(dataset: Location, jobs: Sequence[ArchiveJob]) -> None:
     for slot in done:
         if slot.folder in whole and slot not in planned[slot.folder]:
             dataset.remove(slot.receipt)
-    for slot, path in failure_files(dataset):
-        is_of_old_inputs = slot.folder in whole and slot not in planned[slot.folder]
-        if is_of_old_inputs or (slot in done and path == slot.failure()):
-            dataset.remove(path)

@@ -14,15 +14,11 @@ from typing import Any, Final, TypeVar
 import distributed
 
 from gateway.archive.places import PlaceError
-from gateway.errors import ConfigurationError, SpringscaleError
+from gateway.errors import ConfigurationError
 
 Answer = TypeVar("Answer")
 
 CONNECT_WITHIN_S: Final = 15  # chosen
-
-
-class WorkerKilledError(SpringscaleError):
-    """A job's workers were killed repeatedly."""
 
 
 class Workers(Executor):
@@ -89,15 +85,15 @@ def workers_of(address: str) -> Workers:
 
 
 def answer_of(task: Future[Answer]) -> Answer:
-    """What a task of ``Workers`` returned. Raises what it raised, PlaceError if its cluster dropped it, and
-    WorkerKilledError if its workers were killed.
+    """What a task of ``Workers`` returned. Raises what it raised, and PlaceError if its cluster dropped it or its
+    workers were killed.
     """
     try:
         return task.result()
     except CancelledError:
         raise PlaceError("the cluster dropped the job: its scheduler went away, or was stopped") from None
     except distributed.KilledWorker:
-        raise WorkerKilledError(
+        raise PlaceError(
             "several processes died over it without a word: out of memory, or killed; "
             "see the system's log, and try fewer workers"
         ) from None

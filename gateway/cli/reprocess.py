@@ -68,13 +68,11 @@ def summary_in_words(summary: Summary, output: str) -> str:
     if summary.copies:
         lines.append(f"left out, copies of other logs: {counted(len(summary.copies), 'log')}:")
         lines += _some([f"{copy}: has the content of {log}" for copy, log in summary.copies.items()])
-    if counts["failed_before"]:
-        lines.append(f"failed in an earlier run: {counts['failed_before']}; to try them again, remove {output}/failed")
     failures = [
         reason for outcome in summary.outcomes for reason in outcome.failures if outcome.status is not JobStatus.LOST
     ]
     if failures:
-        lines.append(f"failed: {counted(counts['failed'], 'job')}, {counted(summary.n_failed_logs, 'log')}:")
+        lines.append(f"failed: {counted(summary.n_failed_logs, 'log')}:")
         lines += _some(failures)
     if refused := [text for outcome in summary.outcomes for text in outcome.refused]:
         lines.append("frames refused, which explains batches that were not weighed:")

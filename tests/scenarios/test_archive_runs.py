@@ -1,7 +1,6 @@
 """Runs over an archive that go wrong, stop, or meet what has changed: no lie, no loss, nothing done twice."""
 
 import gzip
-import shutil
 from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +16,6 @@ from gateway.archive.jobs import ArchiveJob
 from gateway.archive.manifest import load_manifest
 from gateway.archive.reprocessing import Summary, reprocess
 from gateway.archive.survey import LogFile, SurveyedLog, survey
-from gateway.archive.workers import WorkerKilledError
 from gateway.errors import ConfigurationError, ReaderMissingError
 
 HOUR = 3600 * S
@@ -72,27 +70,23 @@ def test_a_poison_log_is_reported_and_the_others_are_processed(archive: Path) ->
     (archive / "van-1" / "0.log").write_bytes(b"\0\xff not a log \n" * 100)
     summary = done(archive)
     assert not summary.is_good
-    assert (summary.counts["done"], summary.counts["failed"], summary.n_failed_logs) == (2, 0, 1)
+    assert (summary.counts["done"], summary.n_failed_logs) == (2, 1)
     [told] = failures(archive / "dataset")
     assert told["log"] == "van-1/0.log"
     assert told["reason"].startswith("van-1/0.log: holds no CAN frame")
     [receipt] = [one for one in receipts(archive / "dataset") if one["vehicle"] == "van-1"]
     assert [one["log"] for one in receipt["logs"]] == ["van-1/1.log"]
-    assert [one["log"] for one in receipt["failed_logs"]] == ["van-1/0.log"]
     assert done(archive).is_good  # it is told once; nothing else can be made of the same bytes
 
 
-def test_a_vehicle_of_poison_logs_alone_gets_no_receipt(archive: Path) -> None:
+def test_a_vehicle_of_poison_logs_alone_gets_a_receipt_that_names_them(archive: Path) -> None:
     for log in (archive / "van-1").iterdir():
         log.write_bytes(b"")
-    summary = done(archive)
-    assert (summary.counts["done"], summary.counts["failed"]) == (1, 1)
-    assert {slot.vehicle for slot in slots_done(dataset_of(archive))} == {"van-2"}
-    assert sorted(str(told["log"]) for told in failures(archive / "dataset")) == ["None", "van-1/0.log", "van-1/1.log"]
-    again = done(archive)
-    assert (again.counts["failed_before"], again.counts["failed"]) == (1, 0)
-    shutil.rmtree(archive / "dataset/failed")  # as docs/archive.md says
-    assert done(archive).counts["failed"] == 1
+    assert not done(archive).is_good
+    first, second = slots_done(dataset_of(archive))
+    assert (len(rows_of(dataset_of(archive), first)), len(rows_of(dataset_of(archive), second))) == (0, 2)
+    assert [told["log"] for told in failures(archive / "dataset")] == ["van-1/0.log", "van-1/1.log"]
+    assert done(archive).is_good
 
 
 def test_a_log_cut_in_the_middle_counts_as_far_as_it_goes(archive: Path) -> None:
@@ -144,16 +138,6 @@ def test_two_workers_at_one_job_agree_on_one_receipt(archive: Path, monkeypatch:
     assert files_of(archive) == before
 
 
-def test_a_job_that_kills_its_workers_is_reported_as_failed(archive: Path) -> None:
-    summary = done(archive, Refusing("van-1", WorkerKilledError("3 processes died over it")))
-    assert (summary.counts["done"], summary.counts["failed"]) == (1, 1)
-    [told] = failures(archive / "dataset")
-    assert (told["vehicle"], told["log"], told["reason"]) == ("van-1", None, "3 processes died over it")
-    assert done(archive).counts["failed_before"] == 1
-    shutil.rmtree(archive / "dataset/failed")  # as docs/archive.md says
-    assert done(archive).counts["done"] == 1
-
-
 def test_a_library_that_is_missing_ends_the_run_and_blames_no_log(
     archive: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -165,14 +149,15 @@ def test_a_library_that_is_missing_ends_the_run_and_blames_no_log(
             without.setattr(reader, missing)
             with pytest.raises(ConfigurationError, match="install springscale"):
                 done(archive)
-    assert dataset_of(archive).items("failed") == []
+    assert dataset_of(archive).items("receipts") == []
     assert done(archive).counts["done"] == 2
 
 
-def test_logs_that_the_store_refuses_are_left_for_the_next_run(archive: Path) -> None:
-    summary = done(archive, Refusing("van-1", PlaceError("s3://x/y: timed out")))
+@pytest.mark.parametrize("why", ["s3://x/y: timed out", "several processes died over it"])
+def test_a_job_that_cannot_be_done_now_is_left_for_the_next_run(why: str, archive: Path) -> None:
+    summary = done(archive, Refusing("van-1", PlaceError(why)))
     assert (summary.counts["done"], summary.counts["lost"], summary.is_good) == (1, 1, False)
-    assert list(summary.lost.values()) == ["s3://x/y: timed out"]
+    assert list(summary.lost.values()) == [why]
     assert done(archive).counts["done"] == 1
 
 

@@ -21,12 +21,15 @@ def row(t_end_s: float, *rejected: str, **known: Any) -> dict[str, Any]:
     return {**told, "over_limit": [], **answer, **known}
 
 
-def write_table(dataset: Path, vehicle: str, rows: Sequence[Mapping[str, Any]], month: str = "2026-01") -> Slot:
-    """A job's table and its receipt."""
+def write_table(
+    dataset: Path, vehicle: str, rows: Sequence[Mapping[str, Any]], month: str = "2026-01", failed: Sequence[Any] = ()
+) -> Slot:
+    """A job's table and its receipt, which names the logs that failed."""
     job = hashlib.sha256(f"{vehicle} {month}".encode()).hexdigest()[:32]
     slot = Slot(vehicle, month, job)
     whole = [{**dict.fromkeys(columns()), "vehicle_id": vehicle, "job": job, **_with_instant(one)} for one in rows]
-    for name, content in ((slot.table, parquet_of(whole)), (slot.receipt, text_of({"job": job}))):
+    receipt = {"job": job, "vehicle": vehicle, "month": month, "failed_logs": list(failed)}
+    for name, content in ((slot.table, parquet_of(whole)), (slot.receipt, text_of(receipt))):
         (dataset / name).parent.mkdir(parents=True, exist_ok=True)
         (dataset / name).write_bytes(content)
     return slot

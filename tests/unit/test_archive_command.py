@@ -12,10 +12,11 @@ from click.testing import Result
 from support.archive import MIDNIGHT_NS, Here, die, write_drive, write_manifest
 from support.commands import called
 
+from gateway.archive import PlaceError
 from gateway.archive.job_run import JobOutcome, JobStatus
 from gateway.archive.receipts import Slot
 from gateway.archive.reprocessing import Progress, Summary, done_by
-from gateway.archive.workers import WorkerKilledError, Workers, answer_of, local_workers
+from gateway.archive.workers import Workers, answer_of, local_workers
 from gateway.cli import main
 from gateway.cli.reprocess import duration, how_far, size, summary_in_words
 
@@ -37,14 +38,14 @@ def test_the_summary_reports_the_work_and_that_nothing_is_left(archive: Path) ->
     first, second = reprocessed(archive), reprocessed(archive, "--json")
     assert first.exit_code == second.exit_code == 0, first.output
     assert "done now: 1, 1 batches, 1 of them weighed; done before: 0" in first.stdout
-    assert json.loads(second.stdout)["jobs"] == {"done": 0, "already": 1, "failed": 0, "failed_before": 0, "lost": 0}
+    assert json.loads(second.stdout)["jobs"] == {"done": 0, "already": 1, "lost": 0}
 
 
-def test_a_failed_job_gives_exit_code_1_and_its_reason(archive: Path) -> None:
+def test_a_failed_log_gives_exit_code_1_and_its_reason(archive: Path) -> None:
     (archive / "van-1" / "2.log").write_bytes(b"nothing\n")
     result = reprocessed(archive)
     assert result.exit_code == 1
-    assert "failed: 0 jobs, 1 log:\n  van-1/2.log: holds no CAN frame" in result.stdout
+    assert "failed: 1 log:\n  van-1/2.log: holds no CAN frame" in result.stdout
 
 
 @pytest.mark.parametrize(
@@ -78,15 +79,14 @@ def test_sizes_and_durations_are_in_units_that_suit() -> None:
 
 
 def test_the_summary_names_some_failures_and_the_next_step() -> None:
-    summary = Summary(n_vehicles=2, n_logs=30, size=100, n_jobs=3, n_already=0, n_failed_before=1)
+    summary = Summary(n_vehicles=2, n_logs=30, size=100, n_jobs=3, n_already=0)
     summary.outcomes = [
-        JobOutcome(SLOT, JobStatus.FAILED, failures=tuple(f"log {n}" for n in range(14)), n_failed_logs=14),
+        JobOutcome(SLOT, JobStatus.DONE, failures=tuple(f"log {n}" for n in range(14)), n_failed_logs=14),
         JobOutcome(SLOT, JobStatus.LOST, failures=("timed out",)),
     ]
     summary.lost = {"vehicle=van-1/month=2026-11/abc": "timed out"}
     told = summary_in_words(summary, "DATASET")
     assert "  log 9\n  and 4 more\n" in told
-    assert "failed in an earlier run: 1; to try them again, remove DATASET/failed" in told
     assert told.endswith("not done: 1; run again to try them:\n  vehicle=van-1/month=2026-11/abc: timed out")
 
 
@@ -105,7 +105,7 @@ def test_tasks_run_in_processes_with_one_numeric_thread(workers: Workers) -> Non
 
 def test_a_task_that_kills_every_process_is_given_up_and_the_others_go_on(workers: Workers) -> None:
     killer = workers.submit(die, "")
-    with pytest.raises(WorkerKilledError, match="several processes died over it without a word"):
+    with pytest.raises(PlaceError, match="several processes died over it without a word"):
         answer_of(killer)
     assert workers.submit(truediv, 6, 3).result() == 2.0
 

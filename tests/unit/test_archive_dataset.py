@@ -9,9 +9,9 @@ import duckdb
 import polars as pl
 from support.estimates import make_record, with_everything
 
-from gateway.archive import Slot, failures, place_of, receipts, rows_of, slots_done, trusted_tables
+from gateway.archive import Slot, place_of, receipts, rows_of, slots_done, trusted_tables
 from gateway.archive.dataset import PROVENANCE, columns, parquet_of, row_of
-from gateway.archive.receipts import slots_failed, text_of
+from gateway.archive.receipts import text_of
 from gateway.estimates.as_json import COLUMNS, FIELDS, estimate_to_json
 from gateway.records import Why
 
@@ -66,12 +66,8 @@ def test_readers_trust_receipts_only(tmp_path: Path) -> None:
     without_receipt = replace(SLOT, job="killed")
     place = place_of(tmp_path)
     place.create(without_receipt.table, parquet_of([{**row_of(make_record(2)), **TOLD, "job": "killed"}]))
-    place.create(SLOT.failure("a.log"), text_of({"log": "a.log", "reason": "holds no CAN frame"}))
-    place.create(replace(SLOT, job="broken").failure(), text_of({"log": None, "reason": "killed its worker"}))
     assert slots_done(place) == [SLOT]
-    assert slots_failed(place) == [replace(SLOT, job="broken")]
     assert [told["job"] for told in receipts(tmp_path)] == ["abc"]
-    assert sorted(told["reason"] for told in failures(tmp_path)) == ["holds no CAN frame", "killed its worker"]
     assert [row["payload_kg"] for row in rows_of(place, SLOT, ["payload_kg"])] == [100.0, None]
 
 

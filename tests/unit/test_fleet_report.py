@@ -59,10 +59,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_table(dataset, "van-1", drifting())
     write_table(dataset, "van-2", failing())
     write_table(dataset, "van-3", week(0, 5, "too_slow", EVIL))
-    failure = {"vehicle": "van-4", "month": "2026-01", "log": f"{EVIL}.log", "reason": f"line 1: {EVIL}"}
-    path = dataset / "failed/vehicle=van-4/month=2026-01/job.json"
-    path.parent.mkdir(parents=True)
-    path.write_text(json.dumps(failure))
+    write_table(dataset, "van-4", [], failed=[{"log": f"{EVIL}.log", "reason": f"line 1: {EVIL}"}])
     done = run(dataset, folder / "report")
     assert done.exit_code == 0, done.output
     assert json.loads(done.output)["report"] == str(folder / "report/report.html")

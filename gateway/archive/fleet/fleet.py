@@ -55,11 +55,11 @@ class FleetVehicle:
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A failed log, or with ``log`` None a failed job, and the reason."""
+    """A log that could not be read, and the reason."""
 
     vehicle: str
     month: str
-    log: str | None
+    log: str
     reason: str
 
 
@@ -112,16 +112,12 @@ def fleet_of(dataset: Location, on_vehicle: OnVehicle = lambda done, of: None) -
     if not found:
         raise ConfigurationError(f"{dataset}: its tables hold no batch at all: were the drives long enough for one?")
     drifts = drifts_of(pl.concat(medians))
-    failed = tuple(
-        Failure(str(one.get("vehicle")), str(one.get("month")), one.get("log"), str(one.get("reason")))
-        for one in failures(dataset)
-    )
+    failed = tuple(Failure(one["vehicle"], one["month"], one["log"], one["reason"]) for one in failures(dataset))
     vehicles = tuple(
         replace(one, drifts={name: drifts[one.name, name] for name in DRIFTING if (one.name, name) in drifts})
         for one in found
     )
-    named = {name for name, _ in jobs} | {failure.vehicle for failure in failed}
-    return FleetSummary(vehicles, tuple(sorted(named - {one.name for one in found})), failed)
+    return FleetSummary(vehicles, tuple(sorted({name for name, _ in jobs} - {one.name for one in found})), failed)
 
 
 def _vehicle(name: str, batches: pl.DataFrame, since: pl.DataFrame) -> FleetVehicle:

@@ -209,9 +209,9 @@ def _drift_panel(fleet: FleetSummary, name: str) -> Panel | None:
 
 
 def _failed(fleet: FleetSummary) -> Section:
-    rows = tuple((one.vehicle, one.month, one.log or "every log", one.reason) for one in fleet.failures[:MOST_FAILURES])
+    rows = tuple((one.vehicle, one.month, one.log, one.reason) for one in fleet.failures[:MOST_FAILURES])
     more = len(fleet.failures) - len(rows)
-    text = f"{whole(len(fleet.failures))} logs or months gave nothing. No figure of this report holds them."
+    text = f"{whole(len(fleet.failures))} logs could not be read. No figure of this report holds them."
     paragraphs = (text, *((f"{whole(more)} more stand in report.json.",) if more else ()))
     table = Table("What could not be read", ("Vehicle", "month", "log", "why"), rows)
     return Section("failed", "Logs that failed", paragraphs, (), (table,))
