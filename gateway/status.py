@@ -135,7 +135,6 @@ class StoreStatus:
     n_written: int = 0
     n_held: Annotated[int, Field(description="rows that wait in memory")] = 0
     n_dropped: Annotated[int, Field(description="rows discarded for lack of memory")] = 0
-    n_duplicates: int = 0
     n_pruned: Annotated[int, Field(description="rows removed by age or size")] = 0
     size_bytes: int = 0
     n_bad_records: Annotated[int, Field(description="records that cannot be used, since the start")] = 0

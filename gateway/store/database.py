@@ -13,12 +13,11 @@ from typing import Final
 
 from gateway.errors import StoreError
 from gateway.log import Event, log_event
-from gateway.store.journal import BATCHES, ESTIMATE, KINDS, REMAINDER
+from gateway.store.journal import BATCHES, ESTIMATE, KINDS, REMAINDER, SERVICE
 from gateway.store.queries import INSERT
 from gateway.store.retention import AgeClock, Retention, remove_old, remove_share
 from gateway.store.schema import (
     TABLES,
-    Chain,
     DeliveryRow,
     JournalRow,
     Row,
@@ -88,7 +87,6 @@ class Database:
         self._opened_identity: tuple[tuple[int, int] | None, ...] = ()
         self._age: AgeClock | None = None
         self._is_mended = False
-        self.chain = Chain()  # replaced with every commit, never changed: any thread may copy it
         self._lock_fd: int | None = None
 
     @property
@@ -113,35 +111,26 @@ class Database:
             self.disconnect()
             raise
 
-    def add(self, rows: Sequence[Row], boot_id: str, on_refused: OnRefused) -> tuple[list[JournalRow], int]:
-        """Commit rows in one transaction -> (new records, number of batches that were already stored).
+    def add(self, rows: Sequence[Row], boot_id: str, on_refused: OnRefused) -> int:
+        """Commit rows in one transaction -> number of records stored.
 
         A row that SQLite refuses, though the database is sound, is passed to ``on_refused`` and left out.
         """
         connection = self._connected()
         stored: list[JournalRow] = []
-        n_known = 0
-        chain = Chain(self.chain)
         with _transaction(connection):
             for row in rows:
-                linked = chain.linked(row) if isinstance(row, JournalRow) else row
                 try:
                     with _transaction(connection):
-                        is_new = _add_row(connection, linked)
+                        _add_row(connection, row)
                 except Exception as fault:
                     if not connection.in_transaction or is_damaged(fault) or missing_tables(connection):
                         raise
-                    on_refused(linked, fault)
-                    is_new = False
-                if isinstance(linked, JournalRow):
-                    if is_new:
-                        stored.append(linked)
-                    else:
-                        chain.skip(linked)
-                        n_known += 1
+                    on_refused(row, fault)
+                else:
+                    stored += [row] if isinstance(row, JournalRow) else []
             _keep_receipt(connection, stored, boot_id)
-        self.chain = chain
-        return stored, n_known
+        return sum(row.kind != SERVICE for row in stored)
 
     def prune(self, now_ns: int) -> int:
         """Remove records that are too old, then the oldest until the size fits -> number of rows removed."""
@@ -258,16 +247,13 @@ def missing_tables(connection: sqlite3.Connection) -> list[str]:
     return sorted(TABLES - found)
 
 
-def _add_row(connection: sqlite3.Connection, row: Row) -> bool:
-    """Store a row -> False if it is a batch that was already stored. A later revision replaces the earlier one."""
+def _add_row(connection: sqlite3.Connection, row: Row) -> None:
     if isinstance(row, DeliveryRow):
         sql = "INSERT INTO uplinks (name, seq) VALUES (?, ?) ON CONFLICT (name) DO UPDATE SET seq = excluded.seq"
         connection.execute(sql, (row.name, row.seq))
-        return True
-    if row.kind in KINDS and KINDS[row.kind].is_revised:
-        connection.execute("DELETE FROM journal WHERE id = ? AND seq < ?", (row.id, row.seq))
-    columns = row.columns()
-    return connection.execute(f"{INSERT} ON CONFLICT (id) DO NOTHING", (*columns, checksum(columns))).rowcount > 0
+    else:
+        columns = row.columns()
+        connection.execute(INSERT, (*columns, checksum(columns)))
 
 
 def _keep_receipt(connection: sqlite3.Connection, stored: Sequence[JournalRow], boot_id: str) -> None:

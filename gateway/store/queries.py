@@ -135,4 +135,4 @@ def _decoded(row: Stored) -> JournalRow:
     return JournalRow(seq, kind.decode(), record_id.decode(), t_end_ns, previous, received_ns, text.decode())
 
 
-INSERT: Final = f"INSERT INTO journal ({JOURNAL_COLUMNS}, crc) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
+INSERT: Final = f"INSERT OR REPLACE INTO journal ({JOURNAL_COLUMNS}, crc) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"

@@ -15,7 +15,7 @@ from gateway.store import queries
 from gateway.store.database import is_damaged
 from gateway.store.journal import BATCHES, ENTRIES, ESTIMATE, REJECTION, Delivery, HistoryPage, JournalRecord
 from gateway.store.queries import LAST, JournalQuery, without_spectra
-from gateway.store.schema import Chain, JournalRow, connect_reader
+from gateway.store.schema import JournalRow, connect_reader
 from gateway.store.write_buffer import Held, WriteBuffer
 from gateway.units import NS_PER_S
 
@@ -95,14 +95,10 @@ class StoreReader:
     ) -> list[JournalRow]:
         """The first records of a window in their last revision, in memory and, ``with_disk``, on disk."""
         with self._connection() if with_disk else nullcontext() as connection:
-            fresh = [row for row in _not_stored(connection, held.rows) if window.holds(row)]
-            n_revised = sum(row.kind not in BATCHES for row in fresh)
-            stored = self._stored(connection, window, limit + n_revised, with_spectra=with_spectra)
-        newest: dict[str, JournalRow] = {}
-        for row in (*stored, *fresh):
-            if row.id not in newest or newest[row.id].seq < row.seq:
-                newest[row.id] = row
-        return sorted(newest.values(), key=lambda row: row.seq, reverse=window.newest_first)[:limit]
+            stored = self._stored(connection, window, limit + len(held.rows), with_spectra=with_spectra)
+        newest = {row.id: row for row in sorted((*stored, *held.rows), key=lambda row: row.seq)}
+        chosen = [row for row in newest.values() if window.holds(row)]
+        return sorted(chosen, key=lambda row: row.seq, reverse=window.newest_first)[:limit]
 
     def understood(self, texts: Iterable[str], parse: Callable[[str], T]) -> list[T]:
         """What ``parse`` makes of each record. One that it cannot read is left out, logged and counted."""
@@ -214,25 +210,6 @@ def seq_after(cursor: str | None, epoch: str) -> int | None:
 def _within_64_bits(t_ns: int) -> int:
     """Clip a time to 64 bits: the years 1677 to 2262."""
     return min(max(t_ns, -LAST - 1), LAST)
-
-
-def _not_stored(connection: sqlite3.Connection | None, held: Sequence[JournalRow]) -> Iterator[JournalRow]:
-    """The last revisions of the records in memory, without those that were written meanwhile and without batches that
-    are on disk under another number.
-    """
-    chain = Chain()
-    known: dict[str, int] = {}
-    last = {row.id: row.seq for row in held}
-    for row in map(chain.linked, held):
-        if row.kind not in BATCHES:
-            if last[row.id] == row.seq:
-                yield row
-            continue
-        on_disk = connection and connection.execute("SELECT seq FROM journal WHERE id = ?", (row.id,)).fetchone()
-        if known.setdefault(row.id, on_disk[0] if on_disk else row.seq) != row.seq:
-            chain.skip(row)
-        elif not on_disk:
-            yield row
 
 
 class Follower:

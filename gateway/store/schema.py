@@ -5,7 +5,7 @@ import sqlite3
 import zlib
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from secrets import token_hex
 from typing import Any, Final
@@ -29,7 +29,7 @@ CREATE TABLE state (
 CREATE TABLE journal (
     seq INTEGER PRIMARY KEY AUTOINCREMENT,
     kind TEXT NOT NULL,
-    id TEXT NOT NULL UNIQUE,
+    id TEXT NOT NULL UNIQUE,        -- a later record with an id replaces the earlier one
     t_end_ns INTEGER NOT NULL,
     previous INTEGER NOT NULL,      -- number of the batch before this one, 0 where there is none
     received_ns INTEGER NOT NULL,
@@ -154,19 +154,3 @@ def checksum(columns: Sequence[Any]) -> int:
     """CRC-32 of a row's columns without the sum itself. Detects every single-bit error and every burst of 32 bits."""
     parts = (column if isinstance(column, bytes) else str(column).encode() for column in columns)
     return zlib.crc32(b"\x1f".join(parts))
-
-
-class Chain:
-    """Links each batch to the one before it and leaves out batches that were already stored."""
-
-    def __init__(self, known: "Chain | None" = None) -> None:
-        """Continues a copy of ``known``."""
-        self._skipped: dict[int, int] = {} if known is None else dict(known._skipped)
-
-    def linked(self, row: JournalRow) -> JournalRow:
-        """The row, linked to the last batch that was stored."""
-        return replace(row, previous=self._skipped.pop(row.previous, row.previous)) if row.previous else row
-
-    def skip(self, row: JournalRow) -> None:
-        """Leave this row out: the batch after it is linked to the one before it."""
-        self._skipped[row.seq] = row.previous

@@ -21,7 +21,7 @@ from gateway.store.database import FILE_NAME, DamagedError, Database, is_damaged
 from gateway.store.journal import BATCHES, ENTRIES, ESTIMATE, REJECTION, REMAINDER, SERVICE, Delivery
 from gateway.store.reader import Follower, StoreReader
 from gateway.store.retention import Retention, boot_ns
-from gateway.store.schema import Chain, JournalRow, Row
+from gateway.store.schema import JournalRow, Row
 from gateway.store.write_buffer import Held, WriteBuffer
 
 IDLE_S: Final = 900.0  # chosen: without new rows: how often age is looked at
@@ -54,7 +54,7 @@ class Store(ServicePart):
         self._bad: set[int] = set()  # hashes of the records that this program cannot use
         self._reason: str | None = None
         self._set_aside: str | None = None
-        self._n_written = self._n_duplicates = self._n_pruned = self._size_bytes = 0
+        self._n_written = self._n_pruned = self._size_bytes = 0
         self._has_numbers = False  # whether the numbering is that of a database
         self._thread = threading.Thread(target=self._write_until_closed, name="store-writer", daemon=True)
 
@@ -79,7 +79,7 @@ class Store(ServicePart):
     def write_estimate(self, record: Mapping[str, Any]) -> str:
         """Accept an estimate or a rejection, the object of ``estimate_to_json`` -> its cursor.
 
-        Returns at once; an id the database already has is counted and not stored again.
+        Returns at once. A record with the same id takes the place of the earlier one.
         """
         if record.get("provisional"):
             raise ValueError("provisional estimates go to latest and the stream, not into the store")
@@ -139,7 +139,6 @@ class Store(ServicePart):
             n_written=self._n_written,
             n_held=len(self._buffer),
             n_dropped=self._buffer.n_dropped,
-            n_duplicates=self._n_duplicates,
             n_pruned=self._n_pruned,
             size_bytes=self._size_bytes,
             set_aside=self._set_aside,
@@ -165,9 +164,8 @@ class Store(ServicePart):
         return n_lost
 
     def held(self) -> Held:
-        """The records that are not on disk yet, linked to those that are."""
-        held = self._buffer.held()
-        return held._replace(rows=tuple(map(Chain(self._database.chain).linked, held.rows)))
+        """The records that are not on disk yet."""
+        return self._buffer.held()
 
     def boot(self) -> tuple[str, int]:
         """Identifier of the machine's boot, and the nanoseconds since then, including sleep."""
@@ -262,9 +260,7 @@ class Store(ServicePart):
     def _commit(self) -> None:
         rows = self._buffer.take()
         if rows:
-            stored, n_known = self._database.add(rows, self._boot_id, self._note_refused)
-            self._n_written += sum(row.kind != SERVICE for row in stored)
-            self._n_duplicates += n_known
+            self._n_written += self._database.add(rows, self._boot_id, self._note_refused)
         if self._reason is not None:
             log_event(Event.STORE_RECOVERED, n_held=len(rows))
             self._reason = None

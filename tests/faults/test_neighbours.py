@@ -27,6 +27,7 @@ from gateway.service.learner.learner import Learner
 from gateway.service.signal_watch import SignalWatch, StandingWatch
 from gateway.service.status_of_parts import StatusReport
 from gateway.setup import setup_of
+from gateway.units import NS_PER_S
 from gateway.web.live.board import Board
 
 CALLS: dict[str, tuple[type, str, str]] = {  # what is made to fail, and how the status names it
@@ -45,8 +46,10 @@ CALLS: dict[str, tuple[type, str, str]] = {  # what is made to fail, and how the
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A drive; that of the next hour lies beside it."""
     path = tmp_path_factory.mktemp("drive") / "drive.log"
     write_candump(white_noise(70.0, START_NS, seed=5), "can0", path)
+    write_candump(white_noise(70.0, START_NS + 3600 * NS_PER_S, seed=6), "can0", path.with_name("next.log"))
     return path
 
 
@@ -77,7 +80,7 @@ def test_a_call_that_fails_costs_no_window_and_no_process(
         assert wait_until(lambda: any(told in said and "too much" in said for said in warnings()))
         if name not in ("put", "take"):  # which the service looked up at its start
             monkeypatch.setattr(owner, name, works)
-            running.play(log)
+            running.play(log.with_name("next.log"))
             assert wait_until(lambda: not any("too much" in said for said in warnings()))
 
     monkeypatch.setattr(owner, name, fail)

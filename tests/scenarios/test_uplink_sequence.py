@@ -10,7 +10,6 @@ from contextlib import closing
 from pathlib import Path
 
 import jsonschema
-import pytest
 from support.estimates import make_record
 from support.patience import PATIENCE_S, wait_until
 from support.sequence import BackEnd, drained
@@ -106,22 +105,6 @@ def test_a_record_dropped_from_memory_leaves_a_gap(tmp_path: Path) -> None:
         for message in drained(Outbox(store, "fleet")):
             back_end.take(message.text)
     assert (len(back_end.missing), len(back_end.ids)) == (1, 4)  # the queue's own place takes one of five
-
-
-@pytest.mark.parametrize("is_flushed", [True, False])
-def test_a_duplicate_batch_leaves_no_gap(tmp_path: Path, is_flushed: bool) -> None:
-    back_end = BackEnd()
-    with closing(Store.open(tmp_path)) as store:
-        write(store, 0, 1)
-        for n in (2, 0, 1, 3, 3, 1, 4, 2):
-            store.write_estimate(make_record(n))
-            if is_flushed:
-                assert store.flush(PATIENCE_S)
-        deliver(store, back_end)
-        store.write_estimate(make_record(5))  # asked for before it is on disk, behind one that never will be
-        deliver(store, back_end)
-    assert back_end.missing == []
-    assert len(back_end.ids) == 6
 
 
 def test_a_damaged_record_leaves_a_gap(tmp_path: Path) -> None:
