@@ -84,16 +84,12 @@ class Summary:
     copies: dict[str, str] = field(default_factory=dict)  # logs left out, each with the log whose content it has
     took_s: float = 0.0
 
-    def count(self, status: JobStatus) -> int:
-        return sum(outcome.status is status for outcome in self.outcomes)
-
     @property
     def counts(self) -> dict[str, int]:
-        return {
-            "done": self.count(JobStatus.DONE),
-            "already": self.n_already + self.count(JobStatus.ALREADY),
-            "lost": self.count(JobStatus.LOST),
-        }
+        """Number of jobs by what became of them."""
+        found = Counter(outcome.status for outcome in self.outcomes)
+        already = self.n_already + found[JobStatus.ALREADY]
+        return {"done": found[JobStatus.DONE], "already": already, "lost": found[JobStatus.LOST]}
 
     @property
     def n_failed_logs(self) -> int:

@@ -54,14 +54,6 @@ class Beside:
         else:
             self._faults.pop(name, None)
 
-    def guarded(self, name: str, neighbour: Callable[P, object]) -> Callable[P, None]:
-        """Guards a function."""
-
-        def call(*args: P.args, **named: P.kwargs) -> None:
-            self.call(name, neighbour, *args, **named)
-
-        return call
-
     @property
     def fault(self) -> str | None:
         """Who failed with the last call, for people."""
@@ -102,7 +94,8 @@ class Pipeline(ThreadPart):
         self._board = board
         self._on_frames = on_frames
         self._beside = Beside()
-        flow.on_window = self._beside.guarded("learner", flow.on_window)
+        learn = flow.on_window
+        flow.on_window = lambda batch, rows: self._beside.call("learner", learn, batch, rows)
 
     def stop(self, within_s: float = STOP_WITHIN_S) -> None:
         """Process the rest of the inbox, close the open window, and end."""

@@ -68,7 +68,7 @@ class StoreReader:
         Following ``next_cursor`` neither misses nor repeats a record while records arrive. A cursor of a database that
         no longer exists starts at the first record. Raises ValueError for a text that is not a cursor.
         """
-        held = self.held()
+        held = self._store.held()
         window = JournalQuery(
             tuple(kinds),
             seq_after(cursor, held.epoch),
@@ -84,16 +84,13 @@ class StoreReader:
             last_cursor=f"{held.epoch}-{max(row.seq for row in shown)}" if shown else cursor,
         )
 
-    def held(self) -> Held:
-        """The records in memory. Take them before reading the file: a record that moves to disk in between is then
-        found twice and merged by its number, instead of being missed.
-        """
-        return self._store.held()
-
     def rows(
         self, window: JournalQuery, held: Held, limit: int, *, with_spectra: bool = True, with_disk: bool = True
     ) -> list[JournalRow]:
-        """The first records of a window in their last revision, in memory and, ``with_disk``, on disk."""
+        """The first records of a window in their last revision, in memory and, ``with_disk``, on disk.
+
+        ``held`` is taken before: a record that moves to disk in between is then found twice instead of being missed.
+        """
         with self._connection() if with_disk else nullcontext() as connection:
             stored = self._stored(connection, window, limit + len(held.rows), with_spectra=with_spectra)
         newest = {row.id: row for row in sorted((*stored, *held.rows), key=lambda row: row.seq)}
@@ -124,7 +121,7 @@ class StoreReader:
 
     def latest(self) -> Latest:
         """The last answer and the last rejection ever accepted."""
-        held = self.held().rows
+        held = self._store.held().rows
         with self._connection() as connection:
             answer, rejection = (self._newest(connection, held, kind) for kind in (ESTIMATE, REJECTION))
             age_s = self._age_s(connection, answer) if answer else None
@@ -245,7 +242,7 @@ class Follower:
 
         Raises StoreError or TimeoutError.
         """
-        held = self._reader.held()
+        held = self._buffer.held()
         seq = self._seq(held.epoch)
         found: list[JournalRecord] = []
         if seq < self._buffer.newest(self._kinds):
