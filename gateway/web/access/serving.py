@@ -136,9 +136,12 @@ class WebServer(ThreadPart):
         return "https" if self._config.is_ssl else "http"
 
     def _work(self) -> None:
-        listening = self._listening()
-        with asyncio.Runner(loop_factory=self._config.get_loop_factory()) as runner:
-            runner.run(self._serve(listening))
+        try:
+            listening = self._listening()
+            with asyncio.Runner(loop_factory=self._config.get_loop_factory()) as runner:
+                runner.run(self._serve(listening))
+        except SystemExit:  # uvicorn's way to say so
+            raise OSError("its address cannot be used") from None
         if not self._stopping.is_set():
             raise RuntimeError("it ended")
 
@@ -179,12 +182,9 @@ class WebServer(ThreadPart):
 
     def _listening(self) -> list[socket.socket]:
         """At the address of the settings and, if that is not this machine's own, also at one that is. A client that
-        takes nothing for a while is closed by the kernel. Raises OSError.
+        takes nothing for a while is closed by the kernel. Raises SystemExit.
         """
-        try:
-            listening = [self._config.bind_socket()]
-        except SystemExit:  # uvicorn's way to say it
-            raise OSError("its address cannot be used") from None
+        listening = [self._config.bind_socket()]
         host, port, *_ = listening[0].getsockname()
         self.port, self._own, self.IS_VITAL = port, (host, port), False
         if not is_loopback(host):
