@@ -129,7 +129,8 @@ class WebServer(ThreadPart):
 
     @property
     def is_started(self) -> bool:
-        return self._server is not None and self._server.started
+        server = self._server
+        return server is not None and server.started
 
     @property
     def scheme(self) -> str:
@@ -146,17 +147,22 @@ class WebServer(ThreadPart):
             raise RuntimeError("it ended")
 
     async def _serve(self, listening: list[socket.socket]) -> None:
-        self._server, self._loop = _Server(self._config), asyncio.get_running_loop()
-        self._loop.set_default_executor(Questions(thread_name_prefix="question"))
+        server, loop = _Server(self._config), asyncio.get_running_loop()
+        self._server, self._loop = server, loop
+        loop.set_default_executor(Questions(thread_name_prefix="question"))
         if self._stopping.is_set():  # whoever stops it has seen no loop yet
-            self._server.end()
-        await self._server.serve(listening)
+            server.end()
+        try:
+            await server.serve(listening)
+        finally:
+            self._server = None  # another may begin
 
     def stop(self, within_s: float = 2.0 * STOP_WITHIN_S) -> None:
         self._stopping.set()
-        if self._loop is not None and self._server is not None:
+        server, loop = self._server, self._loop
+        if server is not None and loop is not None:
             with contextlib.suppress(RuntimeError):  # the loop is closed
-                self._loop.call_soon_threadsafe(self._server.end)
+                loop.call_soon_threadsafe(server.end)
         super().stop(within_s)
 
     def death(self) -> str | None:
