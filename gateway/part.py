@@ -122,7 +122,7 @@ class ThreadPart(ServicePart, ABC):
 
 
 class Repeated(ThreadPart):
-    """Does the same again and again: ``do`` after every ``pause_s``."""
+    """Calls ``do`` again and again, each time after a pause of ``pause_s()`` seconds."""
 
     def __init__(self, name: str, do: Callable[[], object], pause_s: Callable[[], float]) -> None:
         super().__init__(name)

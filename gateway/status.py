@@ -29,7 +29,7 @@ SENTENCES: Final[dict[State, str]] = {
     State.WAITING_FOR_SPEED: "Sensors are heard; waiting for the vehicle to drive fast enough.",
     State.COLLECTING: "Driving; collecting the first batch.",
     State.ESTIMATING: "Driving; the estimate is kept up to date.",
-    State.NOT_WEIGHED: "Driving; the last batch was not weighed, its reasons are in the history.",
+    State.NOT_WEIGHED: "Driving; the last batch was not weighed. The history has the reasons.",
     State.STALE: "No new estimate for a while: the shown one is old.",
     State.READER_FAULT: "The bus cannot be read: see the last fault.",
 }

@@ -127,8 +127,9 @@ class Database:
                     if not connection.in_transaction or is_damaged(fault) or missing_tables(connection):
                         raise
                     on_refused(row, fault)
-                else:
-                    stored += [row] if isinstance(row, JournalRow) else []
+                    continue
+                if isinstance(row, JournalRow):
+                    stored.append(row)
             _keep_receipt(connection, stored, boot_id)
         return sum(row.kind != SERVICE for row in stored)
 

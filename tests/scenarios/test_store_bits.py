@@ -139,7 +139,7 @@ def test_an_index_that_disagrees_with_its_table_is_rebuilt(tmp_path: Path, datab
     now_ns = [time.time_ns()]
     with closing(Store.open(tmp_path, Retention(max_age_s=3600.0), clock_ns=lambda: now_ns[0])) as store:
         now_ns[0] += 7200 * 10**9
-        store.write_estimate(make_record(N_RECORDS))  # and removes the others, of which one is not in the index
+        store.write_estimate(make_record(N_RECORDS))  # the older ones are removed; one of them is missing in the index
         assert store.flush(PATIENCE_S)
         health = store.health()
         assert (health.set_aside, health.n_pruned) == (None, N_RECORDS)

@@ -1,4 +1,4 @@
-"""The study of ordinary days: the figures of what was learnt."""
+"""The study of ordinary days: its table counts errors, misses and refusals."""
 
 from benchmarks.accuracy import ordinary_days as study
 

@@ -52,15 +52,19 @@ def fits_of(runs: Sequence[KnownRun], model: VehicleModel, found: Sequence[Found
             load, theta = drive_found.load, of_drive(theta, drive_found.deviations)
         drive, point = with_strokes(cross.without_roll, theta, load, model.ground), Point.of(theta, load)
         whittle = Whittle(drive, model.ground)
-        expected = whittle.expected(point)
+        freq_hz, expected = drive.freq_hz[1:-1], whittle.expected(point)
         measured = _mean(drive, drive.parts)
         modelled = _mean(drive, expected * (_power(drive.parts) / _power(expected)))
-        log_level = 0.5 * np.log(measured[:2] / modelled[:2]).sum(axis=0)
-        log_f = np.log(drive.freq_hz[1:-1])
-        modelled *= np.exp(np.polyval(np.polyfit(log_f, log_level, 1), log_f))
-        seen, shown = (_spectra(drive.freq_hz[1:-1], parts) for parts in (measured, modelled))
+        modelled *= _road_level(freq_hz, measured, modelled)
+        seen, shown = (_spectra(freq_hz, parts) for parts in (measured, modelled))
         fits.append(RunFit(run, load, seen, shown, whittle.misfit(point)))
     return fits
+
+
+def _road_level(freq_hz: F64, measured: F64, modelled: F64) -> F64:
+    """(m,) the line in logarithms that brings the model's parts (4, m) closest to both sensors' powers."""
+    log_level, log_f = 0.5 * np.log(measured[:2] / modelled[:2]).sum(axis=0), np.log(freq_hz)
+    return np.asarray(np.exp(np.polyval(np.polyfit(log_f, log_level, 1), log_f)))
 
 
 def _power(parts: F64) -> F64:

@@ -44,8 +44,8 @@ export const DASHBOARD = {
   "sentence.collecting": ["Driving; collecting the first batch.", "Fahrt; der erste Abschnitt wird gesammelt."],
   "sentence.estimating": ["Driving; the estimate is kept up to date.", "Fahrt; die Schätzung wird laufend erneuert."],
   "sentence.not_weighed": [
-    "Driving; the last batch was not weighed, its reasons are in the history.",
-    "Fahrt; der letzte Abschnitt wurde nicht gewogen, die Gründe stehen im Verlauf.",
+    "Driving; the last batch was not weighed. The history has the reasons.",
+    "Fahrt; der letzte Abschnitt wurde nicht gewogen. Die Gründe stehen im Verlauf.",
   ],
   "sentence.stale": ["No new estimate for a while: the shown one is old.", "Länger keine neue Schätzung: Die gezeigte ist alt."],
   "sentence.reader_fault": ["The bus cannot be read: see the last fault.", "Der Bus kann nicht gelesen werden."],
