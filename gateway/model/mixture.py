@@ -190,7 +190,8 @@ def mixture_of(
 
 def _coarse(own: BatchLikelihood, first: Hypothesis, model: VehicleModel) -> list[Peak]:
     """Distinct peaks, the likeliest first: on a soft and on a firm mount from the best of a few starting loads, and on
-    the likelier of them from a load far from both; from every other load too, where only an unlikely vehicle fits.
+    the likelier of them from a load far from both; from every other load, on either mount, where only an unlikely
+    vehicle fits.
 
     The soft mount is first: a search on a firm one follows a long valley if the load stands on a soft one.
     """
@@ -204,14 +205,15 @@ def _coarse(own: BatchLikelihood, first: Hypothesis, model: VehicleModel) -> lis
         start = np.r_[hypothesis.mean, loads[order[hypothesis.name][0]]]
         found.append(climb(own, hypothesis, start, COARSE, found))
     best = max(found, key=lambda one: one.log_evidence)
-    ordered = order[best.hypothesis.name]
-    near_kg = [loads[ordered[0], 0], best.x[N]]
-    for i in ordered:
-        if np.min(np.abs(loads[i, 0] - near_kg)) > apart_kg:
-            found.append(climb(own, best.hypothesis, np.r_[best.hypothesis.mean, loads[i]], COARSE, found))
-            near_kg.append(loads[i, 0])
-            if max(found, key=lambda one: one.log_evidence).tension < DOUBTFUL:
-                break
+    for hypothesis in sorted((first.soft(), first), key=lambda one: one.name != best.hypothesis.name):
+        ordered = order[hypothesis.name]
+        near_kg = [loads[ordered[0], 0], best.x[N]]
+        for i in ordered:
+            if np.min(np.abs(loads[i, 0] - near_kg)) > apart_kg:
+                found.append(climb(own, hypothesis, np.r_[hypothesis.mean, loads[i]], COARSE, found))
+                near_kg.append(loads[i, 0])
+                if max(found, key=lambda one: one.log_evidence).tension < DOUBTFUL:
+                    return _distinct(found)
     return _distinct(found)
 
 
