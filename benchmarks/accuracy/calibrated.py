@@ -2,10 +2,8 @@
 
 from collections.abc import Sequence
 
-from gateway.calibration.from_drives import drive_name
-from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.ratio_index.index_fit import fit_ratio_index
-from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.stated_drive import StatedDrive, sensor_rate_seen_hz
 from gateway.calibration.teach import teach
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
@@ -13,12 +11,12 @@ from gateway.model.vehicle_model import VehicleModel
 from gateway.weighing.calibrated import CalibratedVehicle
 
 
-def taught_by(runs: Sequence[KnownRun], vehicle: Vehicle) -> VehicleModel:
+def taught_by(runs: Sequence[StatedDrive], vehicle: Vehicle) -> VehicleModel:
     """The vehicle that these runs teach. Raises CalibrationImpossibleError if they allow none."""
-    return teach([TaughtDrive(drive_name(run.number), run.batches, run.statement) for run in runs], vehicle).model
+    return teach(runs, vehicle).model
 
 
-def calibrated_on(runs: Sequence[KnownRun], vehicle: Vehicle, estimator: str) -> CalibratedVehicle:
+def calibrated_on(runs: Sequence[StatedDrive], vehicle: Vehicle, estimator: str) -> CalibratedVehicle:
     """The calibration for one estimator. Raises CalibrationImpossibleError if the runs allow none."""
     with_batches = [run for run in runs if any(not batch.rejected for batch in run.batches)]
     if not with_batches:

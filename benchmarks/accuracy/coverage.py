@@ -35,7 +35,7 @@ def of_one_van(seed: int, number: int, scope: Scope = USUAL) -> Found:
         for i, (trip, one) in enumerate(zip(asked, fresh.test_seed.spawn(len(asked)), strict=True), 1)
     ]
     if number % UNNOTED_EVERY == UNNOTED_EVERY - 1:
-        runs = [replace(run, payload_left_m=None) for run in runs]
+        runs = [replace(run, statement=replace(run.statement, left_m=None)) for run in runs]
     runs_without, tested_without = ([without_roll_rate(run) for run in each] for each in (runs, tested))
     batches: list[JudgedBatch] = []
     refused: list[str] = []

@@ -9,7 +9,7 @@ import numpy as np
 
 from gateway.calibration.judgement.coverage import coverage_of, interval_scores
 from gateway.calibration.judgement.evaluation import TARGETS, Judged
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.records import Why
 
@@ -46,10 +46,17 @@ class JudgedBatch:
 
 
 def judged_batches(
-    judged: Sequence[Judged], vehicle: Vehicle, kind: str, estimator: str, run: KnownRun, *, has_roll_rate: bool = True
+    judged: Sequence[Judged],
+    vehicle: Vehicle,
+    kind: str,
+    estimator: str,
+    run: StatedDrive,
+    *,
+    has_roll_rate: bool = True,
 ) -> list[JudgedBatch]:
     """Complete batches of one run in percent of this vehicle's ranges. Pieces shorter than a window are left out."""
-    cg_m = math.nan if run.payload_left_m is None else cg_left_m(vehicle, run.payload_kg, run.payload_left_m)
+    left_m = run.statement.left_m
+    cg_m = math.nan if left_m is None else cg_left_m(vehicle, run.payload_kg, left_m)
     return [
         _judged(one, vehicle, kind, estimator, cg_m, has_roll_rate)
         for one in judged

@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.accuracy.loads import drawn_load
 from benchmarks.accuracy.scatter import FROM_DAY_TO_DAY, OF_TYPES, scattered
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, SignalMap, load_signal_map
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import MEASURED_OFFSET_STD_M
 from gateway.core.vehicle import Vehicle as StatedVehicle
@@ -117,7 +117,7 @@ def driven(
     seeds: np.random.SeedSequence,
     number: int,
     sensors: Sensors = REFERENCE,
-) -> KnownRun:
+) -> StatedDrive:
     """One drive through sensors, frames and decoder, as batches with their truth."""
     rows, today, carried = rows_of(van, loads, trip, scope, seeds, sensors)
     return known_run(rows, number, trip.kind, today, carried)
@@ -151,15 +151,17 @@ def beside(loads: tuple[Load, ...], off_m: tuple[float, float], rng: np.random.G
     return tuple(replace(load, left_m=left_m) for load in loads)
 
 
-def without_roll_rate(run: KnownRun) -> KnownRun:
+def without_roll_rate(run: StatedDrive) -> StatedDrive:
     """The same run through a signal map without a roll rate: no other number of a batch changes."""
     return replace(run, batches=tuple(replace(batch, roll_rate_radps=None) for batch in run.batches))
 
 
-def known_run(rows: Motion, number: int, name: str, van: Vehicle, carried: tuple[Load, ...]) -> KnownRun:
+def known_run(rows: Motion, number: int, name: str, van: Vehicle, carried: tuple[Load, ...]) -> StatedDrive:
     """Decoded rows as batches with their truth."""
     batches = batches_of_motion(rows, _map(), BatchSettings())
-    return KnownRun(number, name, payload_kg(carried), front_share_pct(van, carried), batches, payload_left_m(carried))
+    return known_drive(
+        number, name, payload_kg(carried), front_share_pct(van, carried), batches, payload_left_m(carried)
+    )
 
 
 @lru_cache(maxsize=1)
@@ -216,7 +218,7 @@ class FreshVan:
     van: Vehicle
     sensors: Sensors
     vehicle: StatedVehicle
-    runs: list[KnownRun]
+    runs: list[StatedDrive]
     rng: np.random.Generator
     test_seed: np.random.SeedSequence
 

@@ -26,9 +26,8 @@ from benchmarks.accuracy.taught import line_of, runs_of, weighed, whole
 from gateway.calibration.assigned import Assigned, Fate, Piece, assign
 from gateway.calibration.campaign_file import load_campaign
 from gateway.calibration.found import ClaimState, FoundClaim, Taught
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.told import common_errors, question
-from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.calibration.statements import Statement
 from gateway.calibration.teach import teach
 from gateway.core.batch_settings import BatchSettings
@@ -69,7 +68,7 @@ EMPTY: Final = said("empty", payload_kg=0.0)
 TRUE: Final = "true"  # the note of a statement that is true although others of its drive are false
 
 
-def axles_kg(run: KnownRun, vehicle: Vehicle) -> tuple[float, float]:
+def axles_kg(run: StatedDrive, vehicle: Vehicle) -> tuple[float, float]:
     """What scales show of the front and the rear axle under the load of a drive."""
     share, below_kg = 0.01 * run.front_share_pct, UNSPRUNG_SHARE * vehicle.empty_mass_kg
     sprung_kg = vehicle.empty_mass_kg + run.payload_kg
@@ -81,8 +80,8 @@ class Recorded:
     """The recorded van: its drives by name, the drives to test on, and the true statements."""
 
     vehicle: Vehicle
-    drives: Mapping[str, KnownRun]
-    tests: tuple[KnownRun, ...]
+    drives: Mapping[str, StatedDrive]
+    tests: tuple[StatedDrive, ...]
     told: Told
 
     def kg(self, name: str) -> float:
@@ -249,10 +248,10 @@ def stated(told: Mapping[str, Sequence[Said]], names: Iterable[str], vehicle: Ve
     return Stated(tuple(records), assign([record for _, record in records], pieces, vehicle), tuple(faults))
 
 
-def taught_by(said: Stated, drives: Mapping[str, KnownRun], vehicle: Vehicle) -> Taught:
+def taught_by(said: Stated, drives: Mapping[str, StatedDrive], vehicle: Vehicle) -> Taught:
     """The vehicle that these drives teach."""
     each = zip(drives.items(), said.assigned.statements, strict=True)
-    return teach([TaughtDrive(name, run.batches, statement) for (name, run), statement in each], vehicle)
+    return teach([StatedDrive(name, run.batches, statement) for (name, run), statement in each], vehicle)
 
 
 def outcome(said: Stated, taught: Taught, false: Collection[str], vehicle: Vehicle) -> dict[str, Any]:
@@ -279,7 +278,7 @@ def outcome(said: Stated, taught: Taught, false: Collection[str], vehicle: Vehic
     return {"states": states, "asked": asked}
 
 
-def shown_without(taught: Taught, drives: Mapping[str, KnownRun]) -> dict[str, float]:
+def shown_without(taught: Taught, drives: Mapping[str, StatedDrive]) -> dict[str, float]:
     """Error (kg) and held share (%) of what each drive with a statement shows without it."""
     off = np.array([
         (one.without_kg - drives[one.name].payload_kg, Z95 * one.without_std_kg)
@@ -331,7 +330,7 @@ def tried(kind: Kind, of: Recorded, before: Lessons) -> dict[str, Any]:
     return outcome(said, lesson.taught, kind.false, of.vehicle) | {"weighs": weighs}
 
 
-def recorded(data: Path) -> tuple[Recorded, list[KnownRun]]:
+def recorded(data: Path) -> tuple[Recorded, list[StatedDrive]]:
     """The drives of known_loads and mixed, and all the mixed ones."""
     campaign = load_campaign(data / "known_loads" / "campaign_roll.toml")
     [steady] = split_runs(campaign, BatchSettings(), numbers=[1])
@@ -340,7 +339,7 @@ def recorded(data: Path) -> tuple[Recorded, list[KnownRun]]:
     return recorded_of(vehicle, whole([steady.identification], [steady.validation])[0], mixed), mixed
 
 
-def recorded_of(vehicle: Vehicle, steady: KnownRun, mixed: Sequence[KnownRun]) -> Recorded:
+def recorded_of(vehicle: Vehicle, steady: StatedDrive, mixed: Sequence[StatedDrive]) -> Recorded:
     """The drives with notes that err by chance."""
     rng = np.random.default_rng(SEED)
     drives = {STEADY: steady, **{name: mixed[i] for name, i in TEACH.items()}}
@@ -350,7 +349,7 @@ def recorded_of(vehicle: Vehicle, steady: KnownRun, mixed: Sequence[KnownRun]) -
     return Recorded(vehicle, drives, tuple(mixed[i] for i in TEST), {STEADY: (EMPTY,), "empty": (EMPTY,), **notes})
 
 
-def of_all(of: Recorded, mixed: Sequence[KnownRun]) -> Iterator[dict[str, Any]]:
+def of_all(of: Recorded, mixed: Sequence[StatedDrive]) -> Iterator[dict[str, Any]]:
     """All mixed drives teach beside the empty one, with notes that are true or false in four ways."""
     rng = np.random.default_rng(SEED)
     drives = {STEADY: of.drives[STEADY], **{f"drive {number}": run for number, run in enumerate(mixed, 1)}}
@@ -381,7 +380,7 @@ def of_all(of: Recorded, mixed: Sequence[KnownRun]) -> Iterator[dict[str, Any]]:
         yield found
 
 
-def study(of: Recorded, mixed: Sequence[KnownRun]) -> dict[str, Any]:
+def study(of: Recorded, mixed: Sequence[StatedDrive]) -> dict[str, Any]:
     """Both tables."""
     lessons: Lessons = {}
     return {"kinds": [tried(kind, of, lessons) for kind in KINDS], "all": list(of_all(of, mixed))}

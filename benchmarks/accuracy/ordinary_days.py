@@ -18,8 +18,7 @@ from benchmarks.accuracy.markdown import table
 from benchmarks.accuracy.scatter import Scatter, scattered
 from benchmarks.accuracy.study import Study
 from benchmarks.accuracy.taught import SHARE_SPAN_PCT, taught, weighed
-from gateway.calibration.known_run import KnownRun
-from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.calibration.teach import teach
 from gateway.model.vehicle_model import VehicleModel
 
@@ -87,19 +86,18 @@ def of_one_van(seed: int, number: int) -> Found:
 
 
 def _taught(
-    drives: Mapping[str, KnownRun],
+    drives: Mapping[str, StatedDrive],
     told: Mapping[str, tuple[Said, ...]],
     fresh: FreshVan,
     sister: VehicleModel | None,
 ) -> VehicleModel:
     statements = stated_of(told, drives, fresh.vehicle).assigned.statements
     each = zip(drives.items(), statements, strict=True)
-    return teach(
-        [TaughtDrive(name, run.batches, statement) for (name, run), statement in each], fresh.vehicle, sister
-    ).model
+    said = [StatedDrive(name, run.batches, statement) for (name, run), statement in each]
+    return teach(said, fresh.vehicle, sister).model
 
 
-def _notes(days: Sequence[KnownRun], seed: np.random.SeedSequence) -> dict[int, Said]:
+def _notes(days: Sequence[StatedDrive], seed: np.random.SeedSequence) -> dict[int, Said]:
     rng = np.random.default_rng(seed)
     said_of: dict[int, Said] = {}
     for day, run in enumerate(days, 1):
@@ -108,7 +106,7 @@ def _notes(days: Sequence[KnownRun], seed: np.random.SeedSequence) -> dict[int, 
     return said_of
 
 
-def _scales(run: KnownRun, fresh: FreshVan) -> Said:
+def _scales(run: StatedDrive, fresh: FreshVan) -> Said:
     """What axle scales show of this tour's load."""
     front_kg, rear_kg = axles_kg(run, fresh.vehicle)
     return said("axle_scales", front_axle_kg=front_kg, rear_axle_kg=rear_kg)
@@ -126,7 +124,7 @@ def _sister(fresh: FreshVan, seed: np.random.SeedSequence) -> VehicleModel:
     return taught(runs, [run.statement for run in runs], stated(van, fresh.sensors))
 
 
-def _rows(tests: Sequence[KnownRun], model: VehicleModel, fresh: FreshVan) -> list[list[float]]:
+def _rows(tests: Sequence[StatedDrive], model: VehicleModel, fresh: FreshVan) -> list[list[float]]:
     rows, refused = weighed(tests, model, fresh.vehicle)
     each = np.array(rows).reshape(-1, 2, 4) * (
         100.0 / np.array([fresh.vehicle.payload_range_kg[1], SHARE_SPAN_PCT])[:, None]

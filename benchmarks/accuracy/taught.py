@@ -21,8 +21,7 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.calibration.campaign_file import load_campaign
-from gateway.calibration.known_run import KnownRun
-from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.calibration.statements import NOTHING_KNOWN, Statement, empty
 from gateway.calibration.teach import teach
 from gateway.core.batch_settings import BatchSettings
@@ -48,19 +47,19 @@ SHARE_SPAN_PCT: Final = 20.0
 SEED: Final = 7
 
 
-def runs_of(folder: Path) -> tuple[Vehicle, list[KnownRun], list[KnownRun]]:
+def runs_of(folder: Path) -> tuple[Vehicle, list[StatedDrive], list[StatedDrive]]:
     """The vehicle, the first parts of a campaign's drives, and the last."""
     campaign = load_campaign(folder / "campaign_roll.toml")
     split = split_runs(campaign, BatchSettings())
     return campaign.vehicle, [one.identification for one in split], [one.validation for one in split]
 
 
-def whole(first: Sequence[KnownRun], last: Sequence[KnownRun]) -> list[KnownRun]:
+def whole(first: Sequence[StatedDrive], last: Sequence[StatedDrive]) -> list[StatedDrive]:
     """Whole drives."""
     return [replace(one, batches=(*one.batches, *other.batches)) for one, other in zip(first, last, strict=True)]
 
 
-def note(run: KnownRun, span_kg: float, rng: np.random.Generator) -> Statement:
+def note(run: StatedDrive, span_kg: float, rng: np.random.Generator) -> Statement:
     """A delivery note: kilograms with an error, and no place."""
     plus_minus_kg = NOTE_PLUS_MINUS * span_kg
     said_kg = max(0.0, run.payload_kg + float(rng.normal(0.0, plus_minus_kg / Z95)))
@@ -68,14 +67,14 @@ def note(run: KnownRun, span_kg: float, rng: np.random.Generator) -> Statement:
 
 
 def taught(
-    runs: Sequence[KnownRun], said: Sequence[Statement], vehicle: Vehicle, sister: VehicleModel | None = None
+    runs: Sequence[StatedDrive], said: Sequence[Statement], vehicle: Vehicle, sister: VehicleModel | None = None
 ) -> VehicleModel:
     """The vehicle that these drives teach."""
-    drives = [TaughtDrive(run.name, run.batches, one) for run, one in zip(runs, said, strict=True)]
+    drives = [StatedDrive(run.log, run.batches, one) for run, one in zip(runs, said, strict=True)]
     return teach(drives, vehicle, sister).model
 
 
-def weighed(runs: Sequence[KnownRun], model: VehicleModel, vehicle: Vehicle) -> tuple[list[F64], Counter[str]]:
+def weighed(runs: Sequence[StatedDrive], model: VehicleModel, vehicle: Vehicle) -> tuple[list[F64], Counter[str]]:
     """Rows of truth, answer and interval (8,) of every batch that is answered, and the reasons of the others."""
     shapes = shape_hypotheses(vehicle, *model.known_shape)
     rows: list[F64] = []

@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.read_drive import EVIDENCE
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model import fit
 from gateway.model.car import Ground
@@ -43,20 +43,20 @@ class StatedRun:
         return found.gradient, found.information
 
 
-def stated_load(run: KnownRun, vehicle: Vehicle) -> Load:
+def stated_load(run: StatedDrive, vehicle: Vehicle) -> Load:
     """The load of a run; none if nobody stated its payload and place."""
-    return run.load if run.has_payload and run.has_place else Load(0.0, vehicle.empty_front_share_pct)
+    return run.load if run.is_known else Load(0.0, vehicle.empty_front_share_pct)
 
 
-def stated_run(run: KnownRun, spectra: CrossSpectra, vehicle: Vehicle) -> StatedRun:
+def stated_run(run: StatedDrive, spectra: CrossSpectra, vehicle: Vehicle) -> StatedRun:
     """The likelihood of one drive; without the roll rate, which a known mount has removed from the other spectra."""
     ground = Ground.of(vehicle, with_roll=spectra.has_roll and spectra.reading.mount is not None)
     return StatedRun(stated_load(run, vehicle), Whittle(spectra.without_roll, ground, EVIDENCE))
 
 
-def stated_runs(runs: Sequence[KnownRun], vehicle: Vehicle, reading: Reading) -> list[StatedRun]:
+def stated_runs(runs: Sequence[StatedDrive], vehicle: Vehicle, reading: Reading) -> list[StatedRun]:
     """The runs whose load is stated, with enough steady driving."""
-    stated = [run for run in runs if run.has_payload and run.has_place]
+    stated = [run for run in runs if run.is_known]
     each = [(run, segments_of([b for b in run.batches if not b.rejected], reading)) for run in stated]
     return [stated_run(run, grouped(segments, reading), vehicle) for run, segments in each if segments is not None]
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gateway.calibration.axle_weights import payload_range_keys, sprung_keys
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.calibration.statements import (
     KNOWN_PLACE_PLUS_MINUS_M,
     KNOWN_PLUS_MINUS_KG,
@@ -136,14 +136,14 @@ class Campaign:
             return math.nan
         return front_share_pct(self.vehicle, run.payload_kg, run.payload_position_m)
 
-    def known_run(self, number: int, run: RunTable, batches: tuple[Batch, ...]) -> KnownRun:
+    def drive(self, number: int, run: RunTable, batches: tuple[Batch, ...]) -> StatedDrive:
         """The batches of a run with what is known of its load."""
         payload_kg = math.nan if run.payload_kg is None else run.payload_kg
         share_plus_minus_pct = KNOWN_SHARE_PLUS_MINUS_PCT
         if "payload_position_plus_minus_m" in run.model_fields_set and payload_kg > 0.0:
             arm = run.payload_position_plus_minus_m / self.vehicle.wheelbase_m
             share_plus_minus_pct = 100.0 * arm * payload_kg / (self.vehicle.empty_mass_kg + payload_kg)
-        return KnownRun(
+        return known_drive(
             number,
             str(run.log),
             payload_kg,

@@ -22,8 +22,8 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.as_stated import StatedRun, fitted, stated_runs
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.prior import Prior
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.late import special
 from gateway.core.vehicle import Vehicle
 from gateway.core.weights.on_the_road import unsprung_kg
@@ -75,7 +75,7 @@ class _Fitted:
 
 
 def contradictions(
-    runs: Sequence[KnownRun], vehicle: Vehicle, model: VehicleModel, sister: VehicleModel | None = None
+    runs: Sequence[StatedDrive], vehicle: Vehicle, model: VehicleModel, sister: VehicleModel | None = None
 ) -> tuple[Doubt, ...]:
     """Contradictions between the drives that taught ``model`` and the statements of ``vehicle``, those of the loads
     taken for true. ``sister``: the vehicle from which it inherited. None if no load is stated.

@@ -12,13 +12,12 @@ from gateway.calibration.contradicted import contradictions
 from gateway.calibration.file import CalibrationFile, DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
 from gateway.calibration.found import ClaimState, FoundClaim, FoundLoad, Taught
 from gateway.calibration.inspection.across_runs import Inspection
-from gateway.calibration.inspection.drive import SplitRun
+from gateway.calibration.inspection.facts import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
-from gateway.calibration.known_run import KnownRun, sensor_rate_seen_hz
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.index_fit import RatioIndexFit, fit_ratio_index
-from gateway.calibration.read_drive import TaughtDrive
 from gateway.calibration.sister import require_alike, sister_in
+from gateway.calibration.stated_drive import StatedDrive, drive_name, sensor_rate_seen_hz
 from gateway.calibration.teach import examined, teach
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.core.vehicle import Load, Vehicle
@@ -110,7 +109,7 @@ def calibrate_inspected(
 
 def _fit(
     estimators: Sequence[str],
-    runs: Sequence[KnownRun],
+    runs: Sequence[StatedDrive],
     vehicle: Vehicle,
     sister: VehicleModel | None,
     bands: BandChoice,
@@ -122,17 +121,16 @@ def _fit(
     ratio_index: RatioIndexFit | None = None
     cross_spectrum: Taught | None = None
     warnings: list[str] = []
-    drives = _drives(runs)
     if "cross_spectrum" in estimators:
         try:
-            cross_spectrum = teach(drives, vehicle, sister, partial(on_fit, "cross_spectrum"))
+            cross_spectrum = teach(runs, vehicle, sister, partial(on_fit, "cross_spectrum"))
             warnings.extend(cross_spectrum.model.warnings)
         except CalibrationImpossibleError as fault:
             warnings.append(f"cross_spectrum: {fault}")
-    claims = cross_spectrum.claims if cross_spectrum else examined(drives, vehicle, sister)
+    claims = cross_spectrum.claims if cross_spectrum else examined(runs, vehicle, sister)
     if "ratio_index" in estimators:
         held = {one.drive for one in claims if one.state is ClaimState.HELD}
-        known = [run for run in runs if run.has_payload and run.has_place and drive_name(run.number) not in held]
+        known = [run for run in runs if run.is_known and run.name not in held]
         try:
             if not known:
                 raise CalibrationImpossibleError("no run has a known payload and place")
@@ -142,25 +140,16 @@ def _fit(
     return ratio_index, cross_spectrum, claims, warnings
 
 
-def _drives(runs: Sequence[KnownRun]) -> list[TaughtDrive]:
-    return [TaughtDrive(drive_name(run.number), run.batches, run.statement) for run in runs]
-
-
 def with_statements_tested(inspection: Inspection, vehicle: Vehicle, like: CalibrationFile | None = None) -> Inspection:
     """The inspection with a warning for each run whose statement the drives contradict, as a calibration tests it."""
     sister = None if like is None else sister_in(like)
     runs = [one.identification for one in inspection.usable if one.has_identification]
-    return _with_disagreements(inspection, examined(_drives(runs), vehicle, sister))
-
-
-def drive_name(number: int) -> str:
-    """The name by which a fit knows a run."""
-    return f"drive {number}"
+    return _with_disagreements(inspection, examined(runs, vehicle, sister))
 
 
 def _with_disagreements(inspection: Inspection, claims: Sequence[FoundClaim]) -> Inspection:
     """The inspection with a warning for each run whose statement was held: the drives contradict it beyond chance."""
-    runs = {drive_name(one.run.number): one.run for one in inspection.split}
+    runs = {one.run.name: one.run for one in inspection.split}
     verdicts = {drive_name(one.number): one for one in inspection.verdicts}
     for claim in {one.drive: one for one in claims if one.state is ClaimState.HELD}.values():
         shown = f"the drive shows {claim.without_kg:.0f} ± {Z95 * claim.without_std_kg:.0f} kg"
@@ -178,23 +167,20 @@ def _as_believed(inspection: Inspection, claims: Sequence[FoundClaim], taught: T
     """The inspection with the loads as the fit believes them, without held statements and without common errors."""
     held = {one.drive for one in claims if one.state is ClaimState.HELD}
 
-    def believed(run: KnownRun) -> KnownRun:
-        name = drive_name(run.number)
-        found = taught.load_of(name) if taught else None
-        if name in held and not (found and math.isfinite(found.stated_kg)):
+    def believed(run: StatedDrive) -> StatedDrive:
+        found = taught.load_of(run.name) if taught else None
+        if run.name in held and not (found and math.isfinite(found.stated_kg)):
             return replace(run, payload_kg=math.nan, front_share_pct=math.nan)
-        if run.said is None or not found:
+        if not run.statement.claims or not found:
             return run
-        return replace(run, payload_kg=found.stated_kg, payload_plus_minus_kg=Z95 * found.stated_std_kg)
+        statement = replace(run.statement, payload_plus_minus_kg=Z95 * found.stated_std_kg)
+        return replace(run, statement=statement, payload_kg=found.stated_kg)
 
-    split = [
-        replace(one, identification=believed(one.identification), validation=believed(one.validation))
-        for one in inspection.split
-    ]
+    split = [replace(one, identification=believed(one.identification)) for one in inspection.split]
     return replace(inspection, split=tuple(split))
 
 
-def _seen(runs: Sequence[KnownRun], taught: Taught | None) -> SeenPart:
+def _seen(runs: Sequence[StatedDrive], taught: Taught | None) -> SeenPart:
     """The ranges covered by the runs with a batch, and by those of its sister; unknown loads as the fit found them."""
     counted = [batch for run in runs for batch in run.batches if not batch.rejected]
     speeds_mps = [batch.mean_speed_mps for batch in counted]
@@ -205,8 +191,8 @@ def _seen(runs: Sequence[KnownRun], taught: Taught | None) -> SeenPart:
         speeds_mps += taught.model.speed_seen_mps
     for run in runs:
         if any(not batch.rejected for batch in run.batches):
-            found = taught.load_of(drive_name(run.number)) if taught else None
-            is_stated = run.has_payload and run.has_place and not (found and found.is_held)
+            found = taught.load_of(run.name) if taught else None
+            is_stated = run.is_known and not (found and found.is_held)
             loads.append(run.load if found is None or is_stated else found.load)
     return SeenPart(
         payload_kg=_span([load.payload_kg for load in loads]),
@@ -245,11 +231,11 @@ def _provenance(campaign_sha256: str, split: Sequence[SplitRun], taught: Taught 
     drives = []
     for one in split:
         run, span_ns = one.identification, one.log.span_ns
-        found = taught.load_of(drive_name(run.number)) if taught else None
+        found = taught.load_of(run.name) if taught else None
         drives.append(
             DrivePart(
                 number=run.number,
-                log=run.name,
+                log=run.log,
                 sha256=one.log.sha256,
                 t_start=iso_utc(span_ns[0]) if span_ns else None,
                 t_end=iso_utc(span_ns[1]) if span_ns else None,

@@ -12,7 +12,7 @@ from typing import Any, Final, Literal, get_type_hints
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from gateway.calibration.inspection.drive import RowFacts, row_facts
+from gateway.calibration.inspection.facts import RowFacts, row_facts
 from gateway.core.batch import Traits
 from gateway.errors import KeptBatchError
 from gateway.records import Batch, Motion

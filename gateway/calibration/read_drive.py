@@ -8,7 +8,8 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.prior import own_prior
-from gateway.calibration.statements import Claim, Statement, Terms, load_prior_of
+from gateway.calibration.stated_drive import StatedDrive
+from gateway.calibration.statements import Claim, Terms, load_prior_of
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model.car import Ground
 from gateway.model.expected import log_stroke_speeds, with_strokes
@@ -17,7 +18,7 @@ from gateway.model.place import ROLL_BAND_HZ
 from gateway.model.spectra import CrossSpectra, Reading, Segments, grouped, level, mount_of
 from gateway.model.table import INDEX, N_OWN, OWN, N, of_drive
 from gateway.model.whittle import Point, Whittle
-from gateway.records import F64, Batch
+from gateway.records import F64
 
 BAND_HZ: Final = (1.1, 14.0)  # chosen: body and wheel resonances
 N_SEGMENT: Final = 256  # chosen: 5 s at 50 Hz, short enough for town traffic
@@ -25,15 +26,6 @@ EVIDENCE: Final = 0.2  # chosen: weight of a drive's evidence; minutes of drivin
 MOST_OFFSET_STD_M: Final = 0.1  # chosen: of the sensor's lateral place; with a worse one roll is not used
 UNKNOWN_SHARE: Final = 0.1  # chosen: of the empty mass; a payload stated no better than that has several starts
 NO_TERMS: Final = Terms.of((), ())
-
-
-@dataclass(frozen=True, slots=True)
-class TaughtDrive:
-    """A drive's batches with what is stated of its load."""
-
-    name: str
-    batches: tuple[Batch, ...]
-    statement: Statement
 
 
 def can_roll(vehicle: Vehicle) -> bool:
@@ -52,7 +44,7 @@ class ReadDrive:
     the own vector (N_OWN + 2,) the drive's deviations from the vehicle, its payload and its front share.
     """
 
-    def __init__(self, drive: TaughtDrive, vehicle: Vehicle, segments: Segments, reading: Reading) -> None:
+    def __init__(self, drive: StatedDrive, vehicle: Vehicle, segments: Segments, reading: Reading) -> None:
         self.drive, self.vehicle, self._segments = drive, vehicle, segments
         self.stated = load_prior_of(drive.statement, vehicle)
         self.terms = NO_TERMS

@@ -29,7 +29,8 @@ from gateway.calibration.fit_of_drives import (
 from gateway.calibration.found import ClaimState, FoundClaim, Taught
 from gateway.calibration.left_out import LeftOut, Limits, limits_shown_by
 from gateway.calibration.prior import Prior
-from gateway.calibration.read_drive import BAND_HZ, N_SEGMENT, ReadDrive, TaughtDrive, can_roll
+from gateway.calibration.read_drive import BAND_HZ, N_SEGMENT, ReadDrive, can_roll
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.calibration.statements import common_causes
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
@@ -48,7 +49,7 @@ Progress = Callable[[int, int], None]
 
 
 def teach(
-    drives: Sequence[TaughtDrive],
+    drives: Sequence[StatedDrive],
     vehicle: Vehicle,
     sister: VehicleModel | None = None,
     progress: Progress | None = None,
@@ -101,7 +102,7 @@ def teach(
     )
 
 
-def examined(drives: Sequence[TaughtDrive], vehicle: Vehicle, sister: VehicleModel | None) -> tuple[FoundClaim, ...]:
+def examined(drives: Sequence[StatedDrive], vehicle: Vehicle, sister: VehicleModel | None) -> tuple[FoundClaim, ...]:
     """The statements about these drives, tested as :func:`teach` does; none if no drive has enough steady driving."""
     try:
         known = _drives(drives, vehicle, sister)
@@ -211,11 +212,11 @@ def _exchanged(
     return None
 
 
-def _drives(drives: Sequence[TaughtDrive], vehicle: Vehicle, sister: VehicleModel | None) -> list[ReadDrive]:
+def _drives(drives: Sequence[StatedDrive], vehicle: Vehicle, sister: VehicleModel | None) -> list[ReadDrive]:
     """The drives with enough steady driving, all read alike: the roll rate only if every one has it."""
     reading = Reading(vehicle.wheelbase_m, BAND_HZ, N_SEGMENT, with_roll=can_roll(vehicle))
 
-    def read(reading: Reading) -> list[tuple[TaughtDrive, Segments]]:
+    def read(reading: Reading) -> list[tuple[StatedDrive, Segments]]:
         each = ((one, segments_of([b for b in one.batches if not b.rejected], reading)) for one in drives)
         return [(one, segments) for one, segments in each if segments is not None]
 

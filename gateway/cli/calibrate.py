@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Iterable, Iterator, Sequence
+from math import isnan
 from pathlib import Path
 from typing import get_args
 
@@ -11,7 +12,7 @@ from gateway.calibration.campaign_file import Campaign, file_sha256, load_campai
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.from_drives import Outcome, calibrate_inspected, with_statements_tested
 from gateway.calibration.inspection.across_runs import Inspection
-from gateway.calibration.inspection.drive import SplitRun
+from gateway.calibration.inspection.facts import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
 from gateway.calibration.judgement.advice import Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
@@ -61,13 +62,13 @@ def _in_all(inspection: Inspection) -> str:
 
 
 def _run_line(one: SplitRun, verdict: RunVerdict) -> str:
-    batches = [batch for part in (one.identification, one.validation) for batch in part.batches if not batch.rejected]
+    batches = [batch for batch in (*one.identification.batches, *one.validating) if not batch.rejected]
     n_identifying = sum(not batch.rejected for batch in one.identification.batches)
     seconds = sum(batch.usable_share * batch.duration_s for batch in batches)
     n_validating = len(batches) - n_identifying
     driven = f"{n_identifying} batches for fitting, {n_validating} for validation, {seconds:.0f} s can be used"
     words = "left out" if not verdict.is_usable else "sound" if not verdict.findings else "usable"
-    load = known(one.identification.payload_kg, " kg") if one.identification.has_payload else "load unknown"
+    load = "load unknown" if isnan(one.run.payload_kg) else known(one.run.payload_kg, " kg")
     return f"run {verdict.number} {verdict.name} ({load}): {words}; {driven}"
 
 

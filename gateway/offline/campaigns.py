@@ -13,9 +13,9 @@ from gateway.bus.signals.decode import SignalCounts
 from gateway.bus.signals.mapping import MappedMessage, id_name
 from gateway.calibration.campaign_file import Campaign, OnRun, RunTable, chosen_runs, file_sha256
 from gateway.calibration.inspection.across_runs import Inspection, inspect_drives
-from gateway.calibration.inspection.drive import LogFacts, SplitRun, row_facts
+from gateway.calibration.inspection.facts import LogFacts, SplitRun, row_facts
 from gateway.calibration.judgement.evaluation import Judged, judge
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
 from gateway.errors import CalibrationImpossibleError, LogUnreadableError
@@ -85,8 +85,7 @@ def split_runs(
         except LogUnreadableError as fault:
             if not keeps_unreadable:
                 raise
-            blank = campaign.known_run(number, run, ())
-            drives.append(SplitRun(blank, blank, log=LogFacts(unreadable=str(fault))))
+            drives.append(SplitRun(campaign.drive(number, run, ()), log=LogFacts(unreadable=str(fault))))
     on_run(len(runs), len(runs))
     return drives
 
@@ -97,15 +96,12 @@ def _split_run(
     log = campaign.log_of(run)
     whole, report = read_whole_log(log, signal_map)
     motion = rows_within(whole, Stretch(run.start_s, run.end_s))
-    parts = []
     stretches = _parts(motion, run, campaign.identification_fraction)
     both = [rows_within(motion, stretch) if stretch and len(motion) else motion.part(0, 0) for stretch in stretches]
-    for rows in both:
-        batches = batches_of_motion(rows, signal_map, settings)
-        parts.append(campaign.known_run(number, run, batches))
+    first, last = (batches_of_motion(rows, signal_map, settings) for rows in both)
     facts = row_facts(both[0] if stretches[0] else both[1], signal_map.traits)
     log_facts = facts_of_log(log, whole, motion, report, signal_map, run.start_s)
-    return SplitRun(parts[0], parts[1], facts, stretches[0] is not None, log_facts)
+    return SplitRun(campaign.drive(number, run, first), last, facts, stretches[0] is not None, log_facts)
 
 
 def facts_of_log(
@@ -199,6 +195,6 @@ def judge_campaign(
     return judged
 
 
-def _judged_parts(run: SplitRun, split: Split) -> list[KnownRun]:
+def _judged_parts(run: SplitRun, split: Split) -> list[StatedDrive]:
     parts = {"identification": [run.identification], "validation": [run.validation]}
     return parts.get(split, [run.identification, run.validation])

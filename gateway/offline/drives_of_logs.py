@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gateway.bus.signals import SignalMap
-from gateway.calibration.inspection.drive import LogFacts, row_facts
+from gateway.calibration.inspection.facts import LogFacts, row_facts
 from gateway.calibration.inspection.finding import Finding, Severity
 from gateway.calibration.kept import KeptBatch, kept_batch_of
 from gateway.calibration.learning.from_pieces import inspected

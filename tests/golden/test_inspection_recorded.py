@@ -13,10 +13,10 @@ from gateway.bus.logs import LogReport
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.campaign_file import load_campaign
 from gateway.calibration.inspection.across_runs import Inspection
-from gateway.calibration.inspection.drive import SplitRun, row_facts
+from gateway.calibration.inspection.facts import SplitRun, row_facts
 from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.inspection.run_checks import inspect_run
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import known_drive
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M
 from gateway.offline import campaigns as offline_campaigns
@@ -130,7 +130,7 @@ def faults_with(signals: str, source: Path, campaign: str, log: int, tmp_path: P
     signal_map = load_signal_map(tmp_path / "signals.toml")
     motion = rows_within(read_whole_log(loaded.log_of(run), signal_map)[0], Stretch(0.0, 700.0))
     batches = batches_of_motion(motion, signal_map, SETTINGS)
-    known = KnownRun(log, str(run.log), run.payload_kg, loaded.front_share_pct(run), batches)
-    one = SplitRun(known, KnownRun(log, "", 0.0, 0.0, ()), row_facts(motion, signal_map.traits))
+    known = known_drive(log, str(run.log), run.payload_kg, loaded.front_share_pct(run), batches)
+    one = SplitRun(known, facts=row_facts(motion, signal_map.traits))
     verdict = inspect_run(one, loaded.vehicle, SETTINGS)
     return [str(finding.kind) for finding in verdict.findings if finding.severity == "fault"]

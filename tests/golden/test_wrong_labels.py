@@ -1,16 +1,13 @@
 """A wrong known load is named: recorded drives, one of them with another label, or two with each other's."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import pytest
 from support.recordings import recordings
 
 from gateway.calibration.campaign_file import Campaign, load_campaign
 from gateway.calibration.found import ClaimState
-from gateway.calibration.from_drives import drive_name
-from gateway.calibration.known_run import KnownRun
-from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.calibration.teach import examined
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import front_share_pct
@@ -27,21 +24,20 @@ def campaign() -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def runs(campaign: Campaign) -> list[KnownRun]:
+def runs(campaign: Campaign) -> list[StatedDrive]:
     return [one.identification for one in split_runs(campaign, BatchSettings())]
 
 
-def held(campaign: Campaign, runs: Sequence[KnownRun], chosen: Sequence[int], labels: dict[int, Label]) -> set[int]:
+def held(campaign: Campaign, runs: Sequence[StatedDrive], chosen: Sequence[int], labels: dict[int, Label]) -> set[int]:
     """The runs whose statements are held where some are labelled so."""
     said = [
-        replace(run, payload_kg=label[0], front_share_pct=front_share_pct(campaign.vehicle, *label))
+        known_drive(run.number, run.log, label[0], front_share_pct(campaign.vehicle, *label), run.batches)
         if (label := labels.get(run.number))
         else run
         for run in runs
         if run.number in chosen
     ]
-    drives = [TaughtDrive(drive_name(run.number), run.batches, run.statement) for run in said]
-    found = examined(drives, campaign.vehicle, None)
+    found = examined(said, campaign.vehicle, None)
     return {int(one.drive.split()[1]) for one in found if one.state is ClaimState.HELD}
 
 
@@ -60,7 +56,7 @@ def held(campaign: Campaign, runs: Sequence[KnownRun], chosen: Sequence[int], la
     ],
 )
 def test_only_wrong_labels_are_held(
-    campaign: Campaign, runs: list[KnownRun], chosen: tuple[int, ...], labels: dict[int, Label]
+    campaign: Campaign, runs: list[StatedDrive], chosen: tuple[int, ...], labels: dict[int, Label]
 ) -> None:
     assert held(campaign, runs, chosen, labels) == set(labels)
 

@@ -12,7 +12,7 @@ from support.drives import SIGNALS, T0_NS, drive
 from support.half_car_road import VAN, batch_over_road, taught_by
 
 from gateway.bus.frames import LAST_SECOND
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import known_drive
 from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
@@ -31,7 +31,7 @@ LAST_NS = LAST_SECOND * NS_PER_S
 
 @pytest.fixture(scope="module")
 def calibrated() -> CalibratedVehicle:
-    known = KnownRun(1, "run 1", 0.0, 52.0, (batch_over_road(0.0, 52.0, seed=1),))
+    known = known_drive(1, "run 1", 0.0, 52.0, (batch_over_road(0.0, 52.0, seed=1),))
     return CalibratedVehicle(
         "sha256:ab",
         VAN,

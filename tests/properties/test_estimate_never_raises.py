@@ -14,7 +14,7 @@ from support.half_car_road import RATE_HZ, VAN, batch_of, batch_over_road, calib
 from support.kept import kept
 from support.model_road import LEFT, QUIET, theta_of
 
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import known_drive
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.change import Rules
 from gateway.core.fusion import fused_epoch
@@ -56,7 +56,7 @@ def over_two_tracks(load: Load, seed: int) -> Batch:
 def taught_on_two_tracks() -> VehicleModel:
     """A short drive with each of two loads."""
     loads = (Load(0.0, 52.0), Load(300.0, 46.0))
-    runs = [KnownRun(i, f"run {i}", *load, (over_two_tracks(load, 50 + i),)) for i, load in enumerate(loads)]
+    runs = [known_drive(i, f"run {i}", *load, (over_two_tracks(load, 50 + i),)) for i, load in enumerate(loads)]
     return taught_by(runs, model_road.VAN)
 
 

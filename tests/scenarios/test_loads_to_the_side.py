@@ -8,7 +8,7 @@ import pytest
 from benchmarks.accuracy.calibrated import taught_by
 from benchmarks.accuracy.drives import known_run, stated, without_roll_rate
 from gateway.bus.signals import Decoder, load_signal_map
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.vehicle import cg_left_m
 from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.model.vehicle_model import VehicleModel
@@ -29,7 +29,7 @@ VEHICLE = stated(PAPER_VAN, SENSORS)
 ROAD = UnevenRoad(iso_road("B"), stretch_m=600.0, spread=0.25)
 
 
-def driven(number: int, loads: tuple[Load, ...], seed: int, duration_s: float = 310.0) -> KnownRun:
+def driven(number: int, loads: tuple[Load, ...], seed: int, duration_s: float = 310.0) -> StatedDrive:
     """One batch at about 14 m/s, through sensors, frames and decoder."""
     course = constant(14.0, duration_s, np.random.default_rng([seed, number]), jitter_std_mps=0.4)
     simulated = simulate_drive(PAPER_VAN, loads, ROAD, course, SENSORS, 100 * seed + number)
@@ -37,7 +37,7 @@ def driven(number: int, loads: tuple[Load, ...], seed: int, duration_s: float = 
     return known_run(rows, number, f"drive {number}", PAPER_VAN, loads)
 
 
-def known_drives() -> list[KnownRun]:
+def known_drives() -> list[StatedDrive]:
     """Empty, and three loads about the centre line."""
     loads: list[tuple[Load, ...]] = [(), (Load(150.0, 0.6),), (Load(280.0, 2.6),), (Load(430.0, 1.4),)]
     return [driven(number, load, seed=1) for number, load in enumerate(loads, 1)]
@@ -60,22 +60,22 @@ def width(quantity: Quantity) -> float:
 
 
 @pytest.fixture(scope="module")
-def known() -> list[KnownRun]:
+def known() -> list[StatedDrive]:
     return known_drives()
 
 
 @pytest.fixture(scope="module")
-def rolling(known: list[KnownRun]) -> VehicleModel:
+def rolling(known: list[StatedDrive]) -> VehicleModel:
     return taught_by(known, VEHICLE)
 
 
 @pytest.fixture(scope="module")
-def unrolled(known: list[KnownRun]) -> VehicleModel:
+def unrolled(known: list[StatedDrive]) -> VehicleModel:
     return taught_by([without_roll_rate(run) for run in known], VEHICLE)
 
 
 @pytest.fixture(scope="module")
-def sideways() -> dict[tuple[float, float, float], KnownRun]:
+def sideways() -> dict[tuple[float, float, float], StatedDrive]:
     return {
         side: driven(number, (Load(side[0], side[1], left_m=side[2]),), seed=2) for number, side in enumerate(SIDES, 1)
     }
@@ -83,7 +83,7 @@ def sideways() -> dict[tuple[float, float, float], KnownRun]:
 
 @pytest.mark.parametrize("side", SIDES, ids=str)
 def test_a_load_to_the_side_is_weighed_and_found(
-    side: tuple[float, float, float], sideways: dict[tuple[float, float, float], KnownRun], rolling: VehicleModel
+    side: tuple[float, float, float], sideways: dict[tuple[float, float, float], StatedDrive], rolling: VehicleModel
 ) -> None:
     payload_kg, _, left_m = side
     run = sideways[side]
@@ -100,7 +100,7 @@ def test_a_load_to_the_side_is_weighed_and_found(
 @pytest.mark.parametrize("side", SIDES, ids=str)
 def test_without_a_roll_rate_the_interval_is_wider_and_holds(
     side: tuple[float, float, float],
-    sideways: dict[tuple[float, float, float], KnownRun],
+    sideways: dict[tuple[float, float, float], StatedDrive],
     rolling: VehicleModel,
     unrolled: VehicleModel,
 ) -> None:
@@ -113,7 +113,7 @@ def test_without_a_roll_rate_the_interval_is_wider_and_holds(
 
 
 def test_an_unseen_sideways_load_costs_surety_and_no_refusal_where_the_load_is_central(
-    known: list[KnownRun], rolling: VehicleModel
+    known: list[StatedDrive], rolling: VehicleModel
 ) -> None:
     """Tracks that differ shake a sensor off the centre line by themselves: no other sensor, and no other vehicle."""
     found = [weighed(replace(run.batches[0], roll_rate_radps=None), rolling) for run in known]
@@ -124,7 +124,7 @@ def test_an_unseen_sideways_load_costs_surety_and_no_refusal_where_the_load_is_c
 
 @pytest.mark.parametrize("turned_deg", [-10.0, 10.0])
 def test_roll_that_leaks_into_a_turned_gyro_is_no_noise(
-    turned_deg: float, sideways: dict[tuple[float, float, float], KnownRun], rolling: VehicleModel
+    turned_deg: float, sideways: dict[tuple[float, float, float], StatedDrive], rolling: VehicleModel
 ) -> None:
     """The noise of a batch is free: without a watch on it, it would hide the roll."""
     batch, by = sideways[SIDES[0]].batches[0], np.deg2rad(turned_deg)
@@ -139,7 +139,7 @@ def test_roll_that_leaks_into_a_turned_gyro_is_no_noise(
 
 
 def test_a_gyro_that_is_noisy_is_not_taken_for_a_turned_one(
-    sideways: dict[tuple[float, float, float], KnownRun], rolling: VehicleModel
+    sideways: dict[tuple[float, float, float], StatedDrive], rolling: VehicleModel
 ) -> None:
     batch = sideways[SIDES[0]].batches[0]
     noise = 5.0 * SENSORS.imu.gyro.noise_density * (batch.rate_hz / 2.0) ** 0.5

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gateway.calibration.known_run import KnownRun
-from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.calibration.teach import teach
 from gateway.core.vehicle import Load, Vehicle
 from gateway.estimates.batch_estimate import Estimate
@@ -68,16 +67,15 @@ def batch_over_road(
     )
 
 
-def run_over_road(number: int, payload_kg: float, share_pct: float) -> KnownRun:
+def run_over_road(number: int, payload_kg: float, share_pct: float) -> StatedDrive:
     """Two batches of a known load."""
     batches = tuple(batch_over_road(payload_kg, share_pct, seed=10 * number + i) for i in range(2))
-    return KnownRun(number, f"run {number}", payload_kg, share_pct, batches)
+    return known_drive(number, f"run {number}", payload_kg, share_pct, batches)
 
 
-def taught_by(runs: list[KnownRun], vehicle: Vehicle = VAN, sister: VehicleModel | None = None) -> VehicleModel:
+def taught_by(runs: list[StatedDrive], vehicle: Vehicle = VAN, sister: VehicleModel | None = None) -> VehicleModel:
     """The vehicle that these runs teach."""
-    drives = [TaughtDrive(f"run {one.number}", one.batches, one.statement) for one in runs]
-    return teach(drives, vehicle, sister).model
+    return teach(runs, vehicle, sister).model
 
 
 @kept

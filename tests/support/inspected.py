@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from gateway.bus.signals import Decoder, SignalMap, load_signal_map
-from gateway.calibration.inspection.drive import SplitRun, row_facts
+from gateway.calibration.inspection.facts import SplitRun, row_facts
 from gateway.calibration.inspection.finding import RunVerdict
 from gateway.calibration.inspection.run_checks import inspect_run
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import known_drive
 from gateway.core.batch import Traits
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
@@ -106,8 +106,8 @@ def verdict_on(
     settings = BatchSettings(window_s=window_s)
     scheduler = Scheduler(settings, traits)
     batches = (*scheduler.feed(motion), *scheduler.flush())
-    run = KnownRun(1, "a.log", load[0], front_share_pct(vehicle, *load), batches)
-    return inspect_run(SplitRun(run, replace(run, batches=()), row_facts(motion, traits)), vehicle, settings)
+    run = known_drive(1, "a.log", load[0], front_share_pct(vehicle, *load), batches)
+    return inspect_run(SplitRun(run, facts=row_facts(motion, traits)), vehicle, settings)
 
 
 def kinds(verdict: RunVerdict) -> list[str]:

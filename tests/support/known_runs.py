@@ -1,7 +1,9 @@
 """Known-load drives of the half-car of support.half_car_road, as calibration reads them."""
 
-from gateway.calibration.inspection.drive import LogFacts, SplitRun
-from gateway.calibration.known_run import KnownRun
+from dataclasses import replace
+
+from gateway.calibration.inspection.facts import LogFacts, SplitRun
+from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.core.vehicle import front_share_pct
 from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64
@@ -21,23 +23,21 @@ def known_run(
     n_batches: int = 1,
     duration_s: float = 200.0,
     car: F64 = CAR,
-) -> KnownRun:
+) -> StatedDrive:
     """One drive at 14 m/s."""
     share_pct = front_share_pct(VAN, payload_kg, position_m)
     batches = tuple(
         batch_over_road(payload_kg, share_pct, 1000 * seed + 10 * number + i, duration_s, car=car)
         for i in range(n_batches)
     )
-    return KnownRun(number, f"{number}.log", payload_kg, share_pct, batches)
+    return known_drive(number, f"{number}.log", payload_kg, share_pct, batches)
 
 
 def split_run(number: int, payload_kg: float, position_m: float | None, seed: int = 1) -> SplitRun:
     """One batch to identify and one to validate."""
     both = known_run(number, payload_kg, position_m, seed, n_batches=2)
-    identification, validation = (
-        KnownRun(number, both.name, both.payload_kg, both.front_share_pct, (batch,)) for batch in both.batches
-    )
-    return SplitRun(identification, validation, log=LogFacts(sha256="0" * 64))
+    first, last = both.batches
+    return SplitRun(replace(both, batches=(first,)), (last,), log=LogFacts(sha256="0" * 64))
 
 
 def campaign(seed: int = 1) -> tuple[SplitRun, ...]:

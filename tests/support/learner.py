@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gateway.calibration.inspection.drive import RowFacts
+from gateway.calibration.inspection.facts import RowFacts
 from gateway.calibration.kept import KeptBatch
 from gateway.calibration.learning.job import LearnJob, LearnResult
 from gateway.config.sections import LearningSection

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.calibration.statements import Statement
 from gateway.calibration.teach import teach
 from gateway.core.cargo import known_shape
@@ -82,10 +82,10 @@ def stated(payload_kg: float, share_pct: float, plus_minus_kg: float = 4.0) -> S
     )
 
 
-def known_drives(*, with_roll: bool = False, **road: float) -> list[TaughtDrive]:
+def known_drives(*, with_roll: bool = False, **road: float) -> list[StatedDrive]:
     """One for each of KNOWN."""
     return [
-        TaughtDrive(f"drive {i}", (drive_of(load, 10 * i, with_roll=with_roll, **road),), stated(*load))
+        StatedDrive(f"drive {i}", (drive_of(load, 10 * i, with_roll=with_roll, **road),), stated(*load))
         for i, load in enumerate(KNOWN)
     ]
 

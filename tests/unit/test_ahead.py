@@ -7,8 +7,7 @@ import pytest
 from support.half_car_road import VAN, batch_over_road
 
 from gateway.calibration.ahead import CANDIDATES, Ahead, next_steps
-from gateway.calibration.known_run import KnownRun
-from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.calibration.statements import NOTHING_KNOWN, Statement
 from gateway.calibration.teach import teach
 from gateway.core.vehicle import Load
@@ -20,9 +19,8 @@ LOADED = Load(330.0, 54.0)
 DRIVE_S = 300.0
 
 
-def driven(load: Load, number: int) -> TaughtDrive:
-    run = KnownRun(number, "", *load, (batch_over_road(*load, seed=number, duration_s=DRIVE_S),))
-    return TaughtDrive(f"run {number}", run.batches, run.statement)
+def driven(load: Load, number: int) -> StatedDrive:
+    return known_drive(number, "", *load, (batch_over_road(*load, seed=number, duration_s=DRIVE_S),))
 
 
 @cache

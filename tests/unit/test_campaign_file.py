@@ -92,8 +92,8 @@ def test_the_gross_limit_and_the_axle_weights_give_the_payload_range(
 
 def test_a_run_without_a_load_has_an_unknown_load(tmp_path: Path) -> None:
     campaign = loaded(tmp_path, text_of_runs(EMPTY_RUN, {"log": '"a.log"'}))
-    run = campaign.known_run(2, campaign.runs[1], ())
-    assert (run.has_payload, run.has_place, run.described) == (False, False, "an unknown load")
+    run = campaign.drive(2, campaign.runs[1], ())
+    assert (run.is_known, run.described) == (False, "an unknown load")
     assert (run.statement.payload_kg, run.statement.front_share_pct, run.statement.source) == (None, None, None)
     assert not run.statement.is_compact
 
@@ -101,8 +101,8 @@ def test_a_run_without_a_load_has_an_unknown_load(tmp_path: Path) -> None:
 def test_a_load_without_a_place_is_a_note(tmp_path: Path) -> None:
     note = {"log": '"a.log"', "payload_kg": "310.0", "payload_plus_minus_kg": "25.0"}
     campaign = loaded(tmp_path, text_of_runs(note))
-    run = campaign.known_run(1, campaign.runs[0], ())
-    assert (run.has_payload, run.has_place, run.described) == (True, False, "310 kg")
+    run = campaign.drive(1, campaign.runs[0], ())
+    assert (run.is_known, run.described) == (False, "310 kg")
     assert (run.statement.payload_kg, run.statement.payload_plus_minus_kg) == (310.0, 25.0)
     assert run.statement.front_share_pct is None
     assert not run.statement.is_compact
@@ -112,7 +112,7 @@ def test_the_doubt_of_a_place_is_that_of_the_share(tmp_path: Path) -> None:
     """0.28 m of a wheelbase of 2.8 m move a tenth of the payload from one axle to the other."""
     rough = loaded_run(payload_position_plus_minus_m="0.28")
     campaign = loaded(tmp_path, text_of_runs(rough, LOADED_RUN))
-    doubtful, usual = (campaign.known_run(i, run, ()).statement for i, run in enumerate(campaign.runs, 1))
+    doubtful, usual = (campaign.drive(i, run, ()).statement for i, run in enumerate(campaign.runs, 1))
     assert doubtful.front_share_plus_minus_pct == pytest.approx(100.0 * 27.0 / 1510.0)
     assert usual.front_share_plus_minus_pct == KNOWN_SHARE_PLUS_MINUS_PCT
     assert usual.is_compact

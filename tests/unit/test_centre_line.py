@@ -10,8 +10,8 @@ from support.calibrated import ratio_index_calibration
 from support.half_car_road import RATE_HZ
 
 from gateway.bus.signals import Decoder, load_signal_map
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.spectra_table import spectrum_table
+from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.ratio_index.index import RatioIndexCalibration, acceleration_spectrum, indexes_of, mean_spectrum
 from gateway.offline.campaigns import batches_of_motion
@@ -71,9 +71,9 @@ def test_segments_without_a_roll_rate_are_left_out_while_enough_are_left() -> No
     np.testing.assert_array_equal(few[1], seen[1])
 
 
-def runs(*roll_rates: F64 | None) -> list[KnownRun]:
+def runs(*roll_rates: F64 | None) -> list[StatedDrive]:
     batches = [batch_of(moving(10 + i)[0], roll_rate) for i, roll_rate in enumerate(roll_rates)]
-    return [KnownRun(i, f"run {i}", 90.0 * i, 50.0, (batch,)) for i, batch in enumerate(batches)]
+    return [known_drive(i, f"run {i}", 90.0 * i, 50.0, (batch,)) for i, batch in enumerate(batches)]
 
 
 def test_a_campaign_is_moved_as_a_whole_or_not_at_all() -> None:

@@ -12,7 +12,7 @@ from support.half_car_road import batch_over_road
 from benchmarks.accuracy import coverage, drives
 from benchmarks.accuracy.coverage_table import coverage_table
 from benchmarks.accuracy.drives import TRIPS, Scope, Trip
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.sim.instruments import Sensors
@@ -34,14 +34,14 @@ def test_every_van_is_put_to_every_kind_of_drive(monkeypatch: pytest.MonkeyPatch
         seed: np.random.SeedSequence,
         number: int,
         sensors: Sensors,
-    ) -> KnownRun:
+    ) -> StatedDrive:
         assert abs(sensors.mount.left_m) <= 0.4
         seeds.append(int(seed.generate_state(1)[0]))
         share_pct = front_share_pct(one, loads)
         batch = batch_over_road(100.0, 50.0, 1, duration_s=60.0, speed_mps=15.0)
-        return KnownRun(number, trip.kind, payload_kg(loads), share_pct, (batch,))
+        return known_drive(number, trip.kind, payload_kg(loads), share_pct, (batch,))
 
-    def fit(runs: Sequence[KnownRun], vehicle: Vehicle, estimator: str) -> CalibratedVehicle:
+    def fit(runs: Sequence[StatedDrive], vehicle: Vehicle, estimator: str) -> CalibratedVehicle:
         if estimator == "cross_spectrum":
             raise CalibrationImpossibleError("not today")
         calibrated_with.append(tuple(run.payload_kg for run in runs))

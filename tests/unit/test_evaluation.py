@@ -9,7 +9,7 @@ from support.drives import T0_NS, drive
 from support.paper_van import paper_van
 
 from gateway.calibration.judgement.evaluation import Comparison, Judged, error_table, errors_of, judge
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import known_drive
 from gateway.cli.evaluate import text_of
 from gateway.core.batch import BatchWindow, build_batch
 from gateway.core.batch_settings import BatchSettings
@@ -153,9 +153,9 @@ def test_without_a_place_that_was_noted_nothing_sideways_is_judged() -> None:
 def test_the_truth_beside_the_centre_line_follows_from_where_the_payload_was_noted() -> None:
     calibrated = calibration_file().for_core()
     runs = [
-        KnownRun(1, "empty.log", 0.0, 50.0, (BATCH,)),
-        KnownRun(2, "noted.log", 310.0, 50.0, (BATCH,), -0.25),
-        KnownRun(3, "not_noted.log", 310.0, 50.0, (BATCH,)),
+        known_drive(1, "empty.log", 0.0, 50.0, (BATCH,)),
+        known_drive(2, "noted.log", 310.0, 50.0, (BATCH,), -0.25),
+        known_drive(3, "not_noted.log", 310.0, 50.0, (BATCH,)),
     ]
     truths_m = [one.cg_left_m for one in judge(runs, calibrated, "ratio_index")]
     assert truths_m == pytest.approx([0.0, -0.05, np.nan], nan_ok=True)

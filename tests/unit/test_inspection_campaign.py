@@ -7,17 +7,17 @@ from support.half_car_road import VAN, batch_over_road
 from support.known_runs import LOADS, campaign, known_run
 
 from gateway.calibration.inspection.across_runs import Inspection, inspect_drives, load_findings
-from gateway.calibration.inspection.drive import RowFacts, SplitRun
+from gateway.calibration.inspection.facts import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.core.batch_settings import BatchSettings
 
 SETTINGS = BatchSettings(window_s=200.0)
 
 
-def labelled(*loads: tuple[float, float]) -> list[KnownRun]:
+def labelled(*loads: tuple[float, float]) -> list[StatedDrive]:
     """Runs with these payloads and shares and nothing driven."""
-    return [KnownRun(number, "a.log", payload, share, ()) for number, (payload, share) in enumerate(loads, 1)]
+    return [known_drive(number, "a.log", payload, share, ()) for number, (payload, share) in enumerate(loads, 1)]
 
 
 @pytest.mark.parametrize(
@@ -37,15 +37,15 @@ def test_loads_that_teach_too_little_are_named(loads: list[tuple[float, float]],
 
 
 @pytest.fixture(scope="module")
-def runs() -> list[KnownRun]:
+def runs() -> list[StatedDrive]:
     return [known_run(number, *load, seed=7) for number, load in enumerate(LOADS, 1)]
 
 
-def inspected(run: KnownRun) -> SplitRun:
-    return SplitRun(run, replace(run, batches=()), RowFacts())
+def inspected(run: StatedDrive) -> SplitRun:
+    return SplitRun(run)
 
 
-def test_a_run_at_another_speed_is_noted_and_one_on_a_far_smoother_road_warned_of(runs: list[KnownRun]) -> None:
+def test_a_run_at_another_speed_is_noted_and_one_on_a_far_smoother_road_warned_of(runs: list[StatedDrive]) -> None:
     share_pct = runs[0].front_share_pct
     fast = replace(runs[0], number=5, batches=(batch_over_road(0.0, share_pct, 3, 200.0, speed_mps=20.0),))
     (batch,) = runs[0].batches
@@ -61,7 +61,7 @@ def test_a_run_at_another_speed_is_noted_and_one_on_a_far_smoother_road_warned_o
     assert told == {1: [], 2: [], 3: [], 4: [], 5: [Kind.SPEED_DIFFERS], 6: [Kind.SMOOTH_ROAD]}
 
 
-def test_a_run_sampled_at_another_rate_calibrates_nothing(runs: list[KnownRun]) -> None:
+def test_a_run_sampled_at_another_rate_calibrates_nothing(runs: list[StatedDrive]) -> None:
     at_100_hz = [replace(run, batches=tuple(replace(b, sensor_rate_hz=100.0) for b in run.batches)) for run in runs]
     slower = replace(runs[0], number=5, batches=tuple(replace(b, sensor_rate_hz=50.0) for b in runs[0].batches))
     verdicts = inspect_drives([inspected(run) for run in (*at_100_hz, slower)], VAN, SETTINGS).verdicts
@@ -69,8 +69,8 @@ def test_a_run_sampled_at_another_rate_calibrates_nothing(runs: list[KnownRun]) 
     assert Kind.RATE_DIFFERS in [finding.kind for finding in verdicts[-1].findings]
 
 
-def test_runs_of_unknown_load_are_inspected_but_not_compared(runs: list[KnownRun]) -> None:
-    unknown = [replace(run, payload_kg=float("nan"), front_share_pct=float("nan")) for run in runs[1:]]
+def test_runs_of_unknown_load_are_inspected_but_not_compared(runs: list[StatedDrive]) -> None:
+    unknown = [StatedDrive(run.name, run.batches, number=run.number, log=run.log) for run in runs[1:]]
     found_in = inspect_drives([inspected(run) for run in (runs[0], *unknown)], VAN, SETTINGS)
     assert ([one.findings for one in found_in.verdicts], found_in.findings) == ([()] * 4, ())
     faulty = tuple(RunVerdict(n, "a.log", (FAULT,) if n == 1 else ()) for n in range(1, 5))

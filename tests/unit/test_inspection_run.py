@@ -24,10 +24,10 @@ from support.inspected import (
 )
 
 from gateway.calibration.inspection.across_runs import inspect_drives
-from gateway.calibration.inspection.drive import LogFacts, RowFacts, SplitRun, row_facts
+from gateway.calibration.inspection.facts import LogFacts, RowFacts, SplitRun, row_facts
 from gateway.calibration.inspection.finding import Finding, Kind
 from gateway.calibration.inspection.run_checks import inspect_run
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import known_drive
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
 from gateway.records import F64, Motion, Signal, Why
@@ -205,8 +205,8 @@ def rate_kinds(motion: Motion) -> list[str]:
 
 def told_of(kinds: tuple[Kind, ...], facts: RowFacts | None = None, log: LogFacts | None = None) -> tuple[Finding, ...]:
     """Findings of these kinds about a run without batches."""
-    nothing = KnownRun(1, "a.log", 0.0, 50.0, ())
-    split = SplitRun(nothing, nothing, facts or RowFacts(), log=log or LogFacts())
+    nothing = known_drive(1, "a.log", 0.0, 50.0, ())
+    split = SplitRun(nothing, facts=facts or RowFacts(), log=log or LogFacts())
     return inspect_run(split, VAN, BatchSettings(), kinds).findings
 
 
@@ -249,8 +249,8 @@ def test_a_drive_that_is_kept_for_validation_has_lost_nothing_that_it_has() -> N
         for one in (*scheduler.feed(motion), *scheduler.flush())
     )
     assert not all(one.rejected for one in batches)
-    nothing = KnownRun(1, "a.log", 0.0, 50.0, ())
-    kept = SplitRun(nothing, replace(nothing, batches=batches), has_identification=False)
+    nothing = known_drive(1, "a.log", 0.0, 50.0, ())
+    kept = SplitRun(nothing, batches, has_identification=False)
     assert inspect_run(kept, EMPTY, settings).is_usable
 
 
@@ -270,8 +270,8 @@ UNLADEN, LOADED = (0.0, 50.0), (420.0, 58.0)
     ],
 )
 def test_two_runs_on_one_drive_are_found(other: LogFacts, load: tuple[float, float], numbers: list[int]) -> None:
-    runs = [KnownRun(1, "a.log", *UNLADEN, ()), KnownRun(2, "b.log", *load, ())]
-    split = [SplitRun(run, run, log=log) for run, log in zip(runs, (SOUND, other), strict=True)]
+    runs = [known_drive(1, "a.log", *UNLADEN, ()), known_drive(2, "b.log", *load, ())]
+    split = [SplitRun(run, log=log) for run, log in zip(runs, (SOUND, other), strict=True)]
     verdicts = inspect_drives(split, VAN, BatchSettings()).verdicts
     told = {one.number: f.text for one in verdicts for f in one.findings if f.kind is Kind.SAME_DRIVE}
     assert list(told) == numbers
@@ -279,8 +279,8 @@ def test_two_runs_on_one_drive_are_found(other: LogFacts, load: tuple[float, flo
 
 
 def test_an_unreadable_log_is_reported_once_and_a_load_beyond_the_range_is_doubted() -> None:
-    nothing = KnownRun(1, "a.log", 4200.0, 60.0, ())
-    unreadable = SplitRun(nothing, nothing, RowFacts(), log=LogFacts(unreadable="a.log: holds no CAN frame"))
+    nothing = known_drive(1, "a.log", 4200.0, 60.0, ())
+    unreadable = SplitRun(nothing, log=LogFacts(unreadable="a.log: holds no CAN frame"))
     (verdict,) = inspect_drives([unreadable], VAN, BatchSettings()).verdicts
     assert [finding.kind for finding in verdict.findings] == [Kind.LOG_UNREADABLE, Kind.LOAD_BEYOND_RANGE]
     assert not verdict.is_usable

@@ -8,7 +8,7 @@ from support.bus_drive import bus_drive
 from support.drives import assert_same_batch
 
 from gateway.bus.signals import Decoder, load_signal_map
-from gateway.calibration.inspection.drive import row_facts
+from gateway.calibration.inspection.facts import row_facts
 from gateway.calibration.kept import KeptBatch, kept_batch_of, packed, unpacked
 from gateway.core.batch_settings import BatchSettings
 from gateway.errors import KeptBatchError

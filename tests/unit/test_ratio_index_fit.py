@@ -9,10 +9,10 @@ from scipy import signal
 from support import half_car_road
 from support.paper_van import paper_van
 
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import candidate_pairs
 from gateway.calibration.ratio_index.index_fit import RatioIndexFit, fit_ratio_index
 from gateway.calibration.ratio_index.spectra_table import SpectrumTable
+from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration, indexes_of
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
 from gateway.errors import CalibrationImpossibleError
@@ -41,9 +41,9 @@ def batch_of(payload_kg: float, front_share_pct: float, seed: int) -> Batch:
     return half_car_road.batch_of(acceleration_mps2, pitch_rate_radps, speed_mps=15.0 + 0.2 * rng.standard_normal(N))
 
 
-def runs_of(loads: list[tuple[float, float]]) -> list[KnownRun]:
+def runs_of(loads: list[tuple[float, float]]) -> list[StatedDrive]:
     return [
-        KnownRun(i, f"{i}.log", kg, pct, (batch_of(kg, pct, 10 * i), batch_of(kg, pct, 10 * i + 1)))
+        known_drive(i, f"{i}.log", kg, pct, (batch_of(kg, pct, 10 * i), batch_of(kg, pct, 10 * i + 1)))
         for i, (kg, pct) in enumerate(loads, 1)
     ]
 

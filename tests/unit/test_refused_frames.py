@@ -20,10 +20,10 @@ from gateway.archive.reprocessing import reprocess
 from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
-from gateway.calibration.inspection.drive import LogFacts, SplitRun, row_facts
+from gateway.calibration.inspection.facts import LogFacts, SplitRun, row_facts
 from gateway.calibration.inspection.finding import Kind, Severity
 from gateway.calibration.inspection.run_checks import inspect_run
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import known_drive
 from gateway.core.batch_settings import BatchSettings
 from gateway.offline.campaigns import read_whole_log
 from gateway.records import Frames, Signal
@@ -144,8 +144,8 @@ def test_an_inspection_finds_the_refused_frames_and_no_silent_sensor(spoiled: tu
     signal_map = load_signal_map(signals)
     motion, report = read_whole_log(log, signal_map)
     mismatches = tuple((one.text, one.share, one.signals) for one in report.causes())
-    nothing = KnownRun(1, "drive.log", 0.0, 50.0, ())
-    split = SplitRun(nothing, nothing, row_facts(motion, signal_map.traits), log=LogFacts(mismatches=mismatches))
+    nothing = known_drive(1, "drive.log", 0.0, 50.0, ())
+    split = SplitRun(nothing, facts=row_facts(motion, signal_map.traits), log=LogFacts(mismatches=mismatches))
     kinds = (Kind.MAP_MISMATCH, Kind.SENSOR_SILENT, Kind.SPEED_MISSING)
     first, *others = inspect_run(split, VAN, BatchSettings(), kinds).findings
     assert (first.kind, first.severity) == (Kind.MAP_MISMATCH, Severity.FAULT)

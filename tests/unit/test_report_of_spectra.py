@@ -10,11 +10,9 @@ from support.estimates import make_estimate
 from support.half_car_road import CAR, RATE_HZ, VAN, as_if_fitted, batch_of, batch_over_road
 
 from gateway.calibration.found import FoundLoad
-from gateway.calibration.from_drives import drive_name
 from gateway.calibration.judgement.assessment import BatchSet, Judgement
 from gateway.calibration.judgement.evaluation import CgLeftErrors, Errors, ErrorTable, Judged, TargetErrors, WheelErrors
-from gateway.calibration.known_run import KnownRun
-from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.stated_drive import StatedDrive, drive_name, known_drive
 from gateway.calibration.teach import teach
 from gateway.core.ratio_index.index import Band
 from gateway.core.vehicle import Load
@@ -50,8 +48,8 @@ def test_batches_of_a_load_are_joined_and_none_is_none() -> None:
     assert density_of([], ACCELERATION) is None
 
 
-def known(number: int, payload_kg: float, share_pct: float) -> KnownRun:
-    return KnownRun(
+def known(number: int, payload_kg: float, share_pct: float) -> StatedDrive:
+    return known_drive(
         number, f"{number}.log", payload_kg, share_pct, (batch_over_road(payload_kg, share_pct, number, 60.0),)
     )
 
@@ -71,8 +69,8 @@ def test_a_curve_for_every_load_and_the_bands_where_they_are() -> None:
     ]
 
 
-def run_of(kg: float, pct: float, number: int = 1, **how: Any) -> KnownRun:
-    return KnownRun(number, f"{number}.log", kg, pct, (batch_over_road(kg, pct, number, 200.0, **how),))
+def run_of(kg: float, pct: float, number: int = 1, **how: Any) -> StatedDrive:
+    return known_drive(number, f"{number}.log", kg, pct, (batch_over_road(kg, pct, number, 200.0, **how),))
 
 
 def differences(fit: RunFit) -> tuple[F64, F64]:
@@ -88,8 +86,7 @@ def differences(fit: RunFit) -> tuple[F64, F64]:
 def test_the_fitted_half_car_agrees_with_the_measured_spectra() -> None:
     """Drives of a half-car: the one fitted to them explains their spectra, phase and coherence."""
     runs = [run_of(0.0, 52.0, 1), run_of(300.0, 47.0, 2)]
-    drives = [TaughtDrive(drive_name(one.number), one.batches, one.statement) for one in runs]
-    taught = teach(drives, VAN)
+    taught = teach(runs, VAN)
     fits = fits_of(runs, taught.model, taught.loads)
     assert [fit.run.number for fit in fits] == [1, 2]
     for fit in fits:

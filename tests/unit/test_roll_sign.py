@@ -8,9 +8,9 @@ import pytest
 from support.inspected import driven, kinds, scaled, stated, traits_of_reference
 
 from gateway.calibration.inspection.across_runs import inspect_drives
-from gateway.calibration.inspection.drive import SplitRun, row_facts
+from gateway.calibration.inspection.facts import SplitRun, row_facts
 from gateway.calibration.inspection.roll import roll_sign_of
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import known_drive
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.scheduler import Scheduler
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M, Vehicle, front_share_pct
@@ -47,8 +47,8 @@ def runs(
         batches = (*scheduler.feed(motion), *scheduler.flush())
         share_pct = front_share_pct(vehicle, payload_kg, 0.5 * vehicle.wheelbase_m)
         noted_m = left_m if are_places_noted else None
-        run = KnownRun(number, f"{number}.log", payload_kg, share_pct, batches, noted_m)
-        split.append(SplitRun(run, replace(run, batches=()), row_facts(motion, traits_of_reference())))
+        run = known_drive(number, f"{number}.log", payload_kg, share_pct, batches, noted_m)
+        split.append(SplitRun(run, facts=row_facts(motion, traits_of_reference())))
     return split
 
 

@@ -9,8 +9,8 @@ from support.known_runs import LOADS, SIBLING, known_run
 from support.model_road import times
 
 from gateway.calibration.contradicted import contradictions
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.fitter_answers import doubts_of
+from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.core.vehicle import Vehicle
 from gateway.model.vehicle_model import VehicleModel
 from gateway.stated.doubt import Doubt, DoubtKind
@@ -117,18 +117,18 @@ def sister() -> VehicleModel:
 
 
 @pytest.fixture(scope="module")
-def empty() -> KnownRun:
+def empty() -> StatedDrive:
     return known_run(1, 0.0, None, seed=7, car=SIBLING)
 
 
-def doubted(run: KnownRun, sister: VehicleModel | None, **false: Any) -> tuple[Doubt, ...]:
+def doubted(run: StatedDrive, sister: VehicleModel | None, **false: Any) -> tuple[Doubt, ...]:
     """What contradicts these facts after a drive that is said to be empty."""
     vehicle = replace(VAN, **false)
-    claimed = replace(run, payload_kg=0.0, front_share_pct=vehicle.empty_front_share_pct)
+    claimed = known_drive(1, "1.log", 0.0, vehicle.empty_front_share_pct, run.batches)
     return contradictions([claimed], vehicle, taught_by([claimed], vehicle, sister), sister)
 
 
-def test_true_facts_are_not_doubted(sister: VehicleModel, empty: KnownRun) -> None:
+def test_true_facts_are_not_doubted(sister: VehicleModel, empty: StatedDrive) -> None:
     assert doubted(empty, sister) == ()
     assert doubted(empty, None) == ()
 
@@ -156,7 +156,7 @@ NEAR_SENSOR = pytest.approx(VAN.sensor_position_m, abs=0.1)
     ],
 )
 def test_false_facts_are_doubted_and_places_measured(
-    sister: VehicleModel, empty: KnownRun, false: dict[str, float], kind: DoubtKind, found_m: Any, has_sister: bool
+    sister: VehicleModel, empty: StatedDrive, false: dict[str, float], kind: DoubtKind, found_m: Any, has_sister: bool
 ) -> None:
     found = {one.kind: one for one in doubted(empty, sister if has_sister else None, **false)}
     assert found[kind].numbers.get("found_m") == found_m

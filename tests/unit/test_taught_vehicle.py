@@ -7,7 +7,7 @@ import pytest
 from support.half_car_road import KNOWN, VAN, batch_over_road
 
 from gateway.calibration.found import Taught
-from gateway.calibration.read_drive import TaughtDrive
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.calibration.statements import NOTHING_KNOWN, Statement, empty, load_prior_of
 from gateway.calibration.teach import teach
 from gateway.core.cargo import known_shape
@@ -24,8 +24,8 @@ def stated(payload_kg: float, share_pct: float) -> Statement:
     )
 
 
-def drive(i: int, statement: Statement, load: tuple[float, float], speed_mps: float = 14.0) -> TaughtDrive:
-    return TaughtDrive(f"drive {i}", (batch_over_road(*load, seed=10 * i, speed_mps=speed_mps),), statement)
+def drive(i: int, statement: Statement, load: tuple[float, float], speed_mps: float = 14.0) -> StatedDrive:
+    return StatedDrive(f"drive {i}", (batch_over_road(*load, seed=10 * i, speed_mps=speed_mps),), statement)
 
 
 @cache
@@ -67,7 +67,7 @@ def test_each_statement_is_compared_with_its_drive_weighed_without_it() -> None:
 
 
 def test_drives_without_steady_driving_teach_nothing() -> None:
-    short = TaughtDrive("short", (batch_over_road(0.0, 52.0, seed=1, duration_s=4.0),), empty())
+    short = StatedDrive("short", (batch_over_road(0.0, 52.0, seed=1, duration_s=4.0),), empty())
     with pytest.raises(CalibrationImpossibleError, match="enough steady driving"):
         teach([short], VAN)
 

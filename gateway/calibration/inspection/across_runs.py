@@ -8,11 +8,11 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.inspection.drive import SplitRun
+from gateway.calibration.inspection.facts import SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.inspection.run_checks import inspect_run
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import Vehicle
 from gateway.estimates.quantity import Z95
@@ -94,11 +94,11 @@ def inspect_drives(
     if (std_m := vehicle.sensor_left_std_m) > HARDLY_KNOWN_M:
         text = f"sensor_offset_left_m is {vehicle.sensor_left_m:g} ± {Z95 * std_m:.2g} m (95 %)"
         findings.append(Finding.of(Kind.SENSOR_OFFSET_UNKNOWN, text))
-    verdicts = (RunVerdict(one.run.number, one.run.name, tuple(found[one.run.number])) for one in drives)
+    verdicts = (RunVerdict(one.run.number, one.run.log, tuple(found[one.run.number])) for one in drives)
     return Inspection(tuple(drives), tuple(verdicts), tuple(findings))
 
 
-def _usable(drives: Sequence[SplitRun], found: Mapping[int, Sequence[Finding]]) -> list[KnownRun]:
+def _usable(drives: Sequence[SplitRun], found: Mapping[int, Sequence[Finding]]) -> list[StatedDrive]:
     """The identification parts of the runs in which no fault was found so far."""
     runs = [one.identification for one in drives if one.has_identification]
     return [run for run in runs if not any(one.severity is Severity.FAULT for one in found[run.number])]
@@ -149,9 +149,9 @@ def _beside_the_others(drives: Sequence[SplitRun]) -> OfRun:
             yield number, Finding.of(Kind.SMOOTH_ROAD, text)
 
 
-def load_findings(runs: Sequence[KnownRun], vehicle: Vehicle) -> Iterator[Finding]:
+def load_findings(runs: Sequence[StatedDrive], vehicle: Vehicle) -> Iterator[Finding]:
     """Whether these loads and positions separate payload from front share, and both from chance."""
-    known = [run for run in runs if isfinite(run.payload_kg) and isfinite(run.front_share_pct)]
+    known = [run for run in runs if run.is_known]
     if not known:
         return
     loads = sorted({(run.payload_kg, round(run.front_share_pct, 2)) for run in known})

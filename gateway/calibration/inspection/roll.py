@@ -22,9 +22,9 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.inspection.axes import reading_of
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.late import special
-from gateway.core.vehicle import Vehicle, cg_left_m
+from gateway.core.vehicle import PAYLOAD_LEFT_NOTED_STD_M, PAYLOAD_LEFT_STD_M, Vehicle, cg_left_m
 from gateway.estimates.quantity import Z95
 from gateway.model.spectra import CrossSpectra, cross_spectra_of
 
@@ -71,7 +71,7 @@ class RollSign:
     why: str
 
 
-def roll_sign_of(runs: Sequence[KnownRun], vehicle: Vehicle) -> RollSign | None:
+def roll_sign_of(runs: Sequence[StatedDrive], vehicle: Vehicle) -> RollSign | None:
     """The combined evidence of these runs; None if none has a roll rate."""
     rows = [row for run in runs if (row := _rolled(run, vehicle)) is not None]
     if not rows:
@@ -99,7 +99,7 @@ def roll_sign_of(runs: Sequence[KnownRun], vehicle: Vehicle) -> RollSign | None:
     )
 
 
-def _rolled(run: KnownRun, vehicle: Vehicle) -> tuple[float, float, float] | None:
+def _rolled(run: StatedDrive, vehicle: Vehicle) -> tuple[float, float, float] | None:
     """The lever arm from the spectra, the stated place of the centre of gravity, and its standard deviation (m)."""
     spectra = cross_spectra_of(run.batches, reading_of(vehicle))
     if spectra is None or not spectra.has_roll:
@@ -107,5 +107,7 @@ def _rolled(run: KnownRun, vehicle: Vehicle) -> tuple[float, float, float] | Non
     payload_kg = (
         run.payload_kg if isfinite(run.payload_kg) else vehicle.payload_range_kg[1]
     )  # an unknown one may be any
-    std_m = run.payload_left_std_m * payload_kg / (vehicle.empty_mass_kg + payload_kg)
-    return lever_m(spectra), cg_left_m(vehicle, payload_kg, run.payload_left_m or 0.0), std_m
+    left_m = run.statement.left_m
+    left_std_m = PAYLOAD_LEFT_STD_M if left_m is None else PAYLOAD_LEFT_NOTED_STD_M
+    std_m = left_std_m * payload_kg / (vehicle.empty_mass_kg + payload_kg)
+    return lever_m(spectra), cg_left_m(vehicle, payload_kg, left_m or 0.0), std_m

@@ -15,7 +15,7 @@ import numpy as np
 
 from gateway.calibration.as_stated import stated_load, stated_run
 from gateway.calibration.inspection.axes import Phases, fitted_position_m, phases, reading_of
-from gateway.calibration.inspection.drive import SplitRun, Stream
+from gateway.calibration.inspection.facts import SplitRun, Stream
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.roll import EXCHANGED, over_pitch, pitch_coherence
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE, REASON_SHARE_MIN
@@ -95,7 +95,7 @@ def inspect_run(
         seen.found += list(check(seen))
     order = list(Severity)
     found = sorted(seen.found, key=lambda one: order.index(one.severity))
-    return RunVerdict(run.number, run.name, tuple(one for one in found if one.kind in only))
+    return RunVerdict(run.number, run.log, tuple(one for one in found if one.kind in only))
 
 
 class _Seen:

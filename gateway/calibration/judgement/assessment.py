@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from gateway.calibration.file import CalibrationFile
-from gateway.calibration.from_drives import Outcome, drive_name
+from gateway.calibration.from_drives import Outcome
 from gateway.calibration.judgement.evaluation import ErrorTable, Judged, error_table, judge
 from gateway.core.vehicle import Vehicle
 from gateway.estimates.budget import BudgetLine, typical_budget
@@ -110,9 +110,9 @@ def judged_left_out(outcome: Outcome, estimator: str) -> list[Judged]:
         taught = outcome.cross_spectrum.without if outcome.cross_spectrum else {}
         identified = [one.identification for one in outcome.split]
         without = {
-            run.number: replace(whole, cross_spectrum=taught[name], is_shape_known=run.statement.is_compact)
+            run.number: replace(whole, cross_spectrum=taught[run.name], is_shape_known=run.statement.is_compact)
             for run in identified
-            if (name := drive_name(run.number)) in taught
+            if run.name in taught
         }
     runs = [one.identification for one in outcome.split if one.identification.number in without]
     return [one for run in runs for one in judge([run], without[run.number], estimator)]

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, NamedTuple, get_args
 import numpy as np
 
 from gateway.calibration.judgement.coverage import interval_scores
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.cargo import is_said
 from gateway.core.vehicle import Vehicle, cg_left_m
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, Unsprung, weighed, weights_of
@@ -300,18 +300,18 @@ def _known(number: float) -> float | None:
     return number if isfinite(number) else None
 
 
-def judge(runs: Iterable[KnownRun], calibrated: CalibratedVehicle, estimator: str) -> list[Judged]:
+def judge(runs: Iterable[StatedDrive], calibrated: CalibratedVehicle, estimator: str) -> list[Judged]:
     """Every batch of every run with its estimate."""
     return [
         Judged(
             run.number,
-            run.name,
+            run.log,
             run.payload_kg,
             run.front_share_pct,
             weighed(_budgeted(batch, calibrated, estimator), calibrated.vehicle, calibrated.unsprung),
             _noted_cg_left_m(run, calibrated.vehicle),
             calibrated.unsprung,
-            run.payload_plus_minus_kg,
+            run.statement.payload_plus_minus_kg,
         )
         for run in runs
         for batch in run.batches
@@ -330,8 +330,9 @@ def _budgeted(batch: Batch, calibrated: CalibratedVehicle, estimator: str) -> Es
     return replace(found.answered(beside_known), error_budget=budget)
 
 
-def _noted_cg_left_m(run: KnownRun, vehicle: Vehicle) -> float:
+def _noted_cg_left_m(run: StatedDrive, vehicle: Vehicle) -> float:
     """An empty vehicle's is the one that the campaign states; NaN for a load without a stated position."""
-    if run.payload_kg > 0.0 and run.payload_left_m is None:
+    left_m = run.statement.left_m
+    if run.payload_kg > 0.0 and left_m is None:
         return nan
-    return cg_left_m(vehicle, run.payload_kg, run.payload_left_m or 0.0)
+    return cg_left_m(vehicle, run.payload_kg, left_m or 0.0)

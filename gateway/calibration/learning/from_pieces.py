@@ -4,7 +4,7 @@ import hashlib
 import json
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from itertools import chain
 from math import isfinite, nan
 from statistics import median
@@ -15,13 +15,13 @@ import numpy as np
 from gateway.calibration.assigned import Assigned, assign
 from gateway.calibration.file import CalibrationFile
 from gateway.calibration.found import FoundClaim, FoundLoad
-from gateway.calibration.from_drives import OnFit, Outcome, calibrate_inspected, drive_name
+from gateway.calibration.from_drives import OnFit, Outcome, calibrate_inspected
 from gateway.calibration.inspection.across_runs import Inspection
-from gateway.calibration.inspection.drive import LogFacts, RowFacts, SplitRun
+from gateway.calibration.inspection.facts import LogFacts, RowFacts, SplitRun
 from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
 from gateway.calibration.inspection.run_checks import inspect_run
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.learning.windows import Driven, chosen
+from gateway.calibration.stated_drive import StatedDrive, drive_name
 from gateway.calibration.statements import Statement
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import Vehicle, front_share_pct
@@ -143,8 +143,8 @@ def learn(
     split, verdicts = [], []
     for number, i in enumerate(used, 1):
         run = _run(number, driven[i], assigned.statements[i], vehicle)
-        split.append(SplitRun(run, replace(run, batches=()), log=_facts(driven[i])))
-        verdicts.append(RunVerdict(number, run.name))
+        split.append(SplitRun(run, log=_facts(driven[i])))
+        verdicts.append(RunVerdict(number, run.log))
     outcome = calibrate_inspected(
         vehicle,
         Inspection(tuple(split), tuple(verdicts), ()),
@@ -196,25 +196,15 @@ def inspected(
     name: str, batches: Sequence[Batch], rows: RowFacts, log: LogFacts, vehicle: Vehicle, settings: BatchSettings
 ) -> tuple[Finding, ...]:
     """What is wrong with the sensors, the map or the log of an ordinary drive, whatever is known of its load."""
-    run = KnownRun(1, name, nan, nan, tuple(batches))
-    whole = SplitRun(run, replace(run, batches=()), rows, log=log)
+    whole = SplitRun(StatedDrive(drive_name(1), tuple(batches), number=1, log=name), facts=rows, log=log)
     return inspect_run(whole, vehicle, settings, LOOKED_FOR).findings
 
 
-def _run(number: int, one: Driven, statement: Statement, vehicle: Vehicle) -> KnownRun:
+def _run(number: int, one: Driven, statement: Statement, vehicle: Vehicle) -> StatedDrive:
     payload_kg = nan if statement.payload_kg is None else statement.payload_kg
     share_pct = nan
     if statement.front_share_pct is not None:
         share_pct = statement.front_share_pct
     elif isfinite(payload_kg) and statement.has_place:
         share_pct = front_share_pct(vehicle, payload_kg, statement.position_m)
-    return KnownRun(
-        number,
-        one.name,
-        payload_kg,
-        share_pct,
-        one.batches,
-        statement.left_m,
-        statement.payload_plus_minus_kg,
-        said=statement,
-    )
+    return StatedDrive(drive_name(number), one.batches, statement, payload_kg, share_pct, number, one.name)

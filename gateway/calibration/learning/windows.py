@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from gateway.calibration.assigned import Piece
-from gateway.calibration.inspection.drive import RowFacts, joined_facts
+from gateway.calibration.inspection.facts import RowFacts, joined_facts
 from gateway.calibration.kept import KeptBatch
 from gateway.calibration.learning.spans import ENOUGH_S, can_teach, spans_of, teaching_most
 from gateway.core.batch_settings import BatchSettings

@@ -19,7 +19,6 @@ import numpy as np
 from gateway.calibration.assigned import moments
 from gateway.calibration.file import load_calibration
 from gateway.calibration.found import FoundLoad
-from gateway.calibration.from_drives import drive_name
 from gateway.calibration.judgement.advice import verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
 from gateway.calibration.kept import KeptBatch, unpacked
@@ -28,6 +27,7 @@ from gateway.calibration.learning.job import JOB, RESULT, LearnJob, LearnResult
 from gateway.calibration.learning.spans import standing
 from gateway.calibration.learning.told import drives_record, learning_record, statements_record
 from gateway.calibration.learning.windows import pieces
+from gateway.calibration.stated_drive import drive_name
 from gateway.core.batch_settings import BatchSettings
 from gateway.errors import CalibrationFileError, KeptBatchError, SpringscaleError
 from gateway.estimates.posterior import Posterior

@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.bands import BandChoice, Pairs, candidates, ratios
 from gateway.calibration.ratio_index.least_squares import (
     FittedRegression,
@@ -23,6 +22,7 @@ from gateway.calibration.ratio_index.least_squares import (
     without_each_run,
 )
 from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, SpectrumTable, spectrum_table
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.late import special
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.ratio_index.regression import (
@@ -171,7 +171,7 @@ class RatioIndexFit:
 
 
 def fit_ratio_index(
-    runs: Sequence[KnownRun],
+    runs: Sequence[StatedDrive],
     vehicle: Vehicle,
     *,
     bands: BandChoice = "campaign",

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.ratio_index.index import (
     RatioIndexCalibration,
     acceleration_segments,
@@ -67,14 +67,14 @@ class SpectrumTable:
         )
 
 
-def spectrum_table(runs: Sequence[KnownRun], sensor_offset_left_m: float = 0.0) -> SpectrumTable:
+def spectrum_table(runs: Sequence[StatedDrive], sensor_offset_left_m: float = 0.0) -> SpectrumTable:
     """Every counted batch with a spectrum of each mapped sensor; runs sorted by name, then by time.
 
     With a roll rate in every batch the acceleration is that of the centre line, sensor_offset_left_m to the right of
     the sensor; else all are taken as measured. Raises CalibrationImpossibleError without any spectrum.
     """
     batches = [(run, batch) for run in runs for batch in run.batches if not batch.rejected]
-    batches.sort(key=lambda one: (one[0].name, one[1].t_start_ns, one[0].payload_kg, one[0].number))
+    batches.sort(key=lambda one: (one[0].log, one[1].t_start_ns, one[0].payload_kg, one[0].number))
     rows = [(run, batch, *_spectra(batch, 0.0)) for run, batch in batches]
     heard = [batch for _, batch, a, _ in rows if a is not None]
     roll_lever_m = 0.0
@@ -130,7 +130,7 @@ class IndexRows:
     rg: F64
 
 
-def index_rows(runs: Sequence[KnownRun], calibration: RatioIndexCalibration) -> IndexRows:
+def index_rows(runs: Sequence[StatedDrive], calibration: RatioIndexCalibration) -> IndexRows:
     """The ratio indexes of all sound batches of ``runs``; an index whose bands are not calibrated is NaN."""
     wanted = [calibration.acceleration_bands is not None, calibration.pitch_rate_bands is not None]
     rows = [

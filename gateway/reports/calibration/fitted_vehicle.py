@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.found import FoundLoad, Taught
-from gateway.calibration.from_drives import drive_name
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive, drive_name
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model.expected import with_strokes
 from gateway.model.spectra import CrossSpectra, cross_spectra_of
@@ -24,7 +23,7 @@ from gateway.reports.charts import Axis, Chart, LineMark, Panel, Section, Table
 class RunFit:
     """One run: its measurement, the model's prediction at its load, known or found, and their agreement."""
 
-    run: KnownRun
+    run: StatedDrive
     load: Load
     measured: Spectra
     modelled: Spectra
@@ -35,7 +34,7 @@ class RunFit:
         return f"Run {self.run.number}: {self.run.described}"
 
 
-def fits_of(runs: Sequence[KnownRun], model: VehicleModel, found: Sequence[FoundLoad]) -> list[RunFit]:
+def fits_of(runs: Sequence[StatedDrive], model: VehicleModel, found: Sequence[FoundLoad]) -> list[RunFit]:
     """Every run with enough steady driving, at its load and with its deviations from the vehicle; where a drive is not
     among the found ones, at the stated load and without.
 
@@ -89,7 +88,7 @@ def _spectra(freq_hz: F64, parts: F64) -> Spectra:
 
 
 def fitted_vehicle_section(
-    runs: Sequence[KnownRun],
+    runs: Sequence[StatedDrive],
     taught: Taught,
     vehicle: Vehicle,
 ) -> Section:

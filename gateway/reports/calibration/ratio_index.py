@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.index_fit import RatioIndexFit
 from gateway.calibration.ratio_index.spectra_table import IndexRows, index_rows
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.core.ratio_index.regression import RegressionModel
 from gateway.records import F64
@@ -18,7 +18,7 @@ N_ALONG: Final = 60  # chosen: points of a curve
 
 
 def ratio_index_section(
-    fit: RatioIndexFit, identification: Sequence[KnownRun], validation: Sequence[KnownRun]
+    fit: RatioIndexFit, identification: Sequence[StatedDrive], validation: Sequence[StatedDrive]
 ) -> Section:
     """R_a and R_g of every batch, the bands and the regression through them, and its coefficients."""
     calibration = fit.calibration

@@ -2,7 +2,7 @@
 
 from gateway.calibration.file import DrivePart
 from gateway.calibration.from_drives import Outcome
-from gateway.calibration.inspection.drive import SplitRun
+from gateway.calibration.inspection.facts import SplitRun
 from gateway.calibration.inspection.finding import Finding, RunVerdict
 from gateway.calibration.judgement.assessment import Assessment
 from gateway.estimates.quantity import Z95
@@ -24,15 +24,15 @@ def runs_section(outcome: Outcome) -> Section:
 def _run_row(verdict: RunVerdict, driven: SplitRun | None) -> tuple[str, ...]:
     if driven is None:
         return (str(verdict.number), verdict.name, _verdict(verdict), *(NONE,) * 5)
-    run, batches = driven.identification, [*driven.identification.batches, *driven.validation.batches]
+    run, batches = driven.identification, [*driven.identification.batches, *driven.validating]
     refused = [b for b in batches if b.rejected and Why.TOO_SHORT not in b.rejected]  # a run's last piece is no batch
     return (
         str(run.number),
-        run.name,
+        run.log,
         _verdict(verdict),
         known(run.statement.payload_kg, " kg"),
         known(run.statement.front_share_pct, " %", ".1f"),
-        *(str(sum(not batch.rejected for batch in part.batches)) for part in (run, driven.validation)),
+        *(str(sum(not batch.rejected for batch in part)) for part in (run.batches, driven.validating)),
         str(len(refused)),
     )
 

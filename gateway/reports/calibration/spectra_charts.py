@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from scipy.special import gammaincinv
 
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.ratio_index.index import Band, RatioIndexCalibration
 from gateway.core.spectrum import frequencies_hz, segment_starts, segment_transforms
 from gateway.records import F64, Batch
@@ -58,14 +58,14 @@ def density_of(batches: Iterable[Batch], sensor: str) -> Density | None:
     return Density(freq_hz[kept], np.sqrt(mean), low, high, n_segments)
 
 
-def spectra_section(runs: Sequence[KnownRun], ratio_index: RatioIndexCalibration | None) -> Section | None:
+def spectra_section(runs: Sequence[StatedDrive], ratio_index: RatioIndexCalibration | None) -> Section | None:
     """Acceleration by payload and pitch rate by front share, a chart each, for a colour is one load or one share.
 
     Runs of which the load is not known are left out. None where there is no spectrum at all.
     """
     by_payload, by_share = defaultdict(list), defaultdict(list)
     for run in runs:
-        if run.has_payload and run.has_place:
+        if run.is_known:
             by_payload[run.payload_kg].append(run)
             by_share[round(run.front_share_pct, 1)].append(run)
     loads = {f"{kg:g} kg": by_payload[kg] for kg in sorted(by_payload)}
@@ -78,7 +78,9 @@ def spectra_section(runs: Sequence[KnownRun], ratio_index: RatioIndexCalibration
     return Section("spectra", "Spectra", (), charts) if charts else None
 
 
-def _chart(sensor: str, by: str, groups: Mapping[str, list[KnownRun]], bands: tuple[Band, Band] | None) -> Chart | None:
+def _chart(
+    sensor: str, by: str, groups: Mapping[str, list[StatedDrive]], bands: tuple[Band, Band] | None
+) -> Chart | None:
     """A curve for each group of runs, or for some of many; None without a spectrum."""
     labels = list(groups)
     some = sorted({round(at) for at in np.linspace(0, len(labels) - 1, MOST_CURVES).tolist()}) if labels else []

@@ -10,11 +10,11 @@ import numpy as np
 
 from gateway.calibration.campaign_file import Campaign, file_sha256, load_campaign
 from gateway.calibration.from_drives import calibrate_inspected
-from gateway.calibration.inspection.drive import SplitRun
+from gateway.calibration.inspection.facts import SplitRun
 from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.least_squares import fit_regression
 from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, index_rows
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
@@ -59,15 +59,15 @@ class DrivenCampaign:
     splits: tuple[SplitRun, ...]
 
     @property
-    def identification(self) -> list[KnownRun]:
+    def identification(self) -> list[StatedDrive]:
         return [split.identification for split in self.splits if split.identification.batches]
 
     @property
-    def validation(self) -> list[KnownRun]:
+    def validation(self) -> list[StatedDrive]:
         return [split.validation for split in self.splits if split.validation.batches]
 
     @property
-    def runs(self) -> list[KnownRun]:
+    def runs(self) -> list[StatedDrive]:
         return [*self.identification, *self.validation]
 
 
@@ -79,7 +79,7 @@ class Method:
     estimator: str
     calibrated: CalibratedVehicle
 
-    def judge(self, runs: Sequence[KnownRun]) -> list[Judged]:
+    def judge(self, runs: Sequence[StatedDrive]) -> list[Judged]:
         return judge(runs, self.calibrated, self.estimator)
 
 
@@ -167,12 +167,12 @@ def with_paper_bands(calibrated: CalibratedVehicle, driven: DrivenCampaign) -> C
     )
 
 
-def condition_of(run: KnownRun) -> str:
+def condition_of(run: StatedDrive) -> str:
     """ "08_L225_D50.0_50kmh_iri2/can.log.gz" -> "50kmh iri2"."""
-    return " ".join(run.name.split("/", maxsplit=1)[0].split("_")[3:])
+    return " ".join(run.log.split("/", maxsplit=1)[0].split("_")[3:])
 
 
-def mean_errors(run: KnownRun, method: Method) -> tuple[float, float]:
+def mean_errors(run: StatedDrive, method: Method) -> tuple[float, float]:
     """Mean error of payload [kg] and share [points] over a run's batches, with the ratio index's gates disabled."""
     if method.estimator == RATIO_INDEX and method.calibrated.ratio_index is not None:
         calibration = method.calibrated.ratio_index

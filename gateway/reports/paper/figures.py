@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.judgement.evaluation import Judged, Target
-from gateway.calibration.known_run import KnownRun
 from gateway.calibration.ratio_index.least_squares import fit_regression
 from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, index_rows
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.ratio_index.index import PAPER_BANDS, band_pass_gain, mean_spectrum
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
 from gateway.records import F64
@@ -108,7 +108,7 @@ def figures_of(experiments: Experiments) -> list[Section]:
     ]
 
 
-def spectrum_of(run: KnownRun, sensor: str) -> tuple[F64, F64]:
+def spectrum_of(run: StatedDrive, sensor: str) -> tuple[F64, F64]:
     """Mean amplitude spectrum over a run's batches: frequencies (m,) and amplitudes (m,), NaN if no batch is usable."""
     freq_hz, total, n = np.arange(1.0, 205.0) * (50.0 / N_SEGMENT), np.zeros(204), 0
     for batch in run.batches:
@@ -201,7 +201,7 @@ def _by_level(x: F64, y: F64, level: F64, unit: str) -> Iterator[Points]:
 
 def _roads(experiments: Experiments) -> Iterator[Panel]:
     """Spectra for two roughnesses; the road's low-pass (1) at several speeds, with and without the wheelbase filter."""
-    named = [(iri, run) for iri in (2, 8) for run in experiments.driven["sensitivity"].runs if f"iri{iri}" in run.name]
+    named = [(iri, run) for iri in (2, 8) for run in experiments.driven["sensitivity"].runs if f"iri{iri}" in run.log]
     lines = (LineMark(*spectrum_of(run, ACCELERATION), f"IRI {iri}", k) for k, (iri, run) in enumerate(named))
     yield Panel(_FREQUENCY, _SPECTRUM[ACCELERATION], tuple(lines))
     freq_hz, marks = np.linspace(0.05, 10.0, 800), []
@@ -256,7 +256,7 @@ def _experimental_grid(experiments: Experiments) -> Iterator[Panel]:
     yield Panel(_LOAD, _SHARE, (Points(load_kg, share_pct, marker="square"),))
 
 
-def _parts_of_experiment(experiments: Experiments) -> tuple[tuple[str, list[KnownRun], Marker], ...]:
+def _parts_of_experiment(experiments: Experiments) -> tuple[tuple[str, list[StatedDrive], Marker], ...]:
     driven = experiments.driven["experiment"]
     return ("identification", driven.identification, "circle"), ("validation", driven.validation, "square")
 

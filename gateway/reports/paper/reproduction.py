@@ -183,7 +183,7 @@ def _findings(experiments: Experiments) -> Section:
 
 def worst_errors(experiments: Experiments, method: Method, part: str) -> tuple[float, float]:
     """Largest mean error of payload [kg] and share [points] over the sensitivity runs whose name contains ``part``."""
-    runs = [run for run in experiments.driven["sensitivity"].runs if part in run.name]
+    runs = [run for run in experiments.driven["sensitivity"].runs if part in run.log]
     errors = np.abs([mean_errors(run, method) for run in runs])
     answered = errors[np.isfinite(errors).all(axis=1)]
     return (float(np.max(answered[:, 0])), float(np.max(answered[:, 1]))) if len(answered) else (np.nan, np.nan)

@@ -1,15 +1,15 @@
 """A drive as it is inspected: its two parts, the facts of its rows before they are cut into batches, and of its log."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan
 
 import numpy as np
 
-from gateway.calibration.known_run import KnownRun
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.batch import Traits
 from gateway.core.timeline import sample_rate_hz
-from gateway.records import ASIDE, Motion, SensorTraits, Signal
+from gateway.records import ASIDE, Batch, Motion, SensorTraits, Signal
 from gateway.units import NS_PER_S
 
 
@@ -127,18 +127,23 @@ class LogFacts:
 class SplitRun:
     """One drive's two parts, either of which may have no batch, with the facts of its rows and of its log.
 
-    has_identification is False if the campaign keeps the whole drive for validation. Only the identification part can
-    spoil a calibration, so facts, batches and run are of that part alone, and of validation only if there is no other:
-    the data that judge a calibration must not change it.
+    ``validating`` are the batches of the second part. has_identification is False if the campaign keeps the whole drive
+    for validation. Only the identification part can spoil a calibration, so facts, batches and run are of that part
+    alone, and of validation only if there is no other: the data that judge a calibration must not change it.
     """
 
-    identification: KnownRun
-    validation: KnownRun
+    identification: StatedDrive
+    validating: tuple[Batch, ...] = ()
     facts: RowFacts = field(default_factory=RowFacts)
     has_identification: bool = True
     log: LogFacts = field(default_factory=LogFacts)
 
     @property
-    def run(self) -> KnownRun:
+    def validation(self) -> StatedDrive:
+        """The second part."""
+        return replace(self.identification, batches=self.validating)
+
+    @property
+    def run(self) -> StatedDrive:
         """The part to inspect."""
         return self.identification if self.has_identification else self.validation
