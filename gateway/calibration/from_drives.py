@@ -12,12 +12,12 @@ from gateway.calibration.contradicted import contradictions
 from gateway.calibration.file import CalibrationFile, DrivePart, ExpectedErrorsPart, FoundPart, ProvenancePart, SeenPart
 from gateway.calibration.found import ClaimState, FoundClaim, FoundLoad, Taught
 from gateway.calibration.inspection.across_runs import Inspection
-from gateway.calibration.inspection.facts import SplitRun
+from gateway.calibration.inspection.facts import InspectedRun
 from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.calibration.ratio_index.index_fit import RatioIndexFit, fit_ratio_index
 from gateway.calibration.sister import require_alike, sister_in
-from gateway.calibration.stated_drive import StatedDrive, drive_name, sensor_rate_seen_hz
+from gateway.calibration.stated_drive import StatedDrive, sensor_rate_seen_hz
 from gateway.calibration.teach import examined, teach
 from gateway.core.spectrum import roughness_mps2, spectra_of
 from gateway.core.vehicle import Load, Vehicle
@@ -44,7 +44,7 @@ class Outcome:
     doubts: tuple[Doubt, ...] = ()
 
     @property
-    def split(self) -> tuple[SplitRun, ...]:
+    def used(self) -> tuple[InspectedRun, ...]:
         """The runs without a fault, which were used for the calibration."""
         return self.inspection.usable
 
@@ -72,9 +72,9 @@ def calibrate_inspected(
     """
     if inspection.refusal is not None:
         faults = [
-            f"run {verdict.number}: {one.kind}: {one.text}: {one.advice}"
-            for verdict in inspection.verdicts
-            for one in verdict.findings
+            f"run {run.run.number}: {one.kind}: {one.text}: {one.advice}"
+            for run in inspection.runs
+            for one in run.findings
             if one.severity is Severity.FAULT
         ]
         refusal = f"{where}: {inspection.refusal}"
@@ -149,18 +149,23 @@ def with_statements_tested(inspection: Inspection, vehicle: Vehicle, like: Calib
 
 def _with_disagreements(inspection: Inspection, claims: Sequence[FoundClaim]) -> Inspection:
     """The inspection with a warning for each run whose statement was held: the drives contradict it beyond chance."""
-    runs = {one.run.name: one.run for one in inspection.split}
-    verdicts = {drive_name(one.number): one for one in inspection.verdicts}
-    for claim in {one.drive: one for one in claims if one.state is ClaimState.HELD}.values():
-        shown = f"the drive shows {claim.without_kg:.0f} ± {Z95 * claim.without_std_kg:.0f} kg"
-        shown += " at another place" if claim.is_of_place else ""
-        text = f"the campaign says {runs[claim.drive].described}, {shown}; the statement taught nothing"
-        kind = Kind.LOAD_DISAGREES
-        if claim.exchanged_with is not None:
-            kind, text = Kind.LOADS_SWAPPED, f"{text}; exchanged with {claim.exchanged_with}, both fit far better"
-        found = verdicts[claim.drive]
-        verdicts[claim.drive] = replace(found, findings=(*found.findings, Finding.of(kind, text)))
-    return replace(inspection, verdicts=tuple(verdicts.values()))
+    held = {one.drive: one for one in claims if one.state is ClaimState.HELD}
+    runs = [
+        replace(one, findings=(*one.findings, _disagreement(one.run, held[one.run.name])))
+        if one.run.name in held
+        else one
+        for one in inspection.runs
+    ]
+    return replace(inspection, runs=tuple(runs))
+
+
+def _disagreement(run: StatedDrive, claim: FoundClaim) -> Finding:
+    shown = f"the drive shows {claim.without_kg:.0f} ± {Z95 * claim.without_std_kg:.0f} kg"
+    shown += " at another place" if claim.is_of_place else ""
+    text = f"the campaign says {run.described}, {shown}; the statement taught nothing"
+    if claim.exchanged_with is None:
+        return Finding.of(Kind.LOAD_DISAGREES, text)
+    return Finding.of(Kind.LOADS_SWAPPED, f"{text}; exchanged with {claim.exchanged_with}, both fit far better")
 
 
 def _as_believed(inspection: Inspection, claims: Sequence[FoundClaim], taught: Taught | None) -> Inspection:
@@ -176,8 +181,8 @@ def _as_believed(inspection: Inspection, claims: Sequence[FoundClaim], taught: T
         statement = replace(run.statement, payload_plus_minus_kg=Z95 * found.stated_std_kg)
         return replace(run, statement=statement, payload_kg=found.stated_kg)
 
-    split = [replace(one, identification=believed(one.identification)) for one in inspection.split]
-    return replace(inspection, split=tuple(split))
+    runs = [replace(one, identification=believed(one.identification)) for one in inspection.runs]
+    return replace(inspection, runs=tuple(runs))
 
 
 def _seen(runs: Sequence[StatedDrive], taught: Taught | None) -> SeenPart:
@@ -227,9 +232,11 @@ def _rms(errors: F64 | None) -> float | None:
     return float(np.sqrt(np.mean(known**2))) if known.size else None
 
 
-def _provenance(campaign_sha256: str, split: Sequence[SplitRun], taught: Taught | None, command: str) -> ProvenancePart:
+def _provenance(
+    campaign_sha256: str, runs: Sequence[InspectedRun], taught: Taught | None, command: str
+) -> ProvenancePart:
     drives = []
-    for one in split:
+    for one in runs:
         run, span_ns = one.identification, one.log.span_ns
         found = taught.load_of(run.name) if taught else None
         drives.append(

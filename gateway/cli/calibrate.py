@@ -12,8 +12,8 @@ from gateway.calibration.campaign_file import Campaign, file_sha256, load_campai
 from gateway.calibration.file import CalibrationFile, load_calibration
 from gateway.calibration.from_drives import Outcome, calibrate_inspected, with_statements_tested
 from gateway.calibration.inspection.across_runs import Inspection
-from gateway.calibration.inspection.facts import SplitRun
-from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
+from gateway.calibration.inspection.facts import InspectedRun
+from gateway.calibration.inspection.finding import Finding, Kind
 from gateway.calibration.judgement.advice import Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import assess_calibration
 from gateway.calibration.learning.fitter_answers import doubts_of_vehicle
@@ -42,8 +42,8 @@ def inspection_sentences(inspection: Inspection) -> str:
     runs.
     """
     lines: list[str] = []
-    for one, verdict in zip(inspection.split, inspection.verdicts, strict=True):
-        lines += [_run_line(one, verdict), *_finding_lines(verdict.findings)]
+    for one in inspection.runs:
+        lines += [_run_line(one), *_finding_lines(one.findings)]
     if inspection.findings:
         lines += ["all runs together", *_finding_lines(inspection.findings)]
     return "\n".join([*lines, _in_all(inspection)])
@@ -52,7 +52,7 @@ def inspection_sentences(inspection: Inspection) -> str:
 def _in_all(inspection: Inspection) -> str:
     """How many runs are usable, and the loads they cover."""
     runs = [one.identification for one in inspection.usable if one.has_identification]
-    counted = f"{len(inspection.usable)} of {len(inspection.split)} runs can be used"
+    counted = f"{len(inspection.usable)} of {len(inspection.runs)} runs can be used"
     if not runs:
         return counted
     payloads_kg, shares_pct = [run.payload_kg for run in runs], [run.front_share_pct for run in runs]
@@ -61,15 +61,15 @@ def _in_all(inspection: Inspection) -> str:
     return f"{counted}: {loads}, {shares} in front"
 
 
-def _run_line(one: SplitRun, verdict: RunVerdict) -> str:
+def _run_line(one: InspectedRun) -> str:
     batches = [batch for batch in (*one.identification.batches, *one.validating) if not batch.rejected]
     n_identifying = sum(not batch.rejected for batch in one.identification.batches)
     seconds = sum(batch.usable_share * batch.duration_s for batch in batches)
     n_validating = len(batches) - n_identifying
     driven = f"{n_identifying} batches for fitting, {n_validating} for validation, {seconds:.0f} s can be used"
-    words = "left out" if not verdict.is_usable else "sound" if not verdict.findings else "usable"
+    words = "left out" if not one.is_usable else "sound" if not one.findings else "usable"
     load = "load unknown" if isnan(one.run.payload_kg) else known(one.run.payload_kg, " kg")
-    return f"run {verdict.number} {verdict.name} ({load}): {words}; {driven}"
+    return f"run {one.run.number} {one.run.log} ({load}): {words}; {driven}"
 
 
 def _finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
@@ -84,12 +84,12 @@ def inspection_json(inspection: Inspection) -> dict[str, object]:
         "refusal": inspection.refusal,
         "runs": [
             {
-                "number": verdict.number,
-                "log": verdict.name,
-                "is_usable": verdict.is_usable,
-                "findings": [finding.to_json() for finding in verdict.findings],
+                "number": one.run.number,
+                "log": one.run.log,
+                "is_usable": one.is_usable,
+                "findings": [finding.to_json() for finding in one.findings],
             }
-            for verdict in inspection.verdicts
+            for one in inspection.runs
         ],
         "campaign_findings": [finding.to_json() for finding in inspection.findings],
     }

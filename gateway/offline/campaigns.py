@@ -13,7 +13,7 @@ from gateway.bus.signals.decode import SignalCounts
 from gateway.bus.signals.mapping import MappedMessage, id_name
 from gateway.calibration.campaign_file import Campaign, OnRun, RunTable, chosen_runs, file_sha256
 from gateway.calibration.inspection.across_runs import Inspection, inspect_drives
-from gateway.calibration.inspection.facts import LogFacts, SplitRun, row_facts
+from gateway.calibration.inspection.facts import InspectedRun, LogFacts, row_facts
 from gateway.calibration.judgement.evaluation import Judged, judge
 from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.batch_settings import BatchSettings
@@ -70,7 +70,7 @@ def split_runs(
     numbers: Sequence[int] | None = None,
     on_run: OnRun = lambda done, of: None,
     keeps_unreadable: bool = False,
-) -> list[SplitRun]:
+) -> list[InspectedRun]:
     """Read the logs of the chosen runs. Batches restart at the cut between the two parts.
 
     Raises LogUnreadableError for an unreadable log, or keeps it as a run without rows whose ``log`` has the reason.
@@ -85,14 +85,14 @@ def split_runs(
         except LogUnreadableError as fault:
             if not keeps_unreadable:
                 raise
-            drives.append(SplitRun(campaign.drive(number, run, ()), log=LogFacts(unreadable=str(fault))))
+            drives.append(InspectedRun(campaign.drive(number, run, ()), log=LogFacts(unreadable=str(fault))))
     on_run(len(runs), len(runs))
     return drives
 
 
 def _split_run(
     campaign: Campaign, number: int, run: RunTable, signal_map: SignalMap, settings: BatchSettings
-) -> SplitRun:
+) -> InspectedRun:
     log = campaign.log_of(run)
     whole, report = read_whole_log(log, signal_map)
     motion = rows_within(whole, Stretch(run.start_s, run.end_s))
@@ -101,7 +101,7 @@ def _split_run(
     first, last = (batches_of_motion(rows, signal_map, settings) for rows in both)
     facts = row_facts(both[0] if stretches[0] else both[1], signal_map.traits)
     log_facts = facts_of_log(log, whole, motion, report, signal_map, run.start_s)
-    return SplitRun(campaign.drive(number, run, first), last, facts, stretches[0] is not None, log_facts)
+    return InspectedRun(campaign.drive(number, run, first), last, facts, stretches[0] is not None, log_facts)
 
 
 def facts_of_log(
@@ -195,6 +195,6 @@ def judge_campaign(
     return judged
 
 
-def _judged_parts(run: SplitRun, split: Split) -> list[StatedDrive]:
+def _judged_parts(run: InspectedRun, split: Split) -> list[StatedDrive]:
     parts = {"identification": [run.identification], "validation": [run.validation]}
     return parts.get(split, [run.identification, run.validation])

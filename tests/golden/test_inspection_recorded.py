@@ -13,7 +13,7 @@ from gateway.bus.logs import LogReport
 from gateway.bus.signals import SignalMap, load_signal_map
 from gateway.calibration.campaign_file import load_campaign
 from gateway.calibration.inspection.across_runs import Inspection
-from gateway.calibration.inspection.facts import SplitRun, row_facts
+from gateway.calibration.inspection.facts import InspectedRun, row_facts
 from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.stated_drive import known_drive
@@ -29,7 +29,7 @@ SETTINGS = BatchSettings()
 def findings(campaign: str) -> dict[int, list[str]]:
     found: Inspection = inspect(load_campaign(recordings() / campaign), SETTINGS)
     assert found.refusal is None
-    return {one.number: [f"{finding.severity}:{finding.kind}" for finding in one.findings] for one in found.verdicts}
+    return {one.run.number: [f"{finding.severity}:{finding.kind}" for finding in one.findings] for one in found.runs}
 
 
 def test_the_validation_part_changes_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -42,8 +42,8 @@ def test_the_validation_part_changes_no_verdict(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(offline_campaigns, "read_whole_log", spoiled_at_the_end)
     campaign = load_campaign(recordings() / "known_loads/campaign.toml")
-    (verdict,) = inspect(campaign, SETTINGS, numbers=[1]).verdicts
-    assert verdict.findings == ()
+    (run,) = inspect(campaign, SETTINGS, numbers=[1]).runs
+    assert run.findings == ()
 
 
 @pytest.mark.parametrize("trip", ["a", "b"])
@@ -131,6 +131,6 @@ def faults_with(signals: str, source: Path, campaign: str, log: int, tmp_path: P
     motion = rows_within(read_whole_log(loaded.log_of(run), signal_map)[0], Stretch(0.0, 700.0))
     batches = batches_of_motion(motion, signal_map, SETTINGS)
     known = known_drive(log, str(run.log), run.payload_kg, loaded.front_share_pct(run), batches)
-    one = SplitRun(known, facts=row_facts(motion, signal_map.traits))
-    verdict = inspect_run(one, loaded.vehicle, SETTINGS)
-    return [str(finding.kind) for finding in verdict.findings if finding.severity == "fault"]
+    one = InspectedRun(known, facts=row_facts(motion, signal_map.traits))
+    found = inspect_run(one, loaded.vehicle, SETTINGS)
+    return [str(finding.kind) for finding in found if finding.severity == "fault"]

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from gateway.bus.signals import Decoder, SignalMap, load_signal_map
-from gateway.calibration.inspection.facts import SplitRun, row_facts
-from gateway.calibration.inspection.finding import RunVerdict
+from gateway.calibration.inspection.facts import InspectedRun, row_facts
 from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.stated_drive import known_drive
 from gateway.core.batch import Traits
@@ -101,15 +100,16 @@ def verdict_on(
     traits: Traits,
     load: tuple[float, float | None] = (0.0, None),
     window_s: float = 120.0,
-) -> RunVerdict:
+) -> InspectedRun:
     """All of the drive identifies; ``load`` is payload and its position."""
     settings = BatchSettings(window_s=window_s)
     scheduler = Scheduler(settings, traits)
     batches = (*scheduler.feed(motion), *scheduler.flush())
     run = known_drive(1, "a.log", load[0], front_share_pct(vehicle, *load), batches)
-    return inspect_run(SplitRun(run, facts=row_facts(motion, traits)), vehicle, settings)
+    read = InspectedRun(run, facts=row_facts(motion, traits))
+    return replace(read, findings=inspect_run(read, vehicle, settings))
 
 
-def kinds(verdict: RunVerdict) -> list[str]:
+def kinds(verdict: InspectedRun) -> list[str]:
     """fault:pitch_rate_sign and so on."""
     return [f"{finding.severity}:{finding.kind}" for finding in verdict.findings]

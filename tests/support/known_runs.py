@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from gateway.calibration.inspection.facts import LogFacts, SplitRun
+from gateway.calibration.inspection.facts import InspectedRun, LogFacts
 from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.core.vehicle import front_share_pct
 from gateway.model.vehicle_model import VehicleModel
@@ -33,14 +33,14 @@ def known_run(
     return known_drive(number, f"{number}.log", payload_kg, share_pct, batches)
 
 
-def split_run(number: int, payload_kg: float, position_m: float | None, seed: int = 1) -> SplitRun:
+def split_run(number: int, payload_kg: float, position_m: float | None, seed: int = 1) -> InspectedRun:
     """One batch to identify and one to validate."""
     both = known_run(number, payload_kg, position_m, seed, n_batches=2)
     first, last = both.batches
-    return SplitRun(replace(both, batches=(first,)), (last,), log=LogFacts(sha256="0" * 64))
+    return InspectedRun(replace(both, batches=(first,)), (last,), log=LogFacts(sha256="0" * 64))
 
 
-def campaign(seed: int = 1) -> tuple[SplitRun, ...]:
+def campaign(seed: int = 1) -> tuple[InspectedRun, ...]:
     """A drive with each of LOADS, numbered from 1."""
     return tuple(split_run(number, *load, seed=seed) for number, load in enumerate(LOADS, 1))
 

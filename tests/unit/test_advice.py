@@ -11,10 +11,12 @@ from support.paper_van import paper_van
 from gateway.calibration.file import FoundPart
 from gateway.calibration.from_drives import Outcome
 from gateway.calibration.inspection.across_runs import Inspection
-from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
+from gateway.calibration.inspection.facts import InspectedRun
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.judgement.advice import Grade, Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import Assessment, BatchSet, Judgement
 from gateway.calibration.judgement.evaluation import Judged, error_table
+from gateway.calibration.stated_drive import known_drive
 from gateway.estimates.batch_estimate import Estimate, Quantity
 from gateway.records import Why
 
@@ -43,12 +45,12 @@ def verdict(
     left_out: list[Judged],
     validation: list[Judged] | None = None,
     warnings: tuple[str, ...] = (),
-    runs: tuple[RunVerdict, ...] | None = None,
+    runs: tuple[InspectedRun, ...] | None = None,
 ) -> Verdict:
     file = calibration_file().model_copy(update={"warnings": warnings})
     parts = {BatchSet.LEFT_OUT: left_out} if left_out else {}
     parts |= {BatchSet.VALIDATION: validation} if validation else {}
-    outcome = None if runs is None else Outcome(file, Inspection((), runs, ()))
+    outcome = None if runs is None else Outcome(file, Inspection(runs))
     (found,) = verdicts_of(Assessment("", file, VAN, (judgement(parts),), outcome))
     return found
 
@@ -110,7 +112,10 @@ def test_warnings_reserve_but_not_those_about_the_other_estimator() -> None:
 )
 def test_runs_that_cannot_be_used_count(severities: tuple[Severity | None, ...], grade: Grade | None) -> None:
     runs = tuple(
-        RunVerdict(number, "a.log", () if severity is None else (Finding(Kind.GAPS, severity, "gaps"),))
+        InspectedRun(
+            known_drive(number, "a.log", 0.0, 50.0, ()),
+            findings=() if severity is None else (Finding(Kind.GAPS, severity, "gaps"),),
+        )
         for number, severity in enumerate(severities, 1)
     )
     rows = [judged(run) for run in range(1, 5)]
@@ -130,7 +135,7 @@ def test_held_statements_are_a_reservation_and_a_majority_makes_unfit(n_held: in
     )
     file = file.model_copy(update={"provenance": file.provenance.model_copy(update={"drives": drives})})
     parts = {BatchSet.LEFT_OUT: [judged(run) for run in range(1, 5)]}
-    outcome = Outcome(file, Inspection((), (), ()))
+    outcome = Outcome(file, Inspection(()))
     (told,) = verdicts_of(Assessment("", file, VAN, (judgement(parts),), outcome))
     labels = {reason.grade for reason in told.reasons if reason.rule == "labels"}
     assert labels == ({grade} if grade else set())

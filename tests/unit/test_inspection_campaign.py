@@ -7,8 +7,8 @@ from support.half_car_road import VAN, batch_over_road
 from support.known_runs import LOADS, campaign, known_run
 
 from gateway.calibration.inspection.across_runs import Inspection, inspect_drives, load_findings
-from gateway.calibration.inspection.facts import SplitRun
-from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict
+from gateway.calibration.inspection.facts import InspectedRun
+from gateway.calibration.inspection.finding import Finding, Kind
 from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.core.batch_settings import BatchSettings
 
@@ -41,8 +41,8 @@ def runs() -> list[StatedDrive]:
     return [known_run(number, *load, seed=7) for number, load in enumerate(LOADS, 1)]
 
 
-def inspected(run: StatedDrive) -> SplitRun:
-    return SplitRun(run)
+def inspected(run: StatedDrive) -> InspectedRun:
+    return InspectedRun(run)
 
 
 def test_a_run_at_another_speed_is_noted_and_one_on_a_far_smoother_road_warned_of(runs: list[StatedDrive]) -> None:
@@ -57,24 +57,24 @@ def test_a_run_at_another_speed_is_noted_and_one_on_a_far_smoother_road_warned_o
     smooth = replace(runs[0], number=6, batches=(quiet,))
     found_in = inspect_drives([inspected(run) for run in (*runs, fast, smooth)], VAN, SETTINGS)
     assert found_in.findings == ()
-    told = {verdict.number: [finding.kind for finding in verdict.findings] for verdict in found_in.verdicts}
+    told = {one.run.number: [finding.kind for finding in one.findings] for one in found_in.runs}
     assert told == {1: [], 2: [], 3: [], 4: [], 5: [Kind.SPEED_DIFFERS], 6: [Kind.SMOOTH_ROAD]}
 
 
 def test_a_run_sampled_at_another_rate_calibrates_nothing(runs: list[StatedDrive]) -> None:
     at_100_hz = [replace(run, batches=tuple(replace(b, sensor_rate_hz=100.0) for b in run.batches)) for run in runs]
     slower = replace(runs[0], number=5, batches=tuple(replace(b, sensor_rate_hz=50.0) for b in runs[0].batches))
-    verdicts = inspect_drives([inspected(run) for run in (*at_100_hz, slower)], VAN, SETTINGS).verdicts
-    assert [one.number for one in verdicts if not one.is_usable] == [5]
-    assert Kind.RATE_DIFFERS in [finding.kind for finding in verdicts[-1].findings]
+    found = inspect_drives([inspected(run) for run in (*at_100_hz, slower)], VAN, SETTINGS).runs
+    assert [one.run.number for one in found if not one.is_usable] == [5]
+    assert Kind.RATE_DIFFERS in [finding.kind for finding in found[-1].findings]
 
 
 def test_runs_of_unknown_load_are_inspected_but_not_compared(runs: list[StatedDrive]) -> None:
     unknown = [StatedDrive(run.name, run.batches, number=run.number, log=run.log) for run in runs[1:]]
     found_in = inspect_drives([inspected(run) for run in (runs[0], *unknown)], VAN, SETTINGS)
-    assert ([one.findings for one in found_in.verdicts], found_in.findings) == ([()] * 4, ())
-    faulty = tuple(RunVerdict(n, "a.log", (FAULT,) if n == 1 else ()) for n in range(1, 5))
-    assert Inspection(tuple(inspected(run) for run in (runs[0], *unknown)), faulty, ()).refusal is None
+    assert ([one.findings for one in found_in.runs], found_in.findings) == ([()] * 4, ())
+    faulty = replace(inspected(runs[0]), findings=(FAULT,))
+    assert Inspection((faulty, *(inspected(run) for run in unknown))).refusal is None
 
 
 FAULT = Finding.of(Kind.PITCH_RATE_SIGN, "it is turned")
@@ -82,5 +82,4 @@ FAULT = Finding.of(Kind.PITCH_RATE_SIGN, "it is turned")
 
 def test_a_campaign_without_identification_is_reported() -> None:
     split = tuple(replace(one, has_identification=False) for one in campaign())
-    verdicts = tuple(RunVerdict(n, "a.log") for n in range(1, 5))
-    assert "identification_fraction" in str(Inspection(split, verdicts, ()).refusal)
+    assert "identification_fraction" in str(Inspection(split).refusal)

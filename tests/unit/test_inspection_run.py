@@ -24,8 +24,8 @@ from support.inspected import (
 )
 
 from gateway.calibration.inspection.across_runs import inspect_drives
-from gateway.calibration.inspection.facts import LogFacts, RowFacts, SplitRun, row_facts
-from gateway.calibration.inspection.finding import Finding, Kind
+from gateway.calibration.inspection.facts import InspectedRun, LogFacts, RowFacts, row_facts
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.stated_drive import known_drive
 from gateway.core.batch_settings import BatchSettings
@@ -206,8 +206,8 @@ def rate_kinds(motion: Motion) -> list[str]:
 def told_of(kinds: tuple[Kind, ...], facts: RowFacts | None = None, log: LogFacts | None = None) -> tuple[Finding, ...]:
     """Findings of these kinds about a run without batches."""
     nothing = known_drive(1, "a.log", 0.0, 50.0, ())
-    split = SplitRun(nothing, facts=facts or RowFacts(), log=log or LogFacts())
-    return inspect_run(split, VAN, BatchSettings(), kinds).findings
+    split = InspectedRun(nothing, facts=facts or RowFacts(), log=log or LogFacts())
+    return inspect_run(split, VAN, BatchSettings(), kinds)
 
 
 def test_stamps_in_bursts_are_named() -> None:
@@ -250,8 +250,8 @@ def test_a_drive_that_is_kept_for_validation_has_lost_nothing_that_it_has() -> N
     )
     assert not all(one.rejected for one in batches)
     nothing = known_drive(1, "a.log", 0.0, 50.0, ())
-    kept = SplitRun(nothing, batches, has_identification=False)
-    assert inspect_run(kept, EMPTY, settings).is_usable
+    kept = InspectedRun(nothing, batches, has_identification=False)
+    assert not [one for one in inspect_run(kept, EMPTY, settings) if one.severity is Severity.FAULT]
 
 
 SOUND = LogFacts("a" * 64, 900.0, 0.0, (0, 900))
@@ -271,16 +271,16 @@ UNLADEN, LOADED = (0.0, 50.0), (420.0, 58.0)
 )
 def test_two_runs_on_one_drive_are_found(other: LogFacts, load: tuple[float, float], numbers: list[int]) -> None:
     runs = [known_drive(1, "a.log", *UNLADEN, ()), known_drive(2, "b.log", *load, ())]
-    split = [SplitRun(run, log=log) for run, log in zip(runs, (SOUND, other), strict=True)]
-    verdicts = inspect_drives(split, VAN, BatchSettings()).verdicts
-    told = {one.number: f.text for one in verdicts for f in one.findings if f.kind is Kind.SAME_DRIVE}
+    split = [InspectedRun(run, log=log) for run, log in zip(runs, (SOUND, other), strict=True)]
+    found = inspect_drives(split, VAN, BatchSettings()).runs
+    told = {one.run.number: f.text for one in found for f in one.findings if f.kind is Kind.SAME_DRIVE}
     assert list(told) == numbers
     assert all("runs 1 and 2" in text for text in told.values())
 
 
 def test_an_unreadable_log_is_reported_once_and_a_load_beyond_the_range_is_doubted() -> None:
     nothing = known_drive(1, "a.log", 4200.0, 60.0, ())
-    unreadable = SplitRun(nothing, log=LogFacts(unreadable="a.log: holds no CAN frame"))
-    (verdict,) = inspect_drives([unreadable], VAN, BatchSettings()).verdicts
+    unreadable = InspectedRun(nothing, log=LogFacts(unreadable="a.log: holds no CAN frame"))
+    (verdict,) = inspect_drives([unreadable], VAN, BatchSettings()).runs
     assert [finding.kind for finding in verdict.findings] == [Kind.LOG_UNREADABLE, Kind.LOAD_BEYOND_RANGE]
     assert not verdict.is_usable

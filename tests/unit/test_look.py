@@ -17,7 +17,7 @@ from support.spoiled import limits
 from gateway.bus.frames import merge_frames, message_of, take
 from gateway.bus.logs import write_candump
 from gateway.bus.signals import load_signal_map
-from gateway.calibration.inspection.facts import LogFacts, SplitRun, row_facts
+from gateway.calibration.inspection.facts import InspectedRun, LogFacts, row_facts
 from gateway.calibration.inspection.finding import Kind, Severity
 from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.stated_drive import known_drive
@@ -322,8 +322,8 @@ def test_a_silent_sensor_has_a_reason(alter: Alter, words: str, tmp_path: Path) 
     why = _silent(report.decoder, motion, REFERENCE)
     assert why == dict.fromkeys(silent, words)
     nothing = known_drive(1, "drive.log", 0.0, 50.0, ())
-    split = SplitRun(nothing, facts=row_facts(motion, REFERENCE.traits), log=LogFacts(silent=why))
-    pitch, roll = inspect_run(split, VAN, BatchSettings(), (Kind.SENSOR_SILENT,)).findings
+    split = InspectedRun(nothing, facts=row_facts(motion, REFERENCE.traits), log=LogFacts(silent=why))
+    pitch, roll = inspect_run(split, VAN, BatchSettings(), (Kind.SENSOR_SILENT,))
     assert pitch.text == f"pitch_rate has 0 samples in the whole run: {words}"
     assert (pitch.severity, roll.severity) == (Severity.FAULT, Severity.WARNING)
     assert roll.text == f"roll_rate has 0 samples in the whole run: {words}"

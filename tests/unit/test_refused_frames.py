@@ -20,7 +20,7 @@ from gateway.archive.reprocessing import reprocess
 from gateway.bus.logs import write_candump
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import Decoder, load_signal_map, shipped_map
-from gateway.calibration.inspection.facts import LogFacts, SplitRun, row_facts
+from gateway.calibration.inspection.facts import InspectedRun, LogFacts, row_facts
 from gateway.calibration.inspection.finding import Kind, Severity
 from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.stated_drive import known_drive
@@ -145,9 +145,9 @@ def test_an_inspection_finds_the_refused_frames_and_no_silent_sensor(spoiled: tu
     motion, report = read_whole_log(log, signal_map)
     mismatches = tuple((one.text, one.share, one.signals) for one in report.causes())
     nothing = known_drive(1, "drive.log", 0.0, 50.0, ())
-    split = SplitRun(nothing, facts=row_facts(motion, signal_map.traits), log=LogFacts(mismatches=mismatches))
+    split = InspectedRun(nothing, facts=row_facts(motion, signal_map.traits), log=LogFacts(mismatches=mismatches))
     kinds = (Kind.MAP_MISMATCH, Kind.SENSOR_SILENT, Kind.SPEED_MISSING)
-    first, *others = inspect_run(split, VAN, BatchSettings(), kinds).findings
+    first, *others = inspect_run(split, VAN, BatchSettings(), kinds)
     assert (first.kind, first.severity) == (Kind.MAP_MISMATCH, Severity.FAULT)
     assert first.text.startswith(case.told)
     assert "roll_rate" in case.signals or all("roll_rate" in other.text for other in others)

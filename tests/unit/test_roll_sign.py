@@ -8,7 +8,7 @@ import pytest
 from support.inspected import driven, kinds, scaled, stated, traits_of_reference
 
 from gateway.calibration.inspection.across_runs import inspect_drives
-from gateway.calibration.inspection.facts import SplitRun, row_facts
+from gateway.calibration.inspection.facts import InspectedRun, row_facts
 from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.stated_drive import known_drive
 from gateway.core.batch_settings import BatchSettings
@@ -39,7 +39,7 @@ def runs(
     sensor_left_m: float = 0.35,
     roll_times: float = 1.0,
     are_places_noted: bool = True,
-) -> list[SplitRun]:
+) -> list[InspectedRun]:
     split = []
     for number, (payload_kg, left_m) in enumerate(loads, 1):
         motion = scaled(drive(vehicle.name, payload_kg, left_m, sensor_left_m), roll_rate=roll_times)
@@ -48,11 +48,11 @@ def runs(
         share_pct = front_share_pct(vehicle, payload_kg, 0.5 * vehicle.wheelbase_m)
         noted_m = left_m if are_places_noted else None
         run = known_drive(number, f"{number}.log", payload_kg, share_pct, batches, noted_m)
-        split.append(SplitRun(run, facts=row_facts(motion, traits_of_reference())))
+        split.append(InspectedRun(run, facts=row_facts(motion, traits_of_reference())))
     return split
 
 
-def told(vehicle: Vehicle, split: list[SplitRun]) -> int:
+def told(vehicle: Vehicle, split: list[InspectedRun]) -> int:
     found = roll_sign_of([one.identification for one in split], vehicle)
     assert found.why
     return found.sign
@@ -85,13 +85,13 @@ def test_a_place_stated_on_the_wrong_side_contradicts_the_loads() -> None:
 
 def test_every_run_reports_a_reversed_roll_sign() -> None:
     inspection = inspect_drives(runs(PLACED, *LOADS[:2], roll_times=-1.0), PLACED, SETTINGS)
-    assert [kinds(verdict) for verdict in inspection.verdicts] == [["fault:roll_rate_sign"]] * 2
+    assert [kinds(verdict) for verdict in inspection.runs] == [["fault:roll_rate_sign"]] * 2
     assert "roll_rate_sign_untold" not in [finding.kind for finding in inspection.findings]
 
 
 def test_an_undetermined_roll_sign_is_one_note_for_all_runs() -> None:
     inspection = inspect_drives(runs(SOMEWHERE, LOADS[0]), SOMEWHERE, SETTINGS)
-    assert [kinds(verdict) for verdict in inspection.verdicts] == [[]]
+    assert [kinds(verdict) for verdict in inspection.runs] == [[]]
     assert [f"{one.severity}:{one.kind}" for one in inspection.findings if "roll" in one.kind] == [
         "note:roll_rate_sign_untold"
     ]

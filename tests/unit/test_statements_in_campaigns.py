@@ -10,17 +10,17 @@ from support.known_runs import campaign as known_campaign
 
 from gateway.calibration.from_drives import Outcome, calibrate_inspected
 from gateway.calibration.inspection.across_runs import Inspection
-from gateway.calibration.inspection.facts import SplitRun
-from gateway.calibration.inspection.finding import Kind, RunVerdict
+from gateway.calibration.inspection.facts import InspectedRun
+from gateway.calibration.inspection.finding import Kind
 from gateway.calibration.judgement.advice import Grade, verdicts_of
 from gateway.calibration.judgement.assessment import BatchSet, assess_calibration
 from gateway.calibration.stated_drive import known_drive
 
 
-def split(**said: dict[str, float]) -> tuple[SplitRun, ...]:
+def split(**said: dict[str, float]) -> tuple[InspectedRun, ...]:
     """The known-load drives, in which other things are said of some: run_2={"payload_kg": nan}."""
 
-    def told(one: SplitRun) -> SplitRun:
+    def told(one: InspectedRun) -> InspectedRun:
         run = one.identification
         load = {"payload_kg": run.payload_kg, "front_share_pct": run.front_share_pct}
         load |= said.get(f"run_{run.number}", {})
@@ -29,11 +29,9 @@ def split(**said: dict[str, float]) -> tuple[SplitRun, ...]:
     return tuple(told(one) for one in known_campaign())
 
 
-def calibrated(runs: Sequence[SplitRun], *others: str) -> Outcome:
-    verdicts = tuple(RunVerdict(one.identification.number, one.identification.log) for one in runs)
-    inspection = Inspection(tuple(runs), verdicts, ())
+def calibrated(runs: Sequence[InspectedRun], *others: str) -> Outcome:
     estimators = ["cross_spectrum", *others]
-    return calibrate_inspected(VAN, inspection, where="campaign.toml", sha256="", estimators=estimators)
+    return calibrate_inspected(VAN, Inspection(tuple(runs)), where="campaign.toml", sha256="", estimators=estimators)
 
 
 UNKNOWN = {"payload_kg": nan, "front_share_pct": nan}

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.calibration.inspection.facts import SplitRun
-from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
+from gateway.calibration.inspection.facts import InspectedRun
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.inspection.roll import roll_sign_of
 from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.stated_drive import StatedDrive
@@ -32,16 +32,15 @@ OfRun = Iterator[tuple[int, Finding]]
 
 @dataclass(frozen=True, slots=True)
 class Inspection:
-    """Every run with its verdict, in the order of the campaign; ``findings`` are of the campaign as a whole."""
+    """Every run in the order of the campaign; ``findings`` are of the campaign as a whole."""
 
-    split: tuple[SplitRun, ...]
-    verdicts: tuple[RunVerdict, ...]
-    findings: tuple[Finding, ...]
+    runs: tuple[InspectedRun, ...]
+    findings: tuple[Finding, ...] = ()
 
     @property
-    def usable(self) -> tuple[SplitRun, ...]:
+    def usable(self) -> tuple[InspectedRun, ...]:
         """The runs without a fault."""
-        return tuple(one for one, verdict in zip(self.split, self.verdicts, strict=True) if verdict.is_usable)
+        return tuple(one for one in self.runs if one.is_usable)
 
     def excusing(self, kind: Kind) -> "Inspection":
         """Without its findings of this ``kind`` about the campaign as a whole."""
@@ -50,7 +49,7 @@ class Inspection:
     @property
     def refusal(self) -> str | None:
         """Why no valid calibration is possible; None if the usable runs allow one."""
-        stated = [one for one in self.split if one.has_identification]
+        stated = [one for one in self.runs if one.has_identification]
         left = [one for one in self.usable if one.has_identification]
         if not stated:
             return (
@@ -68,18 +67,18 @@ class Inspection:
     def warnings(self) -> tuple[str, ...]:
         """The warnings that a calibration file records."""
         warnings = [f"{one.kind}: {one.text}" for one in self.findings if one.severity is not Severity.NOTE]
-        for verdict in self.verdicts:
-            kept = Severity.WARNING if verdict.is_usable else Severity.FAULT
-            what = f"run {verdict.number}" if verdict.is_usable else f"run {verdict.number} left out"
-            warnings += [f"{what}: {one.kind}: {one.text}" for one in verdict.findings if one.severity is kept]
+        for run in self.runs:
+            kept, left_out = (Severity.WARNING, "") if run.is_usable else (Severity.FAULT, " left out")
+            what = f"run {run.run.number}{left_out}"
+            warnings += [f"{what}: {one.kind}: {one.text}" for one in run.findings if one.severity is kept]
         return tuple(warnings)
 
 
 def inspect_drives(
-    drives: Sequence[SplitRun], vehicle: Vehicle, settings: BatchSettings, *, has_roll_rate: bool = True
+    drives: Sequence[InspectedRun], vehicle: Vehicle, settings: BatchSettings, *, has_roll_rate: bool = True
 ) -> Inspection:
-    """A verdict for every run in the order given, and the findings about the campaign as a whole."""
-    found = {one.run.number: list(inspect_run(one, vehicle, settings).findings) for one in drives}
+    """What is found of every run, in the order given, and of the campaign as a whole."""
+    found = {one.run.number: list(inspect_run(one, vehicle, settings)) for one in drives}
     for number, finding in (*_same_drive(drives), *_beyond_range(drives, vehicle), *_beside_the_others(drives)):
         found[number].append(finding)
     roll_sign = roll_sign_of(_usable(drives, found), vehicle)
@@ -94,17 +93,17 @@ def inspect_drives(
     if (std_m := vehicle.sensor_left_std_m) > HARDLY_KNOWN_M:
         text = f"sensor_offset_left_m is {vehicle.sensor_left_m:g} ± {Z95 * std_m:.2g} m (95 %)"
         findings.append(Finding.of(Kind.SENSOR_OFFSET_UNKNOWN, text))
-    verdicts = (RunVerdict(one.run.number, one.run.log, tuple(found[one.run.number])) for one in drives)
-    return Inspection(tuple(drives), tuple(verdicts), tuple(findings))
+    inspected = (replace(one, findings=tuple(found[one.run.number])) for one in drives)
+    return Inspection(tuple(inspected), tuple(findings))
 
 
-def _usable(drives: Sequence[SplitRun], found: Mapping[int, Sequence[Finding]]) -> list[StatedDrive]:
+def _usable(drives: Sequence[InspectedRun], found: Mapping[int, Sequence[Finding]]) -> list[StatedDrive]:
     """The identification parts of the runs in which no fault was found so far."""
     runs = [one.identification for one in drives if one.has_identification]
     return [run for run in runs if not any(one.severity is Severity.FAULT for one in found[run.number])]
 
 
-def _same_drive(drives: Sequence[SplitRun]) -> OfRun:
+def _same_drive(drives: Sequence[InspectedRun]) -> OfRun:
     """Runs that are the same piece of the same log: all but the first; all of them if loads differ."""
     for one, other in combinations(drives, 2):
         if one.log.is_of_same_drive(other.log):
@@ -114,7 +113,7 @@ def _same_drive(drives: Sequence[SplitRun]) -> OfRun:
                 yield number, Finding.of(Kind.SAME_DRIVE, text if is_same_load else f"{text} with two different loads")
 
 
-def _beyond_range(drives: Sequence[SplitRun], vehicle: Vehicle) -> OfRun:
+def _beyond_range(drives: Sequence[InspectedRun], vehicle: Vehicle) -> OfRun:
     low_kg, high_kg = vehicle.payload_range_kg
     for run in (one.run for one in drives):
         if run.payload_kg > high_kg + BEYOND_RANGE_BY * (high_kg - low_kg):
@@ -122,7 +121,7 @@ def _beyond_range(drives: Sequence[SplitRun], vehicle: Vehicle) -> OfRun:
             yield run.number, Finding.of(Kind.LOAD_BEYOND_RANGE, text)
 
 
-def _beside_the_others(drives: Sequence[SplitRun]) -> OfRun:
+def _beside_the_others(drives: Sequence[InspectedRun]) -> OfRun:
     """Runs at another speed, on a far smoother road, or sampled at another rate than the median run."""
     rows = [
         (

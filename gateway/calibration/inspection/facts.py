@@ -1,4 +1,6 @@
-"""A drive as it is inspected: its two parts, the facts of its rows before they are cut into batches, and of its log."""
+"""A drive as it is inspected: its two parts, the facts of its rows before they are cut into batches, those of its log,
+and what was found of it.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -6,6 +8,7 @@ from math import nan
 
 import numpy as np
 
+from gateway.calibration.inspection.finding import Finding, Severity
 from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.batch import Traits
 from gateway.core.timeline import sample_rate_hz
@@ -124,8 +127,9 @@ class LogFacts:
 
 
 @dataclass(frozen=True, slots=True)
-class SplitRun:
-    """One drive's two parts, either of which may have no batch, with the facts of its rows and of its log.
+class InspectedRun:
+    """One drive's two parts, either of which may have no batch, with the facts of its rows and of its log, and what was
+    found of them.
 
     ``validating`` are the batches of the second part. has_identification is False if the campaign keeps the whole drive
     for validation. Only the identification part can spoil a calibration, so facts, batches and run are of that part
@@ -137,6 +141,12 @@ class SplitRun:
     facts: RowFacts = field(default_factory=RowFacts)
     has_identification: bool = True
     log: LogFacts = field(default_factory=LogFacts)
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def is_usable(self) -> bool:
+        """False if a fault excludes the run from the calibration."""
+        return all(finding.severity is not Severity.FAULT for finding in self.findings)
 
     @property
     def validation(self) -> StatedDrive:

@@ -1,4 +1,4 @@
-"""Findings about known-load drives before any fit: the table of their kinds, and a verdict for each run."""
+"""Findings about known-load drives before any fit, and the table of their kinds."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -149,17 +149,3 @@ class Finding:
     def to_json(self) -> dict[str, str]:
         """As in ``calibrate --json`` and the report's numbers."""
         return {"kind": str(self.kind), "severity": str(self.severity), "text": self.text, "advice": self.advice}
-
-
-@dataclass(frozen=True, slots=True)
-class RunVerdict:
-    """All that was found of one run; ``number`` counts the campaign's runs from 1, ``name`` is its log."""
-
-    number: int
-    name: str
-    findings: tuple[Finding, ...] = ()
-
-    @property
-    def is_usable(self) -> bool:
-        """False if a fault excludes the run from the calibration."""
-        return all(finding.severity is not Severity.FAULT for finding in self.findings)

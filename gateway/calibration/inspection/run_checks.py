@@ -1,6 +1,6 @@
 """Inspection of one drive: of its log, its rows, the batches cut of them, and its cross-spectra.
 
-    verdict = inspect_run(drive, vehicle, settings)
+    findings = inspect_run(drive, vehicle, settings)
 
 Axes, units and signs of the sensors, the speed's unit and the sensor's place are compared with a usual vehicle's, which
 needs the cross-spectra, and a vertical acceleration that shows gravity.
@@ -15,8 +15,8 @@ import numpy as np
 
 from gateway.calibration.as_stated import stated_load, stated_run
 from gateway.calibration.inspection.axes import Phases, fitted_position_m, phases, reading_of
-from gateway.calibration.inspection.facts import SplitRun, Stream
-from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
+from gateway.calibration.inspection.facts import InspectedRun, Stream
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.inspection.roll import EXCHANGED, over_pitch, pitch_coherence
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE, REASON_SHARE_MIN
 from gateway.core.batch_settings import BatchSettings
@@ -87,21 +87,21 @@ _DEGREES: Final = 180.0 / pi  # per radian
 
 
 def inspect_run(
-    drive: SplitRun, vehicle: Vehicle, settings: BatchSettings, only: Collection[Kind] = frozenset(Kind)
-) -> RunVerdict:
+    drive: InspectedRun, vehicle: Vehicle, settings: BatchSettings, only: Collection[Kind] = frozenset(Kind)
+) -> tuple[Finding, ...]:
     """Every finding of one run, of these kinds, faults first. Without rows there are none but why."""
-    seen, run = _Seen(drive, vehicle, settings), drive.identification
+    seen = _Seen(drive, vehicle, settings)
     for check in (_unread,) if drive.log.unreadable or drive.log.span_ns is None else CHECKS:
         seen.found += list(check(seen))
     order = list(Severity)
     found = sorted(seen.found, key=lambda one: order.index(one.severity))
-    return RunVerdict(run.number, run.log, tuple(one for one in found if one.kind in only))
+    return tuple(one for one in found if one.kind in only)
 
 
 class _Seen:
     """A drive as its checks see it: what several of them need, computed once, and what those before have found."""
 
-    def __init__(self, drive: SplitRun, vehicle: Vehicle, settings: BatchSettings) -> None:
+    def __init__(self, drive: InspectedRun, vehicle: Vehicle, settings: BatchSettings) -> None:
         self.drive, self.vehicle, self.settings = drive, vehicle, settings
         self.facts, self.streams, self.batches = drive.facts, drive.facts.streams, drive.run.batches
         self.needed_s = settings.last_batch_share_min * settings.window_s

@@ -253,11 +253,11 @@ def _of_one_load(assessment: Assessment, estimator: str) -> Iterator[Reason]:
 
 
 def _of_runs(outcome: Outcome) -> Iterator[Reason]:
-    verdicts = outcome.inspection.verdicts
-    unusable = [one.number for one in verdicts if not one.is_usable]
+    runs = outcome.inspection.runs
+    unusable = [one.run.number for one in runs if not one.is_usable]
     if unusable:
-        grade = Grade.UNFIT if 2 * len(unusable) > len(verdicts) else Grade.RESERVED
-        yield Reason("runs", grade, f"{len(unusable)} of {len(verdicts)} drives cannot be used: {_listed(unusable)}.")
+        grade = Grade.UNFIT if 2 * len(unusable) > len(runs) else Grade.RESERVED
+        yield Reason("runs", grade, f"{len(unusable)} of {len(runs)} drives cannot be used: {_listed(unusable)}.")
     drives = [one for one in outcome.file.provenance.drives if one.statement.is_of_payload]
     held = [one.number for one in drives if one.found is not None and one.found.is_held]
     if held:

@@ -82,8 +82,8 @@ def assess_calibration(outcome: Outcome) -> Assessment:
     for estimator in file.estimators:
         judged = {
             BatchSet.LEFT_OUT: judged_left_out(outcome, estimator),
-            BatchSet.VALIDATION: judge([run.validation for run in outcome.split], calibrated, estimator),
-            BatchSet.IDENTIFICATION: judge([run.identification for run in outcome.split], calibrated, estimator),
+            BatchSet.VALIDATION: judge([run.validation for run in outcome.used], calibrated, estimator),
+            BatchSet.IDENTIFICATION: judge([run.identification for run in outcome.used], calibrated, estimator),
         }
         tables = {part: error_table(rows, vehicle, estimator) for part, rows in judged.items() if rows}
         judgements.append(Judgement(estimator, tables))
@@ -108,11 +108,11 @@ def judged_left_out(outcome: Outcome, estimator: str) -> list[Judged]:
         without = {n: replace(whole, ratio_index=fitted) for n, fitted in (ratio.without if ratio else {}).items()}
     else:
         taught = outcome.cross_spectrum.without if outcome.cross_spectrum else {}
-        identified = [one.identification for one in outcome.split]
+        identified = [one.identification for one in outcome.used]
         without = {
             run.number: replace(whole, cross_spectrum=taught[run.name], is_shape_known=run.statement.is_compact)
             for run in identified
             if run.name in taught
         }
-    runs = [one.identification for one in outcome.split if one.identification.number in without]
+    runs = [one.identification for one in outcome.used if one.identification.number in without]
     return [one for run in runs for one in judge([run], without[run.number], estimator)]

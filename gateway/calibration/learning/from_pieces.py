@@ -17,8 +17,8 @@ from gateway.calibration.file import CalibrationFile
 from gateway.calibration.found import FoundClaim, FoundLoad
 from gateway.calibration.from_drives import OnFit, Outcome, calibrate_inspected
 from gateway.calibration.inspection.across_runs import Inspection
-from gateway.calibration.inspection.facts import LogFacts, RowFacts, SplitRun
-from gateway.calibration.inspection.finding import Finding, Kind, RunVerdict, Severity
+from gateway.calibration.inspection.facts import InspectedRun, LogFacts, RowFacts
+from gateway.calibration.inspection.finding import Finding, Kind, Severity
 from gateway.calibration.inspection.run_checks import inspect_run
 from gateway.calibration.learning.windows import Driven, chosen
 from gateway.calibration.stated_drive import StatedDrive, drive_name
@@ -140,14 +140,13 @@ def learn(
         raise CalibrationImpossibleError(_nothing(faults))
     best = chosen([driven[i] for i in sound], [bool(assigned.holding[i]) for i in sound])
     used = [sound[i] for i in best]
-    split, verdicts = [], []
-    for number, i in enumerate(used, 1):
-        run = _run(number, driven[i], assigned.statements[i], vehicle)
-        split.append(SplitRun(run, log=_facts(driven[i])))
-        verdicts.append(RunVerdict(number, run.log))
+    runs = [
+        InspectedRun(_run(number, driven[i], assigned.statements[i], vehicle), log=_facts(driven[i]))
+        for number, i in enumerate(used, 1)
+    ]
     outcome = calibrate_inspected(
         vehicle,
-        Inspection(tuple(split), tuple(verdicts), ()),
+        Inspection(tuple(runs)),
         where=vehicle.name,
         sha256=hashlib.sha256(json.dumps(asdict(vehicle), sort_keys=True).encode()).hexdigest(),
         estimators=("cross_spectrum",),
@@ -196,8 +195,8 @@ def inspected(
     name: str, batches: Sequence[Batch], rows: RowFacts, log: LogFacts, vehicle: Vehicle, settings: BatchSettings
 ) -> tuple[Finding, ...]:
     """What is wrong with the sensors, the map or the log of an ordinary drive, whatever is known of its load."""
-    whole = SplitRun(StatedDrive(drive_name(1), tuple(batches), number=1, log=name), facts=rows, log=log)
-    return inspect_run(whole, vehicle, settings, LOOKED_FOR).findings
+    whole = InspectedRun(StatedDrive(drive_name(1), tuple(batches), number=1, log=name), facts=rows, log=log)
+    return inspect_run(whole, vehicle, settings, LOOKED_FOR)
 
 
 def _run(number: int, one: Driven, statement: Statement, vehicle: Vehicle) -> StatedDrive:

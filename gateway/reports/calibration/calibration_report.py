@@ -44,14 +44,14 @@ def write_report_of(directory: Path, assessment: Assessment, on_chart: OnChart =
 
 
 def _calibration_sections(outcome: Outcome) -> Iterator[Section]:
-    identification = [one.identification for one in outcome.split]
+    identification = [one.identification for one in outcome.used]
     yield runs_section(outcome)
     ratio_index = outcome.ratio_index.calibration if outcome.ratio_index else None
     spectra = spectra_section(identification, ratio_index)
     if spectra is not None:
         yield spectra
     if outcome.ratio_index is not None:
-        yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in outcome.split])
+        yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in outcome.used])
     if outcome.cross_spectrum is not None:
         yield fitted_vehicle_section(identification, outcome.cross_spectrum, outcome.file.vehicle)
 
@@ -76,12 +76,12 @@ def report_json(assessment: Assessment, verdicts: tuple[Verdict, ...]) -> dict[s
         "verdicts": [{"estimator": verdict.estimator, **verdict.to_json()} for verdict in verdicts],
         "runs": [
             {
-                "run": one.number,
-                "log": one.name,
+                "run": one.run.number,
+                "log": one.run.log,
                 "is_usable": one.is_usable,
                 "findings": [finding.to_json() for finding in one.findings],
             }
-            for one in (assessment.outcome.inspection.verdicts if assessment.outcome else ())
+            for one in (assessment.outcome.inspection.runs if assessment.outcome else ())
         ],
         "errors": {
             one.estimator: {str(part): table.to_json() for part, table in one.tables.items()}

@@ -2,8 +2,8 @@
 
 from gateway.calibration.file import DrivePart
 from gateway.calibration.from_drives import Outcome
-from gateway.calibration.inspection.facts import SplitRun
-from gateway.calibration.inspection.finding import Finding, RunVerdict
+from gateway.calibration.inspection.facts import InspectedRun
+from gateway.calibration.inspection.finding import Finding
 from gateway.calibration.judgement.assessment import Assessment
 from gateway.estimates.quantity import Z95
 from gateway.records import Why
@@ -13,35 +13,33 @@ from gateway.words import NONE, known, span
 
 def runs_section(outcome: Outcome) -> Section:
     """Every run with its verdict; what was found of it, of all of them, and what to do."""
-    driven = {one.identification.number: one for one in outcome.split}
-    rows = tuple(_run_row(verdict, driven.get(verdict.number)) for verdict in outcome.inspection.verdicts)
+    rows = tuple(_run_row(one) for one in outcome.inspection.runs)
     columns = ("Run", "log", "verdict", "payload", "front share", "identify", "validate", "refused")
     caption = "Runs: batches that identify, that validate, and that no estimator can use"
     findings = _findings_table(outcome)
     return Section("runs", "Runs", (), (), (Table(caption, columns, rows), *((findings,) if findings else ())))
 
 
-def _run_row(verdict: RunVerdict, driven: SplitRun | None) -> tuple[str, ...]:
-    if driven is None:
-        return (str(verdict.number), verdict.name, _verdict(verdict), *(NONE,) * 5)
-    run, batches = driven.identification, [*driven.identification.batches, *driven.validating]
+def _run_row(one: InspectedRun) -> tuple[str, ...]:
+    run, batches = one.identification, [*one.identification.batches, *one.validating]
+    named = (str(run.number), run.log, _verdict(one))
+    if not one.is_usable:
+        return (*named, *(NONE,) * 5)
     refused = [b for b in batches if b.rejected and Why.TOO_SHORT not in b.rejected]  # a run's last piece is no batch
     return (
-        str(run.number),
-        run.log,
-        _verdict(verdict),
+        *named,
         known(run.statement.payload_kg, " kg"),
         known(run.statement.front_share_pct, " %", ".1f"),
-        *(str(sum(not batch.rejected for batch in part)) for part in (run.batches, driven.validating)),
+        *(str(sum(not batch.rejected for batch in part)) for part in (run.batches, one.validating)),
         str(len(refused)),
     )
 
 
-def _verdict(verdict: RunVerdict) -> str:
-    if not verdict.findings:
+def _verdict(one: InspectedRun) -> str:
+    if not one.findings:
         return "sound"
-    judged = "usable" if verdict.is_usable else "cannot be used"
-    return f"{judged}: {', '.join(_spoken(finding) for finding in verdict.findings)}"
+    judged = "usable" if one.is_usable else "cannot be used"
+    return f"{judged}: {', '.join(_spoken(finding) for finding in one.findings)}"
 
 
 def _spoken(finding: Finding) -> str:
@@ -50,8 +48,8 @@ def _spoken(finding: Finding) -> str:
 
 def _findings_table(outcome: Outcome) -> Table | None:
     findings = [("all", finding) for finding in outcome.inspection.findings]
-    for verdict in outcome.inspection.verdicts:
-        findings += [(str(verdict.number), finding) for finding in verdict.findings]
+    for one in outcome.inspection.runs:
+        findings += [(str(one.run.number), finding) for finding in one.findings]
     rows = tuple((run, str(one.severity), _spoken(one), one.text, one.advice) for run, one in findings)
     columns = ("Run", "weight", "what", "as found", "what to do")
     return Table("What was found of the runs", columns, rows) if rows else None

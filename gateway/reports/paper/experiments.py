@@ -10,7 +10,7 @@ import numpy as np
 
 from gateway.calibration.campaign_file import Campaign, file_sha256, load_campaign
 from gateway.calibration.from_drives import calibrate_inspected
-from gateway.calibration.inspection.facts import SplitRun
+from gateway.calibration.inspection.facts import InspectedRun
 from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
 from gateway.calibration.ratio_index.least_squares import fit_regression
 from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, index_rows
@@ -56,7 +56,7 @@ class DrivenCampaign:
     """One campaign with its batches."""
 
     campaign: Campaign
-    splits: tuple[SplitRun, ...]
+    splits: tuple[InspectedRun, ...]
 
     @property
     def identification(self) -> list[StatedDrive]:
