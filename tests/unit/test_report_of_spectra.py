@@ -1,72 +1,25 @@
-"""Spectra and roll in a report: levels, limits of so much driving, and the modelled spectra of a known vehicle."""
+"""Spectra and roll in a report: the modelled spectra of a known vehicle, and what its drives told."""
 
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from support.calibrated import ratio_index_calibration
 from support.estimates import make_estimate
-from support.half_car_road import CAR, RATE_HZ, VAN, as_if_fitted, batch_of, batch_over_road
+from support.half_car_road import CAR, VAN, as_if_fitted, batch_over_road
 
 from gateway.calibration.found import FoundLoad
 from gateway.calibration.judgement.assessment import BatchSet, Judgement
 from gateway.calibration.judgement.evaluation import CgLeftErrors, Errors, ErrorTable, Judged, TargetErrors, WheelErrors
 from gateway.calibration.stated_drive import StatedDrive, drive_name, known_drive
 from gateway.calibration.teach import teach
-from gateway.core.ratio_index.index import Band
 from gateway.core.vehicle import Load
 from gateway.estimates.batch_estimate import Quantity
 from gateway.model.table import INDEX, N_OWN, NAMES, OWN, ROWS, prior_of
 from gateway.model.vehicle_model import VehicleModel
-from gateway.records import F64, Batch, Why
+from gateway.records import F64, Why
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.fitted_vehicle import RunFit, fits_of, knowledge_of, knowledge_table, told
-from gateway.reports.calibration.spectra_charts import ACCELERATION, N_SEGMENT, density_of, spectra_section
-from gateway.reports.charts import LineMark, Ribbon, Span
-
-
-def white(seed: int, n: int = 20_000) -> Batch:
-    rng = np.random.default_rng(seed)
-    return batch_of(rng.standard_normal(n), 0.1 * rng.standard_normal(n), speed_mps=14.0)
-
-
-def test_limits_hold_the_true_density_95_times_in_100() -> None:
-    level = (1.0 / (RATE_HZ / 2.0)) ** 0.5
-    held = []
-    for seed in range(40):
-        found = density_of([white(seed, 10_000)], ACCELERATION)
-        held.append(np.mean((found.low <= level) & (level <= found.high)))
-    assert np.mean(held) == pytest.approx(0.95, abs=0.015)
-
-
-def test_batches_of_a_load_are_joined_and_none_is_none() -> None:
-    one, two = density_of([white(1)], ACCELERATION), density_of([white(1), white(2)], ACCELERATION)
-    assert two.n_segments == 2 * one.n_segments
-    assert np.all(two.high / two.low < one.high / one.low)
-    assert density_of([white(1, N_SEGMENT - 1)], ACCELERATION) is None
-    assert density_of([], ACCELERATION) is None
-
-
-def known(number: int, payload_kg: float, share_pct: float) -> StatedDrive:
-    return known_drive(
-        number, f"{number}.log", payload_kg, share_pct, (batch_over_road(payload_kg, share_pct, number, 60.0),)
-    )
-
-
-def test_a_curve_for_every_load_and_the_bands_where_they_are() -> None:
-    runs = [known(1, 0.0, 52.0), known(2, 200.0, 50.0), known(3, 200.0, 47.0)]
-    section = spectra_section(runs, ratio_index_calibration())
-    of_load, of_share = (chart.panels[0] for chart in section.charts)
-    assert [mark.label for mark in of_load.marks if isinstance(mark, LineMark)] == ["0 kg", "200 kg"]
-    assert [mark.label for mark in of_share.marks if isinstance(mark, LineMark)] == ["47.0 %", "50.0 %", "52.0 %"]
-    assert sum(isinstance(mark, Ribbon) for mark in of_share.marks) == 3
-    bands = ratio_index_calibration().acceleration_bands
-    assert bands is not None
-    spans = [mark for mark in of_load.marks if isinstance(mark, Span)]
-    assert [Band((s.low + s.high) / 2.0, s.high - s.low) for s in spans] == [
-        Band(pytest.approx(band.centre_hz), pytest.approx(band.width_hz)) for band in bands
-    ]
 
 
 def run_of(kg: float, pct: float, number: int = 1, **how: Any) -> StatedDrive:

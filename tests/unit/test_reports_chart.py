@@ -16,7 +16,6 @@ from gateway.reports.charts import (
     Points,
     Ribbon,
     Rule,
-    Span,
     Table,
 )
 from gateway.reports.charts.html import table_html
@@ -28,7 +27,6 @@ MARKS: tuple[Mark, ...] = (
     Points(X, X, "points", 1, "diamond", X - 1.0, X + 2.0),
     Ribbon(X, X - 1.0, X + 1.0, "ribbon", 2),
     Rule(2.0, is_vertical=True, label="rule"),
-    Span(1.2, 1.4, "span", 3),
 )
 
 

@@ -19,7 +19,6 @@ from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.fitted_vehicle import fitted_vehicle_section
 from gateway.reports.calibration.ratio_index import ratio_index_section
 from gateway.reports.calibration.runs import provenance_section, runs_section
-from gateway.reports.calibration.spectra_charts import spectra_section
 from gateway.reports.charts import Section
 from gateway.reports.charts.html import (
     OnChart,
@@ -46,10 +45,6 @@ def write_report_of(directory: Path, assessment: Assessment, on_chart: OnChart =
 def _calibration_sections(outcome: Outcome) -> Iterator[Section]:
     identification = [one.identification for one in outcome.used]
     yield runs_section(outcome)
-    ratio_index = outcome.ratio_index.calibration if outcome.ratio_index else None
-    spectra = spectra_section(identification, ratio_index)
-    if spectra is not None:
-        yield spectra
     if outcome.ratio_index is not None:
         yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in outcome.used])
     if outcome.cross_spectrum is not None:

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.found import FoundLoad, Taught
-from gateway.calibration.stated_drive import StatedDrive, drive_name
+from gateway.calibration.stated_drive import StatedDrive
 from gateway.core.vehicle import Load, Vehicle
 from gateway.model.expected import with_strokes
 from gateway.model.spectra import CrossSpectra, cross_spectra_of
@@ -45,7 +45,7 @@ def fits_of(runs: Sequence[StatedDrive], model: VehicleModel, found: Sequence[Fo
         cross = cross_spectra_of([batch for batch in run.batches if not batch.rejected], model.reading)
         if cross is None:
             continue
-        drive_found = by_name.get(drive_name(run.number))
+        drive_found = by_name.get(run.name)
         load, theta = run.load, model.parameters[: len(UPRIGHT)]
         if drive_found is not None:
             load, theta = drive_found.load, of_drive(theta, drive_found.deviations)

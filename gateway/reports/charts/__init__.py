@@ -81,17 +81,7 @@ class Rule:
     dash: Dash = "solid"
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
-    """The range of x from low to high, shaded over the full height of the panel."""
-
-    low: float
-    high: float
-    label: str = ""
-    colour: int = GREY
-
-
-Mark = LineMark | Points | Ribbon | Rule | Span
+Mark = LineMark | Points | Ribbon | Rule
 
 
 @dataclass(frozen=True, slots=True)

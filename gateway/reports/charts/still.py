@@ -12,7 +12,7 @@ from matplotlib.axis import XAxis, YAxis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from gateway.reports.charts import COLOURS, Axis, Chart, LineMark, Mark, Panel, Points, Ribbon, Rule, Span
+from gateway.reports.charts import COLOURS, Axis, Chart, LineMark, Mark, Panel, Points, Ribbon, Rule
 
 _STYLE: Final[Any] = {  # matplotlib types its keys one by one
     "svg.fonttype": "none",
@@ -114,5 +114,3 @@ def _draw_mark(mark: Mark, axes: Axes, order: int) -> None:
         case Rule():
             across = axes.axvline if mark.is_vertical else axes.axhline
             across(mark.at, linestyle=_DASHES[mark.dash], linewidth=1.0, zorder=order, **style)
-        case Span():
-            axes.axvspan(mark.low, mark.high, alpha=0.3, linewidth=0.0, **style)
