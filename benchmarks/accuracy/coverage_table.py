@@ -106,8 +106,8 @@ def _judged(one: Judged, vehicle: Vehicle, kind: str, estimator: str, cg_m: floa
         rejected = (HALF_AN_ANSWER,)
     figures: dict[str, Any] = {}
     for target, unit, quantity, true, full_range in (
-        ("payload", "pct", found.payload, one.payload_kg, vehicle.payload_range_kg),
-        ("front_share", "pct", found.front_share, one.front_share_pct, vehicle.front_share_range_pct),
+        ("payload", "pct", found.payload, one.drive.payload_kg, vehicle.payload_range_kg),
+        ("front_share", "pct", found.front_share, one.drive.front_share_pct, vehicle.front_share_range_pct),
         ("cg_left", "m", found.cg_left, cg_m, (0.0, 100.0)),
     ):
         (low, high), times = quantity.interval95, 100.0 / (full_range[1] - full_range[0])
@@ -118,7 +118,13 @@ def _judged(one: Judged, vehicle: Vehicle, kind: str, estimator: str, cg_m: floa
         figures[f"{target}_half_width_{unit}"] = math.nan if rejected else 0.5 * (high - low) * times
         figures[f"{target}_score_{unit}"] = math.nan if rejected else score * times
     return JudgedBatch(
-        vehicle.name, f"{vehicle.name} {one.run}", kind, estimator, rejected, has_roll_rate=has_roll_rate, **figures
+        vehicle.name,
+        f"{vehicle.name} {one.drive.number}",
+        kind,
+        estimator,
+        rejected,
+        has_roll_rate=has_roll_rate,
+        **figures,
     )
 
 

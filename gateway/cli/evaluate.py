@@ -120,12 +120,12 @@ def _percent(share: float | None, width: int) -> str:
 
 def _run_row(first: Judged, errors: Errors) -> str:
     truth, payload, share = (
-        f"{known(first.payload_kg, ' kg')} at {known(first.front_share_pct, ' %', '.1f')}",
+        f"{known(first.drive.payload_kg, ' kg')} at {known(first.drive.front_share_pct, ' %', '.1f')}",
         errors.payload,
         errors.front_share,
     )
     return (
-        f"{first.run:>4}  {truth:>18}{errors.n_batches:>9}{errors.n_rejected:>10}"
+        f"{first.drive.number:>4}  {truth:>18}{errors.n_batches:>9}{errors.n_rejected:>10}"
         f"{_cell(payload.mean_abs, 'kg', 19)}{_cell(payload.bias, 'kg', 10)}"
         f"{_cell(share.mean_abs, 'pp', 17)}{_cell(share.bias, 'pp', 10)}"
     )

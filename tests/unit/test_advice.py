@@ -30,11 +30,11 @@ def judged(run: int, error_kg: float = 0.0, half_kg: float = 20.0, error_pp: flo
         payload=Quantity(payload_kg, interval95=(payload_kg - half_kg, payload_kg + half_kg)),
         front_share=Quantity(share_pct, interval95=(share_pct - 4.0, share_pct + 4.0)),
     )  # fmt: skip
-    return Judged(run, f"{run}.log", 200.0, 50.0, estimate)
+    return Judged(known_drive(run, f"{run}.log", 200.0, 50.0, ()), estimate)
 
 
 def refused(run: int) -> Judged:
-    return Judged(run, f"{run}.log", 200.0, 50.0, Estimate(0, 1, "cross_spectrum", rejected=(Why.GAP,)))
+    return replace(judged(run), estimate=Estimate(0, 1, "cross_spectrum", rejected=(Why.GAP,)))
 
 
 def judgement(parts: dict[BatchSet, list[Judged]], estimator: str = "cross_spectrum") -> Judgement:

@@ -25,16 +25,15 @@ VAN = paper_van(payload_range_kg=(0.0, 400.0), unsprung_front_kg=60.0, unsprung_
 BATCH = build_batch(drive(100.0), BatchWindow(T0_NS, T0_NS + 100_000_000_000, T0_NS), BatchSettings(window_s=100.0), {})
 
 
-def judged(true_kg: float, found_kg: float | None, true_pct: float = 50.0, found_pct: float = 50.0) -> Judged:
-    blank = Estimate(0, 1, "ratio_index")
-    if found_kg is None:
-        return Judged(1, "a.log", true_kg, true_pct, replace(blank, rejected=(Why.TOO_SLOW,)))
-    answer = replace(
-        blank,
-        payload=Quantity(found_kg, interval95=(found_kg - 10.0, found_kg + 10.0)),
-        front_share=Quantity(found_pct, interval95=(found_pct - 1.0, found_pct + 1.0)),
-    )
-    return Judged(1, "a.log", true_kg, true_pct, answer)
+def judged(
+    true_kg: float, found_kg: float | None, true_pct: float = 50.0, found_pct: float = 50.0, run: int = 1
+) -> Judged:
+    told = Estimate(0, 1, "ratio_index", rejected=(Why.TOO_SLOW,))
+    if found_kg is not None:
+        payload = Quantity(found_kg, interval95=(found_kg - 10.0, found_kg + 10.0))
+        front_share = Quantity(found_pct, interval95=(found_pct - 1.0, found_pct + 1.0))
+        told = replace(told, rejected=(), payload=payload, front_share=front_share)
+    return Judged(known_drive(run, f"{run}.log", true_kg, true_pct, ()), told)
 
 
 @pytest.mark.parametrize(
@@ -78,9 +77,9 @@ def test_pieces_at_the_end_of_a_run_are_no_batches() -> None:
 
 def test_every_run_has_figures_of_its_own() -> None:
     first = [judged(100.0, 108.0), judged(100.0, 96.0)]
-    second = [replace(one, run=2, name="b.log") for one in (judged(300.0, 280.0), judged(300.0, None))]
+    second = [judged(300.0, 280.0, run=2), judged(300.0, None, run=2)]
     runs = error_table([*first, *second], VAN, "ratio_index").to_json()["runs"]
-    assert [(run["run"], run["log"], run["true_payload_kg"]) for run in runs] == [(1, "a.log", 100), (2, "b.log", 300)]
+    assert [(run["run"], run["log"], run["true_payload_kg"]) for run in runs] == [(1, "1.log", 100), (2, "2.log", 300)]
     assert [(run["n_batches"], run["n_rejected"]) for run in runs] == [(2, 0), (2, 1)]
     assert [run["payload"]["bias_kg"] for run in runs] == pytest.approx([2.0, -20.0])
     assert [run["payload"]["max_abs_kg"] for run in runs] == pytest.approx([8.0, 20.0])

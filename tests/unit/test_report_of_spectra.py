@@ -130,7 +130,10 @@ def judged(cg_left: CgLeftErrors | None, wheels: WheelErrors | None) -> Judgemen
     none = TargetErrors("kg", None, None, None, None, None, None, None, None, None, None)
     errors = Errors(0, 0, {}, none, replace(none, unit="pp"), cg_left, wheels)
     told = replace(make_estimate(0, Why.TOO_SLOW), cg_left=Quantity.normal(0.01, 0.02))
-    batches = (Judged(1, "1.log", 0.0, 52.0, told, 0.0), Judged(2, "2.log", 100.0, 50.0, told))
+    batches = (
+        Judged(known_drive(1, "1.log", 0.0, 52.0, ()), told, 0.0),
+        Judged(known_drive(2, "2.log", 100.0, 50.0, ()), told),
+    )
     return Judgement("cross_spectrum", {BatchSet.VALIDATION: ErrorTable("cross_spectrum", batches, errors, ())})
 
 

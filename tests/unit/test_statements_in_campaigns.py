@@ -46,11 +46,11 @@ def test_an_unknown_load_teaches_and_is_found_and_is_not_judged() -> None:
     assert (told.found.without_statement_kg, told.found.is_held) == (None, False)
     assert told.found.payload_kg == pytest.approx(300.0, abs=60.0)
     (judgement,) = assess_calibration(outcome).judgements
-    assert {one.run for one in judgement.tables[BatchSet.LEFT_OUT].judged} == {1, 2, 4}
+    assert {one.drive.number for one in judgement.tables[BatchSet.LEFT_OUT].judged} == {1, 2, 4}
     validation = judgement.tables[BatchSet.VALIDATION]
     assert validation.errors.n_batches == 4
     answered = [one for one in validation.judged if one.is_covered("payload") is not None]
-    assert {one.run for one in answered} == {1, 2, 4}
+    assert {one.drive.number for one in answered} == {1, 2, 4}
     assert validation.to_json()["runs"][2]["true_payload_kg"] is None
 
 
@@ -60,7 +60,7 @@ def test_a_note_is_judged_by_its_kilograms_alone() -> None:
     found = (told.payload_kg, told.payload_plus_minus_kg, told.front_share_pct, told.is_compact)
     assert found == (200, 25, None, False)
     (judgement,) = assess_calibration(outcome).judgements
-    noted = [one for one in judgement.tables[BatchSet.VALIDATION].judged if one.run == 2]
+    noted = [one for one in judgement.tables[BatchSet.VALIDATION].judged if one.drive.number == 2]
     assert all(one.is_covered("payload") is not None for one in noted)
     assert all(one.is_covered("front_share") is None for one in noted)
 

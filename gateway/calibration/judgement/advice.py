@@ -109,7 +109,7 @@ def _uncovered(target: Target) -> Callable[[ErrorTable], float | None]:
     """The least share of intervals that may miss the truth, as few runs determine it; None with fewer than two runs."""
 
     def figure(table: ErrorTable) -> float | None:
-        covered = [(hit, one.run) for one in table.judged if (hit := one.is_covered(target)) is not None]
+        covered = [(hit, one.drive.number) for one in table.judged if (hit := one.is_covered(target)) is not None]
         if len({run for _, run in covered}) < 2:
             return None
         return 100.0 * (1.0 - coverage_of([hit for hit, _ in covered], [run for _, run in covered]).high)

@@ -45,32 +45,28 @@ class Comparison(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """One batch of a run: what was estimated, and what was true.
+    """One batch of a drive: what was estimated, and what was true.
 
-    Payload and front share are NaN if nobody knows them. cg_left_m is the sprung mass's centre of gravity left of the
-    centre line, NaN if not stated; unsprung is what calibration found. payload_doubt_kg is half the 95 % interval of
-    the true payload.
+    cg_left_m is the sprung mass's centre of gravity left of the centre line, NaN if not stated; unsprung is what
+    calibration found.
     """
 
-    run: int
-    name: str
-    payload_kg: float
-    front_share_pct: float
+    drive: StatedDrive
     estimate: Estimate
     cg_left_m: float = nan
     unsprung: Unsprung = NOT_CALIBRATED
-    payload_doubt_kg: float = 0.0
 
     def is_covered(self, target: Target) -> bool | None:
         """Whether the interval of one quantity contains the truth; None if either is unknown."""
-        return self.compared(target).is_covered(self.payload_doubt_kg if target == "payload" else 0.0)
+        doubt_kg = self.drive.statement.payload_plus_minus_kg
+        return self.compared(target).is_covered(doubt_kg if target == "payload" else 0.0)
 
     def compared(self, target: Target) -> Comparison:
         """Truth and estimate of one of the two quantities."""
         told = self.estimate
         if target == "payload":
-            return Comparison(self.payload_kg, told.payload.number, *told.payload.interval95)
-        return Comparison(self.front_share_pct, told.front_share.number, *told.front_share.interval95)
+            return Comparison(self.drive.payload_kg, told.payload.number, *told.payload.interval95)
+        return Comparison(self.drive.front_share_pct, told.front_share.number, *told.front_share.interval95)
 
     @property
     def cg_left(self) -> Comparison:
@@ -84,7 +80,7 @@ class Judged:
         truth takes both from the estimate, so their errors are in neither.
         """
         roll_share = Quantity(self.estimate.roll_share_front, 0.0)
-        truth = exactly(self.payload_kg, self.front_share_pct, self.cg_left_m)
+        truth = exactly(self.drive.payload_kg, self.drive.front_share_pct, self.cg_left_m)
         true = weights_of(vehicle, truth, roll_share, self.unsprung)
         off_kg = [getattr(self.estimate.weights, wheel).kg - getattr(true, wheel).kg for wheel in WHEELS]
         return np.array(off_kg) / true.gross.kg * 100.0
@@ -207,7 +203,7 @@ def error_table(judged: Sequence[Judged], vehicle: Vehicle, estimator: str) -> E
     """(12) over everything judged and run by run."""
     by_run: dict[int, list[Judged]] = {}
     for one in judged:
-        by_run.setdefault(one.run, []).append(one)
+        by_run.setdefault(one.drive.number, []).append(one)
     runs = tuple((of_run[0], errors_of(of_run, vehicle)) for of_run in by_run.values())
     return ErrorTable(estimator, tuple(judged), errors_of(judged, vehicle), runs)
 
@@ -288,10 +284,10 @@ def _mean(x: F64) -> float | None:
 
 def _truth(one: Judged) -> dict[str, int | float | str | None]:
     return {
-        "run": one.run,
-        "log": one.name,
-        "true_payload_kg": _known(one.payload_kg),
-        "true_front_share_pct": _known(one.front_share_pct),
+        "run": one.drive.number,
+        "log": one.drive.log,
+        "true_payload_kg": _known(one.drive.payload_kg),
+        "true_front_share_pct": _known(one.drive.front_share_pct),
         "true_cg_left_m": _known(one.cg_left_m),
     }
 
@@ -304,14 +300,10 @@ def judge(runs: Iterable[StatedDrive], calibrated: CalibratedVehicle, estimator:
     """Every batch of every run with its estimate."""
     return [
         Judged(
-            run.number,
-            run.log,
-            run.payload_kg,
-            run.front_share_pct,
+            run,
             weighed(_budgeted(batch, calibrated, estimator), calibrated.vehicle, calibrated.unsprung),
             _noted_cg_left_m(run, calibrated.vehicle),
             calibrated.unsprung,
-            run.statement.payload_plus_minus_kg,
         )
         for run in runs
         for batch in run.batches

@@ -171,9 +171,9 @@ def runs_table(judgement: Judgement, part: BatchSet) -> Table:
     chosen = (0, 1, 3, 7, 8, 9)  # of _COLUMNS
     rows = tuple(
         (
-            str(first.run),
-            known(first.payload_kg, " kg"),
-            known(first.front_share_pct, " %", ".1f"),
+            str(first.drive.number),
+            known(first.drive.payload_kg, " kg"),
+            known(first.drive.front_share_pct, " %", ".1f"),
             errors.answered,
             *(_cells(of)[n] for of in (errors.payload, errors.front_share) for n in chosen),
         )
@@ -190,7 +190,7 @@ def batches_table(judgement: Judgement, part: BatchSet) -> Table:
     columns = ("Run", "until", "true payload", *answer, "true share", *answer, "no answer")
     rows = tuple(
         (
-            str(one.run),
+            str(one.drive.number),
             iso_utc(one.estimate.t_end_ns)[:19] + "Z",
             *_answer_cells(one.compared("payload"), "g", " kg"),
             *_answer_cells(one.compared("front_share"), ".1f", " %"),

@@ -11,7 +11,7 @@ import numpy as np
 from gateway.calibration.campaign_file import Campaign, file_sha256, load_campaign
 from gateway.calibration.from_drives import calibrate_inspected
 from gateway.calibration.inspection.facts import InspectedRun
-from gateway.calibration.judgement.evaluation import Errors, Judged, errors_of, judge
+from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, errors_of, judge
 from gateway.calibration.ratio_index.least_squares import fit_regression
 from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, index_rows
 from gateway.calibration.stated_drive import StatedDrive
@@ -184,7 +184,7 @@ def mean_errors(run: StatedDrive, method: Method) -> tuple[float, float]:
         ]
     else:
         errors = [
-            [one.estimate.payload.number - one.payload_kg, one.estimate.front_share.number - one.front_share_pct]
+            [one.compared(target).estimated - one.compared(target).true for target in TARGETS]
             for one in method.judge([run])
             if one.estimate.counted
         ]
