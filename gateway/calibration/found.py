@@ -7,9 +7,7 @@ from math import nan
 
 import numpy as np
 
-from gateway.calibration.left_out import (
-    LeftOut,
-)
+from gateway.calibration.left_out import LeftOut
 from gateway.core.vehicle import Load
 from gateway.model.vehicle_model import VehicleModel
 from gateway.records import F64

@@ -15,7 +15,7 @@ from gateway.calibration.inspection.across_runs import Inspection
 from gateway.calibration.inspection.facts import InspectedRun
 from gateway.calibration.inspection.finding import Finding, Kind
 from gateway.calibration.judgement.advice import Verdict, verdicts_of
-from gateway.calibration.judgement.assessment import assess_calibration
+from gateway.calibration.judgement.assessment import Assessment, assess_calibration
 from gateway.calibration.learning.fitter_answers import doubts_of_vehicle
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.cli.options import (
@@ -243,12 +243,17 @@ def written_and_judged(outcome: Outcome, output: Path | None, report: Path | Non
     with counted("judging"):
         assessment = assess_calibration(outcome)
     if report is not None:
-        from gateway.reports.calibration.calibration_report import write_report_of  # noqa: PLC0415 # a vehicle has no matplotlib
-
-        with counted("drawing") as on_chart:
-            written = write_report_of(report, assessment, on_chart)
-        click.echo(str(written), err=True)
+        report_written(report, assessment)
     return verdicts_of(assessment)[0]
+
+
+def report_written(directory: Path, assessment: Assessment) -> None:
+    """Writes the report, and says where it is."""
+    from gateway.reports.calibration.calibration_report import write_report_of  # noqa: PLC0415 # a vehicle has no matplotlib
+
+    with counted("drawing") as on_chart:
+        written = write_report_of(directory, assessment, on_chart)
+    click.echo(str(written), err=True)
 
 
 def _record(file: CalibrationFile, output: Path | None) -> dict[str, object]:

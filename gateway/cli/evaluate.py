@@ -8,8 +8,9 @@ import click
 from gateway.calibration.campaign_file import load_campaign
 from gateway.calibration.file import load_calibration
 from gateway.calibration.judgement.advice import verdicts_of
-from gateway.calibration.judgement.assessment import Assessment, BatchSet, assess_evaluation
+from gateway.calibration.judgement.assessment import BatchSet, assess_evaluation
 from gateway.calibration.judgement.evaluation import Errors, ErrorTable, Judged, TargetErrors, error_table
+from gateway.cli.calibrate import report_written
 from gateway.cli.options import CAMPAIGN, FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.progress import counted
 from gateway.errors import ConfigurationError
@@ -58,15 +59,7 @@ def evaluate(
     else:
         click.echo(f"{text_of(table)}\n\n{verdict.text}")
     if report is not None:
-        _report(report, assessment)
-
-
-def _report(directory: Path, assessment: Assessment) -> None:
-    from gateway.reports.calibration import calibration_report  # noqa: PLC0415 # a vehicle has no matplotlib
-
-    with counted("drawing") as on_chart:
-        written = calibration_report.write_report_of(directory, assessment, on_chart)
-    click.echo(str(written), err=True)
+        report_written(report, assessment)
 
 
 def text_of(table: ErrorTable) -> str:
