@@ -1,7 +1,7 @@
 """A campaign's drives: read, split into identification and validation, inspected, calibrated and judged."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
@@ -35,21 +35,10 @@ def read_whole_log(log: Path, signal_map: SignalMap) -> tuple[Motion, LogReport]
     return joined(parts).weighing, report
 
 
-@dataclass(frozen=True, slots=True)
-class Stretch:
-    """Part of a log, in seconds from the first motion frame; an open end is None."""
-
-    start_s: float = 0.0
-    end_s: float | None = None
-
-
-def rows_within(motion: Motion, stretch: Stretch) -> Motion:
-    """Rows with stamps in [start, end) of the stretch."""
-    since_ns = motion.t_ns - motion.t_ns[0]
-    inside = since_ns >= round(stretch.start_s * NS_PER_S)
-    if stretch.end_s is not None:
-        inside &= since_ns < round(stretch.end_s * NS_PER_S)
-    return motion.rows(inside)
+def rows_within(motion: Motion, start_s: float = 0.0, end_s: float = math.inf) -> Motion:
+    """Rows with stamps in [start, end), in seconds from the first row."""
+    since_ns = motion.t_ns - motion.t_ns[:1]
+    return motion.rows((since_ns >= np.rint(start_s * NS_PER_S)) & (since_ns < np.rint(end_s * NS_PER_S)))
 
 
 def batches_of_motion(motion: Motion, signal_map: SignalMap, settings: BatchSettings) -> tuple[Batch, ...]:
@@ -95,13 +84,21 @@ def _split_run(
 ) -> InspectedRun:
     log = campaign.log_of(run)
     whole, report = read_whole_log(log, signal_map)
-    motion = rows_within(whole, Stretch(run.start_s, run.end_s))
-    stretches = _parts(motion, run, campaign.identification_fraction)
-    both = [rows_within(motion, stretch) if stretch and len(motion) else motion.part(0, 0) for stretch in stretches]
-    first, last = (batches_of_motion(rows, signal_map, settings) for rows in both)
-    facts = row_facts(both[0] if stretches[0] else both[1], signal_map.traits)
-    log_facts = facts_of_log(log, whole, motion, report, signal_map, run.start_s)
-    return InspectedRun(campaign.drive(number, run, first), last, facts, stretches[0] is not None, log_facts)
+    motion = rows_within(whole, run.start_s, run.end_s or math.inf)
+    fraction = campaign.identification_fraction
+    if run.split is not None:
+        fraction = 1.0 if run.split == "identification" else 0.0
+    duration_s = float(motion.t_ns[-1] - motion.t_ns[0]) / NS_PER_S if len(motion) else 0.0
+    cut_s = fraction * duration_s if fraction < 1.0 else math.inf
+    parts = rows_within(motion, end_s=cut_s), rows_within(motion, cut_s)
+    first, last = (batches_of_motion(rows, signal_map, settings) for rows in parts)
+    return InspectedRun(
+        campaign.drive(number, run, first),
+        last,
+        row_facts(parts[0 if fraction > 0.0 else 1], signal_map.traits),
+        has_identification=fraction > 0.0,
+        log=facts_of_log(log, whole, motion, report, signal_map, run.start_s),
+    )
 
 
 def facts_of_log(
@@ -143,19 +140,6 @@ def _damage(report: LogReport) -> str | None:
     if report.n_rejected > LOST_LINES_SHARE * report.lines:
         return f"{report.n_rejected} of {report.lines} lines cannot be read"
     return None
-
-
-def _parts(motion: Motion, run: RunTable, fraction: float) -> tuple[Stretch | None, Stretch | None]:
-    """Identification and validation stretch of a run; None if it has none."""
-    if run.split is not None:
-        whole = Stretch()
-        return (whole, None) if run.split == "identification" else (None, whole)
-    duration_s = float(motion.t_ns[-1] - motion.t_ns[0]) / NS_PER_S if len(motion) else 0.0
-    cut_s = fraction * duration_s
-    return (
-        Stretch(0.0, cut_s if fraction < 1.0 else None) if fraction > 0.0 else None,
-        Stretch(cut_s, None) if fraction < 1.0 else None,
-    )
 
 
 def inspect(

@@ -20,7 +20,7 @@ from gateway.calibration.stated_drive import known_drive
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.vehicle import UNKNOWN_OFFSET_STD_M
 from gateway.offline import campaigns as offline_campaigns
-from gateway.offline.campaigns import Stretch, batches_of_motion, inspect, read_whole_log, rows_within
+from gateway.offline.campaigns import batches_of_motion, inspect, read_whole_log, rows_within
 from gateway.records import Batch, Motion, Signal
 
 SETTINGS = BatchSettings()
@@ -128,7 +128,7 @@ def faults_with(signals: str, source: Path, campaign: str, log: int, tmp_path: P
     loaded = load_campaign(source / f"{campaign}.toml")
     run = loaded.runs[log - 1]
     signal_map = load_signal_map(tmp_path / "signals.toml")
-    motion = rows_within(read_whole_log(loaded.log_of(run), signal_map)[0], Stretch(0.0, 700.0))
+    motion = rows_within(read_whole_log(loaded.log_of(run), signal_map)[0], end_s=700.0)
     batches = batches_of_motion(motion, signal_map, SETTINGS)
     known = known_drive(log, str(run.log), run.payload_kg, loaded.front_share_pct(run), batches)
     one = InspectedRun(known, facts=row_facts(motion, signal_map.traits))
