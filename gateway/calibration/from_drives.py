@@ -43,11 +43,6 @@ class Outcome:
     cross_spectrum: Taught | None = None
     doubts: tuple[Doubt, ...] = ()
 
-    @property
-    def used(self) -> tuple[InspectedRun, ...]:
-        """The runs without a fault, which were used for the calibration."""
-        return self.inspection.usable
-
 
 def calibrate_inspected(
     vehicle: Vehicle,

@@ -69,7 +69,7 @@ def read_drives(
             drives.repeated[log] = first
             continue
         found = windows_of_motion(motion, signal_map, settings)
-        findings = _findings(log, motion, found, facts, signal_map, vehicle, settings)
+        findings = _findings(motion, found, facts, signal_map, vehicle, settings)
         kept = drives.faulty if any(one.severity is Severity.FAULT for one in findings) else drives.findings
         if findings:
             kept[log] = findings
@@ -92,7 +92,6 @@ def windows_of_motion(motion: Motion, signal_map: SignalMap, settings: BatchSett
 
 
 def _findings(
-    log: Path,
     motion: Motion,
     windows: Sequence[KeptBatch],
     facts: LogFacts,
@@ -102,4 +101,4 @@ def _findings(
 ) -> tuple[Finding, ...]:
     """What is wrong with the sensors, the map or the log."""
     batches = [replace(one.batch, rejected=()) if can_teach(one.batch, settings) else one.batch for one in windows]
-    return inspected(log.name, batches, row_facts(motion, signal_map.traits), facts, vehicle, settings)
+    return inspected(batches, row_facts(motion, signal_map.traits), facts, vehicle, settings)

@@ -78,12 +78,13 @@ def stated_budget(judgement: Judgement) -> tuple[BudgetLine, ...]:
 def assess_calibration(outcome: Outcome) -> Assessment:
     """Every estimator judged on runs left out, on the data of its fit and on the validation part."""
     file, vehicle, calibrated = outcome.file, outcome.file.vehicle, outcome.file.for_core()
+    runs = outcome.inspection.usable
     judgements = []
     for estimator in file.estimators:
         judged = {
             BatchSet.LEFT_OUT: judged_left_out(outcome, estimator),
-            BatchSet.VALIDATION: judge([run.validation for run in outcome.used], calibrated, estimator),
-            BatchSet.IDENTIFICATION: judge([run.identification for run in outcome.used], calibrated, estimator),
+            BatchSet.VALIDATION: judge([run.validation for run in runs], calibrated, estimator),
+            BatchSet.IDENTIFICATION: judge([run.identification for run in runs], calibrated, estimator),
         }
         tables = {part: error_table(rows, vehicle, estimator) for part, rows in judged.items() if rows}
         judgements.append(Judgement(estimator, tables))
@@ -102,17 +103,16 @@ def judged_left_out(outcome: Outcome, estimator: str) -> list[Judged]:
     Empty if fewer than three runs leave nothing to fit. The widening of intervals and the range of known loads stay as
     of all runs: the errors are those of a new load, the coverage is slightly optimistic.
     """
-    whole = outcome.file.for_core()
+    whole, runs = outcome.file.for_core(), [one.identification for one in outcome.inspection.usable]
     if estimator == "ratio_index":
         ratio = outcome.ratio_index
         without = {n: replace(whole, ratio_index=fitted) for n, fitted in (ratio.without if ratio else {}).items()}
     else:
         taught = outcome.cross_spectrum.without if outcome.cross_spectrum else {}
-        identified = [one.identification for one in outcome.used]
         without = {
             run.number: replace(whole, cross_spectrum=taught[run.name], is_shape_known=run.statement.is_compact)
-            for run in identified
+            for run in runs
             if run.name in taught
         }
-    runs = [one.identification for one in outcome.used if one.identification.number in without]
-    return [one for run in runs for one in judge([run], without[run.number], estimator)]
+    left_out = [run for run in runs if run.number in without]
+    return [one for run in left_out for one in judge([run], without[run.number], estimator)]

@@ -187,15 +187,15 @@ def _facts(one: Driven) -> LogFacts:
 
 def _faults(one: Driven, vehicle: Vehicle, settings: BatchSettings) -> tuple[Finding, ...]:
     """What is wrong with the sensors or the map in this piece."""
-    found = inspected(one.name, one.batches, one.facts, _facts(one), vehicle, settings)
+    found = inspected(one.batches, one.facts, _facts(one), vehicle, settings)
     return tuple(finding for finding in found if finding.severity is Severity.FAULT)
 
 
 def inspected(
-    name: str, batches: Sequence[Batch], rows: RowFacts, log: LogFacts, vehicle: Vehicle, settings: BatchSettings
+    batches: Sequence[Batch], rows: RowFacts, log: LogFacts, vehicle: Vehicle, settings: BatchSettings
 ) -> tuple[Finding, ...]:
     """What is wrong with the sensors, the map or the log of an ordinary drive, whatever is known of its load."""
-    whole = InspectedRun(StatedDrive(drive_name(1), tuple(batches), number=1, log=name), facts=rows, log=log)
+    whole = InspectedRun(StatedDrive("", tuple(batches)), facts=rows, log=log)
     return inspect_run(whole, vehicle, settings, LOOKED_FOR)
 
 

@@ -43,10 +43,11 @@ def write_report_of(directory: Path, assessment: Assessment, on_chart: OnChart =
 
 
 def _calibration_sections(outcome: Outcome) -> Iterator[Section]:
-    identification = [one.identification for one in outcome.used]
+    runs = outcome.inspection.usable
+    identification = [one.identification for one in runs]
     yield runs_section(outcome)
     if outcome.ratio_index is not None:
-        yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in outcome.used])
+        yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in runs])
     if outcome.cross_spectrum is not None:
         yield fitted_vehicle_section(identification, outcome.cross_spectrum, outcome.file.vehicle)
 
