@@ -86,14 +86,12 @@ def up_to(cursor: str | None) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """How far an uplink has delivered. ``n_pruned`` estimates were removed by retention before it could.
+    """How far an uplink has delivered, and how many records retention removed before it could.
 
     ``oldest_ns`` is when the oldest that waits was received; None if none waits.
-    ``n_pruned_entries`` is of load events, trips and alarms.
     """
 
     cursor: str | None
     n_pruned: int
     n_waiting: int
     oldest_ns: int | None = None
-    n_pruned_entries: int = 0

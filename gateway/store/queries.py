@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.records import json_line
-from gateway.store.journal import BATCHES, ENTRIES, SERVICE, Delivery
+from gateway.store.journal import SERVICE, Delivery
 from gateway.store.schema import JOURNAL_COLUMNS, JournalRow, checksum
 
 LAST: Final = (1 << 63) - 1  # SQLite's largest integer
@@ -72,10 +72,11 @@ def page(
 def delivery(connection: sqlite3.Connection, uplink: str, kinds: Sequence[str]) -> Delivery:
     """The position of an uplink on disk, with the number of waiting records of these kinds."""
     epoch = connection.execute("SELECT epoch FROM state").fetchone()
-    sql = "SELECT seq, n_pruned, n_pruned_entries FROM uplinks WHERE name = ?"
-    found = connection.execute(sql, (uplink,)).fetchone()
-    seq, n_pruned, n_pruned_entries = found or (-1, 0, 0)
+    found = connection.execute("SELECT seq FROM uplinks WHERE name = ?", (uplink,)).fetchone()
+    seq = found[0] if found else -1
     marks = ", ".join("?" * len(kinds))
+    sql = f"SELECT coalesce(sum(n), 0) FROM pruned WHERE kind IN ({marks}) AND name = ?"
+    (n_pruned,) = connection.execute(sql, (*kinds, uplink)).fetchone()
     n, first = connection.execute(
         f"SELECT count(*), min(seq) FROM journal WHERE kind IN ({marks}) AND seq > ?", (*kinds, seq)
     ).fetchone()
@@ -85,20 +86,17 @@ def delivery(connection: sqlite3.Connection, uplink: str, kinds: Sequence[str]) 
         n_pruned=n_pruned,
         n_waiting=n,
         oldest_ns=None if oldest is None else oldest[0],
-        n_pruned_entries=n_pruned_entries,
     )
 
 
 def count_pruned(connection: sqlite3.Connection, condition: str, asked: tuple[object, ...]) -> None:
-    """Adds the undelivered rows under ``condition``, which will be removed, to the counts of each uplink."""
-    for column, kinds in (("n_pruned", BATCHES), ("n_pruned_entries", ENTRIES)):
-        marks = ", ".join(f"'{kind}'" for kind in kinds)
-        connection.execute(
-            f"UPDATE uplinks SET {column} = {column} + (SELECT count(*) FROM journal"
-            f" WHERE {condition} AND kind IN ({marks}) AND journal.seq > uplinks.seq)"
-            f" WHERE EXISTS (SELECT 1 FROM journal WHERE {condition} AND journal.seq > uplinks.seq)",
-            (*asked, *asked),
-        )
+    """Add the rows under ``condition``, which will be removed, to the counts of each uplink that lacks them."""
+    connection.execute(
+        "INSERT INTO pruned (name, kind, n) SELECT name, kind, count(*) FROM uplinks, journal"
+        f" WHERE journal.seq > uplinks.seq AND {condition} GROUP BY name, kind"
+        " ON CONFLICT (name, kind) DO UPDATE SET n = n + excluded.n",
+        asked,
+    )
 
 
 def without_spectra(text: str) -> str:

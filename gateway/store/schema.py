@@ -13,7 +13,7 @@ from typing import Any, Final
 from gateway.errors import StoreRefusedError
 
 APPLICATION_ID: Final = 0x53505253  # "SPRS" in the file's header
-VERSION: Final = 8  # of the tables; a file of another version is refused
+VERSION: Final = 9  # of the tables; a file of another version is refused
 
 _TABLES: Final = f"""
 BEGIN IMMEDIATE;
@@ -38,13 +38,10 @@ CREATE TABLE journal (
 );
 CREATE INDEX journal_by_kind ON journal (kind, seq);
 CREATE INDEX journal_by_time ON journal (kind, t_end_ns);
--- how far each uplink has delivered, and what retention took from it before it could
-CREATE TABLE uplinks (
-    name TEXT PRIMARY KEY,
-    seq INTEGER NOT NULL,
-    n_pruned INTEGER NOT NULL DEFAULT 0,
-    n_pruned_entries INTEGER NOT NULL DEFAULT 0
-);
+-- how far each uplink has delivered
+CREATE TABLE uplinks (name TEXT PRIMARY KEY, seq INTEGER NOT NULL);
+-- how many records retention took from an uplink before it could deliver them
+CREATE TABLE pruned (name TEXT, kind TEXT, n INTEGER NOT NULL, PRIMARY KEY (name, kind));
 PRAGMA application_id = {APPLICATION_ID};
 PRAGMA user_version = {VERSION};
 COMMIT;

@@ -9,7 +9,6 @@ from typing import Final, Generic, TypeVar
 from gateway.errors import StoreError
 from gateway.part import FIRST_PAUSE_S, STOP_WITHIN_S, BackOff, ThreadPart
 from gateway.status import UplinkStatus, WebhookStatus
-from gateway.store.journal import Delivery
 from gateway.units import NS_PER_S
 from gateway.uplink.outbox import Outbox, OutboxMessage
 
@@ -80,10 +79,6 @@ class Sender(ThreadPart, Generic[Report]):
                 self._look()
             self._stopping.wait(min(left_s, LOOK_S))
 
-    def _n_pruned(self, found: Delivery) -> int:
-        """Number of records that retention removed before this sender delivered them."""
-        return found.n_pruned
-
     def _look(self) -> None:
         """Count the waiting records, at most every LOOK_S."""
         if time.monotonic() - self._looked_s < LOOK_S:
@@ -94,7 +89,7 @@ class Sender(ThreadPart, Generic[Report]):
             self._report,
             n_waiting=found.n_waiting,
             waiting_age_s=_age_s(found.oldest_ns),
-            n_pruned=self._n_pruned(found),
+            n_pruned=found.n_pruned,
         )
 
 

@@ -21,7 +21,6 @@ from gateway.log import Event, OnEvent, log_event, tell_event
 from gateway.part import BackOff
 from gateway.records import json_line
 from gateway.status import WebhookStatus
-from gateway.store.journal import ESTIMATE, Delivery
 from gateway.uplink.outbox import Outbox, OutboxMessage
 from gateway.uplink.sender import NotTakenError, Sender
 from gateway.uplink.settings import WebhookSettings
@@ -123,9 +122,6 @@ class Webhook(Sender[WebhookStatus]):
         told = f"{s.receiver} answered {answer.status_code} {answer.reason_phrase}".rstrip()
         wait = answer.headers.get("Retry-After", "")
         return answer.status_code, told, min(float(wait), MOST_PAUSE_S) if wait.isdecimal() else 0.0
-
-    def _n_pruned(self, found: Delivery) -> int:
-        return found.n_pruned_entries + (found.n_pruned if ESTIMATE in self._settings.kinds else 0)
 
     def _note(self, fault: str) -> None:
         if fault != self._report.last_fault:
