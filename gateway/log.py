@@ -57,6 +57,7 @@ class Event(StrEnum):
     STORE_RECOVERED = "store is on disk again"
     STORE_DAMAGED = "database set aside"
     STORE_BAD_RECORD = "bad record left out"
+    STORE_REPLACED = "database removed or replaced by somebody"
     STORE_FORGETS = "old damaged database removed"
     CLOCK_DOUBTED = "clock far ahead, age removes nothing"
     CLOCK_BELIEVED = "clock believed again"

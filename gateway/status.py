@@ -139,6 +139,9 @@ class StoreStatus:
     size_bytes: int = 0
     n_bad_records: Annotated[int, Field(description="records that cannot be used, since the start")] = 0
     set_aside: Annotated[str | None, Field(description="damaged database that the service renamed")] = None
+    is_replaced: Annotated[
+        bool, Field(description="true: somebody removed the database, or put another in its place, since the start")
+    ] = False
     is_reserve_in_use: Annotated[
         bool, Field(description="true: the disk is full, and records go to the room that was kept for them")
     ] = False
@@ -305,6 +308,8 @@ def faults_of(status: Status) -> Iterator[str]:
         yield f"{store.n_dropped} records are lost: the disk refused them for longer than memory holds them"
     if store.set_aside:
         yield f"the database was damaged and is kept as {store.set_aside}; the history begins anew"
+    if store.is_replaced:
+        yield "the database was removed or replaced while the service ran; the history is that of the present one"
     if uplink is not None and uplink.last_fault:
         yield f"the fleet's broker takes no records ({uplink.last_fault}); {uplink.n_waiting} wait"
     if webhook is not None and webhook.last_fault:

@@ -62,10 +62,10 @@ def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
         raise
 
 
-def _identity(path: Path) -> tuple[int, int] | None:
-    """Device and inode of a file; None if it does not exist or cannot be read."""
+def _identity(file: Path | int) -> tuple[int, int] | None:
+    """Device and inode of a file, by path or descriptor; None if it does not exist or cannot be read."""
     try:
-        status = path.stat()
+        status = os.stat(file)
     except OSError:
         return None
     return status.st_dev, status.st_ino
@@ -88,6 +88,7 @@ class Database:
         self._age: AgeClock | None = None
         self._is_mended = False
         self._lock_fd: int | None = None
+        self.is_replaced = False  # whether somebody took the open file away, and this one stands in its place
 
     @property
     def is_open(self) -> bool:
@@ -97,6 +98,7 @@ class Database:
     def open(self, new_epoch: str) -> Opened:
         """Open or create the file. Raises StoreError, OSError or sqlite3.Error; then nothing stays open."""
         self.disconnect()
+        before = self._opened_identity
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self._lock()
         self._connection = connect_writer(self.path)
@@ -106,6 +108,7 @@ class Database:
             self._age = AgeClock(self._connection)
             self._is_mended = False
             self._opened_identity = self._identities()
+            self.is_replaced |= bool(before) and before[0] != self._opened_identity[0]
             return opened
         except (OSError, sqlite3.Error):
             self.disconnect()
@@ -182,13 +185,12 @@ class Database:
     def close(self) -> None:
         """Close the connection and release the lock of the directory."""
         self.disconnect()
-        if self._lock_fd is not None:
-            os.close(self._lock_fd)
-            self._lock_fd = None
+        self._unlock()
 
     def set_aside(self) -> str:
         """Rename the file with its WAL and shared-memory files -> the new name. Raises OSError."""
         self.disconnect()
+        self._opened_identity = ()
         stem = f"{FILE_NAME}.damaged-{datetime.now(UTC):%Y%m%dT%H%M%S}"
         names = (f"{stem}-{n}" if n else stem for n in itertools.count())
         name = next(name for name in names if not self.path.with_name(name).exists())
@@ -219,9 +221,13 @@ class Database:
         return self._connection
 
     def _lock(self) -> None:
+        """Hold the lock file that lies in the directory now: the one held before may have been taken away."""
+        path = self.path.with_name(LOCK_NAME)
         if self._lock_fd is not None:
-            return
-        lock_fd = os.open(self.path.with_name(LOCK_NAME), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)
+            if _identity(path) == _identity(self._lock_fd):
+                return
+            self._unlock()
+        lock_fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)
         try:
             fcntl.flock(lock_fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -230,6 +236,11 @@ class Database:
                 f"another Springscale uses {self.path.parent}: stop it or set another [store] directory"
             ) from None
         self._lock_fd = lock_fd
+
+    def _unlock(self) -> None:
+        lock_fd, self._lock_fd = self._lock_fd, None
+        if lock_fd is not None:
+            os.close(lock_fd)
 
     @staticmethod
     def _identify(connection: sqlite3.Connection, new_epoch: str) -> Opened:

@@ -54,9 +54,13 @@ class WriteBuffer:
     def epoch(self) -> str:
         return self._epoch
 
-    def rebase(self, epoch: str, last_seq: int, last_batch: int, newest: Mapping[str, int]) -> None:
-        """Continue after the last record of a database that was opened later."""
+    def continue_in(self, epoch: str, last_seq: int, last_batch: int, newest: Mapping[str, int]) -> None:
+        """Continue after the last record of the database that was opened, unless its numbers are those of this
+        buffer.
+        """
         with self._changed:
+            if epoch == self._epoch and last_seq < self._next_seq:
+                return
             before, first_seq = self._epoch, last_seq
             self._epoch, self._newest = epoch, dict(newest)
             self._number_behind(last_seq, last_batch)

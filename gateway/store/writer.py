@@ -55,7 +55,6 @@ class Store(ServicePart):
         self._reason: str | None = None
         self._set_aside: str | None = None
         self._n_written = self._n_pruned = self._size_bytes = 0
-        self._has_numbers = False  # whether the numbering is that of a database
         self._thread = threading.Thread(target=self._write_until_closed, name="store-writer", daemon=True)
 
     @classmethod
@@ -142,6 +141,7 @@ class Store(ServicePart):
             n_pruned=self._n_pruned,
             size_bytes=self._size_bytes,
             set_aside=self._set_aside,
+            is_replaced=self._database.is_replaced,
             is_reserve_in_use=self._reserve.is_in_use,
             n_bad_records=len(self._bad),
         )
@@ -252,10 +252,10 @@ class Store(ServicePart):
     def _open_if_closed(self) -> None:
         if self._database.is_open:
             return
-        opened = self._database.open(self._buffer.epoch)
-        if not self._has_numbers:
-            self._buffer.rebase(*opened)
-            self._has_numbers = True
+        was_replaced = self._database.is_replaced
+        self._buffer.continue_in(*self._database.open(self._buffer.epoch))
+        if self._database.is_replaced and not was_replaced:
+            log_event(Event.STORE_REPLACED, level=logging.ERROR, path=str(self.path))
 
     def _commit(self) -> None:
         rows = self._buffer.take()

@@ -17,6 +17,7 @@ from gateway.errors import StoreError
 from gateway.log import Event
 from gateway.status import StoreState
 from gateway.store import Retention, Store, StoreReader
+from gateway.store.journal import BATCHES
 
 
 def test_a_full_disk_degrades_to_memory_and_heals(tmp_path: Path) -> None:
@@ -87,17 +88,46 @@ def test_memory_is_bounded_and_dropped_records_are_counted(tmp_path: Path) -> No
     assert store.close() == 3
 
 
-def test_a_database_deleted_under_the_running_store_is_recreated(tmp_path: Path) -> None:
+def test_a_database_deleted_under_the_running_store_is_recreated(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     store = Store.open(tmp_path)
+    assert not store.health().is_replaced
     cursor = store.write_estimate(make_record(0))
     assert store.flush(PATIENCE_S)
-    for leftover in tmp_path.glob("springscale.db*"):
+    for leftover in tmp_path.glob("springscale.*"):
         leftover.unlink()
     store.write_estimate(make_record(1))
     assert store.flush(PATIENCE_S)
     assert store.reader().estimates(cursor=cursor).items == texts(make_record(1))
+    assert store.health().is_replaced
+    assert fields_of(caplog, Event.STORE_REPLACED) == {"path": str(tmp_path / "springscale.db")}
+    with pytest.raises(StoreError, match="another Springscale uses"):
+        Store.open(tmp_path)
     assert store.close() == 0
     assert (tmp_path / "springscale.db").exists()
+
+
+def test_a_directory_that_is_mounted_over_the_present_one_keeps_its_records(tmp_path: Path) -> None:
+    """Both databases begin with the same numbers, and a record with the number of another one took its place."""
+    volume, directory = tmp_path / "volume", tmp_path / "springscale"
+    earlier = Store.open(volume)
+    for n in range(20):
+        earlier.write_estimate(make_record(n))
+    assert earlier.close() == 0
+    store = Store.open(directory)
+    store.write_estimate(make_record(20))
+    assert store.flush(PATIENCE_S)
+    follower = store.follow(BATCHES, store.head(), lambda: None)
+
+    directory.rename(tmp_path / "hidden")
+    volume.rename(directory)
+    for n in range(21, 24):
+        store.write_estimate(make_record(n))
+        assert store.flush(PATIENCE_S)
+    assert store.reader().estimates().items == texts(*(make_record(n) for n in range(24) if n != 20))
+    assert [one.text for one in follower.read(10)] == list(texts(*(make_record(n) for n in range(21, 24))))
+    store.close()
 
 
 def damage(path: Path) -> None:
