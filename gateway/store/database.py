@@ -62,10 +62,10 @@ def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
         raise
 
 
-def _identity(file: Path | int) -> tuple[int, int] | None:
-    """Device and inode of a file, by path or descriptor; None if it does not exist or cannot be read."""
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Device and inode of a file; None if it does not exist or cannot be read."""
     try:
-        status = os.stat(file)
+        status = path.stat()
     except OSError:
         return None
     return status.st_dev, status.st_ino
@@ -224,7 +224,8 @@ class Database:
         """Hold the lock file that lies in the directory now: the one held before may have been taken away."""
         path = self.path.with_name(LOCK_NAME)
         if self._lock_fd is not None:
-            if _identity(path) == _identity(self._lock_fd):
+            held = os.fstat(self._lock_fd)
+            if _identity(path) == (held.st_dev, held.st_ino):
                 return
             self._unlock()
         lock_fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)

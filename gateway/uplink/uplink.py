@@ -82,6 +82,7 @@ class Uplink(Sender[UplinkStatus]):
         self._connects_by_s = 0.0  # else the attempt has failed, and this client with it
         self._most_bytes: int | None = None  # the broker's Maximum Packet Size
         self._refusal: str | None = None  # of the last record, until one is accepted
+        self._is_refused = False  # the present connection, by the broker's answer to it
 
     def _work(self) -> None:
         """Deliver through one client until stopped, or until the broker does not take a message."""
@@ -218,8 +219,9 @@ class Uplink(Sender[UplinkStatus]):
         client.on_connect = self._later(self._on_connect)
         client.on_disconnect = self._on_disconnect
         client.on_publish = self._later(self._on_publish)
-        client.on_message = self._later(self._statements.append)
-        client.on_subscribe = self._later(self._on_subscribe)
+        if self._desk is not None:
+            client.on_message = self._later(self._statements.append)
+            client.on_subscribe = self._later(self._on_subscribe)
         return client
 
     # In paho's thread:
@@ -260,7 +262,8 @@ class Uplink(Sender[UplinkStatus]):
     # In the uplink's thread:
 
     def _on_connect(self, _flags: Any, code: ReasonCode, told: Any) -> None:
-        if code.is_failure:
+        self._is_refused = code.is_failure
+        if self._is_refused:
             self._note(f"{self._settings.broker} refused the connection: {code}")
             return
         self._most_bytes = getattr(told, "MaximumPacketSize", None)
@@ -274,7 +277,9 @@ class Uplink(Sender[UplinkStatus]):
         if self._report.is_connected:
             self._report = replace(self._report, is_connected=False, n_cuts=self._report.n_cuts + 1)
             self._note(f"the connection to {self._settings.broker} was lost: {code}")
-        self._is_announced = False
+        elif not self._is_refused:
+            self._note(f"{self._settings.broker} closed the connection without an answer: is it an MQTT 5 broker?")
+        self._is_announced = self._is_refused = False
         if code.value in _HOPELESS:  # a broker may answer a message by closing the connection
             self._answer = code
 

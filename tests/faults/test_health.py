@@ -131,6 +131,30 @@ def test_a_broker_that_takes_nothing_is_a_fault(what: str, tmp_path: Path, monke
         assert wait_until(lambda: there.uplink.report().last_fault is None and there.uplink.report().n_delivered)
 
 
+def closes(_: SmallBroker) -> bytes:
+    raise EOFError
+
+
+@pytest.mark.parametrize(
+    ("greets", "fault"),
+    [
+        (closes, "closed the connection without an answer"),
+        (lambda _: bytes([0x20, 3, 0, NOT_AUTHORIZED, 0]), "refused the connection: Not authorized"),
+    ],
+)
+def test_a_broker_that_takes_no_connection_is_a_fault(
+    greets: Callable[[SmallBroker], bytes], fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that closed every connection was tried for ever, and nothing said so."""
+    with monkeypatch.context() as patch:
+        patch.setattr(SmallBroker, "_connack", greets)
+        with Broker(tmp_path, lambda topic: TAKEN) as there:
+            assert wait_until(lambda: fault in (there.uplink.report().last_fault or ""))
+            patch.undo()
+            assert wait_until(lambda: there.uplink.report().n_delivered == 3)
+            assert there.uplink.report().last_fault is None
+
+
 class ScriptedBus:
     """A bus of python-can that gives these messages, then none."""
 

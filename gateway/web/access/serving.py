@@ -137,12 +137,9 @@ class WebServer(ThreadPart):
         return "https" if self._config.is_ssl else "http"
 
     def _work(self) -> None:
-        try:
-            listening = self._listening()
-            with asyncio.Runner(loop_factory=self._config.get_loop_factory()) as runner:
-                runner.run(self._serve(listening))
-        except SystemExit:  # uvicorn's way to say so
-            raise OSError("its address cannot be used") from None
+        listening = self._listening()
+        with asyncio.Runner(loop_factory=self._config.get_loop_factory()) as runner:
+            runner.run(self._serve(listening))
         if not self._stopping.is_set():
             raise RuntimeError("it ended")
 
@@ -167,7 +164,8 @@ class WebServer(ThreadPart):
 
     def death(self) -> str | None:
         told = super().death()
-        return told and f"could not run on {self._config.host}:{self._config.port}: is it taken?"
+        is_refused = told is not None and isinstance(self.failure, OSError)
+        return f"could not run on {self._config.host}:{self._config.port}: {self.failure}" if is_refused else told
 
     def is_answering(self) -> bool:
         """Whether a request to this very server is answered in time."""
@@ -188,15 +186,21 @@ class WebServer(ThreadPart):
 
     def _listening(self) -> list[socket.socket]:
         """At the address of the settings and, if that is not this machine's own, also at one that is. A client that
-        takes nothing for a while is closed by the kernel. Raises SystemExit.
+        takes nothing for a while is closed by the kernel. Raises OSError.
         """
-        listening = [self._config.bind_socket()]
+        is_ipv6 = ":" in self._config.host
+        listening = [
+            socket.create_server(
+                (self._config.host, self._config.port),
+                family=socket.AF_INET6 if is_ipv6 else socket.AF_INET,
+                dualstack_ipv6=is_ipv6 and socket.has_dualstack_ipv6(),
+            )
+        ]
         host, port, *_ = listening[0].getsockname()
         self.port, self._own, self.IS_VITAL = port, (host, port), False
         if not is_loopback(host):
             listening.append(socket.create_server(("127.0.0.1", 0)))
             self._own = listening[1].getsockname()
         for one in listening:
-            one.set_inheritable(False)
             one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNREAD_MS)  # connections inherit it
         return listening
