@@ -134,10 +134,10 @@ def _written(
     told: list[dict[str, Any]],
     failures: dict[JobLog, str],
 ) -> JobOutcome:
-    """Write the table, then its receipt; those of another worker are kept."""
+    """Write the table, then its receipt; those of another worker are kept, unless a power cut has torn the table."""
     table = parquet_of(rows)
-    if not job.dataset.create(job.slot.table, table):
-        table = job.dataset.read(job.slot.table)  # of a worker that was killed before its receipt
+    if not job.dataset.create(job.slot.table, table) and job.dataset.read(job.slot.table) != table:
+        job.dataset.replace(job.slot.table, table)
     receipt = {
         "job": job.slot.job,
         "vehicle": job.slot.vehicle,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.archive.places import Location, place_of
+from gateway.archive.places import Location, PlaceError, place_of
 
 ESTIMATES: Final = "estimates"
 RECEIPTS: Final = "receipts"
@@ -57,9 +57,19 @@ def trusted_tables(dataset: Location | Path | str) -> list[str]:
 
 
 def receipts(dataset: Location | Path | str) -> list[dict[str, Any]]:
-    """The content of every receipt, in order of vehicle and month."""
+    """The content of every receipt, in order of vehicle and month. Raises PlaceError for one that is damaged."""
     place = _place(dataset)
-    return [json.loads(place.read(slot.receipt)) for slot in slots_done(place)]
+    return [_content(place, slot.receipt) for slot in slots_done(place)]
+
+
+def _content(place: Location, path: str) -> dict[str, Any]:
+    try:
+        content: dict[str, Any] = json.loads(place.read(path))
+    except ValueError as fault:
+        raise PlaceError(
+            f"{place}/{path}: is no receipt ({fault}): remove it and run `springscale reprocess` again"
+        ) from None
+    return content
 
 
 def failures(dataset: Location | Path | str) -> list[dict[str, Any]]:

@@ -122,7 +122,8 @@ def test_a_worker_killed_between_table_and_receipt_leaves_no_lie(
         killing.setattr(Location, "create", killed)
         with pytest.raises(KeyboardInterrupt):
             done(archive)
-    assert [item.path for item in dataset_of(archive).items("estimates")]
+    (torn, *_) = dataset_of(archive).items("estimates")  # by a power cut
+    dataset_of(archive).replace(torn.path, b"")
     assert slots_done(dataset_of(archive)) == []
     assert done(archive).counts["done"] == 2
     assert {len(rows_of(dataset_of(archive), slot)) for slot in slots_done(dataset_of(archive))} == {2}

@@ -172,6 +172,14 @@ def test_an_invalid_data_set_is_reported_in_one_line(tmp_path: Path, capsys: pyt
     assert "holds no receipt" in capsys.readouterr().err
 
 
+def test_a_torn_receipt_is_reported_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place_of(tmp_path).replace(write_table(tmp_path, "van-1", week(0, 6)).receipt, b"")
+    with pytest.raises(SystemExit) as left:
+        main(["fleet-report", str(tmp_path), "--output", str(tmp_path / "report")])
+    assert left.value.code == 1
+    assert "is no receipt" in capsys.readouterr().err
+
+
 PAGE = (Path(__file__).parents[2] / "docs/archive.md").read_text(encoding="utf-8")
 TEXT = PAGE.partition("## The report of a fleet")[2]
 SQL = [one for block in re.findall(r"```sql\n(.*?)```", TEXT, re.DOTALL) for one in block.split(";") if one.strip()]
