@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from gateway.core.vehicle import Carries
 from gateway.errors import ConfigurationError
 from gateway.files.toml_file import describe_faults
-from gateway.stated.statement import HALF_CHARACTER, StatementRecord, StatementSource, is_text
+from gateway.stated.statement import HALF_CHARACTER, StatementRecord, StatementSource, is_text, of_a_drive
 
 OF_ANSWERS: Final = ("row", "at", "state", "found", "reason", "question", "drives")
 """What a service or a command says of a statement: it is not read."""
@@ -354,13 +354,15 @@ def _time(name: str, cell: str, habits: _Habits) -> datetime:
         found, has_hour = _date(cell, habits) if iso is None else (datetime.fromisoformat(cell.upper()), iso[1])
     except ValueError as fault:
         raise _CellError(f"{cell}: no time: {fault}") from None
+    try:
+        of_a_drive(found)
+    except ValueError as fault:
+        raise _CellError(f"{cell}: {fault}") from None
     if found.tzinfo is None:
         found = found.replace(tzinfo=habits.zone)
         if name == "until" and not has_hour:
             found += timedelta(days=1)
         _require_one_moment(found, cell)
-    if not 1970 <= found.year <= 2250:
-        raise _CellError(f"{cell}: not a year of a drive")
     return found
 
 

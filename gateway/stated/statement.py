@@ -9,7 +9,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Annotated, Final, Self
 
-from pydantic import AwareDatetime, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, AwareDatetime, ConfigDict, Field, model_validator
 
 from gateway.core.vehicle import Carries, Kilograms, Metres, MetresLeft, WeightKg
 from gateway.stated.facts import Part
@@ -17,6 +17,16 @@ from gateway.stated.facts import Part
 PlusMinusKg = Annotated[float, Field(gt=0.0, le=100_000.0)]
 PlusMinusM = Annotated[float, Field(gt=0.0, le=20.0)]
 Text = Annotated[str, Field(max_length=200)]
+
+
+def of_a_drive(at: datetime) -> datetime:
+    """The same time. Raises ValueError for a year in which no vehicle with a CAN bus drives."""
+    if not 1970 <= at.year <= 2250:
+        raise ValueError("not a year of a drive")
+    return at
+
+
+Moment = Annotated[AwareDatetime, AfterValidator(of_a_drive)]
 
 
 class StatementSource(StrEnum):
@@ -83,8 +93,8 @@ class StatementRecord(Part):
 
     id: Text = Field("", description="given by whoever stores it; empty: made from the content")
     ref: Text | None = Field(None, examples=["LS-4711"])
-    from_: AwareDatetime = Field(alias="from", description="from when it holds", examples=["2026-11-26T07:40:00Z"])
-    until: AwareDatetime | None = Field(None, description="null: until the load changes")
+    from_: Moment = Field(alias="from", description="from when it holds", examples=["2026-11-26T07:40:00Z"])
+    until: Moment | None = Field(None, description="null: until the load changes")
     source: StatementSource
     load: StatedLoad
     place: StatedPlace | None = None

@@ -49,6 +49,7 @@ async def said_to(server: Server, *parts: bytes) -> bytes:
         b"GET /" + b"a" * 40_000,
         b"GET / HTTP/1.1\r\n" + b"C: d\r\n" * 9000,
         b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -5\r\n\r\n",
+        b"POST /api/v1/statements HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\nZZ\r\n",
     ],
 )
 def test_a_malformed_request_gets_an_error_and_no_log_line(

@@ -51,6 +51,19 @@ def listed(client: Client, query: str = "") -> list[dict[str, Any]]:
     return items
 
 
+@pytest.mark.parametrize("moment", ["0001-01-01T00:00:00+14:00", "1969-12-31T23:59:59Z", "9999-12-31T23:59:59.9Z"])
+@pytest.mark.parametrize("bound", ["from", "until"])
+def test_a_year_in_which_nobody_drives_is_refused(local: Client, bound: str, moment: str) -> None:
+    """One was stored, and from then on no statement was answered."""
+    local.request("PUT", VEHICLE, json=ANSWERS)
+    answer = local.request("POST", STATEMENTS, json=NOTE | {bound: moment})
+    assert answer.status_code == 422
+    assert f"{bound}: not a year of a drive" in answer.json()["detail"]
+    table = f"from;until;payload_kg\n{NOTE['from'] if bound == 'until' else moment};{moment};310\n"
+    assert "not a year of a drive" in local.request("POST", STATEMENTS, content=table, headers=CSV).text
+    assert listed(local) == []
+
+
 def test_a_statement_comes_before_its_drive_and_waits_for_it(local: Client, bench: LearnerBench) -> None:
     local.request("PUT", VEHICLE, json=ANSWERS)
     told = post(local)

@@ -7,6 +7,7 @@ from typing import Final
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
@@ -57,6 +58,7 @@ def install(app: FastAPI, routes: Sequence[Route]) -> None:
     app.add_exception_handler(RefusedError, _refused)
     app.add_exception_handler(StoreError, _unavailable)
     app.add_exception_handler(TimeoutError, _unavailable)
+    app.add_exception_handler(ClientDisconnect, _broken_off)
     app.add_exception_handler(Exception, _unforeseen)
 
 
@@ -97,6 +99,11 @@ async def _refused(request: Request, refusal: Exception) -> Response:
 
 async def _unavailable(request: Request, error: Exception) -> Response:
     return problem_response(503, str(error), request.url.path)
+
+
+async def _broken_off(request: Request, _error: Exception) -> Response:
+    """For nobody: the client has left in the middle of its request, or sent what is none."""
+    return problem_response(400, "the request broke off", request.url.path)
 
 
 async def _unforeseen(request: Request, _error: Exception) -> Response:
