@@ -96,10 +96,11 @@ def rows_record(
         for number, lines in told.faults.items()
         for line in lines
     ]
+    own = {row.number for row in mine}
     problems += [
         {"row": row.number, "kind": "unknown_vehicle", "text": f"vehicle: {row.vehicle}: this one is {this_one}"}
         for row in told.rows
-        if row not in mine
+        if row.number not in own
     ]
     n_match = 0
     for row in mine:

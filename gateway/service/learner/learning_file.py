@@ -124,11 +124,6 @@ class LearningRecord(Part):
         """The statement with this id."""
         return next((one for one in self.said if one.record.id == statement_id), None)
 
-    def with_said(self, changed: Said) -> "LearningRecord":
-        """The record with this statement, in place of the one with its id or after all others."""
-        others = [one for one in self.said if one.record.id != changed.record.id]
-        return self.model_copy(update={"said": (*others, changed)[-MOST_STATEMENTS:]})
-
     def changing(self, changed: Said) -> "LearningRecord":
         """The record with this statement changed at its place."""
         said = tuple(changed if one.record.id == changed.record.id else one for one in self.said)

@@ -75,10 +75,11 @@ class StatedLoads:
 
         Raises RefusedError; then nothing has changed.
         """
-        record, taken = self._book.record, []
+        kept, taken = {one.record.id: one for one in self._book.record.said}, []
+        is_changed = False
         for one in records:
             signed = one if one.by else one.model_copy(update={"by": by})
-            known = record.find(one.id)
+            known = kept.get(one.id)
             if known is not None and known.record != signed and known.record.model_copy(update={"by": one.by}) != one:
                 raise RefusedError(
                     "id_taken",
@@ -87,13 +88,14 @@ class StatedLoads:
             if known is not None and (known.withdrawn is None or not stands_again):
                 taken.append(known)
                 continue
-            if known is None and len(record.said) >= MOST_STATEMENTS:
+            if known is None and len(kept) >= MOST_STATEMENTS:
                 raise RefusedError("too_many", f"{MOST_STATEMENTS} statements are kept already")
-            said = Said(record=signed if known is None else known.record, at=self._book.now())
-            record = record.with_said(said)
-            taken.append(said)
-        if record is not self._book.record:
-            self._book.save(record)
+            kept.pop(one.id, None)  # what is stated again comes after all others
+            kept[one.id] = Said(record=signed if known is None else known.record, at=self._book.now())
+            taken.append(kept[one.id])
+            is_changed = True
+        if is_changed:
+            self._book.save(self._book.record.model_copy(update={"said": tuple(kept.values())}))
             self._book.tell(Event.STATED, {"n": len(taken), "by": by})
         return taken
 
