@@ -210,6 +210,7 @@ def test_a_burst_is_judged_by_the_order_of_its_frames_and_errors(what: str, inte
         bus: Any = ScriptedBus(*messages)
         with listening(Receiver(bus, 8, kernel_socket, has_error_classes=True)) as source:
             assert wait_until(lambda: source.state is state)
+            assert ("ip link set can9 type can restart-ms 100" in source.reason) is (state is SourceState.READER_FAULT)
             assert source.counts().error_frames == sum(message.is_error_frame for message in messages)
 
 
