@@ -25,6 +25,7 @@ LONGEST_FIRST = (
     "e2e/test_web_cab_page.py",
     "e2e/test_dist.py",
     "e2e/test_vehicle_packages.py",
+    "e2e/test_web_dashboard_live.py",
     "e2e/test_cli_demo.py",
     "golden/test_wrong_labels.py",
     "e2e/test_gateway_service.py",

@@ -1,4 +1,4 @@
-"""The dashboard in a real browser: it shows, follows, grows old, comes back, and loads nothing from elsewhere."""
+"""The dashboard of a day that is over: what it shows to whom, on every screen, by keyboard and behind a proxy."""
 
 import re
 from collections.abc import Iterator
@@ -8,15 +8,16 @@ from typing import Any
 import httpx
 import pytest
 from support.browser import expect
-from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Look, Watched, furnished
+from support.dashboard import CHARTS_FOLLOW, CONTRASTS, LEAST_CONTRAST, STATUS, Watched, furnished
 from support.estimates import make_estimate
 from support.learner import ANSWERS, LearnerBench, at, found
 from support.web import Gateway, below, serving
 
 from gateway.estimates.batch_estimate import Z95
-from gateway.records import Why
-from gateway.status import State
 from gateway.web.access.tokens import Scope, TokenFile
+
+PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+MOST_SCREENS_ON_A_PHONE = 3.0
 
 
 @pytest.fixture(scope="module")
@@ -29,13 +30,6 @@ def drawn(site: str, browser: Any) -> Iterator[Watched]:
         summary.click()
     yield made
     made.page.close()
-
-
-@pytest.fixture
-def gateway(tmp_path: Path) -> Iterator[Gateway]:
-    with Gateway(tmp_path / "store") as opened:
-        opened.status = STATUS
-        yield opened
 
 
 def test_the_dispatchers_page_shows_load_place_and_history_without_charts(site: str, watched: Watched) -> None:
@@ -187,103 +181,50 @@ def test_a_wide_screen_is_used_and_charts_write_numbers_as_the_page_does(site: s
     made.page.close()
 
 
-def test_the_page_follows_the_stream(gateway: Gateway, dashboard: Look) -> None:
-    page = dashboard()
-    expect(page.locator("#payload")).to_have_text("unknown")
-    expect(page.locator("#note")).to_have_text("Ready: weighs after the next five minutes of driving.")
-    expect(page.locator("#history")).to_contain_text("No batch yet.")
-    expect(page.locator("#payload-chart")).to_be_hidden()
-    expect(page.locator("#day-words")).to_have_text("No trip yet.")
-    expect(page.locator("#day-figure")).to_be_hidden()
-    expect(page.locator("#link")).to_have_text("live")
-    gateway.publish(make_estimate(7))
-    expect(page.locator("#payload")).to_have_text("107 kg")
-    expect(page.locator("#announcement")).to_have_text("Payload 107 kg, 50.5 % on the front axle.")
-    expect(page.locator("#note")).to_be_hidden()
-    expect(page.locator("#recent tr")).to_have_count(1)
-    gateway.board.publish(make_estimate(20, is_provisional=True))
-    expect(page.locator("#note")).to_contain_text("Early value")
-    gateway.publish(make_estimate(20, Why.SPEED_FROZEN))
-    expect(page.locator("#recent tr")).to_have_count(2)
-    page.get_by_role("link", name="For engineers").click()
-    expect(page.locator("#rejected")).to_contain_text("Speed frozen: the speed repeated the same number")
-    gateway.publish(make_estimate(21, Why.GAP))
-    expect(page.locator("#rejected")).to_contain_text("Gap: frames")
-
-
-def test_an_old_estimate_is_marked(gateway: Gateway, dashboard: Look) -> None:
-    gateway.publish(make_estimate(0))
-    gateway.clock_s += 7200.0
-    page = dashboard()
-    expect(page.locator("#note")).to_contain_text("This estimate is old")
-    expect(page.locator("#age")).to_have_text("2.0 h ago")
-    expect(page.locator("#latest")).to_have_class(re.compile("stale"))
-
-
-#: The cards move until all their numbers have come.
+# The cards move until all their numbers have come.
 IN_THREE_COLUMNS = """new Set([...document.querySelectorAll("#packed > .card:not([hidden])")].map(
   card => card.getBoundingClientRect().x)).size === 3"""
 ENGLISH = re.compile(r"\b(the|and|not|of|load|weighed|batch|unknown|heard|never)\b")
-NEVER_HEARD = STATUS.bus.model_copy(update={"n_frames": 0})
-STATES = {
-    State.STARTING: ("Starting", "busy"),
-    State.WAITING_FOR_BUS: ("Bus silent", "warn"),
-    State.SENSOR_FAULT: ("Sensor fault", "bad"),
-    State.WAITING_FOR_SPEED: ("Waiting for speed", "busy"),
-    State.COLLECTING: ("First batch under way", "busy"),
-    State.ESTIMATING: ("Estimating", "good"),
-    State.NOT_WEIGHED: ("Not weighed", "calm"),
-    State.STALE: ("Stale", "warn"),
-    State.READER_FAULT: ("Bus fault", "bad"),
-}
 
 
-def test_every_state_has_a_name_and_a_sentence(gateway: Gateway, watched: Watched) -> None:
-    assert set(STATES) == set(State)
-    with serving(gateway.app) as server:
-        for state, (name, tone) in STATES.items():
-            gateway.status = STATUS.model_copy(
-                update={"state": state, "state_in_words": f"This is {state}.", "bus": NEVER_HEARD}
-            )
-            watched.page.goto(server.url)
-            expect(watched.page.locator("#state")).to_have_text(re.compile(rf"{name}\s+This is {state}\."))
-            expect(watched.page.locator("#state")).to_have_attribute("data-tone", tone)
-        gateway.status = STATUS.model_copy(update={"calibration_id": None})
-        watched.page.goto(server.url)
-        expect(watched.page.locator("#state-name")).to_have_text("No calibration")
-        gateway.board.close()
+def test_the_state_stays_in_view(drawn: Watched) -> None:
+    drawn.page.locator("footer").scroll_into_view_if_needed()
+    assert drawn.page.evaluate("scrollY") > 400
+    expect(drawn.page.locator("#state")).to_be_in_viewport(ratio=1.0)
 
 
-def test_a_silent_bus_between_drives_raises_no_alarm(gateway: Gateway, dashboard: Look) -> None:
-    gateway.publish(make_estimate(0))
-    gateway.status = STATUS.model_copy(update={"state": State.WAITING_FOR_BUS})
-    page = dashboard()
-    expect(page.locator("#state")).to_have_text(re.compile("Bus silent\\s+The vehicle is asleep."))
-    expect(page.locator("#state")).to_have_attribute("data-tone", "calm")
-    page.get_by_role("link", name="For engineers").click()
-    expect(page.locator("#signals tr").nth(1)).to_contain_text("paused for 75 s")
-    expect(page.locator("#signals .silent")).to_have_count(0)
-
-
-def test_it_stays_readable_without_the_service_and_comes_back_with_it(gateway: Gateway, watched: Watched) -> None:
-    gateway.publish(make_estimate(0))
+def test_a_phone_shows_the_load_and_folds_the_rest(site: str, browser: Any) -> None:
+    watched = Watched(browser, **PHONE)
     page = watched.page
-    with serving(gateway.app) as server:
-        page.goto(server.url)
-        expect(page.locator("#link")).to_have_text("live")
-        port = server.socket.getsockname()[1]
-        gateway.board.close()
-    expect(page.locator("#link")).to_have_text("not connected: trying again")
-    expect(page.locator("#state")).to_contain_text("Offline The gateway does not answer.")
-    expect(page.locator("#payload")).to_have_text("100 kg")
-    gateway.restart_board()
-    with serving(gateway.app, port=port):
-        gateway.publish(make_estimate(1))
-        expect(page.locator("#link")).to_have_text("live")
-        expect(page.locator("#state-name")).to_have_text("Estimating")
-        expect(page.locator("#payload")).to_have_text("101 kg")
-        expect(page.locator("#recent tr")).to_have_count(2)
-        gateway.board.close()
+    page.goto(site)
+    expect(page.locator("#payload-chart[data-drawn]")).to_be_visible()
+    assert page.evaluate("document.documentElement.scrollHeight / innerHeight") < MOST_SCREENS_ON_A_PHONE
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["viewport"]["width"]
+    page.locator("footer").scroll_into_view_if_needed()
+    assert page.evaluate("scrollY") > 400
+    expect(page.locator("#state")).to_be_in_viewport(ratio=1.0)
+    page.goto(f"{site}/engineer")
+    fold = page.get_by_role("button", name="Batches that could not be weighed")
+    expect(fold).to_have_attribute("aria-expanded", "false")
+    expect(page.locator("#rejected")).to_be_hidden()
+    fold.click()
+    expect(page.locator("#rejected")).to_be_visible()
+    fold.click()
+    expect(page.locator("#rejected")).to_be_hidden()
+    page.set_viewport_size({"width": 1240, "height": 800})
+    expect(page.locator("#rejected")).to_be_visible()
+    expect(fold).to_have_count(0)
+    assert watched.complaints == []
+    page.close()
+
+
+def test_without_scripts_it_shows_where_the_numbers_are_and_claims_nothing(site: str, browser: Any) -> None:
+    page = browser.new_page(java_script_enabled=False)
+    page.goto(site)
+    seen = page.locator("body").inner_text()
+    assert "This page needs JavaScript. The numbers are at /api/v1/estimates/latest." in seen
+    assert not re.search("no batch|none|unknown|loading|connecting|asking", seen, re.IGNORECASE), seen
+    page.close()
 
 
 def test_it_asks_for_a_token_where_one_is_needed_and_claims_nothing_before(tmp_path: Path, watched: Watched) -> None:
