@@ -290,13 +290,25 @@ class NoisyBus(ScriptedBus):
         return super().recv(timeout_s)
 
 
-@pytest.mark.parametrize("failure", [ValueError("x"), IndexError("x"), AttributeError("x"), TypeError("x")], ids=repr)
-def test_any_exception_of_an_adapter_is_a_fault_and_the_bus_is_reopened(failure: Exception) -> None:
-    """Any but two kinds of exception ended the service."""
+@pytest.mark.parametrize(
+    ("failure", "reason"),
+    [
+        *(
+            (kind("x"), "what the adapter sends cannot be read")
+            for kind in (ValueError, IndexError, AttributeError, TypeError)
+        ),
+        (UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid"), "what the adapter sends cannot be read"),
+        (can.CanOperationError("the adapter is gone"), "the adapter is gone"),
+        (OSError(5, "Input/output error"), "Input/output error"),
+    ],
+    ids=lambda one: type(one).__name__,
+)
+def test_any_exception_of_an_adapter_is_a_fault_and_the_bus_is_reopened(failure: Exception, reason: str) -> None:
+    """What came before it is not lost; any but two kinds of exception ended the service."""
     bus: Any = NoisyBus(failure)
     with listening(Receiver(bus, 8), silence_s=30.0) as source:
         assert wait_until(lambda: source.state is SourceState.READER_FAULT)
-        assert "what the adapter sends cannot be read" in source.reason
+        assert reason in source.reason
         assert source.counts().frames == 1
         assert source.death() is None
 

@@ -59,8 +59,6 @@ CAUSES = {  # what a message may name, and how it does
     "remote and error frames": f"left out: {N // 100} remote frames, {N // 100} error frames",
     "other channel": "correct channel in the signal map",
     "map": "map of this vehicle",
-    "copy": "copies of other logs",
-    "database": "has several signals",
     "vehicle": "not the log of the vehicle",
     "nothing weighed": "nothing was weighed",
     "sensor": "antenna",
@@ -357,46 +355,6 @@ def test_a_clock_that_was_set_while_recording(how: str, folder: Path) -> None:
         said_of_it = all_said(called(*command))
         assert told in said_of_it
         assert "was the clock set?" in said_of_it
-
-
-def test_a_copy(folder: Path) -> None:
-    for name, content in (("1.log", candump()), ("2.log.gz", gzip.compress(candump()))):
-        (folder / "van-1" / name).write_bytes(content)
-    done = called("reprocess", folder, "--output", folder / "out")
-    assert (done.exit_code, causes_in(done.output)) == (0, said("copy"))
-    assert "van-1/2.log.gz: has the content of van-1/1.log" in done.output
-    assert "1 batches, 1 of them weighed" in done.output
-
-
-DBC = """VERSION ""
-NS_ :
-BS_:
-BU_: A
-BO_ 288 IMU_ACCEL: 7 A
- SG_ AccelZ : 32|16@1- (0.001,0) [-32|32] "m/s^2" A
- SG_ AccelZ : 0|16@1- (0.001,0) [-32|32] "m/s^2" A
-"""
-
-
-@pytest.mark.parametrize("command", ["check-config", "estimate", "reprocess", "record"])
-def test_twin_names(command: str, folder: Path) -> None:
-    """The map is at fault and named, whatever the log."""
-    log = written(folder, CASES["sound"])
-    (folder / "twin.dbc").write_text(DBC)
-    (folder / "twin.toml").write_text(
-        'dbc = ["twin.dbc"]\n[signals.vertical_acceleration]\nmessage = "IMU_ACCEL"\nsignal = "AccelZ"\n'
-    )
-    for name in ("springscale.toml", "archive.toml"):
-        (folder / name).write_text((folder / name).read_text().replace(MAP, "twin.toml"))
-    options: dict[str, tuple[object, ...]] = {
-        "check-config": (folder / "springscale.toml",),
-        "estimate": (log, "--config", folder / "springscale.toml"),
-        "reprocess": (folder, "--output", folder / "out"),
-        "record": (folder / "r.log", "--signals", folder / "twin.toml", "--interface", "virtual", "--channel", "x"),
-    }
-    done = called(command, *options[command])
-    assert done.exit_code == 1
-    assert causes_in(all_said(done)) == said("database")
 
 
 def test_another_vehicles_map(folder: Path) -> None:

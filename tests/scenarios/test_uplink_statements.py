@@ -18,7 +18,6 @@ from support.estimates import make_record
 from support.learner import LearnerBench
 from support.patience import PATIENCE_S, wait_until
 
-from gateway.config.sections import UplinkSection
 from gateway.errors import RefusedError
 from gateway.part import BackOff
 from gateway.status import StatementsHeard
@@ -229,8 +228,3 @@ def test_any_exception_on_a_message_is_a_refusal() -> None:
     desk = StatementsDesk(take)
     assert desk.is_done(mqtt.MQTTMessage())
     assert desk.report == StatementsHeard(n_refused=1, last_refusal="ZeroDivisionError()")
-
-
-def test_statements_without_a_broker_are_a_wrong_setting() -> None:
-    with pytest.raises(ValueError, match="set host"):
-        UplinkSection(statements=True)

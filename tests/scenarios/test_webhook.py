@@ -1,18 +1,15 @@
 """The webhook against a real receiver: killed, slow, cut, failing, refusing, with TLS; and the sender killed."""
 
-import json
 import random
 import ssl
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 import trustme
-from support.alarms import LIMIT_KG, AlarmBench, of_load
 from support.patience import PATIENCE_S, wait_until
 from support.ports import free_port
 from support.receiver import SECRET_TEXT, Fault, Receiver, cut, slow, status, trickle
@@ -275,27 +272,3 @@ def test_a_missing_secret_is_reported_until_it_is_back(tmp_path: Path, secret_fi
         assert wait_until(lambda: "secret_file" in (sending.webhook.report().last_fault or ""))
         secret_file.write_text(SECRET_TEXT)
         assert wait_until(lambda: receiver.ids == wanted)
-
-
-def test_every_revision_of_an_alarm_is_delivered(tmp_path: Path, secret_file: Path) -> None:
-    bench = AlarmBench(tmp_path / "state")
-    with Receiver() as receiver:
-        settings = WebhookSettings(
-            url=f"http://127.0.0.1:{receiver.port}/hook", secret_file=secret_file, send=("alarms",)
-        )
-        outbox = Outbox(bench.store, settings.queue, only=settings.kinds)
-        webhook = Webhook(settings, outbox)
-        webhook.start()
-        _step(receiver, 1, lambda: bench.weigh(of_load(1, LIMIT_KG + 60.0, n_batches=2)))
-        _step(receiver, 2, lambda: bench.weigh(of_load(2, 100.0)))
-        webhook.stop(PATIENCE_S)
-    bench.store.close()
-    told = [json.loads(json.dumps(body)) for _, body in receiver.taken]
-    assert [body["type"] for body in told] == ["alarm"] * 2
-    assert [(body["data"]["revision"], body["data"]["is_active"]) for body in told] == [(1, True), (2, False)]
-    assert len({body["data"]["id"] for body in told}) == 1
-
-
-def _step(receiver: Receiver, n: int, does: Callable[[], object]) -> None:
-    does()
-    assert wait_until(lambda: len(receiver.taken) == n)

@@ -2,14 +2,12 @@
 
 import threading
 
-import can
 import numpy as np
 import pytest
 from support.encoded import frames_of
 from support.patience import PATIENCE_S
 
 from gateway.bus.listen import DRAINED_FRAMES, Inbox
-from gateway.bus.receiver import Receiver
 
 
 def burst(first, n):
@@ -75,41 +73,3 @@ def test_closing_frees_a_sender_that_waits():
     inbox.close()
     sender.join(PATIENCE_S)
     assert not sender.is_alive()
-
-
-GARBLED = [
-    ValueError("invalid literal for int() with base 16: '1g0'"),
-    IndexError("string index out of range"),
-    UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte"),
-    can.CanOperationError("the adapter is gone"),
-    OSError(5, "Input/output error"),
-]
-
-
-class FakeBus:
-    """Gives what the script says, then nothing."""
-
-    def __init__(self, *script: can.Message | Exception) -> None:
-        self.script = list(script)
-        self.is_shut_down = False
-
-    def recv(self, timeout: float | None = None) -> can.Message | None:
-        step = self.script.pop(0) if self.script else None
-        if isinstance(step, Exception):
-            raise step
-        return step
-
-    def shutdown(self) -> None:
-        self.is_shut_down = True
-
-
-def message(number: int) -> can.Message:
-    return can.Message(timestamp=1.0 + number, arbitration_id=0x120 + number, is_extended_id=False, data=bytes(8))
-
-
-@pytest.mark.parametrize("fault", GARBLED, ids=lambda fault: type(fault).__name__)
-def test_what_came_before_a_fault_is_given_first(fault: Exception) -> None:
-    receiver = Receiver(FakeBus(message(0), message(1), fault), 8)  # type: ignore[arg-type] # as much as is asked
-    assert receiver.receive(0.0).frames.can_id.tolist() == [0x120, 0x121]
-    with pytest.raises((can.CanError, OSError)):
-        receiver.receive(0.0)

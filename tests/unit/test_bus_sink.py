@@ -8,8 +8,7 @@ import pytest
 from support.encoded import frames_of
 
 from gateway.bus import sink as sink_module
-from gateway.bus.logs import write_candump
-from gateway.bus.sink import BusSink, replay, replay_frames
+from gateway.bus.sink import BusSink, replay_frames
 from gateway.errors import BusError
 
 
@@ -90,18 +89,6 @@ def test_a_stop_ends_the_replay(clock):
     n_sent = replay_frames([frames(*range(100))], sink, 1.0, lambda n_sent, _: n_sent == 3 and stop.set(), stop)
     assert n_sent == 3
     assert len(sink.sent) == 3
-
-
-def test_a_log_is_replayed_whole_with_its_stamps(tmp_path):
-    log = frames(1.0, 1.000000001, 2.5)
-    write_candump(log, "can3", tmp_path / "a.log")
-    with can.Bus(interface="virtual", channel="sink-1", ignore_config=True) as bus:
-        report = replay(tmp_path / "a.log", "virtual", "sink-1", from_channel="can3", speed="max")
-        received = [bus.recv(1.0) for _ in range(3)]
-        assert bus.recv(0.0) is None
-    assert [message.arbitration_id for message in received] == [0, 1, 2]
-    assert [message.timestamp.t_ns for message in received] == log.t_ns.tolist()
-    assert report.wanted == 3
 
 
 def test_a_receiver_that_takes_nothing_is_told_not_waited_for_forever(monkeypatch):

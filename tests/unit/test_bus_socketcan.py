@@ -85,30 +85,6 @@ def test_a_frame_that_came_before_the_filters_is_not_taken_for_one_of_ours(wire)
     assert receiver.receive(PATIENCE_S).frames.can_id.tolist() == [0x120]
 
 
-BUS_OFF = classic(0x20000000 | 0x040 | 0x004, bytes(8))
-DATA = classic(0x12345678 | EXTENDED_ID, b"\1")
-
-
-@pytest.mark.parametrize(
-    ("sent", "is_bus_off"),
-    [
-        ([BUS_OFF], True),
-        ([DATA, BUS_OFF], True),
-        ([BUS_OFF, DATA], False),  # it is on the bus again
-        ([classic(0x20000000 | 0x004, bytes(8))], False),
-    ],
-)
-def test_the_last_error_frame_decides_on_bus_off(sent, is_bus_off, wire):
-    receiver = wire.receiver()
-    for datagram in sent:
-        wire.send(datagram)
-    wire.send(classic(0x40000000 | 0x100, b""))  # a remote frame is counted, not handed on
-    burst = receiver.receive(PATIENCE_S)
-    assert burst.frames.can_id.tolist() == [0x12345678 | EXTENDED_ID] * sent.count(DATA)
-    assert (burst.error_frames, burst.is_bus_off) == (len(sent) - sent.count(DATA), is_bus_off)
-    assert burst.remote_frames == 1
-
-
 @pytest.mark.parametrize(("width", "kept"), [(64, 12), (8, 8)])
 def test_can_fd_frames_among_classic_ones(width, kept, wire):
     receiver = wire.receiver(width)

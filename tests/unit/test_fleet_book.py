@@ -16,26 +16,6 @@ from gateway.fleet.book import AWAY
 from gateway.fleet.messages import KINDS, Entry
 
 NOW_S = 1_800_000_000.0
-UNREADABLE = (
-    ("van-1/estimates", b"no JSON \0"),
-    ("van-1/estimates", b"[]"),
-    ("van-1/estimates", b"{}"),
-    ("van-1/estimates", b'{"id": "a", "t_start": "soon", "t_end": "soon", "rejected": []}'),
-    ("van-1/estimates", b'{"id": "a", "t_end": "2027-01-15T07:55:00Z", "rejected": [], "weights": 7}'),
-    ("van-1/estimates", b'{"id": "a", "t_end": "2027-01-15T07:55:00Z", "rejected": [], "payload_kg": 1e999}'),
-    ("van-1/estimates", b'{"id": "a", "t_end": "2027-01-15T07:55:00Z", "rejected": [], "payload_kg": NaN}'),
-    ("van-1/alarms", b'{"id": "a", "revision": "one"}'),
-    ("van-1/events", b'{"id": "a", "revision": 1000000000000000000000000000000}'),
-    ("van-1/events", b'{"id": "a\\u0000b", "revision": 1}'),
-    ("van-1/status", b"{}"),
-    ("van-1/status", b'{"state": "online", "x": NaN}'),
-    ("van-1/status", b'{"state": "online", "x": 1e999}'),
-    ("van-1/status", b'{"state": "online", "vin": 5}'),
-    ("a van/status", b'{"state": "online"}'),
-    ("van-1/elsewhere", b"{}"),
-    ("van-1", b"{}"),
-    ("van-1/trips", b"[" * 100_000),
-)
 
 
 @pytest.fixture
@@ -88,18 +68,6 @@ def test_a_vehicle_that_goes_offline_keeps_what_it_reported(book: Book) -> None:
     (line,) = book.fleet().items
     assert (line.status.state, line.status.vin) == ("offline", "WVW1")
     assert (line.estimate, line.age_s, line.used_share) == (None, None, None)
-
-
-def test_unreadable_records_are_set_aside_without_delaying_others(book: Book, tmp_path: Path) -> None:
-    poison = [Message(f"springscale/{topic}", payload) for topic, payload in UNREADABLE]
-    told = book.write([*poison, estimate("van-2", 1, 5.0)])
-    assert [topic for topic, _ in told] == [one.topic for one in poison]
-    assert book.counts == {"unreadable": len(UNREADABLE), "estimates": 1}
-    assert book.fleet().n_unreadable == len(UNREADABLE)
-    assert [line.vehicle_id for line in book.fleet().items] == ["van-2"]
-    with sqlite3.connect(tmp_path / "fleet.sqlite") as looked:
-        kept = looked.execute("SELECT topic, payload FROM unreadable").fetchall()
-    assert kept == [(one.topic, one.payload) for one in poison]
 
 
 def test_statements_to_a_vehicle_and_the_copy_of_its_last_estimate_are_no_records(book: Book) -> None:

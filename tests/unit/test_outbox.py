@@ -65,13 +65,6 @@ def test_unwanted_records_count_as_delivered_so_that_age_may_remove_them(store: 
     assert box.look().n_waiting == 0
 
 
-def test_a_record_comes_until_it_is_delivered(store: Store) -> None:
-    tell(store, *MIXED)
-    box = outbox(store, "alarm")
-    assert [box.next().id for _ in range(3)] == ["alarm-1-1"] * 3
-    assert ids(box) == ["alarm-1-1", "alarm-2-1"]
-
-
 def test_entries_that_retention_takes_undelivered_are_counted_and_newer_revisions_are_not(tmp_path: Path) -> None:
     now_ns = [1_800_000_000_000_000_000]
 

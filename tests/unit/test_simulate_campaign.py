@@ -7,9 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.patience import wait_until
 
-from gateway.bus.listen import LiveSource
 from gateway.bus.signals import load_signal_map
 from gateway.calibration.campaign_file import load_campaign
 from gateway.core.batch_settings import BatchSettings
@@ -25,7 +23,6 @@ from gateway.workbench.simulated_drives import (
     SENSORS_OF_MAP,
     bench_of,
     simulated_frames,
-    stream,
     write_campaign,
 )
 
@@ -138,19 +135,3 @@ def test_drives_follow_one_another_with_the_vehicle_parked_between() -> None:
     first, second, *_ = simulated_frames(bench_of("speeds", longest_s=3.0))
     parked_s = (second.t_ns[0] - first.t_ns[-1]) / 1e9
     assert parked_s == pytest.approx(BETWEEN_DRIVES_S, abs=0.2)
-
-
-def test_a_stream_reaches_a_listener_frame_by_frame() -> None:
-    from gateway.bus.signals import load_signal_map
-
-    bench = bench_of("test1", longest_s=3.0)
-    source = LiveSource("virtual", "simulate-stream", load_signal_map("springscale:reference"))
-    source.start()
-    n_sent = stream(bench, "virtual", "simulate-stream", speed="max")
-    assert wait_until(lambda: source.counts().frames == n_sent)
-    source.stop()
-    turns = list(iter(lambda: source.inbox.drain(0.0), None))  # one turn takes a bounded number of frames
-    sent = next(simulated_frames(bench))
-    assert n_sent == len(sent)
-    assert np.array_equal(np.concatenate([one.t_ns for one in turns]), sent.t_ns)
-    assert np.array_equal(np.concatenate([one.payload for one in turns]), sent.payload)
