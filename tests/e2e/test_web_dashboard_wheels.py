@@ -58,7 +58,7 @@ def site(gateway: Gateway) -> Iterator[str]:
         gateway.board.close()
 
 
-def test_every_wheel_has_its_load_and_the_load_lies_to_scale(site: str, watched: Watched) -> None:
+def test_every_wheel_has_its_load_and_the_load_lies_to_scale_in_its_ellipse(site: str, watched: Watched) -> None:
     page = watched.page
     page.goto(site)
     drawing = page.get_by_role("img", name=re.compile(r"front left wheel 435 ± \d+ kg \(limit 430 kg\)"))
@@ -77,11 +77,7 @@ def test_every_wheel_has_its_load_and_the_load_lies_to_scale(site: str, watched:
         "aria-label", re.compile(r"front left wheel 435 ± \d+\skg.*, front right wheel \d+ ± ")
     )
 
-
-def test_the_ellipse_is_that_of_the_covariance(site: str, watched: Watched) -> None:
-    """Its half axes and direction, against the eigenvectors of the covariance in pixels."""
-    page = watched.page
-    page.goto(site)
+    # the ellipse is that of the covariance: half axes and direction by its eigenvectors in pixels
     drawn = page.locator("#van ellipse.spread")
     vehicle, found = tracked().vehicle, leaning(1, tracked())
     assert found.posterior is not None

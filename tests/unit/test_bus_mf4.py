@@ -43,15 +43,6 @@ def assert_same(found: Frames, truth: Frames) -> None:
     assert not found.payload[:, width:].any()
 
 
-@pytest.mark.parametrize("compression", [0, 1, 2])
-def test_one_table(compression, tmp_path, frames):
-    write_mf4(tmp_path / "a.mf4", START_NS, [can_group(frames, START_NS)], compression=compression)
-    found, report = read(tmp_path / "a.mf4")
-    assert_same(found, frames)
-    assert (report.frames, report.wanted, report.out_of_order, report.ended_early) == (N, N, 0, None)
-    assert report.channels == {"0"}
-
-
 @pytest.mark.parametrize("n_at_once", [7, 100, 100_000])
 def test_tables_of_every_identifier_are_merged_in_order_of_time(n_at_once, tmp_path, frames, monkeypatch):
     monkeypatch.setattr(mf4, "PIECE_RECORDS", n_at_once)

@@ -91,15 +91,6 @@ def wait_for(condition):
     assert wait_until(condition), "waited in vain"
 
 
-def test_frames_arrive_in_the_inbox_and_are_counted(listen):
-    source, interface = listen(Burst(frames(3)), Burst(frames(2, 10), error_frames=1, remote_frames=2))
-    assert interface.is_played.wait(PATIENCE_S)
-    assert source.inbox.drain(1.0).t_ns.tolist() == [0, 1, 2, 10, 11]
-    counts = source.counts()
-    assert (counts.frames, counts.error_frames, counts.remote_frames, counts.reconnects) == (5, 1, 2, 0)
-    assert (source.state, source.reason) == (SourceState.RECEIVING, None)
-
-
 def test_a_full_inbox_shows_in_the_counts(listen):
     source, interface = listen(Burst(frames(2000)), inbox_frames=1500)
     assert interface.is_played.wait(PATIENCE_S)
@@ -126,13 +117,6 @@ def test_a_fault_while_receiving_is_told_and_the_channel_opened_again(fault, lis
     assert source.state is SourceState.RECEIVING
     assert source.failure is None
     assert told in source_module.system_reason(error, source._channel)
-
-
-def test_while_a_channel_is_missing_the_state_says_why(listen):
-    source, _ = listen(*[AtOpening(OSError(errno.ENODEV, "No such device"))] * 100_000)
-    assert source.state is SourceState.READER_FAULT
-    assert "does not exist" in source.reason
-    assert source.failure is None
 
 
 class Pauses(threading.Event):

@@ -19,7 +19,6 @@ from support.commands import called
 from support.configured import service_config
 from support.estimates import make_estimate, posterior_of
 from support.paper_van import paper_van
-from support.web import Client, Gateway
 
 from gateway.archive.manifest import load_manifest
 from gateway.config import load_settings
@@ -31,7 +30,6 @@ from gateway.estimates.as_json import table_row
 from gateway.estimates.batch_estimate import PLACES, Z95, Estimate, Quantity, Weight, Weights
 from gateway.estimates.posterior import Posterior, Source
 from gateway.setup import Setup, setup_of
-from gateway.uplink.outbox import Outbox
 
 UNSPRUNG = {"unsprung_front_kg": 80.0, "unsprung_rear_kg": 80.0}
 
@@ -92,27 +90,6 @@ def test_the_table_shows_limits_and_exceeded_ones(tmp_path: Path) -> None:
     assert [row[f"{place}_limit_kg"] for place in ("gross", "front_axle", "rear_axle")] == [1850.0, 900.0, 1100.0]
     assert row["rear_left_limit_kg"] is None
     assert row["over_limit"] == "gross front_axle"
-
-
-def test_an_overload_is_in_every_message_of_the_vehicle(tmp_path: Path) -> None:
-    """In the letter to the broker, in the stream's words, in metrics, in VSS: by the limit of the settings."""
-    setup = loaded(tmp_path, "gross_limit_kg = 1850.0")
-    with Gateway(tmp_path / "state", calibrated=setup.calibrated) as gateway:
-        gateway.publish(batch(setup))
-        message = Outbox(gateway.store, "fleet").next()
-        told = json.loads(message.text)["weights"]
-        ask = Client(gateway.app)
-        metrics = ask.get("/metrics").text
-        points = {point["path"]: point["value"] for point in ask.get("/api/v1/vss").json()}
-        figures = ask.get("/api/v1/vehicle").json()["figures"]
-        latest = ask.get("/api/v1/estimates/latest").json()["weights"]["gross"]
-    assert told["gross"]["kg"] == pytest.approx(1900.0)
-    assert (told["gross"]["limit_kg"], told["gross"]["is_over_limit"]) == (1850.0, True)
-    assert told["rear_axle"]["is_over_limit"] is False
-    assert latest == told["gross"]
-    assert "springscale_weights_gross_limit_kg 1850.0" in metrics
-    assert "springscale_weights_gross_is_over_limit 1.0" in metrics
-    assert points["Vehicle.GrossWeight"] == figures["gross_limit_kg"] == 1850.0
 
 
 def test_check_config_prints_the_limits_in_force(tmp_path: Path) -> None:
