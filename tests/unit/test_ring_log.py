@@ -65,12 +65,6 @@ def test_recorded_frames_are_read_back(tmp_path: Path) -> None:
     assert (log.status().last_fault, path.parent.stat().st_mode & 0o027) == (None, 0)
 
 
-def test_runs_are_kept_one_behind_the_other(tmp_path: Path) -> None:
-    recorded(tmp_path, take(DRIVE, slice(0, 1000)), take(DRIVE, slice(1000, None)))
-    assert [path.name for path in files(tmp_path)] == ["00000001.log", "00000002.log"]
-    assert same(read(*files(tmp_path)), DRIVE)
-
-
 def test_frames_that_cannot_be_written_are_lost_once_and_the_next_are_recorded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
