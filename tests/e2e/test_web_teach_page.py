@@ -200,7 +200,7 @@ ROOT = Path(__file__).parents[2]
 
 TABLES = (
     "from;payload_kg;price\n26.11.2026 07:40;310;7\n",
-    "from;payload_kg\n;310\n46352;310\nyesterday;310\n2026-13-26;310\n2026-11-26;310;7\n2026-11-26T07:40Z;\n",
+    "from;payload_kg\n;310\n46352;310\nyesterday;310\n2026-13-26;310\n2026-11-26;310;7\n1926-11-26T07:40Z;310\n2026-11-26T07:40Z;\n",
     "from;payload_kg;gross_kg\n2026-11-26T07:40Z;310;1890\n2026-11-26T07:40Z;-310;\n2026-11-26T07:40Z;1000000;\n",
     "from;front_axle_kg\n2026-11-26T07:40Z;900\n",
     "from;payload_kg;plus_minus_kg\n2026-11-26T07:40Z;310;0\n",
