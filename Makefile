@@ -77,7 +77,8 @@ vcan: .venv/.package
 	PATH="$(CURDIR)/$(BIN):$$PATH" deploy/try-on-vcan.sh
 
 # A simulated week in the service at high speed, some minutes of one processor; then, where `make test-vm` can run, 200
-# kills of the service, 30 power cuts of its machine at random moments and 30 drives to learn from, half an hour.
+# kills of the service, 30 power cuts of its machine at random moments and 30 drives to learn from, three quarters of an
+# hour.
 SOAK_TESTS := tests/vm/test_4_process_faults.py::test_repeated_kills_lose_and_double_nothing \
 	tests/vm/test_6_power.py tests/vm/test_7_learning.py
 soak: .venv/.development deb

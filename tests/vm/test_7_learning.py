@@ -19,7 +19,10 @@ from gateway.calibration.file import load_calibration
 from gateway.records import Frames
 from gateway.sim.parameters import Load
 
-DRIVEN_S: Final = 22.0  # one window of 20 s, and a rest
+DRIVEN_S: Final = 43.0
+"""Two windows of 20 s, and a rest. With one, three drives do not tell which of three statements is wrong: the others
+weigh the empty drive to -270 +- 284 kg.
+"""
 STANDS_S: Final = 4.5  # longer than [batch] silence_s: a drive ends there
 N_DRIVES: Final = int(os.environ.get("SPRINGSCALE_DRIVES", "3"))
 LEAST_TAUGHT: Final = 0.9  # chosen: of the drives; where the host is busy the player's frames come late, and leave gaps
@@ -157,7 +160,7 @@ def test_from_no_configuration_through_a_power_cut_to_what_learn_makes_of_the_sa
 
     assert len(said) == len(NOTES)
     assert said["X"]["state"] == "withdrawn"
-    assert said["E"]["state"] == "used"
+    assert said["E"]["state"] == said["N"]["state"] == "used"
     assert said["W"]["state"] in ("held", "weak")
     assert len(without["versions"]) == len(with_all["versions"]) + 1  # the refit that was cut left none
     newest = without["versions"][0]
