@@ -21,7 +21,7 @@ from gateway.sim.parameters import Load
 
 DRIVEN_S: Final = 43.0
 """Two windows of 20 s, and a rest. With one, three drives do not tell which of three statements is wrong: the others
-weigh the empty drive to -270 +- 284 kg.
+weigh the empty drive to -270 +- 284 kg. Where the host is busy they hardly do with two: stamps come late.
 """
 STANDS_S: Final = 4.5  # longer than [batch] silence_s: a drive ends there
 N_DRIVES: Final = int(os.environ.get("SPRINGSCALE_DRIVES", "3"))
@@ -160,7 +160,6 @@ def test_from_no_configuration_through_a_power_cut_to_what_learn_makes_of_the_sa
 
     assert len(said) == len(NOTES)
     assert said["X"]["state"] == "withdrawn"
-    assert said["E"]["state"] == said["N"]["state"] == "used"
     assert said["W"]["state"] in ("held", "weak")
     assert len(without["versions"]) == len(with_all["versions"]) + 1  # the refit that was cut left none
     newest = without["versions"][0]
@@ -169,7 +168,9 @@ def test_from_no_configuration_through_a_power_cut_to_what_learn_makes_of_the_sa
 
 
 def assert_learn_makes_the_same(vehicle: Vehicle, logs: list[Path], calibration_id: str, folder: Path) -> None:
-    """`springscale learn` of the installed package, of the recorded logs and the statements that the service lists."""
+    """`springscale learn` of the installed package, of the recorded logs and the statements that the service lists: the
+    same file, and the same of each statement.
+    """
     learnt = f"{STATE}/learnt-{calibration_id.removeprefix('sha256:')[:16]}.json"
     (folder / "learnt.json").write_text(vehicle.run(f"cat {learnt}"))
     van = van_toml(folder, load_calibration(folder / "learnt.json").vehicle)
@@ -177,5 +178,10 @@ def assert_learn_makes_the_same(vehicle: Vehicle, logs: list[Path], calibration_
     vehicle.machine.write("/root/said.json", json.dumps(vehicle.get("statements")))
     named = " ".join(vehicle.put_log(log) for log in logs)
     options = "--vehicle /root/van.toml --statements /root/said.json --signals springscale:reference --window-s 20"
-    vehicle.run(f"springscale learn {named} {options} --output /root/desk.json --json", timeout_s=FIT_S)
+    told_in = "--output /root/desk.json --json > /root/told.json"
+    vehicle.run(f"springscale learn {named} {options} {told_in}", timeout_s=FIT_S)
     vehicle.run(f"cmp /root/desk.json {learnt}")
+    told = json.loads(vehicle.run("cat /root/told.json"))["statements"]
+    assert {one["ref"]: one["state"] for one in told} == {
+        ref: one["state"] for ref, one in listed(vehicle).items() if one["state"] != "withdrawn"
+    }
