@@ -248,7 +248,7 @@ def written_and_judged(outcome: Outcome, output: Path | None, report: Path | Non
 
 
 def report_written(directory: Path, assessment: Assessment) -> None:
-    """Writes the report, and says where it is."""
+    """Write the report, and print its path."""
     from gateway.reports.calibration.calibration_report import write_report_of  # noqa: PLC0415 # a vehicle has no matplotlib
 
     with counted("drawing") as on_chart:

@@ -128,12 +128,12 @@ class LogFacts:
 
 @dataclass(frozen=True, slots=True)
 class InspectedRun:
-    """One drive's two parts, either of which may have no batch, with the facts of its rows and of its log, and what was
-    found of them.
+    """A drive in two parts, the facts of its rows and of its log, and the findings of the inspection.
 
-    ``validating`` are the batches of the second part. has_identification is False if the campaign keeps the whole drive
-    for validation. Only the identification part can spoil a calibration, so facts, batches and run are of that part
-    alone, and of validation only if there is no other: the data that judge a calibration must not change it.
+    ``validating`` are the batches of the second part; either part may have none. has_identification is False if the
+    campaign keeps the whole drive for validation. Only the identification part can spoil a calibration, so facts,
+    batches and run are of that part alone, and of validation only if there is no other: the data that judge a
+    calibration must not change it.
     """
 
     identification: StatedDrive
