@@ -30,6 +30,10 @@ MOST_SPREAD: Final = 2.0
 """Chosen: largest factor of the intervals; 1 is the least. Runs left out of a campaign share its day, road and speed:
 on eight simulated vans, factors below 1 that they showed made the intervals of other drives too narrow.
 """
+GROSS: Final = 4.0
+"""Chosen: standard deviations of the other runs; a run that errs by more counts as if it erred by that. A search that
+failed, or a load that moved, says nothing of the model; two runs that err so much vouch for one another.
+"""
 MISFIT_SCATTER: Final = 0.08
 """Standard deviation of the logarithm of the misfit among batches on one road, before a vehicle has shown its own."""
 
@@ -131,15 +135,24 @@ def _model_std(runs: Sequence[_Run], empty_mass_kg: float) -> tuple[float, float
     usual = np.array([USUAL_PAYLOAD_SHARE * empty_mass_kg, USUAL_FRONT_SHARE_PCT, USUAL_CG_LEFT_M]) ** 2
     found = []
     for i, variance in enumerate(usual.tolist()):
-        excess = [float(one.error[i] ** 2 - one.predicted[i]) for one in runs if np.isfinite(one.error[i])]
-        pooled = max((PRIOR_RUNS * variance + sum(excess)) / (PRIOR_RUNS + len(excess)), LEAST_PART * variance)
-        heavier = float(special.stdtrit(PRIOR_RUNS + len(excess), 0.975)) / Z95
-        found.append(heavier * pooled**0.5)
+        known = [one for one in runs if np.isfinite(one.error[i])]
+        squared, predicted = np.array([(one.error[i] ** 2, one.predicted[i]) for one in known]).reshape(-1, 2).T
+        excess = squared - predicted
+        by_others = [_pooled(np.delete(excess, j), variance) for j in range(len(known))]
+        excess = np.minimum(squared, GROSS**2 * (predicted + by_others)) - predicted
+        heavier = float(special.stdtrit(PRIOR_RUNS + len(known), 0.975)) / Z95
+        found.append(heavier * _pooled(excess, variance) ** 0.5)
     return found[0], found[1], found[2]
+
+
+def _pooled(excess: F64, usual: float) -> float:
+    """The variance of the model's error: from how far runs (n,) exceed what is predicted without it, and other vans."""
+    return max((PRIOR_RUNS * usual + float(np.sum(excess))) / (PRIOR_RUNS + len(excess)), LEAST_PART * usual)
 
 
 def _spread(runs: Sequence[_Run], i: int, model_std: float) -> float:
     """The factor of the intervals of one quantity by which these errors have the size that is predicted for them."""
     ratios = [float(one.error[i] ** 2 / (one.predicted[i] + model_std**2)) for one in runs if np.isfinite(one.error[i])]
-    factor = ((PRIOR_RUNS + sum(ratios)) / (PRIOR_RUNS + len(ratios))) ** 0.5
+    bounded = [min(one, GROSS**2) for one in ratios]
+    factor = ((PRIOR_RUNS + sum(bounded)) / (PRIOR_RUNS + len(bounded))) ** 0.5
     return float(np.clip(factor, 1.0, MOST_SPREAD))
