@@ -201,7 +201,7 @@ class Gateway:
                 self._notifier.send(READY="1")
                 log_event(Event.READY, url=self.url)
                 self._on_started(self)
-            if self.learner.is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
+            if self.learner.learnt.is_due and self.pipeline.is_between_drives(self._settings.batch.silence_s):
                 self.needs_restart = True
                 return
             with contextlib.suppress(queue.Empty):

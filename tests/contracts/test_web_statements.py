@@ -159,7 +159,7 @@ def test_a_denied_proposal_is_not_made_again(local: Client, bench: LearnerBench)
     cut = ({"number": 1, "t_start": at(100), "t_end": at(300)}, {"number": 2, "t_start": at(600), "t_end": at(900)})
     bench.finish(drives=cut, looks_empty=(1, 2))
     again = LearnerBench(bench.directory)
-    (question,) = json.loads(again.learner.learning())["questions"]
+    (question,) = json.loads(again.learner.learnt.state())["questions"]
     assert [one["from"] for one in question["propose"]] == [second]
 
 

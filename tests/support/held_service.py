@@ -4,7 +4,7 @@ import threading
 from typing import Any
 
 from gateway.cli import main
-from gateway.service.learner.learner import Learner
+from gateway.service.learner.learnt import Learnt
 
 
 def never(*_: Any) -> str:
@@ -14,5 +14,5 @@ def never(*_: Any) -> str:
 
 
 if __name__ == "__main__":
-    Learner.learning = never  # type: ignore[method-assign]  # a fault, put in
+    Learnt.state = never  # type: ignore[method-assign]  # a fault, put in
     main()

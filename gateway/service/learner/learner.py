@@ -1,12 +1,11 @@
-"""A thread that keeps drives, starts fits and takes what they found; and what is learnt, as the web asks for it."""
+"""A thread that keeps drives, starts fits and takes what they found."""
 
 import hashlib
 import json
 import logging
 import queue
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -24,15 +23,15 @@ from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, RefusedError
 from gateway.log import Event, log_event
 from gateway.part import STOP_WITHIN_S, BackOff, ThreadPart
-from gateway.records import Batch, Motion, iso_utc, ns_of, rounded
+from gateway.records import Batch, Motion
 from gateway.service.learner.kept_drives import FOLDER, DriveFiles, Window
-from gateway.service.learner.learning_file import MOST_LADEN, MOST_VERSIONS, Book, Laden, LearningRecord, LearntVersion
+from gateway.service.learner.learning_file import MOST_VERSIONS, Book, LearningRecord, LearntVersion
+from gateway.service.learner.learnt import Learnt
 from gateway.service.learner.said import StatedLoads
 from gateway.service.learner.van import LearnerVehicle, StatedVan
 from gateway.service.learner.worker import OnResult, Worker
-from gateway.stated.learning import STATES, Help, LearningState, Question, StatementTold, Version, VersionTold
-from gateway.stated.statement import StatementRecord, StatementSource
-from gateway.units import BYTES_PER_MB, NS_PER_S
+from gateway.stated.statement import StatementRecord
+from gateway.units import BYTES_PER_MB
 from gateway.words import counted
 
 OnEvent = Callable[[str, Mapping[str, Any]], None]
@@ -41,8 +40,6 @@ MakeWorker = Callable[[OnResult], Worker]
 MOST_WAITING: Final = 4  # chosen: windows in the queue; each has some megabytes of rows, one comes every few minutes
 TURN_S: Final = 1.0  # chosen: interval between looks whether there is something to learn
 FIRST_RETRY_S, LAST_RETRY_S = 60.0, 3600.0  # chosen: after a process that was ended from outside
-NEWEST, BY_FILE = "newest", "file"
-OTHER_TIME_NS: Final = 86_400 * NS_PER_S  # chosen: a bus whose time is further off than a day has a time of its own
 
 
 class _Handed(NamedTuple):
@@ -75,14 +72,12 @@ class Learner(ThreadPart):
         super().__init__("learner")
         self._settings, self._batch, self._scheduler = settings, batch, drives
         self._traits = traits
-        self._clock_ns = clock_ns
         self._book = Book(directory, on_event, clock_ns)
         self._files = DriveFiles(directory / FOLDER, round(settings.size_mb * BYTES_PER_MB))
         self.van = StatedVan(self._book, vehicle)
         self.loads = StatedLoads(self._book, self._files, self.van)
         self._worker = (make_worker or (lambda on_result: Worker(directory, on_result)))(self._on_result)
-        active = self._book.record.active
-        self._started_with = active.id if active else None
+        self.learnt = Learnt(self._book, self._files, self.van, self.loads, drives, self._worker, lambda: self.fault)
         self._waiting: queue.Queue[_Handed | None] = queue.Queue(MOST_WAITING)
         self._retry = BackOff(FIRST_RETRY_S, LAST_RETRY_S)
         self._not_before_s = 0.0
@@ -155,12 +150,6 @@ class Learner(ThreadPart):
     def fault(self) -> str | None:
         """Faults of the record and of the disk."""
         return "; ".join(filter(None, (super().fault, self._book.fault, self._disk_fault))) or None
-
-    @property
-    def is_due(self) -> bool:
-        """Whether another calibration than at the start waits for the next drive."""
-        active = self._book.record.active
-        return (active.id if active else None) != self._started_with
 
     @property
     def is_busy(self) -> bool:
@@ -303,122 +292,6 @@ class Learner(ThreadPart):
             n_statements=len(used),
             worse=result.worse,
         )
-
-    # -- what is learnt --
-
-    def learning(self) -> str:
-        """JSON: a LearningState."""
-        with self._book.lock:
-            return self._learning().model_dump_json(by_alias=True)
-
-    def _learning(self) -> LearningState:
-        record, vehicle = self._book.record, self.van.known
-        windows, window_ns = self._files.windows(), self._scheduler.open_window_ns
-        last, told = record.last, self.loads.told(record.said)
-        learning = last.learning if last is not None else {}
-        open_s = 0.0 if window_ns is None else (window_ns[1] - window_ns[0]) / NS_PER_S
-        counts = Counter(one.state for one in told)
-        return LearningState(
-            is_allowed=self.van.given.why_not_allowed is None,
-            why_not=self.van.given.why_not_allowed,
-            vehicle_time=iso_utc(self._vehicle_time_ns(windows)),
-            plus_minus_kg=learning.get("plus_minus_kg"),
-            useful_at_kg=None if vehicle is None else rounded(vehicle.useful_half_width_kg, 1),
-            tested_on=learning.get("tested_on", 0),
-            helps=[Help.model_validate(one) for one in learning.get("helps", ())],
-            findings=[*learning.get("findings", ()), *([last.fault] if last and last.fault else [])],
-            takes_effect="next_drive" if self.is_due else None,
-            lacks=list(self._lacks(windows)),
-            is_learning=self._worker.is_busy,
-            driven_s=round(sum(one.usable_s for one in windows) + open_s, 1),
-            n_drives=len({one.drive_start_ns for one in windows}),
-            statements={name: counts.get(name, 0) for name in STATES},
-            questions=list(self._questions(told, last)),
-            versions=[self._version_told(one, record) for one in reversed(record.versions)],
-            held_version=record.held,
-            fault=self.fault,
-        )
-
-    def _vehicle_time_ns(self, windows: Sequence[Window]) -> int:
-        """The time that a statement without one is of: in a replay or a demonstration the bus has a time of its own."""
-        now_ns, window_ns = self._clock_ns(), self._scheduler.open_window_ns
-        bus_ns = [one.t_end_ns for one in windows] if window_ns is None else [window_ns[1]]
-        newest_ns = max(bus_ns, default=now_ns)
-        return newest_ns if abs(now_ns - newest_ns) > OTHER_TIME_NS else now_ns
-
-    def _lacks(self, windows: Sequence[Window]) -> Iterator[Any]:
-        stated = self._book.record.vehicle
-        if stated is None:
-            yield "vehicle"
-        elif self.van.learnt is None:
-            yield "confirmed_vehicle"
-        if not windows:
-            yield "drives"
-
-    def _questions(self, told: Sequence[StatementTold], last: LearnResult | None) -> Iterator[Question]:
-        for one in told:
-            if one.question and one.state in ("held", "weak"):
-                kind = "held" if one.state == "held" else "weak"
-                named = one.ref or f"the statement from {iso_utc(one.from_ns)[:16]}Z"
-                yield Question(kind=kind, text=f"{named}: {one.question}", statement_id=one.id)
-        drives = self._looking_empty(last)
-        if not drives:
-            return
-        begun = ", ".join(f"{str(one['t_start'])[:16]}Z" for one in drives)
-        which = f"The drive of {begun} looks" if len(drives) == 1 else f"These {len(drives)} drives look"
-        listed = "" if len(drives) == 1 else f" ({begun})"
-        source = str(StatementSource.EMPTY)
-        propose = tuple({"from": one["t_start"], "until": one["t_end"], "source": source} for one in drives)
-        yield Question(kind="looks_empty", text=f"{which} empty{listed}. Is that right?", propose=propose)
-
-    def _looking_empty(self, last: LearnResult | None) -> list[dict[str, Any]]:
-        """The drives that look empty, without those of which somebody said that they were not."""
-        laden = [one.span for one in self._book.record.laden]
-        found = [one for one in last.drives if one["number"] in last.looks_empty] if last else []
-        return [one for one in found if not any(Piece(*_span_of(one), one["number"]).meets(*span) for span in laden)]
-
-    def not_empty(self, begins_ns: Sequence[int], by: str) -> str:
-        """These drives, by their begin, look empty and were not: they are not asked about again; JSON: LearningState.
-
-        Raises RefusedError for a drive that is not asked about; then nothing has changed.
-        """
-        with self._book.lock:
-            record = self._book.record
-            asked = {span[0]: span for one in self._looking_empty(record.last) for span in (_span_of(one),)}
-            if any(begin_ns not in asked for begin_ns in begins_ns):
-                raise RefusedError("no_such_drive", "no drive that looks empty begins then: the questions list them")
-            act = self._book.act(by)
-            said = [Laden(begin_ns=begin, end_ns=end, said=act) for begin, end in map(asked.__getitem__, begins_ns)]
-            self._book.save(record.model_copy(update={"laden": (*record.laden, *said)[-MOST_LADEN:]}))
-            self._book.tell(Event.NOT_EMPTY, {"n": len(said), "by": by})
-            return self._learning().model_dump_json(by_alias=True)
-
-    def _version_told(self, one: LearntVersion, record: LearningRecord) -> VersionTold:
-        active = record.active
-        is_active = active is not None and active.id == one.id
-        state = "earlier"
-        if is_active:
-            state = "in_use" if one.id == self._started_with else "next_drive"
-        elif one.worse is not None:
-            state = "worse"
-        told = {name: getattr(one, name) for name in Version.model_fields}
-        text = one.text + (f"; not used: {one.worse}" if one.worse else "")
-        return VersionTold.model_validate({**told, "text": text, "state": state})
-
-    def use(self, version: str, by: str) -> str:
-        """Use this version from the next drive on, or the newest, or the file of the settings; JSON: LearningState."""
-        self.van.require_allowed()
-        with self._book.lock:
-            record = self._book.record
-            if version not in (NEWEST, BY_FILE) and all(one.id != version for one in record.versions):
-                raise RefusedError("no_such_version", "there is no such version: GET /api/v1/learning lists them")
-            self._book.save(record.model_copy(update={"held": None if version == NEWEST else version}))
-            self._book.tell(Event.VERSION_CHOSEN, {"use": version, "by": by})
-            return self._learning().model_dump_json(by_alias=True)
-
-
-def _span_of(drive: Mapping[str, Any]) -> tuple[int, int]:
-    return ns_of(str(drive["t_start"])), ns_of(str(drive["t_end"]))
 
 
 def _common_s(window: Window, piece: Piece) -> float:

@@ -158,7 +158,7 @@ class Book:
         self._files = KeptFiles(directory)
         self._is_invalid_file_in_the_way = False
         self._on_event = on_event
-        self._clock_ns = clock_ns
+        self.clock_ns = clock_ns
         try:
             self.record = load_learning(directory)
         except ConfigurationError as broken:
@@ -205,7 +205,7 @@ class Book:
 
     def now(self) -> str:
         """The time, as the record writes it."""
-        return iso_utc(self._clock_ns())
+        return iso_utc(self.clock_ns())
 
     def act(self, by: str) -> Act:
         """Somebody does something now."""

@@ -141,7 +141,7 @@ def statements_router(backend: LearnerBackend) -> APIRouter:
     @router.get(LEARNING_PATH, response_model=LearningState)
     async def learning() -> Response:
         """How well a load is weighed now, what would help most, what is asked, and the versions learnt so far."""
-        return await answered(backend.learning)
+        return await answered(backend.learnt.state)
 
     @router.put(LEARNING_PATH, response_model=LearningState, responses={**of_id, **problem_responses(400, 403)})
     async def change_learning(by: By, change: LearningChange) -> Response:
@@ -149,8 +149,8 @@ def statements_router(backend: LearnerBackend) -> APIRouter:
         which look empty were not.
         """
         if change.not_empty is not None:
-            return await answered(backend.not_empty, change.not_empty, by)
-        return await answered(backend.use, change.use or "", by)
+            return await answered(backend.learnt.not_empty, change.not_empty, by)
+        return await answered(backend.learnt.use, change.use or "", by)
 
     return router
 
