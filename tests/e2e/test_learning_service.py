@@ -69,7 +69,7 @@ def settle(running: Running) -> dict[str, Any]:
     def is_settled() -> bool:
         try:
             part = running.gateway.learner
-            return part.has_settled and not part.is_due and running.http(LEARNING)["takes_effect"] is None
+            return part.has_settled and not part.learnt.is_due and running.http(LEARNING)["takes_effect"] is None
         except Exception:  # noqa: BLE001 - between two starts nobody answers
             return False
 
