@@ -113,6 +113,7 @@ class BatchCounts(_Told):
         description="windows with too little driving for a batch of their own, pooled with later ones under the "
         "same load",
     )
+    n_late_rows: int = Field(0, description="samples that came after their window had ended: no batch has them")
     missing_s: float | None = Field(
         None, description="seconds of usable driving that the next batch still lacks", examples=[42.0]
     )

@@ -56,11 +56,6 @@ class Weight:
     def is_known(self) -> bool:
         return math.isfinite(self.kg)
 
-    @property
-    def is_over_limit(self) -> bool:
-        """Whether this number exceeds the limit; alarms have a hysteresis (core.alarms)."""
-        return self.limit_kg is not None and self.kg > self.limit_kg
-
 
 @dataclass(frozen=True, slots=True)
 class Weights:

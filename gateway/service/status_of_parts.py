@@ -75,6 +75,7 @@ class StatusReport:
             standing=self._standing(),
             batches=BatchCounts(
                 **self.pipeline.counts,
+                n_late_rows=self.pipeline.flow.scheduler.n_late_rows,
                 missing_s=round(self.pipeline.flow.missing_s, 1),
                 rejected_by_reason=dict(self.pipeline.rejected_by_reason),
             ),

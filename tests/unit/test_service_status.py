@@ -8,10 +8,14 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+from support.bus_drive import START_NS, white_noise
+from support.calibrated import calibration_file, calibration_text
 from support.paper_van import paper_van_config
 from support.ports import free_port
+from support.running_service import Running, configuration, serve
 
 from gateway.bus.listen import SourceState
+from gateway.bus.logs import write_candump
 from gateway.config import load_settings
 from gateway.records import Signal
 from gateway.service.gateway import Gateway
@@ -100,3 +104,19 @@ def test_the_whole_status_is_made_once_a_second(tmp_path: Path, monkeypatch: pyt
 
     Gateway(settings, setup_of(settings), on_started=on_started).run()
     assert 1 <= len(made) <= 3
+
+
+def test_samples_that_come_after_their_window_are_counted(tmp_path: Path) -> None:
+    """They are in no batch, so the status must say so: the first window ends at 20 s."""
+    log = tmp_path / "drive.log"
+    write_candump(white_noise(45.0, START_NS, seed=5), "can0", log)
+    lines = log.read_text().splitlines(keepends=True)
+    begin, end, after = (int(len(lines) * t_s / 45.0) for t_s in (19.7, 19.8, 20.3))
+    log.write_text("".join([*lines[:begin], *lines[end:after], *lines[begin:end], *lines[after:]]))
+
+    def drive(running: Running) -> None:
+        assert running.http("/api/v1/status")["batches"]["n_late_rows"] == 0
+        running.play(log)
+        assert 0 < running.http("/api/v1/status")["batches"]["n_late_rows"] <= end - begin
+
+    serve(configuration(tmp_path, calibration_text(calibration_file(payload_kg=12.0))), drive)

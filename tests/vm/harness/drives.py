@@ -25,12 +25,6 @@ def loaded_drive(duration_s: float, seed: int, map_name: str = "reference") -> F
     return _drive(duration_s, seed, map_name, (LOAD,))
 
 
-@cache
-def empty_drive(duration_s: float, seed: int) -> Frames:
-    """The van without a load."""
-    return _drive(duration_s, seed, "reference", ())
-
-
 def driven_with(duration_s: float, seed: int, loads: tuple[Load, ...]) -> Frames:
     """The van with these loads."""
     return _drive(duration_s, seed, "reference", loads)

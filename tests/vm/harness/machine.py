@@ -15,7 +15,6 @@ from vm.harness.image import kept_image
 
 AGENT_PORT: Final = 9999
 BOOT_S: Final = 240.0
-SHUTDOWN_S: Final = 60.0
 FURTHER_DISK: Final = "256M"  # sparse
 
 
@@ -96,15 +95,6 @@ class Machine:
         select.select([self._last_breath], [], [], 15.0)  # two guests must never write to one disk
         os.close(self._last_breath)
         self._process = None
-
-    def shut_down(self) -> None:
-        """Through systemd, as ignition off would."""
-        with contextlib.suppress(OSError, GuestError):
-            self.run("systemctl --no-block poweroff", timeout_s=5.0)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            if self._process is not None:
-                self._process.wait(SHUTDOWN_S)
-        self.cut_power()
 
     def close(self) -> None:
         """End it and throw its disk and network away."""
