@@ -122,6 +122,7 @@ class LearningState(Part):
     is_learning: bool = Field(description="a fit is under way")
     driven_s: float = Field(description="driving that can teach, from the first second on")
     n_drives: int
+    n_windows_lost: int = Field(description="windows since the start that could have taught and were not kept")
     statements: dict[str, int] = Field(description="how many are in each state")
     questions: list[Question]
     versions: list[VersionTold] = Field(description="the newest first")

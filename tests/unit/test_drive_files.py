@@ -1,12 +1,15 @@
 """The drives that a service keeps: bounded in size, forgotten by what they teach, and there again after a start."""
 
+import json
 from pathlib import Path
 
 import pytest
-from support.learner import NOW_NS, kept_window
+from support.drives import drive
+from support.learner import NOW_NS, WINDOW_S, LearnerBench, kept_window, window
 
 from gateway.calibration.kept import packed, unpacked
 from gateway.service.learner.kept_drives import DriveFiles
+from gateway.service.learner.learner import MOST_WAITING
 from gateway.units import NS_PER_S
 
 BYTES = len(packed(kept_window(0, 0)))
@@ -66,3 +69,14 @@ def test_a_failing_disk_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (tmp_path / "drives").write_text("in the way")
     with pytest.raises(OSError, match="drives"):
         DriveFiles(tmp_path / "drives", 10 * BYTES).add(kept_window(0, 0), nothing)
+
+
+def test_windows_that_nobody_can_keep_are_counted_and_told(tmp_path: Path) -> None:
+    """The disk is slower than the bus: the queue takes a few windows, and what follows is lost."""
+    learner = LearnerBench(tmp_path).learner
+    n_handed = MOST_WAITING + 3
+    for i in range(n_handed):
+        learner.take(window(0.0, i * WINDOW_S), drive(1.0))
+    told = json.loads(learner.learnt.state())
+    assert told["n_windows_lost"] == n_handed - MOST_WAITING
+    assert "wait for the disk" in told["fault"]

@@ -77,7 +77,16 @@ class Learner(ThreadPart):
         self.van = StatedVan(self._book, vehicle)
         self.loads = StatedLoads(self._book, self._files, self.van)
         self._worker = (make_worker or (lambda on_result: Worker(directory, on_result)))(self._on_result)
-        self.learnt = Learnt(self._book, self._files, self.van, self.loads, drives, self._worker, lambda: self.fault)
+        self.learnt = Learnt(
+            self._book,
+            self._files,
+            self.van,
+            self.loads,
+            drives,
+            self._worker,
+            fault=lambda: self.fault,
+            n_lost=lambda: self.n_lost,
+        )
         self._waiting: queue.Queue[_Handed | None] = queue.Queue(MOST_WAITING)
         self._retry = BackOff(FIRST_RETRY_S, LAST_RETRY_S)
         self._not_before_s = 0.0

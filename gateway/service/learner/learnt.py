@@ -35,10 +35,11 @@ class Learnt:
         drives: Scheduler,
         worker: Worker,
         fault: Callable[[], str | None],
+        n_lost: Callable[[], int],
     ) -> None:
-        """``fault`` says what keeps the learner from learning."""
+        """``fault`` says what keeps the learner from learning, ``n_lost`` how many windows it could not keep."""
         self._book, self._files, self._van, self._loads = book, files, van, loads
-        self._scheduler, self._worker, self._fault = drives, worker, fault
+        self._scheduler, self._worker, self._fault, self._n_lost = drives, worker, fault, n_lost
         active = book.record.active
         self._started_with = active.id if active else None
 
@@ -74,6 +75,7 @@ class Learnt:
             is_learning=self._worker.is_busy,
             driven_s=round(sum(one.usable_s for one in windows) + open_s, 1),
             n_drives=len({one.drive_start_ns for one in windows}),
+            n_windows_lost=self._n_lost(),
             statements={name: counts.get(name, 0) for name in STATES},
             questions=list(self._questions(told, last)),
             versions=[self._version_told(one, record) for one in reversed(record.versions)],
