@@ -39,7 +39,7 @@ def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_every_figure_is_in_the_page_and_a_file(reproduced: Path) -> None:
     page = (reproduced / "report.html").read_text(encoding="utf-8")
     figures = re.findall(r'<img src="(figures/[a-z0-9_]+\.svg)"', page)
-    assert len(figures) == 13
+    assert len(figures) == 12
     for figure in figures:
         assert (reproduced / figure).stat().st_size > 5_000
     assert_self_contained(reproduced / "report.html")

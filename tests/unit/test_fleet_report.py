@@ -150,7 +150,7 @@ def test_every_page_is_well_formed_and_links_only_to_files_beside_it(made: Path)
         assert text.count("<script") == text.count("</script>")
     report = (made / "report.html").read_text()
     assert "&lt;script&gt;alert(1)&lt;/script&gt;&quot;&#x27;&amp;.log" in report
-    assert '<img src="figures/loads.svg"' in report
+    assert '<img src="figures/refused.svg"' in report
 
 
 @pytest.mark.parametrize("name", ["van-17", "../../etc/passwd", "a b", "", EVIL, "x" * 300])

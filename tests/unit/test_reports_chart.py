@@ -65,7 +65,7 @@ def test_the_legend_has_each_label_once() -> None:
 
 
 def test_axes_say_what_they_are() -> None:
-    one = chart(Panel(Axis("f", limits=(1.0, 9.0)), Axis("", places=("low", "high")), (LineMark(X, X),)))
+    one = chart(Panel(Axis("f", limits=(1.0, 9.0)), Axis("", ticks=((1.0, "low"), (2.0, "high"))), (LineMark(X, X),)))
     (axes,) = draw(one).axes
     assert (axes.get_xlabel(), axes.get_xlim()) == ("f", (1.0, 9.0))
     assert [label.get_text() for label in axes.get_yticklabels()] == ["low", "high"]

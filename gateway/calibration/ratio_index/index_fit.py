@@ -167,7 +167,6 @@ class RatioIndexFit:
     payload_errors_kg: F64 | None
     front_share_errors_pct: F64 | None
     table: SpectrumTable
-    choice: Choice
 
 
 def fit_ratio_index(
@@ -233,7 +232,6 @@ def fit_ratio_index(
         payload_errors_kg=payload_errors_kg,
         front_share_errors_pct=share_errors_pct,
         table=table,
-        choice=chosen,
     )
 
 

@@ -19,17 +19,6 @@ class FittedRegression:
     without: tuple[RegressionModel, ...]
     held_out_errors: F64
 
-    @property
-    def covariance(self) -> F64:
-        """Covariance of the coefficients (p + 1, p + 1), by jackknife over runs, so that batches of a run may be
-        correlated.
-
-        B. Efron and R. J. Tibshirani, An Introduction to the Bootstrap, ch. 11.
-        """
-        without = np.array([model.coefficients for model in self.without])
-        moved = without - without.mean(axis=0)
-        return np.asarray((len(moved) - 1.0) / len(moved) * moved.T @ moved)
-
 
 def fit_regression(terms: tuple[str, ...], ra: F64, rg: F64, target: F64, run: I64) -> FittedRegression:
     """target (n,) on the named terms of ra, rg (n,); run (n,) numbers.

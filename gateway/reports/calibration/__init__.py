@@ -1,5 +1,5 @@
 """The report of a calibration, or of an evaluation alone: report.html with figures and report.json.
 
-An outcome or an assessment goes in. One module writes each section (runs, spectra, ratio index, fitted vehicle,
-accuracy, provenance), ``page`` puts them under the verdict, ``report`` writes the directory.
+An assessment goes in. One module writes each section (runs, fitted vehicle, accuracy, provenance);
+``calibration_report`` puts them under the verdict and writes the directory.
 """

@@ -8,11 +8,11 @@ import numpy as np
 
 from gateway.calibration.judgement.assessment import PART_NAMES, PART_TEXT, BatchSet, Judgement
 from gateway.calibration.judgement.coverage import IDEAL_SCORE
-from gateway.calibration.judgement.evaluation import CgLeftErrors, Comparison, Errors, Target, TargetErrors
+from gateway.calibration.judgement.evaluation import CgLeftErrors, Errors, Target, TargetErrors
 from gateway.estimates.batch_estimate import Z95
 from gateway.estimates.budget import BudgetLine
 from gateway.estimates.reasons import REMEDIES, SOURCES
-from gateway.records import F64, iso_utc
+from gateway.records import F64
 from gateway.reports.charts import GREY, Axis, Chart, LineMark, Marker, Panel, Points, Section, Table
 from gateway.words import NONE, counted, decimal, estimator_name, known, percent
 
@@ -29,14 +29,13 @@ def accuracy_section(judgement: Judgement, budget: Sequence[BudgetLine] = ()) ->
     """The errors of one estimator; ``budget`` has the sources of its stated errors."""
     name = estimator_name(judgement.estimator)
     tables = tuple(runs_table(judgement, part) for part in judgement.tables)
-    batches = tuple(batches_table(judgement, part) for part in judgement.tables)
     return Section(
         f"accuracy-{judgement.estimator.replace('_', '-')}",
         f"Accuracy of the {name}",
         (*(PART_TEXT[part] for part in judgement.tables), *_sideways(judgement)),
         tuple(_charts(judgement, name)),
         (summary_table(judgement), *([budget_table(budget)] if budget else [])),
-        (("Errors run by run", tables), ("Every batch", batches)),
+        (("Errors run by run", tables),),
     )
 
 
@@ -182,26 +181,3 @@ def runs_table(judgement: Judgement, part: BatchSet) -> Table:
     figures = (f"{what} {_COLUMNS[n]}" for what in ("payload", "share") for n in chosen)
     caption = f"{PART_NAMES[part].capitalize()}, run by run; ± and score in percent of the range"
     return Table(caption, ("Run", "payload", "front share", "answered", *figures), rows)
-
-
-def batches_table(judgement: Judgement, part: BatchSet) -> Table:
-    """A line for every batch of one set."""
-    answer = ("estimated", "95 % interval")
-    columns = ("Run", "until", "true payload", *answer, "true share", *answer, "no answer")
-    rows = tuple(
-        (
-            str(one.drive.number),
-            iso_utc(one.estimate.t_end_ns)[:19] + "Z",
-            *_answer_cells(one.compared("payload"), "g", " kg"),
-            *_answer_cells(one.compared("front_share"), ".1f", " %"),
-            ", ".join(one.estimate.rejected),
-        )
-        for one in judgement.tables[part].judged
-    )
-    return Table(f"{PART_NAMES[part].capitalize()}, batch by batch", columns, rows)
-
-
-def _answer_cells(compared: Comparison, form: str, unit: str) -> tuple[str, str, str]:
-    estimated = decimal(compared.estimated if math.isfinite(compared.estimated) else None, unit)
-    interval = f"{decimal(compared.low)} to {decimal(compared.high)}" if math.isfinite(compared.low) else NONE
-    return f"{compared.true:{form}}{unit}", estimated, interval

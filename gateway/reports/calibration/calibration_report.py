@@ -17,7 +17,6 @@ from gateway.calibration.judgement.assessment import Assessment, stated_budget
 from gateway.estimates.field_kinds import BUDGET
 from gateway.reports.calibration.accuracy import accuracy_section
 from gateway.reports.calibration.fitted_vehicle import fitted_vehicle_section
-from gateway.reports.calibration.ratio_index import ratio_index_section
 from gateway.reports.calibration.runs import provenance_section, runs_section
 from gateway.reports.charts import Section
 from gateway.reports.charts.html import (
@@ -43,12 +42,9 @@ def write_report_of(directory: Path, assessment: Assessment, on_chart: OnChart =
 
 
 def _calibration_sections(outcome: Outcome) -> Iterator[Section]:
-    runs = outcome.inspection.usable
-    identification = [one.identification for one in runs]
     yield runs_section(outcome)
-    if outcome.ratio_index is not None:
-        yield ratio_index_section(outcome.ratio_index, identification, [one.validation for one in runs])
     if outcome.cross_spectrum is not None:
+        identification = [one.identification for one in outcome.inspection.usable]
         yield fitted_vehicle_section(identification, outcome.cross_spectrum, outcome.file.vehicle)
 
 

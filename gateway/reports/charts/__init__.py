@@ -18,21 +18,12 @@ GREY: Final = 7  # index in the palette
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """An axis. ``places`` names the positions 0, 1, 2 ... if the axis is categorical.
-
-    ``ticks`` labels positions of a numeric axis, for example instants: (position, name).
-    """
+    """An axis; ``ticks`` labels positions of it, for example instants: (position, name)."""
 
     title: str
     is_log: bool = False
     limits: tuple[float, float] | None = None
-    places: tuple[str, ...] = ()
     ticks: tuple[tuple[float, str], ...] = ()
-
-    @property
-    def named(self) -> tuple[tuple[float, str], ...]:
-        """Labelled positions with their labels; empty if the axis shows plain numbers."""
-        return self.ticks or tuple((float(n), place) for n, place in enumerate(self.places))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

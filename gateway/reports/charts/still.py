@@ -79,16 +79,16 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     _set_axis(axes.yaxis, panel.y)
 
 
-def _set_axis(drawn: XAxis | YAxis, axis: Axis, **of_places: Any) -> None:
-    """Set scale, limits and ticks; ``of_places`` formats the labels of a categorical axis."""
+def _set_axis(drawn: XAxis | YAxis, axis: Axis, **of_ticks: Any) -> None:
+    """Set scale, limits and ticks; ``of_ticks`` formats the labels of ticks."""
     name = drawn.axis_name
     if axis.is_log:
         drawn.axes.set(**{f"{name}scale": "log"})
         _with_plain_ticks(drawn)
     if axis.limits:
         drawn.axes.set(**{f"{name}lim": axis.limits})
-    if axis.named:
-        drawn.set_ticks([at for at, _ in axis.named], [name for _, name in axis.named], fontsize=7, **of_places)
+    if axis.ticks:
+        drawn.set_ticks([at for at, _ in axis.ticks], [name for _, name in axis.ticks], fontsize=7, **of_ticks)
 
 
 def _with_plain_ticks(axis: XAxis | YAxis) -> None:

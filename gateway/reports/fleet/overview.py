@@ -6,24 +6,21 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import Final
 
-import numpy as np
 import polars as pl
 
-from gateway.archive.fleet.batches import DRIFTING, OF_VEHICLE
+from gateway.archive.fleet.batches import OF_VEHICLE
 from gateway.archive.fleet.drift import FALSE_SHARE, Drift
 from gateway.archive.fleet.fleet import FleetSummary, FleetVehicle
-from gateway.reports.charts import Axis, Chart, ChartLink, LineMark, Mark, Panel, Points, Ribbon, Section, Table
+from gateway.reports.charts import ChartLink, Section, Table
 from gateway.reports.fleet.text import (
     NAMES,
     day,
     drift_told,
-    every_week,
     kg,
     over_limit,
     page_of,
     percent,
     reason_told,
-    time_axis,
     trouble_told,
     whole,
 )
@@ -32,7 +29,6 @@ from gateway.words import NONE
 
 SILENT_DAYS: Final = 28  # chosen: without a batch, before the last of the fleet's
 LITTLE_ANSWERED: Final = 0.5  # chosen: of a vehicle's batches
-MOST_SLOPES: Final = 400  # in a chart: the steepest either way
 MOST_FAILURES: Final = 200  # in the table; all are in report.json
 
 
@@ -71,7 +67,7 @@ def looks_of(fleet: FleetSummary) -> list[Look]:
 def fleet_sections(fleet: FleetSummary, looks: Sequence[Look]) -> list[Section]:
     refusals = refusals_section("refused", fleet.vehicles)
     failed = [_failed(fleet)] if fleet.failures else []
-    return [_look_section(looks), _vehicles(fleet), _loads(fleet), refusals, _drift(fleet), *failed, _how()]
+    return [_look_section(looks), _vehicles(fleet), refusals, *failed, _how(fleet)]
 
 
 def _drifting(vehicle: FleetVehicle, name: str, drift: Drift) -> Look:
@@ -136,78 +132,6 @@ def _vehicle_row(vehicle: FleetVehicle) -> tuple[ChartLink | str, ...]:
     )
 
 
-def _loads(fleet: FleetSummary) -> Section:
-    mean = pl.col("payload_mean_kg")
-    weeks = (
-        pl.concat([vehicle.weeks.drop_nulls("payload_mean_kg") for vehicle in fleet.vehicles])
-        .group_by("week")
-        .agg(
-            pl.len().alias("n").cast(pl.Float64),
-            mean.quantile(0.25, "linear").alias("low"),
-            mean.median().alias("middle"),
-            mean.quantile(0.75, "linear").alias("high"),
-        )
-    )
-    if weeks.is_empty():
-        return Section("loads", "Loads over time", ("No batch was answered.",))
-    shown = every_week(weeks)
-    axis, x = time_axis(weeks["week"]), shown["week"].cast(float).to_numpy()
-    n, low, middle, high = (shown[name].to_numpy() for name in ("n", "low", "middle", "high"))
-    marks = (Ribbon(x, low, high, "middle half of the vehicles"), LineMark(x, middle, "median of the vehicles"))
-    chart = Chart(
-        "loads",
-        f"Weekly mean loads of the vehicles, and how many vehicles had an answer that week ({min(weeks['n']):.0f} to "
-        f"{max(weeks['n']):.0f} of {len(fleet.vehicles)}). {whole(fleet.n_answered)} batches.",
-        "Median and middle half over the vehicles of each one's weekly mean load, and the number of vehicles by week.",
-        (
-            Panel(axis, Axis("load [kg]"), marks, "Weekly mean loads"),
-            Panel(axis, Axis("vehicles"), (LineMark(x, n, "vehicles", 7),), "With an answer"),
-        ),
-    )
-    return Section("loads", "Loads over time", (), (chart,))
-
-
-def _drift(fleet: FleetSummary) -> Section:
-    panels = tuple(panel for name in DRIFTING if (panel := _drift_panel(fleet, name)) is not None)
-    n = sum(len(vehicle.drifts) for vehicle in fleet.vehicles)
-    n_believed = sum(len(vehicle.believed_drifts) for vehicle in fleet.vehicles)
-    if not panels:
-        return Section("drift", "Drift", ("No vehicle has weeks enough since its calibration to tell a drift.",))
-    text = (
-        f"{whole(n)} slopes of {whole(len(fleet.vehicles))} vehicles, {whole(n_believed)} of them believed. At most "
-        f"{100 * FALSE_SHARE:g} % of the believed are expected to be there by chance. With twenty vehicles or more "
-        "the median movement of the fleet, such as the seasons make, is taken off first."
-    )
-    chart = Chart(
-        "drift",
-        f"Slope of each vehicle with its 95 % interval, in order; of more than {MOST_SLOPES} the steepest either way.",
-        "Slopes of every parameter by vehicle in order of steepness, with intervals; believed ones stand out.",
-        panels,
-        2,
-        260,
-    )
-    return Section("drift", "Drift", (text,), (chart,))
-
-
-def _drift_panel(fleet: FleetSummary, name: str) -> Panel | None:
-    told = sorted(
-        ((vehicle.drifts[name], vehicle.name) for vehicle in fleet.vehicles if name in vehicle.drifts),
-        key=lambda one: one[0].judged.slope,
-    )
-    if not told:
-        return None
-    half = MOST_SLOPES // 2
-    shown = told if len(told) <= MOST_SLOPES else [*told[:half], *told[-half:]]
-    marks: list[Mark] = []
-    for is_believed, label, colour in ((False, "not believed", 7), (True, "believed", 1)):
-        chosen = [(k, drift, vehicle) for k, (drift, vehicle) in enumerate(shown) if drift.is_believed is is_believed]
-        if chosen:
-            at = np.array([float(k) for k, _, _ in chosen])
-            slopes, low, high = np.array([[d.judged.slope, d.judged.low, d.judged.high] for _, d, _ in chosen]).T
-            marks.append(Points(at, slopes, label, colour, "circle", low, high))
-    return Panel(Axis("vehicles"), Axis("a year"), tuple(marks), NAMES[name])
-
-
 def _failed(fleet: FleetSummary) -> Section:
     rows = tuple((one.vehicle, one.month, one.log, one.reason) for one in fleet.failures[:MOST_FAILURES])
     more = len(fleet.failures) - len(rows)
@@ -217,13 +141,19 @@ def _failed(fleet: FleetSummary) -> Section:
     return Section("failed", "Logs that failed", paragraphs, (), (table,))
 
 
-def _how() -> Section:
+def _how(fleet: FleetSummary) -> Section:
+    n = sum(len(vehicle.drifts) for vehicle in fleet.vehicles)
+    n_believed = sum(len(vehicle.believed_drifts) for vehicle in fleet.vehicles)
     return Section(
         "how",
         "How to read it",
         (
             "Only what a receipt of the data set vouches for is counted. Unknown is a dash, never 0. Weeks are UTC and "
             "begin on Monday; every figure says of how many batches, weeks or vehicles it is.",
+            f"A drift is a slope of a parameter since the vehicle's last calibration. Of {whole(n)} slopes "
+            f"{whole(n_believed)} are believed; at most {100 * FALSE_SHARE:g} % of the believed are expected to be "
+            "there by chance. With twenty vehicles or more the median movement of the fleet, such as the seasons make, "
+            "is taken off first. A vehicle's page shows its slopes.",
             "docs/archive.md tells how each figure is made.",
         ),
     )

@@ -13,7 +13,7 @@ from gateway.core.ratio_index.index import PAPER_BANDS, band_pass_gain, mean_spe
 from gateway.core.ratio_index.regression import MODEL_9_PAYLOAD, MODEL_10_FRONT_SHARE
 from gateway.records import F64
 from gateway.reports.charts import COLOURS, GREY, Axis, Chart, LineMark, Mark, Marker, Panel, Points, Rule, Section
-from gateway.reports.paper.experiments import Experiments, condition_of, mean_errors
+from gateway.reports.paper.experiments import Experiments
 from gateway.units import NS_PER_S
 
 ACCELERATION: Final = "acceleration"
@@ -71,13 +71,6 @@ def figures_of(experiments: Experiments) -> list[Section]:
             "road a wheelbase later, |cos(pi f l / v)|: heave has zeros at (n + 1/2) v / l, pitch at n v / l, and they "
             "wander through the very bands that the index compares.",
             _roads(experiments),
-        ),
-        (
-            "sensitivity",
-            "Not in the paper: one load at other speeds and on other roads",
-            "All methods are calibrated at 50 km/h on IRI 4. Here the ratio index answers with its speed gate "
-            "lifted, to show what speed and roughness would do to it; in service it refuses such speeds.",
-            _sensitivity(experiments),
         ),
         *(
             (
@@ -213,19 +206,6 @@ def _roads(experiments: Experiments) -> Iterator[Panel]:
         marks += [LineMark(freq_hz, road, "", k, "dash"), LineMark(freq_hz, both_axles, f"{kmh:.0f} km/h", k)]
     heave = Axis("road into heave: paper dashed, with the wheelbase solid", is_log=True, limits=(1e-4, 1.0))
     yield Panel(_FREQUENCY, heave, tuple(marks))
-
-
-def _sensitivity(experiments: Experiments) -> Iterator[Panel]:
-    """Each method's errors for one load at other speeds and roads, with the ratio index's gate disabled."""
-    runs = experiments.driven["sensitivity"].runs
-    errors = [np.array([mean_errors(run, method) for run in runs]) for method in experiments.simulated]
-    at, conditions = np.arange(float(len(runs))), Axis("", places=tuple(map(condition_of, runs)))
-    for column, title in enumerate(("payload error [kg]", "share error [points]")):
-        points = (
-            Points(at, found[:, column], method.label, k)
-            for k, (method, found) in enumerate(zip(experiments.simulated, errors, strict=True))
-        )
-        yield Panel(conditions, Axis(title), (Rule(0.0), *points))
 
 
 def _over_time(experiments: Experiments, kind: str) -> Iterator[Panel]:
