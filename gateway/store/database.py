@@ -88,8 +88,7 @@ class Database:
         self._age: AgeClock | None = None
         self._is_mended = False
         self._lock_fd: int | None = None
-        self._is_taken_away = False  # whether the file that was open is no longer at its path
-        self.is_replaced = False  # whether somebody took the open file away, and this one stands in its place
+        self.is_replaced = False  # whether somebody took the open file away, or put another in its place
 
     @property
     def is_open(self) -> bool:
@@ -99,7 +98,9 @@ class Database:
     def open(self, new_epoch: str) -> Opened:
         """Open or create the file. Raises StoreError, OSError or sqlite3.Error; then nothing stays open."""
         # before it is closed: a new file may get the inode of one that nobody has open
-        self._is_taken_away |= bool(self._opened_identity) and self._identities()[0] != self._opened_identity[0]
+        if self._opened_identity and self._identities()[0] != self._opened_identity[0] and not self.is_replaced:
+            self.is_replaced = True
+            log_event(Event.STORE_REPLACED, level=logging.ERROR, path=str(self.path))
         self.disconnect()
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self._lock()
@@ -110,7 +111,6 @@ class Database:
             self._age = AgeClock(self._connection)
             self._is_mended = False
             self._opened_identity = self._identities()
-            self.is_replaced |= self._is_taken_away
             return opened
         except (OSError, sqlite3.Error):
             self.disconnect()

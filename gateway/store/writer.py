@@ -250,12 +250,8 @@ class Store(ServicePart):
         return True
 
     def _open_if_closed(self) -> None:
-        if self._database.is_open:
-            return
-        was_replaced = self._database.is_replaced
-        self._buffer.continue_in(*self._database.open(self._buffer.epoch))
-        if self._database.is_replaced and not was_replaced:
-            log_event(Event.STORE_REPLACED, level=logging.ERROR, path=str(self.path))
+        if not self._database.is_open:
+            self._buffer.continue_in(*self._database.open(self._buffer.epoch))
 
     def _commit(self) -> None:
         rows = self._buffer.take()
