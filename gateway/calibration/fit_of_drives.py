@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from gateway.calibration.found import ClaimState, FoundClaim, FoundLoad
-from gateway.calibration.left_out import USUAL_FRONT_SHARE_PCT, USUAL_PAYLOAD_SHARE, LeftOut, Limits, most_misfit
+from gateway.calibration.left_out import USUAL_FRONT_SHARE_PCT, USUAL_PAYLOAD_SHARE, LeftOut, ModelErrors, most_misfit
 from gateway.calibration.prior import MODE, Prior, own_prior
 from gateway.calibration.read_drive import EVIDENCE, OfVehicle, ReadDrive, RollingDrive
 from gateway.calibration.statements import LEAST_PRECISION, Statement, Terms, load_prior_of, shared_disagreement
@@ -282,7 +282,7 @@ class FitOfDrives:
         misfits = [one.whittle.misfit(point) for one, point in zip(self.seen, points, strict=True)]
         loads = tuple(load_of(own) for own in self.half_car.own)
         like = self.prior.like
-        limits = Limits.usual(vehicle.empty_mass_kg, most_misfit(misfits))
+        model_errors = ModelErrors.usual(vehicle.empty_mass_kg, most_misfit(misfits))
         stated = [one.stated.payload_kg for one in self.seen if not one.is_unknown]
         speeds = [batch.mean_speed_mps for batch in batches]
         model = VehicleModel(
@@ -295,9 +295,9 @@ class FitOfDrives:
             parameters=theta,
             covariance=0.5 * (covariance + covariance.T),
             directions=np.zeros((len(theta), 0)),
-            model_std=limits.model_std,
-            spread=limits.spread,
-            misfit_limit=limits.misfit_limit,
+            model_std=model_errors.model_std,
+            spread=model_errors.spread,
+            misfit_limit=model_errors.misfit_limit,
             acceleration_rms_mps2=float(np.median([one.spectra.acceleration_rms_mps2 for one in self.seen])),
             pitch_rate_rms_radps=float(np.median([one.spectra.pitch_rate_rms_radps for one in self.seen])),
             speed_seen_mps=(min(speeds), max(speeds)),

@@ -56,20 +56,20 @@ class LeftOut:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
-    """Results of runs left out; fields as in VehicleModel."""
+class ModelErrors:
+    """How far the model errs on runs left out; fields as in VehicleModel."""
 
     model_std: tuple[float, float, float]
     spread: tuple[float, float, float]
     misfit_limit: float
 
     @classmethod
-    def usual(cls, empty_mass_kg: float, misfit_limit: float) -> "Limits":
+    def usual(cls, empty_mass_kg: float, misfit_limit: float) -> "ModelErrors":
         """Those of other vans, before any run is left out."""
         return cls(_model_std((), empty_mass_kg), (1.0, 1.0, 1.0), misfit_limit)
 
     @classmethod
-    def of(cls, model: VehicleModel) -> "Limits":
+    def of(cls, model: VehicleModel) -> "ModelErrors":
         """Those of one vehicle."""
         return cls(model.model_std, model.spread, model.misfit_limit)
 
@@ -79,13 +79,13 @@ class Limits:
         return replace(model, model_std=self.model_std, spread=self.spread, misfit_limit=most)
 
 
-def limits_shown_by(errors: Sequence[LeftOut], misfit_limit: float, empty_mass_kg: float) -> Limits:
-    """The limits from these; ``misfit_limit`` is the limit from the fit of all, should no misfit be among them."""
+def model_errors_shown_by(errors: Sequence[LeftOut], misfit_limit: float, empty_mass_kg: float) -> ModelErrors:
+    """What these show; ``misfit_limit`` is the limit from the fit of all, should no misfit be among them."""
     runs = [_of_run(list(batches)) for _, batches in groupby(errors, lambda one: one.run)]
     shown = most_misfit([one.misfit for one in errors])
     model_std = _model_std(runs, empty_mass_kg)
     spread = tuple(_spread(runs, i, std) for i, std in enumerate(model_std))
-    return Limits(model_std, (spread[0], spread[1], spread[2]), shown if np.isfinite(shown) else misfit_limit)
+    return ModelErrors(model_std, (spread[0], spread[1], spread[2]), shown if np.isfinite(shown) else misfit_limit)
 
 
 def most_misfit(misfits: Sequence[float]) -> float:

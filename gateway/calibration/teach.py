@@ -27,7 +27,7 @@ from gateway.calibration.fit_of_drives import (
     weighed_left_out,
 )
 from gateway.calibration.found import ClaimState, FoundClaim, Taught
-from gateway.calibration.left_out import LeftOut, Limits, limits_shown_by
+from gateway.calibration.left_out import LeftOut, ModelErrors, model_errors_shown_by
 from gateway.calibration.prior import Prior
 from gateway.calibration.read_drive import BAND_HZ, N_SEGMENT, ReadDrive, can_roll
 from gateway.calibration.stated_drive import StatedDrive
@@ -88,14 +88,14 @@ def teach(
             without[one.drive.name] = replace(left, directions=model.directions)
             errors += weighed_left_out(one, without[one.drive.name], one.terms.truth(*causes))
             step()
-    limits = limits_shown_by(errors, model.misfit_limit, vehicle.empty_mass_kg)
+    model_errors = model_errors_shown_by(errors, model.misfit_limit, vehicle.empty_mass_kg)
     if not errors:
-        limits = limits if sister is None else Limits.of(sister)
+        model_errors = model_errors if sister is None else ModelErrors.of(sister)
         model = model.with_warning(UNTESTED)
     return Taught(
-        limits.on(model),
+        model_errors.on(model),
         tuple(loads),
-        {name: limits.on(one) for name, one in without.items()},
+        {name: model_errors.on(one) for name, one in without.items()},
         tuple(errors),
         tuple(claims),
         fitted.found_causes,

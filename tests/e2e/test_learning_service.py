@@ -63,13 +63,21 @@ def logs(folder: Path, loads: Any = LOADS) -> list[Path]:
     return [folder / f"{number:02d}.log" for number in range(1, len(loads) + 1)]
 
 
+def has_settled(part: learner.Learner) -> bool:
+    """Whether everything that teaches was learnt from, or cannot be."""
+    with part._book.lock:
+        job, last = part._job(), part._book.record.last
+        is_done = job is None or (last is not None and last.key == job.key)
+        return is_done and not part.is_busy and part._waiting.unfinished_tasks == 0
+
+
 def settle(running: Running) -> dict[str, Any]:
     """Until everything was learnt, and the service weighs by it."""
 
     def is_settled() -> bool:
         try:
             part = running.gateway.learner
-            return part.has_settled and not part.learnt.is_due and running.http(LEARNING)["takes_effect"] is None
+            return has_settled(part) and not part.learnt.is_due and running.http(LEARNING)["takes_effect"] is None
         except Exception:  # noqa: BLE001 - between two starts nobody answers
             return False
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pytest
 
-from gateway.calibration.left_out import LEAST_PART, USUAL_PAYLOAD_SHARE, LeftOut, Limits, limits_shown_by
+from gateway.calibration.left_out import LEAST_PART, USUAL_PAYLOAD_SHARE, LeftOut, ModelErrors, model_errors_shown_by
 from gateway.estimates.posterior import Posterior
 
 EMPTY_KG = 1500.0
@@ -22,16 +22,16 @@ def left_out(errors_kg: Sequence[float], n_batches: int = 3) -> Iterator[LeftOut
         yield from [LeftOut(f"run {number}", error, np.zeros(2), posterior, 0.0, 1.0, is_compact=True)] * n_batches
 
 
-def shown_by(errors_kg: Sequence[float], n_batches: int = 3) -> Limits:
-    return limits_shown_by(list(left_out(errors_kg, n_batches)), STATED, EMPTY_KG)
+def shown_by(errors_kg: Sequence[float], n_batches: int = 3) -> ModelErrors:
+    return model_errors_shown_by(list(left_out(errors_kg, n_batches)), STATED, EMPTY_KG)
 
 
 def test_no_run_leaves_the_error_of_other_vans() -> None:
-    assert limits_shown_by([], STATED, EMPTY_KG) == Limits.usual(EMPTY_KG, STATED)
+    assert model_errors_shown_by([], STATED, EMPTY_KG) == ModelErrors.usual(EMPTY_KG, STATED)
 
 
 def test_runs_that_err_widen_and_runs_that_hardly_err_narrow_to_a_part() -> None:
-    usual = Limits.usual(EMPTY_KG, STATED).model_std[0]
+    usual = ModelErrors.usual(EMPTY_KG, STATED).model_std[0]
     assert shown_by([60.0, -50.0, 70.0, -65.0]).model_std[0] > 2.0 * usual
     least = shown_by([0.0] * 40).model_std[0]
     assert least == pytest.approx(LEAST_PART**0.5 * USUAL_PAYLOAD_SHARE * EMPTY_KG, rel=0.05)
@@ -58,8 +58,8 @@ def test_two_gross_errors_vouch_for_one_another() -> None:
 
 def test_an_unknown_place_says_nothing_and_hides_nothing() -> None:
     without = shown_by(SOUND_KG)
-    assert without.model_std[2] == Limits.usual(EMPTY_KG, STATED).model_std[2]
+    assert without.model_std[2] == ModelErrors.usual(EMPTY_KG, STATED).model_std[2]
     unstated = [
         LeftOut("none", np.array([np.nan, np.nan]), np.zeros(2), Posterior(np.zeros(2), np.eye(2)), 0.0, 1.0, True)
     ]
-    assert limits_shown_by([*left_out(SOUND_KG), *unstated], STATED, EMPTY_KG).model_std == without.model_std
+    assert model_errors_shown_by([*left_out(SOUND_KG), *unstated], STATED, EMPTY_KG).model_std == without.model_std

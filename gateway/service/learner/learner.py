@@ -165,14 +165,6 @@ class Learner(ThreadPart):
         """Whether a fit is under way."""
         return self._worker.is_busy
 
-    @property
-    def has_settled(self) -> bool:
-        """Whether everything that teaches was learnt from, or cannot be."""
-        with self._book.lock:
-            job = self._job()
-            is_done = job is None or (self._book.record.last is not None and self._book.record.last.key == job.key)
-            return is_done and not self._worker.is_busy and self._waiting.unfinished_tasks == 0
-
     # -- learning --
 
     def _learn_if_due(self) -> None:
