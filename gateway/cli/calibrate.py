@@ -19,7 +19,6 @@ from gateway.calibration.judgement.assessment import Assessment, assess_calibrat
 from gateway.calibration.learning.fitter_answers import doubts_of_vehicle
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.cli.options import (
-    CAMPAIGN,
     FILE,
     Parsed,
     as_json,
@@ -96,7 +95,7 @@ def inspection_json(inspection: Inspection) -> dict[str, object]:
 
 
 @click.command("calibrate")
-@click.argument("campaign", type=CAMPAIGN)
+@click.argument("campaign", type=FILE)
 @click.option("--output", type=FILE, default=None, help="calibration file to write; not needed with --check")
 @click.option("--estimator", "estimators", type=click.Choice(ESTIMATOR_NAMES), multiple=True, help="[default: all]")
 @click.option(

@@ -11,7 +11,7 @@ from gateway.calibration.judgement.advice import verdicts_of
 from gateway.calibration.judgement.assessment import BatchSet, assess_evaluation
 from gateway.calibration.judgement.evaluation import Errors, ErrorTable, Judged, TargetErrors, error_table
 from gateway.cli.calibrate import report_written
-from gateway.cli.options import CAMPAIGN, FILE, as_json, batch_settings, one_estimator, window
+from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.progress import counted
 from gateway.errors import ConfigurationError
 from gateway.offline.campaigns import Split, judge_campaign
@@ -20,7 +20,7 @@ from gateway.words import known
 
 
 @click.command("evaluate")
-@click.argument("campaign", type=CAMPAIGN)
+@click.argument("campaign", type=FILE)
 @click.option("--calibration", type=FILE, required=True, help="calibration file")
 @one_estimator
 @click.option("--split", type=click.Choice(["identification", "validation", "all"]), default="validation")
@@ -36,7 +36,7 @@ def evaluate(
     window_s: float | None,
     as_json: bool,
 ) -> None:
-    """Compare estimates with the known loads of CAMPAIGN, a campaign file or an archive of `campaign pack`."""
+    """Compare estimates with the known loads of CAMPAIGN."""
     loaded, held = load_campaign(campaign), load_calibration(calibration)
     chosen = estimator or held.estimators[0]
     if chosen not in held.estimators:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 import click
@@ -30,24 +29,6 @@ class NumberRange(click.FloatRange):
             self.fail(f"{value!r} is no number", param, ctx)
         return number
 
-
-class CampaignFile(click.Path):
-    """A campaign file; an archive of `campaign pack` is unpacked for as long as the command runs."""
-
-    def __init__(self) -> None:
-        super().__init__(path_type=Path)
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """Raises CampaignError for an archive that is not whole."""
-        path = Path(str(super().convert(value, param, ctx)))
-        if path.suffix.lower() != ".zip" or ctx is None:
-            return path
-        from gateway.offline.bundle import unpacked  # noqa: PLC0415 # --help need not wait for it
-
-        return unpacked(path, Path(ctx.with_resource(TemporaryDirectory(prefix="springscale-"))))
-
-
-CAMPAIGN = CampaignFile()
 
 as_json = click.option("--json", "as_json", is_flag=True, help="machine-readable output")
 

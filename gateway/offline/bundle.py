@@ -1,10 +1,7 @@
 """A campaign with its logs in one archive, for sharing: the drives, their loads, and the permission to use them.
 
-    pack(FOLDER, FILE)   campaign.toml, its signal map and databases, contribution.toml, and of each log only the mapped
-                         frames, without the position: no other bus traffic leaves the vehicle
-    unpacked(FILE, DIR)  the campaign file in it
-
-The same folder gives the same bytes.
+The archive has campaign.toml, its signal map and databases, contribution.toml, and of each log only the mapped frames,
+without the position: no other bus traffic leaves the vehicle. The same folder gives the same bytes.
 """
 
 import gzip
@@ -12,7 +9,6 @@ import io
 import re
 import tomllib
 import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -36,7 +32,6 @@ from gateway.units import NS_PER_S
 
 CAMPAIGN: Final = "campaign.toml"
 CONTRIBUTION: Final = "contribution.toml"
-LARGEST_BYTES: Final = 8 << 30  # chosen: of all unpacked files, days of drives
 NEEDED: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
 POSITION: Final = frozenset({Signal.LATITUDE, Signal.LONGITUDE})
 _LOG_LINE: Final = re.compile(r"""^([ \t]*log[ \t]*=[ \t]*)(?:"(?:[^"\\]|\\.)*"|'[^']*')""", re.MULTILINE)
@@ -158,22 +153,6 @@ def pack(folder: Path, output: Path, *, with_position: bool = False, on_run: OnR
         file.write(_zipped(members))
     on_run(len(runs), len(runs))
     return Bundle(output, contribution, tuple(runs))
-
-
-def unpacked(bundle: Path, folder: Path) -> Path:
-    """Unpack into an empty folder and return the path of its campaign file. Raises CampaignError for an invalid
-    bundle.
-    """
-    try:
-        with zipfile.ZipFile(bundle) as archive:
-            if sum(each.file_size for each in archive.infolist()) > LARGEST_BYTES:
-                raise CampaignError(f"{bundle}: holds more than any campaign: it is not unpacked")
-            if CAMPAIGN not in archive.namelist():
-                raise CampaignError(f"{bundle}: has no {CAMPAIGN}: it was not made by springscale campaign pack")
-            archive.extractall(folder)  # zipfile keeps every member inside the folder, and checks its sum
-    except (zipfile.BadZipFile, zlib.error, RuntimeError, ValueError, OSError, EOFError) as fault:
-        raise CampaignError(f"{bundle}: is no whole archive of a campaign: {fault}") from None
-    return folder / CAMPAIGN
 
 
 def _contribution(path: Path) -> Contribution:

@@ -31,6 +31,7 @@ RUN_BY = {  # how a command begins: what runs it, or makes its numbers anew
     "python3 provision.py": "tests/unit/test_fleet_files.py",
     "./make_certificates.sh": "tests/support/fleet_view.py",
     "make test-vm": FEED,
+    "python3 -m zipfile -e my-van.zip": PACK,
     "make audit": "tests/unit/test_audit_locks.py",
     "make deb": "tests/e2e/test_vehicle_packages.py",
     "make demo": DEMO,
@@ -45,8 +46,8 @@ RUN_BY = {  # how a command begins: what runs it, or makes its numbers anew
 }
 OWN_RUN_BY = {  # how a command of ours begins: what runs it
     "springscale calibrate campaign.toml --check": "tests/unit/test_inspection_campaign.py",
-    "springscale calibrate my-van.zip": PACK,
-    "springscale evaluate my-van.zip": PACK,
+    "springscale calibrate my-van/": PACK,
+    "springscale evaluate my-van/": PACK,
     "springscale calibrate": "tests/golden/test_recorded_roll.py",
     "springscale campaign pack": PACK,
     "springscale check-config": "tests/unit/test_command_line.py",
