@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from support.browser import expect
 from support.dashboard import CONTRASTS, LEAST_CONTRAST, Watched
-from unit.test_fleet_book import alarm, estimate, message
+from support.fleet_messages import alarm, estimate, message
 
 from gateway.fleet import Book, fleet_app, served
 

@@ -1,15 +1,14 @@
 """The fleet's book: every record once, the newest shown, nothing held up by what cannot be read."""
 
-import json
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import create_model
+from support.fleet_messages import alarm, estimate, message
 
 from gateway.fleet import Book, Message
 from gateway.fleet.book import AWAY
@@ -23,24 +22,6 @@ def book(tmp_path: Path) -> Iterator[Book]:
     opened = Book(str(tmp_path / "fleet.sqlite"), lambda: NOW_S)
     yield opened
     opened.close()
-
-
-def message(vehicle: str, branch: str, **told: Any) -> Message:
-    return Message(f"springscale/{vehicle}/{branch}", json.dumps(told).encode())
-
-
-def estimate(vehicle: str, minute: int, payload_kg: float, *rejected: str, limit_kg: float = 2000.0) -> Message:
-    kg = {"kg": 1500.0 + payload_kg, "std_kg": 9.0, "limit_kg": limit_kg}
-    gross = {**kg, "is_over_limit": payload_kg > limit_kg - 1500.0}
-    told: dict[str, Any] = {"payload_kg": payload_kg, "payload_std_kg": 9.0, "weights": {"gross": gross}}
-    answer = told if not rejected else {"payload_kg": None}
-    t_end = f"2027-01-15T07:{minute:02}:00Z"
-    return message(vehicle, "estimates", id=f"e-{minute}", t_end=t_end, rejected=list(rejected), **answer)
-
-
-def alarm(vehicle: str, revision: int, *, is_active: bool) -> Message:
-    told = {"kind": "overload", "where": "gross", "t_start": "2027-01-15T07:50:00Z"}
-    return message(vehicle, "alarms", id="alarm-1", revision=revision, is_active=is_active, **told)
 
 
 def test_a_late_older_answer_does_not_replace_the_newest(book: Book) -> None:
