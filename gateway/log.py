@@ -1,21 +1,18 @@
 """The log: all events go through one logger, as JSON lines, or as plain text at a terminal.
 
-Standard error is the service's log; systemd stores it in the journal. docs/deployment.md describes every event.
+Standard error is the service's log; systemd stores it in the journal and limits the lines of a minute.
+docs/deployment.md describes every event.
 """
 
 import json
 import logging
 import sys
-import threading
-import time
-from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from enum import StrEnum
 from typing import Any, Final
 
 LOGGER: Final = logging.getLogger("gateway")
-MOST_IN_A_MINUTE: Final = 30  # lines of one event
 
 _SYSLOG_PRIORITY: Final = {
     logging.DEBUG: 7,
@@ -101,33 +98,6 @@ def tell_event(event: Event, fields: Mapping[str, Any], keep: OnEvent, level: in
     keep(event.value.replace(" ", "_"), fields)
 
 
-class FloodGate(logging.Filter):
-    """Limits the lines of each event per minute; the next line that passes says how many were left out."""
-
-    def __init__(self, most: int = MOST_IN_A_MINUTE, clock: Callable[[], float] = time.monotonic) -> None:
-        super().__init__()
-        self._clock = clock
-        self._lock = threading.Lock()
-        self._written_s: defaultdict[str, deque[float]] = defaultdict(lambda: deque(maxlen=most))
-        self._left_out: Counter[str] = Counter()
-
-    def filter(self, record: logging.LogRecord) -> bool:
-        """False if this event was written too often; records of other libraries always pass."""
-        if record.name != LOGGER.name:
-            return True
-        event, now_s = record.getMessage(), self._clock()
-        with self._lock:
-            written_s = self._written_s[event]
-            if len(written_s) == written_s.maxlen and now_s - written_s[0] < 60.0:
-                self._left_out[event] += 1
-                return False
-            written_s.append(now_s)
-            n_left_out = self._left_out.pop(event, 0)
-        if n_left_out:
-            record.fields = {**_fields(record), "left_out": n_left_out}
-        return True
-
-
 class JsonFormatter(logging.Formatter):
     """{"t": ..., "level": ..., "event": ..., further keys}; journald reads the priority before it (sd-daemon(3))."""
 
@@ -166,7 +136,6 @@ def set_up_log(level: str, *, under_journald: bool) -> None:
     """
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(PlainFormatter() if sys.stderr.isatty() else JsonFormatter(with_priority=under_journald))
-    handler.addFilter(FloodGate())
     logging.basicConfig(level=logging.WARNING, handlers=[handler], force=True)
     LOGGER.setLevel(level.upper())
 

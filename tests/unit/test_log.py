@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.log import LOGGER, Event, FloodGate, JsonFormatter, PlainFormatter, log_event, set_up_log
+from gateway.log import LOGGER, Event, JsonFormatter, PlainFormatter, log_event, set_up_log
 
 DEPLOYMENT = Path(__file__).parents[2] / "docs" / "deployment.md"
 
@@ -56,23 +56,11 @@ def test_a_person_at_a_terminal_reads_words() -> None:
     assert said == "info    bus silent channel=can0"
 
 
-def test_an_event_that_comes_too_often_is_left_out_and_counted() -> None:
-    now_s = [0.0]
-    gate = FloodGate(most=3, clock=lambda: now_s[0])
-    assert [gate.filter(record_of("bus fault")) for _ in range(5)] == [True, True, True, False, False]
-    assert gate.filter(record_of("bus silent"))  # another event has room of its own
-    now_s[0] = 61.0
-    late = record_of("bus fault", reason="down")
-    assert gate.filter(late)
-    assert vars(late)["fields"] == {"reason": "down", "left_out": 2}
-    again = record_of("bus fault")
-    assert gate.filter(again)
-    assert vars(again)["fields"] == {}
-
-
-def test_the_gate_is_for_our_events_alone() -> None:
-    gate = FloodGate(most=1)
-    assert all(gate.filter(record_of("careful", "some.package")) for _ in range(5))
+def test_the_journal_limits_the_lines_of_a_minute() -> None:
+    unit = (Path(__file__).parents[2] / "deploy/springscale.service").read_text()
+    settings = dict(line.split("=", 1) for line in unit.splitlines() if line.startswith("LogRateLimit"))
+    assert settings["LogRateLimitIntervalSec"] == "60"
+    assert 30 <= int(settings["LogRateLimitBurst"]) <= 300
 
 
 def test_the_documents_list_exactly_the_logged_events() -> None:
