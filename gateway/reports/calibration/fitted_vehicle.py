@@ -92,23 +92,22 @@ def fitted_vehicle_section(
     taught: Taught,
     vehicle: Vehicle,
 ) -> Section:
-    """Identifiability, and every run's spectra beside the model's; the worst run first."""
-    fits = sorted(fits_of(runs, taught.model, taught.loads), key=lambda fit: -fit.misfit)
+    """Identifiability, every run's misfit, and the spectra of the worst run beside the model's."""
+    fits = fits_of(runs, taught.model, taught.loads)
+    worst = sorted(fits, key=lambda fit: -fit.misfit)[:1]
     known = knowledge_of(taught.model, vehicle)
-    charts = [_fit_chart(fit) for fit in fits]
     return Section(
         "half-car",
         "Half-car fitted to both sensors",
         (
-            "Measured spectra of every run beside those of the vehicle fitted to all of them, with the load that was "
-            "found of the run, and as far as springs, dampers, tyres and goods deviated on it. The road's level is a "
-            "straight line drawn through the spectra; everything else is the model's. Misfit is the likelihood ratio "
-            "over what chance gives: about 1 if the model explains everything.",
+            "Measured spectra of the run that fits worst, beside those of the vehicle fitted to all runs, with the "
+            "load that was found of this one, and as far as springs, dampers, tyres and goods deviated on it. The "
+            "road's level is a straight line drawn through the spectra; everything else is the model's. Misfit is the "
+            "likelihood ratio over what chance gives: about 1 if the model explains everything.",
             told(known),
         ),
-        tuple(charts[:1]),
+        tuple(map(_fit_chart, worst)),
         (_misfit_table(fits), knowledge_table(known)),
-        tuple((fit.title, (chart,)) for fit, chart in zip(fits[1:], charts[1:], strict=True)),
     )
 
 

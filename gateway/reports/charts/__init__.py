@@ -128,11 +128,11 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A chapter of the report: paragraphs, then charts and tables. ``folded`` parts are collapsed at first."""
+    """A chapter of the report: paragraphs, then charts and tables. ``folded`` tables are collapsed at first."""
 
     anchor: str
     heading: str
     paragraphs: tuple[str, ...] = ()
     charts: tuple[Chart, ...] = ()
     tables: tuple[Table, ...] = ()
-    folded: tuple[tuple[str, tuple[Chart | Table, ...]], ...] = ()
+    folded: tuple[tuple[str, tuple[Table, ...]], ...] = ()

@@ -5,7 +5,7 @@ The pages have no scripts and load nothing from other hosts.
 
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from datetime import date
 from html import escape
@@ -72,7 +72,7 @@ def _as_json(told: Any) -> Any:
 
 def write_page(path: Path, page: Page, sections: Sequence[Section], on_chart: OnChart = lambda done, of: None) -> Path:
     """Write a page and its charts' figures, which lie in a folder beside it."""
-    charts = list(charts_of(sections))
+    charts = [chart for section in sections for chart in section.charts]
     for done, chart in enumerate(charts, 1):
         save_still(chart, path.parent / FIGURES)
         on_chart(done, len(charts))
@@ -89,13 +89,6 @@ def made_folder(directory: Path) -> None:
         raise ConfigurationError(f"{directory}: {why}") from None
 
 
-def charts_of(sections: Sequence[Section]) -> Iterator[Chart]:
-    """Every chart of the sections, collapsed ones too."""
-    for section in sections:
-        yield from section.charts
-        yield from (item for _, inside in section.folded for item in inside if isinstance(item, Chart))
-
-
 def prose(text: str) -> str:
     """Escape text, with a non-breaking space between a number and its unit."""
     return re.sub(r"(?<=\d) (?=(?:%|kg|pp|Hz|m|km/h|m/s²)(?:\W|$))", "\u00a0", escape(text)).replace("± ", "±\u00a0")
@@ -103,18 +96,13 @@ def prose(text: str) -> str:
 
 def section_html(section: Section) -> str:
     paragraphs = "".join(f"<p>{prose(text)}</p>" for text in section.paragraphs)
-    items: list[Chart | Table] = [*section.charts, *section.tables]
-    body = "".join(map(_item, items))
+    body = "".join([*map(_figure, section.charts), *map(table_html, section.tables)])
     folded = "".join(
-        f"<details><summary>{escape(summary)}</summary>{''.join(map(_item, inside))}</details>"
+        f"<details><summary>{escape(summary)}</summary>{''.join(map(table_html, inside))}</details>"
         for summary, inside in section.folded
     )
     heading = f"<h2>{escape(section.heading)}</h2>"
     return f'<section id="{section.anchor}">{heading}{paragraphs}{body}{folded}</section>'
-
-
-def _item(item: Chart | Table) -> str:
-    return _figure(item) if isinstance(item, Chart) else table_html(item)
 
 
 def _figure(chart: Chart) -> str:
