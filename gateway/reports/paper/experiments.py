@@ -12,13 +12,12 @@ from gateway.calibration.campaign_file import Campaign, file_sha256, load_campai
 from gateway.calibration.from_drives import calibrate_inspected
 from gateway.calibration.inspection.facts import InspectedRun
 from gateway.calibration.judgement.evaluation import TARGETS, Errors, Judged, errors_of, judge
-from gateway.calibration.ratio_index.least_squares import fit_regression
-from gateway.calibration.ratio_index.spectra_table import N_SEGMENT, index_rows
+from gateway.calibration.ratio_index.index_fit import fit_ratio_index
+from gateway.calibration.ratio_index.spectra_table import index_rows
 from gateway.calibration.stated_drive import StatedDrive
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.batch_settings import BatchSettings
-from gateway.core.ratio_index.index import PAPER_BANDS, RatioIndexCalibration
-from gateway.core.ratio_index.regression import MODEL_11_FRONT_SHARE, MODEL_11_PAYLOAD
+from gateway.core.ratio_index.index import RatioIndexCalibration
 from gateway.offline.campaigns import inspect, split_runs
 from gateway.weighing.calibrated import CalibratedVehicle
 from gateway.workbench.simulated_drives import bench_of, write_campaign
@@ -146,25 +145,11 @@ def _methods(driven: DrivenCampaign, extent: Extent, path: Path) -> tuple[Method
 
 
 def with_paper_bands(calibrated: CalibratedVehicle, driven: DrivenCampaign) -> CalibratedVehicle:
-    """The vehicle with the bands of Table 2 and regressions (11) fitted to them."""
-    own = calibrated.ratio_index
-    if own is None:
+    """The vehicle with the bands of Table 2 and the regressions fitted to them."""
+    if calibrated.ratio_index is None:
         return calibrated
-    bands = replace(
-        own,
-        n_segment=N_SEGMENT,
-        acceleration_bands=PAPER_BANDS["acceleration"],
-        pitch_rate_bands=PAPER_BANDS["pitch_rate"],
-    )
-    rows = index_rows(driven.identification, bands)
-    return replace(
-        calibrated,
-        ratio_index=replace(
-            bands,
-            payload=fit_regression(MODEL_11_PAYLOAD, rows.ra, rows.rg, rows.payload_kg, rows.run).model,
-            front_share=fit_regression(MODEL_11_FRONT_SHARE, rows.ra, rows.rg, rows.front_share_pct, rows.run).model,
-        ),
-    )
+    fit = fit_ratio_index(driven.identification, driven.campaign.vehicle, bands="table2")
+    return replace(calibrated, ratio_index=fit.calibration)
 
 
 def condition_of(run: StatedDrive) -> str:
