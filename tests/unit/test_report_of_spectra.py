@@ -5,20 +5,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.estimates import make_estimate
 from support.half_car_road import CAR, VAN, as_if_fitted, batch_over_road
 
 from gateway.calibration.found import FoundLoad
 from gateway.calibration.judgement.assessment import BatchSet, Judgement
-from gateway.calibration.judgement.evaluation import CgLeftErrors, Errors, ErrorTable, Judged, TargetErrors, WheelErrors
+from gateway.calibration.judgement.evaluation import CgLeftErrors, Errors, ErrorTable, TargetErrors, WheelErrors
 from gateway.calibration.stated_drive import StatedDrive, drive_name, known_drive
 from gateway.calibration.teach import teach
 from gateway.core.vehicle import Load
-from gateway.estimates.batch_estimate import Quantity
 from gateway.model.table import INDEX, N_OWN, NAMES, OWN, ROWS, prior_of
 from gateway.model.vehicle_model import VehicleModel
-from gateway.records import F64, Why
-from gateway.reports.calibration.accuracy import accuracy_section
+from gateway.records import F64
+from gateway.reports.calibration.accuracy import summary_table
 from gateway.reports.calibration.fitted_vehicle import RunFit, fits_of, knowledge_of, knowledge_table, told
 
 
@@ -126,22 +124,15 @@ def test_the_report_has_the_roll_of_the_drives() -> None:
 
 
 def judged(cg_left: CgLeftErrors | None, wheels: WheelErrors | None) -> Judgement:
-    """One set: a place answered to a noted one, one to a load that nobody placed, and no weight."""
+    """One set without a weight."""
     none = TargetErrors("kg", None, None, None, None, None, None, None, None, None, None)
     errors = Errors(0, 0, {}, none, replace(none, unit="pp"), cg_left, wheels)
-    told = replace(make_estimate(0, Why.TOO_SLOW), cg_left=Quantity.normal(0.01, 0.02))
-    batches = (
-        Judged(known_drive(1, "1.log", 0.0, 52.0, ()), told, 0.0),
-        Judged(known_drive(2, "2.log", 100.0, 50.0, ()), told),
-    )
-    return Judgement("cross_spectrum", {BatchSet.VALIDATION: ErrorTable("cross_spectrum", batches, errors, ())})
+    return Judgement("cross_spectrum", {BatchSet.VALIDATION: ErrorTable("cross_spectrum", (), errors, ())})
 
 
-def test_the_accuracy_section_has_the_lateral_errors() -> None:
+def test_the_table_of_errors_has_the_lateral_ones_where_they_are_known() -> None:
     found = CgLeftErrors(mean_abs_m=0.0123, bias_m=0.0, std_m=0.02, max_abs_m=0.03, coverage95=0.9)
-    (sentence,) = accuracy_section(judged(found, WheelErrors(1.26, 2.0))).paragraphs[1:]
-    assert "12 mm on average over 1 answer " in sentence
-    assert "90 %" in sentence
-    assert "1.3 % of the gross weight" in sentence
-    (sentence,) = accuracy_section(judged(found, None)).paragraphs[1:]
-    assert "gross weight" not in sentence
+    rows = {row[1]: row for row in summary_table(judged(found, WheelErrors(1.26, 2.0))).rows}
+    assert {"12.30 mm", "90 %"} <= {*rows["centre of gravity, left"]}
+    assert "1.26" in rows["each wheel's load"]
+    assert set(rows) - {row[1] for row in summary_table(judged(found, None)).rows} == {"each wheel's load"}

@@ -14,7 +14,7 @@ from gateway.estimates.budget import BudgetLine
 from gateway.estimates.reasons import REMEDIES, SOURCES
 from gateway.records import F64
 from gateway.reports.charts import GREY, Axis, Chart, LineMark, Marker, Panel, Points, Section, Table
-from gateway.words import NONE, counted, decimal, estimator_name, known, percent
+from gateway.words import NONE, decimal, estimator_name, known, percent
 
 _SETS: Final[Mapping[BatchSet, tuple[int, Marker]]] = {  # colour and marker
     BatchSet.LEFT_OUT: (0, "circle"),
@@ -32,28 +32,11 @@ def accuracy_section(judgement: Judgement, budget: Sequence[BudgetLine] = ()) ->
     return Section(
         f"accuracy-{judgement.estimator.replace('_', '-')}",
         f"Accuracy of the {name}",
-        (*(PART_TEXT[part] for part in judgement.tables), *_sideways(judgement)),
+        tuple(PART_TEXT[part] for part in judgement.tables),
         tuple(_charts(judgement, name)),
         (summary_table(judgement), *([budget_table(budget)] if budget else [])),
         (("Errors run by run", tables),),
     )
-
-
-def _sideways(judgement: Judgement) -> Iterator[str]:
-    """A sentence for every set with known and answered lateral places."""
-    for part, table in judgement.tables.items():
-        found = table.errors.cg_left
-        if found is None or found.mean_abs_m is None:
-            continue
-        wheels = table.errors.wheels
-        of_wheels = wheels.mean_abs_pct_of_gross if wheels else None
-        n_told = sum(bool(np.isfinite(one.cg_left[:2]).all()) for one in table.judged)
-        yield (
-            f"To the side, {PART_NAMES[part]}: the centre of gravity's place beside the centre line errs by "
-            f"{1000.0 * found.mean_abs_m:.0f} mm on average over {counted(n_told, 'answer')} to a load whose place was "
-            f"noted, and its 95 % intervals contain the truth in {percent(found.coverage95)}"
-            + ("." if of_wheels is None else f"; a wheel's load errs by {of_wheels:.1f} % of the gross weight.")
-        )
 
 
 def _charts(judgement: Judgement, name: str) -> Iterator[Chart]:
