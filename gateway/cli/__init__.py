@@ -137,9 +137,11 @@ def _call(arguments: list[str] | None) -> None:
             raise
         click.echo(f"springscale: this command needs {fault.name}: {_install(extra)}", err=True)
         sys.exit(1)
-    except BrokenPipeError:  # the reader of our output has gone, as `| head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+    except OSError as fault:  # a full disk, a file that vanished: whatever no command has told better
+        place = fault.filename or "a file or the output"  # writing has no name
+        with suppress(OSError):  # standard error may be on that disk
+            click.echo(f"springscale: {place}: {fault.strerror or fault}", err=True)
+        sys.exit(1)
 
 
 def _leave_threads_behind(leaving: SystemExit) -> None:

@@ -9,7 +9,7 @@ from zoneinfo import ZoneInfo
 
 import click
 
-from gateway.cli.options import FILE, MOMENT, ZONE
+from gateway.cli.options import FILE, MOMENT, ZONE, NumberRange
 from gateway.cli.service import Answer, Command, Service, only_one, prints_answer
 from gateway.errors import ConfigurationError
 from gateway.stated.learning import STATES
@@ -106,7 +106,7 @@ def _stated(
     return service.ask(PATH, "POST", body | ({"load": told} if told else {}))
 
 
-_plus_minus = click.option("--plus-minus", type=float, default=None, help="half the 95 % interval, in kg")
+_plus_minus = click.option("--plus-minus", type=NumberRange(), default=None, help="half the 95 % interval, in kg")
 
 
 @click.group("state")
@@ -145,7 +145,7 @@ def state_not_empty(service: Service, begins: tuple[datetime, ...]) -> Answer:
 
 
 @state.command("note")
-@click.argument("kg", type=float)
+@click.argument("kg", type=NumberRange())
 @_plus_minus
 @_statement
 @prints_answer(_one_text)
@@ -155,7 +155,7 @@ def state_note(service: Service, kg: float, plus_minus: float | None, **options:
 
 
 @state.command("scale")
-@click.option("--gross", type=float, required=True, help="what the scale shows of the whole vehicle, in kg")
+@click.option("--gross", type=NumberRange(), required=True, help="what the scale shows of the whole vehicle, in kg")
 @_plus_minus
 @_statement
 @prints_answer(_one_text)
@@ -165,8 +165,8 @@ def state_scale(service: Service, gross: float, plus_minus: float | None, **opti
 
 
 @state.command("axles")
-@click.argument("front", type=float)
-@click.argument("rear", type=float)
+@click.argument("front", type=NumberRange())
+@click.argument("rear", type=NumberRange())
 @_plus_minus
 @_statement
 @prints_answer(_one_text)

@@ -1,5 +1,6 @@
 """The command line beside any one command: version, mistyped names and numbers, what a start does not import."""
 
+import errno
 import re
 import sys
 from pathlib import Path
@@ -31,6 +32,29 @@ def test_ctrl_c_ends_quietly_with_the_code_of_an_interrupted_process(monkeypatch
     assert said.output == ""
 
 
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device"), "a file or the output: No space left on device"),
+        (FileNotFoundError(errno.ENOENT, "No such file or directory", "a.log"), "a.log: No such file or directory"),
+    ],
+)
+def test_what_the_system_refuses_is_told_in_one_line(
+    fault: OSError, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A full disk behind `> file` ended every command in a traceback."""
+
+    @click.command()
+    def refused() -> None:
+        raise fault
+
+    monkeypatch.setattr(gateway.cli._Lazy, "get_command", lambda self, ctx, name: refused)
+    with pytest.raises(SystemExit) as ending:
+        gateway.cli.main(["look"])
+    assert ending.value.code == 1
+    assert capsys.readouterr().err == f"springscale: {said}\n"
+
+
 @pytest.mark.parametrize("text", ["nan", "inf", "-inf", "much"])
 @pytest.mark.parametrize(
     "command",
@@ -39,6 +63,8 @@ def test_ctrl_c_ends_quietly_with_the_code_of_an_interrupted_process(monkeypatch
         ("demo", "--once", "--speed"),
         ("record", "a.log", "--signals", "x", "--interface", "virtual", "--channel", "x", "--for-s"),
         ("simulate", "campaign", "paper", "somewhere", "--longest-s"),
+        ("state", "scale", "--gross"),
+        ("state", "note", "310", "--plus-minus"),
     ],
 )
 def test_text_in_place_of_a_number_is_a_usage_error(command: tuple[str, ...], text: str) -> None:
