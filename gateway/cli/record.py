@@ -52,6 +52,7 @@ def record(log: Path, signals: str, interface: str, channel: str, for_s: float |
     counts = source.counts()
     n_dropped = counts.dropped_inbox + counts.dropped_kernel
     if not n_frames:
+        log.unlink()  # so that the same command works once the bus does
         raise SpringscaleError(f"{log}: no mapped frame came ({source.reason or 'the bus was silent'})")
     others = {"remote_frames": counts.remote_frames, "error_frames": counts.error_frames}
     remarks = [f"left out: {counted(n, name[:-1].replace('_', ' '))}" for name, n in others.items() if n]

@@ -1,6 +1,7 @@
 """Atomic output files: a file gets its name when it is complete; an earlier file stays until then."""
 
 import os
+import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,9 +19,9 @@ def written_whole(output: Path) -> Iterator[BinaryIO]:
         with place.open("wb") as file:
             yield file
         return
-    part = place.with_name(place.name + ".part")
+    part = place.with_name(f"{place.name}.{secrets.token_hex(4)}.part")  # another command may write the same output
     try:
-        with part.open("wb") as file:
+        with part.open("xb") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
@@ -36,6 +37,8 @@ def refusal_told(output: Path, error: type[SpringscaleError]) -> Iterator[None]:
     """Turn an OSError while writing ``output`` into ``error`` with a message for people."""
     try:
         yield
+    except FileExistsError:
+        raise error(f"{output}: is there already, and is not written over; name another") from None
     except OSError as fault:
         raise error(f"{output}: cannot be written: {fault.strerror or fault}") from None
 

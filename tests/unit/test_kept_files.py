@@ -110,6 +110,18 @@ def _filling(output: Path) -> None:
         raise OSError("the disk is full")
 
 
+def test_two_that_write_one_output_each_leave_it_whole(tmp_path: Path) -> None:
+    output = tmp_path / "campaign.zip"
+    with written_whole(output) as first:
+        first.write(b"the fir")
+        with written_whole(output) as second:
+            second.write(b"the second")
+        assert output.read_bytes() == b"the second"
+        first.write(b"st")
+    assert output.read_bytes() == b"the first"
+    assert [path.name for path in tmp_path.iterdir()] == ["campaign.zip"]
+
+
 def test_the_new_one_has_the_rights_of_the_old_and_a_link_stays_one(tmp_path: Path) -> None:
     output, link = tmp_path / "vehicle.json", tmp_path / "current.json"
     write_whole(output, "old")

@@ -69,7 +69,11 @@ def test_frames_that_arrive_during_the_stop_are_counted(tmp_path: Path, monkeypa
 
 
 @pytest.mark.parametrize(
-    ("name", "why"), [("taken.log.gz", "File exists"), ("fresh.log.gz", "no mapped frame came (the bus was silent)")]
+    ("name", "why"),
+    [
+        ("taken.log.gz", "taken.log.gz: is there already, and is not written over; name another"),
+        ("fresh.log.gz", "no mapped frame came (the bus was silent)"),
+    ],
 )
 def test_faults_of_recording_are_reported(tmp_path: Path, name: str, why: str) -> None:
     (tmp_path / "taken.log.gz").write_text("mine")
@@ -77,6 +81,7 @@ def test_faults_of_recording_are_reported(tmp_path: Path, name: str, why: str) -
     assert isinstance(found.exception, SpringscaleError)
     assert why in str(found.exception)
     assert (tmp_path / "taken.log.gz").read_text() == "mine"
+    assert [path.name for path in tmp_path.iterdir()] == ["taken.log.gz"]  # the next try may have the same name
 
 
 @pytest.mark.parametrize("failure", [RuntimeError, OSError])  # the thread dies; the source tries again
