@@ -128,6 +128,13 @@ class CalibrationFile(Part):
                 covariance=(known.covariance, (n, n)),
                 directions=(known.directions, (n, known.directions.shape[-1])),
             )
+            for name in ("empty_mass_kg", "empty_front_share_pct", "wheelbase_m", "track_width_m"):
+                of_fit, of_vehicle = getattr(known, name), getattr(self.vehicle, name)
+                if of_fit != of_vehicle:
+                    raise ValueError(
+                        f"vehicle.{name} is {of_vehicle}, but the springs were fitted with {of_fit}: restore the "
+                        "file, or calibrate again with the right figure"
+                    )
         return self
 
     def for_core(self) -> CalibratedVehicle:

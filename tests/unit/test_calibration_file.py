@@ -105,6 +105,11 @@ ABSURD: list[tuple[Change, str]] = [
     (lambda c: c["ratio_index"].update(speed_range_mps=[0.0, 0.0]), "ratio_index.speed_range_mps"),
     (lambda c: c["vehicle"].update(wheelbase_m=3000.0), "vehicle.wheelbase_m: 3000.0 is above 20: millimetres?"),
     (lambda c: c["seen"].update(payload_kg=[400.0, 0.0]), "seen.payload_kg"),
+    # edited by hand in one of two places, they gave weights that were wrong by as much
+    (lambda c: c["vehicle"].update(empty_mass_kg=1340.0), "vehicle.empty_mass_kg is 1340.0, but the springs"),
+    (lambda c: c["vehicle"].update(wheelbase_m=3.4), "vehicle.wheelbase_m is 3.4, but the springs"),
+    (lambda c: c["cross_spectrum"].update(track_width_m=2.1), "the springs were fitted with 2.1"),
+    (lambda c: c["cross_spectrum"].update(empty_front_share_pct=61.0), "the springs were fitted with 61.0"),
 ]
 
 
