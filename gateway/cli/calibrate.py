@@ -10,13 +10,13 @@ import click
 
 from gateway.calibration.campaign_file import Campaign, file_sha256, load_campaign
 from gateway.calibration.file import CalibrationFile, load_calibration
+from gateway.calibration.fitter_answers import doubts_of_vehicle
 from gateway.calibration.from_drives import Outcome, calibrate_inspected, with_statements_tested
 from gateway.calibration.inspection.across_runs import Inspection
 from gateway.calibration.inspection.facts import InspectedRun
 from gateway.calibration.inspection.finding import Finding, Kind
 from gateway.calibration.judgement.advice import Verdict, verdicts_of
 from gateway.calibration.judgement.assessment import Assessment, assess_calibration
-from gateway.calibration.learning.fitter_answers import doubts_of_vehicle
 from gateway.calibration.ratio_index.bands import BandChoice
 from gateway.cli.options import (
     FILE,

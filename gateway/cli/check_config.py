@@ -7,13 +7,15 @@ from typing import Any
 import click
 
 from gateway.bus.signals.signal_map import unsound_messages
+from gateway.calibration.fitter_answers import doubts_of_vehicle
 from gateway.cli.options import FILE, Told, prints
 from gateway.config import Settings, load_settings
 from gateway.core.weights.limits import Limits
 from gateway.errors import ConfigurationError
-from gateway.service.calibration_in_use import with_learnt
+from gateway.service.calibration_in_use import learnt
 from gateway.service.lifecycle import startable_faults
 from gateway.setup import Setup, setup_of
+from gateway.stated.doubt import DoubtKind
 from gateway.uplink.settings import uplink_settings, webhook_settings
 
 
@@ -50,8 +52,9 @@ def _left_out(fault: str) -> str:
 
 def _sentences(config: Path, settings: Settings, setup: Setup) -> Iterator[str]:
     yield f"{config}: good. Reads {', '.join(setup.signal_map.signals)} from {settings.bus.channel}."
-    if (learning := with_learnt(settings)) is not settings:
-        yield f"The service weighs with the calibration that it has learnt: {learning.calibration}."
+    chosen, in_use, _ = learnt(settings)
+    if chosen.calibration != settings.calibration:
+        yield f"The service weighs with the calibration that it has learnt: {chosen.calibration}."
     elif setup.calibration is None:
         yield (
             "No calibration is configured: batches will carry spectra and rejected = no_calibration, until one is "
@@ -61,6 +64,9 @@ def _sentences(config: Path, settings: Settings, setup: Setup) -> Iterator[str]:
         yield f"It may weigh: {', '.join(f'{name} {kg:g} kg' for name, kg in limits.items())}."
     else:
         yield "No limit is known, so no overload can be reported. See [vehicle] gross_limit_kg."
+    for doubt in doubts_of_vehicle(in_use.calibrated.vehicle) if in_use.calibrated else ():
+        if doubt.kind in (DoubtKind.GROSS_LIMIT, DoubtKind.AXLE_LIMIT):
+            yield f"Unlikely, and overloads are reported by it: {doubt.sentence}."
 
 
 def limits_in_force(setup: Setup) -> dict[str, float]:

@@ -9,6 +9,8 @@ from typing import Final
 from gateway.bus.listen import OpenReceiver
 from gateway.bus.receiver import what_lacks
 from gateway.bus.signals.mapping import SignalMap
+from gateway.calibration.file import load_calibration
+from gateway.calibration.sister import sister_in
 from gateway.config import Settings
 from gateway.errors import ConfigurationError
 from gateway.records import Signal
@@ -28,6 +30,8 @@ def startable_faults(settings: Settings, signal_map: SignalMap) -> Iterator[str]
     if lacking is not None:
         yield f"[bus] {lacking}"
     try:
+        if settings.learning.like is not None:
+            sister_in(load_calibration(settings.learning.like))
         has_tls = tls_of(settings) is not None
         refuse_open_address(settings.web.host, has_tokens=_has_tokens(settings), has_tls=has_tls)
     except ConfigurationError as fault:

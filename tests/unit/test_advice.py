@@ -1,6 +1,7 @@
 """Fit for use or not: every rule by itself, on estimates made up for it."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -139,6 +140,29 @@ def test_held_statements_are_a_reservation_and_a_majority_makes_unfit(n_held: in
     (told,) = verdicts_of(Assessment("", file, VAN, (judgement(parts),), outcome))
     labels = {reason.grade for reason in told.reasons if reason.rule == "labels"}
     assert labels == ({grade} if grade else set())
+
+
+@pytest.mark.parametrize(
+    ("figures", "told"),
+    [
+        ({}, None),
+        ({"kerb_front_axle_kg": 700.0, "kerb_rear_axle_kg": 700.0}, None),
+        (
+            {"kerb_front_axle_kg": 1540.0, "kerb_rear_axle_kg": 1540.0, "empty_mass_kg": 2728.0},
+            "3080 kg empty on a wheelbase of 2.8 m",
+        ),
+        ({"kerb_front_axle_kg": 700.0, "kerb_rear_axle_kg": 700.0, "payload_range_kg": (0.0, 9e3)}, None),
+    ],
+)
+def test_unlikely_figures_of_the_vehicle_are_a_reservation(figures: dict[str, Any], told: str | None) -> None:
+    """In pounds every weight is 2.2 times too large, and the drives cannot tell; the range only scales percentages."""
+    file = calibration_file()
+    vehicle = replace(file.vehicle, gross_limit_kg=None, **figures)
+    outcome = Outcome(file.model_copy(update={"vehicle": vehicle}), Inspection(()))
+    parts = {BatchSet.LEFT_OUT: [judged(run) for run in TEN]}
+    (found,) = verdicts_of(Assessment("", outcome.file, VAN, (judgement(parts),), outcome))
+    facts = [(one.grade, one.text.partition(":")[0]) for one in found.reasons if one.rule == "facts"]
+    assert facts == ([(Grade.RESERVED, told)] if told else [])
 
 
 def test_the_headline_judges_the_estimator_that_the_service_runs_though_the_other_is_better() -> None:

@@ -8,6 +8,7 @@ from typing import NoReturn
 
 import pytest
 from click.testing import Result
+from support.calibrated import calibration_text
 from support.commands import called
 
 from gateway.bus.signals.signal_map import shipped_map
@@ -38,6 +39,7 @@ def test_a_sound_configuration_is_good_and_says_what_weighs_without_a_calibratio
         ({"web": 'host = "0.0.0.0"'}, "springscale token create NAME --config"),
         ({"web": "stale_after_s = 200.0"}, "stale_after_s = 200 is below [batch] window_s = 300"),
         ({"alarms": 'off = ["overlaod"]'}, "is no alarm; known are overload, sensor_fault, "),
+        ({"learning": 'like = "nothere.json"'}, "nothere.json: no such calibration file"),
         ({"uplink": "statements = true"}, "statements come from a broker: set host"),
         ({"webhook": 'url = "https://fleet.example/hook"'}, "url needs secret_file"),
         (
@@ -57,6 +59,26 @@ def test_a_configuration_that_cannot_run_is_refused(
     assert isinstance(found.exception, ConfigurationError)
     assert words in str(found.exception)
     assert "springscale.toml: " in str(found.exception)
+
+
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [
+        ("gross_limit_kg = 2000", None),
+        ("gross_limit_kg = 2.1", "a permitted gross weight of 2.1 kg: the vehicle weighs 1400 kg empty"),
+        ("rear_axle_limit_kg = 11000", "an axle limit of 11000 kg on an axle that weighs 700 kg empty"),
+    ],
+)
+def test_limits_that_are_not_this_vehicle_s_are_asked_about(limits: str, said: str | None, tmp_path: Path) -> None:
+    """One in tonnes would report every van as too heavy, one in newtons none."""
+    (tmp_path / "vehicle.json").write_text(calibration_text(kerb_front_axle_kg=700.0, kerb_rear_axle_kg=700.0))
+    checked(tmp_path, vehicle=limits)
+    config = tmp_path / "springscale.toml"
+    config.write_text(f'calibration = "vehicle.json"\nestimator = "ratio_index"\n{config.read_text()}')
+    found = called("check-config", config)
+    assert found.exit_code == 0
+    assert ("Unlikely, and overloads are reported by it: " in found.stdout) == (said is not None)
+    assert (said or "It may weigh: ") in found.stdout
 
 
 def test_a_map_that_cannot_weigh_is_not_called_good(tmp_path: Path) -> None:

@@ -1,14 +1,18 @@
 """The start of the service: what its TLS settings say, and how it begins anew with another calibration."""
 
+import socket
 import sys
 from pathlib import Path
 
 import pytest
+from fastapi import FastAPI
+from support.patience import wait_until
 
 from gateway.config import Settings, load_settings
 from gateway.errors import ConfigurationError
 from gateway.service import lifecycle as life
 from gateway.service.parts import tls_of
+from gateway.web.access.serving import WebServer, server_config
 
 PLAIN = 'signals = "springscale:reference"\n'
 TLS = PLAIN + '[web]\ntls_certificate = "web.pem"\ntls_key = "web.key"\n'
@@ -17,6 +21,19 @@ TLS = PLAIN + '[web]\ntls_certificate = "web.pem"\ntls_key = "web.key"\n'
 def settings_of(folder: Path, text: str) -> Settings:
     (folder / "springscale.toml").write_text(text)
     return load_settings(folder / "springscale.toml")
+
+
+def test_a_port_that_is_taken_is_told_with_what_to_do() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        server = WebServer(server_config(FastAPI(), "127.0.0.1", port, None))
+        server.start()
+        assert wait_until(lambda: server.death() is not None)
+        told = server.death()
+        server.stop()
+    assert told is not None
+    assert told.startswith(f"could not run on 127.0.0.1:{port}: ")
+    assert told.endswith("stop what listens there, or set another [web] host or port")
 
 
 @pytest.mark.parametrize("half", ['tls_certificate = "a"', 'tls_key = "a"'])

@@ -9,7 +9,7 @@ from support.known_runs import LOADS, SIBLING, known_run
 from support.model_road import times
 
 from gateway.calibration.contradicted import contradictions
-from gateway.calibration.learning.fitter_answers import doubts_of
+from gateway.calibration.fitter_answers import doubts_of
 from gateway.calibration.stated_drive import StatedDrive, known_drive
 from gateway.core.vehicle import Vehicle
 from gateway.model.vehicle_model import VehicleModel

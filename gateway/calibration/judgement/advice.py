@@ -11,12 +11,14 @@ from enum import StrEnum
 from typing import Any, Final
 
 from gateway.calibration.ahead import Step, next_steps
+from gateway.calibration.fitter_answers import doubts_of_vehicle
 from gateway.calibration.from_drives import Outcome
 from gateway.calibration.judgement.assessment import PART_NAMES, Assessment, Judgement
 from gateway.calibration.judgement.coverage import PROMISED, coverage_of
 from gateway.calibration.judgement.evaluation import ErrorTable, Target
 from gateway.config import ESTIMATOR_NAMES
 from gateway.core.vehicle import USEFUL_SHARE, Vehicle
+from gateway.stated.doubt import Doubt, DoubtKind
 from gateway.words import decimal, estimator_name
 
 
@@ -267,7 +269,17 @@ def _of_runs(outcome: Outcome) -> Iterator[Reason]:
         )
         yield Reason("labels", Grade.UNFIT if 2 * len(held) > len(drives) else Grade.RESERVED, text)
     for doubt in outcome.doubts:
-        yield Reason("facts", Grade.UNFIT, f"{doubt.sentence[:1].upper()}{doubt.sentence[1:]}.")
+        yield _of_doubt(doubt, Grade.UNFIT)
+    for doubt in doubts_of_vehicle(outcome.file.vehicle):
+        if doubt.kind not in _OF_PAYLOAD_RANGE:
+            yield _of_doubt(doubt, Grade.RESERVED)
+
+
+_OF_PAYLOAD_RANGE: Final = (DoubtKind.PAYLOAD, DoubtKind.PAYLOAD_LIMIT)  # percentages refer to it, and no weight
+
+
+def _of_doubt(doubt: Doubt, grade: Grade) -> Reason:
+    return Reason("facts", grade, f"{doubt.sentence[:1].upper()}{doubt.sentence[1:]}.")
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gateway.calibration.axle_weights import payload_range_keys
 from gateway.calibration.file import load_calibration
-from gateway.calibration.learning.fitter_answers import doubts_of, vehicle_table
+from gateway.calibration.fitter_answers import doubts_of, vehicle_table
 from gateway.calibration.sister import require_alike, sister_in
 from gateway.core.vehicle import Vehicle
 from gateway.errors import CalibrationFileError, CampaignError, NoSisterError, RefusedError

@@ -165,7 +165,10 @@ class WebServer(ThreadPart):
     def death(self) -> str | None:
         told = super().death()
         is_refused = told is not None and isinstance(self.failure, OSError)
-        return f"could not run on {self._config.host}:{self._config.port}: {self.failure}" if is_refused else told
+        if not is_refused:
+            return told
+        advice = "stop what listens there, or set another [web] host or port"
+        return f"could not run on {self._config.host}:{self._config.port}: {self.failure}; {advice}"
 
     def is_answering(self) -> bool:
         """Whether a request to this very server is answered in time."""
