@@ -119,7 +119,10 @@ def _read(statements: Path, zone: ZoneInfo | None) -> ToldRows:
 def _logs_record(drives: Drives) -> Record:
     """What became of the logs."""
     left_out = {log: [why.removeprefix(f"{log}: ")] for log, why in drives.unreadable.items()}
-    left_out |= {log: [f"the same log as {first}"] for log, first in drives.repeated.items()}
+    left_out |= {
+        log: [f"of the same time as {first}, which counts once: of two drives, record both with their date"]
+        for log, first in drives.repeated.items()
+    }
     left_out |= {
         log: [f"{one.kind}: {one.text}: {one.advice}" for one in found] for log, found in drives.faulty.items()
     }

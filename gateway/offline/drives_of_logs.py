@@ -22,7 +22,8 @@ from gateway.core.scheduler import Scheduler
 from gateway.core.vehicle import Vehicle
 from gateway.errors import LogUnreadableError
 from gateway.offline.campaigns import facts_of_log, read_whole_log
-from gateway.records import Motion
+from gateway.records import FIRST_DATED_NS, Batch, Motion
+from gateway.units import NS_PER_S
 
 OnLog = Callable[[int, int], None]  # (logs done, logs in all)
 
@@ -54,9 +55,8 @@ def read_drives(
 ) -> Drives:
     """The drives of the logs, cut at the moments ``at_ns`` too. A log with a fault of a sensor teaches nothing."""
     drives = Drives(Pieces(()), len(logs))
-    read: dict[str, Path] = {}
     windows: list[KeptBatch] = []
-    source: dict[int, str] = {}
+    source: dict[int, Path] = {}
     for done, log in enumerate(logs):
         on_log(done, len(logs))
         try:
@@ -65,10 +65,11 @@ def read_drives(
             drives.unreadable[log] = str(fault)
             continue
         facts = facts_of_log(log, motion, motion, report, signal_map)
-        if (first := read.setdefault(facts.sha256, log)) != log:
-            drives.repeated[log] = first
-            continue
         found = windows_of_motion(motion, signal_map, settings)
+        teaching = [one for one in found if can_teach(one.batch, settings)]
+        if (same := next((one for one in windows if _is_driven_in(one.batch, teaching)), None)) is not None:
+            drives.repeated[log] = source[same.batch.drive_start_ns]
+            continue
         findings = _findings(motion, found, facts, signal_map, vehicle, settings)
         kept = drives.faulty if any(one.severity is Severity.FAULT for one in findings) else drives.findings
         if findings:
@@ -76,10 +77,23 @@ def read_drives(
         if log in drives.faulty:
             continue
         windows += found
-        source |= {one.batch.drive_start_ns: str(log) for one in found}
+        source |= {one.batch.drive_start_ns: log for one in found}
     on_log(len(logs), len(logs))
-    found_pieces = pieces(windows, at_ns, settings, lambda one: source[one.batch.drive_start_ns])
+    found_pieces = pieces(windows, at_ns, settings, lambda one: str(source[one.batch.drive_start_ns]))
     return replace(drives, pieces=found_pieces)
+
+
+def _is_driven_in(earlier: Batch, windows: Sequence[KeptBatch]) -> bool:
+    """Whether one of these is of the same driving: a log named twice, its packed copy, a second recorder.
+
+    Of times without a date only the same begin tells it: other drives begin at 0 too, but would be joined with this.
+    """
+    for one in windows:
+        begin_ns, end_ns = max(earlier.t_start_ns, one.batch.t_start_ns), min(earlier.t_end_ns, one.batch.t_end_ns)
+        is_dated = begin_ns >= FIRST_DATED_NS
+        if end_ns - begin_ns > NS_PER_S if is_dated else earlier.t_start_ns == one.batch.t_start_ns:
+            return True
+    return False
 
 
 def windows_of_motion(motion: Motion, signal_map: SignalMap, settings: BatchSettings) -> list[KeptBatch]:

@@ -1,7 +1,10 @@
 """springscale learn, as a person calls it: logs of five ordinary drives and a table of notes, one of them wrong."""
 
+import gzip
 import json
 import re
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -134,6 +137,42 @@ def test_unlikely_figures_of_the_vehicle_are_asked_about(
     doubts = [line for line in done.stderr.splitlines() if "van.toml: unlikely: " in line]
     assert len(doubts) == len(told)
     assert all(part in line for part, line in zip(told, doubts, strict=True))
+
+
+def _second_half(log: bytes) -> bytes:
+    lines = log.splitlines(keepends=True)
+    return b"".join(lines[len(lines) // 2 :])
+
+
+def _undated(log: bytes) -> bytes:
+    """Stamps since the first frame, as of ``candump -tz``."""
+    lines = [line.partition(b") ") for line in log.splitlines(keepends=True)]
+    first_s = int(lines[0][0][1:11])
+    return b"".join(b"(%03d%s) %s" % (int(stamp[1:11]) - first_s, stamp[11:], rest) for stamp, _, rest in lines)
+
+
+@pytest.mark.parametrize(
+    ("name", "copied"), [("01.log.gz", gzip.compress), ("a.log", _second_half), ("01.log", lambda log: log)]
+)
+def test_driving_that_two_logs_have_teaches_once(
+    name: str, copied: Callable[[bytes], bytes], drives: Path, tmp_path: Path
+) -> None:
+    """It counted twice, and intervals were narrower than they may be."""
+    shutil.copy(drives / "01.log", tmp_path)
+    (tmp_path / name).write_bytes(copied((drives / "01.log").read_bytes()))
+    logs = (tmp_path / "01.log", tmp_path / name, drives / "02.log")
+    said = printed("learn", *logs, "--vehicle", drives / "van.toml", "--signals", SIGNALS, "--dry-run", *WINDOW)
+    assert "3 logs: 2 drives" in said
+    assert f"{name}: left out: of the same time as {tmp_path / '01.log'}, which counts once" in said
+
+
+def test_drives_without_a_date_are_not_taken_for_one(drives: Path, tmp_path: Path) -> None:
+    logs = [tmp_path / "01.log", tmp_path / "02.log"]
+    for log in logs:
+        log.write_bytes(_undated((drives / log.name).read_bytes()))
+    said = printed("learn", *logs, "--vehicle", drives / "van.toml", "--signals", SIGNALS, "--dry-run", *WINDOW)
+    assert "2 logs: 1 drive with" in said
+    assert f"{logs[1]}: left out: of the same time as {logs[0]}" in said
 
 
 def test_without_a_place_for_the_calibration_nothing_begins(drives: Path) -> None:
