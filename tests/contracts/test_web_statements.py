@@ -2,12 +2,14 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
 from support.learner import ANSWERS, LearnerBench, at, found
+from support.learner import VEHICLE as VAN
 from support.web import Client, Gateway
 
 from gateway.calibration.file import load_calibration
@@ -338,11 +340,19 @@ def test_a_version_that_predicts_worse_is_kept_and_not_used(local: Client, bench
     assert "predicts the loads" in state["versions"][0]["text"]
 
 
+def test_a_box_that_moves_to_another_vehicle_is_told(local: Client, bench: LearnerBench, tmp_path: Path) -> None:
+    """It would weigh the other vehicle by the springs of the first; who only corrects the id states it again."""
+    local.request("PUT", VEHICLE, json=ANSWERS)
+    moved = LearnerBench(bench.directory, replace(VAN, id="van-18"))
+    with Gateway(tmp_path / "moved", learner=moved.learner) as gateway:
+        client = Client(gateway.app)
+        assert "learnt is of van-17, and [vehicle] id is van-18" in client.get(LEARNING).json()["fault"]
+        client.request("PUT", VEHICLE, json=ANSWERS)
+        assert client.get(LEARNING).json()["fault"] is None
+    assert LearnerBench(bench.directory, replace(VAN, id="van-18")).learner.fault is None
+
+
 def test_statements_are_kept_while_learning_is_off(tmp_path: Path) -> None:
-    from dataclasses import replace
-
-    from support.learner import VEHICLE as VAN
-
     bench = LearnerBench(tmp_path / "vehicle", replace(VAN, why_not_allowed="calibrations come by file"))
     with Gateway(tmp_path / "store", learner=bench.learner) as gateway:
         client = Client(gateway.app)

@@ -157,8 +157,8 @@ class Learner(ThreadPart):
 
     @property
     def fault(self) -> str | None:
-        """Faults of the record and of the disk."""
-        return "; ".join(filter(None, (super().fault, self._book.fault, self._disk_fault))) or None
+        """Faults of the record, of its vehicle, and of the disk."""
+        return "; ".join(filter(None, (super().fault, self._book.fault, self.van.fault, self._disk_fault))) or None
 
     @property
     def is_busy(self) -> bool:

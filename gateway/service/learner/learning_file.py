@@ -54,12 +54,13 @@ class Said(Part):
 
 
 class Stated(Part):
-    """The vehicle as somebody stated it; ``confirmed``: unlikely figures are right."""
+    """The vehicle as somebody stated it, by its id then; ``confirmed``: unlikely figures are right."""
 
     figures: VehicleAnswers
     at: str
     by: str
     confirmed: Act | None = None
+    vehicle_id: str | None = None
 
 
 class Sister(Part):

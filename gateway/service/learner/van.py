@@ -79,6 +79,17 @@ class StatedVan:
         """The vehicle that statements are compared with: as stated, else as in the file of the settings."""
         return self.learnt or self.given.in_file
 
+    @property
+    def fault(self) -> str | None:
+        """What is wrong if the box was moved: it would weigh this vehicle by another one's springs."""
+        stated = self._book.record.vehicle
+        if stated is None or stated.vehicle_id in (None, self.given.id):
+            return None
+        return (
+            f"what was learnt is of {stated.vehicle_id}, and [vehicle] id is {self.given.id}: give another vehicle "
+            "another [store] directory; if only the id has changed, state the vehicle again"
+        )
+
     def _doubts(self, stated: Stated) -> list[Doubt]:
         return list(doubts_of(stated.figures, self.named.sister))
 
@@ -106,7 +117,8 @@ class StatedVan:
             raise RefusedError("vehicle_unusable", str(fault)) from None
         with self._book.lock:
             act = self._book.act(by)
-            stated = Stated(figures=answers, at=act.at, by=by, confirmed=act if is_confirmed else None)
+            confirmed = act if is_confirmed else None
+            stated = Stated(figures=answers, at=act.at, by=by, confirmed=confirmed, vehicle_id=self.given.id)
             self._book.save(self._book.record.model_copy(update={"vehicle": stated}))
             self._book.tell(Event.VEHICLE_STATED, {"by": by})
 
