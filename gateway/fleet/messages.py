@@ -51,7 +51,7 @@ class Estimate(_Told):
     rejected: list[Text] = Field(max_length=100)
     vin: Text | None = None
     payload_kg: float | None = None
-    payload_std_kg: float | None = None
+    payload_interval95_kg: tuple[float, float] | None = None
     weights: dict[Text, Weight | None] | None = Field(None, max_length=100)
     sequence: Place | None = None
 

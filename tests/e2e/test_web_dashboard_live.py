@@ -187,6 +187,7 @@ POSTERIOR = Posterior(
         Source.EMPTY_SHARE: np.array([[0.0, 0.4]]),
         Source.MODEL: np.array([[5.0, 0.0], [0.0, 0.1]]),
     },
+    leans=(1.0, 1.4),
 )
 
 
@@ -195,11 +196,14 @@ def test_error_sources_are_listed_largest_first(gateway: Gateway, watched: Watch
     of_grams = replace(budget[-1], payload_kg=0.2)
     gateway.publish(replace(make_estimate(0).answered(POSTERIOR), error_budget=(*budget, of_grams)))
     page = dashboard()
-    half = round(1.96 * POSTERIOR.std(0))
+    low_kg, high_kg = make_estimate(0).answered(POSTERIOR).payload.interval95
+    half = round((high_kg - low_kg) / 2.0)
+    assert half > round(1.96 * POSTERIOR.std(0)) + 5  # the interval leans, and so much wider is each of its parts
     expect(page.locator("#budget-why")).to_have_text(f"Why ± {half} kg?")
     expect(page.locator("#budget")).to_have_attribute("open", "")  # there is room for it
     first = page.locator("#budget-lines li").first
-    expect(first).to_have_text(re.compile(r"vehicle's loads\s*±\s43\skg"))
+    goods_kg = round(22.0 * (high_kg - low_kg) / 2.0 / POSTERIOR.std(0))
+    expect(first).to_have_text(re.compile(rf"vehicle's loads\s*±\s{goods_kg}\skg"))
     remedies = page.locator("#budget-remedies li")
     said = remedies.all_inner_texts()
     assert len({*said}) == len(said) == len({line.remedy for line in budget if helps(line, POSTERIOR.std(0))})

@@ -13,7 +13,11 @@ def message(vehicle: str, branch: str, **told: Any) -> Message:
 def estimate(vehicle: str, minute: int, payload_kg: float, *rejected: str, limit_kg: float = 2000.0) -> Message:
     kg = {"kg": 1500.0 + payload_kg, "std_kg": 9.0, "limit_kg": limit_kg}
     gross = {**kg, "is_over_limit": payload_kg > limit_kg - 1500.0}
-    told: dict[str, Any] = {"payload_kg": payload_kg, "payload_std_kg": 9.0, "weights": {"gross": gross}}
+    told: dict[str, Any] = {
+        "payload_kg": payload_kg,
+        "payload_interval95_kg": [payload_kg - 18.0, payload_kg + 18.0],
+        "weights": {"gross": gross},
+    }
     answer = told if not rejected else {"payload_kg": None}
     t_end = f"2027-01-15T07:{minute:02}:00Z"
     return message(vehicle, "estimates", id=f"e-{minute}", t_end=t_end, rejected=list(rejected), **answer)

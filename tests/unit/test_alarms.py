@@ -84,9 +84,10 @@ def test_an_axle_has_its_own_alarm_and_its_own_limit() -> None:
 
 
 def test_a_wheel_has_its_own_alarm() -> None:
-    weights = Weights(rear_left=Weight(620.0, 5.0, 600.0, None), rear_right=Weight(500.0, 5.0, 600.0, None))
+    heavy = Weight(620.0, 5.0, 600.0, None, interval95_kg=(608.0, 634.0))
+    weights = Weights(rear_left=heavy, rear_right=Weight(500.0, 5.0, 600.0, None))
     (raised,) = watching().weigh(replace(of_load(0, 300.0, n_batches=2), weights=weights), None)
-    assert sentence(raised) == "The wheel at the rear left weighs 620 +- 10 kg, limit 600 kg"
+    assert sentence(raised) == "The wheel at the rear left weighs 620 +- 13 kg, limit 600 kg"
 
 
 def test_without_a_limit_overload_alarms_end() -> None:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Final
 
-from gateway.estimates.batch_estimate import PLACES, Z95
+from gateway.estimates.batch_estimate import PLACES
+from gateway.estimates.quantity import UNKNOWN_INTERVAL
 from gateway.estimates.reasons import EXPLANATIONS
 from gateway.records import iso_utc, ns_of
 
@@ -51,6 +52,7 @@ class AlarmFigure:
     std_kg: float = math.nan
     limit_kg: float = math.nan
     probability: float = math.nan
+    interval95_kg: tuple[float, float] = UNKNOWN_INTERVAL
     detail: str | None = None
 
 
@@ -110,6 +112,7 @@ def alarm_to_json(alarm: Alarm) -> dict[str, Any]:
         "probability": _known(figure.probability, 4),
         "found_kg": _known(figure.found_kg, 1),
         "std_kg": _known(figure.std_kg, 1),
+        "interval95_kg": None if math.isnan(figure.interval95_kg[0]) else [round(x, 1) for x in figure.interval95_kg],
         "limit_kg": _known(figure.limit_kg, 1),
         "detail": figure.detail,
     }
@@ -119,11 +122,12 @@ def alarm_from_json(told: Mapping[str, Any]) -> Alarm:
     """The inverse of alarm_to_json. Raises ValueError, KeyError or TypeError for an object that is not an alarm."""
     names = ("found_kg", "std_kg", "limit_kg", "probability")
     numbers = {name: math.nan if told[name] is None else float(told[name]) for name in names}
+    low_kg, high_kg = told["interval95_kg"] or UNKNOWN_INTERVAL
     return Alarm(
         AlarmCause(AlarmKind(told["kind"]), told["where"]),
         told["vehicle_id"],
         ns_of(told["t_start"]),
-        AlarmFigure(**numbers, detail=told["detail"]),
+        AlarmFigure(**numbers, interval95_kg=(float(low_kg), float(high_kg)), detail=told["detail"]),
         None if told["t_end"] is None else ns_of(told["t_end"]),
     )
 
@@ -142,7 +146,8 @@ def sentence(alarm: Alarm) -> str:
     if alarm.cause.kind is AlarmKind.OVERLOAD:
         where = alarm.cause.where
         subject = _PLACES.get(where, f"The wheel at the {where.replace('_', ' ')}")
-        take = "" if math.isnan(figure.std_kg) else f" +- {Z95 * figure.std_kg:.0f}"
+        low_kg, high_kg = figure.interval95_kg
+        take = "" if math.isnan(low_kg) else f" +- {(high_kg - low_kg) / 2.0:.0f}"
         said = f"{subject} weighs {figure.found_kg:.0f}{take} kg, limit {figure.limit_kg:.0f} kg"
     elif alarm.cause == SILENT:
         said = f"No signal: {detail}" if detail else "No signal"

@@ -73,7 +73,7 @@ def overload_says(
             yield Says(cause, False)
             continue
         probability = over_limit_probability(weight.kg, weight.std_kg, weight.limit_kg)
-        figure = AlarmFigure(weight.kg, weight.std_kg, weight.limit_kg, probability)
+        figure = AlarmFigure(weight.kg, weight.std_kg, weight.limit_kg, probability, weight.interval95_kg)
         yield Says(cause, rules.of_probability(probability, n_batches), figure)
 
 

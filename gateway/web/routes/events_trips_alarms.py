@@ -117,6 +117,7 @@ class Alarm(BaseModel):
     probability: float | None = Field(description="that the limit is passed, 0 to 1", examples=[0.971])
     found_kg: float | None = Field(examples=[2561.3])
     std_kg: float | None = Field(examples=[14.2])
+    interval95_kg: tuple[float, float] | None = Field(examples=[[2533.5, 2589.1]])
     limit_kg: float | None = Field(examples=[2500.0])
     detail: str | None = Field(description="which sensors are silent, or why batches are refused")
 

@@ -3,16 +3,16 @@
 import { show } from "./known.js";
 import { element, made } from "./page.js";
 import { phrase } from "./phrases.js";
-import { alarmName, capital, clock, placeName, reasons, span, withStd } from "./words.js";
+import { alarmName, capital, clock, figure, placeName, reasons, span, withInterval } from "./words.js";
 
 /** Alarms of an answer, newest first, each once. */
 export const alarmsOf = ({ active, items }) => [...new Map([...items, ...active].map((alarm) => [alarm.id, alarm])).values()];
 
 const when = (alarm) => (alarm.t_end ? span(alarm.t_start, alarm.t_end) : phrase("alarm_since", { time: clock(alarm.t_start) }));
 
-function plain({ kind, where, found_kg, std_kg, limit_kg, detail }) {
+function plain({ kind, where, found_kg, interval95_kg, limit_kg, detail }) {
   if (kind === "overload") {
-    const measured = { found: withStd(found_kg, std_kg, 0, "kg"), limit: withStd(limit_kg, null, 0, "kg") };
+    const measured = { found: withInterval(found_kg, interval95_kg, 0, "kg"), limit: figure(limit_kg, 0, "kg") };
     return phrase("over_limit", { place: capital(placeName(where)), ...measured });
   }
   const why = where === "refused" && detail ? reasons(detail.split(", ")) : detail;

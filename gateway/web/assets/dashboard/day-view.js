@@ -4,7 +4,7 @@ import { show } from "./known.js";
 import { element, made, write } from "./page.js";
 import { TIME_AXIS, colour, local, plot } from "./plot.js";
 import { phrase } from "./phrases.js";
-import { SURE, figure, number, span, withStd } from "./words.js";
+import { SURE, figure, number, span, withInterval } from "./words.js";
 
 const DAY_MS = 24 * 3600 * 1000;
 const N_SHOWN = 10; // chosen: entries before the fold
@@ -16,13 +16,13 @@ function eventText(event) {
   const place = event.place ? phrase("day_place", { latitude: event.place.latitude_deg, longitude: event.place.longitude_deg }) : "";
   const stops = event.stops.length > 1 ? phrase("day_stops", { n: event.stops.length }) : "";
   const sure = event.probability >= SURE ? "" : phrase("sure", { percent: number(100 * event.probability, 0) });
-  const kg = withStd(Math.abs(event.change_kg), event.change_std_kg, 0, "kg");
+  const kg = withInterval(Math.abs(event.change_kg), event.change_interval95_kg, 0, "kg");
   return phrase(event.change_kg >= 0 ? "day_loaded" : "day_unloaded", { kg, place, stops, sure });
 }
 
 function tripText(trip) {
   const over = trip.overloaded_share ? phrase("trip_over", { percent: number(100 * trip.overloaded_share, 0) }) : "";
-  const said = { km: figure(trip.distance_m / 1000, 1, "km"), kg: withStd(trip.payload_kg, trip.payload_std_kg, 0, "kg"), over, going: trip.is_over ? "" : phrase("trip_going") };
+  const said = { km: figure(trip.distance_m / 1000, 1, "km"), kg: withInterval(trip.payload_kg, trip.payload_interval95_kg, 0, "kg"), over, going: trip.is_over ? "" : phrase("trip_going") };
   return phrase(trip.payload_kg == null ? "trip_unknown" : "trip_known", said);
 }
 

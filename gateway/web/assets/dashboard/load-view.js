@@ -3,7 +3,7 @@
 import { ageNow, known, show } from "./known.js";
 import { element, made, say, write } from "./page.js";
 import { phrase, taughtHere } from "./phrases.js";
-import { UNKNOWN, USEFUL_HELP, Z95, ago, between, capital, clock, figure, kmh, reasons as named, withStd } from "./words.js";
+import { UNKNOWN, USEFUL_HELP, ago, between, capital, clock, figure, halfOf, kmh, reasons as named, withInterval } from "./words.js";
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interval", { between: between(bounds, digits, unit) }));
 
@@ -62,7 +62,7 @@ function writeNumber(id, value, digits, unit) {
 function loadSoFar(latest) {
   const n = latest.epoch_n_batches;
   if (!(n > 1)) return n === 1 ? phrase("one_batch") : UNKNOWN;
-  return phrase("load_so_far_of", { n, weight: withStd(latest.epoch_payload_kg, latest.epoch_payload_std_kg, 0, "kg") });
+  return phrase("load_so_far_of", { n, weight: withInterval(latest.epoch_payload_kg, latest.epoch_payload_interval95_kg, 0, "kg") });
 }
 
 function showAge() {
@@ -79,14 +79,16 @@ function announce(latest) {
   announcedId = latest.id;
 }
 
-/** Each source with its part of the error, and each remedy once; the widths are half those of 95 % intervals. */
+/** Each source with its part of the error, and each remedy once; the widths are half those of 95 % intervals, each as much
+ * wider than a normal error as that of the payload. */
 show(({ latest, sources, remedies: advised }) => {
   const lines = latest?.error_budget ?? [];
   element("budget").hidden = lines.length === 0;
   if (lines.length === 0) return;
-  const half = (std) => figure(Z95 * std, 0, "kg");
+  const perStd = halfOf(latest.payload_interval95_kg) / latest.payload_std_kg;
+  const half = (std) => figure(perStd * std, 0, "kg");
   write("budget-why", phrase("why", { kg: half(latest.payload_std_kg) }));
-  const shown = lines.filter((line) => Z95 * line.payload_kg >= 0.5); // less would read as 0 kg
+  const shown = lines.filter((line) => perStd * line.payload_kg >= 0.5); // less would read as 0 kg
   element("budget-lines").replaceChildren(...shown.map((line) => {
     const built = made("li", [made("span", capital(sources.get(line.source) ?? line.source.replaceAll("_", " "))), made("span", `±\u00a0${half(line.payload_kg)}`)]);
     built.style.setProperty("--part", `${(100 * line.payload_kg) / latest.payload_std_kg}%`);

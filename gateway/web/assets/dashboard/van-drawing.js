@@ -3,7 +3,7 @@
 
 import { shape } from "./parts.js";
 import { phrase } from "./phrases.js";
-import { Z95, capital, figure, number, withStd } from "./words.js";
+import { Z95, capital, figure, number, withInterval } from "./words.js";
 
 const FRONT_X = 96, REAR_X = 290, MIDDLE_Y = 96, HALF_TRACK = 58; // chosen: units of the drawing
 const LARGEST_RADIUS = 30, LARGEST_REACH = 200; // chosen likewise
@@ -31,7 +31,7 @@ function wheelLabel([place, x, side], weights) {
   const where = { x: x + inwards * 23, y: MIDDLE_Y + side * HALF_TRACK + (side > 0 ? 5 : 3) };
   const anchor = `${inwards > 0 ? "from" : "to"} ${overOf(weight)}`;
   const limit = weight.limit_kg == null ? [] : [shape("text", { class: `small ${anchor}`, ...where, y: where.y - side * 14 }, limitText(weight))];
-  return [shape("text", { class: `on-wheel ${anchor}`, ...where }, withStd(weight.kg, weight.std_kg, 0, "kg")), ...limit];
+  return [shape("text", { class: `on-wheel ${anchor}`, ...where }, withInterval(weight.kg, weight.interval95_kg, 0, "kg")), ...limit];
 }
 
 function body(weights) {
@@ -48,7 +48,7 @@ const limitText = (weight) => phrase("of_limit", { kg: figure(weight.limit_kg, 0
 function axleLabel(x, place, weight) {
   return [
     shape("text", { class: "small", x, y: 22 }, phrase(`place.${place}`)),
-    shape("text", { class: overOf(weight), x, y: 182 }, withStd(weight?.kg, weight?.std_kg, 0, "kg")),
+    shape("text", { class: overOf(weight), x, y: 182 }, withInterval(weight?.kg, weight?.interval95_kg, 0, "kg")),
     ...(weight?.limit_kg == null ? [] : [shape("text", { class: `small ${overOf(weight)}`, x, y: 198 }, limitText(weight))]),
   ];
 }
@@ -112,7 +112,7 @@ function inWords(weights) {
   const across = aside(place, (metres) => `${number(metres, 2)} m`);
   const where = place && `${phrase("behind_front", { metres: `${number(place.position_m, 2)} m` })}${across && `, ${across}`}`;
   const borne = [...AXLES, ...WHEELS.map(([name]) => name)].filter((name) => weights?.[name]?.kg != null)
-    .map((name) => `${phrase(`place.${name}`)} ${withStd(weights[name].kg, weights[name].std_kg, 0, "kg")}${weights[name].limit_kg == null ? "" : phrase("limit", { kg: figure(weights[name].limit_kg, 0, "kg") })}`);
+    .map((name) => `${phrase(`place.${name}`)} ${withInterval(weights[name].kg, weights[name].interval95_kg, 0, "kg")}${weights[name].limit_kg == null ? "" : phrase("limit", { kg: figure(weights[name].limit_kg, 0, "kg") })}`);
   return `${phrase(place ? "van_load" : "van_empty", { where })}${borne.length ? phrase("van_bears", { places: capital(borne.join(", ")) }) : ""}`;
 }
 

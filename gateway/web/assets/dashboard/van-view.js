@@ -4,7 +4,7 @@ import { show } from "./known.js";
 import { element, pair, say } from "./page.js";
 import { aside, drawVan } from "./van-drawing.js";
 import { phrase } from "./phrases.js";
-import { UNKNOWN, capital, figure, withStd } from "./words.js";
+import { UNKNOWN, capital, figure, withInterval, withStd } from "./words.js";
 
 const WHEELS = ["front_left", "front_right", "rear_left", "rear_right"];
 const LIMITED = ["gross", "front_axle", "rear_axle", ...WHEELS];
@@ -16,7 +16,7 @@ const loadOf = (weights, latest) => (weights?.id === latest?.id ? weights?.load 
 
 function weightInWords(weight) {
   const limit = weight.limit_kg == null ? "" : phrase("limit", { kg: figure(weight.limit_kg, 0, "kg") });
-  return `${withStd(weight.kg, weight.std_kg, 0, "kg")}${limit}`;
+  return `${withInterval(weight.kg, weight.interval95_kg, 0, "kg")}${limit}`;
 }
 
 /** Why no wheel is weighed; the drawing shows the wheel loads. */

@@ -21,8 +21,15 @@ export const figure = (x, digits, unit) => (x == null ? UNKNOWN : `${number(x, d
 export const between = (bounds, digits, unit) =>
   bounds == null ? "" : `${common("between", { low: number(bounds[0], digits), high: number(bounds[1], digits) })}${GLUE}${unit}`;
 
-export const withStd = (x, std, digits, unit) =>
-  x == null ? UNKNOWN : `${number(x, digits)}${std == null ? "" : ` ± ${number(Z95 * std, digits)}`}${GLUE}${unit}`;
+export const halfOf = (bounds) => (bounds == null ? null : (bounds[1] - bounds[0]) / 2);
+
+const plusMinus = (x, half, digits, unit) =>
+  x == null ? UNKNOWN : `${number(x, digits)}${half == null ? "" : ` ± ${number(half, digits)}`}${GLUE}${unit}`;
+
+/** ± is half a 95 % interval, which may lean: it is wider than that of a normal error. */
+export const withInterval = (x, bounds, digits, unit) => plusMinus(x, halfOf(bounds), digits, unit);
+
+export const withStd = (x, std, digits, unit) => plusMinus(x, std == null ? null : Z95 * std, digits, unit);
 
 export const kmh = (mps) => figure(mps == null ? null : mps * 3.6, 0, "km/h");
 

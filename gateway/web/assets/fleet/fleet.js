@@ -1,7 +1,7 @@
 // The fleet: fetches every few seconds, shows a line per vehicle, alarms first; the search keeps matching lines.
 
 import { element, made, write } from "../dashboard/page.js";
-import { UNKNOWN, ago, alarmName, capital, clock, figure, placeName, withStd } from "../dashboard/words.js";
+import { UNKNOWN, ago, alarmName, capital, clock, figure, placeName, withInterval } from "../dashboard/words.js";
 import { fill, speaker } from "../language.js";
 import { COMMON } from "../words/common.js";
 import { FLEET } from "../words/fleet.js";
@@ -22,7 +22,7 @@ function loadCell(one) {
   const bar = made("div", [made("span")], "bar");
   bar.setAttribute("aria-hidden", "true"); // the number says it
   bar.style.setProperty("--used", `${Math.min(100, 100 * (one.used_share ?? 0))}%`);
-  const weight = made("span", withStd(one.estimate?.payload_kg ?? null, one.estimate?.payload_std_kg ?? null, 0, "kg"), "weight");
+  const weight = made("span", withInterval(one.estimate?.payload_kg, one.estimate?.payload_interval95_kg, 0, "kg"), "weight");
   return made("td", one.used_share === null ? [weight] : [weight, bar], "load");
 }
 
