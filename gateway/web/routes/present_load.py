@@ -12,7 +12,6 @@ from gateway.core.weights.limits import Light
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, PayloadPlace, place_of, weighed
 from gateway.core.weights.verdict import Says, Verdict, verdict_of
 from gateway.estimates.batch_estimate import Estimate, Weights
-from gateway.estimates.quantity import Z95
 from gateway.estimates.reasons import EXPLANATIONS, Cause
 from gateway.records import Why, rounded
 from gateway.status import Status
@@ -106,9 +105,10 @@ class Scales:
 
     def _is_vague(self, load: Estimate | None) -> bool:
         """Whether the payload's 95 % interval is wider than one that is of use."""
-        return (
-            load is not None and self.vehicle is not None and Z95 * load.payload.std > self.vehicle.useful_half_width_kg
-        )
+        if load is None or self.vehicle is None:
+            return False
+        low_kg, high_kg = load.payload.interval95
+        return (high_kg - low_kg) / 2.0 > self.vehicle.useful_half_width_kg
 
 
 def _rejected(heard: Estimate | None, shown: Estimate | None, now: Status) -> tuple[Why, ...]:
