@@ -3,7 +3,8 @@
 import { show } from "./known.js";
 import { element, made } from "./page.js";
 import { phrase } from "./phrases.js";
-import { alarmName, capital, clock, figure, placeName, reasons, span, withInterval } from "./words.js";
+import { withInterval } from "./plus-minus.js";
+import { alarmName, capital, clock, figure, placeName, reasons, span } from "./words.js";
 
 /** Alarms of an answer, newest first, each once. */
 export const alarmsOf = ({ active, items }) => [...new Map([...items, ...active].map((alarm) => [alarm.id, alarm])).values()];

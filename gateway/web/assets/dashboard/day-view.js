@@ -4,7 +4,8 @@ import { show } from "./known.js";
 import { element, made, write } from "./page.js";
 import { TIME_AXIS, colour, local, plot } from "./plot.js";
 import { phrase } from "./phrases.js";
-import { SURE, figure, number, span, withInterval } from "./words.js";
+import { withInterval } from "./plus-minus.js";
+import { SURE, figure, number, span } from "./words.js";
 
 const DAY_MS = 24 * 3600 * 1000;
 const N_SHOWN = 10; // chosen: entries before the fold

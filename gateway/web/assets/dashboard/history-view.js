@@ -5,7 +5,8 @@ import { element, made, write } from "./page.js";
 import { row } from "./parts.js";
 import { TIME_AXIS, colour, local, plot } from "./plot.js";
 import { phrase } from "./phrases.js";
-import { between, clock, figure, kmh, reasons, withStd } from "./words.js";
+import { withStd } from "./plus-minus.js";
+import { between, clock, figure, kmh, reasons } from "./words.js";
 
 const HOUR_MS = 3600e3;
 const QUANTITIES = {

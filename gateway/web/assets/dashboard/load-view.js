@@ -3,7 +3,8 @@
 import { ageNow, known, show } from "./known.js";
 import { element, made, say, write } from "./page.js";
 import { phrase, taughtHere } from "./phrases.js";
-import { UNKNOWN, USEFUL_HELP, ago, between, capital, clock, figure, halfOf, kmh, reasons as named, withInterval } from "./words.js";
+import { halfOf, withInterval } from "./plus-minus.js";
+import { UNKNOWN, USEFUL_HELP, ago, between, capital, clock, figure, kmh, reasons as named } from "./words.js";
 
 const interval = (bounds, digits, unit) => (bounds == null ? "" : phrase("interval", { between: between(bounds, digits, unit) }));
 

@@ -3,7 +3,8 @@
 
 import { shape } from "./parts.js";
 import { phrase } from "./phrases.js";
-import { Z95, capital, figure, number, withInterval } from "./words.js";
+import { Z95, withInterval } from "./plus-minus.js";
+import { capital, figure, number } from "./words.js";
 
 const FRONT_X = 96, REAR_X = 290, MIDDLE_Y = 96, HALF_TRACK = 58; // chosen: units of the drawing
 const LARGEST_RADIUS = 30, LARGEST_REACH = 200; // chosen likewise

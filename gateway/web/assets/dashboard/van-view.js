@@ -4,7 +4,8 @@ import { show } from "./known.js";
 import { element, pair, say } from "./page.js";
 import { aside, drawVan } from "./van-drawing.js";
 import { phrase } from "./phrases.js";
-import { UNKNOWN, capital, figure, withInterval, withStd } from "./words.js";
+import { withInterval, withStd } from "./plus-minus.js";
+import { UNKNOWN, capital, figure } from "./words.js";
 
 const WHEELS = ["front_left", "front_right", "rear_left", "rear_right"];
 const LIMITED = ["gross", "front_axle", "rear_axle", ...WHEELS];

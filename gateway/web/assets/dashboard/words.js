@@ -6,10 +6,9 @@ import { COMMON } from "../words/common.js";
 const common = speaker(COMMON);
 
 export const UNKNOWN = common("unknown");
-export const Z95 = 1.96; // standard deviations to either side of the middle 95 %
 export const USEFUL_HELP = 0.1; // chosen: what narrows ± by less is not worth saying
 export const SURE = 0.99; // chosen: a change of load that is less probable says how probable
-const GLUE = "\u00a0"; // a number and its unit stay on one line
+export const GLUE = "\u00a0"; // a number and its unit stay on one line
 
 export function number(x, digits) {
   const shown = Number(x.toFixed(digits)) || 0; // never a negative nought
@@ -20,16 +19,6 @@ export const figure = (x, digits, unit) => (x == null ? UNKNOWN : `${number(x, d
 
 export const between = (bounds, digits, unit) =>
   bounds == null ? "" : `${common("between", { low: number(bounds[0], digits), high: number(bounds[1], digits) })}${GLUE}${unit}`;
-
-export const halfOf = (bounds) => (bounds == null ? null : (bounds[1] - bounds[0]) / 2);
-
-const plusMinus = (x, half, digits, unit) =>
-  x == null ? UNKNOWN : `${number(x, digits)}${half == null ? "" : ` ± ${number(half, digits)}`}${GLUE}${unit}`;
-
-/** ± is half a 95 % interval, which may lean: it is wider than that of a normal error. */
-export const withInterval = (x, bounds, digits, unit) => plusMinus(x, halfOf(bounds), digits, unit);
-
-export const withStd = (x, std, digits, unit) => plusMinus(x, std == null ? null : Z95 * std, digits, unit);
 
 export const kmh = (mps) => figure(mps == null ? null : mps * 3.6, 0, "km/h");
 

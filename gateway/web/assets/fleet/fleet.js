@@ -1,7 +1,8 @@
 // The fleet: fetches every few seconds, shows a line per vehicle, alarms first; the search keeps matching lines.
 
 import { element, made, write } from "../dashboard/page.js";
-import { UNKNOWN, ago, alarmName, capital, clock, figure, placeName, withInterval } from "../dashboard/words.js";
+import { withInterval } from "../dashboard/plus-minus.js";
+import { UNKNOWN, ago, alarmName, capital, clock, figure, placeName } from "../dashboard/words.js";
 import { fill, speaker } from "../language.js";
 import { COMMON } from "../words/common.js";
 import { FLEET } from "../words/fleet.js";
